@@ -1,0 +1,17 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+include_guard(GLOBAL)
+
+# voxelpipe_own_target(target...): the warnings that our own code is held to. Never put on an INTERFACE target, so that
+# no user inherits them.
+function(voxelpipe_own_target)
+  foreach(target IN LISTS ARGN)
+    target_compile_options(
+      ${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-Wall;-Wextra;-Wpedantic;-Wconversion>
+                        $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra>)
+    if(VOXELPIPE_WERROR)
+      target_compile_options(${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-Werror>
+                                               $<$<COMPILE_LANGUAGE:CUDA>:-Werror=all-warnings>)
+    endif()
+  endforeach()
+endfunction()
