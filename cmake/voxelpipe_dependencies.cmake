@@ -3,7 +3,8 @@
 #
 # voxelpipe_dependency(NAME...): makes a third-party library available, installed packages first, otherwise fetched at a
 # pinned version. Names and the targets that they give:
-#   glm        glm::glm                      the only one that users of the library need
+#   glm        glm::glm                      with threads the only one that users of the library need
+#   threads    Threads::Threads
 #   tinygltf   voxelpipe_deps::tinygltf      headers (tiny_gltf.h, nlohmann/json.hpp, stb_image.h); define
 #                                            TINYGLTF_IMPLEMENTATION in one source file
 #   json       nlohmann_json::nlohmann_json
@@ -81,11 +82,16 @@ endfunction()
 
 macro(voxelpipe_dependency)
   foreach(voxelpipe_name IN ITEMS ${ARGN})
+    # Imported targets are seen everywhere: by sibling folders, and by a parent project that links ours.
+    set(CMAKE_FIND_PACKAGE_TARGETS_GLOBAL ON)
     if(voxelpipe_name STREQUAL "glm")
       if(NOT TARGET glm::glm)
         FetchContent_MakeAvailable(glm)
         include(voxelpipe_glm)
       endif()
+    elseif(voxelpipe_name STREQUAL "threads")
+      set(THREADS_PREFER_PTHREAD_FLAG ON)
+      find_package(Threads REQUIRED)
     elseif(voxelpipe_name STREQUAL "json")
       if(NOT TARGET nlohmann_json::nlohmann_json)
         FetchContent_MakeAvailable(nlohmann_json)
@@ -116,4 +122,5 @@ macro(voxelpipe_dependency)
       message(FATAL_ERROR "voxelpipe_dependency: unknown name ${voxelpipe_name}")
     endif()
   endforeach()
+  unset(CMAKE_FIND_PACKAGE_TARGETS_GLOBAL)
 endmacro()

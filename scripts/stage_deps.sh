@@ -1,0 +1,70 @@
+#!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# stage_deps.sh [PREFIX]: copies what the build needs of third-party libraries from this machine's packages into PREFIX
+# (default .deps/ in the project, which the other scripts look at by themselves), for a machine without packages and
+# network. Headers and the GoogleTest sources only, no binaries, so the other machine may have another distribution:
+#   cmake --preset cpu -DCMAKE_PREFIX_PATH=PREFIX
+# Google Benchmark is not staged: configure with VOXELPIPE_BUILD_BENCH=OFF, as the presets but `bench` do.
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+
+prefix="$(realpath -m "${1:-.deps}")"
+gtest_source=/usr/src/googletest/googletest
+
+need_packages libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev libgtest-dev
+[[ -e $gtest_source/src/gtest-all.cc ]] || need_packages googletest
+
+# system_header NAME: the folder that holds it, not counting what was staged before.
+system_include() {
+    local folder
+    for folder in /usr/local/include /usr/include; do
+        [[ -e $folder/$1 ]] && { printf '%s' "$folder"; return 0; }
+    done
+    die "no $1 under /usr/local/include or /usr/include"
+}
+
+say "staging into $prefix"
+rm -rf "$prefix"/{include,share/cmake,src/googletest}
+mkdir -p "$prefix"/{include/stb,share/cmake,src}
+cp -rL "$(system_include glm/glm.hpp)/glm" "$(system_include CLI/CLI.hpp)/CLI" \
+    "$(system_include nlohmann/json.hpp)/nlohmann" "$(system_include gtest/gtest.h)/gtest" "$prefix/include/"
+cp -L "$(system_include tiny_gltf.h)/tiny_gltf.h" "$prefix/include/"
+cp -L "$(system_include stb/stb_image.h)"/stb/stb_image*.h "$prefix/include/stb/"
+mkdir -p "$prefix/src/googletest"
+cp -rL "$gtest_source/src" "$prefix/src/googletest/"
+
+# config PACKAGE TARGET: a config file that gives an INTERFACE target with the staged headers.
+config() {
+    mkdir -p "$prefix/share/cmake/$1"
+    cat >"$prefix/share/cmake/$1/$1Config.cmake" <<CMAKE
+# Written by scripts/stage_deps.sh
+if(NOT TARGET $2)
+  get_filename_component(staged_prefix "\${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
+  add_library($2 INTERFACE IMPORTED)
+  set_target_properties($2 PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "\${staged_prefix}/include")
+endif()
+CMAKE
+}
+config glm glm::glm
+config CLI11 CLI11::CLI11
+config nlohmann_json nlohmann_json::nlohmann_json
+
+mkdir -p "$prefix/share/cmake/GTest"
+cat >"$prefix/share/cmake/GTest/GTestConfig.cmake" <<'CMAKE'
+# Written by scripts/stage_deps.sh: GoogleTest is compiled by the project that uses it.
+if(NOT TARGET GTest::gtest)
+  get_filename_component(staged_prefix "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
+  find_package(Threads REQUIRED)
+  add_library(staged_gtest STATIC EXCLUDE_FROM_ALL "${staged_prefix}/src/googletest/src/gtest-all.cc")
+  target_include_directories(staged_gtest SYSTEM PUBLIC "${staged_prefix}/include" PRIVATE "${staged_prefix}/src/googletest")
+  target_compile_features(staged_gtest PUBLIC cxx_std_14)
+  target_link_libraries(staged_gtest PUBLIC Threads::Threads)
+  add_library(staged_gtest_main STATIC EXCLUDE_FROM_ALL "${staged_prefix}/src/googletest/src/gtest_main.cc")
+  target_link_libraries(staged_gtest_main PUBLIC staged_gtest)
+  add_library(GTest::gtest ALIAS staged_gtest)
+  add_library(GTest::gtest_main ALIAS staged_gtest_main)
+endif()
+CMAKE
+
+du -sh "$prefix"
