@@ -1,0 +1,210 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Fine raster into an A-buffer: each tile's fragments are bucketed by voxel on the spot (they come in primitive order,
+// so a stable bucketing leaves each voxel's list sorted), and rows of voxels are then put in the order of the whole
+// grid. Memory is in proportion to the fragments: nothing is dense but one tile's counters per thread.
+
+#include <cpu_ref/pipeline.hpp>
+
+#include <array>
+
+namespace voxelpipe::cpu {
+
+// One thread's finished fragments, in the order of its tiles, and within a tile by voxel.
+template <class Payload>
+struct bucket_store {
+    std::vector<std::uint32_t> counts; // fragments of each occupied voxel
+    std::vector<std::uint8_t> columns; // its x within the tile
+    std::vector<std::uint32_t> primitives;
+    std::vector<Payload> payloads; // stays empty where there is none
+};
+
+// Up to 32 voxels of one tile that lie in one row: what is moved as a piece.
+struct row_segment {
+    std::uint64_t key; // its place in the grid: (z * ny + y) * tiles along x + tile x
+    std::uint32_t worker;
+    std::uint32_t num_voxels;
+    std::uint64_t voxel, fragment; // first of each in the worker's store
+    std::uint64_t num_fragments;
+};
+
+template <class Payload>
+struct abuffer_scratch {
+    struct emitted {
+        std::uint32_t primitive;
+        std::uint16_t voxel; // within the tile
+        [[no_unique_address]] Payload payload;
+    };
+    std::vector<emitted> fragments; // of one tile, as they come
+    std::array<std::uint32_t, tile_voxels> count{};
+    std::array<std::uint32_t, tile_rows> touched{};
+    bucket_store<Payload> store;
+    std::vector<row_segment> segments;
+    counters counts{};
+};
+
+template <coverage Rule, class Payload, class Key, class Scene>
+void bucket_tile(const Scene& s, const core::tile_grid& tiles, const tile_range& range,
+                 const std::vector<tile_pair<Key>>& pairs, std::uint32_t worker, abuffer_scratch<Payload>& scratch) {
+    static_assert(tile_voxels <= 65536);
+    constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
+    const core::voxel_box box = tile_box(tiles, range.tile, s.where.extent);
+    const auto x0 = static_cast<int>(box.lo[0]), y0 = static_cast<int>(box.lo[1]), z0 = static_cast<int>(box.lo[2]);
+    scratch.fragments.clear();
+    for (std::size_t i = range.first; i < range.last; ++i) {
+        const std::uint32_t id = pairs[i].primitive;
+        shade_fragments<Rule>(s, id, box, [&](int x, int y, int z, const auto& out) {
+            if (!out.keep) {
+                ++scratch.counts.fragments_discarded;
+                return;
+            }
+            const int row = (z - z0) * tile_size + (y - y0), column = x - x0;
+            const auto voxel = static_cast<std::size_t>(row * tile_size + column);
+            ++scratch.count[voxel];
+            scratch.touched[static_cast<std::size_t>(row)] |= 1u << column;
+            if constexpr (has_payload)
+                scratch.fragments.push_back({id, static_cast<std::uint16_t>(voxel), get<0>(out.values)});
+            else
+                scratch.fragments.push_back({id, static_cast<std::uint16_t>(voxel), {}});
+        });
+    }
+    scratch.counts.fragments += scratch.fragments.size();
+
+    // Counts become places in the store; the fragments go there in order.
+    bucket_store<Payload>& store = scratch.store;
+    const std::size_t base = store.primitives.size();
+    std::size_t next = base;
+    for (std::size_t row = 0; row < tile_rows; ++row) {
+        std::uint32_t word = scratch.touched[row];
+        if (word == 0) continue;
+        const int y = y0 + static_cast<int>(row) % tile_size, z = z0 + static_cast<int>(row) / tile_size;
+        row_segment segment{};
+        segment.key = (static_cast<std::uint64_t>(z) * static_cast<std::uint64_t>(s.where.extent.y) +
+                       static_cast<std::uint64_t>(y)) *
+                          static_cast<std::uint64_t>(tiles.tiles.x) +
+                      static_cast<std::uint64_t>(x0 >> tiles.log2_size);
+        segment.worker = worker;
+        segment.voxel = store.counts.size();
+        segment.fragment = next;
+        for (; word != 0; word &= word - 1) {
+            const int column = std::countr_zero(word);
+            std::uint32_t& n = scratch.count[row * tile_size + static_cast<std::size_t>(column)];
+            store.counts.push_back(n);
+            store.columns.push_back(static_cast<std::uint8_t>(column));
+            const std::size_t here = next - base;
+            next += n;
+            n = static_cast<std::uint32_t>(here);
+            ++segment.num_voxels;
+        }
+        segment.num_fragments = next - segment.fragment;
+        scratch.segments.push_back(segment);
+    }
+    store.primitives.resize(next);
+    if constexpr (has_payload) store.payloads.resize(next);
+    for (const auto& e : scratch.fragments) {
+        const std::size_t at = base + scratch.count[e.voxel]++;
+        store.primitives[at] = e.primitive;
+        if constexpr (has_payload) store.payloads[at] = e.payload;
+    }
+    for (std::size_t row = 0; row < tile_rows; ++row) {
+        for (std::uint32_t word = scratch.touched[row]; word != 0; word &= word - 1)
+            scratch.count[row * tile_size + static_cast<std::size_t>(std::countr_zero(word))] = 0;
+        scratch.touched[row] = 0;
+    }
+}
+
+template <coverage Rule, class Key, class Scene, class Backend, class Payload>
+[[nodiscard]] status draw_abuffer(const execution& how, Backend& backend, const Scene& s,
+                                  abuffer<Backend, Payload>& lists) {
+    using payload = payload_storage<Payload>;
+    const core::tile_grid tiles(s.where.extent, log2_tile_size);
+    auto coarse = coarse_raster<Rule, Key>(how, s, tiles);
+    status result;
+    result.counts = coarse.counts;
+    if (coarse.code != status_code::ok) {
+        status failed = core::failure(coarse.code, stage::coarse_raster);
+        failed.counts.triangles_in = s.first_primitive.back();
+        return failed;
+    }
+    const std::vector<tile_range> ranges = tile_sort(how, coarse.pairs, tiles.count());
+
+    const unsigned workers =
+        static_cast<unsigned>(std::max<std::size_t>(1, std::min<std::size_t>(how.threads, ranges.size())));
+    std::vector<std::unique_ptr<abuffer_scratch<payload>>> scratch;
+    for (unsigned w = 0; w < workers; ++w) scratch.push_back(std::make_unique<abuffer_scratch<payload>>());
+    {
+        const stopwatch watch(how.times, &stage_times::fine_raster);
+        progress_meter meter(how, ranges.size());
+        parallel_for(how.threads, ranges.size(), [&](unsigned worker, std::size_t r) {
+            bucket_tile<Rule>(s, tiles, ranges[r], coarse.pairs, worker, *scratch[worker]);
+            meter.advance();
+        });
+    }
+    coarse.pairs = {};
+
+    const stopwatch watch(how.times, &stage_times::abuffer_emit);
+    std::vector<row_segment> segments;
+    for (const auto& w : scratch) {
+        segments.insert(segments.end(), w->segments.begin(), w->segments.end());
+        w->segments = {};
+        result.counts.fragments += w->counts.fragments;
+        result.counts.fragments_discarded += w->counts.fragments_discarded;
+    }
+    {
+        std::vector<row_segment> other;
+        const std::uint64_t keys = static_cast<std::uint64_t>(s.where.extent.z) *
+                                   static_cast<std::uint64_t>(s.where.extent.y) *
+                                   static_cast<std::uint64_t>(tiles.tiles.x);
+        radix_sort(how.threads, segments, other, static_cast<int>(std::bit_width(keys - 1)));
+    }
+    // Each segment's place in the result; the counts of the whole follow.
+    struct place {
+        std::uint64_t voxel, fragment;
+    };
+    std::vector<place> places(segments.size());
+    place total{0, 0};
+    for (std::size_t i = 0; i < segments.size(); ++i) {
+        places[i] = total;
+        total.voxel += segments[i].num_voxels;
+        total.fragment += segments[i].num_fragments;
+    }
+    using lists_type = abuffer<Backend, Payload>;
+    typename Backend::template buffer<std::uint64_t> voxels(backend, total.voxel);
+    typename Backend::template buffer<std::uint64_t> offsets(backend, total.voxel == 0 ? 0 : total.voxel + 1);
+    typename Backend::template buffer<std::uint32_t> primitives(backend, total.fragment);
+    typename Backend::template buffer<payload> payloads(backend, lists_type::has_payload ? total.fragment : 0);
+
+    const auto nx = static_cast<std::uint64_t>(s.where.extent.x), tiles_x = static_cast<std::uint64_t>(tiles.tiles.x);
+    constexpr std::size_t block = 1024;
+    parallel_for(how.threads, (segments.size() + block - 1) / block, [&](unsigned, std::size_t b) {
+        const std::size_t last = std::min(segments.size(), (b + 1) * block);
+        for (std::size_t i = b * block; i < last; ++i) {
+            const row_segment& g = segments[i];
+            const bucket_store<payload>& from = scratch[g.worker]->store;
+            const std::uint64_t row_start = g.key / tiles_x * nx + g.key % tiles_x * tile_size;
+            std::uint64_t at = places[i].fragment;
+            for (std::uint32_t v = 0; v < g.num_voxels; ++v) {
+                voxels.data()[places[i].voxel + v] = row_start + from.columns[g.voxel + v];
+                offsets.data()[places[i].voxel + v] = at;
+                at += from.counts[g.voxel + v];
+            }
+            const auto first = static_cast<std::ptrdiff_t>(g.fragment),
+                       n = static_cast<std::ptrdiff_t>(g.num_fragments);
+            std::copy_n(from.primitives.begin() + first, n, primitives.data() + places[i].fragment);
+            if constexpr (lists_type::has_payload)
+                std::copy_n(from.payloads.begin() + first, n, payloads.data() + places[i].fragment);
+        }
+    });
+    if (total.voxel != 0) offsets.data()[total.voxel] = total.fragment;
+    result.counts.voxels = total.voxel;
+    lists.voxels = std::move(voxels);
+    lists.offsets = std::move(offsets);
+    lists.primitives = std::move(primitives);
+    lists.payloads = std::move(payloads);
+    lists.extent = s.where.extent;
+    return result;
+}
+
+} // namespace voxelpipe::cpu

@@ -1,0 +1,106 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// cpu_backend: the pipeline on CPU threads, in plain C++20. It gives the bits that every other backend has to give, for
+// any number of threads, and is quick enough to be used in earnest.
+
+#include <cpu_ref/abuffer_pass.hpp>
+#include <cpu_ref/framebuffer_pass.hpp>
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <new>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe {
+
+class cpu_backend {
+public:
+    // Host memory, uninitialised, 64-byte aligned. Throws std::bad_alloc.
+    template <class T>
+    class buffer {
+    public:
+        buffer(cpu_backend&, std::size_t count) : data_(allocate(count)), count_(count) {}
+        buffer(cpu_backend&, array_view<const T> source) : data_(allocate(source.size())), count_(source.size()) {
+            std::copy(source.begin(), source.end(), data_.get());
+        }
+
+        [[nodiscard]] T* data() { return data_.get(); }
+        [[nodiscard]] const T* data() const { return data_.get(); }
+        [[nodiscard]] std::size_t size() const { return count_; }
+        [[nodiscard]] array_view<const T> view() const { return {data_.get(), count_}; }
+        [[nodiscard]] std::vector<T> to_host(cpu_backend&) const { return {data_.get(), data_.get() + count_}; }
+
+    private:
+        struct release {
+            void operator()(T* p) const { std::free(p); }
+        };
+        static T* allocate(std::size_t count) {
+            static_assert(std::is_trivially_copyable_v<T>);
+            if (count == 0) return nullptr;
+            constexpr std::size_t alignment = 64;
+            if (count > (std::numeric_limits<std::size_t>::max() - alignment) / sizeof(T)) throw std::bad_alloc();
+            const std::size_t bytes = (count * sizeof(T) + alignment - 1) / alignment * alignment;
+            void* const p = std::aligned_alloc(alignment, bytes);
+            if (p == nullptr) throw std::bad_alloc();
+            return static_cast<T*>(p);
+        }
+        std::unique_ptr<T[], release> data_;
+        std::size_t count_;
+    };
+
+    cpu_backend() = default;
+    explicit cpu_backend(unsigned num_threads) : threads(num_threads) {}
+
+    unsigned threads = 0;              // 0: as many as the machine runs at once
+    cpu::stage_times* times = nullptr; // where to add up the time of each stage, if anywhere
+    std::function<void(std::uint64_t done, std::uint64_t total)> progress; // called from any thread, one call at a time
+
+    // What voxelize calls; arguments are validated. Exceptions of a user's shader or progress function pass through.
+    template <class Draws, class Output>
+    [[nodiscard]] status run(const Draws& draws, const grid& g, Output& out, const voxelize_options& options,
+                             std::uint64_t triangles_in) {
+        const cpu::execution how{threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency()), times,
+                                 &progress};
+        try {
+            const auto s = cpu::make_scene(how, draws, g);
+            // Tile numbers of 32 bits keep the pairs small wherever the grid allows.
+            const bool small = core::tile_grid(g.extent, cpu::log2_tile_size).count() <= std::uint64_t{1} << 32;
+            if (options.rule == coverage::thin)
+                return small ? pass<coverage::thin, std::uint32_t>(how, s, out, options)
+                             : pass<coverage::thin, std::uint64_t>(how, s, out, options);
+            return small ? pass<coverage::conservative, std::uint32_t>(how, s, out, options)
+                         : pass<coverage::conservative, std::uint64_t>(how, s, out, options);
+        } catch (const std::bad_alloc&) {
+            status failed = core::failure(status_code::out_of_memory);
+            failed.counts.triangles_in = triangles_in;
+            return failed;
+        } catch (const std::length_error&) { // a vector longer than can be: the same thing
+            status failed = core::failure(status_code::out_of_memory);
+            failed.counts.triangles_in = triangles_in;
+            return failed;
+        }
+    }
+
+private:
+    template <coverage Rule, class Key, class Scene, class... Targets>
+    status pass(const cpu::execution& how, const Scene& s, const framebuffer_view<Targets...>& fb,
+                const voxelize_options& options) {
+        return cpu::draw_framebuffer<Rule, Key>(how, s, fb, options.count_voxels);
+    }
+    template <coverage Rule, class Key, class Scene, class Payload>
+    status pass(const cpu::execution& how, const Scene& s, abuffer<cpu_backend, Payload>& lists,
+                const voxelize_options&) {
+        return cpu::draw_abuffer<Rule, Key>(how, *this, s, lists);
+    }
+};
+
+} // namespace voxelpipe

@@ -1,0 +1,224 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Fine raster into render targets: every tile's triangles in order, each fragment shaded and folded into its targets.
+// Blends that accumulate in their own format (reproducible sums) keep a tile of accumulators; all others work in place.
+
+#include <cpu_ref/pipeline.hpp>
+
+#include <array>
+#include <atomic>
+#include <cstring>
+
+namespace voxelpipe::cpu {
+
+// Sets every voxel of the targets that clear. Padding (of bit rows and bricks) is cleared too; padding bits become 0.
+template <class Target>
+void clear_target(const execution& how, const target_view<Target>& t) {
+    using map = typename Target::map;
+    using element = typename Target::element_type;
+    const std::size_t n = map::elements(t.extent);
+    constexpr std::size_t block = (std::size_t{4} << 20) / sizeof(element) + 1;
+    const std::size_t blocks = (n + block - 1) / block;
+    if constexpr (map::is_bit) {
+        if (t.clear_value) {
+            // Rows end within a word: set bits up to the extent only.
+            const std::uint32_t tail = t.extent.x % 32 == 0 ? ~0u : (1u << (t.extent.x % 32)) - 1;
+            const auto y_end = t.extent.y, z_end = t.extent.z;
+            parallel_for(how.threads, blocks, [&](unsigned, std::size_t b) {
+                std::fill(t.elements + b * block, t.elements + std::min(n, (b + 1) * block), 0u);
+            });
+            parallel_for(how.threads, static_cast<std::size_t>(z_end), [&](unsigned, std::size_t z) {
+                for (int y = 0; y < y_end; ++y)
+                    for (int x = 0; x < t.extent.x; x += 32)
+                        t.elements[map::cell(t.extent, x, y, static_cast<int>(z))] = x + 32 <= t.extent.x ? ~0u : tail;
+            });
+            return;
+        }
+    }
+    const auto fill = [&](element* first, element* last, const element& v) {
+        std::array<std::byte, sizeof(element)> raw;
+        std::memcpy(raw.data(), &v, sizeof(element));
+        const bool zero = std::all_of(raw.begin(), raw.end(), [](std::byte x) { return x == std::byte{0}; });
+        if (zero)
+            std::memset(static_cast<void*>(first), 0, static_cast<std::size_t>(last - first) * sizeof(element));
+        else
+            std::fill(first, last, v);
+    };
+    parallel_for(how.threads, blocks, [&](unsigned, std::size_t b) {
+        const std::size_t first = b * block, last = std::min(n, first + block);
+        if constexpr (map::is_bit) {
+            fill(t.elements + first, t.elements + last, 0u);
+        } else if constexpr (map::planes) {
+            const std::size_t plane = map::cells(t.extent);
+            for (std::size_t i = first; i < last;) {
+                const std::size_t c = i / plane, end = std::min(last, (c + 1) * plane);
+                fill(t.elements + i, t.elements + end, t.clear_value[static_cast<glm::length_t>(c)]);
+                i = end;
+            }
+        } else {
+            fill(t.elements + first, t.elements + last, t.clear_value);
+        }
+    });
+}
+
+template <class Target>
+inline constexpr bool works_in_place =
+    std::is_same_v<typename Target::traits::accumulator, typename Target::value_type>;
+
+// What one thread keeps for the tile that it is at.
+template <class... Targets>
+struct tile_scratch {
+    template <class Target>
+    using accumulators = std::unique_ptr<typename Target::traits::accumulator[]>;
+
+    std::array<std::uint32_t, tile_rows> touched{}; // a bit a voxel: has got a fragment
+    core::pack<accumulators<Targets>...> sums;      // tile_voxels each, for targets that do not work in place
+    counters counts{};
+};
+
+template <class... Targets>
+inline constexpr bool all_in_place = (works_in_place<Targets> && ...);
+
+template <class Target, class Value>
+VOXELPIPE_INLINE void blend_in_place(const target_view<Target>& t, int x, int y, int z, const Value& v) {
+    using map = typename Target::map;
+    using traits = typename Target::traits;
+    if constexpr (map::is_bit || map::planes) {
+        auto stored = map::load(t.elements, t.extent, x, y, z);
+        traits::apply(stored, v);
+        map::store(t.elements, t.extent, x, y, z, stored);
+    } else {
+        traits::apply(t.elements[map::cell(t.extent, x, y, z)], v);
+    }
+}
+
+template <coverage Rule, bool Track, class Scene, class... Targets>
+void raster_tile(const Scene& s, const core::voxel_box& box, const std::uint32_t* primitives, std::size_t stride,
+                 std::size_t count, const framebuffer_view<Targets...>& fb, tile_scratch<Targets...>& scratch) {
+    const auto x0 = static_cast<int>(box.lo[0]), y0 = static_cast<int>(box.lo[1]), z0 = static_cast<int>(box.lo[2]);
+    std::uint64_t fragments = 0, discarded = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t id =
+            *reinterpret_cast<const std::uint32_t*>(reinterpret_cast<const std::byte*>(primitives) + i * stride);
+        shade_fragments<Rule>(s, id, box, [&](int x, int y, int z, const auto& out) {
+            if (!out.keep) {
+                ++discarded;
+                return;
+            }
+            ++fragments;
+            const int row = (z - z0) * tile_size + (y - y0), column = x - x0;
+            bool first = false;
+            if constexpr (Track) {
+                std::uint32_t& word = scratch.touched[static_cast<std::size_t>(row)];
+                first = ((word >> column) & 1u) == 0;
+                word |= 1u << column;
+            }
+            core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+                using target_type = typename core::pack_element<I, Targets...>::type;
+                const auto& t = get<I>(fb.targets);
+                if (t.load == load_operation::off) return;
+                if constexpr (works_in_place<target_type>) {
+                    blend_in_place(t, x, y, z, get<I>(out.values));
+                } else {
+                    auto& sum = get<I>(scratch.sums)[static_cast<std::size_t>(row * tile_size + column)];
+                    if (first) sum = target_type::traits::begin(t(x, y, z));
+                    target_type::traits::apply(sum, get<I>(out.values));
+                }
+            });
+        });
+    }
+    scratch.counts.fragments += fragments;
+    scratch.counts.fragments_discarded += discarded;
+}
+
+// Ends the tile: sums become stored values, voxels are counted, the marks are wiped.
+template <class... Targets>
+void resolve_tile(const core::voxel_box& box, const framebuffer_view<Targets...>& fb,
+                  tile_scratch<Targets...>& scratch) {
+    const auto x0 = static_cast<int>(box.lo[0]), y0 = static_cast<int>(box.lo[1]), z0 = static_cast<int>(box.lo[2]);
+    for (std::size_t row = 0; row < tile_rows; ++row) {
+        std::uint32_t word = scratch.touched[row];
+        if (word == 0) continue;
+        scratch.touched[row] = 0;
+        scratch.counts.voxels += static_cast<unsigned>(std::popcount(word));
+        if constexpr (!all_in_place<Targets...>) {
+            const int y = y0 + static_cast<int>(row) % tile_size, z = z0 + static_cast<int>(row) / tile_size;
+            for (; word != 0; word &= word - 1) {
+                const int column = std::countr_zero(word);
+                core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+                    using target_type = typename core::pack_element<I, Targets...>::type;
+                    if constexpr (!works_in_place<target_type>) {
+                        const auto& t = get<I>(fb.targets);
+                        if (t.load == load_operation::off) return;
+                        const auto& sum = get<I>(scratch.sums)[row * tile_size + static_cast<std::size_t>(column)];
+                        t.store(x0 + column, y, z, target_type::traits::end(sum));
+                    }
+                });
+            }
+        }
+    }
+}
+
+template <coverage Rule, class Key, class Scene, class... Targets>
+[[nodiscard]] status draw_framebuffer(const execution& how, const Scene& s, const framebuffer_view<Targets...>& fb,
+                                      bool count_voxels) {
+    const core::tile_grid tiles(s.where.extent, log2_tile_size);
+    auto coarse = coarse_raster<Rule, Key>(how, s, tiles);
+    status result;
+    result.counts = coarse.counts;
+    if (coarse.code != status_code::ok) {
+        status failed = core::failure(coarse.code, stage::coarse_raster);
+        failed.counts.triangles_in = s.first_primitive.back();
+        return failed;
+    }
+    const std::vector<tile_range> ranges = tile_sort(how, coarse.pairs, tiles.count());
+
+    // All memory is there before the first voxel is written.
+    const unsigned workers =
+        static_cast<unsigned>(std::max<std::size_t>(1, std::min<std::size_t>(how.threads, ranges.size())));
+    std::vector<std::unique_ptr<tile_scratch<Targets...>>> scratch;
+    for (unsigned w = 0; w < workers; ++w) {
+        scratch.push_back(std::make_unique<tile_scratch<Targets...>>());
+        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            using target_type = typename core::pack_element<I, Targets...>::type;
+            if constexpr (!works_in_place<target_type>)
+                if (get<I>(fb.targets).load != load_operation::off)
+                    get<I>(scratch.back()->sums) =
+                        std::make_unique_for_overwrite<typename target_type::traits::accumulator[]>(tile_voxels);
+        });
+    }
+    {
+        const stopwatch watch(how.times, &stage_times::clear);
+        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            const auto& t = get<I>(fb.targets);
+            if (t.load == load_operation::clear) clear_target(how, t);
+        });
+    }
+    const stopwatch watch(how.times, &stage_times::fine_raster);
+    progress_meter meter(how, ranges.size());
+    parallel_for(how.threads, ranges.size(), [&](unsigned worker, std::size_t r) {
+        const tile_range& range = ranges[r];
+        const core::voxel_box box = tile_box(tiles, range.tile, s.where.extent);
+        const std::uint32_t* const primitives = &coarse.pairs[range.first].primitive;
+        const std::size_t count = range.last - range.first;
+        constexpr std::size_t stride = sizeof(tile_pair<Key>);
+        auto& mine = *scratch[worker];
+        if (count_voxels || !all_in_place<Targets...>) {
+            raster_tile<Rule, true>(s, box, primitives, stride, count, fb, mine);
+            resolve_tile(box, fb, mine);
+        } else if constexpr (all_in_place<Targets...>) {
+            raster_tile<Rule, false>(s, box, primitives, stride, count, fb, mine);
+        }
+        meter.advance();
+    });
+    for (const auto& w : scratch) {
+        result.counts.fragments += w->counts.fragments;
+        result.counts.fragments_discarded += w->counts.fragments_discarded;
+        if (count_voxels) result.counts.voxels += w->counts.voxels;
+    }
+    return result;
+}
+
+} // namespace voxelpipe::cpu

@@ -1,0 +1,94 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Threads of the CPU backend: a parallel loop over items that any thread may take, and a stable radix sort. Results
+// never depend on the number of threads: items are fixed pieces of work with places of their own in the output.
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+namespace voxelpipe::cpu {
+
+// Calls work(worker, item) for item = 0 .. num_items - 1, each once, on up to num_threads threads; worker <
+// num_threads. The first exception is rethrown here after all threads have stopped.
+template <class Work>
+void parallel_for(unsigned num_threads, std::size_t num_items, Work&& work) {
+    const auto workers = static_cast<unsigned>(std::min<std::size_t>(num_threads, num_items));
+    if (workers <= 1) {
+        for (std::size_t i = 0; i < num_items; ++i) work(0u, i);
+        return;
+    }
+    std::atomic<std::size_t> next{0};
+    std::exception_ptr error;
+    std::mutex error_mutex;
+    const auto loop = [&](unsigned worker) {
+        try {
+            for (std::size_t i = next.fetch_add(1); i < num_items; i = next.fetch_add(1)) work(worker, i);
+        } catch (...) {
+            next.store(num_items);
+            const std::lock_guard lock(error_mutex);
+            if (!error) error = std::current_exception();
+        }
+    };
+    std::vector<std::thread> threads;
+    threads.reserve(workers - 1);
+    for (unsigned w = 1; w < workers; ++w) {
+        try {
+            threads.emplace_back(loop, w);
+        } catch (const std::system_error&) {
+            break; // the machine gives no more threads: the ones there do the work
+        }
+    }
+    loop(0);
+    for (std::thread& t : threads) t.join();
+    if (error) std::rethrow_exception(error);
+}
+
+// Sorts items by the lowest key_bits bits of item.key, stably. `scratch` is resized to match and left unspecified.
+template <class Item>
+void radix_sort(unsigned num_threads, std::vector<Item>& items, std::vector<Item>& scratch, int key_bits) {
+    constexpr int max_digit_bits = 13; // 32 KB of counters: one pass up to 8192 keys, cache-friendly scatter beyond
+    if (key_bits <= 0 || items.size() < 2) return;
+    const int passes = (key_bits + max_digit_bits - 1) / max_digit_bits;
+    const int digit_bits = (key_bits + passes - 1) / passes;
+    const std::size_t num_digits = std::size_t{1} << digit_bits;
+    const std::size_t blocks = items.size() < 65536 ? 1 : std::max(1u, num_threads);
+    const std::size_t block_size = (items.size() + blocks - 1) / blocks;
+    std::vector<std::size_t> counts(blocks * num_digits);
+    scratch.resize(items.size());
+    for (int pass = 0; pass < passes; ++pass) {
+        const int shift = pass * digit_bits;
+        const auto digit = [&](const Item& i) {
+            return static_cast<std::size_t>(static_cast<std::uint64_t>(i.key) >> shift) & (num_digits - 1);
+        };
+        std::fill(counts.begin(), counts.end(), std::size_t{0});
+        parallel_for(num_threads, blocks, [&](unsigned, std::size_t b) {
+            std::size_t* const c = counts.data() + b * num_digits;
+            const std::size_t last = std::min(items.size(), (b + 1) * block_size);
+            for (std::size_t i = b * block_size; i < last; ++i) ++c[digit(items[i])];
+        });
+        std::size_t sum = 0;
+        for (std::size_t d = 0; d < num_digits; ++d)
+            for (std::size_t b = 0; b < blocks; ++b) {
+                const std::size_t n = counts[b * num_digits + d];
+                counts[b * num_digits + d] = sum;
+                sum += n;
+            }
+        parallel_for(num_threads, blocks, [&](unsigned, std::size_t b) {
+            std::size_t* const c = counts.data() + b * num_digits;
+            const std::size_t last = std::min(items.size(), (b + 1) * block_size);
+            for (std::size_t i = b * block_size; i < last; ++i) scratch[c[digit(items[i])]++] = items[i];
+        });
+        items.swap(scratch);
+    }
+}
+
+} // namespace voxelpipe::cpu

@@ -1,0 +1,423 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The CPU pipeline: vertex shade -> coarse raster (triangle, tile) pairs -> tile sort -> fine raster, tile by tile,
+// each tile's triangles in order. No atomics and no races: a tile belongs to one thread, so every blend, order-free or
+// not, is a plain fold, and the result is the same for any number of threads. Needs neither nvcc nor a CUDA header.
+
+#include <cpu_ref/parallel.hpp>
+#include <voxelpipe/core/coverage.hpp>
+#include <voxelpipe/core/interpolate.hpp>
+#include <voxelpipe/voxelize.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+namespace voxelpipe::cpu {
+
+// Milliseconds spent in each stage of the last voxelize.
+struct stage_times {
+    double vertex_shade = 0, coarse_raster = 0, tile_sort = 0, clear = 0, fine_raster = 0, abuffer_emit = 0;
+};
+
+// What the stages need to know of how they run.
+struct execution {
+    unsigned threads = 1;
+    stage_times* times = nullptr;
+    const std::function<void(std::uint64_t done, std::uint64_t total)>* progress = nullptr;
+};
+
+// Adds the time until its end to one of the stage times.
+class stopwatch {
+public:
+    stopwatch(stage_times* times, double stage_times::*field) : times_(times), field_(field) {
+        if (times_ != nullptr) start_ = std::chrono::steady_clock::now();
+    }
+    stopwatch(const stopwatch&) = delete; // measures one scope
+    stopwatch& operator=(const stopwatch&) = delete;
+    ~stopwatch() {
+        if (times_ == nullptr) return;
+        const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start_;
+        times_->*field_ += ms.count();
+    }
+
+private:
+    stage_times* times_;
+    double stage_times::*field_;
+    std::chrono::steady_clock::time_point start_{};
+};
+
+inline constexpr int log2_tile_size = 5; // a row of a tile is one word of bits
+inline constexpr int tile_size = 1 << log2_tile_size;
+inline constexpr std::size_t tile_rows = std::size_t{tile_size} * tile_size;
+inline constexpr std::size_t tile_voxels = tile_rows * tile_size;
+
+// ---- vertex shade
+// ----------------------------------------------------------------------------------------------------
+
+// The vertices of one draw after the vertex shader, snapped; varyings stay empty where there are none.
+template <class Varyings>
+struct shaded_vertices {
+    std::unique_ptr<core::snapped_position[]> positions;
+    std::unique_ptr<Varyings[]> varyings;
+};
+
+template <class Mesh, class VertexShader, class FragmentShader>
+using draw_varyings = typename core::shaded<Mesh, VertexShader>::varyings;
+
+template <class... Attributes>
+[[nodiscard]] vertex<Attributes...> fetch_vertex(const mesh_view<Attributes...>& m, std::uint32_t index,
+                                                 std::uint32_t draw) {
+    return [&]<std::size_t... I>(std::index_sequence<I...>) {
+        return vertex<Attributes...>{index, draw, m.positions[index],
+                                     core::make_pack(Attributes(get<I>(m.attributes)[index])...)};
+    }
+    (std::index_sequence_for<Attributes...>{});
+}
+
+template <class Mesh, class VertexShader, class FragmentShader>
+[[nodiscard]] auto vertex_shade(const execution& how, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
+                                const core::snap_transform& snap) {
+    using varyings = draw_varyings<Mesh, VertexShader, FragmentShader>;
+    const stopwatch watch(how.times, &stage_times::vertex_shade);
+    std::vector<shaded_vertices<varyings>> shaded(draws.size());
+    for (std::size_t d = 0; d < draws.size(); ++d) {
+        const auto& in = draws[d];
+        auto& out = shaded[d];
+        const std::size_t n = in.mesh.positions.size();
+        out.positions = std::make_unique_for_overwrite<core::snapped_position[]>(n);
+        if constexpr (!std::is_empty_v<varyings>) out.varyings = std::make_unique_for_overwrite<varyings[]>(n);
+        constexpr std::size_t block = 16384;
+        parallel_for(how.threads, (n + block - 1) / block, [&](unsigned, std::size_t b) {
+            const std::size_t last = std::min(n, (b + 1) * block);
+            for (std::size_t i = b * block; i < last; ++i) {
+                const auto v = fetch_vertex(in.mesh, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(d));
+                const auto result = in.vertex_shader(v);
+                using widen = core::vertex_result<std::remove_cvref_t<decltype(result)>>;
+                const auto& o = widen::widen(result);
+                out.positions[i] = core::snap(snap, o.position.x, o.position.y, o.position.z);
+                if constexpr (!std::is_empty_v<varyings>) out.varyings[i] = o.varyings;
+            }
+        });
+    }
+    return shaded;
+}
+
+// ---- the scene as the raster stages see it
+// ---------------------------------------------------------------------------
+
+template <class Mesh, class VertexShader, class FragmentShader>
+struct scene {
+    using varyings = draw_varyings<Mesh, VertexShader, FragmentShader>;
+
+    std::span<const draw<Mesh, VertexShader, FragmentShader>> draws;
+    std::vector<shaded_vertices<varyings>> vertices; // per draw
+    std::vector<std::uint32_t> first_primitive;      // per draw, and one more: the total
+    core::snap_transform snap{};
+    core::triple<double> normal_factors{};
+    grid where{};
+
+    struct primitive {
+        std::uint32_t draw, triangle;
+        glm::uvec3 index;
+    };
+    [[nodiscard]] primitive find(std::uint32_t id) const {
+        std::uint32_t d = 0;
+        if (draws.size() > 1)
+            d = static_cast<std::uint32_t>(std::upper_bound(first_primitive.begin(), first_primitive.end() - 1, id) -
+                                           first_primitive.begin()) -
+                1;
+        const std::uint32_t t = id - first_primitive[d];
+        return {d, t, draws[d].mesh.triangles[t]};
+    }
+    [[nodiscard]] core::voxel_box whole_box() const {
+        return {{{0, 0, 0}}, {{where.extent.x - 1, where.extent.y - 1, where.extent.z - 1}}};
+    }
+};
+
+template <class Mesh, class VertexShader, class FragmentShader>
+[[nodiscard]] scene<Mesh, VertexShader, FragmentShader>
+make_scene(const execution& how, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g) {
+    scene<Mesh, VertexShader, FragmentShader> s;
+    s.draws = draws;
+    s.where = g;
+    s.snap = core::make_snap_transform(g);
+    s.normal_factors = core::normal_factors(g);
+    s.first_primitive.reserve(draws.size() + 1);
+    std::uint32_t first = 0;
+    for (const auto& d : draws) {
+        s.first_primitive.push_back(first);
+        first += static_cast<std::uint32_t>(d.mesh.triangles.size());
+    }
+    s.first_primitive.push_back(first);
+    s.vertices = vertex_shade(how, draws, s.snap);
+    return s;
+}
+
+// ---- coarse raster
+// ---------------------------------------------------------------------------------------------------
+
+template <class Key>
+struct tile_pair {
+    Key key; // tile number
+    std::uint32_t primitive;
+};
+
+enum class triangle_class : std::uint8_t { drawn, nonfinite, too_far, zero_area, outside };
+
+// Whether a triangle is drawn, and if not why. `reach` receives the voxels that it may touch, cut to the grid.
+template <coverage Rule>
+[[nodiscard]] triangle_class classify(const core::snapped_position& a, const core::snapped_position& b,
+                                      const core::snapped_position& c, int fraction, const core::voxel_box& whole,
+                                      core::voxel_box& reach) {
+    if (!core::is_drawable(a) || !core::is_drawable(b) || !core::is_drawable(c)) {
+        const bool nonfinite =
+            a.x == core::nonfinite_mark || b.x == core::nonfinite_mark || c.x == core::nonfinite_mark;
+        return nonfinite ? triangle_class::nonfinite : triangle_class::too_far;
+    }
+    core::voxel_box box = core::bounds(a, b, c, fraction);
+    if constexpr (Rule == coverage::thin) {
+        // The depth at a touched column's centre is at most one voxel beyond the triangle's own depths.
+        for (int i = 0; i < 3; ++i) {
+            --box.lo[i];
+            ++box.hi[i];
+        }
+    }
+    reach = core::intersect(box, whole);
+    return reach.empty() ? triangle_class::outside : triangle_class::drawn;
+}
+
+[[nodiscard]] inline bool has_zero_area(const core::snapped_position& a, const core::snapped_position& b,
+                                        const core::snapped_position& c) {
+    const std::int64_t e1[3] = {b.x - a.x, b.y - a.y, b.z - a.z};
+    const std::int64_t e2[3] = {c.x - a.x, c.y - a.y, c.z - a.z};
+    const auto equal = [&](int i, int j) {
+        return static_cast<int128>(e1[i]) * e2[j] == static_cast<int128>(e1[j]) * e2[i];
+    };
+    return equal(1, 2) && equal(2, 0) && equal(0, 1);
+}
+
+// Calls emit(tile) for each tile that the triangle has work in: exactly the tiles whose closed box it meets
+// (conservative), or the tiles that its plane passes within its columns (thin).
+template <coverage Rule, class Emit>
+void for_each_tile(const core::snapped_position& a, const core::snapped_position& b, const core::snapped_position& c,
+                   int fraction, const core::voxel_box& reach, const core::tile_grid& tiles, Emit&& emit) {
+    core::voxel_box box{};
+    for (int i = 0; i < 3; ++i) {
+        box.lo[i] = reach.lo[i] >> tiles.log2_size;
+        box.hi[i] = reach.hi[i] >> tiles.log2_size;
+    }
+    if (box.lo[0] == box.hi[0] && box.lo[1] == box.hi[1] && box.lo[2] == box.hi[2]) {
+        emit(tiles.index(box.lo[0], box.lo[1], box.lo[2]));
+        return;
+    }
+    // A tile is a voxel of a coarser grid: the same exact coverage, 2^log2_size times larger.
+    constexpr auto rule = Rule == coverage::thin ? core::span_rule::columns : core::span_rule::conservative;
+    core::rasterize<rule>(a, b, c, fraction + tiles.log2_size, box,
+                          [&](const auto& t, std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
+                              for (std::int64_t w = w0; w <= w1; ++w) {
+                                  const auto p = core::to_xyz(t.axis, u, v, w);
+                                  emit(tiles.index(p[0], p[1], p[2]));
+                              }
+                          });
+}
+
+template <class Key>
+struct coarse_result {
+    status_code code = status_code::ok;
+    counters counts{};
+    std::vector<tile_pair<Key>> pairs; // by ascending primitive
+};
+
+template <coverage Rule, class Key, class Scene>
+[[nodiscard]] coarse_result<Key> coarse_raster(const execution& how, const Scene& s, const core::tile_grid& tiles) {
+    const stopwatch watch(how.times, &stage_times::coarse_raster);
+    constexpr std::size_t block = 8192;
+    const std::size_t n = s.first_primitive.back();
+    const std::size_t blocks = (n + block - 1) / block;
+    const core::voxel_box whole = s.whole_box();
+    std::vector<coarse_result<Key>> parts(blocks);
+    parallel_for(how.threads, blocks, [&](unsigned, std::size_t b) {
+        coarse_result<Key>& part = parts[b];
+        part.pairs.reserve(block + block / 4);
+        const std::size_t last = std::min(n, (b + 1) * block);
+        for (std::size_t i = b * block; i < last; ++i) {
+            const auto id = static_cast<std::uint32_t>(i);
+            const auto tri = s.find(id);
+            const std::size_t num_vertices = s.draws[tri.draw].mesh.positions.size();
+            if (tri.index.x >= num_vertices || tri.index.y >= num_vertices || tri.index.z >= num_vertices) {
+                part.code = status_code::index_out_of_range;
+                return;
+            }
+            const core::snapped_position* p = s.vertices[tri.draw].positions.get();
+            const auto &a = p[tri.index.x], &b_ = p[tri.index.y], &c = p[tri.index.z];
+            core::voxel_box reach{};
+            triangle_class kind = classify<Rule>(a, b_, c, s.snap.fraction, whole, reach);
+            if (Rule == coverage::thin && kind == triangle_class::drawn && has_zero_area(a, b_, c))
+                kind = triangle_class::zero_area;
+            switch (kind) {
+            case triangle_class::nonfinite:
+                ++part.counts.triangles_nonfinite;
+                break;
+            case triangle_class::too_far:
+                ++part.counts.triangles_too_far;
+                break;
+            case triangle_class::zero_area:
+                ++part.counts.triangles_zero_area;
+                break;
+            case triangle_class::outside:
+                ++part.counts.triangles_outside;
+                break;
+            case triangle_class::drawn:
+                ++part.counts.triangles_drawn;
+                for_each_tile<Rule>(a, b_, c, s.snap.fraction, reach, tiles, [&](std::uint64_t tile) {
+                    part.pairs.push_back({static_cast<Key>(tile), id});
+                });
+                break;
+            }
+        }
+    });
+
+    coarse_result<Key> all;
+    std::vector<std::size_t> first(blocks + 1, 0);
+    for (std::size_t b = 0; b < blocks; ++b) {
+        const coarse_result<Key>& part = parts[b];
+        if (part.code != status_code::ok) {
+            all.code = part.code;
+            return all;
+        }
+        all.counts.triangles_nonfinite += part.counts.triangles_nonfinite;
+        all.counts.triangles_too_far += part.counts.triangles_too_far;
+        all.counts.triangles_zero_area += part.counts.triangles_zero_area;
+        all.counts.triangles_outside += part.counts.triangles_outside;
+        all.counts.triangles_drawn += part.counts.triangles_drawn;
+        first[b + 1] = first[b] + part.pairs.size();
+    }
+    all.counts.triangles_in = n;
+    all.pairs.resize(first[blocks]);
+    parallel_for(how.threads, blocks, [&](unsigned, std::size_t b) {
+        std::copy(parts[b].pairs.begin(), parts[b].pairs.end(),
+                  all.pairs.begin() + static_cast<std::ptrdiff_t>(first[b]));
+        parts[b].pairs = {};
+    });
+    return all;
+}
+
+// ---- tile sort
+// -------------------------------------------------------------------------------------------------------
+
+// The sorted pairs of one tile: [first, last).
+struct tile_range {
+    std::uint64_t tile;
+    std::size_t first, last;
+};
+
+template <class Key>
+[[nodiscard]] std::vector<tile_range> tile_sort(const execution& how, std::vector<tile_pair<Key>>& pairs,
+                                                std::uint64_t num_tiles) {
+    const stopwatch watch(how.times, &stage_times::tile_sort);
+    {
+        std::vector<tile_pair<Key>> scratch;
+        radix_sort(how.threads, pairs, scratch, static_cast<int>(std::bit_width(num_tiles - 1)));
+    }
+    std::vector<tile_range> ranges;
+    for (std::size_t i = 0; i < pairs.size();) {
+        std::size_t j = i + 1;
+        while (j < pairs.size() && pairs[j].key == pairs[i].key) ++j;
+        ranges.push_back({pairs[i].key, i, j});
+        i = j;
+    }
+    return ranges;
+}
+
+[[nodiscard]] inline core::voxel_box tile_box(const core::tile_grid& tiles, std::uint64_t tile, glm::ivec3 extent) {
+    const glm::ivec3 p = tiles.position(tile) * (1 << tiles.log2_size);
+    core::voxel_box box{};
+    for (int i = 0; i < 3; ++i) {
+        box.lo[i] = p[i];
+        box.hi[i] = std::min(p[i] + (1 << tiles.log2_size), extent[i]) - 1;
+    }
+    return box;
+}
+
+// ---- fragments
+// -------------------------------------------------------------------------------------------------------
+
+// Calls visit(x, y, z, fragment shader's output) for every fragment of one primitive within `box` (voxels of the
+// computed part of the grid). The fragment's fields that the shader does not read cost nothing: all of it is inlined.
+template <coverage Rule, class Scene, class Visit>
+VOXELPIPE_INLINE void shade_fragments(const Scene& s, std::uint32_t id, const core::voxel_box& box, Visit&& visit) {
+    using varyings = typename Scene::varyings;
+    const auto tri = s.find(id);
+    const auto& d = s.draws[tri.draw];
+    const auto& vertices = s.vertices[tri.draw];
+    const core::snapped_position &a = vertices.positions[tri.index.x], &b = vertices.positions[tri.index.y],
+                                 &c = vertices.positions[tri.index.z];
+    static constexpr varyings none{};
+    fragment<varyings> f{};
+    f.triangle = tri.triangle;
+    f.draw = tri.draw;
+    f.primitive = id;
+    for (int i = 0; i < 3; ++i) {
+        if constexpr (std::is_empty_v<varyings>)
+            f.vertex_varyings[i] = &none;
+        else
+            f.vertex_varyings[i] = &vertices.varyings[tri.index[i]];
+    }
+    const auto run = [&](const auto& t) {
+        f.axis = t.zero_area ? 0 : t.axis;
+        f.front_facing = t.normal[2] >= 0;
+        f.normal = core::unit_normal(t, s.normal_factors);
+        core::for_each_span<core::to_rule(Rule)>(
+            t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
+                f.barycentric = core::barycentric(t, u, v);
+                if constexpr (!std::is_empty_v<varyings>)
+                    f.varyings = core::mix(*f.vertex_varyings[0], *f.vertex_varyings[1], *f.vertex_varyings[2],
+                                           f.barycentric.y, f.barycentric.z);
+                for (std::int64_t w = w0; w <= w1; ++w) {
+                    const auto p = core::to_xyz(t.axis, static_cast<int>(u), static_cast<int>(v), static_cast<int>(w));
+                    f.voxel = s.where.offset + glm::ivec3(p[0], p[1], p[2]);
+                    visit(p[0], p[1], p[2], d.fragment_shader(f));
+                }
+            });
+    };
+    constexpr auto rule = core::to_rule(Rule);
+    if (core::fits_narrow(a, b, c, s.snap.fraction))
+        run(core::setup_triangle<rule, std::int64_t>(a, b, c, s.snap.fraction));
+    else
+        run(core::setup_triangle<rule, int128>(a, b, c, s.snap.fraction));
+}
+
+// Reports tiles done, a hundred times at most, one call at a time.
+class progress_meter {
+public:
+    progress_meter(const execution& how, std::uint64_t total) : how_(how), total_(total) {}
+    void advance() {
+        if (how_.progress == nullptr || !*how_.progress) return;
+        const std::uint64_t done = done_.fetch_add(1) + 1;
+        if (done != total_ && done * 100 / total_ == (done - 1) * 100 / total_) return;
+        const std::lock_guard lock(mutex_);
+        if (done < reported_) return;
+        reported_ = done;
+        (*how_.progress)(done, total_);
+    }
+
+private:
+    const execution& how_;
+    std::uint64_t total_;
+    std::atomic<std::uint64_t> done_{0};
+    std::mutex mutex_;
+    std::uint64_t reported_ = 0;
+};
+
+} // namespace voxelpipe::cpu

@@ -1,0 +1,406 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Blend modes: how the fragments of one voxel become one value (paper section 3, render targets). Every result is
+// defined by the fragments alone, never by a race: see docs/design.md, "Blending".
+//
+// A blend of your own is a functor with   static constexpr bool order_free;  T identity() const;  T combine(T, T) const
+// (or templates of them). One that is not order-free is folded in triangle order.
+
+#include <voxelpipe/core/pack.hpp>
+#include <voxelpipe/core/reproducible_sum.hpp>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include <concepts>
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+
+namespace voxelpipe {
+
+// Value type tag of a target with one bit a voxel, 32 to a word along x. Shaders give it a bool.
+struct bit {};
+
+namespace blend {
+
+struct replace {};       // the last triangle wins: draw order, then triangle order
+struct add {};           // integers wrap; floating types sum reproducibly; bit: exclusive or
+struct add_saturate {};  // integers: the exact sum, then clamped to the type's range; bit: or
+struct add_unordered {}; // floating types: plain additions in any order; tested to a bound, not to the bit, on a GPU
+struct min {};           // floats by total order: -inf < ... < -0 < +0 < ... < inf < NaN
+struct max {};
+struct bit_and {};
+struct bit_or {};
+struct bit_xor {};
+struct count {}; // adds 1 a fragment whatever the shader gives; wraps
+
+// add for float with a quantum of 2^Log2Quantum instead of 2^-32: terms from 2^(63 + Log2Quantum) on are infinite.
+template <int Log2Quantum>
+struct add_quantum {};
+
+} // namespace blend
+
+namespace core {
+
+template <class T>
+struct vector_traits {
+    using element = T;
+    static constexpr int components = 1;
+};
+template <glm::length_t N, class S, glm::qualifier Q>
+struct vector_traits<glm::vec<N, S, Q>> {
+    using element = S;
+    static constexpr int components = N;
+};
+
+template <class T>
+inline constexpr bool is_floating = std::is_same_v<T, float> || std::is_same_v<T, double> || std::is_same_v<T, half>;
+template <class T>
+inline constexpr bool is_integer = std::is_integral_v<T> && !std::is_same_v<T, bool>;
+template <class T>
+inline constexpr bool is_scalar = is_floating<T> || is_integer<T> || std::is_same_v<T, bool>;
+
+template <class T>
+struct float_bits;
+template <>
+struct float_bits<half> {
+    using type = std::uint16_t;
+    static constexpr type infinity = 0x7c00u, nan = 0x7e00u;
+};
+template <>
+struct float_bits<float> {
+    using type = std::uint32_t;
+    static constexpr type infinity = 0x7f800000u, nan = 0x7fc00000u;
+};
+template <>
+struct float_bits<double> {
+    using type = std::uint64_t;
+    static constexpr type infinity = 0x7ff0000000000000u, nan = 0x7ff8000000000000u;
+};
+
+// Every NaN that reaches a target of a built-in type is stored as the one positive quiet NaN: machines differ in which
+// NaN an operation gives.
+template <class T>
+[[nodiscard]] VOXELPIPE_HD
+T canonical(T v) {
+    if constexpr (is_floating<T>) {
+        using bits = typename float_bits<T>::type;
+        const auto raw = std::bit_cast<bits>(v);
+        constexpr bits absolute = static_cast<bits>(~bits{0}) >> 1;
+        return (raw & absolute) > float_bits<T>::infinity ? std::bit_cast<T>(float_bits<T>::nan) : v;
+    } else if constexpr (vector_traits<T>::components > 1) {
+        for (int i = 0; i < vector_traits<T>::components; ++i) v[i] = canonical(v[i]);
+        return v;
+    } else {
+        return v;
+    }
+}
+
+// Integers in the order of the floats: for shared-memory atomics on integers, and for min and max here.
+template <class T>
+[[nodiscard]] VOXELPIPE_HD
+auto order_key(T v) {
+    using bits = typename float_bits<T>::type;
+    using key = std::make_signed_t<bits>;
+    const auto raw = std::bit_cast<bits>(canonical(v));
+    constexpr bits absolute = static_cast<bits>(~bits{0}) >> 1;
+    return static_cast<key>((raw & ~absolute) != 0 ? raw ^ absolute : raw);
+}
+
+template <class T>
+[[nodiscard]] VOXELPIPE_HD
+bool ordered_less(T a, T b) {
+    if constexpr (is_floating<T>)
+        return order_key(a) < order_key(b);
+    else
+        return a < b;
+}
+
+template <class Blend, class T>
+concept user_blend = requires(const Blend& f, T a, T b) {
+    { Blend::order_free } -> std::convertible_to<bool>;
+    { f.identity() } -> std::same_as<T>;
+    { f.combine(a, b) } -> std::same_as<T>;
+};
+// The same with templates: identity<T>(), combine<T>(a, b).
+template <class Blend, class T>
+concept user_blend_template = requires(const Blend& f, T a, T b) {
+    { Blend::order_free } -> std::convertible_to<bool>;
+    { f.template identity<T>() } -> std::same_as<T>;
+    { f.combine(a, b) } -> std::same_as<T>;
+};
+
+// blend_traits<Blend, T>: accumulator, identity(), begin(stored value), apply(accumulator, value), end(accumulator).
+// Folding begin, apply..., end in triangle order is the meaning of every blend; where order_free holds, any order gives
+// the same bits. T is a scalar here; vectors go component by component below.
+template <class Blend, class T>
+struct blend_traits {
+    static constexpr bool available = false;
+};
+
+template <class T>
+struct in_place_blend {
+    static constexpr bool available = true;
+    static constexpr bool order_free = true;
+    using accumulator = T;
+    VOXELPIPE_HD
+    static T begin(T stored) { return stored; }
+    VOXELPIPE_HD
+    static T end(T value) { return value; }
+};
+
+template <class T>
+struct blend_traits<blend::replace, T> : in_place_blend<T> {
+    static constexpr bool order_free = false; // order-free only together with the primitive's number
+    VOXELPIPE_HD
+    static T identity() { return T{}; }
+    VOXELPIPE_HD
+    static void apply(T& a, T v) { a = canonical(v); }
+};
+
+template <class T>
+requires is_scalar<T>
+struct blend_traits<blend::min, T> : in_place_blend<T> {
+    VOXELPIPE_HD
+    static T identity() {
+        if constexpr (is_floating<T>)
+            return std::bit_cast<T>(float_bits<T>::nan); // the greatest value of the order
+        else
+            return std::numeric_limits<T>::max();
+    }
+    VOXELPIPE_HD
+    static void apply(T& a, T v) {
+        if (ordered_less(v, a)) a = canonical(v);
+    }
+};
+
+template <class T>
+requires is_scalar<T>
+struct blend_traits<blend::max, T> : in_place_blend<T> {
+    VOXELPIPE_HD
+    static T identity() {
+        if constexpr (is_floating<T>) {
+            using bits = typename float_bits<T>::type;
+            return std::bit_cast<T>(static_cast<bits>(float_bits<T>::infinity | ~(static_cast<bits>(~bits{0}) >> 1)));
+        } else {
+            return std::numeric_limits<T>::lowest();
+        }
+    }
+    VOXELPIPE_HD
+    static void apply(T& a, T v) {
+        if (ordered_less(a, v)) a = canonical(v);
+    }
+};
+
+template <class T>
+requires(is_integer<T> || std::is_same_v<T, bool>) struct blend_traits<blend::bit_and, T> : in_place_blend<T> {
+    VOXELPIPE_HD
+    static T identity() { return std::is_same_v<T, bool> ? T{1} : static_cast<T>(~T{0}); }
+    VOXELPIPE_HD
+    static void apply(T& a, T v) { a = static_cast<T>(a & v); }
+};
+template <class T>
+requires(is_integer<T> || std::is_same_v<T, bool>) struct blend_traits<blend::bit_or, T> : in_place_blend<T> {
+    VOXELPIPE_HD
+    static T identity() { return T{0}; }
+    VOXELPIPE_HD
+    static void apply(T& a, T v) { a = static_cast<T>(a | v); }
+};
+template <class T>
+requires(is_integer<T> || std::is_same_v<T, bool>) struct blend_traits<blend::bit_xor, T> : in_place_blend<T> {
+    VOXELPIPE_HD
+    static T identity() { return T{0}; }
+    VOXELPIPE_HD
+    static void apply(T& a, T v) { a = static_cast<T>(a ^ v); }
+};
+
+// Integer addition that wraps; bit: addition modulo 2.
+template <class T>
+requires(is_integer<T> || std::is_same_v<T, bool>) struct blend_traits<blend::add, T> : in_place_blend<T> {
+    VOXELPIPE_HD
+    static T identity() { return T{0}; }
+    VOXELPIPE_HD
+    static void apply(T& a, T v) {
+        if constexpr (std::is_same_v<T, bool>) {
+            a = a != v;
+        } else {
+            using wide = std::make_unsigned_t<decltype(a + v)>;
+            a = static_cast<T>(static_cast<wide>(a) + static_cast<wide>(v));
+        }
+    }
+};
+
+// A shader's value for a count target is ignored, whatever its type.
+template <class T>
+requires(is_integer<T> || std::is_same_v<T, bool>) struct blend_traits<blend::count, T> : in_place_blend<T> {
+    VOXELPIPE_HD
+    static T identity() { return T{0}; }
+    template <class Any>
+    VOXELPIPE_HD
+    static void apply(T& a, const Any&) { blend_traits<blend::add, T>::apply(a, T{1}); }
+};
+
+template <class T, int Log2Quantum>
+struct reproducible_blend {
+    static constexpr bool available = true;
+    static constexpr bool order_free = true;
+    using accumulator = typename sum_format<T>::sum;
+    VOXELPIPE_HD
+    static T identity() { return std::bit_cast<T>(typename float_bits<T>::type{0}); }
+    VOXELPIPE_HD
+    static accumulator begin(T stored) {
+        accumulator a{};
+        apply(a, stored);
+        return a;
+    }
+    VOXELPIPE_HD
+    static void apply(accumulator& a, T v) {
+        if constexpr (std::is_same_v<T, float>)
+            add_float<Log2Quantum>(a, v);
+        else if constexpr (std::is_same_v<T, half>)
+            add_half<Log2Quantum>(a, v);
+        else
+            add_double<Log2Quantum>(a, v);
+    }
+    VOXELPIPE_HD
+    static T end(const accumulator& a) {
+        using bits = typename float_bits<T>::type;
+        constexpr int mantissa_bits = std::is_same_v<T, half> ? 10 : std::is_same_v<T, float> ? 23 : 52;
+        constexpr int exponent_bits = std::is_same_v<T, half> ? 5 : std::is_same_v<T, float> ? 8 : 11;
+        return std::bit_cast<T>(static_cast<bits>(round_sum(a, Log2Quantum, mantissa_bits, exponent_bits)));
+    }
+};
+template <class T>
+requires is_floating<T>
+struct blend_traits<blend::add, T> : reproducible_blend<T, sum_format<T>::log2_quantum> {
+};
+template <int Log2Quantum>
+struct blend_traits<blend::add_quantum<Log2Quantum>, float> : reproducible_blend<float, Log2Quantum> {};
+
+template <class T>
+requires is_floating<T>
+struct blend_traits<blend::add_unordered, T> : in_place_blend<T> {
+    static constexpr bool order_free = false;
+    VOXELPIPE_HD
+    static T identity() { return std::bit_cast<T>(typename float_bits<T>::type{0}); }
+    VOXELPIPE_HD
+    static void apply(T& a, T v) {
+        if constexpr (std::is_same_v<T, half>)
+            a = canonical(half(exact::add(static_cast<float>(a), static_cast<float>(v))));
+        else
+            a = canonical(a + v);
+    }
+};
+
+// Unsigned sums only grow, so clamping at each step is clamping the exact sum.
+template <class T>
+requires(std::is_unsigned_v<T>) struct blend_traits<blend::add_saturate, T> : in_place_blend<T> {
+    VOXELPIPE_HD
+    static T identity() { return T{0}; }
+    VOXELPIPE_HD
+    static void apply(T& a, T v) {
+        if constexpr (std::is_same_v<T, bool>)
+            a = a || v;
+        else
+            a = static_cast<T>(a + v) < a ? std::numeric_limits<T>::max() : static_cast<T>(a + v);
+    }
+};
+// Signed ones go up and down: sum first, clamp at the end.
+template <class T>
+requires(is_integer<T>&& std::is_signed_v<T>) struct blend_traits<blend::add_saturate, T> {
+    static constexpr bool available = true;
+    static constexpr bool order_free = true;
+    using accumulator = wide_sum<1>;
+    VOXELPIPE_HD
+    static T identity() { return T{0}; }
+    VOXELPIPE_HD
+    static accumulator begin(T stored) {
+        accumulator a{};
+        add_term(a, std::int64_t{stored});
+        return a;
+    }
+    VOXELPIPE_HD
+    static void apply(accumulator& a, T v) { add_term(a, std::int64_t{v}); }
+    VOXELPIPE_HD
+    static T end(const accumulator& a) {
+        const int128 sum = (static_cast<int128>(a.top) << 64) | a.limb[0];
+        if (sum > std::numeric_limits<T>::max()) return std::numeric_limits<T>::max();
+        if (sum < std::numeric_limits<T>::lowest()) return std::numeric_limits<T>::lowest();
+        return static_cast<T>(sum);
+    }
+};
+
+// Vectors, component by component.
+template <class Blend, glm::length_t N, class S, glm::qualifier Q>
+requires(blend_traits<Blend, S>::available && !user_blend<Blend, glm::vec<N, S, Q>> &&
+         !user_blend_template<Blend, glm::vec<N, S, Q>> &&
+         !std::is_same_v<Blend, blend::replace>) struct blend_traits<Blend, glm::vec<N, S, Q>> {
+    using vector = glm::vec<N, S, Q>;
+    using element = blend_traits<Blend, S>;
+    static constexpr bool available = true;
+    static constexpr bool order_free = element::order_free;
+    struct sums {
+        typename element::accumulator c[N];
+    };
+    static constexpr bool in_place = std::is_same_v<typename element::accumulator, S>;
+    using accumulator = std::conditional_t<in_place, vector, sums>;
+    VOXELPIPE_HD
+    static vector identity() {
+        vector r;
+        for (glm::length_t i = 0; i < N; ++i) r[i] = element::identity();
+        return r;
+    }
+    VOXELPIPE_HD
+    static accumulator begin(const vector& stored) {
+        if constexpr (in_place) {
+            return stored;
+        } else {
+            accumulator a;
+            for (glm::length_t i = 0; i < N; ++i) a.c[i] = element::begin(stored[i]);
+            return a;
+        }
+    }
+    template <class Value>
+    VOXELPIPE_HD
+    static void apply(accumulator& a, const Value& v) {
+        for (glm::length_t i = 0; i < N; ++i) {
+            if constexpr (std::is_same_v<Blend, blend::count>)
+                element::apply(a[i], v);
+            else if constexpr (in_place)
+                element::apply(a[i], v[i]);
+            else
+                element::apply(a.c[i], v[i]);
+        }
+    }
+    VOXELPIPE_HD
+    static vector end(const accumulator& a) {
+        if constexpr (in_place) {
+            return a;
+        } else {
+            vector r;
+            for (glm::length_t i = 0; i < N; ++i) r[i] = element::end(a.c[i]);
+            return r;
+        }
+    }
+};
+
+template <class Blend, class T>
+requires(user_blend<Blend, T> || user_blend_template<Blend, T>) struct blend_traits<Blend, T> : in_place_blend<T> {
+    static constexpr bool order_free = Blend::order_free;
+    VOXELPIPE_HD
+    static T identity() {
+        if constexpr (user_blend<Blend, T>)
+            return Blend{}.identity();
+        else
+            return Blend{}.template identity<T>();
+    }
+    VOXELPIPE_HD
+    static void apply(T& a, const T& v) { a = Blend{}.combine(a, v); }
+};
+
+} // namespace core
+} // namespace voxelpipe

@@ -1,0 +1,46 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Version and the few macros of the library. Everything else is C++.
+// VOXELPIPE_HD marks a function that runs on the host and, when nvcc compiles, on the device.
+
+#include <cassert>
+
+#define VOXELPIPE_VERSION_MAJOR 0
+#define VOXELPIPE_VERSION_MINOR 1
+#define VOXELPIPE_VERSION_PATCH 0
+
+#if defined(__FAST_MATH__)
+#error "VoxelPipe promises exact bits: compile without -ffast-math (nvcc's -use_fast_math is fine)"
+#endif
+
+#if defined(__CUDACC__)
+#if !defined(__CUDACC_RELAXED_CONSTEXPR__)
+// GLM 1.0.2 and later silently lose vector arithmetic on the device without this flag.
+#error "VoxelPipe under nvcc needs --expt-relaxed-constexpr (the CMake target voxelpipe::cuda carries it)"
+#endif
+#define VOXELPIPE_HD __host__ __device__
+#else
+#define VOXELPIPE_HD
+#endif
+
+#if defined(__GNUC__) || defined(__clang__)
+#define VOXELPIPE_INLINE inline __attribute__((always_inline))
+#else
+#define VOXELPIPE_INLINE inline
+#endif
+
+// An error of ours, not of the caller: compiled out with NDEBUG.
+#if !defined(VOXELPIPE_ASSERT)
+#define VOXELPIPE_ASSERT(condition) assert(condition)
+#endif
+
+// A precondition of an accessor that returns no status: compiled out with NDEBUG.
+#if !defined(VOXELPIPE_EXPECTS)
+#define VOXELPIPE_EXPECTS(condition) assert(condition)
+#endif
+
+#if !defined(__SIZEOF_INT128__)
+#error "VoxelPipe needs a 64-bit target whose compiler has __int128 (g++, clang or nvcc)"
+#endif

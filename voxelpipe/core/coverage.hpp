@@ -1,0 +1,184 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Coverage: which voxels a triangle gives fragments in, as spans along its dominant axis. Exact: integers only, no
+// epsilon (docs/design.md, "Conservative" and "Thin"; paper section 4).
+
+#include <voxelpipe/core/triangle_setup.hpp>
+
+#include <cstdint>
+
+namespace voxelpipe::core {
+
+// floor(numerator / divisor) stepped along a row: each step adds `delta`, |delta| <= divisor, so that one correction is
+// enough and a row costs one division.
+template <class Int>
+struct stepped_floor {
+    Int quotient, remainder, divisor;
+
+    VOXELPIPE_HD
+    constexpr stepped_floor(Int numerator, Int divisor_)
+        : quotient(exact::floor_div(numerator, divisor_)), remainder(numerator - quotient * divisor_),
+          divisor(divisor_) {}
+
+    VOXELPIPE_HD
+    constexpr void step(Int delta) {
+        remainder += delta;
+        if (remainder < 0) {
+            remainder += divisor;
+            --quotient;
+        } else if (remainder >= divisor) {
+            remainder -= divisor;
+            ++quotient;
+        }
+    }
+};
+
+// Narrows [lo, hi] to the x for which a*x + b*y + c >= 0, for all three half-planes. What they leave of a row is an
+// interval, so a short one is narrowed from its ends; a long one is solved by division.
+template <class Int>
+VOXELPIPE_HD
+constexpr void narrow_row(const half_plane<Int> (&h)[3], Int y, std::int64_t& lo, std::int64_t& hi) {
+    const Int r[3] = {h[0].b * y + h[0].c, h[1].b * y + h[1].c, h[2].b * y + h[2].c};
+    if (hi - lo >= 6) {
+        Int first = lo, last = hi;
+        for (int i = 0; i < 3; ++i) {
+            const Int a = h[i].a;
+            if (a > 0) {
+                const Int bound = exact::ceil_div<Int>(-r[i], a);
+                if (bound > first) first = bound;
+            } else if (a < 0) {
+                const Int bound = exact::floor_div<Int>(r[i], -a);
+                if (bound < last) last = bound;
+            } else if (r[i] < 0) {
+                last = first - 1;
+            }
+            if (first > last) break;
+        }
+        if (first > last) {
+            hi = lo - 1;
+        } else {
+            lo = static_cast<std::int64_t>(first);
+            hi = static_cast<std::int64_t>(last);
+        }
+        return;
+    }
+    const auto inside = [&](std::int64_t x) {
+        const Int i = x;
+        return h[0].a * i + r[0] >= 0 && h[1].a * i + r[1] >= 0 && h[2].a * i + r[2] >= 0;
+    };
+    while (lo <= hi && !inside(lo)) ++lo;
+    while (lo <= hi && !inside(hi)) --hi;
+}
+
+// Calls emit(u, v, w_first, w_last) for every column that holds covered voxels inside `clip` (x y z, in voxels of the
+// setup's fraction). u, v and w are absolute voxel indices. Spans of one triangle do not overlap.
+template <span_rule Rule, class Int, class Emit>
+VOXELPIPE_HD
+constexpr void for_each_span(const triangle_setup<Int>& t, const voxel_box& clip, Emit&& emit) {
+    const triple<std::int64_t> clip_lo = to_uvw(t.axis, clip.lo[0], clip.lo[1], clip.lo[2]);
+    const triple<std::int64_t> clip_hi = to_uvw(t.axis, clip.hi[0], clip.hi[1], clip.hi[2]);
+    triple<std::int64_t> lo{}, hi{};
+    for (int i = 0; i < 3; ++i) {
+        lo[i] = clip_lo[i] - t.origin[i];
+        hi[i] = clip_hi[i] - t.origin[i];
+        // A thin fragment may leave the bounding box along w: its depth is the plane's at the column's centre.
+        if (i == 2 && Rule != span_rule::conservative) continue;
+        if (lo[i] < 0) lo[i] = 0;
+        if (hi[i] > t.last[i]) hi[i] = t.last[i];
+    }
+    if (hi[0] < lo[0] || hi[1] < lo[1] || hi[2] < lo[2]) return;
+
+    if (t.zero_area) {
+        // A segment or a point. Walking its longest axis, each step touches a handful of voxels.
+        if constexpr (Rule == span_rule::conservative) {
+            for (std::int64_t w = lo[2]; w <= hi[2]; ++w) {
+                std::int64_t v_lo = lo[1], v_hi = hi[1], u_lo = lo[0], u_hi = hi[0];
+                // Rows run along the first coordinate of a projection, so (v, w) fits as it is and (w, u) is turned.
+                narrow_row(t.vw, Int{w}, v_lo, v_hi);
+                half_plane<Int> uw[3] = {{t.wu[0].b, t.wu[0].a, t.wu[0].c},
+                                         {t.wu[1].b, t.wu[1].a, t.wu[1].c},
+                                         {t.wu[2].b, t.wu[2].a, t.wu[2].c}};
+                narrow_row(uw, Int{w}, u_lo, u_hi);
+                if (u_lo > u_hi) continue;
+                for (std::int64_t v = v_lo; v <= v_hi; ++v) {
+                    std::int64_t a = u_lo, b = u_hi;
+                    narrow_row(t.uv, Int{v}, a, b);
+                    for (std::int64_t u = a; u <= b; ++u)
+                        emit(t.origin[0] + u, t.origin[1] + v, t.origin[2] + w, t.origin[2] + w);
+                }
+            }
+        }
+        return;
+    }
+
+    const Int nu = t.plane[0], nv = t.plane[1], nw = t.plane[2];
+    for (std::int64_t v = lo[1]; v <= hi[1]; ++v) {
+        std::int64_t u_lo = lo[0], u_hi = hi[0];
+        narrow_row(t.uv, Int{v}, u_lo, u_hi);
+        if (u_lo > u_hi) continue;
+        if constexpr (Rule == span_rule::thin) {
+            // floor of the plane's depth at the column's centre, everything doubled
+            stepped_floor<Int> depth(t.plane_high - nu * (2 * Int{u_lo} + 1) - nv * (2 * Int{v} + 1), 2 * nw);
+            for (std::int64_t u = u_lo;; ++u) {
+                if (depth.quotient >= lo[2] && depth.quotient <= hi[2]) {
+                    const std::int64_t w = t.origin[2] + static_cast<std::int64_t>(depth.quotient);
+                    emit(t.origin[0] + u, t.origin[1] + v, w, w);
+                }
+                if (u == u_hi) break;
+                depth.step(-2 * nu);
+            }
+        } else {
+            // Voxels whose slab the plane can pass within the column's square: its corners decide.
+            const Int row = nu * u_lo + nv * v;
+            stepped_floor<Int> first(t.plane_low - row - positive_part(nu) - positive_part(nv) - 1, nw);
+            stepped_floor<Int> last(t.plane_high - row - negative_part(nu) - negative_part(nv), nw);
+            for (std::int64_t u = u_lo;; ++u) {
+                Int w0 = first.quotient, w1 = last.quotient;
+                if (w0 < lo[2]) w0 = lo[2];
+                if (w1 > hi[2]) w1 = hi[2];
+                if constexpr (Rule == span_rule::conservative) {
+                    // The other two projections cut at most a voxel or two off the ends.
+                    const Int r0 = t.vw[0].a * v + t.vw[0].c, r1 = t.vw[1].a * v + t.vw[1].c,
+                              r2 = t.vw[2].a * v + t.vw[2].c;
+                    const Int s0 = t.wu[0].b * u + t.wu[0].c, s1 = t.wu[1].b * u + t.wu[1].c,
+                              s2 = t.wu[2].b * u + t.wu[2].c;
+                    const auto inside = [&](Int w) {
+                        return t.vw[0].b * w + r0 >= 0 && t.vw[1].b * w + r1 >= 0 && t.vw[2].b * w + r2 >= 0 &&
+                               t.wu[0].a * w + s0 >= 0 && t.wu[1].a * w + s1 >= 0 && t.wu[2].a * w + s2 >= 0;
+                    };
+                    while (w0 <= w1 && !inside(w0)) ++w0;
+                    while (w0 <= w1 && !inside(w1)) --w1;
+                }
+                if (w0 <= w1)
+                    emit(t.origin[0] + u, t.origin[1] + v, t.origin[2] + static_cast<std::int64_t>(w0),
+                         t.origin[2] + static_cast<std::int64_t>(w1));
+                if (u == u_hi) break;
+                first.step(-nu);
+                last.step(-nu);
+            }
+        }
+    }
+}
+
+[[nodiscard]] VOXELPIPE_HD
+constexpr span_rule to_rule(coverage c) { return c == coverage::thin ? span_rule::thin : span_rule::conservative; }
+
+// Whole path for one triangle: picks the integer width, sets up, enumerates. emit(setup, u, v, w_first, w_last) is
+// called with either width of setup.
+template <span_rule Rule, class Emit>
+VOXELPIPE_HD
+constexpr void rasterize(const snapped_position& a, const snapped_position& b, const snapped_position& c, int fraction,
+                         const voxel_box& clip, Emit&& emit) {
+    const auto run = [&](const auto& t) {
+        for_each_span<Rule>(
+            t, clip, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) { emit(t, u, v, w0, w1); });
+    };
+    if (fits_narrow(a, b, c, fraction))
+        run(setup_triangle<Rule, std::int64_t>(a, b, c, fraction));
+    else
+        run(setup_triangle<Rule, int128>(a, b, c, fraction));
+}
+
+} // namespace voxelpipe::core

@@ -1,0 +1,273 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Arithmetic with written-out roundings: the same bits from g++, clang and nvcc, host and device, under every
+// contraction flag and under -use_fast_math. The rule that a reviewer can see: no product feeds a bare + or -; it feeds
+// an fma. On the device the operations are inline PTX, which no compiler flag turns into approximate or flushing ones.
+// Also: exact integer helpers (floor division, floor shift) and conversions between integers and floats.
+
+#include <voxelpipe/config.hpp>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#if !defined(__CUDA_ARCH__) && defined(__SSE2__) && defined(__x86_64__)
+#include <emmintrin.h>
+#endif
+
+namespace voxelpipe {
+
+__extension__ typedef __int128 int128;
+__extension__ typedef unsigned __int128 uint128;
+
+namespace exact {
+
+// ---- float and double operations, one rounding each -----------------------------------------------------------------
+
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE float fma(float a, float b, float c) {
+#if defined(__CUDA_ARCH__)
+    float r;
+    asm("fma.rn.f32 %0, %1, %2, %3;" : "=f"(r) : "f"(a), "f"(b), "f"(c));
+    return r;
+#else
+    return __builtin_fmaf(a, b, c);
+#endif
+}
+
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE double fma(double a, double b, double c) {
+#if defined(__CUDA_ARCH__)
+    return __fma_rn(a, b, c);
+#else
+    return __builtin_fma(a, b, c);
+#endif
+}
+
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE float add(float a, float b) {
+#if defined(__CUDA_ARCH__)
+    float r;
+    asm("add.rn.f32 %0, %1, %2;" : "=f"(r) : "f"(a), "f"(b));
+    return r;
+#else
+    return a + b;
+#endif
+}
+
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE float sub(float a, float b) {
+#if defined(__CUDA_ARCH__)
+    float r;
+    asm("sub.rn.f32 %0, %1, %2;" : "=f"(r) : "f"(a), "f"(b));
+    return r;
+#else
+    return a - b;
+#endif
+}
+
+// The result must feed an fma, a function argument or memory, never a bare + or -.
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE float mul(float a, float b) {
+#if defined(__CUDA_ARCH__)
+    float r;
+    asm("mul.rn.f32 %0, %1, %2;" : "=f"(r) : "f"(a), "f"(b));
+    return r;
+#else
+    return a * b;
+#endif
+}
+
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE float div(float a, float b) {
+#if defined(__CUDA_ARCH__)
+    float r;
+    asm("div.rn.f32 %0, %1, %2;" : "=f"(r) : "f"(a), "f"(b));
+    return r;
+#else
+    return a / b;
+#endif
+}
+
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE double mul(double a, double b) {
+#if defined(__CUDA_ARCH__)
+    return __dmul_rn(a, b);
+#else
+    return a * b;
+#endif
+}
+
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE double div(double a, double b) {
+#if defined(__CUDA_ARCH__)
+    return __ddiv_rn(a, b);
+#else
+    return a / b;
+#endif
+}
+
+// Square root without a call that may set errno, so that an unused result costs nothing.
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE double sqrt(double a) {
+#if defined(__CUDA_ARCH__)
+    return __dsqrt_rn(a);
+#elif defined(__SSE2__) && defined(__x86_64__)
+    return _mm_cvtsd_f64(_mm_sqrt_sd(_mm_set_sd(0.0), _mm_set_sd(a)));
+#else
+    return std::sqrt(a);
+#endif
+}
+
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE float sqrt(float a) {
+#if defined(__CUDA_ARCH__)
+    float r;
+    asm("sqrt.rn.f32 %0, %1;" : "=f"(r) : "f"(a));
+    return r;
+#elif defined(__SSE2__) && defined(__x86_64__)
+    return _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(a)));
+#else
+    return std::sqrt(a);
+#endif
+}
+
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE double to_double(float a) {
+#if defined(__CUDA_ARCH__)
+    double r;
+    asm("cvt.f64.f32 %0, %1;" : "=d"(r) : "f"(a));
+    return r;
+#else
+    return static_cast<double>(a);
+#endif
+}
+
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE float to_float(double a) {
+#if defined(__CUDA_ARCH__)
+    float r;
+    asm("cvt.rn.f32.f64 %0, %1;" : "=f"(r) : "d"(a));
+    return r;
+#else
+    return static_cast<float>(a);
+#endif
+}
+
+// Nearest integer, ties to even. |a| < 2^63; the host runs in the default rounding mode.
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE std::int64_t round_to_int64(double a) {
+#if defined(__CUDA_ARCH__)
+    return __double2ll_rn(a);
+#elif defined(__SSE2__) && defined(__x86_64__)
+    return _mm_cvtsd_si64(_mm_set_sd(a));
+#else
+    return static_cast<std::int64_t>(std::llrint(a));
+#endif
+}
+
+// x*x' + y*y' + z*z' with three roundings: x*x', then two fused steps. V is any type with float members x, y, z.
+template <class V>
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE float dot(const V& a, const V& b) { return fma(a.z, b.z, fma(a.y, b.y, mul(a.x, b.x))); }
+
+// a + t*(b - a), two roundings; exact at t = 0 and wherever a == b.
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE float lerp(float a, float b, float t) { return fma(t, sub(b, a), a); }
+
+// ---- integers
+// --------------------------------------------------------------------------------------------------------
+
+// floor(a / 2^bits)
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD
+constexpr Int floor_shift(Int a, int bits) {
+    return a >> bits; // arithmetic in C++20
+}
+
+// ceil(a / 2^bits)
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD
+constexpr Int ceil_shift(Int a, int bits) { return -((-a) >> bits); }
+
+// floor(a / b), b > 0
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD
+constexpr Int floor_div(Int a, Int b) {
+    const Int q = a / b;
+    return q - static_cast<Int>(a % b < 0);
+}
+
+// ceil(a / b), b > 0
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD
+constexpr Int ceil_div(Int a, Int b) {
+    const Int q = a / b;
+    return q + static_cast<Int>(a % b > 0);
+}
+
+[[nodiscard]] VOXELPIPE_HD
+inline int bit_width(std::uint64_t a) {
+#if defined(__CUDA_ARCH__)
+    return 64 - __clzll(static_cast<long long>(a));
+#else
+    return static_cast<int>(std::bit_width(a));
+#endif
+}
+
+[[nodiscard]] VOXELPIPE_HD
+inline int bit_width(uint128 a) {
+    const auto high = static_cast<std::uint64_t>(a >> 64);
+    return high != 0 ? 64 + bit_width(high) : bit_width(static_cast<std::uint64_t>(a));
+}
+
+// Nearest integer multiple of 2^shift, in units of 2^shift, ties to even. 0 <= shift < 128.
+[[nodiscard]] VOXELPIPE_HD
+inline uint128 shift_right_rne(uint128 a, int shift) {
+    if (shift == 0) return a;
+    const uint128 quotient = a >> shift;
+    const uint128 rest = a & ((uint128{1} << shift) - 1);
+    const uint128 half = uint128{1} << (shift - 1);
+    return quotient + static_cast<uint128>(rest > half || (rest == half && (quotient & 1) != 0));
+}
+
+// magnitude * 2^exponent rounded once (to nearest, ties to even) to a float with `mantissa_bits` stored mantissa bits
+// and `exponent_bits` exponent bits; returns the bit pattern without sign. Overflow gives infinity, underflow is
+// gradual. 16-bit: (10, 5), float: (23, 8), double: (52, 11).
+[[nodiscard]] VOXELPIPE_HD
+inline std::uint64_t round_to_binary(uint128 magnitude, int exponent, int mantissa_bits, int exponent_bits) {
+    if (magnitude == 0) return 0;
+    const int bias = (1 << (exponent_bits - 1)) - 1;
+    const int width = bit_width(magnitude);
+    // Value is 1.xxx * 2^e; below the normal range the last place is fixed at 2^(1 - bias - mantissa_bits).
+    const int e = width - 1 + exponent;
+    const int last_place = (e > 1 - bias ? e : 1 - bias) - mantissa_bits;
+    const int shift = last_place - exponent;
+    uint128 mantissa = 0;
+    if (shift <= 0)
+        mantissa = magnitude << -shift;
+    else if (shift < 128)
+        mantissa = shift_right_rne(magnitude, shift);
+    // A mantissa with its top bit set carries the exponent by plain addition; so does a carry out of the rounding.
+    const std::uint64_t biased = e > 1 - bias ? static_cast<std::uint64_t>(e + bias - 1) : 0;
+    const std::uint64_t bits = (biased << mantissa_bits) + static_cast<std::uint64_t>(mantissa);
+    const std::uint64_t infinity = ((std::uint64_t{1} << exponent_bits) - 1) << mantissa_bits;
+    return bits < infinity ? bits : infinity;
+}
+
+// Nearest double, ties to even, of a wide integer (compilers and devices differ in how they convert __int128).
+[[nodiscard]] VOXELPIPE_HD
+inline double to_double(int128 a) {
+    const bool negative = a < 0;
+    const uint128 magnitude = negative ? uint128{0} - static_cast<uint128>(a) : static_cast<uint128>(a);
+    const std::uint64_t bits = round_to_binary(magnitude, 0, 52, 11) | (negative ? std::uint64_t{1} << 63 : 0);
+    return std::bit_cast<double>(bits);
+}
+
+[[nodiscard]] VOXELPIPE_HD
+VOXELPIPE_INLINE double to_double(std::int64_t a) { return static_cast<double>(a); }
+
+} // namespace exact
+} // namespace voxelpipe

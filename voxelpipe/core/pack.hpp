@@ -1,0 +1,112 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// pack: a tuple that host and device compilers treat alike, and array_view: a pointer with a length.
+
+#include <voxelpipe/config.hpp>
+
+#include <concepts>
+#include <cstddef>
+#include <iterator>
+#include <type_traits>
+#include <utility>
+
+namespace voxelpipe {
+
+namespace core {
+
+template <class... Ts>
+struct pack {};
+
+template <class First, class... Rest>
+struct pack<First, Rest...> {
+    First first;
+    [[no_unique_address]] pack<Rest...> rest;
+};
+
+template <std::size_t I, class... Ts>
+struct pack_element;
+template <class First, class... Rest>
+struct pack_element<0, First, Rest...> {
+    using type = First;
+};
+template <std::size_t I, class First, class... Rest>
+struct pack_element<I, First, Rest...> : pack_element<I - 1, Rest...> {};
+
+} // namespace core
+
+template <std::size_t I, class... Ts>
+[[nodiscard]] VOXELPIPE_HD
+constexpr auto& get(core::pack<Ts...>& p) {
+    static_assert(I < sizeof...(Ts), "voxelpipe::get: index past the end");
+    if constexpr (I == 0)
+        return p.first;
+    else
+        return get<I - 1>(p.rest);
+}
+
+template <std::size_t I, class... Ts>
+[[nodiscard]] VOXELPIPE_HD
+constexpr const auto& get(const core::pack<Ts...>& p) {
+    static_assert(I < sizeof...(Ts), "voxelpipe::get: index past the end");
+    if constexpr (I == 0)
+        return p.first;
+    else
+        return get<I - 1>(p.rest);
+}
+
+namespace core {
+
+[[nodiscard]] VOXELPIPE_HD
+constexpr pack<> make_pack() { return {}; }
+
+template <class First, class... Rest>
+[[nodiscard]] VOXELPIPE_HD
+constexpr pack<First, Rest...> make_pack(First first, Rest... rest) {
+    return {static_cast<First&&>(first), make_pack(static_cast<Rest&&>(rest)...)};
+}
+
+// Calls f.template operator()<I>() for I = 0 .. N - 1, in order.
+template <std::size_t N, class F>
+VOXELPIPE_HD
+constexpr void for_each_index(F&& f) {
+    [&]<std::size_t... I>(std::index_sequence<I...>) { (f.template operator()<I>(), ...); }
+    (std::make_index_sequence<N>{});
+}
+
+} // namespace core
+
+// A non-owning array; T may be const. Unlike std::span it can be used in device code without flags.
+template <class T>
+struct array_view {
+    T* elements = nullptr;
+    std::size_t count = 0;
+
+    constexpr array_view() = default;
+    VOXELPIPE_HD
+    constexpr array_view(T* elements_, std::size_t count_) : elements(elements_), count(count_) {}
+    // From any contiguous container of T on the host (std::vector, std::array, std::span). Does not own.
+    template <class Range>
+    requires(!std::is_same_v<std::remove_cvref_t<Range>, array_view> &&
+             requires(Range && r) {
+                 { std::data(r) } -> std::convertible_to<T*>;
+                 std::size(r);
+             }) constexpr array_view(Range&& r)
+        : elements(std::data(r)), count(std::size(r)) {} // NOLINT(*-explicit-*)
+
+    [[nodiscard]] VOXELPIPE_HD
+    constexpr T* data() const { return elements; }
+    [[nodiscard]] VOXELPIPE_HD
+    constexpr std::size_t size() const { return count; }
+    [[nodiscard]] VOXELPIPE_HD
+    constexpr bool empty() const { return count == 0; }
+    [[nodiscard]] VOXELPIPE_HD
+    constexpr T& operator[](std::size_t i) const { return elements[i]; }
+    [[nodiscard]] VOXELPIPE_HD
+    constexpr T* begin() const { return elements; }
+    [[nodiscard]] VOXELPIPE_HD
+    constexpr T* end() const { return elements + count; }
+};
+
+} // namespace voxelpipe

@@ -1,0 +1,215 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Vertex and fragment shaders: plain functors, checked when the pipeline is instantiated (paper section 3).
+//
+//   vertex shader    vertex_output<Varyings> operator()(const vertex<Attributes...>&) const   (or a bare glm::vec3)
+//   fragment shader  output<T...> operator()(const fragment<Varyings>&) const                 one value per render
+//   target
+//
+// Both are copied to where they run and called from many threads: const, trivially copyable, no side effects.
+
+#include <voxelpipe/core/interpolate.hpp>
+#include <voxelpipe/core/pack.hpp>
+#include <voxelpipe/grid.hpp>
+#include <voxelpipe/mesh.hpp>
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+#include <type_traits>
+
+namespace voxelpipe {
+
+struct no_varyings {};
+
+// ---- vertex shader
+// ---------------------------------------------------------------------------------------------------
+
+template <class... Attributes>
+struct vertex {
+    std::uint32_t index; // in its mesh
+    std::uint32_t draw;  // which draw of the call
+    glm::vec3 position;  // as the mesh has it
+    core::pack<Attributes...> attributes;
+};
+
+// Attribute I of the vertex.
+template <std::size_t I, class... Attributes>
+[[nodiscard]] VOXELPIPE_HD
+constexpr const auto& get(const vertex<Attributes...>& v) { return get<I>(v.attributes); }
+
+template <class Varyings = no_varyings>
+struct vertex_output {
+    glm::vec3 position; // world space
+    Varyings varyings{};
+};
+template <class Varyings>
+vertex_output(glm::vec3, Varyings) -> vertex_output<Varyings>;
+
+// Positions as they are, no varyings.
+struct passthrough {
+    template <class Vertex>
+    VOXELPIPE_HD
+    glm::vec3 operator()(const Vertex& v) const { return v.position; }
+};
+
+// Affine transform of a position, p.x * c0 + p.y * c1 + p.z * c2 + c3, as three fused steps a component.
+[[nodiscard]] VOXELPIPE_HD
+inline glm::vec3 transform_point(const glm::mat4& m, const glm::vec3& p) {
+    const auto row = [&](int i) {
+        return exact::fma(m[2][i], p.z, exact::fma(m[1][i], p.y, exact::fma(m[0][i], p.x, m[3][i])));
+    };
+    return {row(0), row(1), row(2)};
+}
+
+// Vertex shader that places a mesh by an affine matrix (last row 0 0 0 1); no varyings.
+struct transform {
+    glm::mat4 matrix{1.0f};
+    template <class Vertex>
+    VOXELPIPE_HD
+    glm::vec3 operator()(const Vertex& v) const { return transform_point(matrix, v.position); }
+};
+
+// ---- fragment shader
+// -------------------------------------------------------------------------------------------------
+
+// One triangle in one voxel. Barycentrics, varyings and depth-like values are taken at the centre of the voxel's column
+// along the triangle's dominant axis, projected onto the triangle's plane: they extrapolate where that centre lies
+// outside the triangle, and the clamped variants lie on it.
+template <class Varyings = no_varyings>
+struct fragment {
+    std::uint32_t triangle;  // in its mesh
+    std::uint32_t draw;      // which draw of the call
+    std::uint32_t primitive; // counts on through all draws: what replace and the A-buffer order by
+    int axis;                // dominant axis: 0 x, 1 y, 2 z
+    bool front_facing;       // counter-clockwise seen from +infinity on the dominant axis; true where the area is zero
+    glm::ivec3 voxel;        // index in the whole grid
+    glm::vec3 barycentric;   // weights of the triangle's three vertices; 1/3 each where the area is zero
+    glm::vec3 normal;        // unit, world space, right-handed winding; 0 where the area is zero
+    Varyings varyings;       // interpolated by `barycentric`
+
+    const Varyings* vertex_varyings[3]; // of the triangle's vertices
+
+    [[nodiscard]] VOXELPIPE_HD
+    glm::vec3 clamped_barycentric() const { return core::clamp_barycentric(barycentric); }
+    [[nodiscard]] VOXELPIPE_HD
+    Varyings clamped_varyings() const {
+        const glm::vec3 b = clamped_barycentric();
+        return core::mix(*vertex_varyings[0], *vertex_varyings[1], *vertex_varyings[2], b.y, b.z);
+    }
+};
+
+// What a fragment shader returns: one value per render target, in order; or nothing, where it discards the fragment.
+template <class... Ts>
+struct output {
+    core::pack<Ts...> values;
+    bool keep = true;
+
+    // The same values, thrown away where `condition` holds.
+    [[nodiscard]] VOXELPIPE_HD
+    constexpr output discard_if(bool condition) const { return {values, keep && !condition}; }
+};
+
+template <class... Ts>
+[[nodiscard]] VOXELPIPE_HD
+constexpr output<Ts...> outputs(Ts... values) { return {core::make_pack(values...)}; }
+
+// Fragment shader that gives every fragment the same values: solid<bool>{true}, or constant(1.0f, 1u).
+template <class... Ts>
+struct solid {
+    core::pack<Ts...> values;
+    template <class Fragment>
+    VOXELPIPE_HD
+    output<Ts...> operator()(const Fragment&) const { return {values}; }
+};
+template <class... Ts>
+[[nodiscard]] constexpr solid<Ts...> constant(Ts... values) {
+    return {core::make_pack(values...)};
+}
+
+namespace core {
+
+template <class T>
+struct vertex_result;
+template <>
+struct vertex_result<glm::vec3> {
+    using varyings = no_varyings;
+    VOXELPIPE_HD
+    static vertex_output<no_varyings> widen(const glm::vec3& p) { return {p, {}}; }
+};
+template <class Varyings>
+struct vertex_result<vertex_output<Varyings>> {
+    using varyings = Varyings;
+    VOXELPIPE_HD
+    static const vertex_output<Varyings>& widen(const vertex_output<Varyings>& v) { return v; }
+};
+
+template <class T>
+inline constexpr bool is_vertex_result = false;
+template <>
+inline constexpr bool is_vertex_result<glm::vec3> = true;
+template <class Varyings>
+inline constexpr bool is_vertex_result<vertex_output<Varyings>> = true;
+
+template <class T>
+inline constexpr bool is_output = false;
+template <class... Ts>
+inline constexpr bool is_output<output<Ts...>> = true;
+
+template <class T>
+inline constexpr bool is_solid = false;
+template <class... Ts>
+inline constexpr bool is_solid<solid<Ts...>> = true;
+
+template <class Mesh>
+struct mesh_vertex;
+template <class... Attributes>
+struct mesh_vertex<mesh_view<Attributes...>> {
+    using type = vertex<Attributes...>;
+};
+
+// The varyings that a vertex shader makes from a mesh's vertices; one readable line where it cannot be used.
+template <class Mesh, class VertexShader>
+struct shaded {
+    using vertex_type = typename mesh_vertex<Mesh>::type;
+    static_assert(std::is_trivially_copyable_v<VertexShader>, "voxelpipe: a vertex shader must be trivially copyable");
+    static_assert(std::is_invocable_v<const VertexShader&, const vertex_type&>,
+                  "voxelpipe: the vertex shader cannot be called with const vertex<Attributes...>& of this mesh "
+                  "(is its operator() const, and are the mesh's attributes the ones it reads?)");
+    using result = std::remove_cvref_t<std::invoke_result_t<const VertexShader&, const vertex_type&>>;
+    static_assert(is_vertex_result<result>,
+                  "voxelpipe: a vertex shader must return glm::vec3 or vertex_output<Varyings>");
+    using varyings = typename vertex_result<result>::varyings;
+    static_assert(is_varyings<varyings>(),
+                  "voxelpipe: varyings must be an aggregate of float, glm::vec2/3/4, std::array<float, N> or flat<T>");
+};
+
+template <class FragmentShader, class Varyings>
+struct fragment_result {
+    static_assert(std::is_trivially_copyable_v<FragmentShader>,
+                  "voxelpipe: a fragment shader must be trivially copyable");
+    static_assert(std::is_invocable_v<const FragmentShader&, const fragment<Varyings>&>,
+                  "voxelpipe: the fragment shader cannot be called with const fragment<Varyings>& "
+                  "(is its operator() const, and does it take the varyings that the vertex shader makes?)");
+    using type = std::remove_cvref_t<std::invoke_result_t<const FragmentShader&, const fragment<Varyings>&>>;
+    static_assert(is_output<type>,
+                  "voxelpipe: a fragment shader must return vp::outputs(...), one value per render target");
+};
+
+} // namespace core
+
+// ---- draws
+// -----------------------------------------------------------------------------------------------------------
+
+// A mesh with its shaders: the two functors carry the transform and the shader data. Does not own the mesh.
+template <class Mesh, class VertexShader, class FragmentShader>
+struct draw {
+    Mesh mesh;
+    VertexShader vertex_shader;
+    FragmentShader fragment_shader;
+};
+
+} // namespace voxelpipe

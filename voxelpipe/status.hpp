@@ -1,0 +1,153 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What a voxelize call reports: success, or which check failed at which stage, with counts. Nothing in the library
+// throws on bad input; or_throw() turns a status into an exception for those who like exceptions.
+
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+namespace voxelpipe {
+
+enum class status_code : std::uint8_t {
+    ok,
+    empty_mesh,         // no triangles in any draw
+    null_view,          // a view with elements but without memory, or a target that is on but has none
+    index_out_of_range, // a triangle names a vertex that the mesh does not have
+    attribute_mismatch, // a vertex attribute array is not as long as the positions
+    bad_extent,         // an extent that is zero or negative
+    extent_too_large,   // an extent above grid::max_extent
+    bad_origin,         // NaN or infinite
+    bad_voxel_size,     // zero, negative, NaN, infinite, or so small or large that the snapping scale is no number
+    extent_mismatch,    // the framebuffer is not as large as the grid
+    size_overflow,      // a buffer would have more bytes than this machine can address
+    too_many_triangles, // more than 2^32 - 1 in all draws together
+    out_of_memory,
+    capacity_exceeded, // the caller's workspace is too small; `required` says what is needed
+    no_device,
+    device_error, // `device_error` holds the CUDA error
+};
+
+enum class stage : std::uint8_t {
+    validate,
+    vertex_shade,
+    coarse_raster,
+    tile_sort,
+    tile_split,
+    fine_raster,
+    tile_resolve,
+    abuffer_emit,
+};
+
+// What went through the pipeline. A triangle is counted in exactly one of the fields from `triangles_outside` to
+// `triangles_drawn`; a fragment in exactly one of `fragments` and `fragments_discarded`.
+struct counters {
+    std::uint64_t triangles_in = 0;
+    std::uint64_t triangles_nonfinite = 0; // dropped: a position that is NaN or infinite
+    std::uint64_t triangles_too_far = 0;   // dropped: a position beyond 2^40 sub-voxel units
+    std::uint64_t triangles_zero_area = 0; // thin coverage only: zero area after snapping, gives no fragments
+    std::uint64_t triangles_outside = 0;   // bounding box misses the grid
+    std::uint64_t triangles_drawn = 0;
+    std::uint64_t fragments = 0;           // shaded and blended (or kept, in an A-buffer)
+    std::uint64_t fragments_discarded = 0; // by the fragment shader
+    std::uint64_t voxels = 0;              // that got at least one fragment; 0 where counting was switched off
+
+    [[nodiscard]] std::uint64_t triangles_dropped() const { return triangles_nonfinite + triangles_too_far; }
+    friend bool operator==(const counters&, const counters&) = default;
+};
+
+// Sizes that a caller's workspace must have; filled where `code` is capacity_exceeded.
+struct required_sizes {
+    std::uint64_t tile_pairs = 0;
+    std::uint64_t fragments = 0;
+    std::uint64_t bytes = 0;
+};
+
+[[nodiscard]] inline const char* to_string(status_code code) {
+    switch (code) {
+    case status_code::ok:
+        return "ok";
+    case status_code::empty_mesh:
+        return "empty mesh: no triangles in any draw";
+    case status_code::null_view:
+        return "null view: a non-empty array or an enabled target has no memory";
+    case status_code::index_out_of_range:
+        return "index out of range: a triangle names a vertex that does not exist";
+    case status_code::attribute_mismatch:
+        return "attribute mismatch: an attribute array is not as long as the positions";
+    case status_code::bad_extent:
+        return "bad extent: zero or negative";
+    case status_code::extent_too_large:
+        return "extent too large";
+    case status_code::bad_origin:
+        return "bad origin: NaN or infinite";
+    case status_code::bad_voxel_size:
+        return "bad voxel size: not a positive finite number of usable magnitude";
+    case status_code::extent_mismatch:
+        return "extent mismatch: framebuffer and grid differ";
+    case status_code::size_overflow:
+        return "size overflow: more bytes than can be addressed";
+    case status_code::too_many_triangles:
+        return "too many triangles: more than 2^32 - 1 in all draws";
+    case status_code::out_of_memory:
+        return "out of memory";
+    case status_code::capacity_exceeded:
+        return "capacity exceeded: see the required sizes";
+    case status_code::no_device:
+        return "no usable device";
+    case status_code::device_error:
+        return "device error";
+    }
+    return "unknown status";
+}
+
+[[nodiscard]] inline const char* to_string(stage where) {
+    switch (where) {
+    case stage::validate:
+        return "validate";
+    case stage::vertex_shade:
+        return "vertex shade";
+    case stage::coarse_raster:
+        return "coarse raster";
+    case stage::tile_sort:
+        return "tile sort";
+    case stage::tile_split:
+        return "tile split";
+    case stage::fine_raster:
+        return "fine raster";
+    case stage::tile_resolve:
+        return "tile resolve";
+    case stage::abuffer_emit:
+        return "A-buffer emit";
+    }
+    return "unknown stage";
+}
+
+struct [[nodiscard]] status {
+    status_code code = status_code::ok;
+    stage where = stage::validate; // the stage that failed; meaningless when ok
+    int device_error = 0;          // cudaError_t, 0 on the CPU
+    counters counts{};
+    required_sizes required{};
+
+    [[nodiscard]] bool ok() const { return code == status_code::ok; }
+    explicit operator bool() const { return ok(); }
+
+    // One line: what failed and where.
+    [[nodiscard]] std::string message() const {
+        if (ok()) return to_string(code);
+        std::string text = std::string(to_string(where)) + ": " + to_string(code);
+        if (device_error != 0) text += " (CUDA error " + std::to_string(device_error) + ")";
+        return text;
+    }
+
+    // Returns *this when ok; throws std::runtime_error with message() otherwise.
+    const status& or_throw() const {
+        if (!ok()) throw std::runtime_error("voxelpipe: " + message());
+        return *this;
+    }
+};
+
+} // namespace voxelpipe

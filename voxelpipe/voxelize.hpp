@@ -1,0 +1,187 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The one entry point: voxelize draws into a framebuffer or an A-buffer, on the backend whose tag is passed. Arguments
+// are checked here, on the host, before anything runs; a call that fails has written nothing.
+
+#include <voxelpipe/abuffer.hpp>
+#include <voxelpipe/framebuffer.hpp>
+#include <voxelpipe/grid.hpp>
+#include <voxelpipe/mesh.hpp>
+#include <voxelpipe/shader.hpp>
+#include <voxelpipe/status.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <new>
+#include <span>
+#include <type_traits>
+
+namespace voxelpipe {
+
+struct voxelize_options {
+    coverage rule = coverage::conservative;
+    bool count_voxels = true; // fill counters::voxels; costs a bit per voxel of a tile
+
+    voxelize_options() = default;
+    voxelize_options(coverage rule_, bool count_voxels_ = true) // NOLINT(*-explicit-*): a coverage is enough
+        : rule(rule_), count_voxels(count_voxels_) {}
+};
+
+namespace core {
+
+template <class Output, class... Targets>
+struct outputs_match;
+template <class... Ts, class... Targets>
+struct outputs_match<output<Ts...>, Targets...> {
+    static_assert(sizeof...(Ts) == sizeof...(Targets),
+                  "voxelpipe: the fragment shader must return one value per render target of the framebuffer");
+    template <class T, class Target>
+    static consteval bool one() {
+        constexpr bool same = std::is_same_v<T, typename Target::value_type>;
+        constexpr bool counts = std::is_same_v<typename Target::blend_type, blend::count>;
+        static_assert(same || counts, "voxelpipe: a fragment shader output has another type than its render target "
+                                      "(bool for bit; no conversion is made: write the type that you mean)");
+        return same || counts;
+    }
+    static consteval bool check() {
+        if constexpr (sizeof...(Ts) == sizeof...(Targets)) return (one<Ts, Targets>() && ...);
+        return false;
+    }
+    static constexpr bool value = check();
+};
+
+template <class Output, class Payload>
+struct payload_matches;
+template <class... Ts, class Payload>
+struct payload_matches<output<Ts...>, Payload> {
+    static consteval bool check() {
+        if constexpr (std::is_void_v<Payload>) {
+            return true; // values are ignored; discard still counts
+        } else {
+            static_assert(sizeof...(Ts) == 1,
+                          "voxelpipe: a fragment shader for an A-buffer must return one value, its payload");
+            if constexpr (sizeof...(Ts) == 1) {
+                constexpr bool same = (std::is_same_v<Ts, Payload> && ...);
+                static_assert(same,
+                              "voxelpipe: the fragment shader's output has another type than the A-buffer's payload");
+                return same;
+            }
+            return false;
+        }
+    }
+    static constexpr bool value = check();
+};
+
+[[nodiscard]] inline status failure(status_code code, stage where = stage::validate) {
+    status s;
+    s.code = code;
+    s.where = where;
+    return s;
+}
+
+// Everything about the draws that can be told without reading them. Fills counts.triangles_in.
+template <class Mesh, class VertexShader, class FragmentShader>
+[[nodiscard]] status validate_draws(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws) {
+    std::uint64_t triangles = 0;
+    for (const auto& d : draws) {
+        const Mesh& m = d.mesh;
+        if ((m.positions.data() == nullptr && m.positions.size() != 0) ||
+            (m.triangles.data() == nullptr && m.triangles.size() != 0))
+            return failure(status_code::null_view);
+        if (m.positions.size() > std::numeric_limits<std::uint32_t>::max()) return failure(status_code::size_overflow);
+        status_code attributes = status_code::ok;
+        for_each_index<Mesh::num_attributes>([&]<std::size_t I>() {
+            const auto& a = voxelpipe::get<I>(m.attributes);
+            if (a.size() != m.positions.size())
+                attributes = status_code::attribute_mismatch;
+            else if (a.data() == nullptr && a.size() != 0)
+                attributes = status_code::null_view;
+        });
+        if (attributes != status_code::ok) return failure(attributes);
+        if (m.triangles.size() > std::numeric_limits<std::uint32_t>::max() - triangles)
+            return failure(status_code::too_many_triangles);
+        triangles += m.triangles.size();
+    }
+    if (triangles == 0) return failure(status_code::empty_mesh);
+    status s;
+    s.counts.triangles_in = triangles;
+    return s;
+}
+
+template <class... Targets>
+[[nodiscard]] status validate_framebuffer(const framebuffer_view<Targets...>& fb, const grid& g) {
+    if (fb.extent != g.extent) return failure(status_code::extent_mismatch);
+    status_code code = status_code::ok;
+    for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        const auto& t = voxelpipe::get<I>(fb.targets);
+        using target_type = typename pack_element<I, Targets...>::type;
+        if (t.load == load_operation::off || code != status_code::ok) return;
+        if (!fits_memory<target_type>(g.extent))
+            code = status_code::size_overflow;
+        else if (t.extent != g.extent)
+            code = status_code::extent_mismatch;
+        else if (t.elements == nullptr)
+            code = status_code::null_view;
+    });
+    return code == status_code::ok ? status{} : failure(code);
+}
+
+} // namespace core
+
+// Draws meshes into render targets. The draws share one type of mesh, vertex and fragment shader; their data differ.
+// Draw i's triangles come before draw i + 1's: that is the order of blend::replace. Returns after the work is done; on
+// a GPU backend that is one wait.
+template <class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
+[[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
+                              const grid& g, const framebuffer_view<Targets...>& fb, voxelize_options options = {}) {
+    using varyings = typename core::shaded<Mesh, VertexShader>::varyings;
+    static_assert(
+        core::outputs_match<typename core::fragment_result<FragmentShader, varyings>::type, Targets...>::value,
+        "voxelpipe: fragment shader and render targets do not match");
+    if (const status s = validate(g); !s.ok()) return s;
+    if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
+    const status s = core::validate_draws(draws);
+    if (!s.ok()) return s;
+    return backend.run(draws, g, fb, options, s.counts.triangles_in);
+}
+
+template <class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
+[[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
+                              const grid& g, framebuffer<Backend, Targets...>& fb, voxelize_options options = {}) {
+    return voxelize(backend, draws, g, fb.view(), options);
+}
+
+// Draws meshes into an A-buffer. The fragment shader's one output is the payload; values are ignored where it is void.
+template <class Backend, class Mesh, class VertexShader, class FragmentShader, class Payload>
+[[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
+                              const grid& g, abuffer<Backend, Payload>& lists, voxelize_options options = {}) {
+    using varyings = typename core::shaded<Mesh, VertexShader>::varyings;
+    static_assert(core::payload_matches<typename core::fragment_result<FragmentShader, varyings>::type, Payload>::value,
+                  "voxelpipe: fragment shader and A-buffer payload do not match");
+    if (const status s = validate(g); !s.ok()) return s;
+    const status s = core::validate_draws(draws);
+    if (!s.ok()) return s;
+    return backend.run(draws, g, lists, options, s.counts.triangles_in);
+}
+
+// One mesh, into a framebuffer, a framebuffer_view or an A-buffer.
+template <class Backend, class... Attributes, class VertexShader, class FragmentShader, class Output>
+[[nodiscard]] status voxelize(Backend& backend, const mesh_view<Attributes...>& mesh, const grid& g,
+                              const VertexShader& vertex_shader, const FragmentShader& fragment_shader, Output&& out,
+                              voxelize_options options = {}) {
+    using draw_type = draw<mesh_view<Attributes...>, VertexShader, FragmentShader>;
+    const draw_type d{mesh, vertex_shader, fragment_shader};
+    return voxelize(backend, std::span<const draw_type>(&d, 1), g, out, options);
+}
+
+template <class Backend, class... Attributes, class VertexShader, class FragmentShader, class Output>
+[[nodiscard]] status voxelize(Backend& backend, const mesh<Backend, Attributes...>& m, const grid& g,
+                              const VertexShader& vertex_shader, const FragmentShader& fragment_shader, Output&& out,
+                              voxelize_options options = {}) {
+    return voxelize(backend, m.view(), g, vertex_shader, fragment_shader, out, options);
+}
+
+} // namespace voxelpipe

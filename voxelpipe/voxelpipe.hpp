@@ -1,0 +1,17 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The whole library: mesh -> vertex shader -> triangle setup -> coarse raster -> tile sort -> tile split -> fine raster
+// -> blend -> framebuffer / A-buffer. A plain C++20 compiler gets everything but the GPU; the CPU backend is
+// <cpu_ref/backend.hpp>.
+
+#include <voxelpipe/abuffer.hpp>
+#include <voxelpipe/blend.hpp>
+#include <voxelpipe/config.hpp>
+#include <voxelpipe/framebuffer.hpp>
+#include <voxelpipe/grid.hpp>
+#include <voxelpipe/mesh.hpp>
+#include <voxelpipe/shader.hpp>
+#include <voxelpipe/status.hpp>
+#include <voxelpipe/voxelize.hpp>
