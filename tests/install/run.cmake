@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Builds and runs consumer/ in one WAY:
+#   find_package   cmake --install into a prefix of its own, find_package(voxelpipe) from there
+#   no_nvcc        the same, with no CUDA compiler to be found, and a configure of the project itself without one
+#   bare_compiler  the same prefix, one compiler call and no CMake
+#   fetch_content  FetchContent of the source tree as a subproject
+cmake_minimum_required(VERSION 3.24)
+
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    list(JOIN ARGN " " line)
+    message(FATAL_ERROR "failed (${result}): ${line}\n${output}")
+  endif()
+  set(run_output "${output}" PARENT_SCOPE)
+endfunction()
+
+file(REMOVE_RECURSE "${WORK_DIR}")
+file(MAKE_DIRECTORY "${WORK_DIR}")
+set(prefix "${WORK_DIR}/prefix")
+set(build "${WORK_DIR}/build")
+set(consumer "${CMAKE_CURRENT_LIST_DIR}/consumer")
+
+if(NOT WAY STREQUAL "fetch_content")
+  run("${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${prefix}" --component voxelpipe)
+endif()
+
+if(WAY STREQUAL "bare_compiler")
+  string(REPLACE "|" ";" includes "${INCLUDES}")
+  list(TRANSFORM includes PREPEND "-I")
+  separate_arguments(flags UNIX_COMMAND "${CXX_FLAGS}")
+  run("${CXX_COMPILER}" -std=c++20 ${flags} "-I${prefix}/include" ${includes} "${consumer}/main.cpp"
+      "${consumer}/second_unit.cpp" -pthread -o "${WORK_DIR}/consumer")
+  run("${WORK_DIR}/consumer")
+  return()
+endif()
+
+# Not exported to the consumer: what the parent's environment sets for CUDA.
+set(environment "${CMAKE_COMMAND}" -E env)
+if(WAY STREQUAL "no_nvcc")
+  list(APPEND environment --unset=CUDACXX --unset=CUDA_PATH --unset=CUDA_HOME PATH=/usr/bin:/bin)
+endif()
+set(configure ${environment} "${CMAKE_COMMAND}" -G "${GENERATOR}" "-DCMAKE_CXX_COMPILER=${CXX_COMPILER}"
+              "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}" "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}" -DCMAKE_BUILD_TYPE=Release)
+
+if(WAY STREQUAL "fetch_content")
+  run(${configure} -S "${consumer}" -B "${build}" -DCONSUMER_USES=FetchContent
+      "-DFETCHCONTENT_SOURCE_DIR_VOXELPIPE=${SOURCE_DIR}" "-DCMAKE_PREFIX_PATH=${PREFIX_PATH}")
+  # A subproject brings its library alone: no tests, no tool, no install rules.
+  file(STRINGS "${build}/CMakeCache.txt" built REGEX "^VOXELPIPE_(BUILD_TESTS|BUILD_SAMPLES|BUILD_BENCH|INSTALL):.*=ON$")
+  if(built)
+    message(FATAL_ERROR "a subproject must not build: ${built}")
+  endif()
+else()
+  run(${configure} -S "${consumer}" -B "${build}" -DCONSUMER_USES=find_package
+      "-DCMAKE_PREFIX_PATH=${prefix};${PREFIX_PATH}")
+endif()
+if(WAY STREQUAL "no_nvcc")
+  # AUTO in a place where nvcc cannot be found.
+  run(${configure} -S "${SOURCE_DIR}" -B "${WORK_DIR}/project" -DVOXELPIPE_ENABLE_CUDA=AUTO
+      "-DCMAKE_PREFIX_PATH=${PREFIX_PATH}")
+  if(NOT run_output MATCHES "CUDA OFF")
+    message(FATAL_ERROR "CUDA should be off where there is no nvcc:\n${run_output}")
+  endif()
+endif()
+run(${environment} "${CMAKE_COMMAND}" --build "${build}")
+run("${build}/consumer")
+message(STATUS "${run_output}")
