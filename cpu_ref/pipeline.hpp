@@ -207,8 +207,8 @@ template <coverage Rule>
     return equal(1, 2) && equal(2, 0) && equal(0, 1);
 }
 
-// Calls emit(tile) for each tile that the triangle has work in: exactly the tiles whose closed box it meets
-// (conservative), or the tiles that its plane passes within its columns (thin).
+// Calls emit(tile) for each tile that the triangle may have work in: the only tile of its reach, or those of its reach
+// whose closed box it meets (conservative), or that its plane passes within its columns of tiles (thin).
 template <coverage Rule, class Emit>
 void for_each_tile(const core::snapped_position& a, const core::snapped_position& b, const core::snapped_position& c,
                    int fraction, const core::voxel_box& reach, const core::tile_grid& tiles, Emit&& emit) {

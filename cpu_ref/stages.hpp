@@ -43,8 +43,10 @@ struct coarse_output {
     std::vector<tile_pair> pairs;       // by primitive
 };
 
-// Coarse raster with tiles of 2^log2_tile_size voxels. Conservative: exactly the tiles whose closed box meets the
-// triangle. Thin: the tiles that the triangle's plane passes within its columns of tiles, zero-area triangles in none.
+// Coarse raster with tiles of 2^log2_tile_size voxels. A triangle whose reach (its bounding box, for thin coverage one
+// voxel wider, cut to the grid) lies in one tile is paired with that tile. Any other, conservative: with exactly the
+// tiles of its reach whose closed box it meets; thin: with the tiles of its reach that its plane passes within its
+// columns of tiles. Zero-area triangles have no thin pairs.
 template <class Mesh, class VertexShader, class FragmentShader>
 [[nodiscard]] coarse_output tile_pairs(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                                        coverage rule, int log2_tile_size) {
