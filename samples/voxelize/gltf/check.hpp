@@ -1,0 +1,43 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// JSON text -> the part of the document that the loader uses, every type, range, reference and length checked. tinygltf
+// accepts wrong types in silence, drops primitives that it cannot parse and trusts references; so it is given the
+// reduced text that this leaves, in which all of that has been settled, and never the file itself.
+
+#include "budget.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace voxelize::gltf {
+
+struct buffer_source {
+    std::uint64_t byte_length = 0;  // as declared; every buffer view lies inside it
+    std::optional<std::string> uri; // none: the BIN chunk where it is the first buffer, otherwise no data
+};
+
+// Neither a uri nor a view: the picture is in an extension that is not known.
+struct image_source {
+    std::string name;
+    std::optional<std::string> uri;
+    std::optional<std::uint32_t> buffer_view;
+};
+
+struct checked_document {
+    std::string json; // for tinygltf: without buffers, images, animations, skins, cameras, extras
+    std::vector<buffer_source> buffers;
+    std::vector<image_source> images;
+    // Per accessor: it has no buffer view of its own, its base values are zero. (tinygltf insists on a view for
+    // indices, so the reduced text gives them one that is never read.)
+    std::vector<bool> zero_base;
+};
+
+// Throws gltf_error with the path of the first thing that is wrong; appends to warnings what is left out.
+[[nodiscard]] checked_document check_document(std::string_view json_text, bool has_binary_chunk, budget& memory,
+                                              std::vector<std::string>& warnings);
+
+} // namespace voxelize::gltf

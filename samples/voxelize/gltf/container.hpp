@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The outermost layer: a .glb is split into its JSON text and binary chunk, a .gltf is JSON text as it stands. Which of
+// the two a file is, its first four bytes say, not its name.
+
+#include "../gltf_scene.hpp"
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace voxelize::gltf {
+
+// Views into the bytes given to split_container.
+struct container {
+    std::string_view json;
+    std::span<const std::byte> binary; // of the BIN chunk; empty where there is none
+    bool has_binary = false;
+};
+
+// Every length is checked against the bytes that are there. Throws gltf_error; appends to warnings what is harmless.
+[[nodiscard]] container split_container(std::span<const std::byte> bytes, std::vector<std::string>& warnings);
+
+// Refuses text that no sane file holds before a parser sees it: longer than limits.max_json_bytes, or nested deeper
+// than 128 levels.
+void check_json_text(std::string_view json, const gltf_limits& limits);
+
+} // namespace voxelize::gltf

@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What each glTF extension means for a voxelization: one table.
+
+#include <array>
+#include <string_view>
+
+namespace voxelize::gltf {
+
+enum class extension_effect {
+    honoured,   // implemented here, or without any effect on geometry and base colour
+    appearance, // changes how the surface looks: a warning
+    fallback,   // other geometry data, but a file may bring a plain copy: an error only where it is required
+    lost,       // geometry would be missing: an error wherever it is used
+    unknown     // not in the table: a warning, an error where it is required
+};
+
+// extensionsUsed / extensionsRequired name -> effect. KHR_materials_*, the other vendors' materials and all texture
+// formats count as appearance.
+[[nodiscard]] constexpr extension_effect effect_of(std::string_view name) {
+    struct rule {
+        std::string_view name;
+        extension_effect effect;
+    };
+    constexpr std::array rules{
+        rule{"KHR_texture_transform", extension_effect::honoured},
+        rule{"KHR_mesh_quantization", extension_effect::honoured},
+        rule{"KHR_materials_unlit", extension_effect::honoured},
+        rule{"KHR_lights_punctual", extension_effect::honoured},
+        rule{"KHR_xmp", extension_effect::honoured},
+        rule{"KHR_xmp_json_ld", extension_effect::honoured},
+        rule{"KHR_draco_mesh_compression", extension_effect::fallback},
+        rule{"EXT_meshopt_compression", extension_effect::fallback},
+        rule{"KHR_meshopt_compression", extension_effect::fallback},
+        rule{"MESHOPT_compression", extension_effect::fallback},
+        rule{"EXT_mesh_gpu_instancing", extension_effect::lost},
+        rule{"KHR_texture_basisu", extension_effect::appearance},
+        rule{"EXT_texture_webp", extension_effect::appearance},
+        rule{"EXT_texture_avif", extension_effect::appearance},
+        rule{"MSFT_texture_dds", extension_effect::appearance},
+        rule{"EXT_lights_image_based", extension_effect::appearance},
+        rule{"KHR_techniques_webgl", extension_effect::appearance},
+    };
+    for (const rule& known : rules)
+        if (known.name == name) return known.effect;
+    for (const std::string_view prefix : {"KHR_materials_", "EXT_materials_", "ADOBE_materials_"})
+        if (name.substr(0, prefix.size()) == prefix) return extension_effect::appearance;
+    return extension_effect::unknown;
+}
+
+} // namespace voxelize::gltf

@@ -1,0 +1,109 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "materials.hpp"
+
+#include "text.hpp"
+
+#include <cmath>
+
+namespace voxelize::gltf {
+
+namespace {
+
+wrap_mode wrap_of(int value) {
+    if (value == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return wrap_mode::clamp_to_edge;
+    if (value == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT) return wrap_mode::mirrored_repeat;
+    return wrap_mode::repeat;
+}
+
+texture_coordinates coordinates_of(const tinygltf::TextureInfo& info) {
+    texture_coordinates result;
+    result.set = info.texCoord;
+    const auto found = info.extensions.find("KHR_texture_transform");
+    if (found == info.extensions.end()) return result;
+    const tinygltf::Value& transform = found->second;
+    const auto pair = [&](const char* key, double fallback) {
+        if (!transform.Has(key)) return std::array{fallback, fallback};
+        return std::array{transform.Get(key).Get(0).GetNumberAsDouble(), transform.Get(key).Get(1).GetNumberAsDouble()};
+    };
+    const auto offset = pair("offset", 0);
+    const auto scale = pair("scale", 1);
+    const double angle = transform.Has("rotation") ? transform.Get("rotation").GetNumberAsDouble() : 0;
+    if (transform.Has("texCoord")) result.set = transform.Get("texCoord").GetNumberAsInt();
+    // Counter-clockwise as one sees it in the picture, where v runs downwards: that is what the extension's prose and
+    // every viewer do, its GLSL listing has the sign the other way round. Scale first, then rotation, then offset.
+    const double c = std::cos(angle);
+    const double s = std::sin(angle);
+    result.m = {c * scale[0], s * scale[1], offset[0], -s * scale[0], c * scale[1], offset[1]};
+    return result;
+}
+
+} // namespace
+
+void material_reader::read_factors() {
+    for (const tinygltf::Material& source : model_.materials) {
+        material result;
+        result.name = printable(source.name);
+        for (int i = 0; i < 4; ++i)
+            result.base_color[i] = static_cast<float>(source.pbrMetallicRoughness.baseColorFactor[std::size_t(i)]);
+        if (source.alphaMode == "MASK") result.alpha = alpha_mode::mask;
+        if (source.alphaMode == "BLEND") result.alpha = alpha_mode::blend;
+        result.alpha_cutoff = static_cast<float>(source.alphaCutoff);
+        result.double_sided = source.doubleSided;
+        scene_.materials.push_back(std::move(result));
+    }
+}
+
+std::optional<texture_coordinates> material_reader::read_texture(std::size_t material_index) {
+    const tinygltf::TextureInfo& info = model_.materials[material_index].pbrMetallicRoughness.baseColorTexture;
+    if (info.index < 0) return std::nullopt;
+    const std::int32_t texture = scene_texture(static_cast<std::size_t>(info.index));
+    scene_.materials[material_index].texture = texture;
+    if (texture == material::no_texture) return std::nullopt;
+    return coordinates_of(info);
+}
+
+std::int32_t material_reader::scene_texture(std::size_t index) {
+    std::optional<std::int32_t>& result = texture_of_[index];
+    if (result) return *result;
+    result = material::no_texture;
+    const tinygltf::Texture& source = model_.textures[index];
+    if (source.source < 0) {
+        scene_.warnings.push_back("textures[" + std::to_string(index) +
+                                  "] has no picture in a supported format: the colour factor is used alone");
+        return *result;
+    }
+    const std::int32_t image = scene_image(static_cast<std::size_t>(source.source));
+    if (image == material::no_texture) return *result;
+    texture entry;
+    entry.image = static_cast<std::uint32_t>(image);
+    if (source.sampler >= 0) {
+        const tinygltf::Sampler& sampler = model_.samplers[static_cast<std::size_t>(source.sampler)];
+        entry.wrap_s = wrap_of(sampler.wrapS);
+        entry.wrap_t = wrap_of(sampler.wrapT);
+        // There is no minification without mip levels: the magnification filter decides, linear where none is given.
+        if (sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST) entry.filter = filter_mode::nearest;
+    }
+    result = static_cast<std::int32_t>(scene_.textures.size());
+    scene_.textures.push_back(entry);
+    return *result;
+}
+
+std::int32_t material_reader::scene_image(std::size_t index) {
+    if (index >= image_of_.size()) image_of_.resize(index + 1);
+    std::optional<std::int32_t>& result = image_of_[index];
+    if (result) return *result;
+    result = material::no_texture;
+    try {
+        const std::optional<std::uint32_t> view = bytes_.image_view(index);
+        scene_.images.push_back(
+            bytes_.decode_image(index, view ? accessors_.view(*view) : std::span<const std::byte>{}));
+        result = static_cast<std::int32_t>(scene_.images.size() - 1);
+    } catch (const gltf_error& error) {
+        scene_.warnings.push_back("images[" + std::to_string(index) + "] cannot be used: " + error.what() +
+                                  "; the colour factor is used alone");
+    }
+    return *result;
+}
+
+} // namespace voxelize::gltf

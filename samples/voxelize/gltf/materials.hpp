@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// glTF materials -> the base colour part of them, with the textures that it needs. A texture that cannot be had is a
+// warning, not an error: no geometry is lost, the colour factor stands alone.
+
+#include "accessor.hpp"
+
+#include "../scene.hpp"
+
+#include <tiny_gltf.h>
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace voxelize::gltf {
+
+// How the base-colour texture of a material is reached from a primitive's attributes.
+struct texture_coordinates {
+    int set = 0; // TEXCOORD_<set>
+    // u' = m[0] u + m[1] v + m[2],  v' = m[3] u + m[4] v + m[5]
+    std::array<double, 6> m{1, 0, 0, 0, 1, 0};
+};
+
+class material_reader {
+public:
+    material_reader(const tinygltf::Model& model, const accessor_reader& accessors, const resources& bytes,
+                    scene& result)
+        : model_{model}, accessors_{accessors}, bytes_{bytes}, scene_{result}, texture_of_(model.textures.size()),
+          image_of_(model.textures.size()) {}
+
+    // Fills scene.materials with the file's, all without their textures.
+    void read_factors();
+
+    // Called for each material that is shown: decodes its texture the first time, sets material.texture, and gives the
+    // coordinates to use, or nothing where there is no texture.
+    [[nodiscard]] std::optional<texture_coordinates> read_texture(std::size_t material);
+
+private:
+    [[nodiscard]] std::int32_t scene_texture(std::size_t texture);
+    [[nodiscard]] std::int32_t scene_image(std::size_t image);
+
+    const tinygltf::Model& model_;
+    const accessor_reader& accessors_;
+    const resources& bytes_;
+    scene& scene_;
+    // glTF index -> scene index once it has been tried; material::no_texture where it cannot be had.
+    std::vector<std::optional<std::int32_t>> texture_of_;
+    std::vector<std::optional<std::int32_t>> image_of_;
+};
+
+} // namespace voxelize::gltf

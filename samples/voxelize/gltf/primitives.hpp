@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A glTF primitive under a node's transform -> world-space triangles with the attributes that the tool uses.
+
+#include "accessor.hpp"
+#include "affine.hpp"
+#include "materials.hpp"
+
+#include "../scene.hpp"
+
+#include <tiny_gltf.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace voxelize::gltf {
+
+// The number of triangles of MODE (a TINYGLTF_MODE_*) with COUNT indices; a rest too short for a triangle is dropped.
+[[nodiscard]] std::uint64_t triangle_count(int mode, std::uint64_t count);
+
+// The triangles themselves, indices given by INDICES or, where it is empty, counting up to COUNT. Strips and fans keep
+// the winding of their first triangle; their degenerate triangles (two equal indices), which only stitch pieces
+// together, are dropped. MIRROR exchanges front and back.
+[[nodiscard]] std::vector<glm::uvec3> unrolled(int mode, const std::vector<std::uint32_t>& indices, std::uint64_t count,
+                                               bool mirror);
+
+class primitive_reader {
+public:
+    primitive_reader(const tinygltf::Model& model, const accessor_reader& accessors, material_reader& materials,
+                     budget& memory, scene& result)
+        : model_{model}, accessors_{accessors}, materials_{materials}, memory_{memory}, scene_{result} {}
+
+    // Appends primitive PART of mesh MESH to the scene; warns instead where it has no triangles.
+    void read(std::size_t mesh, std::size_t part, const affine& to_world);
+
+    // Appends the warnings that are counted over the whole file.
+    void finish();
+
+private:
+    [[nodiscard]] const tinygltf::Accessor* attribute(const tinygltf::Primitive& source, const std::string& name,
+                                                      std::size_t vertices, const std::string& where) const;
+    void read_positions(primitive& result, const tinygltf::Primitive& source, const affine& to_world,
+                        const std::string& where);
+    void read_texcoords(primitive& result, const tinygltf::Primitive& source, const std::string& where);
+    void read_colors(primitive& result, const tinygltf::Primitive& source, const std::string& where) const;
+    [[nodiscard]] std::uint32_t material_index(const tinygltf::Primitive& source);
+
+    const tinygltf::Model& model_;
+    const accessor_reader& accessors_;
+    material_reader& materials_;
+    budget& memory_;
+    scene& scene_;
+    std::map<std::string, std::uint64_t> counted_; // warning -> how often
+};
+
+} // namespace voxelize::gltf

@@ -1,0 +1,198 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "resources.hpp"
+
+#include "text.hpp"
+
+#include <stb_image.h>
+#include <tiny_gltf.h>
+
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <system_error>
+
+namespace voxelize::gltf {
+
+namespace {
+
+std::vector<std::byte> decode_data_uri(const std::string& uri) {
+    if (!tinygltf::IsDataURI(uri)) throw gltf_error("a data URI that is not base64 of a known media type");
+    std::vector<unsigned char> decoded;
+    std::string media_type;
+    if (!tinygltf::DecodeDataURI(&decoded, media_type, uri, 0, false))
+        throw gltf_error("a data URI without valid base64 data");
+    std::vector<std::byte> bytes(decoded.size());
+    std::memcpy(bytes.data(), decoded.data(), decoded.size());
+    return bytes;
+}
+
+int hex_digit(char c) {
+    if (c >= '0' && c <= '9') return c - '0';
+    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+    return -1;
+}
+
+std::string percent_decoded(std::string_view uri) {
+    std::string text;
+    for (std::size_t i = 0; i < uri.size(); ++i) {
+        if (uri[i] == '%' && i + 2 < uri.size() && hex_digit(uri[i + 1]) >= 0 && hex_digit(uri[i + 2]) >= 0) {
+            text += static_cast<char>(hex_digit(uri[i + 1]) * 16 + hex_digit(uri[i + 2]));
+            i += 2;
+        } else {
+            text += uri[i];
+        }
+    }
+    return text;
+}
+
+// A relative path that stays inside the folder; anything else, and every URI with a scheme, is refused.
+std::filesystem::path local_path(const std::string& uri) {
+    const std::string text = percent_decoded(uri);
+    if (text.empty()) throw gltf_error("an empty file name");
+    if (text.find('\0') != std::string::npos) throw gltf_error("a file name with a zero byte");
+    if (const std::size_t colon = text.find(':'); colon != std::string::npos && text.find('/') > colon)
+        throw gltf_error("not a relative path");
+    const std::filesystem::path path = std::filesystem::path(text).lexically_normal();
+    if (path.is_absolute() || text.front() == '\\') throw gltf_error("not a relative path");
+    if (path.begin()->string() == "..") throw gltf_error("a path that leaves the folder of the file");
+    return path;
+}
+
+enum class picture_format { png, jpeg };
+
+std::optional<picture_format> format_of(std::span<const std::byte> bytes) {
+    const auto starts_with = [&](std::string_view magic) {
+        return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
+    };
+    if (starts_with("\x89PNG\r\n\x1a\n")) return picture_format::png;
+    if (starts_with("\xFF\xD8\xFF")) return picture_format::jpeg;
+    return std::nullopt;
+}
+
+// A picture may take 64 MiB, or 1024 times its encoded size, whichever is more: deflate cannot do better on channels of
+// 8 bits. Colour values of less than a byte can, and are no loss.
+void check_picture_size(std::uint64_t width, std::uint64_t height, std::uint64_t encoded_bytes,
+                        const gltf_limits& limits) {
+    const std::string size = std::to_string(width) + " x " + std::to_string(height);
+    if (width > limits.max_image_side || height > limits.max_image_side)
+        throw gltf_error("its " + size + " pixels are more than " + std::to_string(limits.max_image_side) + " a side");
+    const std::uint64_t allowed = (std::uint64_t{64} << 20) + 1024 * encoded_bytes;
+    if (width * height * 4 > allowed)
+        throw gltf_error("its " + size + " pixels cannot come from " + std::to_string(encoded_bytes) + " bytes");
+}
+
+} // namespace
+
+resources::resources(const checked_document& document, std::span<const std::byte> binary, bool has_binary,
+                     const gltf_file_reader& read_file, budget& memory)
+    : document_{document}, read_file_{read_file}, memory_{memory} {
+    owned_.reserve(document.buffers.size());
+    for (std::size_t index = 0; index < document.buffers.size(); ++index) {
+        const buffer_source& source = document.buffers[index];
+        std::span<const std::byte> bytes;
+        if (source.uri) {
+            try {
+                owned_.push_back(fetch(*source.uri));
+            } catch (const gltf_error& error) {
+                throw gltf_error("buffers[" + std::to_string(index) + "].uri " + in_quotes(*source.uri) + ": " +
+                                 error.what());
+            }
+            bytes = owned_.back();
+        } else if (index == 0 && has_binary) {
+            bytes = binary;
+        } else {
+            buffers_.emplace_back();
+            continue;
+        }
+        if (bytes.size() < source.byte_length)
+            throw gltf_error("buffers[" + std::to_string(index) + "]: byteLength says " +
+                             std::to_string(source.byte_length) + ", the data has " + std::to_string(bytes.size()));
+        buffers_.push_back(bytes.first(source.byte_length));
+    }
+}
+
+std::span<const std::byte> resources::buffer(std::size_t index) const {
+    if (buffers_[index].empty()) throw gltf_error("buffers[" + std::to_string(index) + "] has no data");
+    return buffers_[index];
+}
+
+std::vector<std::byte> resources::fetch(const std::string& uri) const {
+    if (uri.starts_with("data:")) return decode_data_uri(uri);
+    const std::filesystem::path path = local_path(uri);
+    if (!read_file_) throw gltf_error("other files are not read");
+    std::vector<std::byte> bytes = read_file_(path, memory_.limits().max_file_bytes);
+    memory_.grant_input(bytes.size());
+    return bytes;
+}
+
+image resources::decode_image(std::size_t index, std::span<const std::byte> view_bytes) const {
+    const image_source& source = document_.images[index];
+    std::vector<std::byte> fetched;
+    std::span<const std::byte> bytes = view_bytes;
+    if (source.uri) {
+        try {
+            fetched = fetch(*source.uri);
+        } catch (const gltf_error& error) {
+            throw gltf_error(in_quotes(*source.uri) + ": " + error.what());
+        }
+        bytes = fetched;
+    } else if (!source.buffer_view) {
+        throw gltf_error("it is stored in a format that is not supported");
+    }
+    if (!format_of(bytes)) throw gltf_error("it is neither PNG nor JPEG");
+    if (bytes.size() > INT32_MAX) throw gltf_error("it is larger than 2 GiB");
+
+    const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
+    const int size = static_cast<int>(bytes.size());
+    const auto reason = [] { return printable(stbi_failure_reason() != nullptr ? stbi_failure_reason() : "unknown"); };
+    int width = 0;
+    int height = 0;
+    int channels = 0;
+    if (stbi_info_from_memory(data, size, &width, &height, &channels) == 0 || width < 1 || height < 1)
+        throw gltf_error("it cannot be decoded (" + reason() + ")");
+    check_picture_size(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), bytes.size(),
+                       memory_.limits());
+    const std::uint64_t pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+    memory_.charge(pixels, 4, "images[" + std::to_string(index) + "]");
+    struct free_pixels {
+        void operator()(stbi_uc* pixels) const { stbi_image_free(pixels); }
+    };
+    const std::unique_ptr<stbi_uc, free_pixels> decoded{
+        stbi_load_from_memory(data, size, &width, &height, &channels, 4)};
+    if (!decoded) throw gltf_error("it cannot be decoded (" + reason() + ")");
+    image picture;
+    picture.name = source.name;
+    picture.width = static_cast<std::uint32_t>(width);
+    picture.height = static_cast<std::uint32_t>(height);
+    picture.rgba.assign(decoded.get(), decoded.get() + pixels * 4);
+    return picture;
+}
+
+gltf_file_reader folder_reader(std::filesystem::path folder) {
+    return [folder = std::move(folder)](const std::filesystem::path& relative, std::uint64_t max_bytes) {
+        return read_whole_file(folder / relative, max_bytes);
+    };
+}
+
+std::vector<std::byte> read_whole_file(const std::filesystem::path& file, std::uint64_t max_bytes) {
+    std::error_code error;
+    const std::filesystem::file_status status = std::filesystem::status(file, error);
+    if (!std::filesystem::exists(status)) throw gltf_error("no such file");
+    if (!std::filesystem::is_regular_file(status)) throw gltf_error("not a regular file");
+    const std::uintmax_t size = std::filesystem::file_size(file, error);
+    if (error) throw gltf_error("cannot be read: " + error.message());
+    if (size > max_bytes)
+        throw gltf_error("has " + std::to_string(size) + " bytes, more than the " + std::to_string(max_bytes) +
+                         " allowed");
+    std::ifstream stream(file, std::ios::binary);
+    std::vector<std::byte> bytes(static_cast<std::size_t>(size));
+    if (!stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)) && size != 0)
+        throw gltf_error("cannot be read");
+    return bytes;
+}
+
+} // namespace voxelize::gltf

@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The bytes behind a document: buffers and pictures, from the BIN chunk, from data URIs and from files in the folder of
+// the .gltf (never outside it). tinygltf is given no file system: it would read any path, wants files of exactly the
+// declared length and copies all of them.
+
+#include "budget.hpp"
+#include "check.hpp"
+
+#include "../scene.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace voxelize::gltf {
+
+class resources {
+public:
+    // Loads every buffer; a buffer that is missing or shorter than declared is a gltf_error. BINARY is a view into the
+    // caller's bytes and must outlive this; DOCUMENT too.
+    resources(const checked_document& document, std::span<const std::byte> binary, bool has_binary,
+              const gltf_file_reader& read_file, budget& memory);
+
+    // Bytes of buffer INDEX, byte_length of them as declared; throws gltf_error for a placeholder without data.
+    [[nodiscard]] std::span<const std::byte> buffer(std::size_t index) const;
+
+    // The buffer view that picture INDEX lies in, if it lies in one.
+    [[nodiscard]] std::optional<std::uint32_t> image_view(std::size_t index) const {
+        return document_.images[index].buffer_view;
+    }
+
+    // Decodes picture INDEX, PNG or JPEG. VIEW_BYTES are those of its buffer view where it has one. Throws gltf_error
+    // with the reason; the caller decides whether that is fatal.
+    [[nodiscard]] image decode_image(std::size_t index, std::span<const std::byte> view_bytes) const;
+
+private:
+    [[nodiscard]] std::vector<std::byte> fetch(const std::string& uri) const;
+
+    const checked_document& document_;
+    const gltf_file_reader& read_file_;
+    budget& memory_;
+    std::vector<std::vector<std::byte>> owned_;
+    std::vector<std::span<const std::byte>> buffers_; // empty: a placeholder
+};
+
+// Reads files below FOLDER, which need not exist for files that name no others.
+[[nodiscard]] gltf_file_reader folder_reader(std::filesystem::path folder);
+
+// The whole of FILE, refused by name where it is no regular file or larger than MAX_BYTES.
+[[nodiscard]] std::vector<std::byte> read_whole_file(const std::filesystem::path& file, std::uint64_t max_bytes);
+
+} // namespace voxelize::gltf

@@ -1,0 +1,73 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "gltf_scene.hpp"
+
+#include "gltf/accessor.hpp"
+#include "gltf/budget.hpp"
+#include "gltf/check.hpp"
+#include "gltf/container.hpp"
+#include "gltf/materials.hpp"
+#include "gltf/nodes.hpp"
+#include "gltf/primitives.hpp"
+#include "gltf/resources.hpp"
+#include "gltf/text.hpp"
+
+#include <tiny_gltf.h>
+
+#include <new>
+#include <utility>
+
+namespace voxelize {
+
+namespace {
+
+tinygltf::Model parse(const gltf::checked_document& document) {
+    tinygltf::Model model;
+    tinygltf::TinyGLTF parser;
+    std::string error;
+    std::string warning;
+    if (!parser.LoadASCIIFromString(&model, &error, &warning, document.json.data(),
+                                    static_cast<unsigned int>(document.json.size()), ""))
+        throw gltf_error("tinygltf: " + gltf::printable(error.substr(0, error.find('\n')), 200));
+    return model;
+}
+
+scene load(std::span<const std::byte> bytes, const gltf_file_reader& read_file, const gltf_limits& limits) {
+    scene result;
+    gltf::budget memory{limits};
+    memory.grant_input(bytes.size());
+    const gltf::container parts = gltf::split_container(bytes, result.warnings);
+    const gltf::checked_document document = gltf::check_document(parts.json, parts.has_binary, memory, result.warnings);
+    const gltf::resources resources{document, parts.binary, parts.has_binary, read_file, memory};
+    const tinygltf::Model model = parse(document);
+    const gltf::accessor_reader accessors{model, document, resources, memory};
+    gltf::material_reader materials{model, accessors, resources, result};
+    materials.read_factors();
+    gltf::primitive_reader primitives{model, accessors, materials, memory, result};
+    for (const gltf::shown_mesh& shown : gltf::shown_meshes(model, result.warnings))
+        for (std::size_t part = 0; part < model.meshes[shown.mesh].primitives.size(); ++part)
+            primitives.read(shown.mesh, part, shown.to_world);
+    primitives.finish();
+    return result;
+}
+
+} // namespace
+
+scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_file, const gltf_limits& limits) {
+    try {
+        return load(bytes, read_file, limits);
+    } catch (const gltf_error&) {
+        throw;
+    } catch (const std::bad_alloc&) {
+        throw gltf_error("not enough memory to load the file");
+    } catch (const std::exception& error) { // nothing of the libraries underneath gets past
+        throw gltf_error(gltf::printable(error.what(), 200));
+    }
+}
+
+scene load_gltf(const std::filesystem::path& file, const gltf_limits& limits) {
+    const std::vector<std::byte> bytes = gltf::read_whole_file(file, limits.max_file_bytes);
+    return load_gltf(bytes, gltf::folder_reader(file.parent_path()), limits);
+}
+
+} // namespace voxelize

@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// glTF 2.0 (.gltf and .glb) -> scene. What a file may ask for is bounded by its own size before any memory is taken:
+// a malformed or hostile file gives a gltf_error of one line, never a crash, a hang or a huge allocation.
+//
+// Positions are taken as the file gives them after node transforms: no axis swap, no recentring. Node matrices are
+// composed in double and a position is rounded to float once, with every operation written out, so the same file gives
+// the same bits whatever the compiler's floating-point flags.
+//
+// What is not supported: where geometry would be lost (Draco or meshopt compression, GPU instancing, required
+// extensions that are not known) the load fails and says so; otherwise scene::warnings names it. Skinned meshes stand
+// in their bind pose under their node's transform, morph targets at their base shape, animations at rest; points and
+// lines have no surface and are left out.
+
+#include "scene.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace voxelize {
+
+// Why a file cannot be loaded: one line without control characters, for a person.
+struct gltf_error : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+// Bounds on what a file may make the loader do. Memory for decoded data (vertices, triangles, pictures) may reach
+// base_memory + memory_per_input_byte * (bytes read), so an instancing or decompression bomb is refused by name.
+struct gltf_limits {
+    std::uint64_t max_file_bytes = std::uint64_t{8} << 30;
+    std::uint64_t max_json_bytes = std::uint64_t{1} << 30;
+    std::uint64_t base_memory = std::uint64_t{256} << 20;
+    std::uint64_t memory_per_input_byte = 256;
+    std::uint32_t max_image_side = 16384; // pixels
+};
+
+// Gives the bytes of a file that a .gltf names. The path is relative, normalised, percent-decoded and never leaves
+// the folder of the .gltf. Throws gltf_error with the bare reason where the file cannot be had.
+using gltf_file_reader =
+    std::function<std::vector<std::byte>(const std::filesystem::path& relative, std::uint64_t max_bytes)>;
+
+// Loads FILE; a .gltf finds its buffers and images in its own folder or below it. Throws gltf_error.
+[[nodiscard]] scene load_gltf(const std::filesystem::path& file, const gltf_limits& limits = {});
+
+// The same from memory. Without a reader a file that names other files is refused. Throws gltf_error.
+[[nodiscard]] scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_file = {},
+                              const gltf_limits& limits = {});
+
+} // namespace voxelize
