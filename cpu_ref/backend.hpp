@@ -44,7 +44,8 @@ public:
             void operator()(T* p) const { std::free(p); }
         };
         static T* allocate(std::size_t count) {
-            static_assert(std::is_trivially_copyable_v<T>);
+            static_assert(std::is_trivially_copyable_v<T>,
+                          "voxelpipe: what a backend stores must be trivially copyable");
             if (count == 0) return nullptr;
             constexpr std::size_t alignment = 64;
             if (count > (std::numeric_limits<std::size_t>::max() - alignment) / sizeof(T)) throw std::bad_alloc();

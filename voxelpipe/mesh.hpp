@@ -19,7 +19,8 @@ namespace voxelpipe {
 
 template <class... Attributes>
 struct mesh_view {
-    static_assert((std::is_trivially_copyable_v<Attributes> && ...), "vertex attributes must be trivially copyable");
+    static_assert((std::is_trivially_copyable_v<Attributes> && ...),
+                  "voxelpipe: vertex attributes must be trivially copyable");
     static constexpr std::size_t num_attributes = sizeof...(Attributes);
 
     array_view<const glm::vec3> positions;                       // one per vertex

@@ -38,8 +38,9 @@ struct vertex {
 
 // Attribute I of the vertex.
 template <std::size_t I, class... Attributes>
-[[nodiscard]] VOXELPIPE_HD
-constexpr const auto& get(const vertex<Attributes...>& v) { return get<I>(v.attributes); }
+[[nodiscard]] VOXELPIPE_HD constexpr const auto& get(const vertex<Attributes...>& v) {
+    return get<I>(v.attributes);
+}
 
 template <class Varyings = no_varyings>
 struct vertex_output {
@@ -52,13 +53,13 @@ vertex_output(glm::vec3, Varyings) -> vertex_output<Varyings>;
 // Positions as they are, no varyings.
 struct passthrough {
     template <class Vertex>
-    VOXELPIPE_HD
-    glm::vec3 operator()(const Vertex& v) const { return v.position; }
+    VOXELPIPE_HD glm::vec3 operator()(const Vertex& v) const {
+        return v.position;
+    }
 };
 
 // Affine transform of a position, p.x * c0 + p.y * c1 + p.z * c2 + c3, as three fused steps a component.
-[[nodiscard]] VOXELPIPE_HD
-inline glm::vec3 transform_point(const glm::mat4& m, const glm::vec3& p) {
+[[nodiscard]] VOXELPIPE_HD inline glm::vec3 transform_point(const glm::mat4& m, const glm::vec3& p) {
     const auto row = [&](int i) {
         return exact::fma(m[2][i], p.z, exact::fma(m[1][i], p.y, exact::fma(m[0][i], p.x, m[3][i])));
     };
@@ -69,8 +70,9 @@ inline glm::vec3 transform_point(const glm::mat4& m, const glm::vec3& p) {
 struct transform {
     glm::mat4 matrix{1.0f};
     template <class Vertex>
-    VOXELPIPE_HD
-    glm::vec3 operator()(const Vertex& v) const { return transform_point(matrix, v.position); }
+    VOXELPIPE_HD glm::vec3 operator()(const Vertex& v) const {
+        return transform_point(matrix, v.position);
+    }
 };
 
 // ---- fragment shader
@@ -93,10 +95,8 @@ struct fragment {
 
     const Varyings* vertex_varyings[3]; // of the triangle's vertices
 
-    [[nodiscard]] VOXELPIPE_HD
-    glm::vec3 clamped_barycentric() const { return core::clamp_barycentric(barycentric); }
-    [[nodiscard]] VOXELPIPE_HD
-    Varyings clamped_varyings() const {
+    [[nodiscard]] VOXELPIPE_HD glm::vec3 clamped_barycentric() const { return core::clamp_barycentric(barycentric); }
+    [[nodiscard]] VOXELPIPE_HD Varyings clamped_varyings() const {
         const glm::vec3 b = clamped_barycentric();
         return core::mix(*vertex_varyings[0], *vertex_varyings[1], *vertex_varyings[2], b.y, b.z);
     }
@@ -109,21 +109,24 @@ struct output {
     bool keep = true;
 
     // The same values, thrown away where `condition` holds.
-    [[nodiscard]] VOXELPIPE_HD
-    constexpr output discard_if(bool condition) const { return {values, keep && !condition}; }
+    [[nodiscard]] VOXELPIPE_HD constexpr output discard_if(bool condition) const {
+        return {values, keep && !condition};
+    }
 };
 
 template <class... Ts>
-[[nodiscard]] VOXELPIPE_HD
-constexpr output<Ts...> outputs(Ts... values) { return {core::make_pack(values...)}; }
+[[nodiscard]] VOXELPIPE_HD constexpr output<Ts...> outputs(Ts... values) {
+    return {core::make_pack(values...)};
+}
 
 // Fragment shader that gives every fragment the same values: solid<bool>{true}, or constant(1.0f, 1u).
 template <class... Ts>
 struct solid {
     core::pack<Ts...> values;
     template <class Fragment>
-    VOXELPIPE_HD
-    output<Ts...> operator()(const Fragment&) const { return {values}; }
+    VOXELPIPE_HD output<Ts...> operator()(const Fragment&) const {
+        return {values};
+    }
 };
 template <class... Ts>
 [[nodiscard]] constexpr solid<Ts...> constant(Ts... values) {
@@ -171,33 +174,62 @@ struct mesh_vertex<mesh_view<Attributes...>> {
     using type = vertex<Attributes...>;
 };
 
-// The varyings that a vertex shader makes from a mesh's vertices; one readable line where it cannot be used.
+// What a vertex shader makes from a mesh's vertices, and what a fragment shader makes of that; only for shaders that
+// check_shaders accepts.
+template <class Mesh, class VertexShader>
+using shaded_vertex =
+    std::remove_cvref_t<std::invoke_result_t<const VertexShader&, const typename mesh_vertex<Mesh>::type&>>;
 template <class Mesh, class VertexShader>
 struct shaded {
+    using varyings = typename vertex_result<shaded_vertex<Mesh, VertexShader>>::varyings;
+};
+template <class Mesh, class VertexShader, class FragmentShader>
+using shader_output = std::remove_cvref_t<
+    std::invoke_result_t<const FragmentShader&, const fragment<typename shaded<Mesh, VertexShader>::varyings>&>>;
+
+// True where both shaders can be used with the mesh; otherwise one readable line says why not: nothing that depends on
+// a failed check is instantiated.
+template <class Mesh, class VertexShader>
+[[nodiscard]] constexpr bool check_vertex_shader() {
     using vertex_type = typename mesh_vertex<Mesh>::type;
-    static_assert(std::is_trivially_copyable_v<VertexShader>, "voxelpipe: a vertex shader must be trivially copyable");
-    static_assert(std::is_invocable_v<const VertexShader&, const vertex_type&>,
+    constexpr bool copyable = std::is_trivially_copyable_v<VertexShader>;
+    static_assert(copyable, "voxelpipe: a vertex shader must be trivially copyable");
+    constexpr bool callable = std::is_invocable_v<const VertexShader&, const vertex_type&>;
+    static_assert(callable,
                   "voxelpipe: the vertex shader cannot be called with const vertex<Attributes...>& of this mesh "
                   "(is its operator() const, and are the mesh's attributes the ones it reads?)");
-    using result = std::remove_cvref_t<std::invoke_result_t<const VertexShader&, const vertex_type&>>;
-    static_assert(is_vertex_result<result>,
-                  "voxelpipe: a vertex shader must return glm::vec3 or vertex_output<Varyings>");
-    using varyings = typename vertex_result<result>::varyings;
-    static_assert(is_varyings<varyings>(),
-                  "voxelpipe: varyings must be an aggregate of float, glm::vec2/3/4, std::array<float, N> or flat<T>");
-};
+    if constexpr (copyable && callable) {
+        constexpr bool known = is_vertex_result<shaded_vertex<Mesh, VertexShader>>;
+        static_assert(known, "voxelpipe: a vertex shader must return glm::vec3 or vertex_output<Varyings>");
+        if constexpr (known) {
+            constexpr bool interpolable = is_varyings<typename shaded<Mesh, VertexShader>::varyings>();
+            static_assert(interpolable, "voxelpipe: varyings must be an aggregate of float, glm::vec2/3/4, "
+                                        "std::array<float, N> or flat<T>");
+            return interpolable;
+        }
+    }
+    return false;
+}
 
-template <class FragmentShader, class Varyings>
-struct fragment_result {
-    static_assert(std::is_trivially_copyable_v<FragmentShader>,
-                  "voxelpipe: a fragment shader must be trivially copyable");
-    static_assert(std::is_invocable_v<const FragmentShader&, const fragment<Varyings>&>,
-                  "voxelpipe: the fragment shader cannot be called with const fragment<Varyings>& "
-                  "(is its operator() const, and does it take the varyings that the vertex shader makes?)");
-    using type = std::remove_cvref_t<std::invoke_result_t<const FragmentShader&, const fragment<Varyings>&>>;
-    static_assert(is_output<type>,
-                  "voxelpipe: a fragment shader must return vp::outputs(...), one value per render target");
-};
+template <class Mesh, class VertexShader, class FragmentShader>
+[[nodiscard]] constexpr bool check_shaders() {
+    if constexpr (check_vertex_shader<Mesh, VertexShader>()) {
+        using varyings = typename shaded<Mesh, VertexShader>::varyings;
+        constexpr bool copyable = std::is_trivially_copyable_v<FragmentShader>;
+        static_assert(copyable, "voxelpipe: a fragment shader must be trivially copyable");
+        constexpr bool callable = std::is_invocable_v<const FragmentShader&, const fragment<varyings>&>;
+        static_assert(callable,
+                      "voxelpipe: the fragment shader cannot be called with const fragment<Varyings>& "
+                      "(is its operator() const, and does it take the varyings that the vertex shader makes?)");
+        if constexpr (copyable && callable) {
+            constexpr bool gives_output = is_output<shader_output<Mesh, VertexShader, FragmentShader>>;
+            static_assert(gives_output,
+                          "voxelpipe: a fragment shader must return vp::outputs(...), one value per render target");
+            return gives_output;
+        }
+    }
+    return false;
+}
 
 } // namespace core
 

@@ -32,38 +32,37 @@ struct voxelize_options {
 
 namespace core {
 
-template <class Output, class... Targets>
-struct outputs_match;
-template <class... Ts, class... Targets>
-struct outputs_match<output<Ts...>, Targets...> {
-    static_assert(sizeof...(Ts) == sizeof...(Targets),
-                  "voxelpipe: the fragment shader must return one value per render target of the framebuffer");
+// Checks of shaders against what they draw into. Each stops at its first mistake and what depends on it is not
+// instantiated, so that a mistake is one line of the compiler's output.
+template <class Output>
+struct output_check;
+template <class... Ts>
+struct output_check<output<Ts...>> {
     template <class T, class Target>
-    static consteval bool one() {
+    static constexpr bool matches() {
         constexpr bool same = std::is_same_v<T, typename Target::value_type>;
         constexpr bool counts = std::is_same_v<typename Target::blend_type, blend::count>;
         static_assert(same || counts, "voxelpipe: a fragment shader output has another type than its render target "
                                       "(bool for bit; no conversion is made: write the type that you mean)");
         return same || counts;
     }
-    static consteval bool check() {
-        if constexpr (sizeof...(Ts) == sizeof...(Targets)) return (one<Ts, Targets>() && ...);
+    template <class... Targets>
+    static constexpr bool fits_targets() {
+        constexpr bool one_each = sizeof...(Ts) == sizeof...(Targets);
+        static_assert(one_each,
+                      "voxelpipe: the fragment shader must return one value per render target of the framebuffer");
+        if constexpr (one_each) return (matches<Ts, Targets>() && ...);
         return false;
     }
-    static constexpr bool value = check();
-};
-
-template <class Output, class Payload>
-struct payload_matches;
-template <class... Ts, class Payload>
-struct payload_matches<output<Ts...>, Payload> {
-    static consteval bool check() {
+    // Where the payload is void, values are ignored; discard still counts.
+    template <class Payload>
+    static constexpr bool fits_payload() {
         if constexpr (std::is_void_v<Payload>) {
-            return true; // values are ignored; discard still counts
+            return true;
         } else {
-            static_assert(sizeof...(Ts) == 1,
-                          "voxelpipe: a fragment shader for an A-buffer must return one value, its payload");
-            if constexpr (sizeof...(Ts) == 1) {
+            constexpr bool one = sizeof...(Ts) == 1;
+            static_assert(one, "voxelpipe: a fragment shader for an A-buffer must return one value, its payload");
+            if constexpr (one) {
                 constexpr bool same = (std::is_same_v<Ts, Payload> && ...);
                 static_assert(same,
                               "voxelpipe: the fragment shader's output has another type than the A-buffer's payload");
@@ -72,8 +71,21 @@ struct payload_matches<output<Ts...>, Payload> {
             return false;
         }
     }
-    static constexpr bool value = check();
 };
+
+template <class Mesh, class VertexShader, class FragmentShader, class... Targets>
+[[nodiscard]] constexpr bool shaders_fit_targets() {
+    if constexpr (check_shaders<Mesh, VertexShader, FragmentShader>())
+        return output_check<shader_output<Mesh, VertexShader, FragmentShader>>::template fits_targets<Targets...>();
+    return false;
+}
+
+template <class Mesh, class VertexShader, class FragmentShader, class Payload>
+[[nodiscard]] constexpr bool shaders_fit_payload() {
+    if constexpr (check_shaders<Mesh, VertexShader, FragmentShader>())
+        return output_check<shader_output<Mesh, VertexShader, FragmentShader>>::template fits_payload<Payload>();
+    return false;
+}
 
 [[nodiscard]] inline status failure(status_code code, stage where = stage::validate) {
     status s;
@@ -137,15 +149,15 @@ template <class... Targets>
 template <class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, const framebuffer_view<Targets...>& fb, voxelize_options options = {}) {
-    using varyings = typename core::shaded<Mesh, VertexShader>::varyings;
-    static_assert(
-        core::outputs_match<typename core::fragment_result<FragmentShader, varyings>::type, Targets...>::value,
-        "voxelpipe: fragment shader and render targets do not match");
-    if (const status s = validate(g); !s.ok()) return s;
-    if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
-    const status s = core::validate_draws(draws);
-    if (!s.ok()) return s;
-    return backend.run(draws, g, fb, options, s.counts.triangles_in);
+    if constexpr (core::shaders_fit_targets<Mesh, VertexShader, FragmentShader, Targets...>()) {
+        if (const status s = validate(g); !s.ok()) return s;
+        if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
+        const status s = core::validate_draws(draws);
+        if (!s.ok()) return s;
+        return backend.run(draws, g, fb, options, s.counts.triangles_in);
+    } else {
+        return {}; // does not compile: a static_assert has said why
+    }
 }
 
 template <class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
@@ -158,13 +170,14 @@ template <class Backend, class Mesh, class VertexShader, class FragmentShader, c
 template <class Backend, class Mesh, class VertexShader, class FragmentShader, class Payload>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, abuffer<Backend, Payload>& lists, voxelize_options options = {}) {
-    using varyings = typename core::shaded<Mesh, VertexShader>::varyings;
-    static_assert(core::payload_matches<typename core::fragment_result<FragmentShader, varyings>::type, Payload>::value,
-                  "voxelpipe: fragment shader and A-buffer payload do not match");
-    if (const status s = validate(g); !s.ok()) return s;
-    const status s = core::validate_draws(draws);
-    if (!s.ok()) return s;
-    return backend.run(draws, g, lists, options, s.counts.triangles_in);
+    if constexpr (core::shaders_fit_payload<Mesh, VertexShader, FragmentShader, Payload>()) {
+        if (const status s = validate(g); !s.ok()) return s;
+        const status s = core::validate_draws(draws);
+        if (!s.ok()) return s;
+        return backend.run(draws, g, lists, options, s.counts.triangles_in);
+    } else {
+        return {}; // does not compile: a static_assert has said why
+    }
 }
 
 // One mesh, into a framebuffer, a framebuffer_view or an A-buffer.

@@ -9,10 +9,11 @@ struct shader {
     VOXELPIPE_HD
     glm::vec3 operator()(const vp::vertex<float>& v) const {
 #ifndef VOXELPIPE_CONTROL
-        return v.position * vp::get<1>(v);
+        static_cast<void>(vp::get<1>(v));
 #else
-        return v.position * vp::get<0>(v);
+        static_cast<void>(vp::get<0>(v));
 #endif
+        return v.position;
     }
 };
 

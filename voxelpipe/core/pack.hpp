@@ -37,20 +37,22 @@ struct pack_element<I, First, Rest...> : pack_element<I - 1, Rest...> {};
 } // namespace core
 
 template <std::size_t I, class... Ts>
-[[nodiscard]] VOXELPIPE_HD
-constexpr auto& get(core::pack<Ts...>& p) {
+[[nodiscard]] VOXELPIPE_HD constexpr auto& get(core::pack<Ts...>& p) {
     static_assert(I < sizeof...(Ts), "voxelpipe::get: index past the end");
-    if constexpr (I == 0)
+    if constexpr (I >= sizeof...(Ts))
+        return p; // does not compile; without a second error
+    else if constexpr (I == 0)
         return p.first;
     else
         return get<I - 1>(p.rest);
 }
 
 template <std::size_t I, class... Ts>
-[[nodiscard]] VOXELPIPE_HD
-constexpr const auto& get(const core::pack<Ts...>& p) {
+[[nodiscard]] VOXELPIPE_HD constexpr const auto& get(const core::pack<Ts...>& p) {
     static_assert(I < sizeof...(Ts), "voxelpipe::get: index past the end");
-    if constexpr (I == 0)
+    if constexpr (I >= sizeof...(Ts))
+        return p; // does not compile; without a second error
+    else if constexpr (I == 0)
         return p.first;
     else
         return get<I - 1>(p.rest);
@@ -58,19 +60,16 @@ constexpr const auto& get(const core::pack<Ts...>& p) {
 
 namespace core {
 
-[[nodiscard]] VOXELPIPE_HD
-constexpr pack<> make_pack() { return {}; }
+[[nodiscard]] VOXELPIPE_HD constexpr pack<> make_pack() { return {}; }
 
 template <class First, class... Rest>
-[[nodiscard]] VOXELPIPE_HD
-constexpr pack<First, Rest...> make_pack(First first, Rest... rest) {
+[[nodiscard]] VOXELPIPE_HD constexpr pack<First, Rest...> make_pack(First first, Rest... rest) {
     return {static_cast<First&&>(first), make_pack(static_cast<Rest&&>(rest)...)};
 }
 
 // Calls f.template operator()<I>() for I = 0 .. N - 1, in order.
 template <std::size_t N, class F>
-VOXELPIPE_HD
-constexpr void for_each_index(F&& f) {
+VOXELPIPE_HD constexpr void for_each_index(F&& f) {
     [&]<std::size_t... I>(std::index_sequence<I...>) { (f.template operator()<I>(), ...); }
     (std::make_index_sequence<N>{});
 }
@@ -95,18 +94,12 @@ struct array_view {
              }) constexpr array_view(Range&& r)
         : elements(std::data(r)), count(std::size(r)) {} // NOLINT(*-explicit-*)
 
-    [[nodiscard]] VOXELPIPE_HD
-    constexpr T* data() const { return elements; }
-    [[nodiscard]] VOXELPIPE_HD
-    constexpr std::size_t size() const { return count; }
-    [[nodiscard]] VOXELPIPE_HD
-    constexpr bool empty() const { return count == 0; }
-    [[nodiscard]] VOXELPIPE_HD
-    constexpr T& operator[](std::size_t i) const { return elements[i]; }
-    [[nodiscard]] VOXELPIPE_HD
-    constexpr T* begin() const { return elements; }
-    [[nodiscard]] VOXELPIPE_HD
-    constexpr T* end() const { return elements + count; }
+    [[nodiscard]] VOXELPIPE_HD constexpr T* data() const { return elements; }
+    [[nodiscard]] VOXELPIPE_HD constexpr std::size_t size() const { return count; }
+    [[nodiscard]] VOXELPIPE_HD constexpr bool empty() const { return count == 0; }
+    [[nodiscard]] VOXELPIPE_HD constexpr T& operator[](std::size_t i) const { return elements[i]; }
+    [[nodiscard]] VOXELPIPE_HD constexpr T* begin() const { return elements; }
+    [[nodiscard]] VOXELPIPE_HD constexpr T* end() const { return elements + count; }
 };
 
 } // namespace voxelpipe
