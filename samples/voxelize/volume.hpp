@@ -57,6 +57,7 @@ enum class scalar : std::uint8_t { bit, u8, u16, u32, u64, i32, i64, f16, f32, f
 }
 
 // One value per voxel. Names with a meaning to the writers: "occupancy" (bit), "color" (u8 x 4, sRGB and alpha).
+// A name is made of letters, digits, '_', '-' and '.', since it becomes part of file names and of XML.
 struct channel {
     std::string name;
     scalar type = scalar::bit;
@@ -164,6 +165,10 @@ struct volume {
             if (!(s > 0)) throw std::invalid_argument("every voxel size of a volume must be positive");
         for (const channel& c : channels) {
             if (c.name.empty()) throw std::invalid_argument("a channel has no name");
+            for (const char ch : c.name)
+                if (!((ch >= 'a' && ch <= 'z') || (ch >= 'A' && ch <= 'Z') || (ch >= '0' && ch <= '9') || ch == '_' ||
+                      ch == '-' || ch == '.'))
+                    throw std::invalid_argument("a channel name may hold only letters, digits, '_', '-' and '.'");
             if (find(c.name) != &c) throw std::invalid_argument("two channels are named '" + c.name + "'");
             if (c.components < 1 || c.components > 4 || (c.type == scalar::bit && c.components != 1))
                 throw std::invalid_argument("channel '" + c.name + "' has an impossible number of components");

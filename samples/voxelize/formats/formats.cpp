@@ -1,0 +1,68 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats.hpp"
+
+#include "binvox.hpp"
+#include "npy.hpp"
+#include "npz.hpp"
+#include "nrrd.hpp"
+#include "png.hpp"
+#include "vox.hpp"
+#include "vti.hpp"
+
+#include <array>
+#include <string>
+
+namespace voxelize {
+namespace {
+
+using writer = std::vector<std::filesystem::path> (*)(const volume&, const std::filesystem::path&,
+                                                      const write_options&);
+
+constexpr std::array<format, 7> all_formats{{
+    {".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", false, true},
+    {".npz", "NumPy archive with one array for each channel", false, true},
+    {".vox", "MagicaVoxel model, split above 256 voxels, 255 colours", true, false},
+    {".binvox", "binvox occupancy, padded to a cube", true, false},
+    {".vti", "VTK image data for ParaView, all channels as cell data", false, true},
+    {".nrrd", "NRRD for 3D Slicer and teem; OUT.CHANNEL.nrrd for several", false, true},
+    {".png", "shaded picture of the voxels", true, false},
+}};
+constexpr std::array<writer, 7> all_writers{write_npy, write_npz,  write_vox, write_binvox,
+                                            write_vti, write_nrrd, write_png};
+
+std::string extension_of(const std::filesystem::path& path) {
+    std::string extension = path.extension().string();
+    for (char& c : extension)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return extension;
+}
+
+} // namespace
+
+std::span<const format> formats() { return all_formats; }
+
+const format* find_format(const std::filesystem::path& path) {
+    const std::string extension = extension_of(path);
+    for (const format& f : all_formats)
+        if (f.extension == extension) return &f;
+    return nullptr;
+}
+
+std::vector<std::filesystem::path> write(const volume& v, const std::filesystem::path& path,
+                                         const write_options& options) {
+    const format* f = find_format(path);
+    if (f == nullptr) {
+        std::string known;
+        for (const format& each : all_formats) known += (known.empty() ? "" : ", ") + std::string(each.extension);
+        throw write_error(path, "no writer for this extension; there are " + known);
+    }
+    v.check();
+    if (v.channels.empty()) throw write_error(path, "there is no channel to write");
+    if (f->needs_occupancy && v.occupancy() == nullptr)
+        throw write_error(path, std::string(f->extension) + " needs the occupancy");
+    return all_writers[static_cast<std::size_t>(f - all_formats.data())](v, path, options);
+}
+
+} // namespace voxelize

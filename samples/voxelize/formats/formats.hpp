@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The one entry to all writers: takes a volume and a path, picks the format by the extension, writes whole files or
+// none.
+
+#include "../preview.hpp"
+#include "../volume.hpp"
+#include "output_file.hpp" // write_error
+
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace voxelize {
+
+struct write_options {
+    int compression = 1;                  // zlib level of .npz, .vti and .nrrd: 0 stores, 1 is fast, 9 is smallest
+    up_axis up = up_axis::y;              // which world axis stands upright in .vox; glTF's is y
+    int threads = 0;                      // of the preview; 0 takes all cores. No output depends on it
+    preview_options preview;              // camera and light of .png
+    std::function<void(double)> progress; // called with 0..1 now and then, from the calling thread; may be empty
+};
+
+// What the tool shows in --help and checks before it starts to compute.
+struct format {
+    std::string_view extension;   // lower case, with the dot
+    std::string_view description; // one line
+    bool needs_occupancy;         // without the "occupancy" channel the writer refuses
+    bool all_channels;            // false: occupancy, with "color" where the format has colours
+};
+
+// In the order in which --help lists them.
+[[nodiscard]] std::span<const format> formats();
+
+// By the extension of the path, in either case; null when no writer has it.
+[[nodiscard]] const format* find_format(const std::filesystem::path& path);
+
+// Writes the volume and returns the paths of the files, in channel order: one, or several where the format holds one
+// channel a file (OUT.CHANNEL.npy, OUT.CHANNEL.nrrd). Throws write_error when the extension is unknown, a channel that
+// the format needs is missing, the volume does not fit the format, or the disk refuses; std::invalid_argument when the
+// volume itself is inconsistent. In all these cases no file of this call is left behind.
+std::vector<std::filesystem::path> write(const volume& v, const std::filesystem::path& path,
+                                         const write_options& options = {});
+
+} // namespace voxelize

@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "npy.hpp"
+
+#include "dense_stream.hpp"
+#include "progress.hpp"
+
+#include <array>
+#include <memory>
+
+namespace voxelize {
+namespace {
+
+// Type string of numpy.dtype: byte order, kind, bytes.
+std::string_view dtype_of(scalar type) {
+    constexpr std::array<std::string_view, 10> names{"|u1", "|u1", "<u2", "<u4", "<u8",
+                                                     "<i4", "<i8", "<f2", "<f4", "<f8"};
+    return names[static_cast<std::size_t>(type)];
+}
+
+} // namespace
+
+std::string npy_header(const volume& v, const channel& c) {
+    std::string text = "{'descr': '" + std::string(dtype_of(c.type)) + "', 'fortran_order': False, 'shape': (" +
+                       std::to_string(v.extent[2]) + ", " + std::to_string(v.extent[1]) + ", " +
+                       std::to_string(v.extent[0]);
+    if (c.components > 1) text += ", " + std::to_string(c.components);
+    text += "), }";
+    constexpr std::size_t prefix = 10; // magic, version, length
+    const std::size_t padded = (prefix + text.size() + 1 + 63) / 64 * 64;
+    text.append(padded - prefix - text.size() - 1, ' ');
+    text += '\n';
+    std::string header = "\x93NUMPY";
+    header += '\x01';
+    header += '\0';
+    header += static_cast<char>(text.size() & 0xff);
+    header += static_cast<char>(text.size() >> 8);
+    return header + text;
+}
+
+std::filesystem::path channel_path(const std::filesystem::path& path, const volume& v, const channel& c) {
+    if (v.channels.size() < 2) return path;
+    return path.parent_path() / (path.stem().string() + "." + c.name + path.extension().string());
+}
+
+std::vector<std::filesystem::path> write_npy(const volume& v, const std::filesystem::path& path,
+                                             const write_options& options) {
+    std::uint64_t total = 0;
+    for (const channel& c : v.channels) total += streamed_bytes(v, c, half_floats::keep);
+    progress_meter meter(options.progress, total);
+    std::vector<std::unique_ptr<output_file>> files;
+    for (const channel& c : v.channels) {
+        files.push_back(std::make_unique<output_file>(channel_path(path, v, c)));
+        output_file& out = *files.back();
+        out.write(npy_header(v, c));
+        stream_values(v, c, half_floats::keep, [&](std::span<const std::byte> piece) {
+            out.write(piece);
+            meter.advance(piece.size());
+        });
+    }
+    return commit_all(files);
+}
+
+} // namespace voxelize

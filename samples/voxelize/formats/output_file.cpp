@@ -1,0 +1,97 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "output_file.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <limits>
+#include <system_error>
+
+namespace voxelize {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t buffer_bytes = std::size_t{1} << 20;
+
+// Opens a new file for writing; "x" refuses a name that exists, so that two runs never share a temporary.
+std::FILE* open_new(const fs::path& path) { return std::fopen(path.c_str(), "wbx"); }
+
+} // namespace
+
+write_error::write_error(const fs::path& path, std::string_view reason)
+    : std::runtime_error("cannot write '" + path.string() + "': " + std::string(reason)) {}
+
+output_file::output_file(const fs::path& target) : target_(target), real_(target) {
+    std::error_code error;
+    if (fs::is_symlink(target_, error)) {
+        const fs::path resolved = fs::weakly_canonical(target_, error);
+        if (!error) real_ = resolved;
+    }
+    const fs::file_status status = fs::status(real_, error);
+    if (fs::is_directory(status)) fail("open", EISDIR);
+    if (fs::exists(status) && !fs::is_regular_file(status)) {
+        file_ = std::fopen(real_.c_str(), "wb");
+        if (file_ == nullptr) fail("open", errno);
+    } else {
+        constexpr int attempts = 1000;
+        for (int n = 0; n < attempts && file_ == nullptr; ++n) {
+            temporary_ = real_.parent_path() / (real_.filename().string() + ".part" + std::to_string(n));
+            file_ = open_new(temporary_);
+            if (file_ == nullptr && errno != EEXIST) break;
+        }
+        if (file_ == nullptr) {
+            const int reason = errno;
+            temporary_.clear();
+            fail("open", reason);
+        }
+    }
+    std::setvbuf(file_, nullptr, _IOFBF, buffer_bytes);
+}
+
+output_file::~output_file() {
+    if (file_ != nullptr) std::fclose(file_);
+    if (!temporary_.empty()) {
+        std::error_code ignored;
+        fs::remove(temporary_, ignored);
+    }
+}
+
+void output_file::fail(std::string_view action, int error) const {
+    throw write_error(target_, std::string(action) + ": " + std::generic_category().message(error));
+}
+
+void output_file::write(std::span<const std::byte> bytes) {
+    if (bytes.empty()) return;
+    if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail("write", errno);
+    at_ += bytes.size();
+}
+
+void output_file::seek(std::uint64_t at) {
+    if (at > static_cast<std::uint64_t>(std::numeric_limits<long>::max())) fail("seek", EFBIG);
+    if (std::fseek(file_, static_cast<long>(at), SEEK_SET) != 0) fail("seek", errno);
+    at_ = at;
+}
+
+void output_file::commit() {
+    std::FILE* closing = file_;
+    file_ = nullptr;
+    if (std::fclose(closing) != 0) fail("write", errno);
+    if (temporary_.empty()) return;
+    std::error_code error;
+    fs::rename(temporary_, real_, error);
+    if (error) fail("rename", error.value());
+    temporary_.clear();
+}
+
+std::vector<fs::path> commit_all(std::span<const std::unique_ptr<output_file>> files) {
+    std::vector<fs::path> paths;
+    for (const auto& file : files) {
+        file->commit();
+        paths.push_back(file->target());
+    }
+    return paths;
+}
+
+} // namespace voxelize

@@ -1,0 +1,43 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "png.hpp"
+
+#include <exception>
+
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STB_IMAGE_WRITE_STATIC
+#include <stb_image_write.h>
+
+namespace voxelize {
+
+std::vector<std::filesystem::path> write_png(const volume& v, const std::filesystem::path& path,
+                                             const write_options& options) {
+    preview_options preview = options.preview;
+    preview.up = options.up;
+    preview.threads = options.threads;
+    output_file out(path); // first, so that a path that cannot be written costs no rendering
+    const image picture = render_preview(v, preview, options.progress);
+
+    struct sink {
+        output_file& out;
+        std::exception_ptr failure{};
+    } to{out};
+    const auto on_bytes = [](void* context, void* data, int size) {
+        auto& target = *static_cast<sink*>(context);
+        if (target.failure) return;
+        try {
+            target.out.write(std::span{static_cast<const std::byte*>(data), static_cast<std::size_t>(size)});
+        } catch (...) {
+            target.failure = std::current_exception(); // C code is between here and the caller
+        }
+    };
+    const int ok = stbi_write_png_to_func(on_bytes, &to, picture.width, picture.height, picture.components,
+                                          picture.pixels.data(), picture.width * picture.components);
+    if (to.failure) std::rethrow_exception(to.failure);
+    if (ok == 0) throw write_error(path, "out of memory");
+    out.commit();
+    return {path};
+}
+
+} // namespace voxelize

@@ -1,0 +1,15 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// VTK's XML image data (.vti) for ParaView and VTK: every channel as cell data, bits as UInt8, half floats as Float32.
+// Values follow the XML as appended raw binary, in zlib blocks unless compression is 0.
+
+#include "formats.hpp"
+
+namespace voxelize {
+
+std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesystem::path& path,
+                                             const write_options& options);
+
+} // namespace voxelize

@@ -1,0 +1,93 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "preview.hpp"
+
+#include "parallel.hpp"
+#include "preview_camera.hpp"
+#include "preview_scene.hpp"
+#include "preview_shade.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace voxelize {
+namespace {
+
+void check(const volume& v, const preview_options& o) {
+    const auto require = [](bool good, const char* message) {
+        if (!good) throw std::invalid_argument(message);
+    };
+    constexpr int most_pixels = 16384;
+    require(v.occupancy() != nullptr, "the preview needs the occupancy");
+    require(o.width >= 1 && o.height >= 1 && o.width <= most_pixels && o.height <= most_pixels,
+            "the picture must have 1 to 16384 pixels a side");
+    require(o.samples >= 1 && o.samples <= 8, "the samples of the picture must be 1 to 8");
+    require(std::isfinite(o.azimuth), "the azimuth must be a number");
+    require(o.elevation >= -90 && o.elevation <= 90, "the elevation must be -90 to 90 degrees");
+    require(o.zoom >= 1e-3 && o.zoom <= 1e3, "the zoom must be 0.001 to 1000");
+    require(o.field_of_view >= 0 && o.field_of_view <= 150, "the field of view must be 0 to 150 degrees");
+}
+
+std::optional<rgb8> parse_hex(std::string_view text) {
+    if (text.size() != 7 || text[0] != '#') return std::nullopt;
+    std::uint32_t value = 0;
+    const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), value, 16);
+    if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+    return rgb8{static_cast<std::uint8_t>(value >> 16), static_cast<std::uint8_t>(value >> 8),
+                static_cast<std::uint8_t>(value)};
+}
+
+} // namespace
+
+std::optional<background> parse_background(std::string_view text) {
+    if (text == "sky") return background{};
+    if (text == "white") return background{{255, 255, 255}, {255, 255, 255}, false};
+    if (text == "dark") return background{{24, 27, 33}, {52, 57, 66}, false};
+    if (text == "transparent") return background{{255, 255, 255}, {255, 255, 255}, true};
+    const std::size_t comma = text.find(',');
+    const auto top = parse_hex(text.substr(0, comma));
+    const auto bottom = comma == std::string_view::npos ? top : parse_hex(text.substr(comma + 1));
+    if (!top || !bottom) return std::nullopt;
+    return background{*top, *bottom, false};
+}
+
+const channel* find_colors(const volume& v) {
+    const auto usable = [](const channel* c) { return c != nullptr && c->type == scalar::u8 && c->components >= 3; };
+    if (const channel* c = v.find("color"); usable(c)) return c;
+    for (const channel& c : v.channels)
+        if (c.name.starts_with("color") && usable(&c)) return &c;
+    return nullptr;
+}
+
+image render_preview(const volume& v, const preview_options& options, const std::function<void(double)>& progress) {
+    check(v, options);
+    const int threads = thread_count(options.threads);
+    const preview_scene scene(v, threads);
+    const preview_shader shader(v, scene, options);
+
+    image picture{options.width, options.height, options.backdrop.transparent ? 4 : 3, {}};
+    const auto row_bytes = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.components);
+    picture.pixels.resize(row_bytes * static_cast<std::size_t>(picture.height));
+    // Bands of rows: each is rendered by itself, so the pixels do not depend on who renders it, and memory stays small.
+    const int band_rows = std::clamp(options.height / (4 * threads), 8, 64);
+    const auto bands = static_cast<std::size_t>((options.height + band_rows - 1) / band_rows);
+    parallel_for(
+        bands, threads,
+        [&](std::size_t band) {
+            const int from = static_cast<int>(band) * band_rows;
+            const int to = std::min(from + band_rows, options.height);
+            shader.render_rows(from, to, picture.components,
+                               picture.pixels.data() + row_bytes * static_cast<std::size_t>(from));
+        },
+        [&](std::size_t finished) {
+            if (progress) progress(static_cast<double>(finished) / static_cast<double>(bands));
+        });
+    if (progress) progress(1.0);
+    return picture;
+}
+
+} // namespace voxelize

@@ -1,0 +1,93 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The occupied voxels as something that rays can hit: the packed bits, and above them one flag for each 8^3 and each
+// 64^3 voxels, so that empty space is crossed in large steps. Internal to the preview.
+
+#include "volume.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace voxelize {
+
+using vec3 = std::array<double, 3>;
+
+[[nodiscard]] constexpr vec3 operator+(const vec3& a, const vec3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+[[nodiscard]] constexpr vec3 operator-(const vec3& a, const vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+[[nodiscard]] constexpr vec3 operator*(const vec3& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
+[[nodiscard]] constexpr double dot(const vec3& a, const vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// Where a ray meets the first occupied voxel: on the side of `axis`, low or high.
+struct ray_hit {
+    double distance = 0; // along the ray, in lengths of its direction
+    std::array<std::int32_t, 3> voxel{};
+    int axis = -1; // -1: nothing hit
+    bool high = false;
+};
+
+class preview_scene {
+public:
+    // `v` must outlive the scene and have an occupancy channel. Reads the bits once, on `threads` threads (>= 1).
+    preview_scene(const volume& v, int threads);
+
+    [[nodiscard]] bool empty() const { return high_[0] <= low_[0]; }
+    // Bounds of the occupied voxels, in voxels: [low, high).
+    [[nodiscard]] const std::array<std::int32_t, 3>& low() const { return low_; }
+    [[nodiscard]] const std::array<std::int32_t, 3>& high() const { return high_; }
+
+    // First occupied voxel along origin + t * direction for 0 <= t <= limit. Origin and direction in voxel units of the
+    // grid. A ray that starts inside an occupied voxel reports it at t = 0 on the axis of its largest component.
+    [[nodiscard]] ray_hit first_hit(const vec3& origin, const vec3& direction, double limit) const;
+
+    // Outward normal of the surface around an occupied voxel, not normalised and never zero for a voxel that is seen
+    // from `viewer` (a direction, any length): the sum of the exposed faces that look towards the viewer, over the
+    // voxels at most three steps away. This is the area vector of that piece of surface, so it is right for thin shells
+    // and solids alike.
+    [[nodiscard]] vec3 surface_normal(const std::array<std::int32_t, 3>& voxel, const vec3& viewer,
+                                      const vec3& voxel_size) const;
+
+    // Calls visit(low corner, high corner) in voxels for each occupied brick of 8^3, cut to the bounds.
+    template <class Visit>
+    void for_each_brick(Visit visit) const {
+        std::array<std::int32_t, 3> b{};
+        for (b[2] = 0; b[2] < fine_size_[2]; ++b[2])
+            for (b[1] = 0; b[1] < fine_size_[1]; ++b[1])
+                for (b[0] = 0; b[0] < fine_size_[0]; ++b[0]) {
+                    if (fine_[flag_index(fine_size_, b[0], b[1], b[2])] == 0) continue;
+                    vec3 from{}, to{};
+                    for (std::size_t a = 0; a < 3; ++a) {
+                        from[a] = std::max(b[a] * 8, low_[a]);
+                        to[a] = std::min(b[a] * 8 + 8, high_[a]);
+                    }
+                    visit(from, to);
+                }
+    }
+
+private:
+    using int3 = std::array<std::int32_t, 3>;
+
+    static std::size_t flag_index(const int3& size, std::int32_t i, std::int32_t j, std::int32_t k) {
+        return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
+                   static_cast<std::size_t>(size[0]) +
+               static_cast<std::size_t>(i);
+    }
+    [[nodiscard]] std::uint32_t window(std::int32_t i, std::int32_t j, std::int32_t k) const;
+    void fill_layer(const volume& v, const channel& bits, std::int32_t layer, int3& low, int3& high);
+
+    const std::byte* bits_ = nullptr;
+    std::int64_t row_bytes_ = 0;
+    std::int64_t slice_bytes_ = 0;
+    int3 extent_{};
+    int3 fine_size_{};
+    int3 coarse_size_{};
+    std::vector<std::uint8_t> fine_;   // 1 for each 8^3 with an occupied voxel
+    std::vector<std::uint8_t> coarse_; // the same for 64^3
+    int3 low_{};
+    int3 high_{};
+};
+
+} // namespace voxelize

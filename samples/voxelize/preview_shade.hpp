@@ -1,0 +1,86 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Light and colour of the preview. Rows of the picture are rendered one band at a time: find what each sample sees,
+// gather ambient occlusion and sunlight with few rays each, smooth these over neighbouring samples of the same face,
+// shade, and average. Which rays a sample casts depends on its place alone, so the picture is the same on any number of
+// threads. Internal to the preview.
+
+#include "preview.hpp"
+#include "preview_camera.hpp"
+#include "preview_scene.hpp"
+
+#include <cstdint>
+#include <vector>
+
+namespace voxelize {
+
+using rgb_linear = std::array<float, 3>;
+
+class preview_shader {
+public:
+    // All three must outlive the shader; the options are checked already.
+    preview_shader(const volume& v, const preview_scene& scene, const preview_options& options);
+
+    // Pixel rows [from, to) of the picture into `pixels`, RGB or RGBA. May be called from several threads at once.
+    void render_rows(int from, int to, int components, std::uint8_t* pixels) const;
+
+private:
+    // What a sample sees first.
+    enum class seen : std::uint8_t { nothing, ground, voxel };
+    struct sample {
+        seen what = seen::nothing;
+        std::array<float, 3> position{}; // in world units, as the camera's
+        std::array<float, 3> normal{};   // unit length; of the face, or of the surface where voxels are small
+        float smoothness = 0;            // 0: the face's normal, 1: the surface's
+        float slack = 0; // world units that neighbours may lie off the tangent plane and still share light
+        rgb_linear albedo{};
+        float open = 1;   // share of the sky that is not hidden by voxels nearby
+        float sunlit = 1; // share of the sun that is seen
+    };
+    // A rectangle of samples, a few rows larger than the band on either side for the smoothing.
+    struct sample_rows {
+        int first = 0; // sample row of the picture that row 0 is
+        int rows = 0;
+        int width = 0;
+        std::vector<sample> samples;
+        [[nodiscard]] const sample& at(int x, int row) const {
+            return samples[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                           static_cast<std::size_t>(x)];
+        }
+    };
+
+    [[nodiscard]] camera::ray ray_of(int x, int y) const;
+    // The surface normal of the voxel that the last ray hit: neighbouring rays mostly hit the same one.
+    struct normal_cache {
+        std::array<std::int32_t, 3> voxel{-1, -1, -1};
+        vec3 normal{};
+    };
+    [[nodiscard]] sample find(const camera::ray& ray, normal_cache& cache) const;
+    [[nodiscard]] rgb_linear albedo_of(const ray_hit& hit, const vec3& at, double pixels_per_voxel) const;
+    void gather_light(sample& s, int x, int y) const;
+    void smooth(const sample_rows& rows, int x, int row, float& open, float& sunlit) const;
+    [[nodiscard]] rgb_linear shade(const sample& s, float open, float sunlit) const;
+    [[nodiscard]] float ground_shade(float open, float sunlit) const;
+    [[nodiscard]] rgb_linear backdrop_at(double x, double y) const;
+
+    const volume& volume_;
+    const preview_scene& scene_;
+    const preview_options& options_;
+    const channel* colors_ = nullptr;
+    camera camera_;
+    world_axes axes_;
+    vec3 voxel_size_{};
+    vec3 sun_{};         // unit vector towards the sun
+    vec3 sun_side_[2]{}; // unit vectors across it
+    vec3 center_{};      // middle of the occupied voxels' ground area
+    double radius_ = 0;  // half diagonal of the occupied voxels, world units
+    double occlusion_reach_ = 0;
+    double ground_height_ = 0;
+    int occlusion_rays_ = 4;
+    std::array<float, 256> to_linear_{};
+    std::array<rgb_linear, 2> backdrop_{}; // top, bottom
+};
+
+} // namespace voxelize
