@@ -50,12 +50,12 @@ void bucket_tile(const Scene& s, const core::tile_grid& tiles, const tile_range&
                  const std::vector<tile_pair<Key>>& pairs, std::uint32_t worker, abuffer_scratch<Payload>& scratch) {
     static_assert(tile_voxels <= 65536);
     constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
-    const core::voxel_box box = tile_box(tiles, range.tile, s.where.extent);
+    const core::voxel_box box = core::tile_box(tiles, range.tile, s.where.extent);
     const auto x0 = static_cast<int>(box.lo[0]), y0 = static_cast<int>(box.lo[1]), z0 = static_cast<int>(box.lo[2]);
     scratch.fragments.clear();
     for (std::size_t i = range.first; i < range.last; ++i) {
         const std::uint32_t id = pairs[i].primitive;
-        shade_fragments<Rule>(s, id, box, [&](int x, int y, int z, const auto& out) {
+        shade_fragments<Rule>(s, id, box, [&](int x, int y, int z, const auto& out) VOXELPIPE_INLINE_LAMBDA {
             if (!out.keep) {
                 ++scratch.counts.fragments_discarded;
                 return;

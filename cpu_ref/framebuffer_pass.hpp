@@ -102,7 +102,7 @@ void raster_tile(const Scene& s, const core::voxel_box& box, const std::uint32_t
     for (std::size_t i = 0; i < count; ++i) {
         const std::uint32_t id =
             *reinterpret_cast<const std::uint32_t*>(reinterpret_cast<const std::byte*>(primitives) + i * stride);
-        shade_fragments<Rule>(s, id, box, [&](int x, int y, int z, const auto& out) {
+        shade_fragments<Rule>(s, id, box, [&](int x, int y, int z, const auto& out) VOXELPIPE_INLINE_LAMBDA {
             if (!out.keep) {
                 ++discarded;
                 return;
@@ -200,7 +200,7 @@ template <coverage Rule, class Key, class Scene, class... Targets>
     progress_meter meter(how, ranges.size());
     parallel_for(how.threads, ranges.size(), [&](unsigned worker, std::size_t r) {
         const tile_range& range = ranges[r];
-        const core::voxel_box box = tile_box(tiles, range.tile, s.where.extent);
+        const core::voxel_box box = core::tile_box(tiles, range.tile, s.where.extent);
         const std::uint32_t* const primitives = &coarse.pairs[range.first].primitive;
         const std::size_t count = range.last - range.first;
         constexpr std::size_t stride = sizeof(tile_pair<Key>);

@@ -9,6 +9,7 @@
 #include <cpu_ref/parallel.hpp>
 #include <voxelpipe/core/coverage.hpp>
 #include <voxelpipe/core/interpolate.hpp>
+#include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <algorithm>
@@ -75,16 +76,6 @@ struct shaded_vertices {
 template <class Mesh, class VertexShader, class FragmentShader>
 using draw_varyings = typename core::shaded<Mesh, VertexShader>::varyings;
 
-template <class... Attributes>
-[[nodiscard]] vertex<Attributes...> fetch_vertex(const mesh_view<Attributes...>& m, std::uint32_t index,
-                                                 std::uint32_t draw) {
-    return [&]<std::size_t... I>(std::index_sequence<I...>) {
-        return vertex<Attributes...>{index, draw, m.positions[index],
-                                     core::make_pack(Attributes(get<I>(m.attributes)[index])...)};
-    }
-    (std::index_sequence_for<Attributes...>{});
-}
-
 template <class Mesh, class VertexShader, class FragmentShader>
 [[nodiscard]] auto vertex_shade(const execution& how, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                 const core::snap_transform& snap) {
@@ -101,7 +92,8 @@ template <class Mesh, class VertexShader, class FragmentShader>
         parallel_for(how.threads, (n + block - 1) / block, [&](unsigned, std::size_t b) {
             const std::size_t last = std::min(n, (b + 1) * block);
             for (std::size_t i = b * block; i < last; ++i) {
-                const auto v = fetch_vertex(in.mesh, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(d));
+                const auto v =
+                    core::fetch_vertex(in.mesh, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(d));
                 const auto result = in.vertex_shader(v);
                 using widen = core::vertex_result<std::remove_cvref_t<decltype(result)>>;
                 const auto& o = widen::widen(result);
@@ -173,65 +165,6 @@ struct tile_pair {
     std::uint32_t primitive;
 };
 
-enum class triangle_class : std::uint8_t { drawn, nonfinite, too_far, zero_area, outside };
-
-// Whether a triangle is drawn, and if not why. `reach` receives the voxels that it may touch, cut to the grid.
-template <coverage Rule>
-[[nodiscard]] triangle_class classify(const core::snapped_position& a, const core::snapped_position& b,
-                                      const core::snapped_position& c, int fraction, const core::voxel_box& whole,
-                                      core::voxel_box& reach) {
-    if (!core::is_drawable(a) || !core::is_drawable(b) || !core::is_drawable(c)) {
-        const bool nonfinite =
-            a.x == core::nonfinite_mark || b.x == core::nonfinite_mark || c.x == core::nonfinite_mark;
-        return nonfinite ? triangle_class::nonfinite : triangle_class::too_far;
-    }
-    core::voxel_box box = core::bounds(a, b, c, fraction);
-    if constexpr (Rule == coverage::thin) {
-        // The depth at a touched column's centre is at most one voxel beyond the triangle's own depths.
-        for (int i = 0; i < 3; ++i) {
-            --box.lo[i];
-            ++box.hi[i];
-        }
-    }
-    reach = core::intersect(box, whole);
-    return reach.empty() ? triangle_class::outside : triangle_class::drawn;
-}
-
-[[nodiscard]] inline bool has_zero_area(const core::snapped_position& a, const core::snapped_position& b,
-                                        const core::snapped_position& c) {
-    const std::int64_t e1[3] = {b.x - a.x, b.y - a.y, b.z - a.z};
-    const std::int64_t e2[3] = {c.x - a.x, c.y - a.y, c.z - a.z};
-    const auto equal = [&](int i, int j) {
-        return static_cast<int128>(e1[i]) * e2[j] == static_cast<int128>(e1[j]) * e2[i];
-    };
-    return equal(1, 2) && equal(2, 0) && equal(0, 1);
-}
-
-// Calls emit(tile) for each tile that the triangle may have work in: the only tile of its reach, or those of its reach
-// whose closed box it meets (conservative), or that its plane passes within its columns of tiles (thin).
-template <coverage Rule, class Emit>
-void for_each_tile(const core::snapped_position& a, const core::snapped_position& b, const core::snapped_position& c,
-                   int fraction, const core::voxel_box& reach, const core::tile_grid& tiles, Emit&& emit) {
-    core::voxel_box box{};
-    for (int i = 0; i < 3; ++i) {
-        box.lo[i] = reach.lo[i] >> tiles.log2_size;
-        box.hi[i] = reach.hi[i] >> tiles.log2_size;
-    }
-    if (box.lo[0] == box.hi[0] && box.lo[1] == box.hi[1] && box.lo[2] == box.hi[2]) {
-        emit(tiles.index(box.lo[0], box.lo[1], box.lo[2]));
-        return;
-    }
-    // A tile is a voxel of a coarser grid: the same exact coverage, 2^log2_size times larger.
-    constexpr auto rule = Rule == coverage::thin ? core::span_rule::columns : core::span_rule::conservative;
-    core::rasterize<rule>(a, b, c, fraction + tiles.log2_size, box,
-                          [&](const auto& t, std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
-                              for (std::int64_t w = w0; w <= w1; ++w) {
-                                  const auto p = core::to_xyz(t.axis, u, v, w);
-                                  emit(tiles.index(p[0], p[1], p[2]));
-                              }
-                          });
-}
-
 template <class Key>
 struct coarse_result {
     status_code code = status_code::ok;
@@ -262,25 +195,25 @@ template <coverage Rule, class Key, class Scene>
             const core::snapped_position* p = s.vertices[tri.draw].positions.get();
             const auto &a = p[tri.index.x], &b_ = p[tri.index.y], &c = p[tri.index.z];
             core::voxel_box reach{};
-            triangle_class kind = classify<Rule>(a, b_, c, s.snap.fraction, whole, reach);
-            if (Rule == coverage::thin && kind == triangle_class::drawn && has_zero_area(a, b_, c))
-                kind = triangle_class::zero_area;
+            core::triangle_class kind = core::classify<Rule>(a, b_, c, s.snap.fraction, whole, reach);
+            if (Rule == coverage::thin && kind == core::triangle_class::drawn && core::has_zero_area(a, b_, c))
+                kind = core::triangle_class::zero_area;
             switch (kind) {
-            case triangle_class::nonfinite:
+            case core::triangle_class::nonfinite:
                 ++part.counts.triangles_nonfinite;
                 break;
-            case triangle_class::too_far:
+            case core::triangle_class::too_far:
                 ++part.counts.triangles_too_far;
                 break;
-            case triangle_class::zero_area:
+            case core::triangle_class::zero_area:
                 ++part.counts.triangles_zero_area;
                 break;
-            case triangle_class::outside:
+            case core::triangle_class::outside:
                 ++part.counts.triangles_outside;
                 break;
-            case triangle_class::drawn:
+            case core::triangle_class::drawn:
                 ++part.counts.triangles_drawn;
-                for_each_tile<Rule>(a, b_, c, s.snap.fraction, reach, tiles, [&](std::uint64_t tile) {
+                core::for_each_tile<Rule>(a, b_, c, s.snap.fraction, reach, tiles, [&](std::uint64_t tile) {
                     part.pairs.push_back({static_cast<Key>(tile), id});
                 });
                 break;
@@ -340,21 +273,12 @@ template <class Key>
     return ranges;
 }
 
-[[nodiscard]] inline core::voxel_box tile_box(const core::tile_grid& tiles, std::uint64_t tile, glm::ivec3 extent) {
-    const glm::ivec3 p = tiles.position(tile) * (1 << tiles.log2_size);
-    core::voxel_box box{};
-    for (int i = 0; i < 3; ++i) {
-        box.lo[i] = p[i];
-        box.hi[i] = std::min(p[i] + (1 << tiles.log2_size), extent[i]) - 1;
-    }
-    return box;
-}
-
 // ---- fragments
 // -------------------------------------------------------------------------------------------------------
 
 // Calls visit(x, y, z, fragment shader's output) for every fragment of one primitive within `box` (voxels of the
-// computed part of the grid). The fragment's fields that the shader does not read cost nothing: all of it is inlined.
+// computed part of the grid). All of it is inlined by force: the fragment's fields that a shader does not read are then
+// seen to be unused, and cost nothing.
 template <coverage Rule, class Scene, class Visit>
 VOXELPIPE_INLINE void shade_fragments(const Scene& s, std::uint32_t id, const core::voxel_box& box, Visit&& visit) {
     using varyings = typename Scene::varyings;
@@ -374,12 +298,12 @@ VOXELPIPE_INLINE void shade_fragments(const Scene& s, std::uint32_t id, const co
         else
             f.vertex_varyings[i] = &vertices.varyings[tri.index[i]];
     }
-    const auto run = [&](const auto& t) {
+    const auto run = [&](const auto& t) VOXELPIPE_INLINE_LAMBDA {
         f.axis = t.zero_area ? 0 : t.axis;
         f.front_facing = t.normal[2] >= 0;
         f.normal = core::unit_normal(t, s.normal_factors);
         core::for_each_span<core::to_rule(Rule)>(
-            t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
+            t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) VOXELPIPE_INLINE_LAMBDA {
                 f.barycentric = core::barycentric(t, u, v);
                 if constexpr (!std::is_empty_v<varyings>)
                     f.varyings = core::mix(*f.vertex_varyings[0], *f.vertex_varyings[1], *f.vertex_varyings[2],
