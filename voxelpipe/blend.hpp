@@ -85,8 +85,7 @@ struct float_bits<double> {
 // Every NaN that reaches a target of a built-in type is stored as the one positive quiet NaN: machines differ in which
 // NaN an operation gives.
 template <class T>
-[[nodiscard]] VOXELPIPE_HD
-T canonical(T v) {
+[[nodiscard]] VOXELPIPE_HD T canonical(T v) {
     if constexpr (is_floating<T>) {
         using bits = typename float_bits<T>::type;
         const auto raw = std::bit_cast<bits>(v);
@@ -102,8 +101,7 @@ T canonical(T v) {
 
 // Integers in the order of the floats: for shared-memory atomics on integers, and for min and max here.
 template <class T>
-[[nodiscard]] VOXELPIPE_HD
-auto order_key(T v) {
+[[nodiscard]] VOXELPIPE_HD auto order_key(T v) {
     using bits = typename float_bits<T>::type;
     using key = std::make_signed_t<bits>;
     const auto raw = std::bit_cast<bits>(canonical(v));
@@ -112,8 +110,7 @@ auto order_key(T v) {
 }
 
 template <class T>
-[[nodiscard]] VOXELPIPE_HD
-bool ordered_less(T a, T b) {
+[[nodiscard]] VOXELPIPE_HD bool ordered_less(T a, T b) {
     if constexpr (is_floating<T>)
         return order_key(a) < order_key(b);
     else
@@ -240,8 +237,9 @@ requires(is_integer<T> || std::is_same_v<T, bool>) struct blend_traits<blend::co
     VOXELPIPE_HD
     static T identity() { return T{0}; }
     template <class Any>
-    VOXELPIPE_HD
-    static void apply(T& a, const Any&) { blend_traits<blend::add, T>::apply(a, T{1}); }
+    VOXELPIPE_HD static void apply(T& a, const Any&) {
+        blend_traits<blend::add, T>::apply(a, T{1});
+    }
 };
 
 template <class T, int Log2Quantum>
@@ -365,8 +363,7 @@ requires(blend_traits<Blend, S>::available && !user_blend<Blend, glm::vec<N, S, 
         }
     }
     template <class Value>
-    VOXELPIPE_HD
-    static void apply(accumulator& a, const Value& v) {
+    VOXELPIPE_HD static void apply(accumulator& a, const Value& v) {
         for (glm::length_t i = 0; i < N; ++i) {
             if constexpr (std::is_same_v<Blend, blend::count>)
                 element::apply(a[i], v);

@@ -27,8 +27,10 @@
 
 #if defined(__GNUC__) || defined(__clang__)
 #define VOXELPIPE_INLINE inline __attribute__((always_inline))
+#define VOXELPIPE_INLINE_LAMBDA __attribute__((always_inline)) // between a lambda's parameters and its body
 #else
 #define VOXELPIPE_INLINE inline
+#define VOXELPIPE_INLINE_LAMBDA
 #endif
 
 // An error of ours, not of the caller: compiled out with NDEBUG.

@@ -57,8 +57,9 @@ struct target_view {
     load_operation load = load_operation::clear;
     value_type clear_value = Target::traits::identity();
 
-    [[nodiscard]] VOXELPIPE_HD
-    value_type operator()(int x, int y, int z) const { return map::load(elements, extent, x, y, z); }
+    [[nodiscard]] VOXELPIPE_HD value_type operator()(int x, int y, int z) const {
+        return map::load(elements, extent, x, y, z);
+    }
     VOXELPIPE_HD
     void store(int x, int y, int z, const value_type& v) const { map::store(elements, extent, x, y, z, v); }
 };

@@ -38,8 +38,8 @@ struct stepped_floor {
 // Narrows [lo, hi] to the x for which a*x + b*y + c >= 0, for all three half-planes. What they leave of a row is an
 // interval, so a short one is narrowed from its ends; a long one is solved by division.
 template <class Int>
-VOXELPIPE_HD
-constexpr void narrow_row(const half_plane<Int> (&h)[3], Int y, std::int64_t& lo, std::int64_t& hi) {
+VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row(const half_plane<Int> (&h)[3], Int y, std::int64_t& lo,
+                                                        std::int64_t& hi) {
     const Int r[3] = {h[0].b * y + h[0].c, h[1].b * y + h[1].c, h[2].b * y + h[2].c};
     if (hi - lo >= 6) {
         Int first = lo, last = hi;
@@ -64,19 +64,19 @@ constexpr void narrow_row(const half_plane<Int> (&h)[3], Int y, std::int64_t& lo
         }
         return;
     }
-    const auto inside = [&](std::int64_t x) {
+    const auto inside = [&](std::int64_t x) VOXELPIPE_INLINE_LAMBDA {
         const Int i = x;
-        return h[0].a * i + r[0] >= 0 && h[1].a * i + r[1] >= 0 && h[2].a * i + r[2] >= 0;
+        return ((h[0].a * i + r[0]) | (h[1].a * i + r[1]) | (h[2].a * i + r[2])) >= 0;
     };
     while (lo <= hi && !inside(lo)) ++lo;
-    while (lo <= hi && !inside(hi)) --hi;
+    while (lo < hi && !inside(hi)) --hi;
 }
 
 // Calls emit(u, v, w_first, w_last) for every column that holds covered voxels inside `clip` (x y z, in voxels of the
 // setup's fraction). u, v and w are absolute voxel indices. Spans of one triangle do not overlap.
 template <span_rule Rule, class Int, class Emit>
-VOXELPIPE_HD
-constexpr void for_each_span(const triangle_setup<Int>& t, const voxel_box& clip, Emit&& emit) {
+VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<Int>& t, const voxel_box& clip,
+                                                           Emit&& emit) {
     const triple<std::int64_t> clip_lo = to_uvw(t.axis, clip.lo[0], clip.lo[1], clip.lo[2]);
     const triple<std::int64_t> clip_hi = to_uvw(t.axis, clip.hi[0], clip.hi[1], clip.hi[2]);
     triple<std::int64_t> lo{}, hi{};
@@ -130,30 +130,60 @@ constexpr void for_each_span(const triangle_setup<Int>& t, const voxel_box& clip
                 depth.step(-2 * nu);
             }
         } else {
-            // Voxels whose slab the plane can pass within the column's square: its corners decide.
+            // Voxels whose slab the plane can pass within the column's square, whose corners decide: w from
+            // floor((low - 1) / nw) to floor(high / nw).
             const Int row = nu * u_lo + nv * v;
-            stepped_floor<Int> first(t.plane_low - row - positive_part(nu) - positive_part(nv) - 1, nw);
-            stepped_floor<Int> last(t.plane_high - row - negative_part(nu) - negative_part(nv), nw);
+            Int low = t.plane_low - row - positive_part(nu) - positive_part(nv);
+            Int high = t.plane_high - row - negative_part(nu) - negative_part(nv);
+            // The other two projections at (v, w) and (w, u): what depends on v is fixed here, what depends on u steps.
+            Int r[3], s[3];
+            if constexpr (Rule == span_rule::conservative) {
+                for (int i = 0; i < 3; ++i) {
+                    r[i] = t.vw[i].a * v + t.vw[i].c;
+                    s[i] = t.wu[i].b * u_lo + t.wu[i].c;
+                }
+            }
+            // All of the numbers or-ed are non-negative iff no sign bit is set.
+            const auto sides = [&](Int w) VOXELPIPE_INLINE_LAMBDA {
+                return (t.vw[0].b * w + r[0]) | (t.vw[1].b * w + r[1]) | (t.vw[2].b * w + r[2]) |
+                       (t.wu[0].a * w + s[0]) | (t.wu[1].a * w + s[1]) | (t.wu[2].a * w + s[2]);
+            };
+            const auto out = [&](std::int64_t u, Int w0, Int w1) VOXELPIPE_INLINE_LAMBDA {
+                emit(t.origin[0] + u, t.origin[1] + v, t.origin[2] + static_cast<std::int64_t>(w0),
+                     t.origin[2] + static_cast<std::int64_t>(w1));
+            };
+            if (Rule == span_rule::conservative && hi[2] - lo[2] < 4) {
+                // Few voxels deep: asking each end whether the plane passes it costs less than two divisions.
+                for (std::int64_t u = u_lo; u <= u_hi; ++u) {
+                    const auto inside = [&](Int w) VOXELPIPE_INLINE_LAMBDA {
+                        const Int depth = nw * w;
+                        return (sides(w) | (depth + nw - low) | (high - depth)) >= 0;
+                    };
+                    Int w0 = lo[2], w1 = hi[2];
+                    while (w0 <= w1 && !inside(w0)) ++w0;
+                    if (w0 <= w1) {
+                        while (w0 < w1 && !inside(w1)) --w1;
+                        out(u, w0, w1);
+                    }
+                    low -= nu;
+                    high -= nu;
+                    for (int i = 0; i < 3; ++i) s[i] += t.wu[i].b;
+                }
+                continue;
+            }
+            stepped_floor<Int> first(low - 1, nw);
+            stepped_floor<Int> last(high, nw);
             for (std::int64_t u = u_lo;; ++u) {
                 Int w0 = first.quotient, w1 = last.quotient;
                 if (w0 < lo[2]) w0 = lo[2];
                 if (w1 > hi[2]) w1 = hi[2];
                 if constexpr (Rule == span_rule::conservative) {
-                    // The other two projections cut at most a voxel or two off the ends.
-                    const Int r0 = t.vw[0].a * v + t.vw[0].c, r1 = t.vw[1].a * v + t.vw[1].c,
-                              r2 = t.vw[2].a * v + t.vw[2].c;
-                    const Int s0 = t.wu[0].b * u + t.wu[0].c, s1 = t.wu[1].b * u + t.wu[1].c,
-                              s2 = t.wu[2].b * u + t.wu[2].c;
-                    const auto inside = [&](Int w) {
-                        return t.vw[0].b * w + r0 >= 0 && t.vw[1].b * w + r1 >= 0 && t.vw[2].b * w + r2 >= 0 &&
-                               t.wu[0].a * w + s0 >= 0 && t.wu[1].a * w + s1 >= 0 && t.wu[2].a * w + s2 >= 0;
-                    };
-                    while (w0 <= w1 && !inside(w0)) ++w0;
-                    while (w0 <= w1 && !inside(w1)) --w1;
+                    // The sides cut at most a voxel or two off the ends.
+                    while (w0 <= w1 && sides(w0) < 0) ++w0;
+                    while (w0 < w1 && sides(w1) < 0) --w1;
+                    for (int i = 0; i < 3; ++i) s[i] += t.wu[i].b;
                 }
-                if (w0 <= w1)
-                    emit(t.origin[0] + u, t.origin[1] + v, t.origin[2] + static_cast<std::int64_t>(w0),
-                         t.origin[2] + static_cast<std::int64_t>(w1));
+                if (w0 <= w1) out(u, w0, w1);
                 if (u == u_hi) break;
                 first.step(-nu);
                 last.step(-nu);
@@ -162,15 +192,15 @@ constexpr void for_each_span(const triangle_setup<Int>& t, const voxel_box& clip
     }
 }
 
-[[nodiscard]] VOXELPIPE_HD
-constexpr span_rule to_rule(coverage c) { return c == coverage::thin ? span_rule::thin : span_rule::conservative; }
+[[nodiscard]] VOXELPIPE_HD constexpr span_rule to_rule(coverage c) {
+    return c == coverage::thin ? span_rule::thin : span_rule::conservative;
+}
 
 // Whole path for one triangle: picks the integer width, sets up, enumerates. emit(setup, u, v, w_first, w_last) is
 // called with either width of setup.
 template <span_rule Rule, class Emit>
-VOXELPIPE_HD
-constexpr void rasterize(const snapped_position& a, const snapped_position& b, const snapped_position& c, int fraction,
-                         const voxel_box& clip, Emit&& emit) {
+VOXELPIPE_HD constexpr void rasterize(const snapped_position& a, const snapped_position& b, const snapped_position& c,
+                                      int fraction, const voxel_box& clip, Emit&& emit) {
     const auto run = [&](const auto& t) {
         for_each_span<Rule>(
             t, clip, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) { emit(t, u, v, w0, w1); });

@@ -26,8 +26,7 @@ namespace exact {
 
 // ---- float and double operations, one rounding each -----------------------------------------------------------------
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE float fma(float a, float b, float c) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float fma(float a, float b, float c) {
 #if defined(__CUDA_ARCH__)
     float r;
     asm("fma.rn.f32 %0, %1, %2, %3;" : "=f"(r) : "f"(a), "f"(b), "f"(c));
@@ -37,8 +36,7 @@ VOXELPIPE_INLINE float fma(float a, float b, float c) {
 #endif
 }
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE double fma(double a, double b, double c) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double fma(double a, double b, double c) {
 #if defined(__CUDA_ARCH__)
     return __fma_rn(a, b, c);
 #else
@@ -46,8 +44,7 @@ VOXELPIPE_INLINE double fma(double a, double b, double c) {
 #endif
 }
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE float add(float a, float b) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float add(float a, float b) {
 #if defined(__CUDA_ARCH__)
     float r;
     asm("add.rn.f32 %0, %1, %2;" : "=f"(r) : "f"(a), "f"(b));
@@ -57,8 +54,7 @@ VOXELPIPE_INLINE float add(float a, float b) {
 #endif
 }
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE float sub(float a, float b) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float sub(float a, float b) {
 #if defined(__CUDA_ARCH__)
     float r;
     asm("sub.rn.f32 %0, %1, %2;" : "=f"(r) : "f"(a), "f"(b));
@@ -69,8 +65,7 @@ VOXELPIPE_INLINE float sub(float a, float b) {
 }
 
 // The result must feed an fma, a function argument or memory, never a bare + or -.
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE float mul(float a, float b) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float mul(float a, float b) {
 #if defined(__CUDA_ARCH__)
     float r;
     asm("mul.rn.f32 %0, %1, %2;" : "=f"(r) : "f"(a), "f"(b));
@@ -80,8 +75,7 @@ VOXELPIPE_INLINE float mul(float a, float b) {
 #endif
 }
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE float div(float a, float b) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float div(float a, float b) {
 #if defined(__CUDA_ARCH__)
     float r;
     asm("div.rn.f32 %0, %1, %2;" : "=f"(r) : "f"(a), "f"(b));
@@ -91,8 +85,7 @@ VOXELPIPE_INLINE float div(float a, float b) {
 #endif
 }
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE double mul(double a, double b) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double mul(double a, double b) {
 #if defined(__CUDA_ARCH__)
     return __dmul_rn(a, b);
 #else
@@ -100,8 +93,7 @@ VOXELPIPE_INLINE double mul(double a, double b) {
 #endif
 }
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE double div(double a, double b) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double div(double a, double b) {
 #if defined(__CUDA_ARCH__)
     return __ddiv_rn(a, b);
 #else
@@ -110,8 +102,7 @@ VOXELPIPE_INLINE double div(double a, double b) {
 }
 
 // Square root without a call that may set errno, so that an unused result costs nothing.
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE double sqrt(double a) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double sqrt(double a) {
 #if defined(__CUDA_ARCH__)
     return __dsqrt_rn(a);
 #elif defined(__SSE2__) && defined(__x86_64__)
@@ -121,8 +112,7 @@ VOXELPIPE_INLINE double sqrt(double a) {
 #endif
 }
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE float sqrt(float a) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float sqrt(float a) {
 #if defined(__CUDA_ARCH__)
     float r;
     asm("sqrt.rn.f32 %0, %1;" : "=f"(r) : "f"(a));
@@ -134,8 +124,7 @@ VOXELPIPE_INLINE float sqrt(float a) {
 #endif
 }
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE double to_double(float a) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double to_double(float a) {
 #if defined(__CUDA_ARCH__)
     double r;
     asm("cvt.f64.f32 %0, %1;" : "=d"(r) : "f"(a));
@@ -145,8 +134,7 @@ VOXELPIPE_INLINE double to_double(float a) {
 #endif
 }
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE float to_float(double a) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float to_float(double a) {
 #if defined(__CUDA_ARCH__)
     float r;
     asm("cvt.rn.f32.f64 %0, %1;" : "=f"(r) : "d"(a));
@@ -157,8 +145,7 @@ VOXELPIPE_INLINE float to_float(double a) {
 }
 
 // Nearest integer, ties to even. |a| < 2^63; the host runs in the default rounding mode.
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE std::int64_t round_to_int64(double a) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int64_t round_to_int64(double a) {
 #if defined(__CUDA_ARCH__)
     return __double2ll_rn(a);
 #elif defined(__SSE2__) && defined(__x86_64__)
@@ -170,46 +157,43 @@ VOXELPIPE_INLINE std::int64_t round_to_int64(double a) {
 
 // x*x' + y*y' + z*z' with three roundings: x*x', then two fused steps. V is any type with float members x, y, z.
 template <class V>
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE float dot(const V& a, const V& b) { return fma(a.z, b.z, fma(a.y, b.y, mul(a.x, b.x))); }
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float dot(const V& a, const V& b) {
+    return fma(a.z, b.z, fma(a.y, b.y, mul(a.x, b.x)));
+}
 
 // a + t*(b - a), two roundings; exact at t = 0 and wherever a == b.
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE float lerp(float a, float b, float t) { return fma(t, sub(b, a), a); }
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float lerp(float a, float b, float t) { return fma(t, sub(b, a), a); }
 
 // ---- integers
 // --------------------------------------------------------------------------------------------------------
 
 // floor(a / 2^bits)
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD
-constexpr Int floor_shift(Int a, int bits) {
+[[nodiscard]] VOXELPIPE_HD constexpr Int floor_shift(Int a, int bits) {
     return a >> bits; // arithmetic in C++20
 }
 
 // ceil(a / 2^bits)
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD
-constexpr Int ceil_shift(Int a, int bits) { return -((-a) >> bits); }
+[[nodiscard]] VOXELPIPE_HD constexpr Int ceil_shift(Int a, int bits) {
+    return -((-a) >> bits);
+}
 
 // floor(a / b), b > 0
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD
-constexpr Int floor_div(Int a, Int b) {
+[[nodiscard]] VOXELPIPE_HD constexpr Int floor_div(Int a, Int b) {
     const Int q = a / b;
     return q - static_cast<Int>(a % b < 0);
 }
 
 // ceil(a / b), b > 0
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD
-constexpr Int ceil_div(Int a, Int b) {
+[[nodiscard]] VOXELPIPE_HD constexpr Int ceil_div(Int a, Int b) {
     const Int q = a / b;
     return q + static_cast<Int>(a % b > 0);
 }
 
-[[nodiscard]] VOXELPIPE_HD
-inline int bit_width(std::uint64_t a) {
+[[nodiscard]] VOXELPIPE_HD inline int bit_width(std::uint64_t a) {
 #if defined(__CUDA_ARCH__)
     return 64 - __clzll(static_cast<long long>(a));
 #else
@@ -217,15 +201,13 @@ inline int bit_width(std::uint64_t a) {
 #endif
 }
 
-[[nodiscard]] VOXELPIPE_HD
-inline int bit_width(uint128 a) {
+[[nodiscard]] VOXELPIPE_HD inline int bit_width(uint128 a) {
     const auto high = static_cast<std::uint64_t>(a >> 64);
     return high != 0 ? 64 + bit_width(high) : bit_width(static_cast<std::uint64_t>(a));
 }
 
 // Nearest integer multiple of 2^shift, in units of 2^shift, ties to even. 0 <= shift < 128.
-[[nodiscard]] VOXELPIPE_HD
-inline uint128 shift_right_rne(uint128 a, int shift) {
+[[nodiscard]] VOXELPIPE_HD inline uint128 shift_right_rne(uint128 a, int shift) {
     if (shift == 0) return a;
     const uint128 quotient = a >> shift;
     const uint128 rest = a & ((uint128{1} << shift) - 1);
@@ -236,8 +218,8 @@ inline uint128 shift_right_rne(uint128 a, int shift) {
 // magnitude * 2^exponent rounded once (to nearest, ties to even) to a float with `mantissa_bits` stored mantissa bits
 // and `exponent_bits` exponent bits; returns the bit pattern without sign. Overflow gives infinity, underflow is
 // gradual. 16-bit: (10, 5), float: (23, 8), double: (52, 11).
-[[nodiscard]] VOXELPIPE_HD
-inline std::uint64_t round_to_binary(uint128 magnitude, int exponent, int mantissa_bits, int exponent_bits) {
+[[nodiscard]] VOXELPIPE_HD inline std::uint64_t round_to_binary(uint128 magnitude, int exponent, int mantissa_bits,
+                                                                int exponent_bits) {
     if (magnitude == 0) return 0;
     const int bias = (1 << (exponent_bits - 1)) - 1;
     const int width = bit_width(magnitude);
@@ -258,16 +240,14 @@ inline std::uint64_t round_to_binary(uint128 magnitude, int exponent, int mantis
 }
 
 // Nearest double, ties to even, of a wide integer (compilers and devices differ in how they convert __int128).
-[[nodiscard]] VOXELPIPE_HD
-inline double to_double(int128 a) {
+[[nodiscard]] VOXELPIPE_HD inline double to_double(int128 a) {
     const bool negative = a < 0;
     const uint128 magnitude = negative ? uint128{0} - static_cast<uint128>(a) : static_cast<uint128>(a);
     const std::uint64_t bits = round_to_binary(magnitude, 0, 52, 11) | (negative ? std::uint64_t{1} << 63 : 0);
     return std::bit_cast<double>(bits);
 }
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE double to_double(std::int64_t a) { return static_cast<double>(a); }
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double to_double(std::int64_t a) { return static_cast<double>(a); }
 
 } // namespace exact
 } // namespace voxelpipe

@@ -28,24 +28,21 @@ inline constexpr int max_log2_extent = 20;   // a million voxels an axis
 inline constexpr int coordinate_bits = 40;   // |q| <= 2^40: beyond, a position is "too far"
 inline constexpr int narrow_plane_bits = 62; // the 64-bit path keeps a bit to spare
 
-[[nodiscard]] VOXELPIPE_HD
-constexpr int ceil_log2(std::int64_t n) {
+[[nodiscard]] VOXELPIPE_HD constexpr int ceil_log2(std::int64_t n) {
     int bits = 0;
     while ((std::int64_t{1} << bits) < n) ++bits;
     return bits;
 }
 
 // F = min(16, 24 - L): a float32 position has no more than this left at the far end of such a grid.
-[[nodiscard]] VOXELPIPE_HD
-constexpr int fraction_bits(int largest_extent) {
+[[nodiscard]] VOXELPIPE_HD constexpr int fraction_bits(int largest_extent) {
     const int l = ceil_log2(largest_extent);
     return l < 8 ? 16 : 24 - l;
 }
 
 // The largest e for which the 64-bit path is exact. Bounds below: edge functions (2e + 2 bits, before the shift by F),
 // barycentric numerators (2e + 4 bits, exact in a double as well), the plane (3e - F + 2.6 bits).
-[[nodiscard]] VOXELPIPE_HD
-constexpr int narrow_edge_bits(int fraction) {
+[[nodiscard]] VOXELPIPE_HD constexpr int narrow_edge_bits(int fraction) {
     const int plane = (narrow_plane_bits - 3 + fraction) / 3;
     return plane < 24 ? plane : 24;
 }
@@ -81,12 +78,12 @@ struct snap_transform {
     int fraction;           // F
 };
 
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE bool is_finite(float a) { return (std::bit_cast<std::uint32_t>(a) & 0x7f800000u) != 0x7f800000u; }
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_finite(float a) {
+    return (std::bit_cast<std::uint32_t>(a) & 0x7f800000u) != 0x7f800000u;
+}
 
 // The snapped position relative to the rasterised part's first voxel, or a mark where it cannot be drawn.
-[[nodiscard]] VOXELPIPE_HD
-VOXELPIPE_INLINE snapped_position snap(const snap_transform& t, float x, float y, float z) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE snapped_position snap(const snap_transform& t, float x, float y, float z) {
     constexpr double limit = static_cast<double>(std::int64_t{1} << coordinate_bits);
     if (!(is_finite(x) && is_finite(y) && is_finite(z))) return {nonfinite_mark, 0, 0};
     // A subtraction that feeds a product cannot be contracted, so the two roundings stay two under every flag.
@@ -99,7 +96,6 @@ VOXELPIPE_INLINE snapped_position snap(const snap_transform& t, float x, float y
             exact::round_to_int64(c) - t.offset[2]};
 }
 
-[[nodiscard]] VOXELPIPE_HD
-constexpr bool is_drawable(const snapped_position& p) { return p.x > too_far_mark; }
+[[nodiscard]] VOXELPIPE_HD constexpr bool is_drawable(const snapped_position& p) { return p.x > too_far_mark; }
 
 } // namespace voxelpipe::core

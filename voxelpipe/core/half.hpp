@@ -21,8 +21,7 @@ struct half {
     VOXELPIPE_HD
     explicit half(float value) : bits(from_float(value)) {}
 
-    [[nodiscard]] VOXELPIPE_HD
-    static constexpr half from_bits(std::uint16_t raw) { return half(raw, 0); }
+    [[nodiscard]] VOXELPIPE_HD static constexpr half from_bits(std::uint16_t raw) { return half(raw, 0); }
 
     VOXELPIPE_HD
     explicit operator float() const {
@@ -44,8 +43,7 @@ struct half {
     friend constexpr bool operator==(half a, half b) = default; // bitwise
 
 private:
-    [[nodiscard]] VOXELPIPE_HD
-    static std::uint16_t from_float(float value) {
+    [[nodiscard]] VOXELPIPE_HD static std::uint16_t from_float(float value) {
         const auto raw = std::bit_cast<std::uint32_t>(value);
         const auto sign = static_cast<std::uint16_t>((raw >> 16) & 0x8000u);
         const std::uint32_t exponent = (raw >> 23) & 0xffu;

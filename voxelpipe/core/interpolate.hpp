@@ -3,6 +3,7 @@
 #pragma once
 
 // What the fragment shader is given, from exact integers: barycentrics at the column's centre, varyings, the normal.
+// These functions are forced inline, so that what a shader does not read is not computed.
 // Varyings are aggregates whose members are float, glm::vec2/3/4, std::array<float, N> (interpolated) or flat<T> (taken
 // from the triangle's first vertex); up to 12 members.
 
@@ -86,8 +87,7 @@ inline constexpr std::size_t max_varyings_members = 12;
 
 // References to the members, in order.
 template <class V>
-VOXELPIPE_HD
-constexpr auto tie_members(V& s) {
+VOXELPIPE_HD constexpr auto tie_members(V& s) {
     constexpr std::size_t n = num_members<std::remove_const_t<V>>();
     static_assert(n <= max_varyings_members, "a varyings struct may have at most 12 members");
     const auto refs = [](auto&... m) { return make_pack((&m)...); };
@@ -149,8 +149,7 @@ consteval bool is_varyings() {
 
 // a + t1 * (b - a) + t2 * (c - a), member by member, float, two fused steps each.
 template <class V>
-[[nodiscard]] VOXELPIPE_HD
-V mix(const V& a, const V& b, const V& c, float t1, float t2) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE V mix(const V& a, const V& b, const V& c, float t1, float t2) {
     if constexpr (std::is_empty_v<V>) {
         return V{};
     } else {
@@ -169,13 +168,13 @@ V mix(const V& a, const V& b, const V& c, float t1, float t2) {
 // Barycentrics at the centre of column (u, v) (absolute voxel indices): quotients of exact integers, rounded to double
 // and then to float. Outside the triangle some are negative. A zero-area triangle has 1/3 everywhere.
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD
-glm::vec3 barycentric(const triangle_setup<Int>& t, std::int64_t u, std::int64_t v) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE glm::vec3 barycentric(const triangle_setup<Int>& t, std::int64_t u,
+                                                                  std::int64_t v) {
     if (t.zero_area) return glm::vec3(1.0f / 3.0f);
     const Int x = static_cast<Int>(2 * (u - t.origin[0]) + 1) << t.fraction; // doubled, so that the half stays whole
     const Int y = static_cast<Int>(2 * (v - t.origin[1]) + 1) << t.fraction;
     const double area = exact::to_double(2 * t.normal[2]);
-    const auto weight = [&](const triple<Int>& p, const triple<Int>& q) {
+    const auto weight = [&](const triple<Int>& p, const triple<Int>& q) VOXELPIPE_INLINE_LAMBDA {
         const Int n = (q[0] - p[0]) * (y - 2 * p[1]) - (q[1] - p[1]) * (x - 2 * p[0]);
         return exact::to_float(exact::div(exact::to_double(n), area));
     };
@@ -183,8 +182,7 @@ glm::vec3 barycentric(const triangle_setup<Int>& t, std::int64_t u, std::int64_t
 }
 
 // Negative weights to 0, then scaled to sum 1: a point on the triangle.
-[[nodiscard]] VOXELPIPE_HD
-inline glm::vec3 clamp_barycentric(const glm::vec3& b) {
+[[nodiscard]] VOXELPIPE_HD inline glm::vec3 clamp_barycentric(const glm::vec3& b) {
     const float x = b.x > 0.0f ? b.x : 0.0f, y = b.y > 0.0f ? b.y : 0.0f, z = b.z > 0.0f ? b.z : 0.0f;
     const float sum = exact::add(exact::add(x, y), z);
     return {exact::div(x, sum), exact::div(y, sum), exact::div(z, sum)};
@@ -193,8 +191,8 @@ inline glm::vec3 clamp_barycentric(const glm::vec3& b) {
 // Unit normal in world space, (p1 - p0) x (p2 - p0) direction; zero for a zero-area triangle. Exact integers, then
 // double: scale by the voxels' shape, length by three fused steps, quotients rounded to float.
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD
-glm::vec3 unit_normal(const triangle_setup<Int>& t, const triple<double>& factors) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE glm::vec3 unit_normal(const triangle_setup<Int>& t,
+                                                                  const triple<double>& factors) {
     if (t.zero_area) return glm::vec3(0.0f);
     const triple<Int> n = to_xyz(t.axis, t.normal[0], t.normal[1], t.normal[2]);
     const double x = exact::mul(exact::to_double(n[0]), factors[0]);

@@ -50,14 +50,12 @@ struct sum_magnitude {
     int exponent;
 };
 
-[[nodiscard]] VOXELPIPE_HD
-inline sum_magnitude to_magnitude(const wide_sum<1>& s) {
+[[nodiscard]] VOXELPIPE_HD inline sum_magnitude to_magnitude(const wide_sum<1>& s) {
     const int128 v = (static_cast<int128>(s.top) << 64) | s.limb[0];
     return {v < 0, v < 0 ? uint128{0} - static_cast<uint128>(v) : static_cast<uint128>(v), 0};
 }
 
-[[nodiscard]] VOXELPIPE_HD
-inline sum_magnitude to_magnitude(const wide_sum<2>& s) {
+[[nodiscard]] VOXELPIPE_HD inline sum_magnitude to_magnitude(const wide_sum<2>& s) {
     uint128 low = (static_cast<uint128>(s.limb[1]) << 64) | s.limb[0];
     auto top = static_cast<std::uint32_t>(s.top);
     const bool negative = s.top < 0;
@@ -97,8 +95,7 @@ struct sum_format<double> {
 };
 
 template <int Log2Quantum>
-VOXELPIPE_HD
-inline void add_float(wide_sum<1>& s, float term) {
+VOXELPIPE_HD inline void add_float(wide_sum<1>& s, float term) {
     static_assert(Log2Quantum >= -126 && Log2Quantum <= 64);
     constexpr double scale = std::bit_cast<double>(static_cast<std::uint64_t>(1023 - Log2Quantum) << 52);
     if ((std::bit_cast<std::uint32_t>(term) & 0x7fffffffu) > 0x7f800000u) {
@@ -115,12 +112,12 @@ inline void add_float(wide_sum<1>& s, float term) {
 }
 
 template <int Log2Quantum>
-VOXELPIPE_HD
-inline void add_half(wide_sum<1>& s, half term) { add_float<Log2Quantum>(s, static_cast<float>(term)); }
+VOXELPIPE_HD inline void add_half(wide_sum<1>& s, half term) {
+    add_float<Log2Quantum>(s, static_cast<float>(term));
+}
 
 template <int Log2Quantum>
-VOXELPIPE_HD
-inline void add_double(wide_sum<2>& s, double term) {
+VOXELPIPE_HD inline void add_double(wide_sum<2>& s, double term) {
     const auto bits = std::bit_cast<std::uint64_t>(term);
     const bool negative = (bits >> 63) != 0;
     const int exponent = static_cast<int>((bits >> 52) & 0x7ffu);
@@ -142,13 +139,14 @@ inline void add_double(wide_sum<2>& s, double term) {
     add_term(s, negative ? -signed_units : signed_units);
 }
 
-[[nodiscard]] VOXELPIPE_HD
-constexpr bool sum_is_nan(std::uint32_t marks) { return (marks & sum_nan) != 0 || (marks & 3u) == 3u; }
+[[nodiscard]] VOXELPIPE_HD constexpr bool sum_is_nan(std::uint32_t marks) {
+    return (marks & sum_nan) != 0 || (marks & 3u) == 3u;
+}
 
 // The sum rounded once: bit pattern of a format with the given mantissa and exponent bits.
 template <int Limbs>
-[[nodiscard]] VOXELPIPE_HD
-inline std::uint64_t round_sum(const wide_sum<Limbs>& s, int log2_quantum, int mantissa_bits, int exponent_bits) {
+[[nodiscard]] VOXELPIPE_HD inline std::uint64_t round_sum(const wide_sum<Limbs>& s, int log2_quantum, int mantissa_bits,
+                                                          int exponent_bits) {
     const std::uint64_t infinity = ((std::uint64_t{1} << exponent_bits) - 1) << mantissa_bits;
     const std::uint64_t sign = std::uint64_t{1} << (mantissa_bits + exponent_bits);
     if (sum_is_nan(s.marks)) return infinity | (std::uint64_t{1} << (mantissa_bits - 1));

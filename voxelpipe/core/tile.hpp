@@ -42,8 +42,7 @@ struct storage_map {
     static constexpr int brick_x = is_bit ? 32 : 8;
 
     // Elements of one row, slice or brick count; `cells` are voxels, or words of 32 voxels for bits.
-    [[nodiscard]] VOXELPIPE_HD
-    static constexpr std::size_t cells(glm::ivec3 extent) {
+    [[nodiscard]] VOXELPIPE_HD static constexpr std::size_t cells(glm::ivec3 extent) {
         const auto x = static_cast<std::size_t>(extent.x), y = static_cast<std::size_t>(extent.y),
                    z = static_cast<std::size_t>(extent.z);
         if constexpr (bricks)
@@ -51,12 +50,12 @@ struct storage_map {
         else
             return (is_bit ? (x + 31) / 32 : x) * y * z;
     }
-    [[nodiscard]] VOXELPIPE_HD
-    static constexpr std::size_t elements(glm::ivec3 extent) { return cells(extent) * (planes ? components : 1); }
+    [[nodiscard]] VOXELPIPE_HD static constexpr std::size_t elements(glm::ivec3 extent) {
+        return cells(extent) * (planes ? components : 1);
+    }
 
     // Cell of a voxel.
-    [[nodiscard]] VOXELPIPE_HD
-    static constexpr std::size_t cell(glm::ivec3 extent, int x, int y, int z) {
+    [[nodiscard]] VOXELPIPE_HD static constexpr std::size_t cell(glm::ivec3 extent, int x, int y, int z) {
         const int column = is_bit ? x >> 5 : x;
         if constexpr (bricks) {
             const auto bricks_x = static_cast<std::size_t>((extent.x + brick_x - 1) / brick_x);
@@ -74,8 +73,7 @@ struct storage_map {
         }
     }
 
-    [[nodiscard]] VOXELPIPE_HD
-    static value load(const element* data, glm::ivec3 extent, int x, int y, int z) {
+    [[nodiscard]] VOXELPIPE_HD static value load(const element* data, glm::ivec3 extent, int x, int y, int z) {
         const std::size_t i = cell(extent, x, y, z);
         if constexpr (is_bit) {
             return ((data[i] >> (x & 31)) & 1u) != 0;
@@ -115,19 +113,16 @@ struct tile_grid {
           tiles((extent.x + (1 << log2_size_) - 1) >> log2_size_, (extent.y + (1 << log2_size_) - 1) >> log2_size_,
                 (extent.z + (1 << log2_size_) - 1) >> log2_size_) {}
 
-    [[nodiscard]] VOXELPIPE_HD
-    std::uint64_t count() const {
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t count() const {
         return static_cast<std::uint64_t>(tiles.x) * static_cast<std::uint64_t>(tiles.y) *
                static_cast<std::uint64_t>(tiles.z);
     }
-    [[nodiscard]] VOXELPIPE_HD
-    std::uint64_t index(std::int64_t x, std::int64_t y, std::int64_t z) const {
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t index(std::int64_t x, std::int64_t y, std::int64_t z) const {
         return (static_cast<std::uint64_t>(z) * static_cast<std::uint64_t>(tiles.y) + static_cast<std::uint64_t>(y)) *
                    static_cast<std::uint64_t>(tiles.x) +
                static_cast<std::uint64_t>(x);
     }
-    [[nodiscard]] VOXELPIPE_HD
-    glm::ivec3 position(std::uint64_t tile) const {
+    [[nodiscard]] VOXELPIPE_HD glm::ivec3 position(std::uint64_t tile) const {
         const auto x = static_cast<std::uint64_t>(tiles.x), y = static_cast<std::uint64_t>(tiles.y);
         return {static_cast<int>(tile % x), static_cast<int>(tile / x % y), static_cast<int>(tile / (x * y))};
     }

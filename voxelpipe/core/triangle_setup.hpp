@@ -39,12 +39,10 @@ struct triple {
 // Inclusive box of voxels, x y z; empty where hi < lo.
 struct voxel_box {
     triple<std::int64_t> lo, hi;
-    [[nodiscard]] VOXELPIPE_HD
-    constexpr bool empty() const { return hi[0] < lo[0] || hi[1] < lo[1] || hi[2] < lo[2]; }
+    [[nodiscard]] VOXELPIPE_HD constexpr bool empty() const { return hi[0] < lo[0] || hi[1] < lo[1] || hi[2] < lo[2]; }
 };
 
-[[nodiscard]] VOXELPIPE_HD
-constexpr voxel_box intersect(const voxel_box& a, const voxel_box& b) {
+[[nodiscard]] VOXELPIPE_HD constexpr voxel_box intersect(const voxel_box& a, const voxel_box& b) {
     voxel_box r{};
     for (int i = 0; i < 3; ++i) {
         r.lo[i] = a.lo[i] > b.lo[i] ? a.lo[i] : b.lo[i];
@@ -55,45 +53,43 @@ constexpr voxel_box intersect(const voxel_box& a, const voxel_box& b) {
 
 // (x, y, z) -> (u, v, w). Written as selects, so that a device compiler keeps everything in registers.
 template <class T>
-[[nodiscard]] VOXELPIPE_HD
-constexpr triple<T> to_uvw(int axis, const T& x, const T& y, const T& z) {
+[[nodiscard]] VOXELPIPE_HD constexpr triple<T> to_uvw(int axis, const T& x, const T& y, const T& z) {
     return {axis == 0 ? y : axis == 1 ? z : x, axis == 0 ? z : axis == 1 ? x : y, axis == 0 ? x : axis == 1 ? y : z};
 }
 
 // (u, v, w) -> (x, y, z)
 template <class T>
-[[nodiscard]] VOXELPIPE_HD
-constexpr triple<T> to_xyz(int axis, const T& u, const T& v, const T& w) {
+[[nodiscard]] VOXELPIPE_HD constexpr triple<T> to_xyz(int axis, const T& u, const T& v, const T& w) {
     return {axis == 0 ? w : axis == 1 ? v : u, axis == 0 ? u : axis == 1 ? w : v, axis == 0 ? v : axis == 1 ? u : w};
 }
 
 template <class T>
-[[nodiscard]] VOXELPIPE_HD
-constexpr T min3(T a, T b, T c) {
+[[nodiscard]] VOXELPIPE_HD constexpr T min3(T a, T b, T c) {
     const T m = a < b ? a : b;
     return m < c ? m : c;
 }
 template <class T>
-[[nodiscard]] VOXELPIPE_HD
-constexpr T max3(T a, T b, T c) {
+[[nodiscard]] VOXELPIPE_HD constexpr T max3(T a, T b, T c) {
     const T m = a > b ? a : b;
     return m > c ? m : c;
 }
 template <class T>
-[[nodiscard]] VOXELPIPE_HD
-constexpr T positive_part(T a) { return a > 0 ? a : T{0}; }
+[[nodiscard]] VOXELPIPE_HD constexpr T positive_part(T a) {
+    return a > 0 ? a : T{0};
+}
 template <class T>
-[[nodiscard]] VOXELPIPE_HD
-constexpr T negative_part(T a) { return a < 0 ? a : T{0}; }
+[[nodiscard]] VOXELPIPE_HD constexpr T negative_part(T a) {
+    return a < 0 ? a : T{0};
+}
 template <class T>
-[[nodiscard]] VOXELPIPE_HD
-constexpr T magnitude(T a) { return a < 0 ? -a : a; }
+[[nodiscard]] VOXELPIPE_HD constexpr T magnitude(T a) {
+    return a < 0 ? -a : a;
+}
 
 // Voxels (of 2^fraction units) whose closed box meets the triangle's bounding box. A point on a voxel face touches both
 // sides: the lowest voxel is ceil(min) - 1.
-[[nodiscard]] VOXELPIPE_HD
-constexpr voxel_box bounds(const snapped_position& a, const snapped_position& b, const snapped_position& c,
-                           int fraction) {
+[[nodiscard]] VOXELPIPE_HD constexpr voxel_box bounds(const snapped_position& a, const snapped_position& b,
+                                                      const snapped_position& c, int fraction) {
     voxel_box r{};
     r.lo[0] = exact::ceil_shift(min3(a.x, b.x, c.x), fraction) - 1;
     r.lo[1] = exact::ceil_shift(min3(a.y, b.y, c.y), fraction) - 1;
@@ -106,9 +102,8 @@ constexpr voxel_box bounds(const snapped_position& a, const snapped_position& b,
 
 // Whether the 64-bit path is exact for this triangle (fixed_point.hpp, table of widths). Only its size counts, not its
 // place.
-[[nodiscard]] VOXELPIPE_HD
-constexpr bool fits_narrow(const snapped_position& a, const snapped_position& b, const snapped_position& c,
-                           int fraction) {
+[[nodiscard]] VOXELPIPE_HD constexpr bool fits_narrow(const snapped_position& a, const snapped_position& b,
+                                                      const snapped_position& c, int fraction) {
     const std::int64_t limit = std::int64_t{1} << narrow_edge_bits(fraction < 16 ? fraction : 16);
     return max3(a.x, b.x, c.x) - min3(a.x, b.x, c.x) <= limit && max3(a.y, b.y, c.y) - min3(a.y, b.y, c.y) <= limit &&
            max3(a.z, b.z, c.z) - min3(a.z, b.z, c.z) <= limit;
@@ -117,8 +112,7 @@ constexpr bool fits_narrow(const snapped_position& a, const snapped_position& b,
 template <class Int>
 struct half_plane {
     Int a, b, c;
-    [[nodiscard]] VOXELPIPE_HD
-    constexpr Int at(Int x, Int y) const { return a * x + b * y + c; }
+    [[nodiscard]] VOXELPIPE_HD constexpr Int at(Int x, Int y) const { return a * x + b * y + c; }
 };
 
 template <class Int>
@@ -138,8 +132,7 @@ struct triangle_setup {
 
 // The half-plane left of p -> q (sign = 1) or right of it (sign = -1), both in one projection.
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD
-constexpr half_plane<Int> edge(Int px, Int py, Int qx, Int qy, int sign, int fraction) {
+[[nodiscard]] VOXELPIPE_HD constexpr half_plane<Int> edge(Int px, Int py, Int qx, Int qy, int sign, int fraction) {
     const Int a = sign > 0 ? py - qy : qy - py;
     const Int b = sign > 0 ? qx - px : px - qx;
     const Int c = exact::floor_shift<Int>(-(a * px + b * py), fraction) + positive_part(a) + positive_part(b);
@@ -149,8 +142,8 @@ constexpr half_plane<Int> edge(Int px, Int py, Int qx, Int qy, int sign, int fra
 // The three half-planes of the triangle's projection on axes (x, y); `area` is the doubled signed area of it.
 // A projection without area is a segment or a point: then two half-planes hold its line, and the third is always true.
 template <class Int>
-VOXELPIPE_HD
-constexpr void projection(const triple<Int> (&p)[3], int x, int y, Int area, int fraction, half_plane<Int> (&out)[3]) {
+VOXELPIPE_HD constexpr void projection(const triple<Int> (&p)[3], int x, int y, Int area, int fraction,
+                                       half_plane<Int> (&out)[3]) {
     if (area != 0) {
         const int sign = area > 0 ? 1 : -1;
         out[0] = edge(p[0][x], p[0][y], p[1][x], p[1][y], sign, fraction);
@@ -169,17 +162,15 @@ constexpr void projection(const triple<Int> (&p)[3], int x, int y, Int area, int
 
 // floor((n . p) / 2^shift) in 128 bits whatever Int is: the one wide product of a triangle.
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD
-constexpr int128 dot128(const triple<Int>& n, const triple<Int>& p) {
+[[nodiscard]] VOXELPIPE_HD constexpr int128 dot128(const triple<Int>& n, const triple<Int>& p) {
     return static_cast<int128>(n[0]) * p[0] + static_cast<int128>(n[1]) * p[1] + static_cast<int128>(n[2]) * p[2];
 }
 
 // Int = std::int64_t where fits_narrow, int128 otherwise. Vertices are drawable; fraction >= 1.
 template <span_rule Rule, class Int>
-[[nodiscard]] VOXELPIPE_HD
-constexpr triangle_setup<Int> setup_triangle(const snapped_position& a, const snapped_position& b,
-                                             const snapped_position& c, int fraction) {
-    triangle_setup<Int> t{};
+[[nodiscard]] VOXELPIPE_HD constexpr triangle_setup<Int>
+setup_triangle(const snapped_position& a, const snapped_position& b, const snapped_position& c, int fraction) {
+    triangle_setup<Int> t; // every field that the rule uses is set below
     t.fraction = fraction;
     const voxel_box box = bounds(a, b, c, fraction);
     const std::int64_t ox = box.lo[0] << fraction, oy = box.lo[1] << fraction, oz = box.lo[2] << fraction;
@@ -211,12 +202,19 @@ constexpr triangle_setup<Int> setup_triangle(const snapped_position& a, const sn
     }
     t.plane = t.normal;
     if (t.plane[2] < 0) t.plane = {-t.plane[0], -t.plane[1], -t.plane[2]};
-    const int128 d = dot128(t.plane, t.p[0]);
-    if constexpr (Rule == span_rule::thin) {
-        t.plane_low = t.plane_high = static_cast<Int>(exact::floor_shift<int128>(2 * d, fraction));
+    const auto divide = [&](auto d) VOXELPIPE_INLINE_LAMBDA {
+        if constexpr (Rule == span_rule::thin) {
+            t.plane_low = t.plane_high = static_cast<Int>(exact::floor_shift(2 * d, fraction));
+        } else {
+            t.plane_low = static_cast<Int>(exact::ceil_shift(d, fraction));
+            t.plane_high = static_cast<Int>(exact::floor_shift(d, fraction));
+        }
+    };
+    if (sizeof(Int) == 8 && max3(t.last[0], t.last[1], t.last[2]) < (std::int64_t{1} << 19 >> fraction)) {
+        // A small triangle's product fits: factors of 38 and 20 bits, three of them, doubled.
+        divide(t.plane[0] * t.p[0][0] + t.plane[1] * t.p[0][1] + t.plane[2] * t.p[0][2]);
     } else {
-        t.plane_low = static_cast<Int>(exact::ceil_shift<int128>(d, fraction));
-        t.plane_high = static_cast<Int>(exact::floor_shift<int128>(d, fraction));
+        divide(dot128(t.plane, t.p[0]));
     }
     return t;
 }
