@@ -315,6 +315,19 @@ VOXELPIPE_INLINE void shade_fragments(const Scene& s, std::uint32_t id, const co
                 }
             });
     };
+    using shader = std::remove_cvref_t<decltype(d.fragment_shader)>;
+    if constexpr (Rule == coverage::conservative && core::is_solid<shader>) {
+        // A shader that reads nothing needs no setup where coverage is plain from the bounding box.
+        const core::voxel_box all = core::bounds(a, b, c, s.snap.fraction);
+        if (core::is_line_of_voxels(all)) {
+            const core::voxel_box here = core::intersect(all, box);
+            for (auto z = static_cast<int>(here.lo[2]); z <= static_cast<int>(here.hi[2]); ++z)
+                for (auto y = static_cast<int>(here.lo[1]); y <= static_cast<int>(here.hi[1]); ++y)
+                    for (auto x = static_cast<int>(here.lo[0]); x <= static_cast<int>(here.hi[0]); ++x)
+                        visit(x, y, z, d.fragment_shader(f));
+            return;
+        }
+    }
     constexpr auto rule = core::to_rule(Rule);
     if (core::fits_narrow(a, b, c, s.snap.fraction))
         run(core::setup_triangle<rule, std::int64_t>(a, b, c, s.snap.fraction));

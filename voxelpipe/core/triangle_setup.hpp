@@ -100,6 +100,14 @@ template <class T>
     return r;
 }
 
+// A bounding box one voxel wide along two axes: then every voxel of it is covered conservatively, because the triangle
+// is connected and reaches both ends.
+[[nodiscard]] VOXELPIPE_HD constexpr bool is_line_of_voxels(const voxel_box& bounding_box) {
+    int wide = 0;
+    for (int i = 0; i < 3; ++i) wide += bounding_box.hi[i] != bounding_box.lo[i] ? 1 : 0;
+    return wide <= 1;
+}
+
 // Whether the 64-bit path is exact for this triangle (fixed_point.hpp, table of widths). Only its size counts, not its
 // place.
 [[nodiscard]] VOXELPIPE_HD constexpr bool fits_narrow(const snapped_position& a, const snapped_position& b,
