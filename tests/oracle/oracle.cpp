@@ -175,9 +175,11 @@ private:
 // Halves a cube of 2^level voxels that meets the triangle until single voxels remain; closed children cover their
 // closed parent, so nothing is lost.
 template <class Integer>
-void descend(const grid& g, int fraction, const separating_axes<Integer>& axes, int i, int j, int k, int level,
+void descend(const region& part, int fraction, const separating_axes<Integer>& axes, int i, int j, int k, int level,
              std::vector<voxel>& out) {
-    if (i >= g.extent[0] || j >= g.extent[1] || k >= g.extent[2]) return;
+    const int width = 1 << level;
+    if (i >= part.hi[0] || j >= part.hi[1] || k >= part.hi[2]) return;
+    if (i + width <= part.lo[0] || j + width <= part.lo[1] || k + width <= part.lo[2]) return;
     const std::int64_t size = std::int64_t{1} << (level + fraction);
     const std::int64_t lo[3] = {std::int64_t{i} << fraction, std::int64_t{j} << fraction, std::int64_t{k} << fraction};
     const std::int64_t hi[3] = {lo[0] + size, lo[1] + size, lo[2] + size};
@@ -188,7 +190,7 @@ void descend(const grid& g, int fraction, const separating_axes<Integer>& axes, 
     }
     const int half = 1 << (level - 1);
     for (int child = 0; child < 8; ++child)
-        descend(g, fraction, axes, i + (child & 1) * half, j + ((child >> 1) & 1) * half, k + (child >> 2) * half,
+        descend(part, fraction, axes, i + (child & 1) * half, j + ((child >> 1) & 1) * half, k + (child >> 2) * half,
                 level - 1, out);
 }
 
@@ -197,9 +199,10 @@ struct column {
 };
 
 template <class Integer>
-void descend_2d(const int (&extent)[2], int fraction, const separating_axes_2d<Integer>& axes, column at, int level,
-                std::vector<column>& out) {
-    if (at.u >= extent[0] || at.v >= extent[1]) return;
+void descend_2d(const int (&lo)[2], const int (&hi)[2], int fraction, const separating_axes_2d<Integer>& axes,
+                column at, int level, std::vector<column>& out) {
+    const int width = 1 << level;
+    if (at.u >= hi[0] || at.v >= hi[1] || at.u + width <= lo[0] || at.v + width <= lo[1]) return;
     const std::int64_t size = std::int64_t{1} << (level + fraction);
     const std::int64_t u = std::int64_t{at.u} << fraction;
     const std::int64_t v = std::int64_t{at.v} << fraction;
@@ -210,7 +213,7 @@ void descend_2d(const int (&extent)[2], int fraction, const separating_axes_2d<I
     }
     const int half = 1 << (level - 1);
     for (int child = 0; child < 4; ++child)
-        descend_2d(extent, fraction, axes, {at.u + (child & 1) * half, at.v + (child >> 1) * half}, level - 1, out);
+        descend_2d(lo, hi, fraction, axes, {at.u + (child & 1) * half, at.v + (child >> 1) * half}, level - 1, out);
 }
 
 int ceil_log2(int value) {
@@ -218,6 +221,8 @@ int ceil_log2(int value) {
     while ((std::int64_t{1} << log2) < value) ++log2;
     return log2;
 }
+
+region whole(const grid& g) { return {{0, 0, 0}, {g.extent[0], g.extent[1], g.extent[2]}}; }
 
 int largest_extent(const grid& g) { return std::max({g.extent[0], g.extent[1], g.extent[2]}); }
 
@@ -273,6 +278,30 @@ std::int64_t round_half_even(double x) {
     return whole % 2 == 0 ? whole : whole + 1;
 }
 
+template <class Float>
+Float nearest(const ratio& value) {
+    if (value.numerator.sign() == 0) return Float{0};
+    constexpr int digits = std::numeric_limits<Float>::digits;
+    // Scale to a quotient with two or three bits more than the significand; what the division leaves is sticky.
+    const int shift = digits + 2 - (value.numerator.bit_width() - value.denominator.bit_width());
+    const wide numerator = shift > 0 ? value.numerator.shifted_left(shift) : value.numerator;
+    const wide denominator = shift < 0 ? value.denominator.shifted_left(-shift) : value.denominator;
+    const wide::division parts = wide::divide_magnitudes(numerator, denominator);
+    auto significand = static_cast<std::uint64_t>(parts.quotient.to_int64());
+    const int dropped = parts.quotient.bit_width() - digits;
+    const std::uint64_t rest = significand & ((std::uint64_t{1} << dropped) - 1);
+    const std::uint64_t half = std::uint64_t{1} << (dropped - 1);
+    significand >>= dropped;
+    const bool sticky = parts.remainder.sign() != 0;
+    if (rest > half || (rest == half && (sticky || significand % 2 == 1))) ++significand;
+    const double magnitude = std::ldexp(static_cast<double>(significand), dropped - shift); // exact
+    if (magnitude > static_cast<double>(std::numeric_limits<Float>::max()) ||
+        magnitude < static_cast<double>(std::numeric_limits<Float>::min()))
+        throw std::overflow_error("oracle: ratio outside the normal numbers");
+    const bool negative = value.numerator.sign() * value.denominator.sign() < 0;
+    return static_cast<Float>(negative ? -magnitude : magnitude);
+}
+
 } // namespace
 
 int fraction_bits(const grid& g) {
@@ -316,11 +345,15 @@ bool covers_conservative(const grid& g, const snapped_triangle& t, int i, int j,
 }
 
 std::vector<voxel> conservative(const grid& g, const snapped_triangle& t, arithmetic with) {
+    return conservative(g, t, whole(g), with);
+}
+
+std::vector<voxel> conservative(const grid& g, const snapped_triangle& t, const region& part, arithmetic with) {
     std::vector<voxel> result;
     if (t.dropped) return result;
     const int fraction = fraction_bits(g);
     with_integers(t, with, [&]<class Integer>(Integer) {
-        descend(g, fraction, separating_axes<Integer>(t), 0, 0, 0, ceil_log2(largest_extent(g)), result);
+        descend(part, fraction, separating_axes<Integer>(t), 0, 0, 0, ceil_log2(largest_extent(g)), result);
     });
     std::sort(result.begin(), result.end());
     return result;
@@ -344,6 +377,10 @@ int dominant_axis(const snapped_triangle& t) {
 }
 
 std::vector<voxel> thin(const grid& g, const snapped_triangle& t, arithmetic with) {
+    return thin(g, t, whole(g), with);
+}
+
+std::vector<voxel> thin(const grid& g, const snapped_triangle& t, const region& part, arithmetic with) {
     std::vector<voxel> result;
     if (t.dropped) return result;
     const int axis = dominant_axis(t);
@@ -353,12 +390,13 @@ std::vector<voxel> thin(const grid& g, const snapped_triangle& t, arithmetic wit
     const int fraction = fraction_bits(g);
     with_integers(t, with, [&]<class Integer>(Integer) {
         std::vector<column> columns;
-        const int extent[2] = {g.extent[u], g.extent[v]};
-        descend_2d(extent, fraction, separating_axes_2d<Integer>(t, u, v), {0, 0},
-                   ceil_log2(std::max(extent[0], extent[1])), columns);
+        const int lo[2] = {part.lo[u], part.lo[v]};
+        const int hi[2] = {part.hi[u], part.hi[v]};
+        descend_2d(lo, hi, fraction, separating_axes_2d<Integer>(t, u, v), {0, 0}, ceil_log2(std::max(hi[0], hi[1])),
+                   columns);
         for (const column& at : columns) {
             const int w = floor_inside(depth_over<Integer>(t, fraction, axis, at.u, at.v), g.extent[axis]);
-            if (w < 0) continue;
+            if (w < part.lo[axis] || w >= part.hi[axis]) continue;
             int index[3];
             index[u] = at.u;
             index[v] = at.v;
@@ -402,27 +440,7 @@ ratio depth(const grid& g, const snapped_triangle& t, const voxel& at) {
     return {exact.numerator, exact.denominator};
 }
 
-float nearest_float(const ratio& value) {
-    if (value.numerator.sign() == 0) return 0.0f;
-    // Scale to a quotient of 26 or 27 bits: 24 significant ones and at least two below; what the division leaves is
-    // sticky.
-    const int shift = 26 - (value.numerator.bit_width() - value.denominator.bit_width());
-    const wide numerator = shift > 0 ? value.numerator.shifted_left(shift) : value.numerator;
-    const wide denominator = shift < 0 ? value.denominator.shifted_left(-shift) : value.denominator;
-    const wide::division parts = wide::divide_magnitudes(numerator, denominator);
-    auto significand = static_cast<std::uint64_t>(parts.quotient.to_int64());
-    const int dropped = parts.quotient.bit_width() - 24;
-    const std::uint64_t rest = significand & ((std::uint64_t{1} << dropped) - 1);
-    const std::uint64_t half = std::uint64_t{1} << (dropped - 1);
-    significand >>= dropped;
-    const bool sticky = parts.remainder.sign() != 0;
-    if (rest > half || (rest == half && (sticky || significand % 2 == 1))) ++significand;
-    const double magnitude = std::ldexp(static_cast<double>(significand), dropped - shift); // exact
-    if (magnitude > static_cast<double>(std::numeric_limits<float>::max()) ||
-        magnitude < static_cast<double>(std::numeric_limits<float>::min()))
-        throw std::overflow_error("oracle: ratio outside the normal floats");
-    const bool negative = value.numerator.sign() * value.denominator.sign() < 0;
-    return static_cast<float>(negative ? -magnitude : magnitude);
-}
+float nearest_float(const ratio& value) { return nearest<float>(value); }
+double nearest_double(const ratio& value) { return nearest<double>(value); }
 
 } // namespace oracle

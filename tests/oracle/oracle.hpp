@@ -5,7 +5,7 @@
 // The oracle: which voxels a triangle covers, decided a second way that shares nothing with voxelpipe/ (no header of it
 // is included here or in oracle.cpp). Takes a grid and three float positions; gives exact voxel sets and exact rational
 // barycentrics. Coverage is decided by projecting every box corner and every vertex on each of the separating axes, in
-// integers that provably do not overflow. Candidates come from halving the whole grid, never from a bounding box.
+// integers that provably do not overflow. Candidates come from halving the grid, never from a bounding box.
 
 #include "wide_int.hpp"
 
@@ -44,6 +44,12 @@ struct voxel {
     }
 };
 
+// Part of a grid: voxels from lo to hi, hi not included.
+struct region {
+    int lo[3];
+    int hi[3];
+};
+
 // Integers to decide with. `automatic` takes the narrowest that is proven wide enough; naming one that is not throws
 // std::overflow_error. All give the same answer, which oracle_test checks.
 enum class arithmetic { automatic, bits64, bits128, bits256 };
@@ -65,6 +71,10 @@ bool covers_conservative(const grid& g, const snapped_triangle& t, int i, int j,
 // Every voxel of the grid whose closed box meets the closed triangle, ascending. Empty for a dropped triangle.
 std::vector<voxel> conservative(const grid& g, const snapped_triangle& t, arithmetic with = arithmetic::automatic);
 
+// The same, for the voxels of a part of the grid; the grid still decides how positions snap.
+std::vector<voxel> conservative(const grid& g, const snapped_triangle& t, const region& part,
+                                arithmetic with = arithmetic::automatic);
+
 // Axis of the largest |normal component| (ties: x over y over z), or -1 for a zero-area triangle.
 int dominant_axis(const snapped_triangle& t);
 
@@ -74,6 +84,8 @@ std::array<wide, 3> normal(const snapped_triangle& t);
 // One voxel for every column along the dominant axis whose closed unit square meets the closed projected triangle, at
 // the floor of the plane's depth at the column's centre, if that lies inside the grid. Ascending.
 std::vector<voxel> thin(const grid& g, const snapped_triangle& t, arithmetic with = arithmetic::automatic);
+std::vector<voxel> thin(const grid& g, const snapped_triangle& t, const region& part,
+                        arithmetic with = arithmetic::automatic);
 
 // A rational number; the denominator is not zero but may be negative.
 struct ratio {
@@ -88,8 +100,9 @@ std::array<ratio, 3> barycentrics(const grid& g, const snapped_triangle& t, cons
 // The plane's depth at that point along the dominant axis, in voxels.
 ratio depth(const grid& g, const snapped_triangle& t, const voxel& at);
 
-// The float nearest to the exact value, ties to even. Throws std::overflow_error for magnitudes above the largest
-// finite float (none of the ratios above reaches that) and for subnormal results other than zero.
+// The float, or double, nearest to the exact value, ties to even. Throws std::overflow_error for magnitudes above the
+// largest finite one (none of the ratios above reaches that) and for subnormal results other than zero.
 float nearest_float(const ratio& value);
+double nearest_double(const ratio& value);
 
 } // namespace oracle

@@ -69,8 +69,7 @@ TEST(OracleSnap, DropsWhatIsNotANumberOrTooFar) {
     EXPECT_TRUE(snapped(g, {1, 1, 1}, {2, 2, 2}, {-infinity, 0, 0}).dropped);
 }
 
-// ---- The snap formula again, in exact integers: value = significand * 2^exponent
-// ---------------------------------------
+// ---- The snap formula again, in exact integers: value = significand * 2^exponent ----
 
 struct exact {
     wide_int<8> significand;
@@ -144,8 +143,7 @@ TEST(OracleSnap, IsTheFormulaInExactRationalArithmetic) {
     EXPECT_GT(compared, 80000);
 }
 
-// ---- Conservative, by hand
-// -------------------------------------------------------------------------------------------
+// ---- Conservative, by hand ----
 
 TEST(OracleConservative, PointOnACornerTouchesEightVoxels) {
     const grid g = unit_grid(4, 4, 4);
@@ -234,8 +232,7 @@ TEST(OracleConservative, NothingForADroppedTriangle) {
     EXPECT_TRUE(thin(g, t).empty());
 }
 
-// ---- Thin, by hand
-// ---------------------------------------------------------------------------------------------------
+// ---- Thin, by hand ----
 
 TEST(OracleThin, EveryClosedColumnOnceAtTheFloorOfItsCentre) {
     const grid g = unit_grid(4, 4, 4);
@@ -290,8 +287,32 @@ TEST(OracleThin, ZeroAreaGivesNone) {
     EXPECT_FALSE(conservative(g, snapped(g, {1, 1, 1}, {2, 2, 2}, {4, 4, 4})).empty());
 }
 
-// ---- Fragments
-// -------------------------------------------------------------------------------------------------------
+TEST(OracleRegion, IsTheCropOfTheWhole) {
+    splitmix64 random(8);
+    for (const triangle_class kind : all_triangle_classes) {
+        for (int n = 0; n < 20; ++n) {
+            const test_grid& where = test_grids()[random.below(8)];
+            region part{};
+            for (int axis = 0; axis < 3; ++axis) {
+                part.lo[axis] = static_cast<int>(random.between(0, where.g.extent[axis] - 1));
+                part.hi[axis] = static_cast<int>(random.between(part.lo[axis] + 1, where.g.extent[axis]));
+            }
+            const world_triangle w = make_triangle(random, where, kind);
+            const snapped_triangle t = snap(where.g, w.v);
+            const auto crop = [&](voxels all) {
+                std::erase_if(all, [&](const voxel& v) {
+                    return v.i < part.lo[0] || v.i >= part.hi[0] || v.j < part.lo[1] || v.j >= part.hi[1] ||
+                           v.k < part.lo[2] || v.k >= part.hi[2];
+                });
+                return all;
+            };
+            ASSERT_EQ(conservative(where.g, t, part), crop(conservative(where.g, t))) << name(kind);
+            ASSERT_EQ(thin(where.g, t, part), crop(thin(where.g, t))) << name(kind);
+        }
+    }
+}
+
+// ---- Fragments ----
 
 TEST(OracleBarycentrics, AreExactRationals) {
     const grid g = unit_grid(4, 4, 4);
@@ -354,17 +375,29 @@ TEST(OracleNearestFloat, RoundsOnceTiesToEven) {
     EXPECT_THROW(static_cast<void>(nearest_float({wide(1).shifted_left(129), wide(1)})), std::overflow_error);
 }
 
-// ---- Widths
-// ----------------------------------------------------------------------------------------------------------
+TEST(OracleNearestDouble, RoundsOnceTiesToEven) {
+    const std::int64_t tie = (std::int64_t{1} << 53) + 1;
+    EXPECT_EQ(nearest_double({wide(tie), wide(1)}), 0x1p53);
+    EXPECT_EQ(nearest_double({wide(tie + 2), wide(-1)}), -(0x1p53 + 4));
+    EXPECT_EQ(nearest_double({wide(tie).shifted_left(80) + wide(1), wide(1)}), 0x1p133 + 0x1p81);
+    splitmix64 random(9);
+    for (int n = 0; n < 100000; ++n) {
+        const std::int64_t a = random.between(-(std::int64_t{1} << 53), std::int64_t{1} << 53);
+        const std::int64_t b = random.between(1, std::int64_t{1} << 53);
+        ASSERT_EQ(nearest_double({wide(a), wide(b)}), static_cast<double>(a) / static_cast<double>(b));
+        ASSERT_EQ(nearest_double({wide(a) * wide(b), wide(1)}), static_cast<double>(a) * static_cast<double>(b));
+    }
+}
+
+// ---- Widths ----
 
 TEST(OracleArithmetic, EveryWidthGivesTheSameVoxels) {
     splitmix64 random(7);
     long in_64 = 0, in_128 = 0;
     for (const triangle_class kind : all_triangle_classes) {
         for (const test_grid& where : test_grids()) {
-            const bool wide_kind = kind == triangle_class::large || kind == triangle_class::far_away;
-            if (!where.dense && wide_kind) continue; // millions of voxels a triangle
-            const int count = wide_kind ? 3 : 7;
+            if (!where.dense && covers_much(kind)) continue; // millions of voxels a triangle
+            const int count = covers_much(kind) ? 3 : 7;
             for (int n = 0; n < count; ++n) {
                 const world_triangle w = make_triangle(random, where, kind);
                 const snapped_triangle t = snap(where.g, w.v);

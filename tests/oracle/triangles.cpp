@@ -20,8 +20,14 @@ position operator*(double s, const position& a) { return {s * a[0], s * a[1], s 
 class maker {
 public:
     maker(splitmix64& random, const test_grid& where)
-        : random_(random), extent_{where.g.extent[0], where.g.extent[1], where.g.extent[2]}, dense_(where.dense),
-          exact_(where.exact), unit_(std::ldexp(1.0, fraction_bits(where.g))) {}
+        : random_(random), dense_(where.dense), exact_(where.exact), unit_(std::ldexp(1.0, fraction_bits(where.g))) {
+        const bool everywhere = where.focus.hi[0] == 0;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            begin_[axis] = everywhere ? 0 : where.focus.lo[axis];
+            size_[axis] = everywhere ? where.g.extent[axis] : where.focus.hi[axis] - where.focus.lo[axis];
+            largest_ = std::max(largest_, static_cast<double>(where.g.extent[axis]));
+        }
+    }
 
     corners make(triangle_class kind) {
         switch (kind) {
@@ -70,6 +76,8 @@ public:
             return around(on_border(), scale(0.1, reach()));
         case triangle_class::wholly_outside:
             return wholly_outside();
+        case triangle_class::powers_of_two:
+            return powers_of_two();
         case triangle_class::far_away:
             return far_away();
         case triangle_class::dropped:
@@ -79,9 +87,13 @@ public:
     }
 
 private:
-    double voxels(int axis) const { return static_cast<double>(extent_[static_cast<std::size_t>(axis)]); }
-    double largest() const { return std::max({voxels(0), voxels(1), voxels(2)}); }
-    double reach() const { return dense_ ? largest() : std::min(largest(), 64.0); } // voxels
+    double first_unit(std::size_t axis) const { return unit_ * begin_[axis]; }
+    double last_unit(std::size_t axis) const { return unit_ * (begin_[axis] + size_[axis]); }
+    // The longest that a triangle should be, in voxels, so that it is not too much work.
+    double reach() const {
+        const double longest = std::max({size_[0], size_[1], size_[2]});
+        return dense_ ? longest : std::min(longest, 64.0);
+    }
 
     // Log-uniform between lo and hi voxels, in fixed-point units.
     double scale(double lo, double hi) {
@@ -92,18 +104,20 @@ private:
         return {random_.uniform(-1.0, 1.0), random_.uniform(-1.0, 1.0), random_.uniform(-1.0, 1.0)};
     }
 
-    // A position in the grid, or outside it by at most the fraction `margin` of its size.
+    // A position in the grid (or its part), or outside it by at most the fraction `margin` of its size.
     position inside(double margin) {
         position p{};
-        for (int axis = 0; axis < 3; ++axis)
-            p[static_cast<std::size_t>(axis)] = unit_ * voxels(axis) * random_.uniform(-margin, 1.0 + margin);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const double across = random_.uniform(-margin, 1.0 + margin);
+            p[axis] = first_unit(axis) + across * (last_unit(axis) - first_unit(axis));
+        }
         return p;
     }
 
     position on_border() {
         position p = inside(0.05);
         const std::size_t axis = random_.below(3);
-        p[axis] = random_.one_in(2) ? 0.0 : unit_ * extent_[axis];
+        p[axis] = random_.one_in(2) ? first_unit(axis) : last_unit(axis);
         return p;
     }
 
@@ -145,8 +159,12 @@ private:
         corners c = around(inside(0.0), scale(0.25, std::min(reach(), 24.0)));
         const std::size_t axis = random_.below(3);
         for (position& p : c) p = rounded(p);
-        const double plane =
-            unit_ * static_cast<double>(random_.between(0, extent_[axis])); // borders of the grid included
+        double plane = std::nearbyint(c[0][axis] / unit_) * unit_;
+        if (random_.one_in(4)) { // on the border of the grid
+            const double border = random_.one_in(2) ? first_unit(axis) : last_unit(axis);
+            for (position& p : c) p[axis] += border - plane;
+            plane = border;
+        }
         for (std::size_t vertex = 0; vertex < vertices; ++vertex) c[vertex][axis] = plane;
         if (random_.one_in(3)) // an axis-parallel edge of it, often along voxel edges
             c[1][(axis + 1) % 3] = c[0][(axis + 1) % 3] = std::nearbyint(c[0][(axis + 1) % 3] / unit_) * unit_;
@@ -155,7 +173,7 @@ private:
     }
 
     corners large() {
-        const double size = scale(1.0, 1e3) * largest();
+        const double size = scale(1.0, 1e3) * largest_;
         corners c = around(inside(0.0), size);
         if (!random_.one_in(4)) { // bring the plane through the grid: move a point of the triangle to a point in it
             const double a = random_.unit();
@@ -181,7 +199,7 @@ private:
         const position a = rounded(inside(0.05));
         const position off = {static_cast<double>(random_.between(-2, 2)), static_cast<double>(random_.between(-2, 2)),
                               static_cast<double>(random_.between(-2, 2))};
-        const double length = random_.one_in(8) ? scale(1.0, 100.0) * largest() : scale(0.5, reach());
+        const double length = random_.one_in(8) ? scale(1.0, 100.0) * largest_ : scale(0.5, reach());
         return {a, a + off, rounded(a + length * direction())};
     }
 
@@ -254,11 +272,30 @@ private:
         const double gap = random_.one_in(3) ? static_cast<double>(random_.between(0, 2)) : scale(1e-3, 4.0);
         corners c;
         const bool above = random_.one_in(2);
-        const double border = above ? unit_ * extent_[axis] : 0.0;
+        const double border = above ? last_unit(axis) : first_unit(axis);
         for (position& p : c) {
             p = rounded(centre + size * direction());
             const double off = gap + (random_.one_in(2) ? 0.0 : std::nearbyint(size * random_.unit()));
             p[axis] = std::nearbyint(above ? border + off : border - off);
+        }
+        return c;
+    }
+
+    // Every axis of the bounding box is 2^k units, give or take two; a point of the triangle is in the grid.
+    corners powers_of_two() {
+        const std::int64_t bits = random_.between(14, 34);
+        const position at = rounded(inside(0.0));
+        corners c;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const auto k =
+                static_cast<int>(random_.one_in(2) ? bits : random_.between(std::max<std::int64_t>(bits - 3, 8), bits));
+            const double length = std::ldexp(1.0, k) + static_cast<double>(random_.between(-2, 2));
+            std::array<double, 3> side = {0.0, length, std::nearbyint(length * random_.unit())};
+            std::swap(side[2], side[random_.below(3)]);
+            std::swap(side[1], side[random_.below(2)]);
+            // A third of each side away from its middle at most, which keeps the point inside for most triangles.
+            const double centre = std::nearbyint((side[0] + side[1] + side[2]) / 3.0);
+            for (std::size_t vertex = 0; vertex < 3; ++vertex) c[vertex][axis] = at[axis] - centre + side[vertex];
         }
         return c;
     }
@@ -282,7 +319,8 @@ private:
     }
 
     splitmix64& random_;
-    std::array<int, 3> extent_;
+    std::array<int, 3> begin_{}, size_{}; // where to put triangles, in voxels
+    double largest_ = 1.0;                // of the grid's extents
     bool dense_;
     bool exact_;
     double unit_; // fixed-point units in a voxel
@@ -316,10 +354,10 @@ void make_bad(splitmix64& random, const grid& g, world_triangle& t) {
 
 std::string_view name(triangle_class kind) {
     static constexpr std::array<std::string_view, all_triangle_classes.size()> names = {
-        "small",          "medium",       "large",           "sliver",        "needle",        "point",
-        "segment",        "collinear",    "corner_vertices", "edge_vertices", "face_vertices", "edge_in_face",
-        "face_plane",     "half_lattice", "diagonal_plane",  "grazing",       "lattice",       "partly_outside",
-        "wholly_outside", "far_away",     "dropped",
+        "small",          "medium",        "large",           "sliver",        "needle",        "point",
+        "segment",        "collinear",     "corner_vertices", "edge_vertices", "face_vertices", "edge_in_face",
+        "face_plane",     "half_lattice",  "diagonal_plane",  "grazing",       "lattice",       "partly_outside",
+        "wholly_outside", "powers_of_two", "far_away",        "dropped",
     };
     return names[static_cast<std::size_t>(kind)];
 }
@@ -339,6 +377,14 @@ const std::vector<test_grid>& test_grids() {
         {{{0, 0, 0}, {2, 4, 1}, {257, 300, 511}}, "odd_hundreds", true, false},
     };
     return grids;
+}
+
+test_grid focused(const test_grid& where, const region& part) {
+    test_grid result = where;
+    result.focus = part;
+    result.dense = true;
+    for (std::size_t axis = 0; axis < 3; ++axis) result.dense = result.dense && part.hi[axis] - part.lo[axis] <= 64;
+    return result;
 }
 
 std::array<float, 3> to_world(const grid& g, const std::array<double, 3>& units) {

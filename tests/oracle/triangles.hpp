@@ -63,6 +63,7 @@ enum class triangle_class {
     lattice,         // small integer coordinates in fixed-point units round a voxel corner
     partly_outside,  // across the border of the grid
     wholly_outside,  // no vertex in the grid, most of them not touching it
+    powers_of_two,   // bounding box of 2^k units, give or take two: where widths of integers run out
     far_away,        // vertices up to 2^40 fixed-point units away
     dropped,         // a vertex is NaN, infinite or further than 2^40 units
 };
@@ -74,8 +75,14 @@ inline constexpr std::array all_triangle_classes = {
     triangle_class::edge_vertices,  triangle_class::face_vertices, triangle_class::edge_in_face,
     triangle_class::face_plane,     triangle_class::half_lattice,  triangle_class::diagonal_plane,
     triangle_class::grazing,        triangle_class::lattice,       triangle_class::partly_outside,
-    triangle_class::wholly_outside, triangle_class::far_away,      triangle_class::dropped,
+    triangle_class::wholly_outside, triangle_class::powers_of_two, triangle_class::far_away,
+    triangle_class::dropped,
 };
+
+// Whether its triangles usually cross the whole grid: few of them are a lot of work, on large grids too many.
+constexpr bool covers_much(triangle_class kind) {
+    return kind == triangle_class::large || kind == triangle_class::powers_of_two || kind == triangle_class::far_away;
+}
 
 std::string_view name(triangle_class kind);
 
@@ -88,7 +95,11 @@ struct test_grid {
     std::string_view name;
     bool exact; // dyadic origin and voxel size: every lattice position inside the grid is a float and snaps to itself
     bool dense; // small enough for triangles that cover a large part of it
+    region focus = {{0, 0, 0}, {0, 0, 0}}; // where triangles are put: the whole grid where empty
 };
+
+// The same grid with the triangles put into a part of it, which may be small enough to count as dense.
+test_grid focused(const test_grid& where, const region& part);
 
 // Cubic, non-cubic, odd, flat, one voxel, anisotropic, far from the world origin, and up to 4096 voxels an axis.
 const std::vector<test_grid>& test_grids();

@@ -213,6 +213,33 @@ TEST(Triangles, ScalesRunFromAThousandthVoxelToAThousandGrids) {
     EXPECT_GT(farthest, 0x1p39);
 }
 
+TEST(Triangles, PowersOfTwoAreJustThat) {
+    int powers = 0, all = 0;
+    for_each(triangle_class::powers_of_two, true, [&](const sample& s) {
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto [lo, hi] = std::minmax({s.t.v[0][axis], s.t.v[1][axis], s.t.v[2][axis]});
+            const std::int64_t size = hi - lo;
+            std::int64_t power = 1;
+            while (power + 2 < size) power *= 2;
+            ++all;
+            powers += std::abs(power - size) <= 2;
+        }
+    });
+    EXPECT_GT(powers, all / 2); // beyond the grid floats are coarser
+}
+
+TEST(Triangles, FocusPutsThemInAPart) {
+    splitmix64 random(13);
+    const test_grid where = focused(test_grids()[8], {{600, 10, 300}, {640, 30, 340}});
+    EXPECT_TRUE(where.dense);
+    int hits = 0;
+    for (int n = 0; n < 300; ++n) {
+        const world_triangle w = make_triangle(random, where, triangle_class::medium);
+        hits += !conservative(where.g, snap(where.g, w.v), where.focus).empty();
+    }
+    EXPECT_GT(hits, 250);
+}
+
 TEST(Triangles, PlacesAreWhatTheyAreCalled) {
     int inside_and_out = 0, all = 0, far_hits = 0;
     for_each(triangle_class::partly_outside, false, [&](const sample& s) {
