@@ -25,14 +25,14 @@ enum class alpha_mode : std::uint8_t { opaque, mask, blend };
 
 // A decoded picture: RGBA, 8 bits a channel, the top row first. R, G and B hold sRGB-encoded values as the file has
 // them (they become linear when they are sampled), A is linear.
-struct image {
+struct picture {
     std::string name;
     std::uint32_t width = 0;
     std::uint32_t height = 0;
     std::vector<std::uint8_t> rgba; // width * height * 4 bytes
 };
 
-// An image and the way it is sampled. Coordinates: (0, 0) is the top left corner of the picture, (1, 1) the bottom
+// A picture and the way it is sampled. Coordinates: (0, 0) is the top left corner of the picture, (1, 1) the bottom
 // right, so v runs downwards.
 struct texture {
     std::uint32_t image = 0; // index into scene::images
@@ -67,7 +67,7 @@ struct scene {
     std::vector<primitive> primitives;
     std::vector<material> materials; // the file's, in its order; then, where one is needed, the default material
     std::vector<texture> textures;
-    std::vector<image> images;
+    std::vector<picture> images;
     std::vector<std::string> warnings; // what was left out or put right; one line each
 
     [[nodiscard]] std::uint64_t vertex_count() const {

@@ -33,7 +33,7 @@ void check(const voxelize::scene& scene) {
                 "texture out of range");
     for (const voxelize::texture& texture : scene.textures)
         require(texture.image < scene.images.size(), "image out of range");
-    for (const voxelize::image& image : scene.images)
+    for (const voxelize::picture& image : scene.images)
         require(image.width > 0 && image.height > 0 && image.rgba.size() == std::size_t{4} * image.width * image.height,
                 "image of wrong size");
 }

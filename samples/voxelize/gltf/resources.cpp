@@ -129,7 +129,7 @@ std::vector<std::byte> resources::fetch(const std::string& uri) const {
     return bytes;
 }
 
-image resources::decode_image(std::size_t index, std::span<const std::byte> view_bytes) const {
+picture resources::decode_image(std::size_t index, std::span<const std::byte> view_bytes) const {
     const image_source& source = document_.images[index];
     std::vector<std::byte> fetched;
     std::span<const std::byte> bytes = view_bytes;
@@ -164,12 +164,12 @@ image resources::decode_image(std::size_t index, std::span<const std::byte> view
     const std::unique_ptr<stbi_uc, free_pixels> decoded{
         stbi_load_from_memory(data, size, &width, &height, &channels, 4)};
     if (!decoded) throw gltf_error("it cannot be decoded (" + reason() + ")");
-    image picture;
-    picture.name = source.name;
-    picture.width = static_cast<std::uint32_t>(width);
-    picture.height = static_cast<std::uint32_t>(height);
-    picture.rgba.assign(decoded.get(), decoded.get() + pixels * 4);
-    return picture;
+    picture result;
+    result.name = source.name;
+    result.width = static_cast<std::uint32_t>(width);
+    result.height = static_cast<std::uint32_t>(height);
+    result.rgba.assign(decoded.get(), decoded.get() + pixels * 4);
+    return result;
 }
 
 gltf_file_reader folder_reader(std::filesystem::path folder) {

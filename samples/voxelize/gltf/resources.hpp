@@ -36,7 +36,7 @@ public:
 
     // Decodes picture INDEX, PNG or JPEG. VIEW_BYTES are those of its buffer view where it has one. Throws gltf_error
     // with the reason; the caller decides whether that is fatal.
-    [[nodiscard]] image decode_image(std::size_t index, std::span<const std::byte> view_bytes) const;
+    [[nodiscard]] picture decode_image(std::size_t index, std::span<const std::byte> view_bytes) const;
 
 private:
     [[nodiscard]] std::vector<std::byte> fetch(const std::string& uri) const;

@@ -1,0 +1,335 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "command_line.hpp"
+
+#include "exit_code.hpp"
+
+#include <voxelpipe/config.hpp>
+
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <optional>
+
+namespace voxelize {
+
+namespace {
+
+// "1,2,3" -> numbers; LEAST to 3 of them.
+template <class Number>
+std::vector<Number> parse_list(const std::string& option, const std::string& text, std::size_t least) {
+    std::vector<Number> numbers;
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    while (true) {
+        Number number{};
+        const auto [next, error] = std::from_chars(at, end, number);
+        bool good = error == std::errc{} && (next == end || *next == ',');
+        if constexpr (std::is_floating_point_v<Number>) good = good && std::isfinite(number);
+        if (!good) break;
+        numbers.push_back(number);
+        if (next == end) {
+            if (numbers.size() < least || (numbers.size() != 1 && numbers.size() != 3)) break;
+            return numbers;
+        }
+        at = next + 1;
+    }
+    throw usage_error(option + " takes " + (least == 3 ? "three numbers x,y,z" : "one number or three, x,y,z") +
+                      ", not \"" + text + '"');
+}
+
+glm::dvec3 parse_point(const std::string& option, const std::string& text, std::size_t least) {
+    const std::vector<double> n = parse_list<double>(option, text, least);
+    return n.size() == 3 ? glm::dvec3(n[0], n[1], n[2]) : glm::dvec3(n[0]);
+}
+
+std::string lower(std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text;
+}
+
+// What --help says after the options.
+std::string footer() {
+    std::string text = "TARGETS (--target NAME)\n";
+    const auto line = [&text](std::string_view name, std::string_view rest) {
+        text += "  " + std::string(name) + std::string(name.size() < 16 ? 16 - name.size() : 1, ' ') +
+                std::string(rest) + '\n';
+    };
+    for (const target_info& entry : target_table) {
+        std::string type(name_of(entry.type));
+        if (entry.components > 1) type += " x " + std::to_string(entry.components);
+        line(entry.name,
+             type + std::string(type.size() < 9 ? 9 - type.size() : 1, ' ') + std::string(entry.description));
+    }
+    text += "\nOUTPUTS (by extension; .npy has the shape (nz, ny, nx) or (nz, ny, nx, components))\n";
+    for (const format& entry : formats()) line(entry.extension, entry.description);
+    text += "\nEXIT CODES\n"
+            "  0 done   1 wrong command line   2 the model cannot be used   3 not enough memory\n"
+            "  4 an output cannot be written   5 the backend is not there   70 a bug of this program\n"
+            "\nEXAMPLES\n"
+            "  voxelize helmet.glb -o helmet.vox -o helmet.png --resolution 256\n"
+            "  voxelize part.glb -o part.npy --voxel-size 0.5 --coverage thin\n"
+            "  voxelize part.glb -o part.npz --target occupancy --target normal --target material\n";
+    return text;
+}
+
+// "--stats" may stand before INPUT: only "json" and "text" are its value.
+std::vector<std::string> arguments(int argc, const char* const* argv) {
+    std::vector<std::string> list;
+    for (int i = 1; i < argc; ++i) {
+        list.emplace_back(argv[i]);
+        if (list.back() != "--stats") continue;
+        const std::string next = i + 1 < argc ? argv[i + 1] : "";
+        if (next == "json" || next == "text") {
+            list.back() += '=' + next;
+            ++i;
+        } else {
+            list.back() += "=text";
+        }
+    }
+    std::reverse(list.begin(), list.end()); // as CLI::App::parse wants it
+    return list;
+}
+
+// What the options fill before it is understood.
+struct raw_options {
+    std::string origin, voxel_size, extent, image_size, background;
+    std::vector<std::string> targets;
+    int resolution = 0;
+    bool no_edges = false;
+    bool no_ground = false;
+    bool no_color = false;
+};
+
+void describe(CLI::App& app, command_line& options, raw_options& raw) {
+    app.add_option("INPUT", options.input, "glTF 2.0 model, .glb or .gltf")->required()->option_text(" ");
+    app.add_option("-o,--output", options.outputs, "Write the voxels to FILE; may be repeated")
+        ->required()
+        ->allow_extra_args(false)
+        ->option_text("FILE");
+    app.add_option("-t,--target", raw.targets,
+                   "What to compute for each voxel, see TARGETS; may be repeated. Default: occupancy, with color where "
+                   "an output shows colours (.vox, .png)")
+        ->allow_extra_args(false)
+        ->delimiter(',')
+        ->option_text("NAME");
+
+    app.add_option("-r,--resolution", raw.resolution,
+                   "N voxels along the longest side of the model, cubic and centred. Default: 128")
+        ->option_text("N")
+        ->group("Grid");
+    app.add_option("--padding", options.grid.padding, "Keep N voxels free on every side. Default: 0")
+        ->option_text("N")
+        ->group("Grid");
+    app.add_option("-s,--voxel-size", raw.voxel_size,
+                   "Voxels of this size in the model's units instead, on the lattice of its multiples")
+        ->option_text("S[,SY,SZ]")
+        ->group("Grid");
+    app.add_option("--origin", raw.origin,
+                   "With --voxel-size and --extent: the exact grid, its lowest corner at this point")
+        ->option_text("X,Y,Z")
+        ->group("Grid");
+    app.add_option("--extent", raw.extent, "Voxels along each axis of the exact grid")
+        ->option_text("NX,NY,NZ")
+        ->group("Grid");
+
+    using voxelpipe::coverage;
+    const std::map<std::string, coverage> coverages{{"conservative", coverage::conservative}, {"thin", coverage::thin}};
+    app.add_option("--coverage", options.voxelize.coverage,
+                   "conservative: every voxel that a triangle touches. thin: the fewest without a hole (6-separating). "
+                   "Default: conservative")
+        ->transform(CLI::CheckedTransformer(coverages).description(""))
+        ->option_text("RULE")
+        ->group("Computation");
+    const std::map<std::string, int> axes{{"x", 0}, {"y", 1}, {"z", 2}};
+    app.add_option("--depth-axis", options.voxelize.depth_axis, "Axis of --target depth: x, y or z. Default: z")
+        ->transform(CLI::CheckedTransformer(axes).description(""))
+        ->option_text("AXIS")
+        ->group("Computation");
+    const std::map<std::string, backend_choice> backends{
+        {"auto", backend_choice::automatic}, {"cpu", backend_choice::cpu}, {"cuda", backend_choice::cuda}};
+    app.add_option("--backend", options.voxelize.backend,
+                   "cpu, cuda, or auto: cuda where it is there. All give the same bytes. Default: auto")
+        ->transform(CLI::CheckedTransformer(backends).description(""))
+        ->option_text("NAME")
+        ->group("Computation");
+    app.add_option("-j,--threads", options.voxelize.threads, "Threads on the CPU. Default: 0, one for each core")
+        ->check(CLI::Range(0, 1024).description(""))
+        ->option_text("N")
+        ->group("Computation");
+    app.add_option_function<int>(
+           "--work-memory",
+           [&options](int mebibytes) { options.voxelize.work_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
+           "MiB for sums that exist only on the way; a grid that needs more is computed in slabs, with the same "
+           "result. Default: 512")
+        ->check(CLI::Range(1, 1 << 20).description(""))
+        ->option_text("MIB")
+        ->group("Computation");
+
+    preview_options& picture = options.write.preview;
+    app.add_option("--image-size", raw.image_size, "Pixels. Default: 1280x960")
+        ->option_text("WxH")
+        ->group("Picture (.png)");
+    app.add_option("--azimuth", picture.azimuth, "Degrees around the model, 0 from its front. Default: 35")
+        ->option_text("DEG")
+        ->group("Picture (.png)");
+    app.add_option("--elevation", picture.elevation, "Degrees above the horizon. Default: 25")
+        ->check(CLI::Range(-90.0, 90.0).description(""))
+        ->option_text("DEG")
+        ->group("Picture (.png)");
+    app.add_option("--zoom", picture.zoom, "1 fits the model into the picture. Default: 1")
+        ->check(CLI::PositiveNumber.description(""))
+        ->option_text("F")
+        ->group("Picture (.png)");
+    app.add_option("--fov", picture.field_of_view, "Degrees from top to bottom, 0: orthographic. Default: 28")
+        ->check(CLI::Range(0.0, 150.0).description(""))
+        ->option_text("DEG")
+        ->group("Picture (.png)");
+    app.add_option("--samples", picture.samples, "Rays along each side of a pixel. Default: 2")
+        ->check(CLI::Range(1, 8).description(""))
+        ->option_text("N")
+        ->group("Picture (.png)");
+    app.add_option("--background", raw.background,
+                   "sky, white, dark, transparent, #rrggbb, or #rrggbb,#rrggbb from top to bottom. Default: sky")
+        ->option_text("COLOUR")
+        ->group("Picture (.png)");
+    app.add_flag("--no-color", raw.no_color, "Show all voxels in one colour")->group("Picture (.png)");
+    app.add_flag("--no-edges", raw.no_edges, "No lines between voxels")->group("Picture (.png)");
+    app.add_flag("--no-ground", raw.no_ground, "No shadow on the ground")->group("Picture (.png)");
+
+    const std::map<std::string, up_axis> ups{{"y", up_axis::y}, {"z", up_axis::z}};
+    app.add_option("--up", options.write.up,
+                   "Axis that stands upright in .png and .vox: y or z. Default: y, as in glTF")
+        ->transform(CLI::CheckedTransformer(ups).description(""))
+        ->option_text("AXIS")
+        ->group("Files");
+    app.add_option("--compression", options.write.compression, "Level of .npz, .vti and .nrrd, 0 to 9. Default: 1")
+        ->check(CLI::Range(0, 9).description(""))
+        ->option_text("N")
+        ->group("Files");
+
+    const std::map<std::string, stats_format> styles{{"text", stats_format::text}, {"json", stats_format::json}};
+    app.add_option("--stats", options.stats,
+                   "Print counts, times and memory; `--stats json` for programs, one object on standard output")
+        ->transform(CLI::CheckedTransformer(styles).description(""))
+        ->option_text("[json]")
+        ->group("Messages");
+    app.add_flag("-q,--quiet", options.quiet, "Print errors (and --stats) only")->group("Messages");
+    app.set_help_flag("-h,--help", "Print this help")->group("Messages");
+    app.set_version_flag("--version",
+                         "voxelize " + std::to_string(VOXELPIPE_VERSION_MAJOR) + '.' +
+                             std::to_string(VOXELPIPE_VERSION_MINOR) + '.' + std::to_string(VOXELPIPE_VERSION_PATCH),
+                         "Print the version")
+        ->group("Messages");
+}
+
+void understand_grid(command_line& options, const raw_options& raw, bool has_resolution) {
+    if (has_resolution) options.grid.resolution = raw.resolution;
+    if (!raw.voxel_size.empty()) options.grid.voxel_size = parse_point("--voxel-size", raw.voxel_size, 1);
+    if (!raw.origin.empty()) options.grid.origin = parse_point("--origin", raw.origin, 3);
+    if (!raw.extent.empty()) {
+        const std::vector<int> n = parse_list<int>("--extent", raw.extent, 3);
+        options.grid.extent = glm::ivec3(n[0], n[1], n[2]);
+    }
+    // What can be told of the grid before the model is there.
+    bounding_box unit;
+    unit.high = glm::dvec3(1);
+    try {
+        grid_request probe = options.grid;
+        if (probe.voxel_size && !probe.origin && !probe.extent) unit.high = *probe.voxel_size;
+        (void)place_grid(probe, unit);
+    } catch (const grid_error& error) {
+        throw usage_error(error.what());
+    }
+}
+
+void understand_outputs(command_line& options, const raw_options& raw) {
+    bool shows_colors = false;
+    bool needs_occupancy = false;
+    for (const std::filesystem::path& output : options.outputs) {
+        const format* found = find_format(output);
+        if (found == nullptr) {
+            std::string known;
+            for (const format& entry : formats()) known += (known.empty() ? "" : ", ") + std::string(entry.extension);
+            throw usage_error("\"" + output.string() + "\": the extension of an output must be one of " + known);
+        }
+        if (std::count(options.outputs.begin(), options.outputs.end(), output) > 1)
+            throw usage_error("\"" + output.string() + "\" is given twice");
+        needs_occupancy = needs_occupancy || found->needs_occupancy;
+        shows_colors = shows_colors || found->extension == ".vox" || found->extension == ".png";
+    }
+    std::vector<target>& targets = options.voxelize.targets;
+    targets.clear();
+    for (const std::string& name : raw.targets) {
+        const std::optional<target> id = target_named(lower(name));
+        if (!id) {
+            std::string known;
+            for (const target_info& entry : target_table)
+                known += (known.empty() ? "" : ", ") + std::string(entry.name);
+            throw usage_error("--target \"" + name + "\" is not one of " + known);
+        }
+        if (std::find(targets.begin(), targets.end(), *id) == targets.end()) targets.push_back(*id);
+    }
+    if (targets.empty()) {
+        targets.push_back(target::occupancy);
+        if (shows_colors && !raw.no_color) targets.push_back(target::color);
+    }
+    if (needs_occupancy && std::find(targets.begin(), targets.end(), target::occupancy) == targets.end())
+        targets.insert(targets.begin(), target::occupancy);
+}
+
+void understand_picture(command_line& options, const raw_options& raw) {
+    preview_options& picture = options.write.preview;
+    if (!raw.image_size.empty()) {
+        const char* const end = raw.image_size.data() + raw.image_size.size();
+        const auto [middle, first] = std::from_chars(raw.image_size.data(), end, picture.width);
+        const bool cross = first == std::errc{} && middle != end && *middle == 'x';
+        const auto [last, second] = cross ? std::from_chars(middle + 1, end, picture.height)
+                                          : std::from_chars_result{middle, std::errc::invalid_argument};
+        if (second != std::errc{} || last != end || picture.width < 1 || picture.width > 16384 || picture.height < 1 ||
+            picture.height > 16384)
+            throw usage_error("--image-size takes WIDTHxHEIGHT from 1x1 to 16384x16384, not \"" + raw.image_size + '"');
+    }
+    if (!raw.background.empty()) {
+        const std::optional<background> chosen = parse_background(raw.background);
+        if (!chosen) throw usage_error("--background \"" + raw.background + "\" is not known, see --help");
+        picture.backdrop = *chosen;
+    }
+    picture.use_color = !raw.no_color;
+    picture.edges = !raw.no_edges;
+    picture.ground = !raw.no_ground;
+    picture.up = options.write.up;
+    picture.threads = options.voxelize.threads;
+    options.write.threads = options.voxelize.threads;
+}
+
+} // namespace
+
+command_line parse_command_line(int argc, const char* const* argv) {
+    command_line options;
+    raw_options raw;
+    CLI::App app{"Turns a glTF model into voxels: exact coverage, several values a voxel, many file formats.",
+                 "voxelize"};
+    app.footer(footer());
+    app.get_formatter()->column_width(30);
+    describe(app, options, raw);
+    try {
+        app.parse(arguments(argc, argv));
+    } catch (const CLI::CallForHelp&) {
+        throw early_exit{app.help()};
+    } catch (const CLI::CallForVersion& version) {
+        throw early_exit{std::string(version.what()) + '\n'};
+    } catch (const CLI::ParseError& error) {
+        throw usage_error(error.what());
+    }
+    understand_grid(options, raw, app.count("--resolution") != 0);
+    understand_outputs(options, raw);
+    understand_picture(options, raw);
+    return options;
+}
+
+} // namespace voxelize

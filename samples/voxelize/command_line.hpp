@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// argv -> options, checked as far as that goes without reading the model.
+
+#include "formats/formats.hpp"
+#include "placement.hpp"
+#include "voxelizer.hpp"
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace voxelize {
+
+enum class stats_format : std::uint8_t { none, text, json };
+
+struct command_line {
+    std::filesystem::path input;
+    std::vector<std::filesystem::path> outputs;
+    grid_request grid;
+    voxelize_request voxelize; // all but its grid and progress
+    write_options write;       // all but its progress
+    stats_format stats = stats_format::none;
+    bool quiet = false;
+};
+
+// Asked for --help or --version: TEXT goes to standard output and the program ends well.
+struct early_exit {
+    std::string text;
+};
+
+// What is wrong with the command line, one line.
+struct usage_error : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+// Throws early_exit or usage_error.
+[[nodiscard]] command_line parse_command_line(int argc, const char* const* argv);
+
+} // namespace voxelize

@@ -1,0 +1,107 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// voxelize INPUT.glb -o OUT... [options]: turns a glTF model into voxels. See --help.
+#include "command_line.hpp"
+#include "exit_code.hpp"
+#include "gltf_scene.hpp"
+#include "report.hpp"
+
+#include <chrono>
+#include <cstdio>
+#include <iostream>
+
+namespace voxelize {
+namespace {
+
+int fail(exit_code code, const std::string& why) {
+    std::cerr << "voxelize: " << why << '\n';
+    return code;
+}
+
+// What comes after the command line; every way to fail is an exception.
+void run(const command_line& options) {
+    const auto milliseconds_since = [](std::chrono::steady_clock::time_point start) {
+        return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    };
+    run_report report;
+    report.input = options.input;
+    report.request = options.voxelize;
+    progress_bar bar{!options.quiet};
+
+    auto start = std::chrono::steady_clock::now();
+    scene model = load_gltf(options.input);
+    report.warnings = std::move(model.warnings);
+    report.vertices = model.vertex_count();
+    for (const material& m : model.materials) report.materials.push_back(m.name);
+    if (model.triangle_count() == 0) throw gltf_error("there are no triangles to voxelize");
+    const bounding_box bounds = bounds_of(model);
+    if (bounds.empty) throw gltf_error("no triangle has a corner at a finite position");
+    report.request.grid = place_grid(options.grid, bounds);
+    report.stats.milliseconds.emplace_back("read", milliseconds_since(start));
+
+    bar.start("voxelizing");
+    report.request.progress = [&bar](double done) { bar.show(done); };
+    const volume voxels = run_voxelizer(std::move(model), report.request, report.stats);
+    if (report.stats.triangles_dropped != 0)
+        report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
+                                  " triangles are dropped: a position is not finite, or too far from the grid");
+    if (report.stats.voxels == 0) report.warnings.emplace_back("no voxel is covered: the model lies outside the grid");
+
+    start = std::chrono::steady_clock::now();
+    for (const std::filesystem::path& output : options.outputs) {
+        write_options how = options.write;
+        bar.start("writing " + output.filename().string());
+        how.progress = [&bar](double done) { bar.show(done); };
+        for (std::filesystem::path& file : write(voxels, output, how)) report.files.push_back(std::move(file));
+    }
+    bar.clear();
+    report.stats.milliseconds.emplace_back("write", milliseconds_since(start));
+    report.peak_memory = peak_memory_bytes();
+
+    if (!options.quiet) {
+        for (const std::string& warning : report.warnings) std::cerr << "voxelize: warning: " << warning << '\n';
+        // Standard output belongs to the object where one is asked for.
+        std::ostream& stream = options.stats == stats_format::json ? std::cerr : std::cout;
+        const glm::ivec3 extent = report.request.grid.extent;
+        for (const std::filesystem::path& file : report.files) stream << "wrote " << file.string() << '\n';
+        stream << report.stats.voxels << " of " << extent.x << " x " << extent.y << " x " << extent.z
+               << " voxels are covered\n";
+    }
+    if (options.stats == stats_format::text) print_text(std::cout, report);
+    if (options.stats == stats_format::json) print_json(std::cout, report);
+}
+
+int run_main(int argc, char** argv) {
+    command_line options;
+    try {
+        options = parse_command_line(argc, argv);
+    } catch (const early_exit& text) {
+        std::cout << text.text;
+        return exit_ok;
+    } catch (const usage_error& error) {
+        return fail(exit_usage, std::string(error.what()) + "\nTry: voxelize --help");
+    }
+    try {
+        run(options);
+    } catch (const gltf_error& error) {
+        return fail(exit_input, options.input.string() + ": " + error.what());
+    } catch (const grid_error& error) {
+        return fail(exit_usage, error.what());
+    } catch (const memory_error& error) {
+        return fail(exit_too_large, error.what());
+    } catch (const std::bad_alloc&) {
+        return fail(exit_too_large, "not enough memory");
+    } catch (const write_error& error) {
+        return fail(exit_output, error.what());
+    } catch (const backend_error& error) {
+        return fail(exit_backend, error.what());
+    } catch (const std::exception& error) {
+        return fail(exit_internal, std::string("unexpected error, please report it: ") + error.what());
+    }
+    return exit_ok;
+}
+
+} // namespace
+} // namespace voxelize
+
+int main(int argc, char** argv) { return voxelize::run_main(argc, argv); }

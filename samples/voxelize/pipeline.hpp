@@ -1,0 +1,376 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The tool's pipeline, a template over the backend: instantiated for cpu_backend in voxelizer.cpp, and ready to be so
+// for another backend in a translation unit of its compiler. Takes a scene, uploads it, draws every slab of the grid
+// into a framebuffer of all wanted targets and resolves it into the volume.
+
+#include "parallel.hpp"
+#include "surface.hpp"
+#include "voxelizer.hpp"
+
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <algorithm>
+#include <bitset>
+#include <chrono>
+#include <cstring>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace voxelize {
+
+// Whether the host can read a backend's memory where it is; specialise it before the pipeline is instantiated.
+template <class Backend>
+inline constexpr bool memory_is_host = false;
+
+// Elements of a render target in host memory.
+template <class Backend, class Reference>
+[[nodiscard]] auto host_elements(Backend& backend, const Reference& target) {
+    if constexpr (memory_is_host<Backend>) {
+        using target_type = typename Reference::target_type;
+        const auto& view = target.view();
+        return std::span<const typename target_type::element_type>(view.elements,
+                                                                   target_type::map::elements(view.extent));
+    } else {
+        return target.to_host(backend);
+    }
+}
+
+template <class Backend>
+class pipeline {
+public:
+    pipeline(Backend& backend, scene&& model, const voxelize_request& request, voxelize_stats& stats)
+        : backend_{backend}, request_{request}, stats_{stats} {
+        for (const target wanted : request.targets) wanted_[static_cast<std::size_t>(wanted)] = true;
+        const stage_timer timer{*this, "upload"};
+        tables_.push_back({backend_, one(make_color_tables())});
+        upload_pictures(model);
+        for (primitive& part : model.primitives) upload_primitive(part, model);
+        stats_.triangles = num_triangles_;
+        if (wants(target::triangle) && num_triangles_ > INT32_MAX)
+            throw std::runtime_error("more triangles than --target triangle can number");
+        only_bits_ = !any_mask_ && !wants(target::color) && !wants(target::color_max) &&
+                     !wants(target::color_replace) && !wants(target::normal) && !wants(target::material) &&
+                     !wants(target::triangle) && !wants(target::depth);
+    }
+
+    [[nodiscard]] volume run() {
+        volume result;
+        const voxelpipe::grid& grid = request_.grid;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const auto a = static_cast<glm::length_t>(axis);
+            result.extent[axis] = grid.extent[a];
+            result.origin[axis] = grid.part_origin()[a];
+            result.voxel_size[axis] = grid.voxel_size[a];
+        }
+        for (const target wanted : request_.targets)
+            result.add(std::string(info_of(wanted).name), info_of(wanted).type, info_of(wanted).components);
+
+        const int depth = slab_depth();
+        const int num_slabs = (grid.extent.z + depth - 1) / depth;
+        stats_.slabs = num_slabs;
+        for (int slab = 0; slab < num_slabs; ++slab) {
+            const int begin = slab * depth;
+            const glm::ivec3 size{grid.extent.x, grid.extent.y, std::min(depth, grid.extent.z - begin)};
+            const voxelpipe::grid part = grid.crop({0, 0, begin}, size);
+            report_ = [this, slab, num_slabs](double done) {
+                if (request_.progress) request_.progress((slab + done) / num_slabs);
+            };
+            if (only_bits_)
+                draw_bits(result, part, begin);
+            else
+                draw_surface(result, part, begin);
+        }
+        return result;
+    }
+
+private:
+    template <class T>
+    using buffer = typename Backend::template buffer<T>;
+    using mesh_view = vp::mesh_view<>;
+    using surface_draw = vp::draw<mesh_view, surface_vertex_shader, surface_fragment_shader>;
+    using bits_draw = vp::draw<mesh_view, vp::passthrough, vp::solid<bool, std::uint32_t>>;
+
+    // In the order of surface_fragment_shader's outputs.
+    enum : std::size_t { occupancy, count, color_sum, color_max, color_last, normal_sum, triangle, depth, num_targets };
+    using surface_framebuffer =
+        vp::framebuffer<Backend, vp::target<vp::bit, vp::blend::bit_or>, vp::target<std::uint32_t, vp::blend::count>,
+                        vp::target<glm::vec4, vp::blend::add>, vp::target<glm::u8vec4, vp::blend::max>,
+                        vp::target<glm::u8vec4, vp::blend::replace>, vp::target<glm::vec3, vp::blend::add>,
+                        vp::target<std::uint32_t, vp::blend::replace>, vp::target<float, vp::blend::min>>;
+    using bits_framebuffer =
+        vp::framebuffer<Backend, vp::target<vp::bit, vp::blend::bit_or>, vp::target<std::uint32_t, vp::blend::count>>;
+
+    // Adds the time until its end to a stage of the statistics.
+    class stage_timer {
+    public:
+        stage_timer(pipeline& owner, const char* stage) : owner_{owner}, stage_{stage} {}
+        ~stage_timer() {
+            const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - start_;
+            owner_.add_time(stage_, time.count());
+        }
+        stage_timer(const stage_timer&) = delete;
+        stage_timer& operator=(const stage_timer&) = delete;
+
+    private:
+        pipeline& owner_;
+        const char* stage_;
+        std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+    };
+
+    void add_time(const char* stage, double milliseconds) {
+        for (auto& [name, sum] : stats_.milliseconds) {
+            if (name == stage) {
+                sum += milliseconds;
+                return;
+            }
+        }
+        stats_.milliseconds.emplace_back(stage, milliseconds);
+    }
+
+    [[nodiscard]] bool wants(target id) const { return wanted_[static_cast<std::size_t>(id)]; }
+
+    template <class T>
+    static std::vector<T> one(const T& value) {
+        return {value};
+    }
+
+    // ---- upload ----------------------------------------------------------------------------------------------------
+
+    void upload_pictures(scene& model) {
+        for (picture& source : model.images) {
+            const std::span<const glm::u8vec4> texels{reinterpret_cast<const glm::u8vec4*>(source.rgba.data()),
+                                                      source.rgba.size() / 4};
+            texels_.push_back({backend_, texels});
+            source.rgba = {};
+        }
+    }
+
+    [[nodiscard]] sampled_texture texture_of(const material& m, const scene& model) {
+        sampled_texture result;
+        if (m.texture == material::no_texture) return result;
+        const texture& source = model.textures[static_cast<std::size_t>(m.texture)];
+        result.texels = texels_[source.image].data();
+        result.width = static_cast<int>(model.images[source.image].width);
+        result.height = static_cast<int>(model.images[source.image].height);
+        result.wrap_s = source.wrap_s;
+        result.wrap_t = source.wrap_t;
+        result.filter = source.filter;
+        return result;
+    }
+
+    void upload_primitive(primitive& part, const scene& model) {
+        const material& m = model.materials[part.material];
+        positions_.push_back({backend_, part.positions});
+        triangles_.push_back({backend_, part.triangles});
+        texcoords_.push_back({backend_, part.texcoords});
+        colors_.push_back({backend_, part.colors});
+
+        surface_vertex_shader vertex_shader;
+        if (!part.texcoords.empty()) vertex_shader.texcoords = texcoords_.back().data();
+        if (!part.colors.empty()) vertex_shader.colors = colors_.back().data();
+        surface_fragment_shader fragment_shader;
+        if (!part.texcoords.empty()) fragment_shader.texture = texture_of(m, model);
+        fragment_shader.tables = tables_.front().data();
+        fragment_shader.base_color = m.base_color;
+        fragment_shader.alpha = m.alpha;
+        fragment_shader.alpha_cutoff = m.alpha_cutoff;
+        fragment_shader.centers = {request_.grid.origin, request_.grid.voxel_size};
+        fragment_shader.depth_axis = request_.depth_axis;
+        fragment_shader.wanted = {wants(target::color), wants(target::color_max) || wants(target::color_replace),
+                                  wants(target::depth)};
+        const mesh_view mesh{positions_.back().view(), triangles_.back().view()};
+        draws_.push_back({mesh, vertex_shader, fragment_shader});
+        bits_draws_.push_back({mesh, vp::passthrough{}, vp::constant(true, 1U)});
+
+        any_mask_ = any_mask_ || m.alpha == alpha_mode::mask;
+        first_triangle_.push_back(num_triangles_);
+        material_of_.push_back(static_cast<std::int32_t>(part.material));
+        num_triangles_ += part.triangles.size();
+        part = {};
+    }
+
+    // ---- slabs -----------------------------------------------------------------------------------------------------
+
+    [[nodiscard]] std::bitset<num_targets> enabled_targets() const {
+        std::bitset<num_targets> enabled;
+        enabled[occupancy] = wants(target::occupancy);
+        enabled[count] = wants(target::count) || wants(target::color);
+        enabled[color_sum] = wants(target::color);
+        enabled[color_max] = wants(target::color_max);
+        enabled[color_last] = wants(target::color_replace);
+        enabled[normal_sum] = wants(target::normal);
+        enabled[triangle] = wants(target::triangle) || wants(target::material);
+        enabled[depth] = wants(target::depth);
+        if (enabled.none()) enabled[occupancy] = true;
+        return enabled;
+    }
+
+    // Layers that go into the working memory at once; whole tiles where more than one tile's height fits.
+    [[nodiscard]] int slab_depth() const {
+        constexpr double bytes[num_targets] = {0.125, 4, 16, 4, 4, 12, 4, 4};
+        const std::bitset<num_targets> enabled = enabled_targets();
+        double voxel_bytes = 0;
+        for (std::size_t i = 0; i < num_targets; ++i) voxel_bytes += enabled[i] ? bytes[i] : 0;
+        const glm::ivec3 extent = request_.grid.extent;
+        const double layer_bytes = voxel_bytes * extent.x * extent.y;
+        const double layers =
+            std::clamp(static_cast<double>(request_.work_memory) / layer_bytes, 1.0, static_cast<double>(extent.z));
+        constexpr int tile = 32;
+        const int depth = static_cast<int>(layers);
+        return depth < extent.z && depth > tile ? depth / tile * tile : depth;
+    }
+
+    template <class Draw, class Framebuffer>
+    void draw(const std::vector<Draw>& draws, const voxelpipe::grid& part, Framebuffer& framebuffer) {
+        const vp::status status = vp::voxelize(backend_, std::span<const Draw>(draws), part, framebuffer,
+                                               vp::voxelize_options{request_.coverage});
+        if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
+        status.or_throw();
+        stats_.triangles_dropped = status.counts.triangles_dropped();
+        stats_.fragments += status.counts.fragments;
+        stats_.fragments_discarded += status.counts.fragments_discarded;
+        stats_.voxels += status.counts.voxels;
+    }
+
+    void draw_bits(volume& result, const voxelpipe::grid& part, int begin) {
+        std::bitset<2> enabled;
+        enabled[0] = wants(target::occupancy) || !wants(target::count);
+        enabled[1] = wants(target::count);
+        bits_framebuffer framebuffer{backend_, part.extent, enabled};
+        draw_reporting(bits_draws_, part, framebuffer);
+        const stage_timer timer{*this, "resolve"};
+        if (wants(target::occupancy))
+            copy(result, target::occupancy, host_elements(backend_, vp::get<0>(framebuffer)), begin);
+        if (wants(target::count)) copy(result, target::count, host_elements(backend_, vp::get<1>(framebuffer)), begin);
+    }
+
+    void draw_surface(volume& result, const voxelpipe::grid& part, int begin) {
+        surface_framebuffer framebuffer{backend_, part.extent, enabled_targets()};
+        if (enabled_targets()[triangle]) vp::get<triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
+        draw_reporting(draws_, part, framebuffer);
+        const stage_timer timer{*this, "resolve"};
+        if (wants(target::occupancy))
+            copy(result, target::occupancy, host_elements(backend_, vp::get<occupancy>(framebuffer)), begin);
+        if (wants(target::count))
+            copy(result, target::count, host_elements(backend_, vp::get<count>(framebuffer)), begin);
+        if (wants(target::color))
+            resolve_color(result, host_elements(backend_, vp::get<color_sum>(framebuffer)),
+                          host_elements(backend_, vp::get<count>(framebuffer)), begin);
+        if (wants(target::color_max))
+            copy(result, target::color_max, host_elements(backend_, vp::get<color_max>(framebuffer)), begin);
+        if (wants(target::color_replace))
+            copy(result, target::color_replace, host_elements(backend_, vp::get<color_last>(framebuffer)), begin);
+        if (wants(target::normal))
+            resolve_normal(result, host_elements(backend_, vp::get<normal_sum>(framebuffer)), begin);
+        if (wants(target::triangle))
+            copy(result, target::triangle, host_elements(backend_, vp::get<triangle>(framebuffer)), begin);
+        if (wants(target::material))
+            resolve_material(result, host_elements(backend_, vp::get<triangle>(framebuffer)), begin);
+        if (wants(target::depth))
+            copy(result, target::depth, host_elements(backend_, vp::get<depth>(framebuffer)), begin);
+    }
+
+    // The backend counts work of its own; the bar runs from 0 to 1 for each slab.
+    template <class Draw, class Framebuffer>
+    void draw_reporting(const std::vector<Draw>& draws, const voxelpipe::grid& part, Framebuffer& framebuffer) {
+        const stage_timer timer{*this, "voxelize"};
+        if constexpr (requires { backend_.progress; }) {
+            backend_.progress = [this](std::uint64_t done, std::uint64_t total) {
+                report_(total == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(total));
+            };
+        }
+        draw(draws, part, framebuffer);
+        report_(1.0);
+    }
+
+    // ---- resolve: slab -> volume -----------------------------------------------------------------------------------
+
+    // Where voxel (0, 0, begin) of a channel lies.
+    template <class T>
+    [[nodiscard]] static T* channel_at(volume& result, target id, int begin) {
+        channel* c = result.find(info_of(id).name);
+        const std::size_t layer = result.num_bytes(c->type, c->components) / static_cast<std::size_t>(result.extent[2]);
+        return reinterpret_cast<T*>(c->data.data() + layer * static_cast<std::size_t>(begin));
+    }
+
+    template <class Elements>
+    void copy(volume& result, target id, const Elements& elements, int begin) {
+        std::memcpy(channel_at<std::byte>(result, id, begin), elements.data(), elements.size() * sizeof(elements[0]));
+    }
+
+    // VISIT(i) for every voxel of a slab, in blocks, on several threads.
+    template <class Visit>
+    void for_each_voxel(std::size_t voxels, Visit visit) {
+        constexpr std::size_t block = 1 << 16;
+        parallel_for((voxels + block - 1) / block, thread_count(request_.threads), [&](std::size_t b) {
+            for (std::size_t i = b * block; i < std::min(voxels, (b + 1) * block); ++i) visit(i);
+        });
+    }
+
+    template <class Sums, class Counts>
+    void resolve_color(volume& result, const Sums& sums, const Counts& counts, int begin) {
+        auto* out = channel_at<glm::u8vec4>(result, target::color, begin);
+        const color_tables tables = make_color_tables();
+        for_each_voxel(counts.size(), [&](std::size_t i) {
+            if (counts[i] == 0) return;
+            const auto n = static_cast<float>(counts[i]);
+            glm::vec4 mean;
+            for (int c = 0; c < 4; ++c) mean[c] = std::min(vp::exact::div(sums[i][c], n), 1.0F);
+            out[i] = encode(tables, mean);
+        });
+    }
+
+    template <class Sums>
+    void resolve_normal(volume& result, const Sums& sums, int begin) {
+        auto* out = channel_at<glm::vec3>(result, target::normal, begin);
+        for_each_voxel(sums.size(), [&](std::size_t i) {
+            const double x = sums[i].x;
+            const double y = sums[i].y;
+            const double z = sums[i].z;
+            const double length = vp::exact::sqrt(vp::exact::fma(z, z, vp::exact::fma(y, y, vp::exact::mul(x, x))));
+            if (length > 0)
+                out[i] = {static_cast<float>(x / length), static_cast<float>(y / length),
+                          static_cast<float>(z / length)};
+        });
+    }
+
+    template <class Triangles>
+    void resolve_material(volume& result, const Triangles& triangles, int begin) {
+        auto* out = channel_at<std::int32_t>(result, target::material, begin);
+        for_each_voxel(triangles.size(), [&](std::size_t i) {
+            if (triangles[i] == UINT32_MAX) {
+                out[i] = -1;
+                return;
+            }
+            const auto next = std::upper_bound(first_triangle_.begin(), first_triangle_.end(), triangles[i]);
+            out[i] = material_of_[static_cast<std::size_t>(next - first_triangle_.begin()) - 1];
+        });
+    }
+
+    Backend& backend_;
+    const voxelize_request& request_;
+    voxelize_stats& stats_;
+    std::bitset<target_table.size()> wanted_;
+    bool any_mask_ = false;
+    bool only_bits_ = false;
+    std::function<void(double)> report_;
+
+    // The scene in the backend's memory; draws point into it.
+    std::vector<buffer<color_tables>> tables_;
+    std::vector<buffer<glm::u8vec4>> texels_; // of each picture
+    std::vector<buffer<glm::vec3>> positions_;
+    std::vector<buffer<glm::uvec3>> triangles_;
+    std::vector<buffer<glm::vec2>> texcoords_;
+    std::vector<buffer<glm::vec4>> colors_;
+    std::vector<surface_draw> draws_;
+    std::vector<bits_draw> bits_draws_;
+    std::vector<std::uint64_t> first_triangle_; // of each draw
+    std::vector<std::int32_t> material_of_;
+    std::uint64_t num_triangles_ = 0;
+};
+
+} // namespace voxelize

@@ -1,0 +1,118 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <iomanip>
+#include <utility>
+
+namespace voxelize {
+
+progress_bar::progress_bar(bool enabled) : enabled_{enabled && isatty(STDERR_FILENO) != 0} {}
+
+void progress_bar::start(std::string what) {
+    clear();
+    what_ = std::move(what);
+    percent_ = -1;
+    start_ = std::chrono::steady_clock::now();
+}
+
+void progress_bar::show(double done) {
+    if (!enabled_ || std::chrono::steady_clock::now() - start_ < std::chrono::milliseconds(500)) return;
+    const int percent = static_cast<int>(std::clamp(done, 0.0, 1.0) * 100);
+    if (percent == percent_) return;
+    percent_ = percent;
+    constexpr int width = 30;
+    const int filled = percent * width / 100;
+    std::fprintf(stderr, "\r\033[K%s [%s%s] %3d %%", what_.c_str(),
+                 std::string(static_cast<std::size_t>(filled), '#').c_str(),
+                 std::string(static_cast<std::size_t>(width - filled), '.').c_str(), percent);
+    std::fflush(stderr);
+    drawn_ = true;
+}
+
+void progress_bar::clear() {
+    if (!drawn_) return;
+    std::fputs("\r\033[K", stderr);
+    std::fflush(stderr);
+    drawn_ = false;
+}
+
+std::uint64_t peak_memory_bytes() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+void print_text(std::ostream& stream, const run_report& report) {
+    const voxelpipe::grid& grid = report.request.grid;
+    const auto line = [&stream](const char* name) -> std::ostream& {
+        return stream << "  " << std::left << std::setw(20) << name << std::right;
+    };
+    line("grid") << grid.extent.x << " x " << grid.extent.y << " x " << grid.extent.z << ", voxels of "
+                 << grid.voxel_size.x;
+    if (grid.voxel_size.y != grid.voxel_size.x || grid.voxel_size.z != grid.voxel_size.x)
+        stream << " x " << grid.voxel_size.y << " x " << grid.voxel_size.z;
+    stream << " from (" << grid.origin.x << ", " << grid.origin.y << ", " << grid.origin.z << ")\n";
+    line("backend") << report.stats.backend << ", " << report.stats.threads << " threads, " << report.stats.slabs
+                    << (report.stats.slabs == 1 ? " slab\n" : " slabs\n");
+    line("triangles") << report.stats.triangles;
+    if (report.stats.triangles_dropped != 0) stream << " (" << report.stats.triangles_dropped << " dropped)";
+    stream << '\n';
+    line("vertices") << report.vertices << '\n';
+    line("fragments") << report.stats.fragments;
+    if (report.stats.fragments_discarded != 0) stream << " (" << report.stats.fragments_discarded << " more discarded)";
+    stream << '\n';
+    line("voxels") << report.stats.voxels << '\n';
+    double total = 0;
+    stream << std::fixed << std::setprecision(1);
+    for (const auto& [stage, time] : report.stats.milliseconds) {
+        line((stage + " ms").c_str()) << std::setw(10) << time << '\n';
+        total += time;
+    }
+    line("all ms") << std::setw(10) << total << '\n';
+    line("peak memory MiB") << std::setw(10) << static_cast<double>(report.peak_memory) / (1 << 20) << '\n';
+}
+
+void print_json(std::ostream& stream, const run_report& report) {
+    using json = nlohmann::ordered_json;
+    const voxelpipe::grid& grid = report.request.grid;
+    json root;
+    root["input"] = report.input.string();
+    root["grid"] = {{"extent", {grid.extent.x, grid.extent.y, grid.extent.z}},
+                    {"origin", {grid.origin.x, grid.origin.y, grid.origin.z}},
+                    {"voxel_size", {grid.voxel_size.x, grid.voxel_size.y, grid.voxel_size.z}}};
+    root["coverage"] = report.request.coverage == voxelpipe::coverage::thin ? "thin" : "conservative";
+    root["targets"] = json::array();
+    for (const target id : report.request.targets) root["targets"].push_back(info_of(id).name);
+    root["backend"] = report.stats.backend;
+    root["threads"] = report.stats.threads;
+    root["slabs"] = report.stats.slabs;
+    root["triangles"] = report.stats.triangles;
+    root["triangles_dropped"] = report.stats.triangles_dropped;
+    root["vertices"] = report.vertices;
+    root["fragments"] = report.stats.fragments;
+    root["fragments_discarded"] = report.stats.fragments_discarded;
+    root["voxels"] = report.stats.voxels;
+    double total = 0;
+    for (const auto& [stage, time] : report.stats.milliseconds) {
+        root["ms"][stage] = time;
+        total += time;
+    }
+    root["ms"]["total"] = total;
+    root["peak_memory_bytes"] = report.peak_memory;
+    root["materials"] = report.materials;
+    root["files"] = json::array();
+    for (const std::filesystem::path& file : report.files) root["files"].push_back(file.string());
+    root["warnings"] = report.warnings;
+    // Paths may be any bytes; what is not UTF-8 is replaced.
+    stream << root.dump(2, ' ', false, json::error_handler_t::replace) << '\n';
+}
+
+} // namespace voxelize

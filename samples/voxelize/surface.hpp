@@ -1,0 +1,206 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The tool's shaders: world-space triangles in, one value for each of the tool's render targets out. Base colour =
+// factor * texture * vertex colour, in linear light. Plain functors over pointers, for every backend; floats follow the
+// rule of voxelpipe/core/exact.hpp, so the CPU and a GPU give the same bits.
+
+#include "scene.hpp"
+#include "srgb.hpp"
+
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <glm/gtc/type_precision.hpp>
+
+#include <cmath>
+#include <cstdint>
+
+namespace voxelize {
+
+namespace vp = voxelpipe;
+
+// What the shaders need of a texture. Memory of the backend, not owned.
+struct sampled_texture {
+    const glm::u8vec4* texels = nullptr; // rows from the top; null: no texture
+    int width = 0;
+    int height = 0;
+    wrap_mode wrap_s = wrap_mode::repeat;
+    wrap_mode wrap_t = wrap_mode::repeat;
+    filter_mode filter = filter_mode::linear;
+};
+
+// A coordinate brought into [0, 1]; NaN gives 0.
+[[nodiscard]] VOXELPIPE_HD inline float wrap_coordinate(wrap_mode mode, float c) {
+    if (mode == wrap_mode::repeat) {
+        c = vp::exact::sub(c, std::floor(c));
+    } else if (mode == wrap_mode::mirrored_repeat) {
+        c = vp::exact::fma(-2.0f, std::floor(c * 0.5f), c);
+        if (c > 1.0f) c = vp::exact::sub(2.0f, c);
+    }
+    return c > 0.0f ? (c < 1.0f ? c : 1.0f) : 0.0f;
+}
+
+// A texel index from -1 to size brought into the picture.
+[[nodiscard]] VOXELPIPE_HD inline int wrap_texel(wrap_mode mode, int i, int size) {
+    if (mode == wrap_mode::repeat) return i < 0 ? i + size : i >= size ? i - size : i;
+    return i < 0 ? 0 : i >= size ? size - 1 : i;
+}
+
+// Linear colour and alpha of one texel, bytes looked up.
+[[nodiscard]] VOXELPIPE_HD inline glm::vec4 fetch_texel(const sampled_texture& t, const color_tables& tables, int x,
+                                                        int y) {
+    const glm::u8vec4 texel =
+        t.texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(t.width) + static_cast<std::size_t>(x)];
+    return {tables.linear[texel.r], tables.linear[texel.g], tables.linear[texel.b], tables.fraction[texel.a]};
+}
+
+// The texture at UV: (0, 0) is the top left corner of the picture, texel centres lie at halves.
+[[nodiscard]] VOXELPIPE_HD inline glm::vec4 sample(const sampled_texture& t, const color_tables& tables, glm::vec2 uv) {
+    const float u = wrap_coordinate(t.wrap_s, uv.x);
+    const float v = wrap_coordinate(t.wrap_t, uv.y);
+    const auto width = static_cast<float>(t.width);
+    const auto height = static_cast<float>(t.height);
+    if (t.filter == filter_mode::nearest) {
+        const int x = static_cast<int>(std::floor(vp::exact::mul(u, width)));
+        const int y = static_cast<int>(std::floor(vp::exact::mul(v, height)));
+        return fetch_texel(t, tables, wrap_texel(t.wrap_s, x, t.width), wrap_texel(t.wrap_t, y, t.height));
+    }
+    const float x = vp::exact::fma(u, width, -0.5f);
+    const float y = vp::exact::fma(v, height, -0.5f);
+    const float left = std::floor(x);
+    const float top = std::floor(y);
+    const float s = vp::exact::sub(x, left);
+    const float r = vp::exact::sub(y, top);
+    const int x0 = wrap_texel(t.wrap_s, static_cast<int>(left), t.width);
+    const int x1 = wrap_texel(t.wrap_s, static_cast<int>(left) + 1, t.width);
+    const int y0 = wrap_texel(t.wrap_t, static_cast<int>(top), t.height);
+    const int y1 = wrap_texel(t.wrap_t, static_cast<int>(top) + 1, t.height);
+    const glm::vec4 a = fetch_texel(t, tables, x0, y0);
+    const glm::vec4 b = fetch_texel(t, tables, x1, y0);
+    const glm::vec4 c = fetch_texel(t, tables, x0, y1);
+    const glm::vec4 d = fetch_texel(t, tables, x1, y1);
+    glm::vec4 result;
+    for (int i = 0; i < 4; ++i)
+        result[i] = vp::exact::lerp(vp::exact::lerp(a[i], b[i], s), vp::exact::lerp(c[i], d[i], s), r);
+    return result;
+}
+
+struct surface_varyings {
+    glm::vec2 texcoord;
+    glm::vec4 color;
+    glm::vec3 position; // world space
+};
+
+// World coordinates of voxel centres, for nearest_on_triangle.
+struct voxel_centers {
+    glm::dvec3 origin{0.0};
+    glm::dvec3 voxel_size{1.0};
+
+    [[nodiscard]] VOXELPIPE_HD double operator()(int axis, int voxel) const {
+        return vp::exact::fma(voxel + 0.5, voxel_size[axis], origin[axis]);
+    }
+};
+
+// The varyings at the point of the triangle that is nearest to the centre of the fragment's column, seen along the
+// dominant axis. Fragments interpolate at that centre, which lies outside of the triangle in many voxels that it only
+// touches; extrapolated there, a texture shows what belongs to other triangles, and weights cut off at zero jump along
+// a sliver to its far end.
+[[nodiscard]] VOXELPIPE_HD inline surface_varyings nearest_on_triangle(const vp::fragment<surface_varyings>& f,
+                                                                       const voxel_centers& centers) {
+    if (f.barycentric.x >= 0.0f && f.barycentric.y >= 0.0f && f.barycentric.z >= 0.0f) return f.varyings;
+    const int u = f.axis == 0 ? 1 : 0;
+    const int v = f.axis == 2 ? 1 : 2;
+    const double center_u = centers(u, f.voxel[u]);
+    const double center_v = centers(v, f.voxel[v]);
+    surface_varyings nearest = f.varyings;
+    float least = 0.0f;
+    bool found = false;
+    for (int opposite = 0; opposite < 3; ++opposite) { // the edge across from this vertex
+        if (f.barycentric[opposite] >= 0.0f) continue;
+        const surface_varyings& a = *f.vertex_varyings[(opposite + 1) % 3];
+        const surface_varyings& b = *f.vertex_varyings[(opposite + 2) % 3];
+        const float edge_u = vp::exact::sub(b.position[u], a.position[u]);
+        const float edge_v = vp::exact::sub(b.position[v], a.position[v]);
+        const auto to_u = static_cast<float>(center_u - static_cast<double>(a.position[u]));
+        const auto to_v = static_cast<float>(center_v - static_cast<double>(a.position[v]));
+        const float length = vp::exact::fma(edge_u, edge_u, vp::exact::mul(edge_v, edge_v));
+        const float along = vp::exact::fma(to_u, edge_u, vp::exact::mul(to_v, edge_v));
+        float t = length > 0.0f ? vp::exact::div(along, length) : 0.0f;
+        t = t > 0.0f ? (t < 1.0f ? t : 1.0f) : 0.0f;
+        const float rest_u = vp::exact::fma(-t, edge_u, to_u);
+        const float rest_v = vp::exact::fma(-t, edge_v, to_v);
+        const float distance = vp::exact::fma(rest_u, rest_u, vp::exact::mul(rest_v, rest_v));
+        if (found && !(distance < least)) continue;
+        found = true;
+        least = distance;
+        for (int i = 0; i < 2; ++i) nearest.texcoord[i] = vp::exact::lerp(a.texcoord[i], b.texcoord[i], t);
+        for (int i = 0; i < 4; ++i) nearest.color[i] = vp::exact::lerp(a.color[i], b.color[i], t);
+        for (int i = 0; i < 3; ++i) nearest.position[i] = vp::exact::lerp(a.position[i], b.position[i], t);
+    }
+    return nearest;
+}
+
+// Attributes by pointer, so that a primitive without them needs no array of ones.
+struct surface_vertex_shader {
+    const glm::vec2* texcoords = nullptr; // null: 0
+    const glm::vec4* colors = nullptr;    // null: white
+
+    VOXELPIPE_HD vp::vertex_output<surface_varyings> operator()(const vp::vertex<>& v) const {
+        return {v.position,
+                {texcoords != nullptr ? texcoords[v.index] : glm::vec2(0.0f),
+                 colors != nullptr ? colors[v.index] : glm::vec4(1.0f), v.position}};
+    }
+};
+
+// What the fragment shader has to work out; the rest of its outputs are placeholders for targets that are off.
+struct surface_outputs {
+    bool linear_color = false;  // for the average
+    bool encoded_color = false; // for max and replace
+    bool depth = false;
+};
+
+// Values and order of the tool's render targets:
+//   occupancy, count, sum of linear colours, encoded colour (max), encoded colour (last), sum of normals, triangle
+//   number, depth
+struct surface_fragment_shader {
+    sampled_texture texture;
+    const color_tables* tables = nullptr;
+    glm::vec4 base_color{1.0f};
+    alpha_mode alpha = alpha_mode::opaque;
+    float alpha_cutoff = 0.5f;
+    voxel_centers centers;
+    int depth_axis = 2;
+    surface_outputs wanted;
+
+    VOXELPIPE_HD auto operator()(const vp::fragment<surface_varyings>& f) const {
+        const bool shaded = wanted.linear_color || wanted.encoded_color || alpha == alpha_mode::mask;
+        const surface_varyings at = shaded || wanted.depth ? nearest_on_triangle(f, centers) : f.varyings;
+        glm::vec4 color(1.0f);
+        bool discarded = false;
+        if (shaded) {
+            color = shade(at);
+            discarded = alpha == alpha_mode::mask && color.a < alpha_cutoff;
+            if (alpha != alpha_mode::blend) color.a = 1.0f;
+        }
+        glm::u8vec4 encoded(0);
+        if (wanted.encoded_color) encoded = encode(*tables, color);
+        return vp::outputs(true, 1u, color, encoded, encoded, f.normal, f.primitive, at.position[depth_axis])
+            .discard_if(discarded);
+    }
+
+    // Linear, every component in [0, 1].
+    [[nodiscard]] VOXELPIPE_HD glm::vec4 shade(const surface_varyings& at) const {
+        glm::vec4 color = base_color;
+        if (texture.texels != nullptr) {
+            const glm::vec4 texel = sample(texture, *tables, at.texcoord);
+            for (int i = 0; i < 4; ++i) color[i] = vp::exact::mul(color[i], texel[i]);
+        }
+        for (int i = 0; i < 4; ++i) {
+            const float c = vp::exact::mul(color[i], at.color[i]);
+            color[i] = c > 0.0f ? (c < 1.0f ? c : 1.0f) : 0.0f; // NaN gives 0
+        }
+        return color;
+    }
+};
+
+} // namespace voxelize

@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What can be computed for each voxel: the names of --target with the type and the meaning of the values. One table,
+// which --help prints too.
+
+#include "volume.hpp"
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string_view>
+
+namespace voxelize {
+
+enum class target : std::uint8_t {
+    occupancy,
+    count,
+    color,
+    color_max,
+    color_replace,
+    normal,
+    material,
+    triangle,
+    depth
+};
+
+struct target_info {
+    target id;
+    std::string_view name; // of --target and of the volume's channel
+    scalar type;
+    int components;
+    std::string_view description; // one line, with the value of an empty voxel where it is not 0
+};
+
+inline constexpr std::array target_table{
+    target_info{target::occupancy, "occupancy", scalar::bit, 1, "1 where a triangle touches the voxel"},
+    target_info{target::count, "count", scalar::u32, 1, "number of triangles in the voxel"},
+    target_info{target::color, "color", scalar::u8, 4, "sRGB and alpha: mean of the triangles, taken in linear light"},
+    target_info{target::color_max, "color-max", scalar::u8, 4, "sRGB and alpha: greatest of each component"},
+    target_info{target::color_replace, "color-replace", scalar::u8, 4, "sRGB and alpha: of the last triangle"},
+    target_info{target::normal, "normal", scalar::f32, 3, "mean of the unit normals, made unit again"},
+    target_info{target::material, "material", scalar::i32, 1, "material of the last triangle; empty: -1"},
+    target_info{target::triangle, "triangle", scalar::i32, 1, "number of the last triangle; empty: -1"},
+    target_info{target::depth, "depth", scalar::f32, 1, "least world position along --depth-axis; empty: NaN"},
+};
+
+[[nodiscard]] constexpr const target_info& info_of(target id) { return target_table[static_cast<std::size_t>(id)]; }
+
+[[nodiscard]] constexpr std::optional<target> target_named(std::string_view name) {
+    for (const target_info& entry : target_table)
+        if (entry.name == name) return entry.id;
+    return std::nullopt;
+}
+
+} // namespace voxelize
