@@ -43,6 +43,8 @@ present() {
         nlohmann-json3-dev) has_header nlohmann/json.hpp ;;
         libstb-dev) has_header stb/stb_image.h || has_header stb_image.h ;;
         libcli11-dev) has_header CLI/CLI.hpp ;;
+        zlib1g-dev) has_header zlib.h ;;
+        libminizip-dev) has_header minizip/zip.h ;;
         libgtest-dev) has_header gtest/gtest.h ;;
         libbenchmark-dev) has_header benchmark/benchmark.h ;;
         python3-venv) python3 -c 'import ensurepip, venv' 2>/dev/null ;;
@@ -82,7 +84,8 @@ Install them and run the same command again; on Debian or Ubuntu:
 }
 
 # What the library, the tool and the samples are built with.
-build_packages=(g++ cmake ninja-build libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev)
+build_packages=(g++ cmake ninja-build libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev zlib1g-dev
+    libminizip-dev)
 
 # configure PRESET [cmake option...]: quiet unless it fails. Uses ccache where there is one, and the staged prefix.
 configure() {
@@ -90,6 +93,7 @@ configure() {
     shift
     local options=("$@")
     command -v ccache >/dev/null && options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+    [[ -x .venv/bin/python ]] && options+=("-DVOXELPIPE_PYTHON=$root/.venv/bin/python")
     [[ -d .deps ]] && options+=("-DCMAKE_PREFIX_PATH=$root/.deps${CMAKE_PREFIX_PATH:+;${CMAKE_PREFIX_PATH//:/;}}")
     mkdir -p build
     log=build/configure-$preset.log

@@ -4,7 +4,8 @@
 #
 # stage_deps.sh [PREFIX]: copies what the build needs of third-party libraries from this machine's packages into PREFIX
 # (default .deps/ in the project, which the other scripts look at by themselves), for a machine without packages and
-# network. Headers and the GoogleTest sources only, no binaries, so the other machine may have another distribution:
+# network. Headers, the GoogleTest sources and the static C libraries zlib and minizip, so that the other machine may have
+# another distribution of the same architecture:
 #   cmake --preset cpu -DCMAKE_PREFIX_PATH=PREFIX
 # Google Benchmark is not staged: configure with VOXELPIPE_BUILD_BENCH=OFF, as the presets but `bench` do.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
@@ -12,7 +13,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 prefix="$(realpath -m "${1:-.deps}")"
 gtest_source=/usr/src/googletest/googletest
 
-need_packages libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev libgtest-dev
+need_packages libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev libgtest-dev zlib1g-dev libminizip-dev
 [[ -e $gtest_source/src/gtest-all.cc ]] || need_packages googletest
 
 # system_header NAME: the folder that holds it, not counting what was staged before.
@@ -25,12 +26,20 @@ system_include() {
 }
 
 say "staging into $prefix"
-rm -rf "$prefix"/{include,share/cmake,src/googletest}
-mkdir -p "$prefix"/{include/stb,share/cmake,src}
+rm -rf "$prefix"/{include,lib,share/cmake,src/googletest}
+mkdir -p "$prefix"/{include/stb,lib,share/cmake,src}
 cp -rL "$(system_include glm/glm.hpp)/glm" "$(system_include CLI/CLI.hpp)/CLI" \
     "$(system_include nlohmann/json.hpp)/nlohmann" "$(system_include gtest/gtest.h)/gtest" "$prefix/include/"
 cp -L "$(system_include tiny_gltf.h)/tiny_gltf.h" "$prefix/include/"
 cp -L "$(system_include stb/stb_image.h)"/stb/stb_image*.h "$prefix/include/stb/"
+cp -rL "$(system_include minizip/zip.h)/minizip" "$prefix/include/"
+cp -L "$(system_include zlib.h)/zlib.h" "$prefix/include/"
+zconf=$(find /usr/include -name zconf.h | head -n 1)
+cp -L "${zconf:?no zconf.h under /usr/include}" "$prefix/include/"
+for library in libz.a libminizip.a; do
+    archive=$(find /usr/lib /usr/local/lib -name "$library" 2>/dev/null | head -n 1)
+    cp -L "${archive:?no $library under /usr/lib}" "$prefix/lib/"
+done
 mkdir -p "$prefix/src/googletest"
 cp -rL "$gtest_source/src" "$prefix/src/googletest/"
 
