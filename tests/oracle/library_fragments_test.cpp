@@ -77,7 +77,7 @@ TEST_P(LibraryFragments, AreTheOraclesExactValues) {
             }
             const grid& g = where.g;
             std::vector<world_triangle> triangles;
-            for (int n = 0; n < 40; ++n) triangles.push_back(make_triangle(random, where, kind));
+            for (int n = 0; n < 25; ++n) triangles.push_back(make_triangle(random, where, kind));
             const soup mesh(triangles);
             std::vector<std::uint32_t> numbers(mesh.positions.size());
             for (std::size_t n = 0; n < numbers.size(); ++n) numbers[n] = static_cast<std::uint32_t>(n);
@@ -156,7 +156,7 @@ TEST_P(LibraryFragments, AreTheOraclesExactValues) {
             }
         }
     }
-    EXPECT_GT(checked, GetParam() == vp::coverage::thin ? 30000u : 60000u);
+    EXPECT_GT(checked, GetParam() == vp::coverage::thin ? 20000u : 40000u);
     // Two roundings differ from one only where the double falls on a tie of floats.
     EXPECT_GE(static_cast<double>(correctly_rounded), 0.9999 * static_cast<double>(quotients));
     RecordProperty("not_correctly_rounded", std::to_string(quotients - correctly_rounded));
