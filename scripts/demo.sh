@@ -19,7 +19,7 @@ cmake --build build/demo --target voxelize demo_model -j "$jobs"
 
 mkdir -p demo
 if [[ -z $model ]]; then
-    model=demo/demo_model.glb
+    model=demo/lighthouse.glb
     say "making a small textured model: $model"
     build/demo/samples/demo_model/demo_model "$model"
 fi
@@ -30,14 +30,14 @@ say "voxelizing $model: ${resolution} voxels along its longest side, with colour
 build/demo/samples/voxelize/voxelize "$model" --resolution "$resolution" --target occupancy --target color \
     -o "demo/$name.npz" -o "demo/$name.vox" -o "demo/$name.vti" -o demo/preview.png --stats
 
-say "done; the picture is demo/preview.png"
+say "done; the files are in $root/demo"
 ls -l "demo/preview.png" "demo/$name".*
 cat <<TEXT
 
-  demo/preview.png   the voxels, shaded
-  demo/$name.vox     for MagicaVoxel and other voxel editors
-  demo/$name.npz     for NumPy: numpy.load(...)["color"], shape (nz, ny, nx, components)
-  demo/$name.vti     for ParaView
+  preview.png   a shaded picture of the voxels
+  $name.vox   for MagicaVoxel and other voxel editors
+  $name.npz   for NumPy: numpy.load(...)["color"] has the shape (nz, ny, nx, 4)
+  $name.vti   for ParaView
 
 Another model: make demo MODEL=file.glb (glTF 2.0, .gltf or .glb). The tool: build/demo/samples/voxelize/voxelize --help
 TEXT
