@@ -4,7 +4,7 @@
 
 // The whole library: mesh -> vertex shader -> triangle setup -> coarse raster -> tile sort -> tile split -> fine raster
 // -> blend -> framebuffer / A-buffer. A plain C++20 compiler gets everything but the GPU; the CPU backend is
-// <cpu_ref/backend.hpp>.
+// <cpu_ref/backend.hpp>; nvcc gets cuda_backend too.
 
 #include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/blend.hpp>
@@ -15,3 +15,7 @@
 #include <voxelpipe/shader.hpp>
 #include <voxelpipe/status.hpp>
 #include <voxelpipe/voxelize.hpp>
+
+#if defined(__CUDACC__)
+#include <voxelpipe/device/backend.cuh>
+#endif

@@ -136,7 +136,7 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<
             Int low = t.plane_low - row - positive_part(nu) - positive_part(nv);
             Int high = t.plane_high - row - negative_part(nu) - negative_part(nv);
             // The other two projections at (v, w) and (w, u): what depends on v is fixed here, what depends on u steps.
-            Int r[3], s[3];
+            Int r[3]{}, s[3]{};
             if constexpr (Rule == span_rule::conservative) {
                 for (int i = 0; i < 3; ++i) {
                     r[i] = t.vw[i].a * v + t.vw[i].c;

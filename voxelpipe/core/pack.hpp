@@ -62,6 +62,9 @@ namespace core {
 
 [[nodiscard]] VOXELPIPE_HD constexpr pack<> make_pack() { return {}; }
 
+#if defined(__CUDACC__)
+#pragma nv_exec_check_disable // on the host it also packs types that only the host has
+#endif
 template <class First, class... Rest>
 [[nodiscard]] VOXELPIPE_HD constexpr pack<First, Rest...> make_pack(First first, Rest... rest) {
     return {static_cast<First&&>(first), make_pack(static_cast<Rest&&>(rest)...)};

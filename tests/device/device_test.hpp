@@ -1,0 +1,202 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the GPU tests share: generated meshes, the benchmark scenes where they are present, and expect_same, which runs
+// one call on cpu_backend and on cuda_backend and compares every byte of the results and every counter.
+
+#include <cpu_ref/backend.hpp>
+#include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace device_test {
+
+namespace vp = voxelpipe;
+
+struct mesh_data {
+    std::vector<glm::vec3> positions;
+    std::vector<glm::uvec3> triangles;
+};
+
+inline void add_triangle(mesh_data& m, glm::vec3 a, glm::vec3 b, glm::vec3 c) {
+    const auto n = static_cast<std::uint32_t>(m.positions.size());
+    m.positions.insert(m.positions.end(), {a, b, c});
+    m.triangles.emplace_back(n, n + 1, n + 2);
+}
+
+// Triangles of every size from a hundredth of a voxel to beyond the grid, in a grid of `size` voxels at the origin;
+// among them some on voxel faces, zero-area ones, NaN, infinite, far away and outside.
+inline mesh_data mixed_triangles(int count, float size, std::uint32_t seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> unit(0.0f, 1.0f);
+    mesh_data m;
+    for (int i = 0; i < count; ++i) {
+        const glm::vec3 centre(unit(random) * size, unit(random) * size, unit(random) * size);
+        const float extent = 0.01f * std::pow(size * 150.0f, unit(random) * unit(random));
+        const auto point = [&] {
+            glm::vec3 p = centre;
+            for (int a = 0; a < 3; ++a) p[a] += (unit(random) - 0.5f) * extent;
+            if (i % 7 == 0)
+                for (int a = 0; a < 3; ++a) p[a] = std::round(p[a]);
+            return p;
+        };
+        glm::vec3 a = point(), b = point(), c = point();
+        switch (i % 97) {
+        case 3:
+            b = a;
+            break;
+        case 5:
+            b = a;
+            c = a;
+            break;
+        case 11:
+            c = a + (b - a) * 0.5f;
+            break;
+        case 13:
+            b.x = std::numeric_limits<float>::quiet_NaN();
+            break;
+        case 17:
+            c.y = std::numeric_limits<float>::infinity();
+            break;
+        case 19:
+            a.z = 1e30f;
+            break;
+        case 23:
+            for (glm::vec3* p : {&a, &b, &c}) p->x += 3.0f * size;
+            break;
+        case 29:
+            c.x += 40.0f * size;
+            break; // wide path
+        case 31:
+            b.y = b.y - 2000.0f * size;
+            break;
+        default:
+            break;
+        }
+        add_triangle(m, a, b, c);
+    }
+    return m;
+}
+
+inline vp::grid box_grid(glm::ivec3 extent) {
+    vp::grid g;
+    g.extent = extent;
+    return g;
+}
+
+// A scene by name (VPM file in VOXELPIPE_VPM_DIR), empty where it is absent.
+inline mesh_data load_scene(const std::string& name) {
+    mesh_data m;
+    const char* const folder = std::getenv("VOXELPIPE_VPM_DIR");
+    if (folder == nullptr) return m;
+    std::ifstream in(std::string(folder) + "/" + name + ".vpm", std::ios::binary);
+    char magic[8];
+    std::uint32_t counts[2];
+    if (!in.read(magic, 8) || std::memcmp(magic, "VPMESH1", 8) != 0) return m;
+    in.read(reinterpret_cast<char*>(counts), 8);
+    m.positions.resize(counts[0]);
+    m.triangles.resize(counts[1]);
+    in.read(reinterpret_cast<char*>(m.positions.data()), static_cast<std::streamsize>(sizeof(glm::vec3) * counts[0]));
+    in.read(reinterpret_cast<char*>(m.triangles.data()), static_cast<std::streamsize>(sizeof(glm::uvec3) * counts[1]));
+    return in ? m : mesh_data{};
+}
+
+inline void expect_same_counts(const vp::counters& a, const vp::counters& b) {
+    EXPECT_EQ(a.triangles_in, b.triangles_in);
+    EXPECT_EQ(a.triangles_nonfinite, b.triangles_nonfinite);
+    EXPECT_EQ(a.triangles_too_far, b.triangles_too_far);
+    EXPECT_EQ(a.triangles_zero_area, b.triangles_zero_area);
+    EXPECT_EQ(a.triangles_outside, b.triangles_outside);
+    EXPECT_EQ(a.triangles_drawn, b.triangles_drawn);
+    EXPECT_EQ(a.fragments, b.fragments);
+    EXPECT_EQ(a.fragments_discarded, b.fragments_discarded);
+    EXPECT_EQ(a.voxels, b.voxels);
+}
+
+// Reports the first element that differs.
+template <class T>
+void expect_same_bytes(const std::vector<T>& cpu, const std::vector<T>& gpu, const char* what) {
+    ASSERT_EQ(cpu.size(), gpu.size()) << what;
+    if (cpu.empty() || std::memcmp(cpu.data(), gpu.data(), cpu.size() * sizeof(T)) == 0) return;
+    std::size_t differing = 0, first = 0;
+    for (std::size_t i = 0; i < cpu.size(); ++i)
+        if (std::memcmp(&cpu[i], &gpu[i], sizeof(T)) != 0 && differing++ == 0) first = i;
+    const auto hex = [](const T& v) {
+        std::string text;
+        const auto* const raw = reinterpret_cast<const unsigned char*>(&v);
+        for (std::size_t i = sizeof(T); i-- > 0;) {
+            static const char digits[] = "0123456789abcdef";
+            text += {digits[raw[i] / 16], digits[raw[i] % 16]};
+        }
+        return text;
+    };
+    ADD_FAILURE() << what << ": " << differing << " of " << cpu.size() << " elements differ, first " << first
+                  << ": cpu " << hex(cpu[first]) << ", gpu " << hex(gpu[first]);
+}
+
+// How the targets start: cleared (to their blends' identities) or loaded with a pattern of bytes drawn by an earlier
+// call.
+enum class start { clear, load };
+
+template <class Backend, class... Targets, class VertexShader, class FragmentShader>
+vp::status draw_framebuffer(Backend& backend, vp::framebuffer<Backend, Targets...>& fb, const mesh_data& m,
+                            const vp::grid& g, const VertexShader& vs, const FragmentShader& fs,
+                            const vp::voxelize_options& options, start how) {
+    vp::mesh<Backend> mesh(backend, m.positions, m.triangles);
+    vp::status s = vp::voxelize(backend, mesh, g, vs, fs, fb, options);
+    if (!s.ok() || how == start::clear) return s;
+    vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() { vp::get<I>(fb).load(); });
+    return vp::voxelize(backend, mesh, g, vs, fs, fb, options);
+}
+
+template <class... Targets, class VertexShader, class FragmentShader>
+void expect_same(const mesh_data& m, const vp::grid& g, const VertexShader& vs, const FragmentShader& fs,
+                 vp::voxelize_options options, start how = start::clear) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
+    vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
+    const vp::status sa = draw_framebuffer(cpu, a, m, g, vs, fs, options, how);
+    const vp::status sb = draw_framebuffer(gpu, b, m, g, vs, fs, options, how);
+    ASSERT_EQ(sa.code, sb.code) << sb.message();
+    expect_same_counts(sa.counts, sb.counts);
+    vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        const std::string what = "target " + std::to_string(I);
+        expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu), what.c_str());
+    });
+}
+
+template <class Payload, class VertexShader, class FragmentShader>
+void expect_same_lists(const mesh_data& m, const vp::grid& g, const VertexShader& vs, const FragmentShader& fs,
+                       vp::voxelize_options options) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    vp::abuffer<vp::cpu_backend, Payload> a{cpu};
+    vp::abuffer<vp::cuda_backend, Payload> b{gpu};
+    vp::mesh<vp::cpu_backend> ma(cpu, m.positions, m.triangles);
+    vp::mesh<vp::cuda_backend> mb(gpu, m.positions, m.triangles);
+    const vp::status sa = vp::voxelize(cpu, ma, g, vs, fs, a, options);
+    const vp::status sb = vp::voxelize(gpu, mb, g, vs, fs, b, options);
+    ASSERT_EQ(sa.code, sb.code) << sb.message();
+    expect_same_counts(sa.counts, sb.counts);
+    const auto ha = a.to_host(cpu), hb = b.to_host(gpu);
+    EXPECT_EQ(ha.extent, hb.extent);
+    expect_same_bytes(ha.voxels, hb.voxels, "voxels");
+    expect_same_bytes(ha.offsets, hb.offsets, "offsets");
+    expect_same_bytes(ha.primitives, hb.primitives, "primitives");
+    if constexpr (!std::is_void_v<Payload>) expect_same_bytes(ha.payloads, hb.payloads, "payloads");
+}
+
+inline constexpr vp::coverage both_rules[] = {vp::coverage::thin, vp::coverage::conservative};
+
+} // namespace device_test

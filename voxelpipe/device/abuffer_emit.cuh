@@ -1,0 +1,165 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A-buffer: every fragment, ordered by (voxel, primitive). Count -> scan -> emit leaves the fragments by ascending
+// primitive; a stable sort by voxel over just the bits in use gives the order; the first fragment of each voxel is then
+// selected. Memory is in proportion to the fragments (paper section 3, A-buffer).
+
+#include <voxelpipe/device/fragment_shade.cuh>
+#include <voxelpipe/device/tile_sort.cuh>
+#include <voxelpipe/device/work_share.cuh>
+
+#include <cub/device/device_select.cuh>
+#include <thrust/iterator/counting_iterator.h>
+
+namespace voxelpipe::device {
+
+// Fragments as cells of work_share: the voxel is the key; the value is the primitive or, where there are payloads, the
+// fragment's place among them.
+template <coverage Rule, class Scene, class Key, class Payload, class MakePayload>
+struct fragment_cells {
+    static constexpr coverage rule = Rule;
+    static constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
+
+    Scene s;
+    Key* keys;
+    std::uint32_t* values;
+    std::uint32_t* primitives; // by place, where there are payloads
+    Payload* payloads;         // by place
+    bool counts_triangles;
+
+    struct cell {
+        std::uint64_t voxel;
+        typename Scene::fragment_output out;
+    };
+
+    [[nodiscard]] __device__ core::voxel_box cells(const core::voxel_box& reach) const { return reach; }
+    template <class Visit>
+    __device__ void enumerate(const geometry& geo, const loaded_triangle& t, std::uint32_t id,
+                              const core::voxel_box& box, bool, Visit&& visit) const {
+        const auto nx = static_cast<std::uint64_t>(geo.extent.x), ny = static_cast<std::uint64_t>(geo.extent.y);
+        shade_fragments<Rule>(s, t, id, box, [&](int x, int y, int z, const auto& out) {
+            visit(cell{(static_cast<std::uint64_t>(z) * ny + static_cast<std::uint64_t>(y)) * nx +
+                           static_cast<std::uint64_t>(x),
+                       out});
+        });
+    }
+    [[nodiscard]] __device__ static bool keep(const cell& c) { return c.out.keep; }
+    __device__ void store(unsigned long long at, std::uint32_t primitive, const cell& c) const {
+        keys[at] = static_cast<Key>(c.voxel);
+        if constexpr (has_payload) {
+            values[at] = static_cast<std::uint32_t>(at);
+            primitives[at] = primitive;
+            payloads[at] = MakePayload{}(c.out);
+        } else {
+            values[at] = primitive;
+        }
+    }
+};
+
+// The A-buffer's payload: the fragment shader's one output.
+struct first_value {
+    template <class Output>
+    __device__ auto operator()(const Output& o) const {
+        return voxelpipe::get<0>(o.values);
+    }
+};
+// All outputs, for folding them in order.
+struct all_values {
+    template <class Output>
+    __device__ auto operator()(const Output& o) const {
+        return o.values;
+    }
+};
+
+// Whether fragment i is the first of its voxel.
+template <class Key>
+struct is_first_of_voxel {
+    const Key* keys;
+    const pipeline_state* state;
+    capacities limits;
+    [[nodiscard]] __device__ bool operator()(unsigned long long i) const {
+        return !has_failed(*state, limits) && i < state->list_fragments && (i == 0 || keys[i] != keys[i - 1]);
+    }
+};
+
+template <class Key>
+[[nodiscard]] std::size_t select_bytes(std::uint64_t capacity) {
+    std::size_t bytes = 0;
+    check(cub::DeviceSelect::If(nullptr, bytes, thrust::counting_iterator<unsigned long long>(0),
+                                static_cast<unsigned long long*>(nullptr), static_cast<unsigned long long*>(nullptr),
+                                capacity, is_first_of_voxel<Key>{}),
+          stage::abuffer_emit);
+    return bytes;
+}
+
+// Arrays of the fragment lists of one call.
+template <class Key, class Payload>
+struct list_buffers {
+    Key* keys[2];
+    std::uint32_t* values[2];
+    std::uint32_t* primitives;          // by place; null without payloads
+    Payload* payloads;                  // by place
+    unsigned long long* first_of_voxel; // fragment numbers, ascending; list_voxels of them
+    void* storage;
+    std::size_t storage_bytes;
+    int bits;
+};
+
+// The sorted lists, where they came to lie.
+template <class Key, class Payload>
+struct fragment_lists {
+    const Key* keys;
+    const std::uint32_t* values;
+    const std::uint32_t* primitives;
+    const Payload* payloads;
+    const unsigned long long* first_of_voxel;
+};
+
+template <coverage Rule, class MakePayload, class Scene, class Key, class Payload>
+[[nodiscard]] fragment_lists<Key, Payload>
+build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const share_buffers& share, pipeline_state* state,
+            const capacities& limits, bool counts_triangles, cudaStream_t stream) {
+    const fragment_cells<Rule, Scene, Key, Payload, MakePayload> op{
+        s, b.keys[0], b.values[0], b.primitives, b.payloads, counts_triangles};
+    fill_keys(b.keys[0], limits.fragments, stream);
+    share_count(s.geo, op, share, state, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
+    share_emit(s.geo, op, share, state, limits, stage::abuffer_emit, stream);
+    cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
+    cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
+    sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
+    std::size_t bytes = b.storage_bytes;
+    check(cub::DeviceSelect::If(b.storage, bytes, thrust::counting_iterator<unsigned long long>(0), b.first_of_voxel,
+                                &state->list_voxels, limits.fragments,
+                                is_first_of_voxel<Key>{keys.Current(), state, limits}, stream),
+          stage::abuffer_emit);
+    return {keys.Current(), values.Current(), b.primitives, b.payloads, b.first_of_voxel};
+}
+
+// ---- into an A-buffer -----------------------------------------------------------------------------------------------
+
+template <class Key, class Payload>
+__global__ void copy_lists_kernel(fragment_lists<Key, Payload> lists, std::uint64_t num_voxels,
+                                  std::uint64_t num_fragments, std::uint64_t* voxels, std::uint64_t* offsets,
+                                  std::uint32_t* primitives, Payload* payloads) {
+    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
+    for (std::uint64_t i = thread; i < num_voxels; i += threads) {
+        const std::uint64_t first = lists.first_of_voxel[i];
+        voxels[i] = lists.keys[first];
+        offsets[i] = first;
+    }
+    if (thread == 0 && num_voxels != 0) offsets[num_voxels] = num_fragments;
+    for (std::uint64_t i = thread; i < num_fragments; i += threads) {
+        const std::uint32_t v = lists.values[i];
+        if constexpr (std::is_same_v<Payload, no_payload>) {
+            primitives[i] = v;
+        } else {
+            primitives[i] = lists.primitives[v];
+            payloads[i] = lists.payloads[v];
+        }
+    }
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,276 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// cuda_backend: the pipeline on an NVIDIA GPU, with the bits of cpu_backend. All work, copies and memory go through one
+// stream of the current device; a call to voxelize waits once, for the counters in its status.
+
+#include <voxelpipe/device/dispatch.cuh>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe {
+
+// Memory that a cuda_backend keeps between calls, released in stream order. Moves with its backend, is never shared.
+class device_block {
+public:
+    device_block() = default;
+    device_block(std::size_t bytes, const memory_resource& resource, cudaStream_t stream)
+        : pointer_(resource.allocate(bytes, stream)), bytes_(bytes), resource_(resource), stream_(stream) {}
+    device_block(device_block&& other) noexcept { swap(other); }
+    device_block& operator=(device_block&& other) noexcept {
+        device_block(std::move(other)).swap(*this);
+        return *this;
+    }
+    ~device_block() { resource_.deallocate(pointer_, bytes_, stream_); }
+
+    [[nodiscard]] void* data() const { return pointer_; }
+    [[nodiscard]] std::size_t size() const { return bytes_; }
+
+private:
+    void swap(device_block& other) noexcept {
+        std::swap(pointer_, other.pointer_);
+        std::swap(bytes_, other.bytes_);
+        std::swap(resource_, other.resource_);
+        std::swap(stream_, other.stream_);
+    }
+    void* pointer_ = nullptr;
+    std::size_t bytes_ = 0;
+    memory_resource resource_;
+    cudaStream_t stream_ = nullptr;
+};
+
+class cuda_backend {
+public:
+    // Device memory on the backend's stream, uninitialised. Throws std::bad_alloc, or std::runtime_error with the CUDA
+    // error. Freed in stream order; the stream must outlive it.
+    template <class T>
+    class buffer {
+        static_assert(std::is_trivially_copyable_v<T>);
+
+    public:
+        buffer(cuda_backend& backend, std::size_t count) : count_(count) {
+            if (count > std::numeric_limits<std::size_t>::max() / sizeof(T)) throw std::bad_alloc();
+            translate([&] { block_ = device_block(count * sizeof(T), backend.resource, backend.stream); });
+        }
+        // Copies from the host: the source may go when the constructor returns.
+        buffer(cuda_backend& backend, array_view<const T> source) : buffer(backend, source.size()) {
+            if (count_ == 0) return;
+            translate([&] {
+                device::check(cudaMemcpyAsync(block_.data(), source.data(), count_ * sizeof(T), cudaMemcpyHostToDevice,
+                                              backend.stream));
+            });
+        }
+
+        // Written out, so that they are host functions: the implicit ones would count as both.
+        buffer(buffer&& other) noexcept : block_(std::move(other.block_)), count_(std::exchange(other.count_, 0)) {}
+        buffer& operator=(buffer&& other) noexcept {
+            block_ = std::move(other.block_);
+            count_ = std::exchange(other.count_, 0);
+            return *this;
+        }
+        ~buffer() {} // NOLINT(*-equals-default)
+
+        [[nodiscard]] T* data() { return static_cast<T*>(block_.data()); }
+        [[nodiscard]] const T* data() const { return static_cast<const T*>(block_.data()); }
+        [[nodiscard]] std::size_t size() const { return count_; }
+        [[nodiscard]] array_view<const T> view() const { return {data(), count_}; }
+        // Copies, then waits.
+        [[nodiscard]] std::vector<T> to_host(cuda_backend& backend) const {
+            std::vector<T> host(count_);
+            if (count_ != 0)
+                translate([&] {
+                    device::check(cudaMemcpyAsync(host.data(), data(), count_ * sizeof(T), cudaMemcpyDeviceToHost,
+                                                  backend.stream));
+                    device::check(cudaStreamSynchronize(backend.stream));
+                });
+            return host;
+        }
+
+    private:
+        template <class F>
+        static void translate(F&& f) {
+            try {
+                f();
+            } catch (const device::cuda_failure& e) {
+                throw std::runtime_error(std::string("voxelpipe: ") + cudaGetErrorString(e.error));
+            }
+        }
+        device_block block_;
+        std::size_t count_;
+    };
+
+    cuda_backend() = default;
+    explicit cuda_backend(cudaStream_t stream_, memory_resource resource_ = {})
+        : stream(stream_), resource(resource_) {}
+
+    cudaStream_t stream = nullptr; // not owned
+    memory_resource resource;      // where all memory comes from
+
+    // What voxelize calls; arguments are validated. `Selector` picks tile and block size (tuning/); results do not
+    // depend on it.
+    template <class Selector = tuning::fine_raster_selector, class Mesh, class VertexShader, class FragmentShader,
+              class... Targets>
+    [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
+                             const framebuffer_view<Targets...>& fb, const voxelize_options& options,
+                             std::uint64_t triangles_in) {
+        using call_type =
+            device::framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, framebuffer_view<Targets...>, Selector>;
+        return attempt(triangles_in, [&](const device::capacities& limits, device::pipeline_state& state) {
+            const call_type call{draws, g, fb, options, static_cast<std::uint32_t>(triangles_in), limits};
+            if (options.rule == coverage::thin)
+                launch<coverage::thin>(call, state);
+            else
+                launch<coverage::conservative>(call, state);
+        });
+    }
+
+    template <class Mesh, class VertexShader, class FragmentShader, class Payload>
+    [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
+                             abuffer<cuda_backend, Payload>& lists, const voxelize_options& options,
+                             std::uint64_t triangles_in) {
+        using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
+        lists = abuffer<cuda_backend, Payload>(*this);
+        status s = attempt(triangles_in, [&](const device::capacities& limits, device::pipeline_state& state) {
+            const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits};
+            const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
+            if (options.rule == coverage::thin)
+                small ? fill<coverage::thin, std::uint32_t>(call, lists, state)
+                      : fill<coverage::thin, std::uint64_t>(call, lists, state);
+            else
+                small ? fill<coverage::conservative, std::uint32_t>(call, lists, state)
+                      : fill<coverage::conservative, std::uint64_t>(call, lists, state);
+        });
+        if (s.ok()) {
+            lists.extent = g.extent;
+            s.counts.fragments = lists.num_fragments();
+            s.counts.voxels = lists.num_voxels();
+        }
+        return s;
+    }
+
+    // Gives back the memory that is kept between calls.
+    void release() { workspace_ = {}; }
+
+private:
+    // Runs the stages with the capacities of the last call, waits, and once more where something did not fit.
+    template <class Launch>
+    [[nodiscard]] status attempt(std::uint64_t triangles_in, Launch&& launch_stages) {
+        status s;
+        try {
+            device::capacities limits = guess(triangles_in);
+            for (int tries = 0;; ++tries) {
+                device::pipeline_state state{};
+                launch_stages(limits, state);
+                if (state.index_error != 0) {
+                    s = core::failure(status_code::index_out_of_range, stage::coarse_raster);
+                    break;
+                }
+                if (!device::has_failed(state, limits)) {
+                    s.counts.triangles_nonfinite = state.nonfinite;
+                    s.counts.triangles_too_far = state.too_far;
+                    s.counts.triangles_zero_area = state.zero_area;
+                    s.counts.triangles_outside = state.outside;
+                    s.counts.triangles_drawn = state.drawn;
+                    s.counts.fragments = state.fragments;
+                    s.counts.fragments_discarded = state.discarded;
+                    s.counts.voxels = state.voxels;
+                    break;
+                }
+                // A pass that overflowed its records did not count all of its cells: the next try may need a third.
+                constexpr std::uint64_t most = 0xfffffff0u; // pairs and fragments are numbered with 32 bits
+                if (tries == 4 || state.tile_pairs > most || state.list_fragments > most) {
+                    s = core::failure(status_code::out_of_memory, stage::coarse_raster);
+                    s.required = {state.tile_pairs, state.list_fragments, 0};
+                    break;
+                }
+                raise(limits.tile_pairs, state.tile_pairs);
+                raise(limits.tile_records, state.tile_records);
+                raise(limits.fragments, state.list_fragments);
+                raise(limits.fragment_records, state.fragment_records);
+                known_ = limits;
+            }
+        } catch (const device::cuda_failure& e) {
+            s = device::to_status(e);
+        } catch (const std::bad_alloc&) {
+            s = core::failure(status_code::out_of_memory);
+        }
+        s.counts.triangles_in = triangles_in;
+        return s;
+    }
+
+    static void raise(unsigned long long& capacity, unsigned long long need) {
+        if (need > capacity) capacity = need + need / 16;
+    }
+
+    [[nodiscard]] device::capacities guess(std::uint64_t triangles) const {
+        const auto at_least = [](unsigned long long known, std::uint64_t first) {
+            return known > first ? known : first;
+        };
+        return {at_least(known_.tile_pairs, triangles + triangles / 4 + 16384),
+                at_least(known_.tile_records, triangles / 16 + 4096), at_least(known_.fragments, 4 * triangles + 65536),
+                at_least(known_.fragment_records, triangles / 16 + 4096)};
+    }
+
+    // The workspace, at least so large.
+    [[nodiscard]] void* reserve(std::size_t bytes) {
+        if (workspace_.size() < bytes) {
+            workspace_ = {}; // first, so that both need not fit
+            workspace_ = device_block(bytes, resource, stream);
+        }
+        return workspace_.data();
+    }
+
+    void read_state(const device::pipeline_state* d_state, device::pipeline_state& state) const {
+        device::check(cudaMemcpyAsync(&state, d_state, sizeof(state), cudaMemcpyDeviceToHost, stream),
+                      stage::tile_resolve);
+        device::check(cudaStreamSynchronize(stream), stage::tile_resolve);
+    }
+
+    template <coverage Rule, class Call>
+    void launch(const Call& call, device::pipeline_state& state) {
+        device::pipeline_state* d_state = nullptr;
+        device::arena plan;
+        call.template go<Rule, false>(plan, d_state, stream);
+        device::arena memory(reserve(plan.used()));
+        call.template go<Rule, true>(memory, d_state, stream);
+        read_state(d_state, state);
+    }
+
+    template <coverage Rule, class Key, class Call, class Payload>
+    void fill(const Call& call, abuffer<cuda_backend, Payload>& lists, device::pipeline_state& state) {
+        device::pipeline_state* d_state = nullptr;
+        device::arena plan;
+        (void)call.template go<Rule, false, Key>(plan, d_state, stream);
+        device::arena memory(reserve(plan.used()));
+        const auto sorted = call.template go<Rule, true, Key>(memory, d_state, stream);
+        read_state(d_state, state);
+        if (device::has_failed(state, call.limits)) return;
+        using payload = payload_storage<Payload>;
+        constexpr bool has_payload = abuffer<cuda_backend, Payload>::has_payload;
+        buffer<std::uint64_t> voxels(*this, state.list_voxels);
+        buffer<std::uint64_t> offsets(*this, state.list_voxels == 0 ? 0 : state.list_voxels + 1);
+        buffer<std::uint32_t> primitives(*this, state.list_fragments);
+        buffer<payload> payloads(*this, has_payload ? state.list_fragments : 0);
+        if (state.list_fragments != 0) {
+            device::
+                copy_lists_kernel<<<device::fill_device(state.list_fragments), device::threads_per_block, 0, stream>>>(
+                    sorted, state.list_voxels, state.list_fragments, voxels.data(), offsets.data(), primitives.data(),
+                    payloads.data());
+            device::check(cudaGetLastError(), stage::abuffer_emit);
+        }
+        lists.voxels = std::move(voxels);
+        lists.offsets = std::move(offsets);
+        lists.primitives = std::move(primitives);
+        lists.payloads = std::move(payloads);
+    }
+
+    device::capacities known_{};
+    device_block workspace_;
+};
+
+} // namespace voxelpipe

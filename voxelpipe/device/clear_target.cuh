@@ -1,0 +1,84 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Clears render targets, padding included (padding bits become 0), unless the call has failed: then nothing is written.
+
+#include <voxelpipe/device/scene.cuh>
+
+#include <cstring>
+
+namespace voxelpipe::device {
+
+template <class Element>
+struct fill_pattern {
+    Element value;
+};
+
+// Elements of 1, 2, 4, 8 or 16 bytes go out 16 bytes at a time.
+template <class Element>
+__global__ void fill_kernel(Element* to, std::uint64_t count, const __grid_constant__ fill_pattern<Element> pattern,
+                            const pipeline_state* state, capacities limits) {
+    if (has_failed(*state, limits)) return;
+    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
+    std::uint64_t done = 0;
+    if constexpr (sizeof(Element) <= 16 && (sizeof(Element) & (sizeof(Element) - 1)) == 0) {
+        if (reinterpret_cast<std::uintptr_t>(to) % 16 == 0) {
+            constexpr unsigned per_store = 16 / sizeof(Element);
+            Element lanes[per_store];
+            for (unsigned i = 0; i < per_store; ++i) lanes[i] = pattern.value;
+            uint4 wide;
+            memcpy(&wide, lanes, 16);
+            const std::uint64_t stores = count / per_store;
+            for (std::uint64_t i = thread; i < stores; i += threads) reinterpret_cast<uint4*>(to)[i] = wide;
+            done = stores * per_store;
+        }
+    }
+    for (std::uint64_t i = done + thread; i < count; i += threads) to[i] = pattern.value;
+}
+
+// Rows of set bits end within a word; bricks too.
+template <class Target>
+__global__ void fill_bits_kernel(const __grid_constant__ target_view<Target> t, const pipeline_state* state,
+                                 capacities limits) {
+    if (has_failed(*state, limits)) return;
+    const auto words_x = static_cast<std::uint64_t>((t.extent.x + 31) / 32);
+    const std::uint64_t count =
+        words_x * static_cast<std::uint64_t>(t.extent.y) * static_cast<std::uint64_t>(t.extent.z);
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < count;
+         i += std::uint64_t{gridDim.x} * blockDim.x) {
+        const int x = static_cast<int>(i % words_x) * 32, y = static_cast<int>(i / words_x % t.extent.y),
+                  z = static_cast<int>(i / words_x / t.extent.y);
+        const int left = t.extent.x - x;
+        t.elements[Target::map::cell(t.extent, x, y, z)] = left >= 32 ? ~0u : (1u << left) - 1;
+    }
+}
+
+template <class Target>
+void clear_target(const target_view<Target>& t, const pipeline_state* state, const capacities& limits,
+                  cudaStream_t stream) {
+    using map = typename Target::map;
+    using element = typename Target::element_type;
+    const auto fill = [&](element* to, std::size_t count, const element& value) {
+        fill_kernel<element><<<fill_device(count / (16 / sizeof(element) + 1) + 1, 16), threads_per_block, 0, stream>>>(
+            to, count, {value}, state, limits);
+        check(cudaGetLastError(), stage::fine_raster);
+    };
+    if constexpr (map::is_bit) {
+        fill(t.elements, map::elements(t.extent), 0u);
+        if (t.clear_value) {
+            fill_bits_kernel<Target>
+                <<<fill_device(map::elements(t.extent), 16), threads_per_block, 0, stream>>>(t, state, limits);
+            check(cudaGetLastError(), stage::fine_raster);
+        }
+    } else if constexpr (map::planes) {
+        const std::size_t plane = map::cells(t.extent);
+        for (int c = 0; c < map::components; ++c)
+            fill(t.elements + static_cast<std::size_t>(c) * plane, plane, t.clear_value[c]);
+    } else {
+        fill(t.elements, map::elements(t.extent), t.clear_value);
+    }
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Coarse raster: triangles -> (tile, primitive) pairs, by ascending primitive; counts triangles and why any is dropped
+// (paper section 4, coarse raster). A tile is a voxel of a coarser grid, so the same exact coverage decides.
+
+#include <voxelpipe/device/work_share.cuh>
+
+namespace voxelpipe::device {
+
+template <coverage Rule>
+struct tile_cells {
+    static constexpr coverage rule = Rule;
+    core::tile_grid tiles;
+    std::uint32_t* keys;       // tile numbers
+    std::uint32_t* primitives; // as long as keys
+    bool counts_triangles = true;
+
+    [[nodiscard]] __device__ core::voxel_box cells(const core::voxel_box& reach) const {
+        return core::coarsen(reach, tiles.log2_size);
+    }
+    template <class Visit>
+    __device__ void enumerate(const geometry& geo, const loaded_triangle& t, std::uint32_t, const core::voxel_box& box,
+                              bool whole, Visit&& visit) const {
+        // A triangle that lies in one tile needs no test; a chunk of a larger one does.
+        if (whole && box.lo[0] == box.hi[0] && box.lo[1] == box.hi[1] && box.lo[2] == box.hi[2])
+            visit(tiles.index(box.lo[0], box.lo[1], box.lo[2]));
+        else
+            core::for_each_tile_in<Rule>(t.a, t.b, t.c, geo.snap.fraction, box, tiles, visit);
+    }
+    [[nodiscard]] __device__ static bool keep(std::uint64_t) { return true; }
+    __device__ void store(unsigned long long at, std::uint32_t primitive, std::uint64_t tile) const {
+        keys[at] = static_cast<std::uint32_t>(tile);
+        primitives[at] = primitive;
+    }
+};
+
+} // namespace voxelpipe::device

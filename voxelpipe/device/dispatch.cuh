@@ -1,0 +1,409 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Host side of a call: which targets go through which path, what memory that takes (plan), and the launch of every
+// stage on one stream, without a wait (launch). The same plan serves voxelize, which reads the state once at the end,
+// and voxelize_async, which leaves it on the device.
+
+#include <voxelpipe/device/clear_target.cuh>
+#include <voxelpipe/device/coarse_raster.cuh>
+#include <voxelpipe/device/fine_raster.cuh>
+#include <voxelpipe/device/ordered_blend.cuh>
+#include <voxelpipe/device/tile_resolve.cuh>
+#include <voxelpipe/device/tile_sort.cuh>
+#include <voxelpipe/device/tile_split.cuh>
+#include <voxelpipe/device/vertex_shade.cuh>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+namespace voxelpipe::device {
+
+// ---- targets into groups --------------------------------------------------------------------------------------------
+
+// Which targets the tile passes draw together, by compile-time greed: a group is closed where one more target would not
+// fit into the shared memory of the smallest tile. Group `ordered` is not drawn in tiles.
+template <class Framebuffer>
+struct target_groups {
+    static constexpr std::size_t count = targets_of<Framebuffer>::count;
+    static constexpr int ordered = -1;
+
+    static constexpr std::array<int, count> assign() {
+        std::array<int, count> groups{};
+        int group = 0, bits = 1, members = 0; // 1: the touched bit
+        bool winner = false;
+        core::for_each_index<count>([&]<std::size_t K>() {
+            using t = typename targets_of<Framebuffer>::template at<K>;
+            constexpr blend_method method = method_of<t>();
+            if constexpr (method == blend_method::ordered) {
+                groups[K] = ordered;
+            } else {
+                static_assert(bits_per_voxel<t>() + 1 <= tuning::most_bits_per_voxel,
+                              "voxelpipe: a render target needs more shared memory than a tile of 8^3 voxels can have");
+                const int more = method == blend_method::winner ? (winner ? 0 : 32) : bits_per_voxel<t>();
+                if (members > 0 && bits + more > tuning::most_bits_per_voxel) {
+                    ++group;
+                    bits = 1;
+                    members = 0;
+                    winner = false;
+                }
+                bits += method == blend_method::winner ? (winner ? 0 : 32) : bits_per_voxel<t>();
+                winner = winner || method == blend_method::winner;
+                ++members;
+                groups[K] = group;
+            }
+        });
+        return groups;
+    }
+    static constexpr std::array<int, count> group_of = assign();
+    static constexpr int num_groups() {
+        int n = 0;
+        for (const int g : group_of) n = g + 1 > n ? g + 1 : n;
+        return n;
+    }
+    static constexpr std::size_t size_of(int group) {
+        std::size_t n = 0;
+        for (const int g : group_of) n += g == group;
+        return n;
+    }
+    static constexpr bool has_ordered = size_of(ordered) != 0;
+
+    template <int Group>
+    static constexpr auto members() {
+        constexpr std::size_t n = size_of(Group);
+        std::array<std::size_t, n> m{};
+        std::size_t at = 0;
+        for (std::size_t k = 0; k < count; ++k)
+            if (group_of[k] == Group) m[at++] = k;
+        return m;
+    }
+    // The members of a group as an index_sequence.
+    template <int Group, std::size_t... N>
+    static constexpr auto sequence(std::index_sequence<N...>) {
+        constexpr auto m = members<Group>();
+        return std::index_sequence<m[N]...>{};
+    }
+    template <int Group>
+    using indices = decltype(sequence<Group>(std::make_index_sequence<size_of(Group)>{}));
+
+    // Bits of a voxel in the largest group: what the tile size follows from, for all groups share one coarse pass.
+    static constexpr int most_bits() {
+        int most = 1;
+        for (int g = 0; g < num_groups(); ++g) {
+            int bits = 1;
+            bool winner = false;
+            core::for_each_index<count>([&]<std::size_t K>() {
+                using t = typename targets_of<Framebuffer>::template at<K>;
+                if (group_of[K] != g) return;
+                bits += bits_per_voxel<t>();
+                winner = winner || method_of<t>() == blend_method::winner;
+            });
+            bits += winner ? 32 : 0;
+            most = bits > most ? bits : most;
+        }
+        return most;
+    }
+};
+
+template <int Log2Size, class Framebuffer, std::size_t... I>
+tile_image<Log2Size, Framebuffer, I...> image_type(std::index_sequence<I...>);
+
+// ---- memory ---------------------------------------------------------------------------------------------------------
+
+// What a framebuffer call keeps on the device.
+template <class Draw, class Framebuffer, class Selector>
+struct framebuffer_call;
+template <class Mesh, class VertexShader, class FragmentShader, class Framebuffer, class Selector>
+struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, Selector>;
+
+// Geometry and shading of the draws, and where they lie on the device.
+template <class Mesh, class VertexShader, class FragmentShader>
+struct scene_memory {
+    using varyings = typename core::shaded<Mesh, VertexShader>::varyings;
+    using scene_type = scene<FragmentShader, varyings>;
+    using draw_type = draw<Mesh, VertexShader, FragmentShader>;
+
+    core::snapped_position* positions;
+    varyings* vertex_varyings;
+    draw_geometry* geometries; // null where there is one draw
+    typename scene_type::shading* shadings;
+
+    scene_memory(arena& memory, std::span<const draw_type> draws) {
+        std::size_t vertices = 0;
+        for (const auto& d : draws) vertices += d.mesh.positions.size();
+        positions = memory.take<core::snapped_position>(vertices);
+        vertex_varyings = memory.take<varyings>(std::is_empty_v<varyings> ? 0 : vertices);
+        geometries = memory.take<draw_geometry>(draws.size() > 1 ? draws.size() : 0);
+        shadings = memory.take<typename scene_type::shading>(draws.size() > 1 ? draws.size() : 0);
+    }
+
+    // Runs the vertex shaders and gives the scene that the other stages read.
+    [[nodiscard]] scene_type shade(std::span<const draw_type> draws, const grid& g, cudaStream_t stream) const {
+        scene_type s{};
+        s.geo.num_draws = static_cast<std::uint32_t>(draws.size());
+        s.geo.snap = core::make_snap_transform(g);
+        s.geo.extent = g.extent;
+        s.normal_factors = core::normal_factors(g);
+        s.offset = g.offset;
+        std::vector<draw_geometry> geometry_of(draws.size());
+        std::size_t vertex = 0;
+        std::uint32_t primitive = 0;
+        for (std::size_t d = 0; d < draws.size(); ++d) {
+            const Mesh& m = draws[d].mesh;
+            geometry_of[d] = {m.triangles.data(), positions + vertex, primitive,
+                              static_cast<std::uint32_t>(m.positions.size())};
+            vertex_shade(m, draws[d].vertex_shader, s.geo.snap, static_cast<std::uint32_t>(d), positions + vertex,
+                         varyings_at(vertex), stream);
+            vertex += m.positions.size();
+            primitive += static_cast<std::uint32_t>(m.triangles.size());
+        }
+        s.geo.num_primitives = primitive;
+        s.geo.one = geometry_of[0];
+        s.one = {draws[0].fragment_shader, varyings_at(0)};
+        if (draws.size() > 1) {
+            upload(
+                geometries, draws.size(), [&](std::size_t d) { return geometry_of[d]; }, stream);
+            std::size_t first = 0;
+            upload(
+                shadings, draws.size(),
+                [&](std::size_t d) {
+                    const typename scene_type::shading one{draws[d].fragment_shader, varyings_at(first)};
+                    first += draws[d].mesh.positions.size();
+                    return one;
+                },
+                stream);
+            s.geo.many = geometries;
+            s.many = shadings;
+        }
+        return s;
+    }
+
+private:
+    [[nodiscard]] varyings* varyings_at(std::size_t vertex) const {
+        return std::is_empty_v<varyings> ? nullptr : vertex_varyings + vertex;
+    }
+};
+
+[[nodiscard]] inline share_buffers take_share(arena& memory, std::uint32_t num_primitives,
+                                              unsigned long long record_capacity) {
+    share_buffers b{};
+    b.counts = memory.take<std::uint32_t>(num_primitives);
+    b.offsets = memory.take<unsigned long long>(num_primitives);
+    b.records = memory.take<chunk_record>(record_capacity);
+    b.record_capacity = record_capacity;
+    return b;
+}
+
+// Fragment lists with payloads of one type.
+template <class Key, class Payload>
+[[nodiscard]] list_buffers<Key, Payload> take_lists(arena& memory, std::uint32_t num_primitives,
+                                                    std::uint64_t num_voxels, unsigned long long capacity) {
+    constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
+    list_buffers<Key, Payload> b{};
+    for (int i = 0; i < 2; ++i) {
+        b.keys[i] = memory.take<Key>(capacity);
+        b.values[i] = memory.take<std::uint32_t>(capacity);
+    }
+    b.primitives = memory.take<std::uint32_t>(has_payload ? capacity : 0);
+    b.payloads = memory.take<Payload>(has_payload ? capacity : 0);
+    b.first_of_voxel = memory.take<unsigned long long>(capacity);
+    b.bits = key_bits(num_voxels);
+    b.storage_bytes =
+        std::max({sort_bytes<Key>(capacity, b.bits), select_bytes<Key>(capacity), share_scan_bytes(num_primitives)});
+    b.storage = memory.take<std::byte>(b.storage_bytes);
+    return b;
+}
+
+[[nodiscard]] inline std::uint64_t num_voxels(const grid& g) {
+    return static_cast<std::uint64_t>(g.extent.x) * static_cast<std::uint64_t>(g.extent.y) *
+           static_cast<std::uint64_t>(g.extent.z);
+}
+
+// ---- a framebuffer call ---------------------------------------------------------------------------------------------
+
+template <class Mesh, class VertexShader, class FragmentShader, class Framebuffer, class Selector>
+struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, Selector> {
+    using draw_type = draw<Mesh, VertexShader, FragmentShader>;
+    using scene_buffers = scene_memory<Mesh, VertexShader, FragmentShader>;
+    using scene_type = typename scene_buffers::scene_type;
+    using groups = target_groups<Framebuffer>;
+    using values = decltype(std::declval<typename scene_type::fragment_output>().values);
+    static constexpr auto policy = Selector{}(groups::most_bits());
+    static constexpr bool in_tiles = groups::num_groups() > 0;
+    template <int Group>
+    using image = decltype(image_type<policy.log2_tile_size, Framebuffer>(typename groups::template indices<Group>{}));
+
+    std::span<const draw_type> draws;
+    grid g;
+    Framebuffer fb;
+    voxelize_options options;
+    std::uint32_t num_primitives;
+    capacities limits;
+    core::tile_grid tiles{g.extent, policy.log2_tile_size};
+
+    [[nodiscard]] static std::uint32_t pairs_per_item(std::uint64_t pair_capacity) {
+        return static_cast<std::uint32_t>(std::max<std::uint64_t>(512, pair_capacity / 1024));
+    }
+    static constexpr int most_image_words() {
+        int most = 0;
+        [&]<int... G>(std::integer_sequence<int, G...>) {
+            ((most = image<G>::words > most ? image<G>::words : most), ...);
+        }
+        (std::make_integer_sequence<int, groups::num_groups()>{});
+        return most;
+    }
+
+    // Carves the memory and, with Run, launches every stage. Whatever can fail is known before the first voxel is
+    // written.
+    template <coverage Rule, bool Run>
+    void go(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
+        // Voxel ids of 32 bits keep the lists of the ordered targets small wherever the grid allows.
+        if (!groups::has_ordered || num_voxels(g) < std::numeric_limits<std::uint32_t>::max())
+            go_with<Rule, Run, std::uint32_t>(memory, state, stream);
+        else if constexpr (groups::has_ordered)
+            go_with<Rule, Run, std::uint64_t>(memory, state, stream);
+    }
+
+private:
+    struct tile_work {
+        fine_raster_input in{nullptr, nullptr, nullptr, {glm::ivec3(1), 3}, false, false, false};
+        const split_tile* splits = nullptr;
+    };
+
+    template <coverage Rule, bool Run, class Key>
+    void go_with(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
+        state = memory.take<pipeline_state>(1);
+        const scene_buffers buffers(memory, draws);
+        scene_type s{};
+        if constexpr (Run) {
+            check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
+            s = buffers.shade(draws, g, stream);
+        }
+        tile_work work;
+        if constexpr (in_tiles) work = sort_tiles<Rule, Run>(memory, s, state, stream);
+        fragment_lists<Key, values> lists{};
+        if constexpr (groups::has_ordered) lists = list_fragments<Rule, Run, Key>(memory, s, state, stream);
+        if constexpr (Run) {
+            core::for_each_index<groups::count>([&]<std::size_t K>() {
+                const auto& t = voxelpipe::get<K>(fb.targets);
+                if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
+            });
+            if constexpr (in_tiles) {
+                [&]<int... G>(std::integer_sequence<int, G...>) { (draw_group<Rule, G>(s, work, state, stream), ...); }
+                (std::make_integer_sequence<int, groups::num_groups()>{});
+            }
+            if constexpr (groups::has_ordered)
+                fold(lists, state, typename groups::template indices<groups::ordered>{}, stream);
+        }
+    }
+
+    template <coverage Rule, bool Run>
+    [[nodiscard]] tile_work sort_tiles(arena& memory, const scene_type& s, pipeline_state* state,
+                                       cudaStream_t stream) const {
+        share_buffers share = take_share(memory, num_primitives, limits.tile_records);
+        std::uint32_t *keys[2], *primitives[2];
+        for (int i = 0; i < 2; ++i) {
+            keys[i] = memory.take<std::uint32_t>(limits.tile_pairs);
+            primitives[i] = memory.take<std::uint32_t>(limits.tile_pairs);
+        }
+        const std::uint32_t per_item = pairs_per_item(limits.tile_pairs);
+        split_buffers<> split{};
+        split.pairs_per_item = per_item;
+        split.items = memory.take<work_item>(most_items(limits.tile_pairs, tiles.count(), per_item));
+        split.splits = memory.take<split_tile>(most_images(limits.tile_pairs, per_item));
+        word* const images = memory.take<word>(most_images(limits.tile_pairs, per_item) * most_image_words());
+        const int bits = key_bits(tiles.count());
+        const std::size_t storage_bytes =
+            std::max(sort_bytes<std::uint32_t>(limits.tile_pairs, bits), share_scan_bytes(num_primitives));
+        void* const storage = memory.take<std::byte>(storage_bytes);
+        tile_work work;
+        if constexpr (Run) {
+            share.num_records = &state->tile_records;
+            share.num_cells = &state->tile_pairs;
+            const tile_cells<Rule> op{tiles, keys[0], primitives[0]};
+            fill_keys(keys[0], limits.tile_pairs, stream);
+            share_count(s.geo, op, share, state, storage, storage_bytes, stage::coarse_raster, stream);
+            share_emit(s.geo, op, share, state, limits, stage::coarse_raster, stream);
+            cub::DoubleBuffer<std::uint32_t> k(keys[0], keys[1]), v(primitives[0], primitives[1]);
+            sort_by_cell(k, v, limits.tile_pairs, bits, storage, storage_bytes, stage::tile_sort, stream);
+            tile_split(k.Current(), split, state, limits, stream);
+            work.in = {v.Current(), split.items, images, tiles, false, false, false};
+            work.splits = split.splits;
+        }
+        return work;
+    }
+
+    // Fragments and voxels are counted once: by the lists, where there are any, otherwise by the first group.
+    template <coverage Rule, int Group>
+    void draw_group(const scene_type& s, const tile_work& work, pipeline_state* state, cudaStream_t stream) const {
+        using image_words = image<Group>;
+        fine_raster_input in = work.in;
+        in.count_fragments = Group == 0 && !groups::has_ordered;
+        in.count_voxels = in.count_fragments && options.count_voxels;
+        in.track = in.count_voxels || image_words::has_atomic || image_words::has_winner;
+        draw_tiles<Rule, image_words, policy.threads_per_block, policy.min_blocks_per_sm>(s, fb, in, work.splits, state,
+                                                                                          limits, stream);
+    }
+
+    template <coverage Rule, bool Run, class Key>
+    [[nodiscard]] fragment_lists<Key, values> list_fragments(arena& memory, const scene_type& s, pipeline_state* state,
+                                                             cudaStream_t stream) const {
+        share_buffers share = take_share(memory, num_primitives, limits.fragment_records);
+        const auto lists = take_lists<Key, values>(memory, num_primitives, num_voxels(g), limits.fragments);
+        if constexpr (Run) {
+            share.num_records = &state->fragment_records;
+            share.num_cells = &state->list_fragments;
+            return build_lists<Rule, all_values>(s, lists, share, state, limits, !in_tiles, stream);
+        } else {
+            return {};
+        }
+    }
+
+    template <class Key, std::size_t... I>
+    void fold(const fragment_lists<Key, values>& lists, pipeline_state* state, std::index_sequence<I...>,
+              cudaStream_t stream) const {
+        fold_kernel<Key, values, Framebuffer, I...><<<fill_device(limits.fragments), threads_per_block, 0, stream>>>(
+            lists, fb, state, limits, options.count_voxels);
+        check(cudaGetLastError(), stage::fine_raster);
+    }
+};
+
+// ---- an A-buffer call -----------------------------------------------------------------------------------------------
+
+template <class Draw, class Payload>
+struct abuffer_call;
+template <class Mesh, class VertexShader, class FragmentShader, class Payload>
+struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
+    using draw_type = draw<Mesh, VertexShader, FragmentShader>;
+    using scene_buffers = scene_memory<Mesh, VertexShader, FragmentShader>;
+    using scene_type = typename scene_buffers::scene_type;
+
+    std::span<const draw_type> draws;
+    grid g;
+    std::uint32_t num_primitives;
+    capacities limits;
+
+    // Carves the memory and, with `run`, launches the stages up to the sorted lists.
+    template <coverage Rule, bool Run, class Key>
+    [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
+        state = memory.take<pipeline_state>(1);
+        const scene_buffers buffers(memory, draws);
+        share_buffers share = take_share(memory, num_primitives, limits.fragment_records);
+        const auto lists = take_lists<Key, Payload>(memory, num_primitives, num_voxels(g), limits.fragments);
+        if constexpr (Run) {
+            check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
+            const scene_type s = buffers.shade(draws, g, stream);
+            share.num_records = &state->fragment_records;
+            share.num_cells = &state->list_fragments;
+            return build_lists<Rule, first_value>(s, lists, share, state, limits, true, stream);
+        } else {
+            return {};
+        }
+    }
+};
+
+} // namespace voxelpipe::device

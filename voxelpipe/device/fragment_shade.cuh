@@ -1,0 +1,97 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Fragment shade: every fragment of one primitive within a box, with what the fragment shader is given and what it
+// returns (paper section 3, fragment shader); and one fragment alone, for targets that need only the last one.
+
+#include <voxelpipe/device/scene.cuh>
+
+#include <type_traits>
+
+namespace voxelpipe::device {
+
+// The fields of a fragment that its triangle gives, and the shader to call.
+template <class Scene>
+struct fragment_source {
+    using varyings = typename Scene::varyings;
+
+    const Scene& s;
+    const typename Scene::shading& d;
+    varyings none{};
+    fragment<varyings> f{};
+
+    __device__ fragment_source(const Scene& s_, const loaded_triangle& t, std::uint32_t id)
+        : s(s_), d(s_.draw(t.draw)) {
+        f.triangle = t.triangle;
+        f.draw = t.draw;
+        f.primitive = id;
+        for (int i = 0; i < 3; ++i) {
+            if constexpr (std::is_empty_v<varyings>)
+                f.vertex_varyings[i] = &none;
+            else
+                f.vertex_varyings[i] = d.varyings + t.index[i];
+        }
+    }
+    template <class Int>
+    __device__ VOXELPIPE_INLINE void begin_triangle(const core::triangle_setup<Int>& t) {
+        f.axis = t.zero_area ? 0 : t.axis;
+        f.front_facing = t.normal[2] >= 0;
+        f.normal = core::unit_normal(t, s.normal_factors);
+    }
+    template <class Int>
+    __device__ VOXELPIPE_INLINE void begin_column(const core::triangle_setup<Int>& t, std::int64_t u, std::int64_t v) {
+        f.barycentric = core::barycentric(t, u, v);
+        if constexpr (!std::is_empty_v<varyings>)
+            f.varyings = core::mix(*f.vertex_varyings[0], *f.vertex_varyings[1], *f.vertex_varyings[2], f.barycentric.y,
+                                   f.barycentric.z);
+    }
+    __device__ VOXELPIPE_INLINE auto shade(int x, int y, int z) {
+        f.voxel = glm::ivec3(s.offset.x + x, s.offset.y + y, s.offset.z + z);
+        return d.fragment_shader(f);
+    }
+};
+
+// Calls visit(x, y, z, fragment shader's output) for every fragment of the primitive within `box` (voxels of the
+// computed part). What the shader does not read costs nothing: all of it is inlined.
+template <coverage Rule, class Scene, class Visit>
+__device__ VOXELPIPE_INLINE void shade_fragments(const Scene& s, const loaded_triangle& tri, std::uint32_t id,
+                                                 const core::voxel_box& box, Visit&& visit) {
+    constexpr auto rule = core::to_rule(Rule);
+    fragment_source<Scene> source(s, tri, id);
+    const auto run = [&](const auto& t) {
+        source.begin_triangle(t);
+        core::for_each_span<rule>(t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
+            source.begin_column(t, u, v);
+            for (std::int64_t w = w0; w <= w1; ++w) {
+                const auto p = core::to_xyz(t.axis, static_cast<int>(u), static_cast<int>(v), static_cast<int>(w));
+                visit(p[0], p[1], p[2], source.shade(p[0], p[1], p[2]));
+            }
+        });
+    };
+    const int fraction = s.geo.snap.fraction;
+    if (core::fits_narrow(tri.a, tri.b, tri.c, fraction))
+        run(core::setup_triangle<rule, std::int64_t>(tri.a, tri.b, tri.c, fraction));
+    else
+        run(core::setup_triangle<rule, int128>(tri.a, tri.b, tri.c, fraction));
+}
+
+// The output of the primitive's fragment in voxel (x, y, z), which it covers.
+template <class Scene>
+__device__ auto shade_fragment(const Scene& s, std::uint32_t id, int x, int y, int z) {
+    const loaded_triangle tri = s.geo.load(id);
+    fragment_source<Scene> source(s, tri, id);
+    const auto run = [&](const auto& t) {
+        const auto p = core::to_uvw(t.axis, x, y, z);
+        source.begin_triangle(t);
+        source.begin_column(t, p[0], p[1]);
+        return source.shade(x, y, z);
+    };
+    const int fraction = s.geo.snap.fraction;
+    // Barycentrics and the normal do not depend on the coverage rule; thin needs the least set-up.
+    if (core::fits_narrow(tri.a, tri.b, tri.c, fraction))
+        return run(core::setup_triangle<core::span_rule::thin, std::int64_t>(tri.a, tri.b, tri.c, fraction));
+    return run(core::setup_triangle<core::span_rule::thin, int128>(tri.a, tri.b, tri.c, fraction));
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,134 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Device memory of the CUDA backend: where it comes from (memory_resource), how one block is carved into named arrays
+// (arena), and how CUDA errors become exceptions inside the backend and a status at its surface.
+
+#include <voxelpipe/status.hpp>
+
+#include <cuda_runtime.h>
+
+#include <cstddef>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+
+namespace voxelpipe {
+
+namespace device {
+
+// Carries a CUDA error and the stage that met it from where it happened to the status of the call.
+struct cuda_failure {
+    cudaError_t error;
+    stage where;
+};
+
+inline void check(cudaError_t error, stage where = stage::validate) {
+    if (error == cudaSuccess) return;
+    cudaGetLastError(); // a failed launch leaves its error behind; it is reported here, once
+    throw cuda_failure{error, where};
+}
+
+[[nodiscard]] inline status to_status(const cuda_failure& f) {
+    status s;
+    s.where = f.where;
+    s.device_error = static_cast<int>(f.error);
+    switch (f.error) {
+    case cudaErrorMemoryAllocation:
+        s.code = status_code::out_of_memory;
+        break;
+    case cudaErrorNoDevice:
+    case cudaErrorInsufficientDriver:
+    case cudaErrorInitializationError:
+    case cudaErrorNoKernelImageForDevice:
+        s.code = status_code::no_device;
+        break;
+    default:
+        s.code = status_code::device_error;
+    }
+    return s;
+}
+
+} // namespace device
+
+// Where a cuda_backend takes its memory from, in stream order. Refers to a resource that must outlive it; the default
+// is the current device's cudaMallocAsync pool. Any object will do that has
+//   void* allocate_async(bytes, alignment, stream)      and deallocate_async(pointer, bytes, alignment, stream), or
+//   void* allocate(stream, bytes, alignment)            and deallocate(stream, pointer, bytes, alignment),
+// where stream is made from a cudaStream_t: cuda::mr resources of CCCL 2 and 3, and wrappers of other allocators.
+class memory_resource {
+public:
+    static constexpr std::size_t alignment = 256;
+
+    memory_resource() = default;
+    template <class Resource>
+    requires(!std::is_same_v<std::remove_cvref_t<Resource>, memory_resource>)
+        memory_resource(Resource& resource) // NOLINT(*-explicit-*): a resource is what a backend is made of
+        : object_(&resource), allocate_([](void* object, std::size_t bytes, cudaStream_t stream) -> void* {
+              auto& r = *static_cast<Resource*>(object);
+              if constexpr (requires { r.allocate_async(bytes, alignment, stream); })
+                  return r.allocate_async(bytes, alignment, stream);
+              else
+                  return r.allocate(stream, bytes, alignment);
+          }),
+          deallocate_([](void* object, void* pointer, std::size_t bytes, cudaStream_t stream) {
+              auto& r = *static_cast<Resource*>(object);
+              if constexpr (requires { r.deallocate_async(pointer, bytes, alignment, stream); })
+                  r.deallocate_async(pointer, bytes, alignment, stream);
+              else
+                  r.deallocate(stream, pointer, bytes, alignment);
+          }) {}
+
+    // Throws std::bad_alloc, or what the resource throws; device::cuda_failure for any other CUDA error.
+    [[nodiscard]] void* allocate(std::size_t bytes, cudaStream_t stream) const {
+        if (bytes == 0) return nullptr;
+        if (allocate_ != nullptr) return allocate_(object_, bytes, stream);
+        void* pointer = nullptr;
+        const cudaError_t error = cudaMallocAsync(&pointer, bytes, stream);
+        if (error == cudaErrorMemoryAllocation) {
+            cudaGetLastError();
+            throw std::bad_alloc();
+        }
+        device::check(error);
+        return pointer;
+    }
+    void deallocate(void* pointer, std::size_t bytes, cudaStream_t stream) const noexcept {
+        if (pointer == nullptr) return;
+        if (deallocate_ != nullptr)
+            deallocate_(object_, pointer, bytes, stream);
+        else
+            cudaFreeAsync(pointer, stream); // fails only where the context is gone, and the memory with it
+    }
+
+private:
+    void* object_ = nullptr;
+    void* (*allocate_)(void*, std::size_t, cudaStream_t) = nullptr;
+    void (*deallocate_)(void*, void*, std::size_t, cudaStream_t) = nullptr;
+};
+
+namespace device {
+
+// One block of memory as a row of arrays, each aligned to 256 bytes. With a null base it only adds up the bytes, so
+// that the same code plans and carves.
+class arena {
+public:
+    explicit arena(void* base = nullptr) : base_(static_cast<std::byte*>(base)) {}
+
+    template <class T>
+    [[nodiscard]] T* take(std::size_t count) {
+        const std::size_t at = used_;
+        used_ += (count * sizeof(T) + memory_resource::alignment - 1) / memory_resource::alignment *
+                 memory_resource::alignment;
+        return base_ == nullptr ? nullptr : reinterpret_cast<T*>(base_ + at);
+    }
+    [[nodiscard]] std::size_t used() const { return used_; }
+
+private:
+    std::byte* base_;
+    std::size_t used_ = 0;
+};
+
+} // namespace device
+} // namespace voxelpipe

@@ -1,0 +1,165 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the kernels know of a call: geometry (triangles and snapped positions, all that the coarse stages read), scene
+// (geometry with the draws' shaders and varyings), and pipeline_state, the counters and flags of a call in progress.
+
+#include <voxelpipe/core/primitive.hpp>
+#include <voxelpipe/device/memory.cuh>
+#include <voxelpipe/voxelize.hpp>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+// In global memory, zeroed when a call starts. Totals go on counting past a capacity, so that they say what is needed.
+struct pipeline_state {
+    unsigned long long nonfinite, too_far, zero_area, outside, drawn;
+    unsigned long long fragments, discarded, voxels;
+    unsigned long long tile_pairs, tile_records;         // coarse raster
+    unsigned long long list_fragments, fragment_records; // A-buffer
+    unsigned long long list_voxels;
+    unsigned int index_error;
+    unsigned int num_items, num_splits, num_images; // tile split
+    unsigned int next_item;                         // fine raster
+};
+
+// How many elements the arrays of a call have. What does not fit is counted, not written.
+struct capacities {
+    unsigned long long tile_pairs, tile_records, fragments, fragment_records;
+};
+
+// Whether the call must not write anything: a bad index, or something that did not fit.
+[[nodiscard]] VOXELPIPE_HD inline bool has_failed(const pipeline_state& s, const capacities& c) {
+    return s.index_error != 0 || s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ||
+           s.list_fragments > c.fragments || s.fragment_records > c.fragment_records;
+}
+
+struct draw_geometry {
+    const glm::uvec3* triangles;
+    const core::snapped_position* positions;
+    std::uint32_t first_primitive, num_vertices;
+};
+
+struct loaded_triangle {
+    std::uint32_t draw, triangle;
+    glm::uvec3 index;
+    bool index_ok;
+    core::snapped_position a, b, c; // unset where the index is not ok
+};
+
+struct geometry {
+    draw_geometry one;         // the draw, where there is only one
+    const draw_geometry* many; // otherwise all of them
+    std::uint32_t num_draws, num_primitives;
+    core::snap_transform snap;
+    glm::ivec3 extent;
+
+    [[nodiscard]] VOXELPIPE_HD const draw_geometry& draw(std::uint32_t d) const {
+        return many != nullptr ? many[d] : one;
+    }
+
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t find_draw(std::uint32_t primitive) const {
+        std::uint32_t lo = 0,
+                      hi = num_draws; // the last draw that begins at or before the primitive; empty draws precede
+        while (hi - lo > 1) {
+            const std::uint32_t middle = lo + (hi - lo) / 2;
+            if (draw(middle).first_primitive <= primitive)
+                lo = middle;
+            else
+                hi = middle;
+        }
+        return lo;
+    }
+
+    [[nodiscard]] VOXELPIPE_HD loaded_triangle load(std::uint32_t primitive) const {
+        loaded_triangle t;
+        t.draw = find_draw(primitive);
+        const draw_geometry& d = draw(t.draw);
+        t.triangle = primitive - d.first_primitive;
+        t.index = d.triangles[t.triangle];
+        t.index_ok = t.index.x < d.num_vertices && t.index.y < d.num_vertices && t.index.z < d.num_vertices;
+        if (t.index_ok) {
+            t.a = d.positions[t.index.x];
+            t.b = d.positions[t.index.y];
+            t.c = d.positions[t.index.z];
+        }
+        return t;
+    }
+
+    [[nodiscard]] VOXELPIPE_HD core::voxel_box whole_box() const {
+        return {{{0, 0, 0}}, {{extent.x - 1, extent.y - 1, extent.z - 1}}};
+    }
+};
+
+template <class FragmentShader, class Varyings>
+struct draw_shading {
+    FragmentShader fragment_shader;
+    const Varyings* varyings; // per vertex; null where there are none
+};
+
+template <class FragmentShader, class Varyings>
+struct scene {
+    using varyings = Varyings;
+    using fragment_output = std::remove_cvref_t<std::invoke_result_t<const FragmentShader&, const fragment<Varyings>&>>;
+    using shading = draw_shading<FragmentShader, Varyings>;
+
+    geometry geo;
+    shading one;
+    const shading* many;
+    core::triple<double> normal_factors;
+    glm::ivec3 offset; // of the computed part in the whole grid
+
+    [[nodiscard]] VOXELPIPE_HD const shading& draw(std::uint32_t d) const { return many != nullptr ? many[d] : one; }
+};
+
+// ---- launches -------------------------------------------------------------------------------------------------------
+
+inline constexpr int threads_per_block = 256; // of kernels that have no tuning of their own
+
+[[nodiscard]] inline unsigned num_blocks(std::uint64_t items, unsigned per_block = threads_per_block) {
+    return static_cast<unsigned>((items + per_block - 1) / per_block);
+}
+
+[[nodiscard]] inline int num_multiprocessors() {
+    int device = 0, count = 0;
+    check(cudaGetDevice(&device));
+    check(cudaDeviceGetAttribute(&count, cudaDevAttrMultiProcessorCount, device));
+    return count;
+}
+
+// Blocks of a grid-stride or persistent kernel: enough to fill the device, no more than there is work.
+[[nodiscard]] inline unsigned fill_device(std::uint64_t items, unsigned blocks_per_multiprocessor = 8) {
+    const auto most = static_cast<std::uint64_t>(num_multiprocessors()) * blocks_per_multiprocessor;
+    const std::uint64_t wanted = num_blocks(items);
+    return static_cast<unsigned>(wanted < 1 ? 1 : wanted < most ? wanted : most);
+}
+
+// Copies a few host values to the device as kernel arguments: no host memory has to outlive the call, and a captured
+// graph replays it.
+template <class T, int N>
+struct argument_chunk {
+    T items[N];
+};
+template <class T, int N>
+__global__ void write_chunk(T* to, const __grid_constant__ argument_chunk<T, N> chunk, int count) {
+    const int i = static_cast<int>(threadIdx.x);
+    if (i < count) to[i] = chunk.items[i];
+}
+
+template <class T, class Source>
+void upload(T* to, std::size_t count, Source&& source, cudaStream_t stream) {
+    constexpr int n = sizeof(T) > 1024 ? 1 : static_cast<int>(3072 / sizeof(T) < 256 ? 3072 / sizeof(T) : 256);
+    static_assert(sizeof(T) <= 4000, "voxelpipe: a shader has too much data by value; let it hold a pointer");
+    for (std::size_t first = 0; first < count; first += n) {
+        argument_chunk<T, n> chunk{};
+        const std::size_t part = count - first < n ? count - first : n;
+        for (std::size_t i = 0; i < part; ++i) chunk.items[i] = source(first + i);
+        write_chunk<T, n><<<1, 256, 0, stream>>>(to + first, chunk, static_cast<int>(part));
+        check(cudaGetLastError(), stage::vertex_shade);
+    }
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,202 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The words of one tile for a group of render targets: where each target's planes lie, how a fragment enters them, and
+// how a finished tile is written to the framebuffer. The same words lie in shared memory (fine raster) and in global
+// memory (images of split tiles).
+
+#include <voxelpipe/device/atomics.cuh>
+#include <voxelpipe/device/fragment_shade.cuh>
+#include <voxelpipe/framebuffer.hpp>
+
+#include <utility>
+
+namespace voxelpipe::device {
+
+template <class Framebuffer>
+struct targets_of;
+template <class... Targets>
+struct targets_of<framebuffer_view<Targets...>> {
+    static constexpr std::size_t count = sizeof...(Targets);
+    template <std::size_t I>
+    using at = typename core::pack_element<I, Targets...>::type;
+};
+
+// Bits of a tile that one voxel of the target takes, in a tile image.
+template <class Target>
+[[nodiscard]] constexpr int bits_per_voxel() {
+    if constexpr (method_of<Target>() == blend_method::atomic)
+        return 32 * value_blend<typename Target::blend_type, typename Target::value_type>::words;
+    else if constexpr (method_of<Target>() == blend_method::bits)
+        return 1;
+    else
+        return 0; // winners share one plane
+}
+
+// Targets I... of a framebuffer, in one tile of 2^(3 * Log2Size) voxels:
+//   planes of the atomic targets, words of the bit targets, the winner plane, a bit a voxel that is touched.
+template <int Log2Size, class Framebuffer, std::size_t... I>
+struct tile_image {
+    static constexpr int size = 1 << Log2Size;
+    static constexpr int voxels = 1 << (3 * Log2Size);
+    static constexpr std::size_t num_targets = sizeof...(I);
+    template <std::size_t K>
+    using target = typename targets_of<Framebuffer>::template at<K>;
+
+    static constexpr int words_of(int bits) { return voxels / 32 * bits; }
+    static constexpr bool has_winner = ((method_of<target<I>>() == blend_method::winner) || ...);
+    static constexpr bool has_atomic = ((method_of<target<I>>() == blend_method::atomic) || ...);
+    static constexpr bool has_bits = ((method_of<target<I>>() == blend_method::bits) || ...);
+    static constexpr int winner_at = (words_of(bits_per_voxel<target<I>>()) + ...);
+    static constexpr int touched_at = winner_at + (has_winner ? voxels : 0);
+    static constexpr int words = touched_at + voxels / 32;
+    static constexpr std::size_t bytes = words * sizeof(word);
+
+    // First word of target K's planes.
+    template <std::size_t K>
+    static constexpr int offset() {
+        int at = 0;
+        bool before = true;
+        ((before = before && I != K, at += before ? words_of(bits_per_voxel<target<I>>()) : 0), ...);
+        return at;
+    }
+
+    template <class Each>
+    __device__ VOXELPIPE_INLINE static void for_each_target(Each&& each) {
+        (each.template operator()<I>(), ...);
+    }
+
+    // All threads of the block; a barrier must follow.
+    __device__ static void clear(word* tile) {
+        for_each_target([&]<std::size_t K>() {
+            using t = target<K>;
+            word* const plane = tile + offset<K>();
+            if constexpr (method_of<t>() == blend_method::atomic) {
+                using blend_type = value_blend<typename t::blend_type, typename t::value_type>;
+                for (int i = static_cast<int>(threadIdx.x); i < voxels; i += static_cast<int>(blockDim.x))
+                    blend_type::clear(plane, i, voxels);
+            } else if constexpr (method_of<t>() == blend_method::bits) {
+                for (int i = static_cast<int>(threadIdx.x); i < voxels / 32; i += static_cast<int>(blockDim.x))
+                    plane[i] = bit_blend<typename t::blend_type>::neutral;
+            }
+        });
+        for (int i = winner_at + static_cast<int>(threadIdx.x); i < words; i += static_cast<int>(blockDim.x))
+            tile[i] = 0;
+    }
+
+    // One fragment in voxel i of the tile. Winners keep primitive + 1; 0 is none.
+    template <class Values>
+    __device__ VOXELPIPE_INLINE static void blend(word* tile, int i, std::uint32_t primitive, const Values& values,
+                                                  bool track) {
+        const word mask = 1u << (i & 31);
+        for_each_target([&]<std::size_t K>() {
+            using t = target<K>;
+            word* const plane = tile + offset<K>();
+            if constexpr (method_of<t>() == blend_method::atomic)
+                value_blend<typename t::blend_type, typename t::value_type>::accumulate(plane, i, voxels,
+                                                                                        voxelpipe::get<K>(values));
+            else if constexpr (method_of<t>() == blend_method::bits)
+                bit_blend<typename t::blend_type>::accumulate(plane + (i >> 5), mask, voxelpipe::get<K>(values));
+        });
+        if constexpr (has_winner) atomicMax(tile + winner_at + i, primitive + 1);
+        if (track) {
+            word* const touched = tile + touched_at + (i >> 5);
+            if ((*touched & mask) == 0) atomicOr(touched, mask);
+        }
+    }
+};
+
+// A row of a tile's bits in the framebuffer, 8, 16 or 32 of them: rows of different tiles never share one.
+template <int Size>
+using bit_row =
+    std::conditional_t<Size == 32, std::uint32_t, std::conditional_t<Size == 16, std::uint16_t, std::uint8_t>>;
+
+// Sets or clears one bit of a target, while other threads may be at other bits of the word.
+template <class Target>
+__device__ void store_bit(const target_view<Target>& t, int x, int y, int z, bool v) {
+    word* const w = t.elements + Target::map::cell(t.extent, x, y, z);
+    const word mask = 1u << (x & 31);
+    if (v)
+        atomicOr(w, mask);
+    else
+        atomicAnd(w, ~mask);
+}
+
+// Source gives the tile's words, from one image or merged from several:
+//   cell<Blend>(offset, i)   bits<BitBlend>(offset, w)   winner(i)   touched(w)
+// Writes every touched voxel of the tile whose index is this thread's (from `first`, `step` apart) and returns how many
+// voxels it found touched.
+template <class Image, class Scene, class Framebuffer, class Source>
+__device__ std::uint32_t store_tile(const Scene& s, const Framebuffer& fb, const core::voxel_box& box,
+                                    const Source& source, int first, int step, bool track) {
+    const auto x0 = static_cast<int>(box.lo[0]), y0 = static_cast<int>(box.lo[1]), z0 = static_cast<int>(box.lo[2]);
+    const int rows_y = static_cast<int>(box.hi[1]) - y0 + 1, rows_z = static_cast<int>(box.hi[2]) - z0 + 1;
+    constexpr int size = Image::size;
+    std::uint32_t num_touched = 0;
+    if (track)
+        for (int w = first; w < Image::voxels / 32; w += step)
+            num_touched += static_cast<std::uint32_t>(__popc(source.touched(w)));
+
+    if constexpr (Image::has_bits) {
+        constexpr int per_word = 32 / size; // rows in a word of the image
+        for (int r = first; r < size * size; r += step) {
+            const int y = r % size, z = r / size;
+            if (y >= rows_y || z >= rows_z) continue;
+            Image::for_each_target([&]<std::size_t K>() {
+                using t = typename Image::template target<K>;
+                if constexpr (method_of<t>() == blend_method::bits) {
+                    using blend_type = bit_blend<typename t::blend_type>;
+                    const auto& view = voxelpipe::get<K>(fb.targets);
+                    if (view.load == load_operation::off) return;
+                    word v = source.template bits<blend_type>(Image::template offset<K>(), r / per_word);
+                    v >>= r % per_word * size;
+                    if constexpr (size < 32) v &= (1u << size) - 1;
+                    if (v == (size < 32 ? blend_type::neutral & ((1u << (size & 31)) - 1) : blend_type::neutral))
+                        return;
+                    auto* const rows = reinterpret_cast<bit_row<size>*>(
+                        view.elements + t::map::cell(view.extent, x0 & ~31, y0 + y, z0 + z));
+                    bit_row<size>& stored = rows[(x0 & 31) / size];
+                    word value = stored;
+                    blend_type::merge(value, v);
+                    stored = static_cast<bit_row<size>>(value);
+                }
+            });
+        }
+    }
+    if constexpr (Image::has_atomic || Image::has_winner) {
+        for (int i = first; i < Image::voxels; i += step) {
+            if (((source.touched(i >> 5) >> (i & 31)) & 1u) == 0) continue;
+            const int x = x0 + i % size, y = y0 + i / size % size, z = z0 + i / (size * size);
+            Image::for_each_target([&]<std::size_t K>() {
+                using t = typename Image::template target<K>;
+                if constexpr (method_of<t>() == blend_method::atomic) {
+                    using blend_type = value_blend<typename t::blend_type, typename t::value_type>;
+                    const auto& view = voxelpipe::get<K>(fb.targets);
+                    if (view.load == load_operation::off) return;
+                    const auto stored = view.load == load_operation::clear ? view.clear_value : view(x, y, z);
+                    view.store(
+                        x, y, z,
+                        blend_type::finish(source.template cell<blend_type>(Image::template offset<K>(), i), stored));
+                }
+            });
+            if constexpr (Image::has_winner) {
+                const auto out = shade_fragment(s, source.winner(i) - 1, x, y, z);
+                Image::for_each_target([&]<std::size_t K>() {
+                    using t = typename Image::template target<K>;
+                    if constexpr (method_of<t>() == blend_method::winner) {
+                        const auto& view = voxelpipe::get<K>(fb.targets);
+                        if (view.load == load_operation::off) return;
+                        if constexpr (t::map::is_bit)
+                            store_bit(view, x, y, z, voxelpipe::get<K>(out.values));
+                        else
+                            view.store(x, y, z, core::canonical(voxelpipe::get<K>(out.values)));
+                    }
+                });
+            }
+        }
+    }
+    return num_touched;
+}
+
+} // namespace voxelpipe::device
