@@ -93,7 +93,7 @@ configure() {
     shift
     local options=("$@")
     command -v ccache >/dev/null && options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
-    [[ -x .venv/bin/python ]] && options+=("-DVOXELPIPE_PYTHON=$root/.venv/bin/python")
+    [[ -f .venv/requirements.txt ]] && options+=("-DVOXELPIPE_PYTHON=$root/.venv/bin/python")
     [[ -d .deps ]] && options+=("-DCMAKE_PREFIX_PATH=$root/.deps${CMAKE_PREFIX_PATH:+;${CMAKE_PREFIX_PATH//:/;}}")
     mkdir -p build
     log=build/configure-$preset.log
