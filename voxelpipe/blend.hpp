@@ -196,7 +196,12 @@ struct blend_traits<blend::max, T> : in_place_blend<T> {
 template <class T>
 requires(is_integer<T> || std::is_same_v<T, bool>) struct blend_traits<blend::bit_and, T> : in_place_blend<T> {
     VOXELPIPE_HD
-    static T identity() { return std::is_same_v<T, bool> ? T{1} : static_cast<T>(~T{0}); }
+    static T identity() {
+        if constexpr (std::is_same_v<T, bool>)
+            return true;
+        else
+            return static_cast<T>(~T{0});
+    }
     VOXELPIPE_HD
     static void apply(T& a, T v) { a = static_cast<T>(a & v); }
 };

@@ -1,0 +1,248 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// core/interpolate.hpp: barycentrics and normals against exact rationals, varyings of every kind, clamping.
+
+#include "test_support.hpp"
+
+#include <voxelpipe/core/coverage.hpp>
+#include <voxelpipe/core/interpolate.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+
+namespace {
+
+namespace vp = voxelpipe;
+using unit::splitmix64;
+using vp::int128;
+using vp::core::snapped_position;
+
+constexpr int fraction = 14;
+
+struct triangle {
+    snapped_position v[3];
+};
+
+// Edges up to 2^bits units.
+triangle random_triangle(splitmix64& random, int bits) {
+    triangle t{};
+    const std::int64_t size = std::int64_t{1} << random.between(2, bits), at = std::int64_t{1} << 25;
+    const auto c = [&] { return random.between(-at, at); };
+    const std::int64_t x = c(), y = c(), z = c();
+    for (auto& v : t.v) v = {x + random.between(0, size), y + random.between(0, size), z + random.between(0, size)};
+    return t;
+}
+
+// All of it once more with wide integers: normal, dominant axis, barycentric numerators over twice the projected area.
+struct model {
+    unit::wide normal[3]; // x y z
+    int axis;             // -1: zero area
+
+    explicit model(const triangle& t) {
+        const auto sub = [](std::int64_t a, std::int64_t b) { return unit::wide(a) - unit::wide(b); };
+        const unit::wide e1[3] = {sub(t.v[1].x, t.v[0].x), sub(t.v[1].y, t.v[0].y), sub(t.v[1].z, t.v[0].z)};
+        const unit::wide e2[3] = {sub(t.v[2].x, t.v[0].x), sub(t.v[2].y, t.v[0].y), sub(t.v[2].z, t.v[0].z)};
+        unit::wide size[3];
+        for (std::size_t a = 0; a < 3; ++a) {
+            normal[a] = e1[(a + 1) % 3] * e2[(a + 2) % 3] - e1[(a + 2) % 3] * e2[(a + 1) % 3];
+            size[a] = normal[a].sign() < 0 ? -normal[a] : normal[a];
+        }
+        axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
+        if (size[static_cast<std::size_t>(axis)].sign() == 0) axis = -1;
+    }
+
+    // Weights at the centre of column (u, v), as exact ratios.
+    [[nodiscard]] std::array<unit::rational, 3> weights(const triangle& t, std::int64_t u, std::int64_t v) const {
+        const auto coordinate = [](const snapped_position& p, int a) {
+            return unit::wide(a == 0 ? p.x : a == 1 ? p.y : p.z);
+        };
+        const int ua = (axis + 1) % 3, va = (axis + 2) % 3;
+        const unit::wide half = unit::power_of_two(fraction - 1);
+        const unit::wide cu = unit::wide(u).shifted_left(fraction) + half,
+                         cv = unit::wide(v).shifted_left(fraction) + half;
+        std::array<unit::rational, 3> w;
+        for (std::size_t i = 0; i < 3; ++i) {
+            const snapped_position &p = t.v[(i + 1) % 3], &q = t.v[(i + 2) % 3];
+            unit::wide n = (coordinate(q, ua) - coordinate(p, ua)) * (cv - coordinate(p, va)) -
+                           (coordinate(q, va) - coordinate(p, va)) * (cu - coordinate(p, ua));
+            unit::wide d = normal[static_cast<std::size_t>(axis)];
+            if (d.sign() < 0) {
+                n = -n;
+                d = -d;
+            }
+            w[i] = {n, d};
+        }
+        return w;
+    }
+};
+
+template <class Int>
+void check_barycentrics(splitmix64& random, int bits) {
+    const triangle t = random_triangle(random, bits);
+    const model m(t);
+    const auto setup = vp::core::setup_triangle<vp::core::span_rule::thin, Int>(t.v[0], t.v[1], t.v[2], fraction);
+    ASSERT_EQ(setup.zero_area, m.axis < 0);
+    if (m.axis < 0) {
+        EXPECT_EQ(vp::core::barycentric(setup, 0, 0), glm::vec3(1.0f / 3.0f));
+        return;
+    }
+    ASSERT_EQ(setup.axis, m.axis);
+    const std::int64_t u = setup.origin[0] + random.between(-1, setup.last[0] + 1);
+    const std::int64_t v = setup.origin[1] + random.between(-1, setup.last[1] + 1);
+    const glm::vec3 b = vp::core::barycentric(setup, u, v);
+    const auto exact = m.weights(t, u, v);
+    for (int i = 0; i < 3; ++i) {
+        const unit::rational& w = exact[static_cast<std::size_t>(i)];
+        // Numerator and denominator are rounded to double (where they do not fit), then the quotient, then to float.
+        const double n = unit::nearest_double({w.numerator + w.numerator}),
+                     d = unit::nearest_double({w.denominator + w.denominator});
+        ASSERT_EQ(b[i], static_cast<float>(n / d));
+        if constexpr (std::is_same_v<Int, std::int64_t>) {
+            ASSERT_EQ(b[i], static_cast<float>(unit::nearest_double(w))); // 64-bit path: exact before the roundings
+        }
+    }
+    ASSERT_NEAR(b.x + b.y + b.z, 1.0f, 1e-5f * (1.0f + std::fabs(b.x) + std::fabs(b.y) + std::fabs(b.z)));
+}
+
+TEST(Barycentric, IsTheExactRatioRounded) {
+    splitmix64 random(1);
+    for (std::int64_t i = 0; i < unit::cases(20'000); ++i) {
+        check_barycentrics<std::int64_t>(random, 24);
+        check_barycentrics<int128>(random, i % 2 == 0 ? 24 : 40);
+    }
+}
+
+TEST(Barycentric, ClampedLiesOnTheTriangle) {
+    splitmix64 random(2);
+    for (std::int64_t i = 0; i < unit::cases(100'000); ++i) {
+        const auto f = [&] { return static_cast<float>(unit::spread_double(random, -5, 5)); };
+        glm::vec3 b{f(), f(), 0};
+        b.z = 1.0f - b.x - b.y; // what is left, as for a point of the plane
+        const glm::vec3 c = vp::core::clamp_barycentric(b);
+        for (int k = 0; k < 3; ++k) {
+            ASSERT_GE(c[k], 0.0f);
+            ASSERT_LE(c[k], 1.0f);
+            ASSERT_TRUE(b[k] > 0 || c[k] == 0.0f);
+        }
+        ASSERT_NEAR(c.x + c.y + c.z, 1.0f, 3e-7f);
+        const bool inside = b.x >= 0 && b.y >= 0 && b.z >= 0 && b.x + b.y + b.z == 1.0f;
+        ASSERT_TRUE(!inside || c == b); // untouched
+    }
+}
+
+TEST(UnitNormal, IsTheIntegerNormalOfLengthOne) {
+    splitmix64 random(3);
+    for (std::int64_t i = 0; i < unit::cases(20'000); ++i) {
+        const triangle t = random_triangle(random, 24);
+        const model m(t);
+        const auto setup =
+            vp::core::setup_triangle<vp::core::span_rule::thin, std::int64_t>(t.v[0], t.v[1], t.v[2], fraction);
+        const glm::vec3 n = vp::core::unit_normal(setup, {{1.0, 1.0, 1.0}});
+        if (m.axis < 0) {
+            ASSERT_EQ(n, glm::vec3(0.0f));
+            continue;
+        }
+        double length = 0, d[3];
+        for (int a = 0; a < 3; ++a) {
+            d[a] = unit::nearest_double({m.normal[a]});
+            length = std::hypot(length, d[a]);
+        }
+        for (int a = 0; a < 3; ++a) ASSERT_NEAR(n[a], d[a] / length, 1.2e-7) << a;
+        for (int a = 0; a < 3; ++a) ASSERT_GE(std::fabs(n[m.axis]), std::fabs(n[a]));
+    }
+}
+
+TEST(UnitNormal, FollowsTheShapeOfTheVoxels) {
+    // In voxels of 1 x 2 x 4 a triangle through one voxel's corners on the three axes has the world normal (4, 2, 1).
+    const snapped_position x{1 << fraction, 0, 0}, y{0, 1 << fraction, 0}, z{0, 0, 1 << fraction};
+    const auto setup = vp::core::setup_triangle<vp::core::span_rule::thin, std::int64_t>(x, y, z, fraction);
+    const vp::core::triple<double> factors{{2.0 * 4 / 16, 1.0 * 4 / 16, 1.0 * 2 / 16}};
+    const glm::vec3 n = vp::core::unit_normal(setup, factors);
+    const double length = std::sqrt(21.0);
+    EXPECT_NEAR(n.x, 4 / length, 1e-7);
+    EXPECT_NEAR(n.y, 2 / length, 1e-7);
+    EXPECT_NEAR(n.z, 1 / length, 1e-7);
+}
+
+// ---- varyings
+// --------------------------------------------------------------------------------------------------------
+
+struct everything {
+    float scalar;
+    glm::vec2 two;
+    glm::vec3 three;
+    glm::vec4 four;
+    std::array<float, 5> many;
+    vp::flat<std::uint64_t> id;
+};
+struct twelve {
+    float a, b, c, d, e, f, g, h, i, j, k, l;
+};
+struct one {
+    float a;
+};
+struct nothing {};
+
+static_assert(vp::core::num_members<everything>() == 6);
+static_assert(vp::core::num_members<twelve>() == 12);
+static_assert(vp::core::num_members<one>() == 1);
+static_assert(vp::core::is_varyings<everything>() && vp::core::is_varyings<twelve>() &&
+              vp::core::is_varyings<nothing>());
+
+everything make_varyings(float base, std::uint64_t id) {
+    everything v{};
+    v.scalar = base;
+    v.two = {base + 1, base + 2};
+    v.three = {base + 3, base + 4, base + 5};
+    v.four = {base + 6, base + 7, base + 8, base + 9};
+    for (std::size_t i = 0; i < 5; ++i) v.many[i] = base + 10 + static_cast<float>(i);
+    v.id.value = id;
+    return v;
+}
+
+float mixed(float a, float b, float c, float t1, float t2) {
+    const float first = std::fma(t1, vp::exact::sub(b, a), a);
+    return std::fma(t2, vp::exact::sub(c, a), first);
+}
+
+TEST(Varyings, EveryMemberIsInterpolatedByTheWrittenSteps) {
+    splitmix64 random(4);
+    for (std::int64_t i = 0; i < unit::cases(10'000); ++i) {
+        const auto f = [&] { return static_cast<float>(unit::spread_double(random, -8, 8)); };
+        const float x = f(), y = f(), z = f(), t1 = f(), t2 = f();
+        const everything a = make_varyings(x, 1), b = make_varyings(y, 2), c = make_varyings(z, 3);
+        const everything m = vp::core::mix(a, b, c, t1, t2);
+        ASSERT_EQ(m.scalar, mixed(x, y, z, t1, t2));
+        for (int k = 0; k < 2; ++k) ASSERT_EQ(m.two[k], mixed(a.two[k], b.two[k], c.two[k], t1, t2));
+        for (int k = 0; k < 3; ++k) ASSERT_EQ(m.three[k], mixed(a.three[k], b.three[k], c.three[k], t1, t2));
+        for (int k = 0; k < 4; ++k) ASSERT_EQ(m.four[k], mixed(a.four[k], b.four[k], c.four[k], t1, t2));
+        for (std::size_t k = 0; k < 5; ++k) ASSERT_EQ(m.many[k], mixed(a.many[k], b.many[k], c.many[k], t1, t2));
+        ASSERT_EQ(m.id.value, 1u); // the first vertex's
+    }
+}
+
+TEST(Varyings, TwelveMembersComeOutInOrder) {
+    const twelve a{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+    twelve b = a, c = a;
+    b.d = 100;
+    c.l = 200;
+    const twelve m = vp::core::mix(a, b, c, 0.5f, 0.25f);
+    EXPECT_EQ(m.d, 52.0f);
+    EXPECT_EQ(m.l, 59.0f);
+    EXPECT_EQ(m.a, 1.0f); // where the vertices agree the value is exact whatever the weights
+    EXPECT_EQ(m.k, 11.0f);
+    EXPECT_EQ(vp::core::mix(one{1}, one{3}, one{9}, 0.5f, 0.0f).a, 2.0f);
+    static_assert(std::is_empty_v<decltype(vp::core::mix(nothing{}, nothing{}, nothing{}, 0.f, 0.f))>);
+}
+
+TEST(Varyings, AtTheVerticesAreTheVertices) {
+    const everything a = make_varyings(0.1f, 1), b = make_varyings(7.7f, 2), c = make_varyings(-3.3f, 3);
+    EXPECT_EQ(vp::core::mix(a, b, c, 0.0f, 0.0f).four, a.four);
+    for (int k = 0; k < 4; ++k) EXPECT_NEAR(vp::core::mix(a, b, c, 1.0f, 0.0f).four[k], b.four[k], 2e-6);
+    for (int k = 0; k < 4; ++k) EXPECT_NEAR(vp::core::mix(a, b, c, 0.0f, 1.0f).four[k], c.four[k], 2e-6);
+}
+
+} // namespace
