@@ -49,11 +49,11 @@ camera fit_camera(const preview_scene& scene, const vec3& voxel_size, const prev
     const double tan_y = c.perspective ? std::tan(radians(options.field_of_view / 2)) : 0.0;
     const double tan_x = tan_y * aspect;
 
-    // The nearest planes of the view frustum's four sides that keep all bricks inside: with z towards the viewer, a
+    // The nearest planes of the view frustum's four sides that keep all voxels inside: with z towards the viewer, a
     // point is inside the right side if x + z tan <= const. The camera then stands where opposite planes meet.
     constexpr double infinity = std::numeric_limits<double>::infinity();
     double right = -infinity, left = -infinity, top = -infinity, bottom = -infinity, front = -infinity;
-    scene.for_each_brick([&](const vec3& low, const vec3& high) {
+    scene.for_each_row([&](const vec3& low, const vec3& high) {
         for (unsigned corner = 0; corner < 8; ++corner) {
             vec3 p{};
             for (std::size_t a = 0; a < 3; ++a) p[a] = (corner >> a & 1u ? high[a] : low[a]) * voxel_size[a];

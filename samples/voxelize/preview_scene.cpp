@@ -145,6 +145,21 @@ ray_hit preview_scene::first_hit(const vec3& origin, const vec3& direction, doub
     }
 }
 
+std::array<std::int32_t, 2> preview_scene::row_ends(std::int32_t j, std::int32_t k) const {
+    const std::byte* row = bits_ + k * slice_bytes_ + j * row_bytes_;
+    const auto word = [&](std::int32_t w) {
+        std::uint32_t value;
+        std::memcpy(&value, row + 4 * w, 4);
+        return value;
+    };
+    const auto words = static_cast<std::int32_t>(row_bytes_ / 4);
+    std::int32_t first = 0, last = words - 1;
+    while (first < words && word(first) == 0) ++first;
+    if (first == words) return {1, 0};
+    while (word(last) == 0) --last;
+    return {32 * first + std::countr_zero(word(first)), 32 * last + 31 - std::countl_zero(word(last))};
+}
+
 // Voxels (i, j, k) .. (i + 31, j, k) as bits; whatever lies outside the grid is empty.
 std::uint32_t preview_scene::window(std::int32_t i, std::int32_t j, std::int32_t k) const {
     if (j < 0 || j >= extent_[1] || k < 0 || k >= extent_[2]) return 0;

@@ -7,7 +7,6 @@
 
 #include "volume.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -50,21 +49,17 @@ public:
     [[nodiscard]] vec3 surface_normal(const std::array<std::int32_t, 3>& voxel, const vec3& viewer,
                                       const vec3& voxel_size) const;
 
-    // Calls visit(low corner, high corner) in voxels for each occupied brick of 8^3, cut to the bounds.
+    // Calls visit(low corner, high corner) in voxels for the stretch of each row along x that its first and last occupied
+    // voxel bound; together these boxes have the convex hull of all occupied voxels.
     template <class Visit>
-    void for_each_brick(Visit visit) const {
-        std::array<std::int32_t, 3> b{};
-        for (b[2] = 0; b[2] < fine_size_[2]; ++b[2])
-            for (b[1] = 0; b[1] < fine_size_[1]; ++b[1])
-                for (b[0] = 0; b[0] < fine_size_[0]; ++b[0]) {
-                    if (fine_[flag_index(fine_size_, b[0], b[1], b[2])] == 0) continue;
-                    vec3 from{}, to{};
-                    for (std::size_t a = 0; a < 3; ++a) {
-                        from[a] = std::max(b[a] * 8, low_[a]);
-                        to[a] = std::min(b[a] * 8 + 8, high_[a]);
-                    }
-                    visit(from, to);
-                }
+    void for_each_row(Visit visit) const {
+        for (std::int32_t k = low_[2]; k < high_[2]; ++k)
+            for (std::int32_t j = low_[1]; j < high_[1]; ++j) {
+                const auto [first, last] = row_ends(j, k);
+                if (first > last) continue;
+                visit(vec3{static_cast<double>(first), static_cast<double>(j), static_cast<double>(k)},
+                      vec3{last + 1.0, j + 1.0, k + 1.0});
+            }
     }
 
 private:
@@ -75,6 +70,8 @@ private:
                    static_cast<std::size_t>(size[0]) +
                static_cast<std::size_t>(i);
     }
+    // First and last occupied voxel of a row; first > last when there is none.
+    [[nodiscard]] std::array<std::int32_t, 2> row_ends(std::int32_t j, std::int32_t k) const;
     [[nodiscard]] std::uint32_t window(std::int32_t i, std::int32_t j, std::int32_t k) const;
     void fill_layer(const volume& v, const channel& bits, std::int32_t layer, int3& low, int3& high);
 

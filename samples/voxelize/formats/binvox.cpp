@@ -20,6 +20,7 @@ public:
     explicit run_writer(output_file& out) : out_(out) { pairs_.reserve(flush_bytes + 2 * 255); }
 
     void add(bool value, std::uint64_t length) {
+        if (length == 0) return; // must not end a run of the other value
         if (value != value_) {
             put();
             value_ = value;

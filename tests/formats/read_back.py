@@ -1,0 +1,258 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reads files of the voxelize writers with other people's readers and compares every value.
+
+usage: read_back.py FORMAT FOLDER     FORMAT is npy, npz, vti, nrrd, vox, binvox or png; FOLDER was filled by write_samples
+       read_back.py --have-modules    exit code 0 when all the readers are installed
+
+The expected values are computed here from the voxel's position, by the function that test_volumes.hpp describes; nothing is
+compared with another file of ours.
+"""
+
+import json
+import pathlib
+import sys
+
+MODULES = ["numpy", "vtkmodules", "nrrd", "trimesh", "PIL", "pyvox", "midvoxio"]
+
+
+def have_modules():
+    import importlib.util
+
+    missing = [name for name in MODULES if importlib.util.find_spec(name) is None]
+    if missing:
+        print("missing: " + " ".join(missing))
+    return not missing
+
+
+def pattern(extent, channel, component):
+    """32 well-mixed bits for each voxel, as an array (nz, ny, nx)."""
+    import numpy as np
+
+    nx, ny, nz = extent
+    mask = np.uint64(0xFFFFFFFF)
+    i = np.arange(nx, dtype=np.uint64)[None, None, :] * np.uint64(73856093) & mask
+    j = np.arange(ny, dtype=np.uint64)[None, :, None] * np.uint64(19349663) & mask
+    k = np.arange(nz, dtype=np.uint64)[:, None, None] * np.uint64(83492791) & mask
+    h = i ^ j ^ k ^ np.uint64((channel * 4 + component + 1) * 2654435761 & 0xFFFFFFFF)
+    h ^= h >> np.uint64(15)
+    h = h * np.uint64(0x2C1B3C6D) & mask
+    h ^= h >> np.uint64(12)
+    return h
+
+
+def expected(case, index):
+    """Values of a channel as (nz, ny, nx) or (nz, ny, nx, components), in the type that NumPy files have."""
+    import numpy as np
+
+    name, kind, components = case["channels"][index]
+    if kind == "bit":
+        if case["density"] == 0:
+            return np.zeros(case["extent"][::-1], np.uint8)
+        return (pattern(case["extent"], index, 0) % np.uint64(case["density"]) == 0).astype(np.uint8)
+    planes = []
+    for m in range(components):
+        h = pattern(case["extent"], index, m)
+        n = h.astype(np.int64)
+        planes.append(
+            {
+                "u8": lambda: h.astype(np.uint8),
+                "u16": lambda: h.astype(np.uint16),
+                "u32": lambda: h.astype(np.uint32),
+                "u64": lambda: h * np.uint64(0x100000001),
+                "i32": lambda: h.astype(np.uint32).view(np.int32),
+                "i64": lambda: (n - 0x80000000) * 0x10001,
+                "f16": lambda: ((n % 801 - 400) / 4).astype(np.float16),
+                "f32": lambda: ((n % 20001 - 10000) / 8).astype(np.float32),
+                "f64": lambda: (n % 2000001 - 1000000) / 1024,
+            }[kind]()
+        )
+    return planes[0] if components == 1 else np.stack(planes, axis=-1)
+
+
+def widened(values):
+    """VTK and NRRD have no half floats."""
+    import numpy as np
+
+    return values.astype(np.float32) if values.dtype == np.float16 else values
+
+
+def same(got, want, what):
+    import numpy as np
+
+    assert got.shape == want.shape, f"{what}: shape {got.shape}, expected {want.shape}"
+    assert got.dtype == want.dtype, f"{what}: type {got.dtype}, expected {want.dtype}"
+    assert np.array_equal(got, want), f"{what}: {np.count_nonzero(got != want)} of {want.size} values differ"
+
+
+def close(got, want, what):
+    import numpy as np
+
+    assert np.allclose(got, want, rtol=1e-12, atol=0), f"{what}: {got}, expected {want}"
+
+
+def check_npy(case, files):
+    import numpy as np
+
+    assert len(files) == len(case["channels"])
+    for n, file in enumerate(files):
+        same(np.load(file), expected(case, n), file.name)
+
+
+def check_npz(case, files):
+    import numpy as np
+
+    with np.load(files[0]) as archive:
+        assert archive.files == [c[0] for c in case["channels"]], archive.files
+        for n, (name, _, _) in enumerate(case["channels"]):
+            same(archive[name], expected(case, n), f"{files[0].name}: {name}")
+
+
+def check_vti(case, files):
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOXML import vtkXMLImageDataReader
+
+    reader = vtkXMLImageDataReader()
+    assert reader.CanReadFile(str(files[0]))
+    reader.SetFileName(str(files[0]))
+    reader.Update()
+    image = reader.GetOutput()
+    assert reader.GetErrorCode() == 0
+    assert list(image.GetDimensions()) == [n + 1 for n in case["extent"]]
+    close(image.GetOrigin(), case["origin"], "origin")
+    close(image.GetSpacing(), case["voxel_size"], "spacing")
+    cells = image.GetCellData()
+    assert image.GetPointData().GetNumberOfArrays() == 0
+    assert cells.GetNumberOfArrays() == len(case["channels"])
+    for n, (name, _, components) in enumerate(case["channels"]):
+        want = widened(expected(case, n))
+        got = vtk_to_numpy(cells.GetArray(name))
+        same(got.reshape(want.shape), want, f"{files[0].name}: {name}")
+
+
+def check_nrrd(case, files):
+    import nrrd
+    import numpy as np
+
+    for n, file in enumerate(files):
+        _, _, components = case["channels"][n]
+        data, header = nrrd.read(str(file), index_order="C")
+        same(np.ascontiguousarray(data), widened(expected(case, n)), file.name)
+        size = np.array(case["voxel_size"])
+        close(header["space origin"], np.array(case["origin"]) + size / 2, "space origin")
+        close(header["space directions"][-3:], np.diag(size), "space directions")
+        assert header["kinds"][-3:] == ["domain"] * 3 and len(header["kinds"]) == (3 if components == 1 else 4)
+
+
+def check_binvox(case, files):
+    import numpy as np
+    import trimesh
+
+    with open(files[0], "rb") as file:
+        runs = trimesh.exchange.binvox.parse_binvox(file)
+        close(runs.translate, case["origin"], "translate")
+        close(runs.scale, max(case["extent"]) * case["voxel_size"][0], "scale")
+        file.seek(0)
+        grid = trimesh.exchange.binvox.load_binvox(file)
+    nx, ny, nz = case["extent"]
+    got = grid.matrix.transpose(2, 1, 0)
+    assert got.shape == (max(nx, ny, nz),) * 3, got.shape
+    same(got[:nz, :ny, :nx].astype(np.uint8), expected(case, 0), files[0].name)
+    assert got.sum() == got[:nz, :ny, :nx].sum(), "voxels in the padding"
+
+
+def check_vox(case, files):
+    import numpy as np
+    from midvoxio.parser import Parser
+    from pyvox.parser import VoxParser
+
+    occupancy = expected(case, 0)
+    k, j, i = np.nonzero(occupancy)
+    nx, ny, nz = case["extent"]
+    # MagicaVoxel is z up: where y is up in the volume, (i, j, k) stands at (i, nz-1-k, j).
+    places = np.stack([i, nz - 1 - k, j] if case["up"] == "y" else [i, j, k], axis=1)
+    single = max(case["extent"]) <= 256
+    if single:
+        vox = VoxParser(str(files[0])).parse()
+        assert len(vox.models) == 1
+        assert list(vox.models[0].size) == ([nx, nz, ny] if case["up"] == "y" else [nx, ny, nz])
+        voxels = np.array([[v.x, v.y, v.z, v.c] for v in vox.models[0].voxels])
+        palette = np.array([[c.r, c.g, c.b] for c in vox.palette])
+    else:
+        # The other reader knows the scene graph. A transform moves the middle of a model, floor(size / 2).
+        vox = Parser(str(files[0])).parse()
+        shapes = {shape.node_id: shape.models[0].id for shape in vox.nshps}
+        parts = []
+        for node in vox.ntrns:
+            if node.child_node_id not in shapes:
+                continue
+            model = shapes[node.child_node_id]
+            part = np.array(vox.voxels[model])
+            part[:, :3] += np.array(list(map(int, node.frames[0]["_t"].split()))) - np.array(vox.sizes[model]) // 2
+            parts.append(part)
+        assert len(parts) == len(vox.voxels) > 1
+        voxels = np.concatenate(parts)
+        palette = np.array(vox.palettes[0])[:, :3]
+        whole = np.array([nx, nz, ny] if case["up"] == "y" else [nx, ny, nz])
+        places = places - np.array([whole[0] // 2, whole[1] // 2, 0])
+    assert len(voxels) == len(places), f"{len(voxels)} voxels, expected {len(places)}"
+    order = np.lexsort(voxels[:, :3].T)
+    wanted = np.lexsort(places.T)
+    assert np.array_equal(voxels[order, :3], places[wanted]), "voxels stand elsewhere"
+    if len(case["channels"]) < 2:
+        assert len(np.unique(voxels[:, 3])) == 1
+        return
+    # Random colours do not fit 255 entries, so compare distances: at worst that of a cube of an eighth a side.
+    want = expected(case, 1)[k, j, i, :3][wanted].astype(int)
+    got = palette[voxels[order, 3] - 1].astype(int)
+    distance = np.sqrt(((got - want) ** 2).sum(axis=1))
+    few = len(np.unique(want, axis=0)) <= 255
+    assert distance.max() <= (0 if few else 100), f"a colour is off by {distance.max()}"
+    assert distance.mean() <= 25, f"colours are off by {distance.mean()}"
+
+
+def check_png(case, files):
+    import numpy as np
+    from PIL import Image
+
+    with Image.open(files[0]) as picture:
+        picture.load()
+        assert picture.format == "PNG"
+        assert picture.size == (160, 120), picture.size
+        pixels = np.asarray(picture)
+    if case["name"] == "glass":
+        assert picture.mode == "RGBA"
+        assert pixels[0, 0, 3] == 0 and pixels[60, 80, 3] == 255
+    else:
+        assert picture.mode == "RGB"
+    colors = len(np.unique(pixels.reshape(-1, pixels.shape[-1]), axis=0))
+    assert colors > 20, f"only {colors} colours"
+
+
+def main():
+    if sys.argv[1:] == ["--have-modules"]:
+        return 0 if have_modules() else 1
+    if len(sys.argv) != 3:
+        print(__doc__)
+        return 2
+    kind, folder = sys.argv[1], pathlib.Path(sys.argv[2])
+    cases = json.loads((folder / "manifest.json").read_text())
+    failures = checked = 0
+    for case in cases:
+        files = case["files"].get("." + kind)
+        if files is None:
+            continue
+        checked += 1
+        try:
+            globals()["check_" + kind](case, [folder / name for name in files])
+            print(f"{case['name']}: as expected")
+        except Exception as problem:  # whatever a reader throws is a failure of this case
+            failures += 1
+            print(f"{case['name']}: {type(problem).__name__}: {problem}")
+    if checked == 0:
+        print("no file of this format")
+    return 1 if failures or checked == 0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,132 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Writes the files that read_back.py reads, and manifest.json, which says what they hold: write_samples FOLDER.
+
+#include "formats/formats.hpp"
+#include "test_volumes.hpp"
+
+#include <cstdio>
+#include <iostream>
+#include <map>
+
+using namespace voxelize;
+using namespace voxelize::testing;
+
+namespace {
+
+struct sample_case {
+    std::string name;
+    volume v;
+    std::uint32_t density; // one voxel in so many is set; 0: none
+    std::vector<std::string> extensions;
+    write_options options;
+};
+
+volume with_channels(std::array<std::int64_t, 3> extent, std::uint32_t density, bool color, bool all_types) {
+    volume v = make_volume(extent);
+    v.add("occupancy", scalar::bit);
+    if (color) v.add("color", scalar::u8, 4);
+    if (all_types)
+        for (int type = 1; type < 10; ++type)
+            for (int components = 1; components <= 4; ++components)
+                v.add(std::string(name_of(static_cast<scalar>(type))) + "x" + std::to_string(components),
+                      static_cast<scalar>(type), components);
+    for (std::size_t n = density == 0 ? 1 : 0; n < v.channels.size(); ++n) fill(v, n, density);
+    return v;
+}
+
+std::vector<sample_case> make_cases() {
+    const std::vector<std::string> any{".npy", ".npz", ".vti", ".nrrd"};
+    const std::vector<std::string> solid{".npy", ".npz", ".vti", ".nrrd", ".vox", ".binvox", ".png"};
+    std::vector<sample_case> cases;
+    const auto add = [&](const char* name, std::array<std::int64_t, 3> extent, std::uint32_t density, bool color,
+                         bool all_types, const std::vector<std::string>& extensions) -> sample_case& {
+        cases.push_back({name, with_channels(extent, density, color, all_types), density, extensions, {}});
+        cases.back().options.preview.width = 160;
+        cases.back().options.preview.height = 120;
+        return cases.back();
+    };
+    add("one", {1, 1, 1}, 1, true, false, solid);
+    add("plain", {32, 32, 32}, 5, false, false, solid);
+    add("odd", {37, 23, 11}, 5, true, false, solid);
+    add("words", {65, 64, 63}, 3, true, false, solid);
+    add("thin", {3, 1, 200}, 2, true, false, solid);
+    add("long", {300, 17, 40}, 23, true, false, solid);
+    add("split", {260, 40, 513}, 997, true, false, {".vox", ".binvox"}).options.up = up_axis::z;
+    add("split_y", {270, 513, 33}, 997, true, false, {".vox"});
+    add("empty", {9, 8, 7}, 0, false, false, {".npy", ".npz", ".vti", ".nrrd", ".binvox", ".png"});
+    sample_case& types = add("types", {13, 7, 5}, 2, false, true, any);
+    types.v.voxel_size = {0.1, 0.25, 3};
+    sample_case& raw = add("raw", {13, 7, 5}, 2, false, true, any);
+    raw.options.compression = 0;
+    add("glass", {16, 16, 16}, 2, true, false, {".png"}).options.preview.backdrop = *parse_background("transparent");
+    return cases;
+}
+
+std::string list_of(const auto& values) {
+    std::string out;
+    for (const auto value : values) {
+        std::array<char, 40> text{};
+        std::snprintf(text.data(), text.size(), "%.17g", static_cast<double>(value));
+        if (!out.empty()) out += ", ";
+        out += text.data();
+    }
+    return out;
+}
+
+std::string describe(const sample_case& c, const std::map<std::string, std::vector<std::string>>& files) {
+    std::string out = "  {\"name\": \"" + c.name + "\", \"density\": " + std::to_string(c.density);
+    out += ", \"up\": \"";
+    out += c.options.up == up_axis::y ? "y" : "z";
+    out += "\", \"extent\": [" + list_of(c.v.extent) + "], \"origin\": [" + list_of(c.v.origin);
+    out += "], \"voxel_size\": [" + list_of(c.v.voxel_size) + "],\n   \"channels\": [";
+    for (std::size_t n = 0; n < c.v.channels.size(); ++n) {
+        const channel& ch = c.v.channels[n];
+        if (n != 0) out += ", ";
+        out.append("[\"").append(ch.name).append("\", \"").append(name_of(ch.type));
+        out.append("\", ").append(std::to_string(ch.components)).append("]");
+    }
+    out += "],\n   \"files\": {";
+    bool first = true;
+    for (const auto& [extension, paths] : files) {
+        if (!first) out += ", ";
+        first = false;
+        out.append("\"").append(extension).append("\": [");
+        for (std::size_t n = 0; n < paths.size(); ++n) {
+            if (n != 0) out += ", ";
+            out.append("\"").append(paths[n]).append("\"");
+        }
+        out += "]";
+    }
+    return out + "}}";
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+    if (argc != 2) {
+        std::cerr << "usage: write_samples FOLDER\n";
+        return 2;
+    }
+    try {
+        const std::filesystem::path folder = argv[1];
+        std::filesystem::remove_all(folder);
+        std::filesystem::create_directories(folder);
+        std::string manifest;
+        for (const sample_case& c : make_cases()) {
+            std::map<std::string, std::vector<std::string>> files;
+            for (const std::string& extension : c.extensions)
+                for (const auto& path : write(c.v, folder / (c.name + extension), c.options))
+                    files[extension].push_back(path.filename().string());
+            if (!manifest.empty()) manifest += ",\n";
+            manifest += describe(c, files);
+        }
+        std::ofstream out(folder / "manifest.json");
+        out << "[\n" << manifest << "\n]\n";
+        return out ? 0 : 1;
+    } catch (const std::exception& e) {
+        std::cerr << "write_samples: " << e.what() << "\n";
+        return 1;
+    }
+}
