@@ -77,6 +77,26 @@ std::string footer() {
     return text;
 }
 
+// Lines of at most WIDTH characters, broken at spaces.
+std::string wrapped(const std::string& text, std::size_t width) {
+    std::string lines;
+    std::size_t column = 0;
+    for (std::size_t at = 0; at < text.size();) {
+        const std::size_t end = std::min(text.find(' ', at), text.size());
+        if (column != 0 && column + 1 + end - at > width) {
+            lines += '\n';
+            column = 0;
+        } else if (column != 0) {
+            lines += ' ';
+            ++column;
+        }
+        lines += text.substr(at, end - at);
+        column += end - at;
+        at = end + 1;
+    }
+    return lines;
+}
+
 // "--stats" may stand before INPUT: only "json" and "text" are its value.
 std::vector<std::string> arguments(int argc, const char* const* argv) {
     std::vector<std::string> list;
@@ -107,7 +127,7 @@ struct raw_options {
 
 void describe(CLI::App& app, command_line& options, raw_options& raw) {
     app.add_option("INPUT", options.input, "glTF 2.0 model, .glb or .gltf")->required()->option_text(" ");
-    app.add_option("-o,--output", options.outputs, "Write the voxels to FILE; may be repeated")
+    app.add_option("-o,--output", options.outputs, "Write the voxels to FILE (required); may be repeated")
         ->required()
         ->allow_extra_args(false)
         ->option_text("FILE");
@@ -315,8 +335,11 @@ command_line parse_command_line(int argc, const char* const* argv) {
     CLI::App app{"Turns a glTF model into voxels: exact coverage, several values a voxel, many file formats.",
                  "voxelize"};
     app.footer(footer());
-    app.get_formatter()->column_width(30);
+    constexpr int name_column = 28;
+    app.get_formatter()->column_width(name_column);
     describe(app, options, raw);
+    for (CLI::Option* option : app.get_options())
+        option->description(wrapped(option->get_description(), 100 - name_column));
     try {
         app.parse(arguments(argc, argv));
     } catch (const CLI::CallForHelp&) {

@@ -417,7 +417,7 @@ TEST(GltfScene, TextureTransformOverridesTheSet) {
 TEST(GltfScene, APictureThatCannotBeHadIsAWarning) {
     const auto with = [](const json& image) {
         builder file = textured();
-        file.root["images"] = {image};
+        file.root["images"] = json::array({image});
         const scene scene = load(file);
         EXPECT_EQ(voxelize::material::no_texture, scene.materials.at(0).texture);
         EXPECT_TRUE(scene.primitives.at(0).texcoords.empty());

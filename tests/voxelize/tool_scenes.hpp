@@ -1,0 +1,66 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Models for tests of the tool.
+
+#include "gltf_builder.hpp"
+
+namespace gltf_test {
+
+// A square from (0, 0, z) to (1, 1, z) that faces +z; its picture stands upright as seen from there.
+inline json& add_square(builder& file, float z) {
+    const int positions = file.accessor(std::vector<float>{0, 0, z, 1, 0, z, 1, 1, z, 0, 1, z}, "VEC3");
+    const int texcoords = file.accessor(std::vector<float>{0, 1, 1, 1, 1, 0, 0, 0}, "VEC2");
+    const int indices = file.accessor(std::vector<std::uint8_t>{0, 1, 2, 0, 2, 3}, "SCALAR");
+    json& primitive = file.mesh({{"POSITION", positions}, {"TEXCOORD_0", texcoords}});
+    primitive["indices"] = indices;
+    return primitive;
+}
+
+inline int add_material(builder& file, const std::vector<double>& color, const json& more = json::object()) {
+    json entry = more;
+    entry["pbrMetallicRoughness"]["baseColorFactor"] = color;
+    return file.append("materials", entry);
+}
+
+// A material with a picture of WIDTH x HEIGHT, sampled nearest.
+inline int add_textured_material(builder& file, std::uint32_t width, std::uint32_t height,
+                                 const std::vector<std::uint8_t>& rgba, const json& more = json::object()) {
+    const int view = file.view(png(width, height, rgba));
+    const int image = file.append("images", {{"bufferView", view}, {"mimeType", "image/png"}});
+    const int sampler = file.append("samplers", {{"magFilter", 9728}, {"wrapS", 33071}, {"wrapT", 33071}});
+    const int texture = file.append("textures", {{"source", image}, {"sampler", sampler}});
+    json entry = more;
+    entry["pbrMetallicRoughness"]["baseColorTexture"]["index"] = texture;
+    return file.append("materials", entry);
+}
+
+// The surface of the cube from (0, 0, 0) to (1, 1, 1), 12 triangles that face outwards, moved and scaled by its node.
+inline void add_cube(builder& file, const std::vector<double>& translation, double scale, int material) {
+    std::vector<float> positions;
+    for (int corner = 0; corner < 8; ++corner)
+        for (int axis = 0; axis < 3; ++axis) positions.push_back(static_cast<float>(corner >> axis & 1));
+    const std::vector<std::uint8_t> indices{0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                                            2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+    const int index_accessor = file.accessor(indices, "SCALAR");
+    json& primitive = file.mesh({{"POSITION", file.accessor(positions, "VEC3")}});
+    primitive["indices"] = index_accessor;
+    primitive["material"] = material;
+    json& node = file.root["nodes"].back();
+    node["translation"] = translation;
+    node["scale"] = {scale, scale, scale};
+}
+
+// Two cubes of two materials, one of them leaning, and a half-transparent mask: something of everything.
+inline builder small_world() {
+    builder file;
+    add_cube(file, {0, 0, 0}, 1, add_material(file, {0.8, 0.1, 0.05, 1}, {{"name", "brick"}}));
+    add_cube(file, {0.6, 0.9, 0.2}, 0.7, add_material(file, {0.1, 0.2, 0.9, 0.5}, {{"alphaMode", "BLEND"}}));
+    file.root["nodes"].back()["rotation"] = {0.2, 0.3, 0.1, 0.9};
+    const std::vector<std::uint8_t> holes{255, 255, 0, 255, 255, 255, 255, 0, 255, 255, 255, 0, 0, 255, 255, 255};
+    const int mask = add_textured_material(file, 2, 2, holes, {{"alphaMode", "MASK"}, {"alphaCutoff", 0.5}});
+    add_square(file, 1.4F)["material"] = mask;
+    return file;
+}
+
+} // namespace gltf_test

@@ -1,0 +1,439 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// The voxelize program, end to end, on models that the tests write.
+#include "tool_runner.hpp"
+#include "tool_scenes.hpp"
+
+#include <formats/formats.hpp>
+#include <targets.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+using gltf_test::builder;
+using gltf_test::json;
+using tool_test::array;
+using tool_test::outcome;
+using tool_test::read_npy;
+using tool_test::run;
+using tool_test::scratch_folder;
+
+namespace {
+
+constexpr const char* all_targets = "occupancy,count,color,color-max,color-replace,normal,material,triangle,depth";
+
+TEST(Tool, HelpNamesEverything) {
+    const scratch_folder folder;
+    const outcome help = run(folder, {"--help"});
+    EXPECT_EQ(0, help.code);
+    EXPECT_EQ("", help.err);
+    for (const voxelize::target_info& entry : voxelize::target_table)
+        EXPECT_NE(std::string::npos, help.out.find("  " + std::string(entry.name))) << entry.name;
+    for (const voxelize::format& entry : voxelize::formats())
+        EXPECT_NE(std::string::npos, help.out.find("  " + std::string(entry.extension))) << entry.extension;
+    for (const char* part : {"INPUT", "--resolution N", "EXIT CODES", "EXAMPLES", "--stats"})
+        EXPECT_NE(std::string::npos, help.out.find(part)) << part;
+    std::istringstream lines(help.out);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 120U) << line;
+
+    const outcome version = run(folder, {"--version"});
+    EXPECT_EQ(0, version.code);
+    EXPECT_EQ(0U, version.out.find("voxelize ")) << version.out;
+}
+
+TEST(Tool, WrongCommandLinesAreExplained) {
+    const scratch_folder folder;
+    const std::string model = folder / "m.glb";
+    gltf_test::small_world().write_glb(model);
+    const std::string out = folder / "o.npy";
+    const auto expect = [&](std::vector<std::string> arguments, const std::string& part) {
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(1, result.code) << part;
+        EXPECT_EQ("", result.out);
+        EXPECT_NE(std::string::npos, result.err.find(part)) << result.err;
+        EXPECT_EQ(0U, result.err.find("voxelize: ")) << result.err;
+        EXPECT_LE(std::count(result.err.begin(), result.err.end(), '\n'), 2) << result.err;
+        EXPECT_FALSE(std::filesystem::exists(out));
+    };
+    expect({}, "INPUT is required");
+    expect({model}, "--output is required");
+    expect({model, "-o", folder / "o.xyz"}, "must be one of .npy");
+    expect({model, "-o", out, "-o", out}, "given twice");
+    expect({model, "-o", out, "--target", "colour"}, "is not one of occupancy, count");
+    expect({model, "-o", out, "--resolution", "0"}, "at least 1");
+    expect({model, "-o", out, "--resolution", "many"}, "--resolution");
+    expect({model, "-o", out, "-r", "8", "--padding", "4"}, "leaves nothing");
+    expect({model, "-o", out, "-r", "8", "--padding", "-1"}, "negative");
+    expect({model, "-o", out, "-r", "8", "--voxel-size", "1"}, "do not go together");
+    expect({model, "-o", out, "--voxel-size", "0"}, "positive");
+    expect({model, "-o", out, "--voxel-size", "1,2"}, "one number or three");
+    expect({model, "-o", out, "--voxel-size", "nan"}, "one number or three");
+    expect({model, "-o", out, "--origin", "0,0,0"}, "all three");
+    expect({model, "-o", out, "--origin", "0,0", "--voxel-size", "1", "--extent", "1,1,1"}, "three numbers");
+    expect({model, "-o", out, "--origin", "0,0,0", "--voxel-size", "1", "--extent", "4,0,4"}, "extent");
+    expect({model, "-o", out, "--origin", "0,0,0", "--voxel-size", "1", "--extent", "4,4,4", "-r", "3"}, "do not go");
+    expect({model, "-o", out, "--coverage", "thick"}, "thick");
+    expect({model, "-o", out, "--backend", "gpu"}, "gpu");
+    expect({model, "-o", out, "--threads", "-1"}, "--threads");
+    expect({model, "-o", out, "--image-size", "100"}, "--image-size");
+    expect({model, "-o", out, "--background", "mauve"}, "mauve");
+    expect({model, "-o", out, "--no-such-option"}, "--no-such-option");
+    expect({model, model, "-o", out}, "m.glb");
+}
+
+TEST(Tool, ModelsThatCannotBeUsedEndWithTwo) {
+    const scratch_folder folder;
+    const auto expect = [&](const std::string& model, const std::string& part) {
+        const outcome result = run(folder, {model, "-o", folder / "o.npy"});
+        EXPECT_EQ(2, result.code) << part;
+        EXPECT_EQ("", result.out);
+        EXPECT_NE(std::string::npos, result.err.find(part)) << result.err;
+        EXPECT_EQ(0U, result.err.find("voxelize: " + model + ": ")) << result.err;
+        EXPECT_EQ(1, std::count(result.err.begin(), result.err.end(), '\n')) << result.err;
+        EXPECT_FALSE(std::filesystem::exists(folder / "o.npy"));
+    };
+    expect(folder / "none.glb", "no such file");
+    expect(folder.path().string(), "not a regular file");
+    std::ofstream(folder / "text.glb") << "hello";
+    expect(folder / "text.glb", "neither a GLB");
+    builder empty;
+    empty.write_glb(folder / "empty.glb");
+    expect(folder / "empty.glb", "no triangles");
+    builder nowhere;
+    nowhere.mesh({{"POSITION", nowhere.accessor(std::vector<float>(9, NAN), "VEC3")}});
+    nowhere.write_glb(folder / "nowhere.glb");
+    expect(folder / "nowhere.glb", "finite position");
+    builder bad;
+    bad.triangle()["indices"] = 7;
+    bad.write_glb(folder / "bad.glb");
+    expect(folder / "bad.glb", "meshes[0].primitives[0].indices: 7 is not in accessors");
+}
+
+TEST(Tool, OtherFailuresHaveTheirOwnCodes) {
+    const scratch_folder folder;
+    const std::string model = folder / "m.glb";
+    gltf_test::small_world().write_glb(model);
+    const outcome output = run(folder, {model, "-o", folder / "away/o.npy"});
+    EXPECT_EQ(4, output.code) << output.err;
+    EXPECT_NE(std::string::npos, output.err.find("o.npy")) << output.err;
+    const outcome large = run(folder, {model, "-o", folder / "o.npy", "--origin", "0,0,0", "--voxel-size", "1",
+                                       "--extent", "1000000,1000000,1000000"});
+    EXPECT_EQ(3, large.code) << large.err;
+    EXPECT_NE(std::string::npos, large.err.find("MiB")) << large.err;
+    const outcome cuda = run(folder, {model, "-o", folder / "o.npy", "--backend", "cuda"});
+    EXPECT_TRUE(cuda.code == 5 || cuda.code == 0) << cuda.err; // 0 where it is built and there is a device
+    if (cuda.code == 5) {
+        EXPECT_NE(std::string::npos, cuda.err.find("--backend cpu")) << cuda.err;
+    }
+}
+
+// (x, y) of the one layer of a grid, as sRGB and alpha.
+glm::u8vec4 pixel(const array& colors, std::size_t x, std::size_t y) {
+    return colors.at<glm::u8vec4>(y * colors.shape[2] + x);
+}
+
+TEST(Tool, PicturesStandUpright) {
+    const scratch_folder folder;
+    builder file;
+    const std::vector<std::uint8_t> quarters{255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255};
+    const int material = gltf_test::add_textured_material(file, 2, 2, quarters);
+    gltf_test::add_square(file, 0)["material"] = material;
+    file.write_glb(folder / "m.glb");
+    const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "color", "--origin", "0,0,-0.5",
+                                        "--voxel-size", "0.125,0.125,1", "--extent", "8,8,1"});
+    ASSERT_EQ(0, result.code) << result.err;
+    const array colors = read_npy(folder / "o.npy");
+    EXPECT_EQ((std::vector<std::size_t>{1, 8, 8, 4}), colors.shape);
+    EXPECT_EQ("|u1", colors.type);
+    EXPECT_EQ(glm::u8vec4(255, 0, 0, 255), pixel(colors, 0, 7)); // the picture's top left
+    EXPECT_EQ(glm::u8vec4(0, 255, 0, 255), pixel(colors, 7, 7));
+    EXPECT_EQ(glm::u8vec4(0, 0, 255, 255), pixel(colors, 0, 0));
+    EXPECT_EQ(glm::u8vec4(255, 255, 255, 255), pixel(colors, 7, 0));
+}
+
+// Three squares in one layer: red below green below a blue that is half transparent.
+TEST(Tool, ColorsMeetAsTheirTargetSays) {
+    const scratch_folder folder;
+    builder file;
+    for (const auto& [z, color, mode] : {std::tuple{0.0F, std::vector<double>{1, 0, 0, 1}, "OPAQUE"},
+                                         std::tuple{0.1F, std::vector<double>{0, 1, 0, 1}, "OPAQUE"},
+                                         std::tuple{0.2F, std::vector<double>{0, 0, 0.2, 0.2}, "BLEND"}}) {
+        const int material = gltf_test::add_material(file, color, {{"alphaMode", mode}});
+        gltf_test::add_square(file, z)["material"] = material;
+    }
+    file.write_glb(folder / "m.glb");
+    const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", all_targets, "--origin",
+                                        "0.25,0,-0.5", "--voxel-size", "0.125,0.125,1", "--extent", "1,1,1"});
+    ASSERT_EQ(0, result.code) << result.err;
+    const auto color = [&](const std::string& name) {
+        return read_npy(folder / ("o." + name + ".npy")).at<glm::u8vec4>(0);
+    };
+    EXPECT_EQ(3U, read_npy(folder / "o.count.npy").at<std::uint32_t>(0));
+    EXPECT_EQ(glm::u8vec4(156, 156, 73, 187), color("color")); // linear 1/3, 1/3, 0.2/3; alpha 2.2/3
+    EXPECT_EQ(glm::u8vec4(255, 255, 124, 255), color("color-max"));
+    EXPECT_EQ(glm::u8vec4(0, 0, 124, 51), color("color-replace"));
+    EXPECT_EQ(2, read_npy(folder / "o.material.npy").at<std::int32_t>(0));
+    EXPECT_EQ(4, read_npy(folder / "o.triangle.npy").at<std::int32_t>(0)); // the lower right one of the third square
+    EXPECT_EQ(0.0F, read_npy(folder / "o.depth.npy").at<float>(0));
+    EXPECT_EQ(glm::vec3(0, 0, 1), read_npy(folder / "o.normal.npy").at<glm::vec3>(0));
+}
+
+TEST(Tool, AlphaMaskLeavesHoles) {
+    const scratch_folder folder;
+    builder file;
+    const std::vector<std::uint8_t> left_only{255, 255, 255, 128, 255, 255, 255, 126};
+    const int material = gltf_test::add_textured_material(file, 2, 1, left_only, {{"alphaMode", "MASK"}});
+    gltf_test::add_square(file, 0)["material"] = material;
+    file.write_glb(folder / "m.glb");
+    // By the targets that need shading and by occupancy alone, which elsewhere takes a shorter way.
+    for (const char* targets : {"occupancy", "occupancy,color"}) {
+        const outcome result =
+            run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-o", folder / "o.npz", "-t", targets, "--origin",
+                         "0,0,-0.5", "--voxel-size", "0.125,0.125,1", "--extent", "8,8,1", "--stats", "json"});
+        ASSERT_EQ(0, result.code) << result.err;
+        const json stats = json::parse(result.out);
+        EXPECT_EQ(32, stats["voxels"]);
+        EXPECT_LT(31, stats["fragments_discarded"]);
+        const array bits = read_npy(folder / (targets == std::string("occupancy") ? "o.npy" : "o.occupancy.npy"));
+        for (std::size_t y = 0; y < 8; ++y)
+            for (std::size_t x = 0; x < 8; ++x)
+                EXPECT_EQ(x < 4, bits.at<std::uint8_t>(y * 8 + x) != 0) << x << ' ' << y;
+    }
+}
+
+TEST(Tool, AllTargetsAgreeOnWhatIsCovered) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    for (const char* coverage : {"conservative", "thin"}) {
+        const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-r", "40", "-t", all_targets,
+                                            "--coverage", coverage, "--depth-axis", "y", "--stats", "json"});
+        ASSERT_EQ(0, result.code) << result.err;
+        const json stats = json::parse(result.out);
+        const array bits = read_npy(folder / "o.occupancy.npy");
+        const array count = read_npy(folder / "o.count.npy");
+        const array color = read_npy(folder / "o.color.npy");
+        const array most = read_npy(folder / "o.color-max.npy");
+        const array last = read_npy(folder / "o.color-replace.npy");
+        const array normal = read_npy(folder / "o.normal.npy");
+        const array material = read_npy(folder / "o.material.npy");
+        const array triangle = read_npy(folder / "o.triangle.npy");
+        const array depth = read_npy(folder / "o.depth.npy");
+        EXPECT_EQ("|u1", bits.type);
+        EXPECT_EQ("<u4", count.type);
+        EXPECT_EQ("<f4", normal.type);
+        EXPECT_EQ("<i4", triangle.type);
+        const double voxel = stats["grid"]["voxel_size"][1];
+        const double origin = stats["grid"]["origin"][1];
+        std::uint64_t voxels = 0;
+        std::uint64_t fragments = 0;
+        for (std::size_t i = 0; i < bits.voxels(); ++i) {
+            const bool covered = bits.at<std::uint8_t>(i) != 0;
+            voxels += covered;
+            fragments += count.at<std::uint32_t>(i);
+            ASSERT_EQ(covered, count.at<std::uint32_t>(i) != 0) << i;
+            ASSERT_EQ(covered, color.at<glm::u8vec4>(i).a != 0) << i;
+            ASSERT_EQ(covered, last.at<glm::u8vec4>(i).a != 0) << i;
+            ASSERT_EQ(covered, triangle.at<std::int32_t>(i) >= 0) << i;
+            ASSERT_EQ(covered, !std::isnan(depth.at<float>(i))) << i;
+            if (!covered) {
+                ASSERT_EQ(-1, triangle.at<std::int32_t>(i));
+                ASSERT_EQ(-1, material.at<std::int32_t>(i));
+                ASSERT_EQ(glm::vec3(0), normal.at<glm::vec3>(i));
+                continue;
+            }
+            const int number = triangle.at<std::int32_t>(i);
+            ASSERT_EQ(number < 12 ? 0 : number < 24 ? 1 : 2, material.at<std::int32_t>(i)) << i;
+            for (int c = 0; c < 4; ++c) {
+                ASSERT_LE(last.at<glm::u8vec4>(i)[c], most.at<glm::u8vec4>(i)[c]) << i;
+                ASSERT_LE(color.at<glm::u8vec4>(i)[c], most.at<glm::u8vec4>(i)[c]) << i;
+            }
+            const float length = glm::length(normal.at<glm::vec3>(i));
+            ASSERT_TRUE(length == 0 || std::abs(length - 1) < 1e-5F) << i;
+            if (std::string(coverage) == "thin") continue;
+            // The nearest point of the triangle lies in the voxel's column along the dominant axis, at worst beside it.
+            const double low = origin + voxel * static_cast<double>(i / bits.shape[2] % bits.shape[1]);
+            ASSERT_LT(low - 1.5 * voxel, depth.at<float>(i)) << i;
+            ASSERT_GT(low + 2.5 * voxel, depth.at<float>(i)) << i;
+        }
+        EXPECT_EQ(stats["voxels"], voxels);
+        EXPECT_EQ(stats["fragments"], fragments);
+        EXPECT_LT(0U, voxels);
+    }
+}
+
+// Every subset of the targets gives the channels that all of them together give.
+TEST(Tool, TargetsDoNotDisturbEachOther) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const auto voxelize = [&](const std::string& targets, const std::string& out) {
+        const outcome result = run(folder, {folder / "m.glb", "-q", "-o", folder / out, "-r", "24", "-t", targets});
+        ASSERT_EQ(0, result.code) << result.err;
+        EXPECT_EQ("", result.out + result.err);
+    };
+    voxelize(all_targets, "all.npy");
+    for (const voxelize::target_info& entry : voxelize::target_table) {
+        const std::string name(entry.name);
+        voxelize(name, "one.npy");
+        EXPECT_EQ(tool_test::read_file(folder / ("all." + name + ".npy")), tool_test::read_file(folder / "one.npy"))
+            << name;
+        voxelize(name + ",depth,count", "few.npy");
+        EXPECT_EQ(tool_test::read_file(folder / ("all." + name + ".npy")),
+                  tool_test::read_file(folder / ("few." + name + ".npy")))
+            << name;
+    }
+}
+
+TEST(Tool, ThreadsAndSlabsChangeNothing) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const auto voxelize = [&](const std::vector<std::string>& how) {
+        std::vector<std::string> arguments{folder / "m.glb", "-o",  folder / "o.npy", "-r", "70", "-t", all_targets,
+                                           "--stats",        "json"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        json stats = json::parse(result.out);
+        std::string bytes;
+        for (const voxelize::target_info& entry : voxelize::target_table)
+            bytes += tool_test::read_file(folder / ("o." + std::string(entry.name) + ".npy"));
+        const int slabs = stats["slabs"];
+        for (const char* key : {"ms", "peak_memory_bytes", "threads", "slabs"}) stats.erase(key);
+        return std::tuple{bytes, stats.dump(), slabs};
+    };
+    const auto [bytes, stats, slabs] = voxelize({"--threads", "1"});
+    EXPECT_EQ(1, slabs);
+    for (const std::vector<std::string>& how : {std::vector<std::string>{"--threads", "2"},
+                                                {"--threads", "7"},
+                                                {"--work-memory", "1"},
+                                                {"--work-memory", "9", "--threads", "3"}}) {
+        const auto [other_bytes, other_stats, other_slabs] = voxelize(how);
+        EXPECT_TRUE(bytes == other_bytes) << how[0] << ' ' << how[1];
+        EXPECT_EQ(stats, other_stats);
+        EXPECT_EQ(how[0] == "--work-memory", other_slabs > 1);
+    }
+}
+
+TEST(Tool, GridsAreWhatWasAskedFor) {
+    const scratch_folder folder;
+    builder file;
+    gltf_test::add_cube(file, {0.1, 0.2, -0.3}, 2, gltf_test::add_material(file, {1, 1, 1, 1}));
+    file.root["nodes"].back()["scale"] = {2, 1, 0.5};
+    file.write_glb(folder / "m.glb");
+    const auto grid = [&](const std::vector<std::string>& how) {
+        std::vector<std::string> arguments{folder / "m.glb", "-q", "-o", folder / "o.npy", "--stats=json"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        return json::parse(result.out)["grid"];
+    };
+    // The nodes' bounds: 0.1 to 2.1, 0.2 to 1.2, -0.3 to 0.2.
+    const json resolution = grid({"-r", "20"});
+    EXPECT_EQ(json({20, 11, 6}), resolution["extent"]);
+    EXPECT_NEAR(2.0 * 1.0002 / 20, resolution["voxel_size"][0], 1e-7);
+    array bits = read_npy(folder / "o.npy");
+    EXPECT_EQ((std::vector<std::size_t>{6, 11, 20}), bits.shape);
+
+    const json padded = grid({"-r", "20", "--padding", "3"});
+    EXPECT_EQ(20, padded["extent"][0]);
+    bits = read_npy(folder / "o.npy");
+    for (std::size_t i = 0; i < bits.voxels(); ++i) {
+        const std::size_t at[3] = {i % bits.shape[2], i / bits.shape[2] % bits.shape[1],
+                                   i / bits.shape[2] / bits.shape[1]};
+        for (std::size_t a = 0; a < 3; ++a)
+            if (at[a] < 3 || at[a] + 3 >= bits.shape[2 - a]) {
+                ASSERT_EQ(0, bits.at<std::uint8_t>(i)) << at[0] << ' ' << at[1] << ' ' << at[2];
+            }
+    }
+
+    const json lattice = grid({"--voxel-size", "0.25"});
+    EXPECT_EQ(json({9, 5, 3}), lattice["extent"]);
+    EXPECT_EQ(json({0.0, 0.0, -0.5}), lattice["origin"]);
+    EXPECT_EQ(json({5, 3, 5}), grid({"--voxel-size", "0.5,0.5,0.125"})["extent"]);
+    EXPECT_EQ(json({7, 5, 7}), grid({"--voxel-size", "0.5,0.5,0.125", "--padding", "1"})["extent"]);
+
+    const json exact = grid({"--origin", "-1,0.5,0", "--voxel-size", "0.1,0.2,0.3", "--extent", "7,6,5"});
+    EXPECT_EQ(json({7, 6, 5}), exact["extent"]);
+    EXPECT_EQ(json({-1.0, 0.5, 0.0}), exact["origin"]);
+    EXPECT_EQ(json({0.1, 0.2, 0.3}), exact["voxel_size"]);
+}
+
+TEST(Tool, AModelOutsideTheGridIsAWarning) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "--origin", "50,50,50",
+                                        "--voxel-size", "1", "--extent", "4,4,4"});
+    EXPECT_EQ(0, result.code);
+    EXPECT_NE(std::string::npos, result.err.find("outside the grid")) << result.err;
+}
+
+TEST(Tool, StatsAreOneJsonObject) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const outcome result =
+        run(folder, {"--stats", "json", folder / "m.glb", "-o", folder / "a.npy", "-o", folder / "b.vti"});
+    ASSERT_EQ(0, result.code) << result.err;
+    const json stats = json::parse(result.out); // the whole of standard output
+    EXPECT_EQ(26, stats["triangles"]);
+    EXPECT_EQ(0, stats["triangles_dropped"]);
+    EXPECT_EQ(20, stats["vertices"]);
+    EXPECT_EQ("cpu", stats["backend"]);
+    EXPECT_EQ("conservative", stats["coverage"]);
+    EXPECT_EQ(json({"occupancy"}), stats["targets"]);
+    EXPECT_EQ(json({"brick", "", ""}), stats["materials"]);
+    EXPECT_EQ(2U, stats["files"].size());
+    EXPECT_EQ(128, std::max({stats["grid"]["extent"][0], stats["grid"]["extent"][1], stats["grid"]["extent"][2]}));
+    EXPECT_LT(1000000, stats["peak_memory_bytes"]);
+    double sum = 0;
+    for (const char* stage :
+         {"read", "upload", "vertex_shade", "coarse_raster", "tile_sort", "clear", "fine_raster", "resolve", "write"}) {
+        ASSERT_TRUE(stats["ms"].contains(stage)) << stage;
+        EXPECT_LE(0.0, stats["ms"][stage]);
+        sum += stats["ms"][stage].get<double>();
+    }
+    EXPECT_NEAR(sum, stats["ms"]["total"], 1e-6);
+
+    // Before INPUT, without a value: text.
+    const outcome text = run(folder, {"-q", "--stats", folder / "m.glb", "-o", folder / "a.npy"});
+    ASSERT_EQ(0, text.code) << text.err;
+    EXPECT_EQ("", text.err);
+    for (const char* part : {"triangles           26", "fine_raster ms", "peak memory MiB"})
+        EXPECT_NE(std::string::npos, text.out.find(part)) << text.out;
+}
+
+TEST(Tool, ColourIsTheDefaultWhereItShows) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const auto targets = [&](const std::vector<std::string>& how) {
+        std::vector<std::string> arguments{folder / "m.glb", "-q",   "--stats", "json", "-r", "16",
+                                           "--image-size",   "32x24"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        return json::parse(result.out)["targets"];
+    };
+    EXPECT_EQ(json({"occupancy"}), targets({"-o", folder / "a.npy"}));
+    EXPECT_EQ(json({"occupancy", "color"}), targets({"-o", folder / "a.png"}));
+    EXPECT_EQ(json({"occupancy", "color"}), targets({"-o", folder / "a.vox", "-o", folder / "a.npz"}));
+    EXPECT_EQ(json({"occupancy"}), targets({"-o", folder / "a.png", "--no-color"}));
+    EXPECT_EQ(json({"occupancy", "count"}), targets({"-o", folder / "a.binvox", "-t", "count"}));
+    EXPECT_EQ(json({"count", "depth"}), targets({"-o", folder / "a.vti", "-t", "count", "-t", "depth", "-t", "count"}));
+}
+
+TEST(Tool, EveryFormatTakesEveryTarget) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    for (const voxelize::format& entry : voxelize::formats()) {
+        const std::string out = folder / std::string("o").append(entry.extension);
+        const outcome result =
+            run(folder, {folder / "m.glb", "-o", out, "-r", "20", "-t", all_targets, "--image-size", "64x48"});
+        EXPECT_EQ(0, result.code) << entry.extension << ": " << result.err;
+        const std::size_t at = result.out.find("wrote ");
+        ASSERT_NE(std::string::npos, at) << result.out;
+        const std::string first = result.out.substr(at + 6, result.out.find('\n', at) - at - 6);
+        EXPECT_LT(0U, std::filesystem::file_size(first)) << first;
+    }
+}
+
+} // namespace
