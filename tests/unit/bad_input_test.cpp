@@ -1,0 +1,457 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Bad input to the API: every refusal has the code that says what is wrong, has written nothing to the caller's memory
+// and has left no allocation behind. What is odd but defined (positions that are no numbers, a mesh far away) works.
+
+#include <cpu_ref/backend.hpp>
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <climits>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+// Counts what this program has allocated and not yet freed.
+namespace {
+std::atomic<std::int64_t> live_allocations{0};
+}
+void* operator new(std::size_t size) {
+    void* const p = std::malloc(size == 0 ? 1 : size);
+    if (p == nullptr) throw std::bad_alloc();
+    ++live_allocations;
+    return p;
+}
+void operator delete(void* p) noexcept {
+    if (p != nullptr) --live_allocations;
+    std::free(p);
+}
+void operator delete(void* p, std::size_t) noexcept { operator delete(p); }
+
+// Sanitizers end the program at an allocation that cannot be had, unless told to fail it as the system would.
+extern "C" const char* __asan_default_options() { return "allocator_may_return_null=1"; }
+extern "C" const char* __tsan_default_options() { return "allocator_may_return_null=1"; }
+
+namespace {
+
+namespace vp = voxelpipe;
+using vp::status_code;
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr double dnan = std::numeric_limits<double>::quiet_NaN();
+constexpr double dinfinity = std::numeric_limits<double>::infinity();
+
+using floats = vp::target<float, vp::blend::max>;
+using bits = vp::target<vp::bit, vp::blend::bit_or>;
+constexpr auto shader = vp::constant(1.0f, true);
+constexpr auto payload = vp::constant(7);
+
+// A valid call into memory that shows every write: what a test then breaks one part of.
+struct call {
+    static constexpr float mark = -12345.0f;
+    static constexpr std::uint32_t bit_mark = 0x5a5a5a5au;
+
+    std::vector<glm::vec3> positions = {{1, 1, 1}, {6, 1, 2}, {1, 6, 3}};
+    std::vector<glm::uvec3> triangles = {{0, 1, 2}, {2, 1, 0}};
+    vp::grid grid;
+    std::vector<float> depths = std::vector<float>(8 * 8 * 8, mark);
+    std::vector<std::uint32_t> words = std::vector<std::uint32_t>(8 * 8, bit_mark);
+    vp::framebuffer_view<floats, bits> view;
+    vp::mesh_view<> mesh;
+
+    call() {
+        grid.extent = {8, 8, 8};
+        view.extent = {8, 8, 8};
+        vp::get<0>(view.targets).elements = depths.data();
+        vp::get<0>(view.targets).extent = {8, 8, 8};
+        vp::get<1>(view.targets).elements = words.data();
+        vp::get<1>(view.targets).extent = {8, 8, 8};
+        look();
+    }
+    call(const call&) = delete; // the views point into it
+    call& operator=(const call&) = delete;
+
+    void look() { mesh = {positions, triangles}; } // after the arrays have changed
+    bool untouched() const {
+        return std::all_of(depths.begin(), depths.end(), [](float x) { return x == mark; }) &&
+               std::all_of(words.begin(), words.end(), [](std::uint32_t x) { return x == bit_mark; });
+    }
+};
+
+// The call must be refused with `expected` by framebuffer and A-buffer alike, for both rules and any number of threads.
+// `into_lists`: whether what is wrong concerns an A-buffer too.
+void expect_refused(const call& c, status_code expected, bool into_lists = true) {
+    for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin}) {
+        for (const unsigned threads : {1u, 3u}) {
+            vp::cpu_backend be(threads);
+            const std::int64_t before = live_allocations;
+            const vp::status s = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, c.view, rule);
+            EXPECT_EQ(live_allocations, before);
+            EXPECT_EQ(s.code, expected) << s.message();
+            EXPECT_FALSE(s.ok());
+            EXPECT_EQ(s.counts.fragments, 0u);
+            EXPECT_EQ(s.counts.voxels, 0u);
+            EXPECT_THROW(s.or_throw(), std::runtime_error);
+            EXPECT_NE(s.message().find(vp::to_string(expected)), std::string::npos);
+            EXPECT_TRUE(c.untouched());
+            if (!into_lists) continue;
+            vp::abuffer<vp::cpu_backend, int> lists{be};
+            const std::int64_t before_lists = live_allocations;
+            const vp::status t = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, payload, lists, rule);
+            EXPECT_EQ(live_allocations, before_lists);
+            EXPECT_EQ(t.code, expected) << t.message();
+            EXPECT_EQ(lists.num_voxels(), 0u);
+            EXPECT_EQ(lists.num_fragments(), 0u);
+            EXPECT_EQ(lists.offsets.size(), 0u);
+        }
+    }
+}
+
+TEST(BadInput, TheCallThatTheTestsBreakIsGood) {
+    call c;
+    vp::cpu_backend be(1);
+    const vp::status s = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, c.view);
+    EXPECT_TRUE(s.ok()) << s.message();
+    EXPECT_GT(s.counts.voxels, 10u);
+    EXPECT_FALSE(c.untouched());
+}
+
+// ---- mesh ----
+
+TEST(BadInput, MeshWithoutTriangles) {
+    call c;
+    c.triangles.clear();
+    c.look();
+    expect_refused(c, status_code::empty_mesh);
+    c.positions.clear();
+    c.look();
+    expect_refused(c, status_code::empty_mesh);
+    c.mesh = {};
+    expect_refused(c, status_code::empty_mesh);
+}
+
+TEST(BadInput, NoDraws) {
+    call c;
+    vp::cpu_backend be(1);
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_const_t<decltype(shader)>>;
+    EXPECT_EQ(vp::voxelize(be, std::span<const draw>{}, c.grid, c.view).code, status_code::empty_mesh);
+    EXPECT_TRUE(c.untouched());
+    const draw empty{{}, {}, shader}, full{c.mesh, {}, shader};
+    const draw both[] = {empty, full}; // an empty draw among others is no error
+    EXPECT_TRUE(vp::voxelize(be, std::span<const draw>(both), c.grid, c.view).ok());
+}
+
+TEST(BadInput, IndexOutOfRange) {
+    for (const std::uint32_t index : {3u, 4u, 0x7fffffffu, 0x80000000u, 0xffffffffu})
+        for (int corner = 0; corner < 3; ++corner) {
+            call c;
+            c.triangles[1][corner] = index;
+            expect_refused(c, status_code::index_out_of_range);
+        }
+    call c; // no vertex at all
+    c.positions.clear();
+    c.look();
+    expect_refused(c, status_code::index_out_of_range);
+}
+
+TEST(BadInput, IndexOutOfRangeInTheLastOfManyTriangles) {
+    call c; // far enough from the start that other threads have done work by then
+    c.triangles.assign(50000, {0, 1, 2});
+    c.triangles.back().y = 3;
+    c.look();
+    expect_refused(c, status_code::index_out_of_range);
+}
+
+TEST(BadInput, IndexOutOfRangeOfItsOwnMeshInALaterDraw) {
+    call c;
+    vp::cpu_backend be(2);
+    const std::vector<glm::vec3> few(c.positions.begin(), c.positions.begin() + 2); // index 2 is one too many here
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_const_t<decltype(shader)>>;
+    const draw draws[] = {{c.mesh, {}, shader}, {{few, c.triangles}, {}, shader}};
+    EXPECT_EQ(vp::voxelize(be, std::span<const draw>(draws), c.grid, c.view).code, status_code::index_out_of_range);
+    EXPECT_TRUE(c.untouched());
+}
+
+TEST(BadInput, NullArrays) {
+    {
+        call c;
+        c.mesh.positions = {nullptr, 3};
+        expect_refused(c, status_code::null_view);
+    }
+    {
+        call c;
+        c.mesh.triangles = {nullptr, 1};
+        expect_refused(c, status_code::null_view);
+    }
+    call c; // a null array of no elements is an empty array
+    c.mesh.positions = {nullptr, 0};
+    expect_refused(c, status_code::index_out_of_range);
+}
+
+TEST(BadInput, MoreElementsThanNumbers) {
+    call c; // only the lengths are looked at
+    c.mesh.triangles = {c.triangles.data(), std::size_t{1} << 32};
+    expect_refused(c, status_code::too_many_triangles);
+    c.mesh.triangles = {c.triangles.data(), std::numeric_limits<std::size_t>::max()};
+    expect_refused(c, status_code::too_many_triangles);
+    c.look();
+    c.mesh.positions = {c.positions.data(), std::size_t{1} << 32};
+    expect_refused(c, status_code::size_overflow);
+
+    c.look();
+    vp::cpu_backend be(1);
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_const_t<decltype(shader)>>;
+    draw half{c.mesh, {}, shader}; // two draws that are too many only together
+    half.mesh.triangles = {c.triangles.data(), std::size_t{1} << 31};
+    const draw draws[] = {half, half};
+    EXPECT_EQ(vp::voxelize(be, std::span<const draw>(draws), c.grid, c.view).code, status_code::too_many_triangles);
+    EXPECT_TRUE(c.untouched());
+}
+
+struct by_weight {
+    glm::vec3 operator()(const vp::vertex<float>& v) const { return v.position * vp::get<0>(v); }
+};
+
+TEST(BadInput, AttributesOfAnotherLength) {
+    call c;
+    vp::cpu_backend be(2);
+    const std::vector<float> weights(4, 1.0f);
+    const auto with = [&](vp::array_view<const float> attribute) {
+        const vp::mesh_view<float> mesh{c.positions, c.triangles, vp::core::make_pack(attribute)};
+        const vp::status s = vp::voxelize(be, mesh, c.grid, by_weight{}, shader, c.view);
+        if (!s.ok()) {
+            EXPECT_TRUE(c.untouched());
+        }
+        return s.code;
+    };
+    EXPECT_EQ(with({weights.data(), 2}), status_code::attribute_mismatch);
+    EXPECT_EQ(with({weights.data(), 4}), status_code::attribute_mismatch);
+    EXPECT_EQ(with({nullptr, 0}), status_code::attribute_mismatch);
+    EXPECT_EQ(with({nullptr, 3}), status_code::null_view);
+    EXPECT_EQ(with({weights.data(), 3}), status_code::ok);
+}
+
+// ---- positions: not an error, but counted ----
+
+TEST(BadInput, PositionsThatAreNoNumbersDropTheirTriangle) {
+    for (const float bad : {nan, -nan, infinity, -infinity})
+        for (int corner = 0; corner < 3; ++corner)
+            for (int axis = 0; axis < 3; ++axis) {
+                call c;
+                c.positions.insert(c.positions.end(), {{2, 2, 2}, {5, 2, 2}, {2, 5, 2}});
+                c.triangles = {{0, 1, 2}, {3, 4, 5}};
+                c.positions[static_cast<std::size_t>(corner)][axis] = bad;
+                c.look();
+                vp::cpu_backend be(2);
+                vp::abuffer<vp::cpu_backend> lists{be};
+                const vp::status s = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, payload, lists);
+                ASSERT_TRUE(s.ok()) << s.message();
+                EXPECT_EQ(s.counts.triangles_nonfinite, 1u);
+                EXPECT_EQ(s.counts.triangles_drawn, 1u);
+                for (const auto& [voxel, fragments] : lists.to_host(be))
+                    for (const auto& f : fragments) EXPECT_EQ(f.triangle, 1u);
+            }
+}
+
+TEST(BadInput, AMeshOfNothingButBadPositionsIsAnEmptyResult) {
+    for (const float bad : {nan, infinity, std::numeric_limits<float>::max()}) {
+        call c;
+        for (glm::vec3& p : c.positions) p = glm::vec3(bad);
+        vp::cpu_backend be(2);
+        const vp::status s = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, c.view);
+        ASSERT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(s.counts.triangles_dropped(), 2u);
+        EXPECT_EQ(s.counts.fragments, 0u);
+        EXPECT_TRUE(std::all_of(c.words.begin(), c.words.end(), [](std::uint32_t w) { return w == 0; })); // cleared
+    }
+}
+
+TEST(BadInput, AnOriginTooFarToReachDropsEverything) {
+    call c;
+    for (const double far : {1e30, -1e300, std::numeric_limits<double>::max()}) {
+        c.grid.origin = {far, 0, 0};
+        vp::cpu_backend be(1);
+        const vp::status s = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, c.view);
+        ASSERT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(s.counts.triangles_too_far, 2u);
+    }
+}
+
+// ---- grid ----
+
+TEST(BadInput, ExtentsOfZeroOrLess) {
+    for (const int bad : {0, -1, INT_MIN})
+        for (int axis = 0; axis < 3; ++axis) {
+            call c;
+            c.grid.extent[axis] = bad;
+            c.view.extent = c.grid.extent;
+            expect_refused(c, status_code::bad_extent);
+        }
+    call c;
+    c.grid.extent = {0, 0, 0};
+    expect_refused(c, status_code::bad_extent);
+}
+
+TEST(BadInput, ExtentsBeyondTheLimit) {
+    for (const int bad : {vp::grid::max_extent + 1, INT_MAX})
+        for (int axis = 0; axis < 3; ++axis) {
+            call c;
+            c.grid.extent[axis] = bad;
+            c.view.extent = c.grid.extent;
+            expect_refused(c, status_code::extent_too_large);
+        }
+    call c; // as the whole of a crop
+    c.grid.whole = {vp::grid::max_extent + 1, 8, 8};
+    expect_refused(c, status_code::extent_too_large);
+}
+
+TEST(BadInput, CropsThatLeaveTheGrid) {
+    call c;
+    const vp::grid whole = c.grid;
+    for (const glm::ivec3 begin : {glm::ivec3(1, 0, 0), glm::ivec3(0, -1, 0), glm::ivec3(0, 0, 8),
+                                   glm::ivec3(INT_MAX, 0, 0), glm::ivec3(0, INT_MIN, 0)}) {
+        c.grid = whole.crop(begin, {8, 8, 8});
+        expect_refused(c, status_code::bad_extent);
+    }
+    c.grid = whole.crop({0, 0, 0}, {8, 8, 9});
+    c.view.extent = c.grid.extent;
+    expect_refused(c, status_code::bad_extent);
+    c.grid = whole.crop({4, 4, 4}, {0, 1, 1});
+    c.view.extent = c.grid.extent;
+    expect_refused(c, status_code::bad_extent);
+}
+
+TEST(BadInput, VoxelSizesThatAreNone) {
+    for (const double bad : {0.0, -0.0, -1.0, dnan, dinfinity, -dinfinity, 5e-324, 1e-308, 1e-305, 1e308,
+                             std::numeric_limits<double>::max()})
+        for (int axis = 0; axis < 3; ++axis) {
+            call c;
+            c.grid.voxel_size[axis] = bad;
+            expect_refused(c, status_code::bad_voxel_size);
+        }
+}
+
+TEST(BadInput, OriginsThatAreNoNumbers) {
+    for (const double bad : {dnan, dinfinity, -dinfinity})
+        for (int axis = 0; axis < 3; ++axis) {
+            call c;
+            c.grid.origin[axis] = bad;
+            expect_refused(c, status_code::bad_origin);
+        }
+}
+
+TEST(BadInput, ValidateSaysTheSameWithoutAMesh) {
+    call c;
+    EXPECT_TRUE(vp::validate(c.grid).ok());
+    c.grid.voxel_size.y = 0;
+    EXPECT_EQ(vp::validate(c.grid).code, status_code::bad_voxel_size);
+    c.grid.extent.z = -3;
+    EXPECT_EQ(vp::validate(c.grid).code, status_code::bad_voxel_size); // the first axis that is wrong
+}
+
+// ---- framebuffer ----
+
+TEST(BadInput, FramebufferOfAnotherExtent) {
+    {
+        call c;
+        c.view.extent = {8, 8, 7};
+        expect_refused(c, status_code::extent_mismatch, false);
+    }
+    {
+        call c;
+        vp::get<1>(c.view.targets).extent = {8, 9, 8};
+        expect_refused(c, status_code::extent_mismatch, false);
+    }
+    call c;
+    c.grid.extent = {4, 8, 8};
+    expect_refused(c, status_code::extent_mismatch, false);
+}
+
+TEST(BadInput, TargetsWithoutMemory) {
+    for (const vp::load_operation how : {vp::load_operation::clear, vp::load_operation::load}) {
+        call c;
+        vp::get<1>(c.view.targets).elements = nullptr;
+        vp::get<1>(c.view.targets).load = how;
+        expect_refused(c, status_code::null_view, false);
+    }
+    call c; // one that is off needs none
+    vp::get<1>(c.view.targets).elements = nullptr;
+    vp::get<1>(c.view.targets).load = vp::load_operation::off;
+    vp::cpu_backend be(1);
+    EXPECT_TRUE(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, c.view).ok());
+}
+
+TEST(BadInput, SizesThatCannotBeAddressed) {
+    using large = vp::target<glm::dvec4, vp::blend::replace>;
+    const glm::ivec3 extent(vp::grid::max_extent); // 2^60 voxels of 32 bytes
+    vp::cpu_backend be(1);
+    call c;
+    c.grid.extent = extent;
+    vp::framebuffer_view<large> view;
+    view.extent = extent;
+    vp::get<0>(view.targets).extent = extent;
+    vp::get<0>(view.targets).elements = reinterpret_cast<glm::dvec4*>(c.depths.data());
+    const auto white = vp::constant(glm::dvec4(1.0));
+    EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, white, view).code, status_code::size_overflow);
+    EXPECT_TRUE(c.untouched());
+    const std::int64_t before = live_allocations;
+    using owner = vp::framebuffer<vp::cpu_backend, large>;
+    EXPECT_THROW(owner(be, extent), std::length_error);
+    // 2^57 bytes can be addressed on paper, but no machine has them.
+    using bit_owner = vp::framebuffer<vp::cpu_backend, bits>;
+    EXPECT_THROW(bit_owner(be, extent), std::bad_alloc);
+    EXPECT_EQ(live_allocations, before);
+}
+
+TEST(BadInput, AFramebufferOfABadExtentOwnsNothingAndIsRefused) {
+    vp::cpu_backend be(1);
+    for (const glm::ivec3 extent : {glm::ivec3(0, 8, 8), glm::ivec3(8, -1, 8), glm::ivec3(INT_MIN)}) {
+        call c;
+        vp::framebuffer<vp::cpu_backend, floats, bits> fb{be, extent};
+        EXPECT_EQ(vp::get<0>(fb).to_host(be).size(), 0u);
+        c.grid.extent = extent;
+        EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, fb).code, status_code::bad_extent);
+        c.grid.extent = {8, 8, 8};
+        EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, fb).code, status_code::extent_mismatch);
+    }
+}
+
+// ---- A-buffer ----
+
+// Nothing is written: not the lists of an earlier call either.
+TEST(BadInput, ARefusedCallLeavesEarlierListsAsTheyWere) {
+    call c;
+    vp::cpu_backend be(2);
+    vp::abuffer<vp::cpu_backend, int> lists{be};
+    vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, payload, lists).or_throw();
+    const auto before = lists.to_host(be);
+    ASSERT_GT(before.voxels.size(), 10u);
+    const auto expect_same = [&] {
+        const auto after = lists.to_host(be);
+        EXPECT_EQ(after.voxels, before.voxels);
+        EXPECT_EQ(after.offsets, before.offsets);
+        EXPECT_EQ(after.primitives, before.primitives);
+        EXPECT_EQ(after.payloads, before.payloads);
+        EXPECT_EQ(after.extent, before.extent);
+    };
+    vp::grid bad = c.grid;
+    bad.voxel_size.x = -1;
+    EXPECT_FALSE(vp::voxelize(be, c.mesh, bad, vp::passthrough{}, payload, lists).ok());
+    expect_same();
+    c.triangles[1].z = 99;
+    EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, payload, lists).code,
+              status_code::index_out_of_range);
+    expect_same();
+}
+
+} // namespace
