@@ -1,0 +1,311 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Render targets on cpu_backend: many types and blends in one pass, clear, load, off, discard, user types, against
+// folds over the oracle's fragments.
+
+#include "api_model.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+namespace {
+
+namespace vp = voxelpipe;
+namespace blend = voxelpipe::blend;
+using unit::mark;
+
+const glm::ivec3 extent{45, 34, 37};
+
+// ---- values of a fragment, by shader and by model
+// --------------------------------------------------------------------
+
+struct record { // a user's struct, with a hash chain that shows every change of order
+    std::uint64_t chain;
+    std::uint32_t fragments;
+    std::uint32_t last;
+};
+struct chain {
+    static constexpr bool order_free = false;
+    VOXELPIPE_HD record identity() const { return {0xcbf29ce484222325u, 0, 0xffffffffu}; }
+    VOXELPIPE_HD record combine(record a, record b) const {
+        return {(a.chain ^ b.chain) * 0x100000001b3u, a.fragments + b.fragments, b.last};
+    }
+};
+
+VOXELPIPE_HD bool bit_of(std::uint64_t m) { return (m >> 20 & 3u) != 0; }
+VOXELPIPE_HD float float_of(std::uint64_t m) { return static_cast<float>(static_cast<std::int32_t>(m)) * 0x1p-10f; }
+VOXELPIPE_HD glm::vec3 vector_of(std::uint64_t m) { return {float_of(m), float_of(m >> 8), float_of(m >> 16)}; }
+VOXELPIPE_HD vp::half half_of(std::uint64_t m) { return vp::half(float_of(m) * 0x1p-14f); }
+
+struct mark_shader {
+    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+        const std::uint64_t m = mark(f.primitive, f.voxel);
+        return vp::outputs(bit_of(m), f.primitive, float_of(m), vector_of(m), static_cast<std::int16_t>(m), half_of(m),
+                           static_cast<std::uint64_t>(m), record{m, 1, f.primitive})
+            .discard_if(m % 7 == 0);
+    }
+};
+
+using framebuffer =
+    vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, blend::bit_xor>, vp::target<std::uint32_t, blend::replace>,
+                    vp::target<float, blend::add>, vp::target<glm::vec3, blend::max, vp::layout::planar>,
+                    vp::target<std::int16_t, blend::min, vp::layout::tiled>, vp::target<vp::half, blend::add>,
+                    vp::target<std::uint64_t, blend::count>, vp::target<record, chain>>;
+
+// The same, voxel by voxel, without the library's folds.
+struct model_voxel {
+    bool odd = false;
+    std::uint32_t last = 0;
+    unit::wide sum, half_sum; // 2^-32, 2^-24
+    glm::vec3 high{-HUGE_VALF};
+    std::int16_t low = 32767;
+    std::uint64_t count = 0;
+    record r = chain{}.identity();
+    std::uint64_t kept = 0;
+};
+
+struct model {
+    std::vector<model_voxel> voxels;
+    std::uint64_t fragments = 0, discarded = 0, occupied = 0;
+
+    model(const std::vector<unit::model_fragment>& list, glm::ivec3 e)
+        : voxels(static_cast<std::size_t>(e.x) * static_cast<std::size_t>(e.y) * static_cast<std::size_t>(e.z)) {
+        for (const auto& f : list) {
+            const std::uint64_t m = mark(f.primitive, f.voxel);
+            if (m % 7 == 0) {
+                ++discarded;
+                continue;
+            }
+            ++fragments;
+            model_voxel& v = voxels[unit::linear(e, f.voxel)];
+            occupied += v.kept++ == 0 ? 1 : 0;
+            v.odd = v.odd != bit_of(m);
+            v.last = f.primitive;
+            v.sum = v.sum + unit::round_to_integer({unit::exact(std::ldexp(double{float_of(m)}, 32))});
+            v.half_sum = v.half_sum +
+                         unit::round_to_integer({unit::exact(std::ldexp(double{static_cast<float>(half_of(m))}, 24))});
+            for (int a = 0; a < 3; ++a) v.high[a] = std::max(v.high[a], vector_of(m)[a]);
+            v.low = std::min(v.low, static_cast<std::int16_t>(m));
+            ++v.count;
+            v.r = {(v.r.chain ^ m) * 0x100000001b3u, v.r.fragments + 1, f.primitive};
+        }
+    }
+};
+
+class Targets : public ::testing::TestWithParam<vp::coverage> {};
+
+TEST_P(Targets, EightInOnePassAreTheFoldsOfTheOraclesFragments) {
+    const unit::small_mesh mesh = unit::make_mesh(1, 120, extent);
+    const vp::grid grid = unit::unit_grid(extent);
+    vp::cpu_backend backend{2};
+    framebuffer fb{backend, extent};
+    const vp::status s = vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, mark_shader{}, fb, GetParam());
+    ASSERT_TRUE(s.ok()) << s.message();
+    const model expected(unit::fragments_of(grid, GetParam(), {mesh}), extent);
+    EXPECT_EQ(s.counts.fragments, expected.fragments);
+    EXPECT_EQ(s.counts.fragments_discarded, expected.discarded);
+    EXPECT_EQ(s.counts.voxels, expected.occupied);
+    EXPECT_GT(expected.fragments, 1000u);
+    EXPECT_GT(expected.discarded, 100u);
+
+    const auto odd = vp::get<0>(fb).to_host_target(backend);
+    const auto last = vp::get<1>(fb).to_host_target(backend);
+    const auto sum = vp::get<2>(fb).to_host_target(backend);
+    const auto high = vp::get<3>(fb).to_host_target(backend);
+    const auto low = vp::get<4>(fb).to_host_target(backend);
+    const auto half_sum = vp::get<5>(fb).to_host_target(backend);
+    const auto count = vp::get<6>(fb).to_host_target(backend);
+    const auto chained = vp::get<7>(fb).to_host_target(backend);
+    unit::for_each_voxel(extent, [&](int x, int y, int z) {
+        const model_voxel& v = expected.voxels[unit::linear(extent, {x, y, z})];
+        ASSERT_EQ(odd(x, y, z), v.odd) << x << ' ' << y << ' ' << z;
+        ASSERT_EQ(last(x, y, z), v.last) << x << ' ' << y << ' ' << z;
+        ASSERT_EQ(std::bit_cast<std::uint32_t>(sum(x, y, z)),
+                  unit::nearest_bits({v.sum, unit::power_of_two(32)}, 23, 8));
+        ASSERT_EQ(high(x, y, z), v.high);
+        ASSERT_EQ(low(x, y, z), v.low);
+        ASSERT_EQ(half_sum(x, y, z).bits, unit::nearest_bits({v.half_sum, unit::power_of_two(24)}, 10, 5));
+        ASSERT_EQ(count(x, y, z), v.count);
+        ASSERT_EQ(chained(x, y, z).chain, v.r.chain) << "triangle order";
+        ASSERT_EQ(chained(x, y, z).fragments, v.r.fragments);
+        ASSERT_EQ(chained(x, y, z).last, v.r.last);
+    });
+}
+
+INSTANTIATE_TEST_SUITE_P(Both, Targets, ::testing::Values(vp::coverage::conservative, vp::coverage::thin),
+                         [](const auto& p) { return p.param == vp::coverage::thin ? "thin" : "conservative"; });
+
+// ---- load operations
+// ---------------------------------------------------------------------------------------------------
+
+struct two_values {
+    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+        return vp::outputs(f.triangle + 1u, static_cast<float>(f.triangle));
+    }
+};
+using two = vp::framebuffer<vp::cpu_backend, vp::target<std::uint32_t, blend::add>, vp::target<float, blend::add>>;
+
+TEST(LoadOperation, ClearSetsEveryVoxelAndCountsAsAFirstTerm) {
+    const unit::small_mesh mesh = unit::make_mesh(2, 40, extent);
+    vp::cpu_backend backend{2};
+    two fb{backend, extent};
+    vp::get<0>(fb).clear(1000u);
+    vp::get<1>(fb).clear(0.5f);
+    const auto grid = unit::unit_grid(extent);
+    vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, two_values{}, fb).or_throw();
+    std::vector<std::uint32_t> sums(static_cast<std::size_t>(extent.x * extent.y * extent.z), 1000u);
+    std::vector<float> floats(sums.size(), 0.5f); // small numbers: a plain sum is exact
+    for (const auto& f : unit::fragments_of(grid, vp::coverage::conservative, {mesh})) {
+        sums[unit::linear(extent, f.voxel)] += f.triangle + 1;
+        floats[unit::linear(extent, f.voxel)] += static_cast<float>(f.triangle);
+    }
+    EXPECT_TRUE(unit::same_bytes(vp::get<0>(fb).to_host(backend), sums));
+    EXPECT_TRUE(unit::same_bytes(vp::get<1>(fb).to_host(backend), floats));
+
+    // Load blends onto what is there: the same triangles once more.
+    vp::get<0>(fb).load();
+    vp::get<1>(fb).load();
+    vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, two_values{}, fb).or_throw();
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        sums[i] = 2 * sums[i] - 1000;
+        floats[i] = 2 * floats[i] - 0.5f;
+    }
+    EXPECT_TRUE(unit::same_bytes(vp::get<0>(fb).to_host(backend), sums));
+    EXPECT_TRUE(unit::same_bytes(vp::get<1>(fb).to_host(backend), floats));
+
+    // Off: neither read nor written.
+    vp::get<0>(fb).off();
+    vp::get<1>(fb).clear(-1.0f);
+    vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, two_values{}, fb).or_throw();
+    EXPECT_TRUE(unit::same_bytes(vp::get<0>(fb).to_host(backend), sums));
+    EXPECT_FALSE(unit::same_bytes(vp::get<1>(fb).to_host(backend), floats));
+}
+
+TEST(LoadOperation, DisabledTargetsNeedNoMemory) {
+    const unit::small_mesh mesh = unit::make_mesh(3, 40, extent);
+    vp::cpu_backend backend{2};
+    two both{backend, extent}, second{backend, extent, 0b10};
+    EXPECT_EQ(vp::get<0>(second).view().elements, nullptr);
+    EXPECT_EQ(vp::get<0>(second).to_host(backend).size(), 0u);
+    const auto grid = unit::unit_grid(extent);
+    for (two* fb : {&both, &second})
+        vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, two_values{}, *fb).or_throw();
+    EXPECT_TRUE(unit::same_bytes(vp::get<1>(both).to_host(backend), vp::get<1>(second).to_host(backend)));
+}
+
+TEST(LoadOperation, UntouchedVoxelsKeepTheirBits) {
+    // A NaN that is not the canonical one and -0 survive where no fragment falls, under clear and under load.
+    const float odd_nan = std::bit_cast<float>(0xffc12345u);
+    vp::cpu_backend backend{2};
+    vp::framebuffer<vp::cpu_backend, vp::target<float, blend::add>> fb{backend, extent};
+    unit::small_mesh one;
+    one.positions = {{1.5f, 1.5f, 1.5f}, {1.6f, 1.5f, 1.5f}, {1.5f, 1.6f, 1.5f}};
+    one.triangles = {{0, 1, 2}};
+    const auto grid = unit::unit_grid(extent);
+    for (const float start : {odd_nan, -0.0f}) {
+        vp::get<0>(fb).clear(start);
+        for (int pass = 0; pass < 2; ++pass) {
+            vp::voxelize(backend, one.view(), grid, vp::passthrough{}, vp::constant(1.0f), fb).or_throw();
+            const auto values = vp::get<0>(fb).to_host(backend);
+            for (std::size_t i = 0; i < values.size(); ++i) {
+                if (i == unit::linear(extent, {1, 1, 1})) continue;
+                ASSERT_EQ(std::bit_cast<std::uint32_t>(values[i]), std::bit_cast<std::uint32_t>(start));
+            }
+            vp::get<0>(fb).load();
+        }
+    }
+}
+
+TEST(LoadOperation, BitsClearToOneUpToTheExtentAndPaddingToZero) {
+    vp::cpu_backend backend{2};
+    unit::small_mesh far;
+    far.positions = {{1000, 0, 0}, {1001, 0, 0}, {1000, 1, 0}};
+    far.triangles = {{0, 1, 2}};
+    for (const int nx : {1, 31, 32, 33, 70}) {
+        const glm::ivec3 e{nx, 3, 9};
+        vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, blend::bit_and>,
+                        vp::target<vp::bit, blend::bit_and, vp::layout::tiled>>
+            fb{backend, e};
+        vp::get<0>(fb).clear(true);
+        vp::get<1>(fb).clear(true);
+        vp::voxelize(backend, far.view(), unit::unit_grid(e), vp::passthrough{}, vp::constant(false, false), fb)
+            .or_throw();
+        for (const auto& words : {vp::get<0>(fb).to_host(backend), vp::get<1>(fb).to_host(backend)}) {
+            int bits = 0;
+            for (const std::uint32_t w : words) bits += std::popcount(w);
+            EXPECT_EQ(bits, nx * 3 * 9);
+        }
+        unit::for_each_voxel(e, [&](int x, int y, int z) {
+            ASSERT_TRUE(vp::get<0>(fb).view()(x, y, z));
+            ASSERT_TRUE(vp::get<1>(fb).view()(x, y, z));
+        });
+    }
+}
+
+TEST(Layouts, HoldTheSameValues) {
+    const unit::small_mesh mesh = unit::make_mesh(4, 100, extent);
+    vp::cpu_backend backend{2};
+    struct shader {
+        VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+            const glm::vec3 v = vector_of(mark(f.primitive, f.voxel));
+            return vp::outputs(v, v, v, v.x > 0, v.x > 0);
+        }
+    };
+    vp::framebuffer<vp::cpu_backend, vp::target<glm::vec3, blend::min>,
+                    vp::target<glm::vec3, blend::min, vp::layout::planar>,
+                    vp::target<glm::vec3, blend::min, vp::layout::tiled>, vp::target<vp::bit, blend::bit_or>,
+                    vp::target<vp::bit, blend::bit_or, vp::layout::tiled>>
+        fb{backend, extent};
+    vp::voxelize(backend, mesh.view(), unit::unit_grid(extent), vp::passthrough{}, shader{}, fb).or_throw();
+    const auto a = vp::get<0>(fb).to_host_target(backend);
+    const auto b = vp::get<1>(fb).to_host_target(backend);
+    const auto c = vp::get<2>(fb).to_host_target(backend);
+    int set = 0;
+    unit::for_each_voxel(extent, [&](int x, int y, int z) {
+        const glm::vec3 va = a(x, y, z), vb = b(x, y, z), vc = c(x, y, z);
+        ASSERT_EQ(std::memcmp(&va, &vb, sizeof va), 0);
+        ASSERT_EQ(std::memcmp(&va, &vc, sizeof va), 0);
+        ASSERT_EQ(vp::get<3>(fb).view()(x, y, z), vp::get<4>(fb).view()(x, y, z));
+        set += vp::get<3>(fb).view()(x, y, z) ? 1 : 0;
+    });
+    EXPECT_GT(set, 100);
+}
+
+TEST(FramebufferView, WritesIntoMemoryOfTheCallers) {
+    const unit::small_mesh mesh = unit::make_mesh(5, 30, extent);
+    using target = vp::target<std::uint32_t, blend::add>;
+    const std::size_t n = target::map::elements(extent);
+    std::vector<std::uint32_t> memory(n + 2, 0xabababab);
+    vp::framebuffer_view<target> fb{extent, {}};
+    vp::get<0>(fb.targets) = {memory.data() + 1, extent, vp::load_operation::clear, 0u};
+    vp::cpu_backend backend{2};
+    const vp::status s =
+        vp::voxelize(backend, mesh.view(), unit::unit_grid(extent), vp::passthrough{}, vp::constant(1u), fb);
+    ASSERT_TRUE(s.ok());
+    std::uint64_t sum = 0;
+    for (std::size_t i = 1; i <= n; ++i) sum += memory[i];
+    EXPECT_EQ(sum, s.counts.fragments);
+    EXPECT_EQ(memory.front(), 0xababababu); // nothing beside it
+    EXPECT_EQ(memory.back(), 0xababababu);
+}
+
+TEST(CountVoxels, CanBeSwitchedOffWithoutChangingAnything) {
+    const unit::small_mesh mesh = unit::make_mesh(6, 80, extent);
+    vp::cpu_backend backend{2};
+    vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, blend::bit_or>> a{backend, extent}, b{backend, extent};
+    const auto grid = unit::unit_grid(extent);
+    const auto with = vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, vp::constant(true), a,
+                                   {vp::coverage::conservative, true});
+    const auto without = vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, vp::constant(true), b,
+                                      {vp::coverage::conservative, false});
+    EXPECT_TRUE(unit::same_bytes(vp::get<0>(a).to_host(backend), vp::get<0>(b).to_host(backend)));
+    std::uint64_t bits = 0;
+    for (const std::uint32_t w : vp::get<0>(a).to_host(backend)) bits += static_cast<unsigned>(std::popcount(w));
+    EXPECT_EQ(with.counts.voxels, bits);
+    EXPECT_EQ(without.counts.voxels, 0u);
+    EXPECT_EQ(with.counts.fragments, without.counts.fragments);
+}
+
+} // namespace
