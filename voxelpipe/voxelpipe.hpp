@@ -18,4 +18,5 @@
 
 #if defined(__CUDACC__)
 #include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/device/voxelize_async.cuh>
 #endif

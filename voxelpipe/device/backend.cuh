@@ -15,6 +15,25 @@
 
 namespace voxelpipe {
 
+namespace device {
+
+// The counters of a call that succeeded; triangles_in counts every triangle that was looked at.
+[[nodiscard]] inline status to_status(const pipeline_state& state) {
+    status s;
+    s.counts.triangles_nonfinite = state.nonfinite;
+    s.counts.triangles_too_far = state.too_far;
+    s.counts.triangles_zero_area = state.zero_area;
+    s.counts.triangles_outside = state.outside;
+    s.counts.triangles_drawn = state.drawn;
+    s.counts.triangles_in = state.nonfinite + state.too_far + state.zero_area + state.outside + state.drawn;
+    s.counts.fragments = state.fragments;
+    s.counts.fragments_discarded = state.discarded;
+    s.counts.voxels = state.voxels;
+    return s;
+}
+
+} // namespace device
+
 // Memory that a cuda_backend keeps between calls, released in stream order. Moves with its backend, is never shared.
 class device_block {
 public:
@@ -171,14 +190,7 @@ private:
                     break;
                 }
                 if (!device::has_failed(state, limits)) {
-                    s.counts.triangles_nonfinite = state.nonfinite;
-                    s.counts.triangles_too_far = state.too_far;
-                    s.counts.triangles_zero_area = state.zero_area;
-                    s.counts.triangles_outside = state.outside;
-                    s.counts.triangles_drawn = state.drawn;
-                    s.counts.fragments = state.fragments;
-                    s.counts.fragments_discarded = state.discarded;
-                    s.counts.voxels = state.voxels;
+                    s = device::to_status(state);
                     break;
                 }
                 // A pass that overflowed its records did not count all of its cells: the next try may need a third.

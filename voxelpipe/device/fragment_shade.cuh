@@ -6,6 +6,7 @@
 // returns (paper section 3, fragment shader); and one fragment alone, for targets that need only the last one.
 
 #include <voxelpipe/device/scene.cuh>
+#include <voxelpipe/device/wide_path.cuh>
 
 #include <type_traits>
 
@@ -39,9 +40,13 @@ struct fragment_source {
         f.front_facing = t.normal[2] >= 0;
         f.normal = core::unit_normal(t, s.normal_factors);
     }
-    template <class Int>
-    __device__ VOXELPIPE_INLINE void begin_column(const core::triangle_setup<Int>& t, std::int64_t u, std::int64_t v) {
-        f.barycentric = core::barycentric(t, u, v);
+    __device__ VOXELPIPE_INLINE void begin_triangle(const wide_triangle& t) {
+        f.axis = t.zero_area ? 0 : t.axis;
+        f.front_facing = t.front_facing;
+        f.normal = t.normal;
+    }
+    __device__ VOXELPIPE_INLINE void begin_column(const glm::vec3& barycentric) {
+        f.barycentric = barycentric;
         if constexpr (!std::is_empty_v<varyings>)
             f.varyings = core::mix(*f.vertex_varyings[0], *f.vertex_varyings[1], *f.vertex_varyings[2], f.barycentric.y,
                                    f.barycentric.z);
@@ -59,21 +64,28 @@ __device__ VOXELPIPE_INLINE void shade_fragments(const Scene& s, const loaded_tr
                                                  const core::voxel_box& box, Visit&& visit) {
     constexpr auto rule = core::to_rule(Rule);
     fragment_source<Scene> source(s, tri, id);
-    const auto run = [&](const auto& t) {
+    const int fraction = s.geo.snap.fraction;
+    const auto column = [&](int axis, int u, int v, int w0, int w1) {
+        for (int w = w0; w <= w1; ++w) {
+            const auto p = core::to_xyz(axis, u, v, w);
+            visit(p[0], p[1], p[2], source.shade(p[0], p[1], p[2]));
+        }
+    };
+    if (core::fits_narrow(tri.a, tri.b, tri.c, fraction)) {
+        const auto t = core::setup_triangle<rule, std::int64_t>(tri.a, tri.b, tri.c, fraction);
         source.begin_triangle(t);
         core::for_each_span<rule>(t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
-            source.begin_column(t, u, v);
-            for (std::int64_t w = w0; w <= w1; ++w) {
-                const auto p = core::to_xyz(t.axis, static_cast<int>(u), static_cast<int>(v), static_cast<int>(w));
-                visit(p[0], p[1], p[2], source.shade(p[0], p[1], p[2]));
-            }
+            source.begin_column(core::barycentric(t, u, v));
+            column(t.axis, static_cast<int>(u), static_cast<int>(v), static_cast<int>(w0), static_cast<int>(w1));
         });
-    };
-    const int fraction = s.geo.snap.fraction;
-    if (core::fits_narrow(tri.a, tri.b, tri.c, fraction))
-        run(core::setup_triangle<rule, std::int64_t>(tri.a, tri.b, tri.c, fraction));
-    else
-        run(core::setup_triangle<rule, int128>(tri.a, tri.b, tri.c, fraction));
+    } else {
+        const wide_triangle t = set_up_wide(tri.a, tri.b, tri.c, fraction, s.normal_factors);
+        source.begin_triangle(t);
+        for_each_wide_span<rule>(tri.a, tri.b, tri.c, fraction, box, [&](const wide_span& span) {
+            source.begin_column(span.barycentric);
+            column(t.axis, span.u, span.v, span.w_first, span.w_last);
+        });
+    }
 }
 
 // The output of the primitive's fragment in voxel (x, y, z), which it covers.
@@ -81,17 +93,20 @@ template <class Scene>
 __device__ auto shade_fragment(const Scene& s, std::uint32_t id, int x, int y, int z) {
     const loaded_triangle tri = s.geo.load(id);
     fragment_source<Scene> source(s, tri, id);
-    const auto run = [&](const auto& t) {
-        const auto p = core::to_uvw(t.axis, x, y, z);
-        source.begin_triangle(t);
-        source.begin_column(t, p[0], p[1]);
-        return source.shade(x, y, z);
-    };
     const int fraction = s.geo.snap.fraction;
     // Barycentrics and the normal do not depend on the coverage rule; thin needs the least set-up.
-    if (core::fits_narrow(tri.a, tri.b, tri.c, fraction))
-        return run(core::setup_triangle<core::span_rule::thin, std::int64_t>(tri.a, tri.b, tri.c, fraction));
-    return run(core::setup_triangle<core::span_rule::thin, int128>(tri.a, tri.b, tri.c, fraction));
+    if (core::fits_narrow(tri.a, tri.b, tri.c, fraction)) {
+        const auto t = core::setup_triangle<core::span_rule::thin, std::int64_t>(tri.a, tri.b, tri.c, fraction);
+        const auto p = core::to_uvw(t.axis, x, y, z);
+        source.begin_triangle(t);
+        source.begin_column(core::barycentric(t, p[0], p[1]));
+    } else {
+        const wide_triangle t = set_up_wide(tri.a, tri.b, tri.c, fraction, s.normal_factors);
+        const auto p = core::to_uvw(t.axis, x, y, z);
+        source.begin_triangle(t);
+        source.begin_column(wide_barycentric(tri.a, tri.b, tri.c, fraction, p[0], p[1]));
+    }
+    return source.shade(x, y, z);
 }
 
 } // namespace voxelpipe::device

@@ -16,6 +16,7 @@ namespace voxelpipe::device {
 
 inline constexpr std::int64_t small_cells = 16; // at most so many columns are one thread's work
 inline constexpr int chunk_columns = 16;        // of a large triangle's chunk: a row of so many
+inline constexpr int share_min_blocks = 3;      // per multiprocessor: registers for that many
 inline constexpr int chunks_per_record = 32;    // one a lane
 
 // 32 chunks of a large triangle.
@@ -91,8 +92,10 @@ __device__ inline void count_discarded(std::uint64_t discarded, pipeline_state* 
 //   keep(cell)                                                whether it is stored, or only counted as discarded
 //   store(position, primitive, cell)
 template <class Op>
-__global__ void share_count_small(const __grid_constant__ geometry geo, const __grid_constant__ Op op, share_buffers b,
-                                  pipeline_state* state) {
+__global__ __launch_bounds__(threads_per_block,
+                             share_min_blocks) void share_count_small(const __grid_constant__ geometry geo,
+                                                                      const __grid_constant__ Op op, share_buffers b,
+                                                                      pipeline_state* state) {
     using core::triangle_class;
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     const bool valid = i < geo.num_primitives;
@@ -163,8 +166,10 @@ __device__ void for_each_record(const geometry& geo, const Op& op, const share_b
 }
 
 template <class Op>
-__global__ void share_count_large(const __grid_constant__ geometry geo, const __grid_constant__ Op op, share_buffers b,
-                                  pipeline_state* state) {
+__global__ __launch_bounds__(threads_per_block,
+                             share_min_blocks) void share_count_large(const __grid_constant__ geometry geo,
+                                                                      const __grid_constant__ Op op, share_buffers b,
+                                                                      pipeline_state* state) {
     unsigned long long all = 0, discarded = 0;
     if (state->index_error == 0) {
         for_each_record(geo, op, b,
@@ -188,8 +193,10 @@ __global__ void share_count_large(const __grid_constant__ geometry geo, const __
 }
 
 template <class Op>
-__global__ void share_emit_small(const __grid_constant__ geometry geo, const __grid_constant__ Op op, share_buffers b,
-                                 const pipeline_state* state, capacities limits) {
+__global__ __launch_bounds__(threads_per_block,
+                             share_min_blocks) void share_emit_small(const __grid_constant__ geometry geo,
+                                                                     const __grid_constant__ Op op, share_buffers b,
+                                                                     const pipeline_state* state, capacities limits) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i >= geo.num_primitives || has_failed(*state, limits) || b.counts[i] == 0) return;
     const auto id = static_cast<std::uint32_t>(i);
@@ -207,8 +214,10 @@ __global__ void share_emit_small(const __grid_constant__ geometry geo, const __g
 // counts become what of a primitive is not yet placed: its records take their places in any order, which a later stable
 // sort by cell does not show, because a primitive meets a cell once.
 template <class Op>
-__global__ void share_emit_large(const __grid_constant__ geometry geo, const __grid_constant__ Op op, share_buffers b,
-                                 const pipeline_state* state, capacities limits) {
+__global__ __launch_bounds__(threads_per_block,
+                             share_min_blocks) void share_emit_large(const __grid_constant__ geometry geo,
+                                                                     const __grid_constant__ Op op, share_buffers b,
+                                                                     const pipeline_state* state, capacities limits) {
     if (has_failed(*state, limits)) return;
     for_each_record(geo, op, b,
                     [&](std::uint32_t id, const loaded_triangle& t, bool valid, const core::voxel_box& box) {

@@ -1,0 +1,118 @@
+#!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# run_gpu_suite.sh [part...]: the CUDA tests on this machine's GPU, with a record under tests/gpu_results/ (or where
+# VOXELPIPE_RESULTS says). Fails without a device, and where a part cannot run. Parts, all by default:
+#   default     the equality suite, scenes included where VOXELPIPE_SCENES_DIR has them
+#   fast_math   the suite without the scenes, built with -use_fast_math
+#   no_fmad     the same with --fmad=false
+#   sanitizer   compute-sanitizer memcheck, racecheck, initcheck and synccheck over a reduced suite
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+
+parts=("$@")
+[[ ${#parts[@]} -gt 0 ]] || parts=(default fast_math no_fmad sanitizer)
+results="${VOXELPIPE_RESULTS:-tests/gpu_results}"
+mkdir -p "$results"
+
+command -v nvcc >/dev/null || die "no nvcc on PATH"
+device="$(nvidia-smi --query-gpu=name --format=csv,noheader 2>/dev/null | head -n 1)" || true
+[[ -n $device ]] || die "no CUDA device: the suite was not run"
+driver="$(nvidia-smi --query-gpu=driver_version --format=csv,noheader | head -n 1)"
+clocks="$(nvidia-smi --query-gpu=clocks.sm,clocks.mem --format=csv,noheader | head -n 1)"
+toolkit="$(nvcc --version | sed -n 's/.*release \([0-9.]*\).*/\1/p')"
+commit="${VOXELPIPE_COMMIT:-$(git rev-parse --short HEAD 2>/dev/null || echo unknown)}"
+architecture="$(nvidia-smi --query-gpu=compute_cap --format=csv,noheader | head -n 1 | tr -d .)"
+
+record="$results/$(date -u +%Y-%m-%dT%H%M%SZ).txt"
+{
+    printf 'device: %s\ndriver: %s\nCUDA: %s\nclocks (SM, memory): %s\ncommit: %s\n\n' \
+        "$device" "$driver" "$toolkit" "$clocks" "$commit"
+    printf '%-12s %-28s %8s %8s %8s\n' part program passed failed seconds
+} >"$record"
+
+# Scenes are decoded beside the build, never inside the project.
+scenes="${VOXELPIPE_SCENES_DIR:-$root/../shared/scenes}"
+decode_scenes() {
+    [[ -e $scenes/vpmesh.py ]] || { printf 'note: no scenes at %s; generated meshes stand in\n' "$scenes" | tee -a "$record"; return 0; }
+    export VOXELPIPE_VPM_DIR="${TMPDIR:-/tmp}/voxelpipe-scenes"
+    mkdir -p "$VOXELPIPE_VPM_DIR"
+    local archive name
+    for archive in "$scenes"/*.vpz; do
+        name="$(basename "$archive" .vpz)"
+        [[ -e $VOXELPIPE_VPM_DIR/$name.vpm ]] || python3 "$scenes/vpmesh.py" decode "$archive" "$VOXELPIPE_VPM_DIR/$name.vpm" >/dev/null &
+    done
+    wait
+}
+
+failures=0
+# run_program PART LABEL COMMAND...: counts what the program's tests say, and a crash as a failure.
+run_program() {
+    local part=$1 name=$2 start=$SECONDS log passed failed status=0
+    shift 2
+    log="build/gpu-$part-$name.log"
+    "$@" >"$log" 2>&1 || status=$?
+    passed="$(grep -cE '^\[       OK \]' "$log" || true)"
+    failed="$(grep -E '^\[  FAILED  \]' "$log" | grep -cE 'ms\)$' || true)"
+    [[ $status -eq 0 || $failed -gt 0 ]] || failed=1
+    [[ $passed -gt 0 || $failed -gt 0 ]] || failed=1
+    printf '%-12s %-28s %8d %8d %8d\n' "$part" "$name" "$passed" "$failed" $((SECONDS - start)) | tee -a "$record"
+    failures=$((failures + failed))
+    if [[ $failed -gt 0 ]]; then grep -vE '^\[ (RUN|      OK)' "$log" | head -n 40; fi
+}
+
+# build_suite FOLDER FLAG...
+build_suite() {
+    local folder=$1
+    shift
+    cmake -S . -B "build/$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DVOXELPIPE_ENABLE_CUDA=ON \
+        -DVOXELPIPE_BUILD_SAMPLES=OFF -DVOXELPIPE_BUILD_BENCH=OFF -DCMAKE_CUDA_ARCHITECTURES="$architecture" \
+        -DCMAKE_CUDA_FLAGS="$*" ${CMAKE_PREFIX_PATH:+-DCMAKE_PREFIX_PATH="$CMAKE_PREFIX_PATH"} \
+        $([[ -d .deps ]] && printf -- '-DCMAKE_PREFIX_PATH=%s/.deps' "$root") >"build/configure-$folder.log" 2>&1 ||
+        { tail -n 40 "build/configure-$folder.log"; die "cmake could not configure $folder"; }
+    cmake --build "build/$folder" -j "$jobs" --target device_tests -- -k 0 >"build/make-$folder.log" 2>&1 || {
+        grep -E 'error|FAILED' "build/make-$folder.log" | head -n 20
+        printf 'note: %s did not build completely\n' "$folder" | tee -a "$record"
+        failures=$((failures + 1))
+    }
+}
+
+run_suite() {
+    local part=$1 folder=$2 program
+    for program in "build/$folder"/tests/device/device_*_test; do
+        [[ $part != default && $program == *scenes_test ]] && continue
+        run_program "$part" "$(basename "$program")" "$program"
+    done
+}
+
+mkdir -p build
+for part in "${parts[@]}"; do
+    case $part in
+    default)
+        decode_scenes
+        build_suite gpu
+        run_suite default gpu
+        ;;
+    fast_math)
+        build_suite gpu-fast-math -use_fast_math
+        run_suite fast_math gpu-fast-math
+        ;;
+    no_fmad)
+        build_suite gpu-no-fmad --fmad=false
+        run_suite no_fmad gpu-no-fmad
+        ;;
+    sanitizer)
+        command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"
+        [[ -e build/gpu/tests/device/device_reduced_test ]] || build_suite gpu
+        for tool in memcheck racecheck initcheck synccheck; do
+            run_program sanitizer "$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 \
+                build/gpu/tests/device/device_reduced_test
+        done
+        ;;
+    *) die "no part is called $part" ;;
+    esac
+done
+
+printf '\nfailures: %d\n' "$failures" | tee -a "$record"
+printf 'record: %s\n' "$record"
+[[ $failures -eq 0 ]]

@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Adversarial loads: one triangle over everything, a million in one voxel, grid-long slivers, zero-area triangles, and
+// mixtures; then random configurations. Equality with the CPU, and time limits that only a serial stage would miss.
+
+#include "cells.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+using namespace device_test;
+namespace blend = voxelpipe::blend;
+
+namespace {
+
+using bits = vp::target<vp::bit, blend::bit_or>;
+using sum = vp::target<float, blend::add>;
+using counts = vp::target<std::uint32_t, blend::count>;
+using last = vp::target<std::uint32_t, blend::replace>;
+
+struct load_values {
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& f) const {
+        return vp::outputs(true, f.barycentric.x, 0u, f.primitive);
+    }
+};
+
+void compare(const mesh_data& m, const vp::grid& g) {
+    for (const vp::coverage rule : both_rules) {
+        expect_same<bits>(m, g, vp::passthrough{}, vp::constant(true), rule);
+        expect_same<bits, sum, counts, last>(m, g, vp::passthrough{}, load_values{}, rule);
+    }
+}
+
+TEST(Balance, OneTriangleOverTheWholeGrid) {
+    mesh_data m;
+    add_triangle(m, {-3000.0f, -3000.0f, -100.0f}, {5000.0f, -3000.0f, 1500.0f}, {-3000.0f, 5000.0f, 600.0f});
+    for (const vp::coverage rule : both_rules) {
+        expect_same<bits>(m, box_grid({1024, 1024, 1024}), vp::passthrough{}, vp::constant(true), rule);
+        expect_same_lists<void>(m, box_grid({1024, 1024, 1024}), vp::passthrough{}, vp::constant(true), rule);
+    }
+    compare(m, box_grid({300, 400, 500}));
+}
+
+TEST(Balance, TwoMillionTrianglesInOneVoxel) {
+    std::mt19937 random(50);
+    std::uniform_real_distribution<float> inside(0.1f, 0.9f);
+    mesh_data m;
+    const auto point = [&] {
+        return glm::vec3(17.0f, 5.0f, 30.0f) + glm::vec3(inside(random), inside(random), inside(random));
+    };
+    for (int i = 0; i < 2000000; ++i) add_triangle(m, point(), point(), point());
+    compare(m, box_grid({64, 64, 64}));
+    expect_same_lists<void>(m, box_grid({64, 64, 64}), vp::passthrough{}, vp::constant(true),
+                            vp::coverage::conservative);
+}
+
+TEST(Balance, GridLongSlivers) {
+    std::mt19937 random(51);
+    std::uniform_real_distribution<float> unit(0.0f, 1.0f);
+    mesh_data m;
+    for (int i = 0; i < 100000; ++i) {
+        glm::vec3 a(unit(random), unit(random), unit(random)), b(unit(random), unit(random), unit(random));
+        a[i % 3] = -0.1f;
+        b[i % 3] = 1.1f;
+        if (i % 4 != 0) b = glm::vec3(i % 3 == 0 ? b.x : a.x, i % 3 == 1 ? b.y : a.y, i % 3 == 2 ? b.z : a.z);
+        const glm::vec3 c = b + glm::vec3(0.001f * unit(random), 0.001f * unit(random), 0.001f * unit(random));
+        add_triangle(m, a * 256.0f, b * 256.0f, c * 256.0f);
+    }
+    compare(m, box_grid({256, 256, 256}));
+}
+
+TEST(Balance, ThreeMillionZeroAreaTriangles) {
+    std::mt19937 random(52);
+    std::uniform_real_distribution<float> unit(0.0f, 128.0f);
+    mesh_data m;
+    for (int i = 0; i < 3000000; ++i) {
+        const glm::vec3 a(unit(random), unit(random), unit(random));
+        glm::vec3 b = a;
+        b[i % 3] += 1.5f;
+        add_triangle(m, a, i % 2 == 0 ? a : b, a);
+    }
+    compare(m, box_grid({128, 128, 128}));
+}
+
+// Everything at once, in several orders: order-free blends give one result.
+TEST(Balance, MixturesInAnyOrder) {
+    mesh_data m = mixed_triangles(200000, 128.0f, 53);
+    const vp::grid g = box_grid({128, 128, 128});
+    compare(m, g);
+    const auto run = [&](const mesh_data& data) {
+        vp::cuda_backend be;
+        vp::mesh mesh{be, data.positions, data.triangles};
+        vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
+        EXPECT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(0.3f), fb).ok());
+        return vp::get<0>(fb).to_host(be);
+    };
+    const auto expected = run(m);
+    std::mt19937 random(54);
+    for (int i = 0; i < 3; ++i) {
+        std::shuffle(m.triangles.begin(), m.triangles.end(), random);
+        expect_same_bytes(expected, run(m), "permuted");
+    }
+}
+
+TEST(Balance, RandomConfigurations) {
+    std::mt19937 random(static_cast<std::uint32_t>(
+        std::getenv("VOXELPIPE_TEST_SEED") != nullptr ? std::atoi(std::getenv("VOXELPIPE_TEST_SEED")) : 55));
+    for (int i = 0; i < 200; ++i) {
+        const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+        const int limit = i % 10 == 0 ? 300 : 70;
+        vp::grid g = box_grid({1 + below(limit), 1 + below(limit), 1 + below(limit)});
+        const float size = static_cast<float>(std::max({g.extent.x, g.extent.y, g.extent.z}));
+        const mesh_data m = mixed_triangles(1 + below(3000), size, random());
+        g.origin = glm::dvec3(below(3), 0.25, -below(2));
+        g.voxel_size = glm::dvec3(1.0 + 0.1 * below(3), 1.0, 0.9);
+        if (i % 3 == 0 && g.extent.x > 4) g = g.crop({g.extent.x / 3, 0, 0}, {g.extent.x / 2, g.extent.y, g.extent.z});
+        const vp::voxelize_options options{both_rules[random() % 2], i % 5 != 0};
+        SCOPED_TRACE("configuration " + std::to_string(i));
+        expect_same<bits, sum, counts, last>(m, g, vp::passthrough{}, load_values{}, options,
+                                             i % 2 == 0 ? start::clear : start::load);
+        expect_same_lists<void>(m, g, vp::passthrough{}, vp::constant(true), options);
+        if (HasFailure()) break;
+    }
+}
+
+} // namespace

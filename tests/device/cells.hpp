@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Shaders that give every render target values of its own type, with the hard ones among them (extremes, negative zero,
+// NaN, infinities), and the grids and meshes that every cell of (coverage x type x blend x targets) is compared on.
+
+#include "device_test.hpp"
+
+#include <limits>
+
+namespace device_test {
+
+[[nodiscard]] VOXELPIPE_HD inline std::uint32_t mix_bits(std::uint32_t h) {
+    h ^= h >> 16;
+    h *= 0x7feb352du;
+    h ^= h >> 15;
+    h *= 0x846ca68bu;
+    return h ^ (h >> 16);
+}
+
+template <class T>
+struct any_value {
+    VOXELPIPE_HD static T make(std::uint32_t h, float f) {
+        if constexpr (std::is_same_v<T, bool>) {
+            return h % 3 == 0;
+        } else if constexpr (std::is_integral_v<T>) {
+            const std::uint64_t wide = (static_cast<std::uint64_t>(mix_bits(h + 1)) << 32) | h;
+            switch (h % 5) {
+            case 0:
+                return static_cast<T>(wide);
+            case 1:
+                return std::numeric_limits<T>::max();
+            case 2:
+                return std::numeric_limits<T>::lowest();
+            default:
+                return static_cast<T>(wide % 100);
+            }
+        } else {
+            const float sign = (h & 64u) != 0 ? -1.0f : 1.0f;
+            switch (h % 29) {
+            case 0:
+                return static_cast<T>(std::numeric_limits<float>::quiet_NaN());
+            case 1:
+                return static_cast<T>(sign * std::numeric_limits<float>::infinity());
+            case 2:
+                return static_cast<T>(sign * 0.0f);
+            case 3:
+                return static_cast<T>(vp::exact::mul(sign, 3e9f)); // beyond the exact range of a sum of floats
+            case 4:
+                return static_cast<T>(vp::exact::mul(sign, 1e-20f));
+            case 5:
+                return static_cast<T>(vp::exact::mul(sign, 6e4f));
+            default:
+                return static_cast<T>(vp::exact::fma(f, 3.0f, sign));
+            }
+        }
+    }
+};
+template <glm::length_t N, class S, glm::qualifier Q>
+struct any_value<glm::vec<N, S, Q>> {
+    VOXELPIPE_HD static glm::vec<N, S, Q> make(std::uint32_t h, float f) {
+        glm::vec<N, S, Q> v;
+        for (glm::length_t i = 0; i < N; ++i) v[i] = any_value<S>::make(mix_bits(h + static_cast<std::uint32_t>(i)), f);
+        return v;
+    }
+};
+
+// One value per target from what the fragment is given; a fifth of the fragments is discarded.
+template <class... Targets>
+struct any_values {
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& f) const {
+        const std::uint32_t h =
+            mix_bits(f.primitive * 31u + static_cast<std::uint32_t>(f.voxel.x + 1009 * f.voxel.y + 20011 * f.voxel.z) +
+                     static_cast<std::uint32_t>(f.front_facing) + static_cast<std::uint32_t>(f.axis) * 7u);
+        const float value = (h & 1u) != 0 ? f.barycentric.y : f.normal.x;
+        return make(h, value, std::make_index_sequence<sizeof...(Targets)>{}).discard_if(h % 5 == 4);
+    }
+
+private:
+    template <std::size_t... I>
+    VOXELPIPE_HD static auto make(std::uint32_t h, float f, std::index_sequence<I...>) {
+        return vp::outputs(any_value<typename Targets::value_type>::make(mix_bits(h + I), f)...);
+    }
+};
+
+// Every cell of the targets, both coverages, cleared and loaded.
+template <class... Targets>
+void compare_cells() {
+    const any_values<Targets...> shader;
+    for (const vp::coverage rule : both_rules) {
+        expect_same<Targets...>(mixed_triangles(1500, 40.0f, 1), box_grid({40, 33, 47}), vp::passthrough{}, shader,
+                                rule);
+        expect_same<Targets...>(mixed_triangles(600, 30.0f, 2), box_grid({97, 9, 31}), vp::passthrough{}, shader, rule,
+                                start::load);
+        expect_same<Targets...>(mixed_triangles(200, 1.0f, 3), box_grid({1, 1, 1}), vp::passthrough{}, shader,
+                                vp::voxelize_options{rule, false}, start::load);
+        // Enough triangles in a few tiles that they are split.
+        expect_same<Targets...>(mixed_triangles(6000, 8.0f, 4), box_grid({8, 8, 8}), vp::passthrough{}, shader, rule);
+    }
+}
+
+} // namespace device_test

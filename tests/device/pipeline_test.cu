@@ -1,0 +1,377 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// The promises of a call beside its bits: status and counters, nothing written on failure, memory through the resource,
+// several draws with attributes and varyings, crops, streams, no wait in voxelize_async, graphs, tile policies.
+
+#include "cells.hpp"
+
+#include <numeric>
+
+using namespace device_test;
+namespace blend = voxelpipe::blend;
+
+namespace {
+
+using bits = vp::target<vp::bit, blend::bit_or>;
+using sum = vp::target<float, blend::add>;
+
+// glm arithmetic on the device: lost without --expt-relaxed-constexpr in some versions.
+struct varyings {
+    glm::vec3 colour;
+    std::array<float, 2> uv;
+    vp::flat<std::uint32_t> id;
+};
+struct moved {
+    glm::vec3 offset;
+    VOXELPIPE_HD vp::vertex_output<varyings> operator()(const vp::vertex<glm::vec3, std::uint32_t>& v) const {
+        const glm::vec3 p = v.position + offset;
+        return {p, {vp::get<0>(v), {p.x, p.y}, {vp::get<1>(v) + v.draw}}};
+    }
+};
+struct coloured {
+    float scale;
+    VOXELPIPE_HD auto operator()(const vp::fragment<varyings>& f) const {
+        const varyings c = f.clamped_varyings();
+        return vp::outputs(f.varyings.colour, vp::exact::mul(c.uv[1], scale), f.varyings.id.value + f.triangle,
+                           f.primitive)
+            .discard_if(f.varyings.id.value % 13 == 5);
+    }
+};
+
+template <class Backend>
+struct two_draws {
+    using mesh_type = vp::mesh<Backend, glm::vec3, std::uint32_t>;
+    using draw_type = vp::draw<vp::mesh_view<glm::vec3, std::uint32_t>, moved, coloured>;
+    using framebuffer =
+        vp::framebuffer<Backend, vp::target<glm::vec3, blend::add>, vp::target<float, blend::max>,
+                        vp::target<std::uint32_t, blend::min>, vp::target<std::uint32_t, blend::replace>>;
+
+    std::vector<mesh_type> meshes;
+    std::vector<draw_type> draws;
+
+    explicit two_draws(Backend& be) {
+        for (std::uint32_t k = 0; k < 3; ++k) {
+            mesh_data m = mixed_triangles(k == 1 ? 0 : 700, 40.0f, 20 + k);
+            std::vector<glm::vec3> colours(m.positions.size());
+            std::vector<std::uint32_t> ids(m.positions.size());
+            for (std::size_t i = 0; i < colours.size(); ++i) {
+                colours[i] = glm::vec3(static_cast<float>(i % 17), -static_cast<float>(i % 5), 0.1f);
+                ids[i] = static_cast<std::uint32_t>(i / 3);
+            }
+            meshes.emplace_back(be, m.positions, m.triangles, colours, ids);
+        }
+        for (std::size_t k = 0; k < 3; ++k)
+            draws.push_back(
+                {meshes[k].view(), {glm::vec3(static_cast<float>(k) * 1.25f)}, {0.5f + static_cast<float>(k)}});
+    }
+};
+
+template <class Backend>
+struct outcome {
+    vp::status s;
+    std::tuple<std::vector<glm::vec3>, std::vector<float>, std::vector<std::uint32_t>, std::vector<std::uint32_t>> data;
+};
+template <class Backend>
+outcome<Backend> run_draws(const vp::grid& g, vp::coverage rule) {
+    Backend be;
+    two_draws<Backend> scene(be);
+    typename two_draws<Backend>::framebuffer fb{be, g.extent};
+    using draw_type = typename two_draws<Backend>::draw_type;
+    outcome<Backend> o;
+    o.s = vp::voxelize(be, std::span<const draw_type>(scene.draws), g, fb, rule);
+    o.data = {vp::get<0>(fb).to_host(be), vp::get<1>(fb).to_host(be), vp::get<2>(fb).to_host(be),
+              vp::get<3>(fb).to_host(be)};
+    return o;
+}
+
+TEST(Pipeline, SeveralDrawsWithVaryings) {
+    const vp::grid whole = box_grid({40, 33, 47});
+    for (const vp::coverage rule : both_rules)
+        for (const vp::grid& g : {whole, whole.crop({7, 3, 11}, {20, 30, 17})}) {
+            const auto a = run_draws<vp::cpu_backend>(g, rule);
+            const auto b = run_draws<vp::cuda_backend>(g, rule);
+            ASSERT_TRUE(a.s.ok() && b.s.ok()) << b.s.message();
+            expect_same_counts(a.s.counts, b.s.counts);
+            expect_same_bytes(std::get<0>(a.data), std::get<0>(b.data), "add");
+            expect_same_bytes(std::get<1>(a.data), std::get<1>(b.data), "max");
+            expect_same_bytes(std::get<2>(a.data), std::get<2>(b.data), "min");
+            expect_same_bytes(std::get<3>(a.data), std::get<3>(b.data), "replace");
+        }
+}
+
+TEST(Pipeline, AnIndexOutOfRangeWritesNothing) {
+    mesh_data m = mixed_triangles(500, 20.0f, 30);
+    m.triangles[321].y = static_cast<std::uint32_t>(m.positions.size());
+    vp::cuda_backend be;
+    const vp::grid g = box_grid({20, 20, 20});
+    vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
+    cudaMemset(const_cast<float*>(vp::get<0>(fb).view().elements), 0x5a, 8000 * sizeof(float));
+    vp::mesh mesh{be, m.positions, m.triangles};
+    const vp::status s = vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(1.0f), fb);
+    EXPECT_EQ(s.code, vp::status_code::index_out_of_range);
+    EXPECT_EQ(s.where, vp::stage::coarse_raster);
+    EXPECT_EQ(s.counts.triangles_in, 500u);
+    for (const float v : vp::get<0>(fb).to_host(be)) ASSERT_EQ(std::bit_cast<std::uint32_t>(v), 0x5a5a5a5au);
+    vp::abuffer<vp::cuda_backend> lists{be};
+    EXPECT_EQ(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), lists).code,
+              vp::status_code::index_out_of_range);
+    EXPECT_EQ(lists.num_voxels(), 0u);
+}
+
+TEST(Pipeline, BadArgumentsAreRefused) {
+    vp::cuda_backend be;
+    mesh_data m = mixed_triangles(5, 20.0f, 31);
+    vp::mesh mesh{be, m.positions, m.triangles};
+    vp::framebuffer<vp::cuda_backend, bits> fb{be, {20, 20, 20}};
+    EXPECT_EQ(vp::voxelize(be, mesh, box_grid({20, 20, 21}), vp::passthrough{}, vp::constant(true), fb).code,
+              vp::status_code::extent_mismatch);
+    m.triangles.clear();
+    vp::mesh empty{be, m.positions, m.triangles};
+    EXPECT_EQ(vp::voxelize(be, empty, box_grid({20, 20, 20}), vp::passthrough{}, vp::constant(true), fb).code,
+              vp::status_code::empty_mesh);
+}
+
+// Counts what it gives out, and can refuse.
+struct counting_resource {
+    std::size_t live = 0, most = std::size_t{1} << 40;
+    int calls = 0;
+    void* allocate_async(std::size_t bytes, std::size_t, cudaStream_t stream) {
+        if (live + bytes > most) throw std::bad_alloc();
+        void* p = nullptr;
+        if (cudaMallocAsync(&p, bytes, stream) != cudaSuccess) throw std::bad_alloc();
+        live += bytes;
+        ++calls;
+        return p;
+    }
+    void deallocate_async(void* p, std::size_t bytes, std::size_t, cudaStream_t stream) {
+        cudaFreeAsync(p, stream);
+        live -= bytes;
+    }
+};
+
+TEST(Pipeline, MemoryComesFromTheResource) {
+    counting_resource resource;
+    {
+        vp::cuda_backend be{nullptr, resource};
+        const mesh_data m = mixed_triangles(500, 20.0f, 32);
+        const vp::grid g = box_grid({20, 20, 20});
+        vp::mesh mesh{be, m.positions, m.triangles};
+        vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
+        EXPECT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(1.0f), fb).ok());
+        EXPECT_GT(resource.calls, 3);
+        be.release();
+        resource.most = resource.live;
+        const vp::status s = vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(1.0f), fb);
+        EXPECT_EQ(s.code, vp::status_code::out_of_memory);
+    }
+    EXPECT_EQ(resource.live, 0u);
+}
+
+// More pairs, records and fragments than the first guess has room for.
+TEST(Pipeline, ACallThatOverflowsIsRunAgain) {
+    mesh_data m;
+    for (int i = 0; i < 40; ++i) {
+        const float h = static_cast<float>(i);
+        add_triangle(m, {-100.0f, -100.0f, h}, {700.0f, -100.0f, h + 30.0f}, {-100.0f, 700.0f, 300.0f});
+    }
+    const vp::grid g = box_grid({300, 300, 300});
+    for (const vp::coverage rule : both_rules) {
+        expect_same<bits>(m, g, vp::passthrough{}, vp::constant(true), rule);
+        expect_same_lists<void>(m, g, vp::passthrough{}, vp::constant(true), rule);
+    }
+}
+
+TEST(Pipeline, ListsWithPayloads) {
+    const any_values<vp::target<double, blend::replace>> shader;
+    for (const vp::coverage rule : both_rules) {
+        expect_same_lists<double>(mixed_triangles(2000, 40.0f, 33), box_grid({40, 33, 47}), vp::passthrough{}, shader,
+                                  rule);
+        expect_same_lists<void>(mixed_triangles(2000, 40.0f, 34), box_grid({40, 33, 47}), vp::passthrough{}, shader,
+                                rule);
+    }
+}
+
+// A linear id beyond 32 bits.
+TEST(Pipeline, ListsOfAGridBeyond32Bits) {
+    mesh_data m = mixed_triangles(300, 100.0f, 35);
+    for (glm::vec3& p : m.positions) p += glm::vec3(1900.0f, 1950.0f, 1980.0f);
+    for (const vp::coverage rule : both_rules)
+        expect_same_lists<void>(m, box_grid({2048, 2048, 2048}), vp::passthrough{}, vp::constant(true), rule);
+}
+
+struct small_tiles {
+    constexpr vp::tuning::fine_raster_policy operator()(int) const { return {64, 3, 4}; }
+};
+struct large_blocks {
+    constexpr vp::tuning::fine_raster_policy operator()(int) const { return {512, 4, 1}; }
+};
+
+template <class Selector>
+std::vector<float> run_policy(const mesh_data& m, const vp::grid& g, vp::coverage rule, vp::counters& counts) {
+    vp::cuda_backend be;
+    vp::mesh mesh{be, m.positions, m.triangles};
+    vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<float>>;
+    const draw_type d{mesh.view(), {}, vp::constant(0.3f)};
+    const vp::status s = be.run<Selector>(std::span<const draw_type>(&d, 1), g, fb.view(), vp::voxelize_options{rule},
+                                          m.triangles.size());
+    EXPECT_TRUE(s.ok()) << s.message();
+    counts = s.counts;
+    return vp::get<0>(fb).to_host(be);
+}
+
+TEST(Pipeline, ResultsDoNotDependOnThePolicy) {
+    const mesh_data m = mixed_triangles(4000, 60.0f, 36);
+    const vp::grid g = box_grid({61, 50, 67});
+    for (const vp::coverage rule : both_rules) {
+        vp::counters a, b, c;
+        const auto first = run_policy<vp::tuning::fine_raster_selector>(m, g, rule, a);
+        expect_same_bytes(first, run_policy<small_tiles>(m, g, rule, b), "small tiles");
+        expect_same_bytes(first, run_policy<large_blocks>(m, g, rule, c), "large blocks");
+        expect_same_counts(a, b);
+        expect_same_counts(a, c);
+    }
+}
+
+struct stream_owner {
+    cudaStream_t stream = nullptr;
+    stream_owner() { cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking); }
+    ~stream_owner() { cudaStreamDestroy(stream); }
+};
+
+using one_draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<float>>;
+
+TEST(Pipeline, TwoStreamsAtOnce) {
+    const mesh_data m = mixed_triangles(4000, 60.0f, 37);
+    const vp::grid g = box_grid({64, 64, 64});
+    vp::counters counts;
+    const auto expected = run_policy<vp::tuning::fine_raster_selector>(m, g, vp::coverage::conservative, counts);
+    stream_owner streams[2];
+    vp::cuda_backend first{streams[0].stream}, second{streams[1].stream};
+    vp::cuda_backend* const backends[2] = {&first, &second};
+    std::vector<vp::mesh<vp::cuda_backend>> meshes;
+    std::vector<vp::framebuffer<vp::cuda_backend, sum>> fbs;
+    std::vector<vp::cuda_backend::buffer<std::byte>> memory;
+    std::vector<vp::workspace_view> views;
+    const auto limits = vp::workspace_limits::for_triangles(4 * m.triangles.size());
+    for (vp::cuda_backend* be : backends) {
+        meshes.emplace_back(*be, m.positions, m.triangles);
+        fbs.emplace_back(*be, g.extent);
+        const one_draw d{meshes.back().view(), {}, vp::constant(0.3f)};
+        const std::size_t bytes =
+            vp::workspace_bytes(std::span<const one_draw>(&d, 1), g, fbs.back().view(), {}, limits);
+        ASSERT_GT(bytes, 0u);
+        memory.emplace_back(*be, bytes);
+        views.push_back({memory.back().data(), bytes, limits});
+    }
+    for (int round = 0; round < 5; ++round)
+        for (int k = 0; k < 2; ++k) {
+            const one_draw d{meshes[static_cast<std::size_t>(k)].view(), {}, vp::constant(0.3f)};
+            const vp::status s =
+                vp::voxelize_async(*backends[k], std::span<const one_draw>(&d, 1), g,
+                                   fbs[static_cast<std::size_t>(k)].view(), {}, views[static_cast<std::size_t>(k)]);
+            ASSERT_TRUE(s.ok()) << s.message();
+        }
+    for (std::size_t k = 0; k < 2; ++k) {
+        const vp::status s = vp::read_status(*backends[k], views[k]);
+        ASSERT_TRUE(s.ok()) << s.message();
+        expect_same_counts(counts, s.counts);
+        expect_same_bytes(expected, vp::get<0>(fbs[k]).to_host(*backends[k]), "stream");
+    }
+}
+
+TEST(Pipeline, AGraphIsReplayedWithChangedVertices) {
+    stream_owner owner;
+    vp::cuda_backend be{owner.stream};
+    const mesh_data m = mixed_triangles(3000, 60.0f, 38), other = mixed_triangles(3000, 60.0f, 39);
+    const vp::grid g = box_grid({64, 64, 64});
+    vp::cuda_backend::buffer<glm::vec3> positions(be, vp::array_view<const glm::vec3>(m.positions));
+    vp::cuda_backend::buffer<glm::uvec3> triangles(be, vp::array_view<const glm::uvec3>(m.triangles));
+    vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
+    const one_draw d{{positions.view(), triangles.view(), {}}, {}, vp::constant(0.3f)};
+    const std::span<const one_draw> draws(&d, 1);
+    const auto limits = vp::workspace_limits::for_triangles(4 * m.triangles.size());
+    const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), {}, limits);
+    vp::cuda_backend::buffer<std::byte> memory(be, bytes);
+    const vp::workspace_view workspace{memory.data(), bytes, limits};
+
+    cudaGraph_t graph = nullptr;
+    cudaGraphExec_t instance = nullptr;
+    ASSERT_EQ(cudaStreamBeginCapture(be.stream, cudaStreamCaptureModeGlobal), cudaSuccess);
+    const vp::status captured = vp::voxelize_async(be, draws, g, fb.view(), {}, workspace);
+    ASSERT_EQ(cudaStreamEndCapture(be.stream, &graph), cudaSuccess);
+    ASSERT_TRUE(captured.ok()) << captured.message();
+    ASSERT_EQ(cudaGraphInstantiate(&instance, graph, 0), cudaSuccess);
+    for (const mesh_data* data : {&m, &other, &m}) {
+        ASSERT_EQ(cudaMemcpyAsync(positions.data(), data->positions.data(), data->positions.size() * sizeof(glm::vec3),
+                                  cudaMemcpyHostToDevice, be.stream),
+                  cudaSuccess);
+        ASSERT_EQ(cudaGraphLaunch(instance, be.stream), cudaSuccess);
+        const vp::status s = vp::read_status(be, workspace);
+        ASSERT_TRUE(s.ok()) << s.message();
+        vp::counters counts;
+        mesh_data expected{data->positions, m.triangles};
+        const auto reference =
+            run_policy<vp::tuning::fine_raster_selector>(expected, g, vp::coverage::conservative, counts);
+        expect_same_counts(counts, s.counts);
+        expect_same_bytes(reference, vp::get<0>(fb).to_host(be), "graph");
+    }
+    cudaGraphExecDestroy(instance);
+    cudaGraphDestroy(graph);
+}
+
+TEST(Pipeline, AWorkspaceThatIsTooSmallSaysWhatIsNeeded) {
+    vp::cuda_backend be;
+    mesh_data m = mixed_triangles(3000, 60.0f, 40);
+    const vp::grid g = box_grid({200, 200, 200});
+    vp::mesh mesh{be, m.positions, m.triangles};
+    vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
+    const one_draw d{mesh.view(), {}, vp::constant(0.3f)};
+    const std::span<const one_draw> draws(&d, 1);
+    vp::workspace_limits limits{10, 1, 0, 0};
+    EXPECT_EQ(vp::voxelize_async(be, draws, g, fb.view(), {}, {nullptr, 0, limits}).code,
+              vp::status_code::capacity_exceeded);
+    cudaMemset(const_cast<float*>(vp::get<0>(fb).view().elements), 0x5a, 8000000 * sizeof(float));
+    bool done = false;
+    for (int tries = 0; tries < 4 && !done; ++tries) {
+        const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), {}, limits);
+        vp::cuda_backend::buffer<std::byte> memory(be, bytes);
+        const vp::workspace_view workspace{memory.data(), bytes, limits};
+        ASSERT_TRUE(vp::voxelize_async(be, draws, g, fb.view(), {}, workspace).ok());
+        const vp::status s = vp::read_status(be, workspace, &limits);
+        done = s.ok();
+        if (!done) {
+            ASSERT_EQ(s.code, vp::status_code::capacity_exceeded);
+            EXPECT_GT(s.required.tile_pairs, 10u);
+            for (const float v : vp::get<0>(fb).to_host(be)) ASSERT_EQ(std::bit_cast<std::uint32_t>(v), 0x5a5a5a5au);
+        }
+    }
+    ASSERT_TRUE(done);
+    vp::counters counts;
+    expect_same_bytes(run_policy<vp::tuning::fine_raster_selector>(m, g, vp::coverage::conservative, counts),
+                      vp::get<0>(fb).to_host(be), "after retry");
+}
+
+// add_unordered is not the same bits: it stays within the rounding of its additions.
+TEST(Pipeline, UnorderedSumsStayWithinABound) {
+    const mesh_data m = mixed_triangles(3000, 30.0f, 41);
+    const vp::grid g = box_grid({32, 32, 32});
+    using unordered = vp::target<float, blend::add_unordered>;
+    vp::cuda_backend be;
+    vp::mesh mesh{be, m.positions, m.triangles};
+    vp::framebuffer<vp::cuda_backend, unordered, vp::target<double, blend::add_unordered>,
+                    vp::target<double, blend::add>, vp::target<std::uint32_t, blend::count>>
+        fb{be, g.extent};
+    const vp::status s = vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(0.1f, 0.1, 0.1, 0u), fb);
+    ASSERT_TRUE(s.ok()) << s.message();
+    const auto f = vp::get<0>(fb).to_host(be);
+    const auto d = vp::get<1>(fb).to_host(be), exact = vp::get<2>(fb).to_host(be);
+    const auto n = vp::get<3>(fb).to_host(be);
+    for (std::size_t i = 0; i < f.size(); ++i) {
+        ASSERT_NEAR(static_cast<double>(f[i]), 0.1 * n[i], 1.2e-7 * n[i] * (0.1 * n[i] + 1.0));
+        ASSERT_NEAR(d[i], exact[i], 2.3e-16 * n[i] * (0.1 * n[i] + 1.0));
+    }
+}
+
+} // namespace

@@ -1,0 +1,140 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// voxelize_async: a framebuffer call that never waits and never allocates. It works in the caller's memory, so a CUDA
+// graph can capture it and replay it with changed vertices. Capacities are fixed beforehand; what does not fit leaves
+// every target as it was, and read_status says what would have been needed.
+
+#include <voxelpipe/device/backend.cuh>
+
+namespace voxelpipe {
+
+// How much a call may hold. tile_pairs: (tile, triangle) pairs; fragments: only for targets with blends that need
+// triangle order; the records are pieces of large triangles, 512 columns of tiles (or voxels) each.
+struct workspace_limits {
+    std::uint64_t tile_pairs = 0;
+    std::uint64_t tile_records = 0;
+    std::uint64_t fragments = 0;
+    std::uint64_t fragment_records = 0;
+
+    // A start for a mesh whose triangles are mostly smaller than a tile.
+    [[nodiscard]] static workspace_limits for_triangles(std::uint64_t triangles) {
+        return {triangles + triangles / 4 + 16384, triangles / 16 + 4096, 4 * triangles + 65536, triangles / 16 + 4096};
+    }
+};
+
+// Memory of the caller's, at least workspace_bytes(...) of it, aligned to 256 bytes, in use from the call until the
+// stream has passed it.
+struct workspace_view {
+    void* memory = nullptr;
+    std::size_t bytes = 0;
+    workspace_limits limits;
+};
+
+namespace device {
+
+template <class Call>
+[[nodiscard]] std::size_t bytes_of(const Call& call, coverage rule) {
+    arena plan;
+    pipeline_state* state = nullptr;
+    if (rule == coverage::thin)
+        call.template go<coverage::thin, false>(plan, state, nullptr);
+    else
+        call.template go<coverage::conservative, false>(plan, state, nullptr);
+    return plan.used();
+}
+
+[[nodiscard]] inline capacities to_capacities(const workspace_limits& l) {
+    return {l.tile_pairs, l.tile_records, l.fragments, l.fragment_records};
+}
+
+template <class Mesh, class VertexShader, class FragmentShader, class... Targets>
+[[nodiscard]] auto make_call(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
+                             const framebuffer_view<Targets...>& fb, const voxelize_options& options,
+                             std::uint64_t triangles, const workspace_limits& limits) {
+    return framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, framebuffer_view<Targets...>,
+                            tuning::fine_raster_selector>{
+        draws, g, fb, options, static_cast<std::uint32_t>(triangles), to_capacities(limits)};
+}
+
+} // namespace device
+
+// Bytes that voxelize_async needs for such a call; 0 where the arguments are refused.
+template <class Mesh, class VertexShader, class FragmentShader, class... Targets>
+[[nodiscard]] std::size_t workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
+                                          const grid& g, const framebuffer_view<Targets...>& fb,
+                                          const voxelize_options& options, const workspace_limits& limits) {
+    const status s = core::validate_draws(draws);
+    if (!s.ok() || !validate(g).ok()) return 0;
+    try {
+        return device::bytes_of(device::make_call(draws, g, fb, options, s.counts.triangles_in, limits), options.rule);
+    } catch (const device::cuda_failure&) {
+        return 0;
+    }
+}
+
+// Puts the call on the backend's stream and returns. A status other than ok means that nothing was launched, or that a
+// launch failed; what the device finds out is in read_status.
+template <class Mesh, class VertexShader, class FragmentShader, class... Targets>
+[[nodiscard]] status voxelize_async(cuda_backend& backend,
+                                    std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
+                                    const framebuffer_view<Targets...>& fb, const voxelize_options& options,
+                                    const workspace_view& workspace) {
+    if constexpr (core::shaders_fit_targets<Mesh, VertexShader, FragmentShader, Targets...>()) {
+        if (const status s = validate(g); !s.ok()) return s;
+        if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
+        status s = core::validate_draws(draws);
+        if (!s.ok()) return s;
+        try {
+            const auto call = device::make_call(draws, g, fb, options, s.counts.triangles_in, workspace.limits);
+            const std::size_t need = device::bytes_of(call, options.rule);
+            if (workspace.memory == nullptr || workspace.bytes < need) {
+                s.code = status_code::capacity_exceeded;
+                s.required = {workspace.limits.tile_pairs, workspace.limits.fragments, need};
+                return s;
+            }
+            device::arena memory(workspace.memory);
+            device::pipeline_state* state = nullptr; // the first thing in the workspace
+            if (options.rule == coverage::thin)
+                call.template go<coverage::thin, true>(memory, state, backend.stream);
+            else
+                call.template go<coverage::conservative, true>(memory, state, backend.stream);
+        } catch (const device::cuda_failure& e) {
+            return device::to_status(e);
+        }
+        return s;
+    } else {
+        return {};
+    }
+}
+
+// Waits for the stream and says how the last call in this workspace went. Where it was too small (capacity_exceeded),
+// `need`, if given, receives limits with which the same call succeeds, or comes closer: a pass that had no room for its
+// records has not seen all of its pairs.
+[[nodiscard]] inline status read_status(cuda_backend& backend, const workspace_view& workspace,
+                                        workspace_limits* need = nullptr) {
+    device::pipeline_state state{};
+    try {
+        device::check(cudaMemcpyAsync(&state, workspace.memory, sizeof(state), cudaMemcpyDeviceToHost, backend.stream));
+        device::check(cudaStreamSynchronize(backend.stream));
+    } catch (const device::cuda_failure& e) {
+        return device::to_status(e);
+    }
+    if (state.index_error != 0) return core::failure(status_code::index_out_of_range, stage::coarse_raster);
+    if (device::has_failed(state, device::to_capacities(workspace.limits))) {
+        status s = core::failure(status_code::capacity_exceeded, stage::coarse_raster);
+        s.required = {state.tile_pairs, state.list_fragments, 0};
+        if (need != nullptr) {
+            const auto larger = [](std::uint64_t a, std::uint64_t b) { return a > b ? a : b; };
+            *need = {larger(workspace.limits.tile_pairs, state.tile_pairs),
+                     larger(workspace.limits.tile_records, state.tile_records),
+                     larger(workspace.limits.fragments, state.list_fragments),
+                     larger(workspace.limits.fragment_records, state.fragment_records)};
+        }
+        return s;
+    }
+    return device::to_status(state);
+}
+
+} // namespace voxelpipe

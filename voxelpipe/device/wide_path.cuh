@@ -1,0 +1,66 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The 128-bit path of coverage, for the few triangles that are too large for 64 bits: out of line, so that its
+// registers and its code are not paid for by all others. Spans come a handful at a time.
+
+#include <voxelpipe/core/interpolate.hpp>
+#include <voxelpipe/core/primitive.hpp>
+
+namespace voxelpipe::device {
+
+struct wide_span {
+    int u, v, w_first, w_last;
+    glm::vec3 barycentric; // at the column's centre
+};
+
+struct wide_triangle {
+    int axis;
+    bool zero_area, front_facing;
+    glm::vec3 normal;
+};
+
+inline constexpr int wide_batch = 8;
+
+// Spans number `skip` and on within `box`; returns how many it wrote, fewer than wide_batch at the end.
+template <core::span_rule Rule>
+__device__ __noinline__ int wide_spans(core::snapped_position a, core::snapped_position b, core::snapped_position c,
+                                       int fraction, const core::voxel_box& box, int skip,
+                                       wide_span (&out)[wide_batch]) {
+    const auto t = core::setup_triangle<Rule, int128>(a, b, c, fraction);
+    int i = 0, n = 0;
+    core::for_each_span<Rule>(t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
+        if (i++ < skip || n == wide_batch) return;
+        out[n++] = {static_cast<int>(u), static_cast<int>(v), static_cast<int>(w0), static_cast<int>(w1),
+                    core::barycentric(t, u, v)};
+    });
+    return n;
+}
+
+template <class Factors>
+__device__ __noinline__ wide_triangle set_up_wide(core::snapped_position a, core::snapped_position b,
+                                                  core::snapped_position c, int fraction, Factors factors) {
+    const auto t = core::setup_triangle<core::span_rule::thin, int128>(a, b, c, fraction);
+    return {t.axis, t.zero_area, t.normal[2] >= 0, core::unit_normal(t, factors)};
+}
+
+template <class Position>
+__device__ __noinline__ glm::vec3 wide_barycentric(Position a, Position b, Position c, int fraction, std::int64_t u,
+                                                   std::int64_t v) {
+    return core::barycentric(core::setup_triangle<core::span_rule::thin, int128>(a, b, c, fraction), u, v);
+}
+
+// Calls visit(axis, span) for every span of a triangle that fits_narrow refuses.
+template <core::span_rule Rule, class Visit>
+__device__ void for_each_wide_span(core::snapped_position a, core::snapped_position b, core::snapped_position c,
+                                   int fraction, const core::voxel_box& box, Visit&& visit) {
+    wide_span spans[wide_batch];
+    for (int skip = 0;; skip += wide_batch) {
+        const int n = wide_spans<Rule>(a, b, c, fraction, box, skip, spans);
+        for (int i = 0; i < n; ++i) visit(spans[i]);
+        if (n < wide_batch) break;
+    }
+}
+
+} // namespace voxelpipe::device
