@@ -428,7 +428,7 @@ scene make_lighthouse() {
     for (const auto& [x, y, z, scale, turn] : boulders) place(0, "boulder", boulder, {x, y, z}, turn, scale);
 
     const std::size_t gull = add_mesh("gull", make_gull(m));
-    constexpr std::array<std::array<double, 5>, 4> gulls{{{4.6, 11.6, 3.4, 1.3, 40},
+    constexpr std::array<std::array<double, 5>, 4> gulls{{{6.6, 12.2, 0.8, 1.3, 40},
                                                           {-5.6, 14.2, 2.4, 1.15, 100},
                                                           {3.4, 16.4, -2.6, 1.0, 200},
                                                           {6.6, 8.6, -2.2, 1.1, 320}}};

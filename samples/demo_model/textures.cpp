@@ -49,7 +49,7 @@ in_cell cell(double at, double count) {
 } // namespace
 
 texture paint_tower() {
-    return paint("tower", 512, 512, [](double u, double v) {
+    return paint("tower", 256, 256, [](double u, double v) {
         const double grain = tiling_noise(u, v, 24, 1);
         const in_cell band = cell(v, 6);
         const bool red = static_cast<int>(band.number) % 2 == 0;
@@ -64,7 +64,7 @@ texture paint_tower() {
 }
 
 texture paint_rock() {
-    return paint("rock", 512, 512, [](double u, double v) {
+    return paint("rock", 256, 256, [](double u, double v) {
         const double coarse = tiling_noise(u, v, 6, 3), fine = tiling_noise(u, v, 40, 4);
         const double crack = std::abs(tiling_noise(u, v, 9, 5));
         double light = 0.84 + 0.20 * coarse + 0.14 * fine;
