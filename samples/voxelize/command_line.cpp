@@ -47,6 +47,17 @@ glm::dvec3 parse_point(const std::string& option, const std::string& text, std::
     return n.size() == 3 ? glm::dvec3(n[0], n[1], n[2]) : glm::dvec3(n[0]);
 }
 
+// One member of every entry, with commas between.
+template <class List, class Member>
+std::string names(const List& list, Member member) {
+    std::string text;
+    for (const auto& entry : list) {
+        if (!text.empty()) text += ", ";
+        text += entry.*member;
+    }
+    return text;
+}
+
 std::string lower(std::string text) {
     std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
     return text;
@@ -185,7 +196,7 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
            "--work-memory",
            [&options](int mebibytes) { options.voxelize.work_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
            "MiB for sums that exist only on the way; a grid that needs more is computed in slabs, with the same "
-           "result. Default: 512")
+           "result. Default: 128")
         ->check(CLI::Range(1, 1 << 20).description(""))
         ->option_text("MIB")
         ->group("Computation");
@@ -273,9 +284,8 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     for (const std::filesystem::path& output : options.outputs) {
         const format* found = find_format(output);
         if (found == nullptr) {
-            std::string known;
-            for (const format& entry : formats()) known += (known.empty() ? "" : ", ") + std::string(entry.extension);
-            throw usage_error("\"" + output.string() + "\": the extension of an output must be one of " + known);
+            throw usage_error("\"" + output.string() + "\": the extension of an output must be one of " +
+                              names(formats(), &format::extension));
         }
         if (std::count(options.outputs.begin(), options.outputs.end(), output) > 1)
             throw usage_error("\"" + output.string() + "\" is given twice");
@@ -286,12 +296,8 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     targets.clear();
     for (const std::string& name : raw.targets) {
         const std::optional<target> id = target_named(lower(name));
-        if (!id) {
-            std::string known;
-            for (const target_info& entry : target_table)
-                known += (known.empty() ? "" : ", ") + std::string(entry.name);
-            throw usage_error("--target \"" + name + "\" is not one of " + known);
-        }
+        if (!id)
+            throw usage_error("--target \"" + name + "\" is not one of " + names(target_table, &target_info::name));
         if (std::find(targets.begin(), targets.end(), *id) == targets.end()) targets.push_back(*id);
     }
     if (targets.empty()) {

@@ -15,6 +15,7 @@
 #include <bitset>
 #include <chrono>
 #include <cstring>
+#include <memory>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -236,42 +237,48 @@ private:
         stats_.voxels += status.counts.voxels;
     }
 
+    // The framebuffer of the slab before serves again where it has the size: its memory is there already.
+    template <class Framebuffer, std::size_t N>
+    Framebuffer& framebuffer_for(std::unique_ptr<Framebuffer>& kept, glm::ivec3 extent, std::bitset<N> enabled) {
+        if (kept == nullptr || kept->extent() != extent) {
+            kept.reset();
+            kept = std::make_unique<Framebuffer>(backend_, extent, enabled);
+        }
+        return *kept;
+    }
+
     void draw_bits(volume& result, const voxelpipe::grid& part, int begin) {
         std::bitset<2> enabled;
         enabled[0] = wants(target::occupancy) || !wants(target::count);
         enabled[1] = wants(target::count);
-        bits_framebuffer framebuffer{backend_, part.extent, enabled};
+        bits_framebuffer& framebuffer = framebuffer_for(bits_framebuffer_, part.extent, enabled);
         draw_reporting(bits_draws_, part, framebuffer);
         const stage_timer timer{*this, "resolve"};
-        if (wants(target::occupancy))
-            copy(result, target::occupancy, host_elements(backend_, vp::get<0>(framebuffer)), begin);
-        if (wants(target::count)) copy(result, target::count, host_elements(backend_, vp::get<1>(framebuffer)), begin);
+        if (wants(target::occupancy)) copy(result, target::occupancy, elements_of<0>(framebuffer), begin);
+        if (wants(target::count)) copy(result, target::count, elements_of<1>(framebuffer), begin);
     }
 
     void draw_surface(volume& result, const voxelpipe::grid& part, int begin) {
-        surface_framebuffer framebuffer{backend_, part.extent, enabled_targets()};
+        surface_framebuffer& framebuffer = framebuffer_for(surface_framebuffer_, part.extent, enabled_targets());
         if (enabled_targets()[triangle]) vp::get<triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
         draw_reporting(draws_, part, framebuffer);
         const stage_timer timer{*this, "resolve"};
-        if (wants(target::occupancy))
-            copy(result, target::occupancy, host_elements(backend_, vp::get<occupancy>(framebuffer)), begin);
-        if (wants(target::count))
-            copy(result, target::count, host_elements(backend_, vp::get<count>(framebuffer)), begin);
+        if (wants(target::occupancy)) copy(result, target::occupancy, elements_of<occupancy>(framebuffer), begin);
+        if (wants(target::count)) copy(result, target::count, elements_of<count>(framebuffer), begin);
         if (wants(target::color))
-            resolve_color(result, host_elements(backend_, vp::get<color_sum>(framebuffer)),
-                          host_elements(backend_, vp::get<count>(framebuffer)), begin);
-        if (wants(target::color_max))
-            copy(result, target::color_max, host_elements(backend_, vp::get<color_max>(framebuffer)), begin);
+            resolve_color(result, elements_of<color_sum>(framebuffer), elements_of<count>(framebuffer), begin);
+        if (wants(target::color_max)) copy(result, target::color_max, elements_of<color_max>(framebuffer), begin);
         if (wants(target::color_replace))
-            copy(result, target::color_replace, host_elements(backend_, vp::get<color_last>(framebuffer)), begin);
-        if (wants(target::normal))
-            resolve_normal(result, host_elements(backend_, vp::get<normal_sum>(framebuffer)), begin);
-        if (wants(target::triangle))
-            copy(result, target::triangle, host_elements(backend_, vp::get<triangle>(framebuffer)), begin);
-        if (wants(target::material))
-            resolve_material(result, host_elements(backend_, vp::get<triangle>(framebuffer)), begin);
-        if (wants(target::depth))
-            copy(result, target::depth, host_elements(backend_, vp::get<depth>(framebuffer)), begin);
+            copy(result, target::color_replace, elements_of<color_last>(framebuffer), begin);
+        if (wants(target::normal)) resolve_normal(result, elements_of<normal_sum>(framebuffer), begin);
+        if (wants(target::triangle)) copy(result, target::triangle, elements_of<triangle>(framebuffer), begin);
+        if (wants(target::material)) resolve_material(result, elements_of<triangle>(framebuffer), begin);
+        if (wants(target::depth)) copy(result, target::depth, elements_of<depth>(framebuffer), begin);
+    }
+
+    template <std::size_t I, class Framebuffer>
+    [[nodiscard]] auto elements_of(Framebuffer& framebuffer) {
+        return host_elements(backend_, vp::get<I>(framebuffer));
     }
 
     // The backend counts work of its own; the bar runs from 0 to 1 for each slab.
@@ -368,6 +375,8 @@ private:
     std::vector<buffer<glm::vec4>> colors_;
     std::vector<surface_draw> draws_;
     std::vector<bits_draw> bits_draws_;
+    std::unique_ptr<surface_framebuffer> surface_framebuffer_;
+    std::unique_ptr<bits_framebuffer> bits_framebuffer_;
     std::vector<std::uint64_t> first_triangle_; // of each draw
     std::vector<std::int32_t> material_of_;
     std::uint64_t num_triangles_ = 0;

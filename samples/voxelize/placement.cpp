@@ -15,7 +15,7 @@ namespace {
 constexpr double margin = 1e-4;
 
 [[noreturn]] void too_many_voxels(double count, int axis) {
-    throw grid_error("the grid would have " + std::to_string(static_cast<long long>(std::min(count, 9e18))) +
+    throw grid_error("the grid would have " + std::to_string(static_cast<long long>(std::fmin(count, 9e18))) +
                      " voxels along " + "xyz"[axis] + ", the most is " + std::to_string(voxelpipe::grid::max_extent));
 }
 

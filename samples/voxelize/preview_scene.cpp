@@ -149,7 +149,7 @@ std::array<std::int32_t, 2> preview_scene::row_ends(std::int32_t j, std::int32_t
     const std::byte* row = bits_ + k * slice_bytes_ + j * row_bytes_;
     const auto word = [&](std::int32_t w) {
         std::uint32_t value;
-        std::memcpy(&value, row + 4 * w, 4);
+        std::memcpy(&value, row + std::ptrdiff_t{4} * w, 4);
         return value;
     };
     const auto words = static_cast<std::int32_t>(row_bytes_ / 4);
@@ -186,7 +186,8 @@ vec3 preview_scene::surface_normal(const int3& voxel, const vec3& viewer, const 
     for (int z = 1; z <= side; ++z)
         for (int y = 1; y <= side; ++y) {
             const auto row = [&](int dy, int dz) {
-                return rows[static_cast<std::size_t>(z + dz)][static_cast<std::size_t>(y + dy)];
+                const auto at_y = static_cast<unsigned>(y + dy), at_z = static_cast<unsigned>(z + dz);
+                return rows[at_z][at_y];
             };
             const std::uint32_t here = row(0, 0) & inner;
             if (here == 0) continue;

@@ -49,8 +49,8 @@ public:
     [[nodiscard]] vec3 surface_normal(const std::array<std::int32_t, 3>& voxel, const vec3& viewer,
                                       const vec3& voxel_size) const;
 
-    // Calls visit(low corner, high corner) in voxels for the stretch of each row along x that its first and last occupied
-    // voxel bound; together these boxes have the convex hull of all occupied voxels.
+    // Calls visit(low corner, high corner) in voxels for the stretch of each row along x that its first and last
+    // occupied voxel bound; together these boxes have the convex hull of all occupied voxels.
     template <class Visit>
     void for_each_row(Visit visit) const {
         for (std::int32_t k = low_[2]; k < high_[2]; ++k)

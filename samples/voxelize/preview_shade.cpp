@@ -52,7 +52,7 @@ double srgb_to_linear(double v) { return v <= 0.04045 ? v / 12.92 : std::pow((v 
 std::uint8_t linear_to_srgb8(float linear) {
     const double v = std::clamp(static_cast<double>(linear), 0.0, 1.0);
     const double s = v <= 0.0031308 ? v * 12.92 : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
-    return static_cast<std::uint8_t>(s * 255 + 0.5);
+    return static_cast<std::uint8_t>(std::lround(s * 255));
 }
 
 // Leaves values below the knee as they are and bends the rest towards 1.
@@ -311,7 +311,7 @@ void preview_shader::render_rows(int from, int to, int components, std::uint8_t*
             std::uint8_t* out = pixels + (static_cast<std::ptrdiff_t>(y - from) * options_.width + x) * components;
             const float scale = components == 4 && alpha > 0 ? 1 / alpha : 1.0f;
             for (std::size_t a = 0; a < 3; ++a) out[a] = linear_to_srgb8(sum[a] * scale);
-            if (components == 4) out[3] = static_cast<std::uint8_t>(std::clamp(alpha, 0.0f, 1.0f) * 255 + 0.5f);
+            if (components == 4) out[3] = static_cast<std::uint8_t>(std::lround(std::clamp(alpha, 0.0f, 1.0f) * 255));
         }
 }
 

@@ -31,7 +31,7 @@ struct voxelize_request {
     backend_choice backend = backend_choice::automatic;
     int threads = 0; // 0: all cores
     // Bytes for what exists only while the pipeline runs. A grid that needs more is computed in slabs along z.
-    std::uint64_t work_memory = std::uint64_t{512} << 20;
+    std::uint64_t work_memory = std::uint64_t{128} << 20;
     std::function<void(double)> progress; // called with 0..1, one call at a time; may be empty
 };
 

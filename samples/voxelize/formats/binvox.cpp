@@ -17,7 +17,7 @@ namespace {
 // Collects runs of equal voxels and writes them as (value, length) byte pairs, each at most 255 long.
 class run_writer {
 public:
-    explicit run_writer(output_file& out) : out_(out) { pairs_.reserve(flush_bytes + 2 * 255); }
+    explicit run_writer(output_file& out) : out_(out) { pairs_.reserve(flush_bytes + 2); }
 
     void add(bool value, std::uint64_t length) {
         if (length == 0) return; // must not end a run of the other value

@@ -249,7 +249,7 @@ std::vector<std::filesystem::path> write_vox(const volume& v, const std::filesys
     std::vector<std::pair<std::string_view, chunk_bytes>> graph;
     if (!single) graph = scene_graph(v, blocks, to_file);
     constexpr std::uint64_t head = 12;
-    std::uint64_t children = head + 4 * 256;
+    std::uint64_t children = head + 1024; // the palette
     for (const block& b : blocks) children += head + 12 + head + 4 + 4 * b.count;
     for (const auto& [id, content] : graph) children += head + content.bytes().size();
     if (children > static_cast<std::uint64_t>(std::numeric_limits<std::int32_t>::max()))

@@ -36,6 +36,14 @@ void with_component(int component_type, Visit&& visit) {
     }
 }
 
+// The same for the unsigned types, which indices have.
+template <class Visit>
+void with_index_component(int component_type, Visit&& visit) {
+    if (component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE) return visit(std::uint8_t{});
+    if (component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT) return visit(std::uint16_t{});
+    return visit(std::uint32_t{});
+}
+
 std::size_t component_size(int component_type) {
     return static_cast<std::size_t>(tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(component_type)));
 }
@@ -72,11 +80,11 @@ std::vector<std::byte> accessor_reader::packed(std::size_t index, std::size_t el
             .subspan(static_cast<std::size_t>(accessor.sparse.indices.byteOffset));
     const std::span<const std::byte> values = view(static_cast<std::size_t>(accessor.sparse.values.bufferView))
                                                   .subspan(static_cast<std::size_t>(accessor.sparse.values.byteOffset));
-    with_component(accessor.sparse.indices.componentType, [&](auto component) {
+    with_index_component(accessor.sparse.indices.componentType, [&](auto component) {
         using Component = decltype(component);
         std::uint64_t least = 0;
         for (std::size_t i = 0; i < count; ++i) {
-            const auto place = static_cast<std::uint64_t>(load<Component>(&places[i * sizeof(Component)]));
+            const std::uint64_t place = load<Component>(&places[i * sizeof(Component)]);
             if (place < least || place >= accessor.count)
                 throw gltf_error(user + ": sparse index " + std::to_string(place) + " of accessors[" +
                                  std::to_string(index) + "] is " +
@@ -112,10 +120,9 @@ std::vector<std::uint32_t> accessor_reader::indices(std::size_t index, const std
     const std::vector<std::byte> elements = packed(index, component_size(accessor.componentType), user);
     memory_.charge(accessor.count, sizeof(std::uint32_t), user);
     std::vector<std::uint32_t> values(accessor.count);
-    with_component(accessor.componentType, [&](auto component) {
+    with_index_component(accessor.componentType, [&](auto component) {
         using Component = decltype(component);
-        for (std::size_t i = 0; i < values.size(); ++i)
-            values[i] = static_cast<std::uint32_t>(load<Component>(&elements[i * sizeof(Component)]));
+        for (std::size_t i = 0; i < values.size(); ++i) values[i] = load<Component>(&elements[i * sizeof(Component)]);
     });
     return values;
 }

@@ -56,7 +56,7 @@ std::filesystem::path local_path(const std::string& uri) {
     if (text.find('\0') != std::string::npos) throw gltf_error("a file name with a zero byte");
     if (const std::size_t colon = text.find(':'); colon != std::string::npos && text.find('/') > colon)
         throw gltf_error("not a relative path");
-    const std::filesystem::path path = std::filesystem::path(text).lexically_normal();
+    std::filesystem::path path = std::filesystem::path(text).lexically_normal();
     if (path.is_absolute() || text.front() == '\\') throw gltf_error("not a relative path");
     if (path.begin()->string() == "..") throw gltf_error("a path that leaves the folder of the file");
     return path;
