@@ -41,7 +41,8 @@ public:
     }
 
     template <class T>
-    std::size_t add_accessor(const std::vector<T>& values, int component, const char* type, int target, json more) {
+    std::size_t add_accessor(const std::vector<T>& values, int component, const char* type, int target,
+                             const json& more) {
         const std::size_t view = add_view(std::as_bytes(std::span{values}), target);
         json accessor{{"bufferView", view}, {"componentType", component}, {"count", values.size()}, {"type", type}};
         accessor.update(more);

@@ -101,8 +101,8 @@ TEST_F(DemoModel, IsValidAndUsesWhatTheLoaderReads) {
                 for (std::size_t c = 0; c < 3; ++c)
                     for (std::size_t a = 0; a < 3; ++a) {
                         ASSERT_LT(indices[n + c], positions.size() / 3);
-                        corner[c][a] = static_cast<double>(positions[3 * indices[n + c] + a]);
-                        normal[a] += static_cast<double>(normals[3 * indices[n + c] + a]);
+                        corner[c][a] = static_cast<double>(positions[3 * std::size_t{indices[n + c]} + a]);
+                        normal[a] += static_cast<double>(normals[3 * std::size_t{indices[n + c]} + a]);
                     }
                 double along = 0;
                 for (std::size_t a = 0; a < 3; ++a) {
