@@ -5,12 +5,13 @@
 // conservative, A-buffer thin and conservative. Median milliseconds of 20 calls after 3 warm-ups, CUDA events around
 // the whole call (clear and the wait for the counters included), mesh resident on the device. `async` is
 // voxelize_async.
-//   gpu_table FOLDER_OF_VPM_FILES > table.csv
+//   gpu_table FOLDER_OF_VPM_FILES [SCENE RESOLUTION] > table.csv
 
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <functional>
@@ -115,8 +116,9 @@ int main(int argc, char** argv) {
     std::printf("scene,resolution,cell,ms,async_ms,fragments\n");
     for (const char* scene : {"conference", "dragon", "blade", "hairball", "asiandragon"}) {
         const mesh_data m = read_vpm(std::string(argv[1]) + "/" + scene + ".vpm");
-        if (m.triangles.empty()) continue;
+        if (m.triangles.empty() || (argc > 2 && std::string(argv[2]) != scene)) continue;
         for (const int n : {128, 512, 1024}) {
+            if (argc > 3 && std::atoi(argv[3]) != n) continue;
             vp::cuda_backend be{stream};
             const vp::grid g = vp::fit(m.positions, glm::ivec3(n));
             const vp::mesh<vp::cuda_backend> mesh{be, m.positions, m.triangles};

@@ -19,10 +19,16 @@ namespace core {
 template <class... Ts>
 struct pack {};
 
-template <class First, class... Rest>
-struct pack<First, Rest...> {
+// No [[no_unique_address]]: nvcc 13.0 lays such members out differently on the host and on the device.
+template <class First>
+struct pack<First> {
     First first;
-    [[no_unique_address]] pack<Rest...> rest;
+};
+
+template <class First, class Second, class... Rest>
+struct pack<First, Second, Rest...> {
+    First first;
+    pack<Second, Rest...> rest;
 };
 
 template <std::size_t I, class... Ts>
@@ -67,7 +73,10 @@ namespace core {
 #endif
 template <class First, class... Rest>
 [[nodiscard]] VOXELPIPE_HD constexpr pack<First, Rest...> make_pack(First first, Rest... rest) {
-    return {static_cast<First&&>(first), make_pack(static_cast<Rest&&>(rest)...)};
+    if constexpr (sizeof...(Rest) == 0)
+        return {static_cast<First&&>(first)};
+    else
+        return {static_cast<First&&>(first), make_pack(static_cast<Rest&&>(rest)...)};
 }
 
 // Calls f.template operator()<I>() for I = 0 .. N - 1, in order.

@@ -20,6 +20,7 @@ namespace voxelpipe::device {
 template <coverage Rule, class Scene, class Key, class Payload, class MakePayload>
 struct fragment_cells {
     static constexpr coverage rule = Rule;
+    static constexpr std::int64_t small_columns = 256; // a warp per triangle pays only beyond
     static constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
 
     Scene s;
@@ -123,9 +124,9 @@ build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const share_buf
             const capacities& limits, bool counts_triangles, cudaStream_t stream) {
     const fragment_cells<Rule, Scene, Key, Payload, MakePayload> op{
         s, b.keys[0], b.values[0], b.primitives, b.payloads, counts_triangles};
-    fill_keys(b.keys[0], limits.fragments, stream);
     share_count(s.geo, op, share, state, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
     share_emit(s.geo, op, share, state, limits, stage::abuffer_emit, stream);
+    fill_end(b.keys[0], b.values[0], share.num_cells, limits.fragments, state, limits, stream);
     cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
     cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
     sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);

@@ -13,6 +13,7 @@ namespace voxelpipe::device {
 template <coverage Rule>
 struct tile_cells {
     static constexpr coverage rule = Rule;
+    static constexpr std::int64_t small_columns = 16;
     core::tile_grid tiles;
     std::uint32_t* keys;       // tile numbers
     std::uint32_t* primitives; // as long as keys

@@ -114,12 +114,6 @@ tile_image<Log2Size, Framebuffer, I...> image_type(std::index_sequence<I...>);
 
 // ---- memory ---------------------------------------------------------------------------------------------------------
 
-// What a framebuffer call keeps on the device.
-template <class Draw, class Framebuffer, class Selector>
-struct framebuffer_call;
-template <class Mesh, class VertexShader, class FragmentShader, class Framebuffer, class Selector>
-struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, Selector>;
-
 // Geometry and shading of the draws, and where they lie on the device.
 template <class Mesh, class VertexShader, class FragmentShader>
 struct scene_memory {
@@ -225,6 +219,8 @@ template <class Key, class Payload>
 
 // ---- a framebuffer call ---------------------------------------------------------------------------------------------
 
+template <class Draw, class Framebuffer, class Selector>
+struct framebuffer_call;
 template <class Mesh, class VertexShader, class FragmentShader, class Framebuffer, class Selector>
 struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, Selector> {
     using draw_type = draw<Mesh, VertexShader, FragmentShader>;
@@ -325,9 +321,9 @@ private:
             share.num_records = &state->tile_records;
             share.num_cells = &state->tile_pairs;
             const tile_cells<Rule> op{tiles, keys[0], primitives[0]};
-            fill_keys(keys[0], limits.tile_pairs, stream);
             share_count(s.geo, op, share, state, storage, storage_bytes, stage::coarse_raster, stream);
             share_emit(s.geo, op, share, state, limits, stage::coarse_raster, stream);
+            fill_end(keys[0], primitives[0], share.num_cells, limits.tile_pairs, state, limits, stream);
             cub::DoubleBuffer<std::uint32_t> k(keys[0], keys[1]), v(primitives[0], primitives[1]);
             sort_by_cell(k, v, limits.tile_pairs, bits, storage, storage_bytes, stage::tile_sort, stream);
             tile_split(k.Current(), split, state, limits, stream);

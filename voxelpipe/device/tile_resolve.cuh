@@ -9,7 +9,7 @@
 
 namespace voxelpipe::device {
 
-// Many images of one tile, merged as they are read.
+// Many images of one tile, merged as they are read, eight reads in flight.
 template <class Image>
 struct merged_source {
     const word* images;
@@ -18,17 +18,20 @@ struct merged_source {
     template <class Blend>
     __device__ typename Blend::cell cell(int offset, int i) const {
         auto c = Blend::load(images + offset, i, Image::voxels);
+#pragma unroll 8
         for (std::uint32_t k = 1; k < count; ++k) Blend::merge(c, Blend::load(image(k) + offset, i, Image::voxels));
         return c;
     }
     template <class BitBlend>
     __device__ word bits(int offset, int w) const {
         word c = images[offset + w];
+#pragma unroll 8
         for (std::uint32_t k = 1; k < count; ++k) BitBlend::merge(c, image(k)[offset + w]);
         return c;
     }
     __device__ std::uint32_t winner(int i) const {
         std::uint32_t c = 0;
+#pragma unroll 8
         for (std::uint32_t k = 0; k < count; ++k) {
             const std::uint32_t other = image(k)[Image::winner_at + i];
             c = other > c ? other : c;
@@ -37,6 +40,7 @@ struct merged_source {
     }
     __device__ word touched(int w) const {
         word c = 0;
+#pragma unroll 8
         for (std::uint32_t k = 0; k < count; ++k) c |= image(k)[Image::touched_at + w];
         return c;
     }

@@ -26,10 +26,24 @@ template <class Key>
     return bytes;
 }
 
-// Makes every key the filler; before the keys are written.
+// Makes the pairs beyond *num_pairs, or all where the call has failed, fillers that sort to the end.
 template <class Key>
-void fill_keys(Key* keys, std::uint64_t capacity, cudaStream_t stream) {
-    check(cudaMemsetAsync(keys, 0xff, capacity * sizeof(Key), stream), stage::tile_sort);
+__global__ void fill_end_kernel(Key* keys, std::uint32_t* values, const unsigned long long* num_pairs,
+                                std::uint64_t capacity, const pipeline_state* state, capacities limits) {
+    const std::uint64_t first = has_failed(*state, limits) ? 0 : *num_pairs;
+    for (std::uint64_t i = first + std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < capacity;
+         i += std::uint64_t{gridDim.x} * blockDim.x) {
+        keys[i] = static_cast<Key>(~Key{0});
+        values[i] = 0;
+    }
+}
+
+template <class Key>
+void fill_end(Key* keys, std::uint32_t* values, const unsigned long long* num_pairs, std::uint64_t capacity,
+              const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+    fill_end_kernel<<<fill_device(capacity), threads_per_block, 0, stream>>>(keys, values, num_pairs, capacity, state,
+                                                                             limits);
+    check(cudaGetLastError(), stage::tile_sort);
 }
 
 template <class Key>

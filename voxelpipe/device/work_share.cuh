@@ -14,10 +14,9 @@
 
 namespace voxelpipe::device {
 
-inline constexpr std::int64_t small_cells = 16; // at most so many columns are one thread's work
-inline constexpr int chunk_columns = 16;        // of a large triangle's chunk: a row of so many
-inline constexpr int share_min_blocks = 3;      // per multiprocessor: registers for that many
-inline constexpr int chunks_per_record = 32;    // one a lane
+inline constexpr int chunk_columns = 16;     // of a large triangle's chunk: a row of so many
+inline constexpr int share_min_blocks = 3;   // per multiprocessor: registers for that many
+inline constexpr int chunks_per_record = 32; // one a lane
 
 // 32 chunks of a large triangle.
 struct chunk_record {
@@ -25,9 +24,10 @@ struct chunk_record {
     std::uint32_t first; // 32nd chunks: chunk number / 32
 };
 
-[[nodiscard]] VOXELPIPE_HD inline bool is_small(const core::voxel_box& box) {
+// Whether a box of cells is one thread's work: at most so many columns, whichever the dominant axis.
+[[nodiscard]] VOXELPIPE_HD inline bool is_small(const core::voxel_box& box, std::int64_t most_columns) {
     const std::int64_t x = box.hi[0] - box.lo[0] + 1, y = box.hi[1] - box.lo[1] + 1, z = box.hi[2] - box.lo[2] + 1;
-    return core::max3(x * y, y * z, z * x) <= small_cells;
+    return core::max3(x * y, y * z, z * x) <= most_columns;
 }
 
 // The chunks of a box of cells: rows of up to 16 columns in the plane of u and v, all of w.
@@ -85,7 +85,8 @@ __device__ inline void count_discarded(std::uint64_t discarded, pipeline_state* 
 }
 
 // Op is the stage:
-//   static constexpr coverage rule;   bool counts_triangles (whether this stage fills the triangle counters)
+//   static constexpr coverage rule;   std::int64_t small_columns (what one thread takes)
+//     bool counts_triangles (whether this stage fills the triangle counters)
 //   voxel_box cells(voxel_box reach)                          voxels to cells
 //   enumerate(geometry, triangle, primitive, box, whole, visit)   calls visit(cell) for every cell within the box;
 //                                                                 whole: the box is all of the triangle's
@@ -114,7 +115,7 @@ __global__ __launch_bounds__(threads_per_block,
                 kind = triangle_class::zero_area;
             if (kind == triangle_class::drawn) {
                 const core::voxel_box box = op.cells(reach);
-                if (is_small(box)) {
+                if (is_small(box, Op::small_columns)) {
                     op.enumerate(geo, t, id, box, true, [&](const auto& cell) { ++(Op::keep(cell) ? n : discarded); });
                 } else {
                     const chunk_grid chunks(box, core::dominant_axis(t.a, t.b, t.c, geo.snap.fraction));
@@ -204,7 +205,7 @@ __global__ __launch_bounds__(threads_per_block,
     core::voxel_box reach{};
     (void)core::classify<Op::rule>(t.a, t.b, t.c, geo.snap.fraction, geo.whole_box(), reach);
     const core::voxel_box box = op.cells(reach);
-    if (!is_small(box)) return;
+    if (!is_small(box, Op::small_columns)) return;
     unsigned long long at = b.offsets[i];
     op.enumerate(geo, t, id, box, true, [&](const auto& cell) {
         if (Op::keep(cell)) op.store(at++, id, cell);
