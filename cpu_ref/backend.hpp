@@ -73,13 +73,8 @@ public:
                                  &progress};
         try {
             const auto s = cpu::make_scene(how, draws, g);
-            // Tile numbers of 32 bits keep the pairs small wherever the grid allows.
-            const bool small = core::tile_grid(g.extent, cpu::log2_tile_size).count() <= std::uint64_t{1} << 32;
-            if (options.rule == coverage::thin)
-                return small ? pass<coverage::thin, std::uint32_t>(how, s, out, options)
-                             : pass<coverage::thin, std::uint64_t>(how, s, out, options);
-            return small ? pass<coverage::conservative, std::uint32_t>(how, s, out, options)
-                         : pass<coverage::conservative, std::uint64_t>(how, s, out, options);
+            return options.rule == coverage::thin ? pass<coverage::thin>(how, s, out, options)
+                                                  : pass<coverage::conservative>(how, s, out, options);
         } catch (const std::bad_alloc&) {
             status failed = core::failure(status_code::out_of_memory);
             failed.counts.triangles_in = triangles_in;
@@ -92,15 +87,22 @@ public:
     }
 
 private:
-    template <coverage Rule, class Key, class Scene, class... Targets>
+    // Tile numbers of 32 bits keep the tile pairs small. A grid with more tiles than that has 2^47 voxels, more than
+    // any framebuffer holds, though not more than an A-buffer may span.
+    static bool has_small_keys(const grid& g) {
+        return core::tile_grid(g.extent, cpu::log2_tile_size).count() <= std::uint64_t{1} << 32;
+    }
+    template <coverage Rule, class Scene, class... Targets>
     status pass(const cpu::execution& how, const Scene& s, const framebuffer_view<Targets...>& fb,
                 const voxelize_options& options) {
-        return cpu::draw_framebuffer<Rule, Key>(how, s, fb, options.count_voxels);
+        if (!has_small_keys(s.where)) return core::failure(status_code::size_overflow);
+        return cpu::draw_framebuffer<Rule, std::uint32_t>(how, s, fb, options.count_voxels);
     }
-    template <coverage Rule, class Key, class Scene, class Payload>
+    template <coverage Rule, class Scene, class Payload>
     status pass(const cpu::execution& how, const Scene& s, abuffer<cpu_backend, Payload>& lists,
                 const voxelize_options&) {
-        return cpu::draw_abuffer<Rule, Key>(how, *this, s, lists);
+        return has_small_keys(s.where) ? cpu::draw_abuffer<Rule, std::uint32_t>(how, *this, s, lists)
+                                       : cpu::draw_abuffer<Rule, std::uint64_t>(how, *this, s, lists);
     }
 };
 
