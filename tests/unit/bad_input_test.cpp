@@ -413,6 +413,18 @@ TEST(BadInput, SizesThatCannotBeAddressed) {
     EXPECT_EQ(live_allocations, before);
 }
 
+TEST(BadInput, AFramebufferWithMoreTilesThanNumbersIsRefused) {
+    const glm::ivec3 extent(vp::grid::max_extent); // 2^45 tiles; no memory, because its one target is off
+    vp::cpu_backend be(1);
+    call c;
+    c.grid.extent = extent;
+    vp::framebuffer_view<vp::target<vp::bit, vp::blend::bit_or>> view;
+    view.extent = extent;
+    vp::get<0>(view.targets).load = vp::load_operation::off;
+    EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, vp::constant(true), view).code,
+              status_code::size_overflow);
+}
+
 TEST(BadInput, AFramebufferOfABadExtentOwnsNothingAndIsRefused) {
     vp::cpu_backend be(1);
     for (const glm::ivec3 extent : {glm::ivec3(0, 8, 8), glm::ivec3(8, -1, 8), glm::ivec3(INT_MIN)}) {
