@@ -4,7 +4,7 @@
 // Fuzzing the API: bytes become a grid, a crop of it, a mesh and a coverage rule; the library's A-buffer and
 // framebuffer must be the oracle's voxels, and bad input must be refused with the right code. A libFuzzer target, or,
 // built with VOXELPIPE_FUZZ_REPLAY by any compiler, a program that runs the files and folders it is given, and without
-// arguments pseudo-random inputs (VOXELPIPE_FUZZ_INPUTS of them, 40000 if unset).
+// arguments pseudo-random inputs (VOXELPIPE_FUZZ_INPUTS of them, 15000 if unset).
 
 #include "library.hpp"
 
@@ -287,7 +287,7 @@ int main(int argc, char** argv) {
     for (int n = 1; n < argc; ++n) replay(argv[n]);
     if (argc > 1) return 0;
     const char* const inputs = std::getenv("VOXELPIPE_FUZZ_INPUTS");
-    random_inputs(inputs != nullptr ? std::strtoull(inputs, nullptr, 10) : 40000);
+    random_inputs(inputs != nullptr ? std::strtoull(inputs, nullptr, 10) : 15000);
     return 0;
 }
 #endif

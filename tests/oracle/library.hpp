@@ -115,13 +115,16 @@ inline std::string describe(const grid& g, const world_triangle& t) {
     return text.str();
 }
 
-// How many triangles all classes together are tested with: VOXELPIPE_ORACLE_TRIANGLES, or `usual` scaled down by
-// VOXELPIPE_TEST_SCALE (slow builds).
+// VOXELPIPE_TEST_SCALE, which slow builds set below 1; 1 otherwise.
+inline double test_scale() {
+    const char* const scale = std::getenv("VOXELPIPE_TEST_SCALE");
+    return scale == nullptr ? 1.0 : std::strtod(scale, nullptr);
+}
+
+// How many triangles all classes together are tested with: VOXELPIPE_ORACLE_TRIANGLES, or `usual` by the test scale.
 inline std::uint64_t triangle_budget(std::uint64_t usual) {
     if (const char* const count = std::getenv("VOXELPIPE_ORACLE_TRIANGLES")) return std::strtoull(count, nullptr, 10);
-    if (const char* const scale = std::getenv("VOXELPIPE_TEST_SCALE"))
-        return static_cast<std::uint64_t>(static_cast<double>(usual) * std::strtod(scale, nullptr));
-    return usual;
+    return static_cast<std::uint64_t>(static_cast<double>(usual) * test_scale());
 }
 
 } // namespace oracle

@@ -8,6 +8,7 @@
 
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <span>
 #include <tuple>
@@ -23,28 +24,30 @@ struct payload {
     friend bool operator==(const payload&, const payload&) = default;
 };
 
-inline payload value_of(const vp::fragment<>& f) {
+// `primitive`: the fragment's, or 0 to leave it out.
+payload value_of(const vp::fragment<>& f, std::uint32_t primitive) {
     const auto mix = [](std::uint32_t h) {
         h = (h ^ (h >> 16)) * 0x7feb352du;
         h = (h ^ (h >> 15)) * 0x846ca68bu;
         return h ^ (h >> 16);
     };
     const std::uint32_t h =
-        mix(mix(mix(f.primitive) + static_cast<std::uint32_t>(f.voxel.x)) +
-            static_cast<std::uint32_t>(f.voxel.y) * 31u + static_cast<std::uint32_t>(f.voxel.z) * 977u);
+        mix(mix(mix(primitive) + static_cast<std::uint32_t>(f.voxel.x)) + static_cast<std::uint32_t>(f.voxel.y) * 31u +
+            static_cast<std::uint32_t>(f.voxel.z) * 977u);
     // Floats of all sizes and signs, a few of them zero.
     const float level = h % 16 == 0 ? 0.0f
                                     : std::ldexp(static_cast<float>(static_cast<std::int32_t>(h)),
                                                  static_cast<int>(h % 53) - 50 + (f.barycentric.x > 0.5f ? 1 : 0));
-    return {level, h, static_cast<std::int64_t>(h) * 0x100000001ll - 7};
+    return {level, h, static_cast<std::int64_t>(h * 0x100000001ull - 7)};
 }
 
 bool discards(const payload& p) { return p.word % 11 == 3; }
 
 struct to_payload {
+    bool keep_all = false;
     vp::output<payload> operator()(const vp::fragment<>& f) const {
-        const payload p = value_of(f);
-        return vp::outputs(p).discard_if(discards(p));
+        const payload p = value_of(f, f.primitive);
+        return vp::outputs(p).discard_if(!keep_all && discards(p));
     }
 };
 
@@ -60,14 +63,15 @@ using add_target = vp::target<std::uint32_t, vp::blend::add>;
 using min_target = vp::target<float, vp::blend::min>;
 using max_target = vp::target<std::int64_t, vp::blend::max>;
 using xor_target = vp::target<std::uint32_t, vp::blend::bit_xor>;
-using sum_target = vp::target<float, vp::blend::add>;
+using float_target = vp::target<float, vp::blend::add>;
 using chain_target = vp::target<std::uint32_t, chain>;
 using count_target = vp::target<std::uint32_t, vp::blend::count>;
 
 struct to_targets {
+    bool with_primitive = true;
     vp::output<std::uint32_t, std::uint32_t, float, std::int64_t, std::uint32_t, float, std::uint32_t, std::uint32_t>
     operator()(const vp::fragment<>& f) const {
-        const payload p = value_of(f);
+        const payload p = value_of(f, with_primitive ? f.primitive : 0);
         return vp::outputs(p.word, p.word, p.level, p.large, p.word, p.level, p.word, 0u).discard_if(discards(p));
     }
 };
@@ -92,12 +96,15 @@ float exact_sum(const std::vector<float>& terms) {
     return oracle::nearest_float({sum, oracle::wide(1).shifted_left(32)});
 }
 
+using framebuffer = vp::framebuffer<vp::cpu_backend, replace_target, add_target, min_target, max_target, xor_target,
+                                    float_target, chain_target, count_target>;
+
 class ABuffer : public ::testing::TestWithParam<vp::coverage> {};
 
 TEST_P(ABuffer, HoldsEveryPairOnceInOrder) {
     splitmix64 random(81);
     for (const test_grid& where : oracle::test_grids()) {
-        const auto triangles = all_kinds(random, where, 60);
+        const auto triangles = all_kinds(random, where, scaled(60));
         const oracle::soup mesh(triangles);
         const vp::grid g = oracle::as_library(where.g);
         for (const unsigned threads : {1u, 3u}) {
@@ -131,16 +138,13 @@ TEST_P(ABuffer, HoldsEveryPairOnceInOrder) {
 // Discarding takes fragments away from a voxel and leaves the others as they were.
 TEST_P(ABuffer, DiscardRemovesJustThoseFragments) {
     splitmix64 random(82);
-    struct keep_all {
-        vp::output<payload> operator()(const vp::fragment<>& f) const { return vp::outputs(value_of(f)); }
-    };
     for (const test_grid& where : oracle::test_grids()) {
-        const auto triangles = all_kinds(random, where, 30);
+        const auto triangles = all_kinds(random, where, scaled(30));
         const oracle::soup mesh(triangles);
         const vp::grid g = oracle::as_library(where.g);
         vp::cpu_backend be(2);
         vp::abuffer<vp::cpu_backend, payload> all{be}, some{be};
-        vp::voxelize(be, mesh.view(), g, vp::passthrough{}, keep_all{}, all, GetParam()).or_throw();
+        vp::voxelize(be, mesh.view(), g, vp::passthrough{}, to_payload{true}, all, GetParam()).or_throw();
         vp::voxelize(be, mesh.view(), g, vp::passthrough{}, to_payload{}, some, GetParam()).or_throw();
         struct entry {
             std::uint64_t voxel;
@@ -167,15 +171,13 @@ TEST_P(ABuffer, FoldedWithABlendIsTheFramebuffer) {
     std::uint64_t deepest = 0;
     for (const test_grid& where : oracle::test_grids()) {
         if (!where.dense) continue;
-        const auto triangles = all_kinds(random, where, 60);
+        const auto triangles = all_kinds(random, where, scaled(60));
         const oracle::soup mesh(triangles);
         const vp::grid g = oracle::as_library(where.g);
         vp::cpu_backend be(2);
         vp::abuffer<vp::cpu_backend, payload> lists{be};
         vp::voxelize(be, mesh.view(), g, vp::passthrough{}, to_payload{}, lists, GetParam()).or_throw();
-        vp::framebuffer<vp::cpu_backend, replace_target, add_target, min_target, max_target, xor_target, sum_target,
-                        chain_target, count_target>
-            fb{be, g.extent};
+        framebuffer fb{be, g.extent};
         vp::get<0>(fb).clear(123u);
         vp::get<5>(fb).clear(0.5f);
         const vp::status s = vp::voxelize(be, mesh.view(), g, vp::passthrough{}, to_targets{}, fb, GetParam());
@@ -231,40 +233,44 @@ TEST_P(ABuffer, FoldedWithABlendIsTheFramebuffer) {
 // Two draws of one call, and two calls of which the second loads, are the whole mesh in one.
 TEST_P(ABuffer, TwoDrawsAndTwoCallsAreOne) {
     splitmix64 random(84);
-    struct words { // nothing of the primitive's number, which starts again with each call
-        vp::output<std::uint32_t, std::uint32_t, std::uint32_t> operator()(const vp::fragment<>& f) const {
-            const std::uint32_t w = std::bit_cast<std::uint32_t>(f.barycentric.x) +
-                                    static_cast<std::uint32_t>(f.voxel.x + 64 * f.voxel.y + 4096 * f.voxel.z);
-            return vp::outputs(w, w, w).discard_if(w % 13 == 0);
-        }
-    };
+    // Nothing of the primitive's number, which starts again with each call.
+    const to_targets shader{false};
     for (const test_grid& where : oracle::test_grids()) {
         if (!where.dense) continue;
-        const auto triangles = all_kinds(random, where, 30);
+        const auto triangles = all_kinds(random, where, scaled(30));
         const oracle::soup mesh(triangles);
         const vp::grid g = oracle::as_library(where.g);
         vp::cpu_backend be(2);
-        using framebuffer = vp::framebuffer<vp::cpu_backend, add_target, xor_target, replace_target>;
         framebuffer whole{be, g.extent}, draws{be, g.extent}, calls{be, g.extent};
         const std::size_t half = triangles.size() / 2;
         const vp::array_view<const glm::uvec3> all(mesh.triangles.data(), mesh.triangles.size());
         const vp::mesh_view<> first{mesh.positions, {all.data(), half}};
         const vp::mesh_view<> second{mesh.positions, {all.data() + half, all.size() - half}};
         const vp::status in_one =
-            vp::voxelize(be, mesh.view(), g, vp::passthrough{}, words{}, whole, GetParam()).or_throw();
-        using draw = vp::draw<vp::mesh_view<>, vp::passthrough, words>;
-        const draw both[] = {{first, {}, {}}, {second, {}, {}}};
+            vp::voxelize(be, mesh.view(), g, vp::passthrough{}, shader, whole, GetParam()).or_throw();
+        using draw = vp::draw<vp::mesh_view<>, vp::passthrough, to_targets>;
+        const draw both[] = {{first, {}, shader}, {second, {}, shader}};
         const vp::status in_two = vp::voxelize(be, std::span<const draw>(both), g, draws, GetParam()).or_throw();
         EXPECT_TRUE(in_one.counts == in_two.counts);
-        const vp::status a = vp::voxelize(be, first, g, vp::passthrough{}, words{}, calls, GetParam()).or_throw();
+        const vp::status a = vp::voxelize(be, first, g, vp::passthrough{}, shader, calls, GetParam()).or_throw();
         vp::get<0>(calls).load();
         vp::get<1>(calls).load();
         vp::get<2>(calls).load();
-        const vp::status b = vp::voxelize(be, second, g, vp::passthrough{}, words{}, calls, GetParam()).or_throw();
+        vp::get<3>(calls).load();
+        vp::get<4>(calls).load();
+        vp::get<6>(calls).load();
+        vp::get<7>(calls).load();
+        vp::get<5>(calls).off(); // a sum of floats is rounded at the end of each call
+        const vp::status b = vp::voxelize(be, second, g, vp::passthrough{}, shader, calls, GetParam()).or_throw();
         EXPECT_EQ(a.counts.fragments + b.counts.fragments, in_one.counts.fragments);
         EXPECT_EQ(a.counts.fragments_discarded + b.counts.fragments_discarded, in_one.counts.fragments_discarded);
         const auto contents = [&](framebuffer& fb) {
-            return std::tuple(vp::get<0>(fb).to_host(be), vp::get<1>(fb).to_host(be), vp::get<2>(fb).to_host(be));
+            const auto lowest = vp::get<2>(fb).to_host(be);
+            std::vector<std::uint32_t> lowest_bits(lowest.size()); // NaN where empty
+            std::memcpy(lowest_bits.data(), lowest.data(), lowest.size() * sizeof(float));
+            return std::tuple(vp::get<0>(fb).to_host(be), vp::get<1>(fb).to_host(be), lowest_bits,
+                              vp::get<3>(fb).to_host(be), vp::get<4>(fb).to_host(be), vp::get<6>(fb).to_host(be),
+                              vp::get<7>(fb).to_host(be));
         };
         EXPECT_TRUE(contents(whole) == contents(draws)) << where.name;
         EXPECT_TRUE(contents(whole) == contents(calls)) << where.name;

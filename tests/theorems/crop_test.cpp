@@ -12,44 +12,6 @@
 namespace theorems {
 namespace {
 
-// Sums, an order-dependent target and one that shows the shader's input, so that a fragment lost, doubled or shaded
-// otherwise shows.
-using occupancy = vp::target<vp::bit, vp::blend::bit_or>;
-using last = vp::target<std::uint32_t, vp::blend::replace>;
-using sum = vp::target<glm::vec3, vp::blend::add>;
-using where_seen = vp::target<glm::ivec3, vp::blend::max>;
-
-struct shade {
-    vp::output<bool, std::uint32_t, glm::vec3, glm::ivec3> operator()(const vp::fragment<>& f) const {
-        return vp::outputs(true, f.primitive, f.barycentric, f.voxel);
-    }
-};
-
-struct image {
-    glm::ivec3 extent;
-    vp::host_target<occupancy> bits;
-    vp::host_target<last> ids;
-    vp::host_target<sum> sums;
-    vp::host_target<where_seen> voxels;
-    vp::counters counts;
-};
-
-image draw(const vp::grid& g, const std::vector<world_triangle>& triangles, vp::coverage rule) {
-    const oracle::soup mesh(triangles);
-    vp::cpu_backend be(2);
-    vp::framebuffer<vp::cpu_backend, occupancy, last, sum, where_seen> fb{be, g.extent};
-    vp::get<1>(fb).clear(0xffffffffu);
-    vp::get<3>(fb).clear(glm::ivec3(-1));
-    const vp::status s = vp::voxelize(be, mesh.view(), g, vp::passthrough{}, shade{}, fb, rule);
-    s.or_throw();
-    return {g.extent,
-            vp::get<0>(fb).to_host_target(be),
-            vp::get<1>(fb).to_host_target(be),
-            vp::get<2>(fb).to_host_target(be),
-            vp::get<3>(fb).to_host_target(be),
-            s.counts};
-}
-
 template <class T>
 bool same_bytes(const T& a, const T& b) {
     return std::memcmp(&a, &b, sizeof(T)) == 0;
@@ -60,12 +22,12 @@ void expect_crop(const image& whole, const image& part, const oracle::part& p) {
         for (int y = 0; y < p.size[1]; ++y)
             for (int x = 0; x < p.size[0]; ++x) {
                 const int i = x + p.begin[0], j = y + p.begin[1], k = z + p.begin[2];
-                ASSERT_EQ(part.bits(x, y, z), whole.bits(i, j, k));
-                ASSERT_EQ(part.ids(x, y, z), whole.ids(i, j, k));
+                ASSERT_EQ(part.occupied(x, y, z), whole.occupied(i, j, k));
+                ASSERT_EQ(part.last(x, y, z), whole.last(i, j, k));
                 ASSERT_TRUE(same_bytes(part.sums(x, y, z), whole.sums(i, j, k)));
-                ASSERT_EQ(part.voxels(x, y, z), whole.voxels(i, j, k));
-                if (part.bits(x, y, z)) {
-                    ASSERT_EQ(part.voxels(x, y, z), glm::ivec3(i, j, k));
+                ASSERT_EQ(part.places(x, y, z), whole.places(i, j, k));
+                if (part.occupied(x, y, z)) {
+                    ASSERT_EQ(part.places(x, y, z), glm::ivec3(i, j, k));
                 }
             }
 }
@@ -76,12 +38,12 @@ TEST_P(Crop, OfAFramebufferIsTheFramebufferOfThePart) {
     splitmix64 random(71);
     for (const test_grid& where : oracle::test_grids()) {
         if (!where.dense) continue;
-        const auto triangles = all_kinds(random, where, 60);
+        const auto triangles = all_kinds(random, where, scaled(60));
         const vp::grid g = oracle::as_library(where.g);
-        const image whole = draw(g, triangles, GetParam());
+        const image whole = library_image(g, triangles, GetParam());
         for (int n = 0; n < 12; ++n) {
             const oracle::part p = n == 0 ? oracle::whole_of(where.g) : oracle::random_part(random, where.g, 4096);
-            const image part = draw(oracle::as_library(where.g, p), triangles, GetParam());
+            const image part = library_image(oracle::as_library(where.g, p), triangles, GetParam());
             expect_crop(whole, part, p);
             if (HasFatalFailure()) return;
         }
@@ -91,19 +53,20 @@ TEST_P(Crop, OfAFramebufferIsTheFramebufferOfThePart) {
 TEST_P(Crop, OfACropIsACrop) {
     const test_grid& where = oracle::test_grids()[6];
     splitmix64 random(72);
-    const auto triangles = all_kinds(random, where, 40);
+    const auto triangles = all_kinds(random, where, scaled(40));
     const vp::grid g = oracle::as_library(where.g);
     const vp::grid once = g.crop({6, 4, 7}, {10, 9, 20}), twice = once.crop({2, 1, 5}, {7, 8, 11});
     EXPECT_TRUE(twice == g.crop({8, 5, 12}, {7, 8, 11}));
-    expect_crop(draw(g, triangles, GetParam()), draw(twice, triangles, GetParam()), {{8, 5, 12}, {7, 8, 11}});
+    expect_crop(library_image(g, triangles, GetParam()), library_image(twice, triangles, GetParam()),
+                {{8, 5, 12}, {7, 8, 11}});
 }
 
 TEST_P(Crop, SlabsPutTogetherAreTheWhole) {
     splitmix64 random(73);
     for (const test_grid& where : oracle::test_grids()) {
         if (!where.dense) continue;
-        const auto triangles = all_kinds(random, where, 40);
-        const image whole = draw(oracle::as_library(where.g), triangles, GetParam());
+        const auto triangles = all_kinds(random, where, scaled(40));
+        const image whole = library_image(oracle::as_library(where.g), triangles, GetParam());
         for (int axis = 0; axis < 3; ++axis) {
             vp::counters sums;
             for (int begin = 0; begin < where.g.extent[axis];) {
@@ -111,7 +74,7 @@ TEST_P(Crop, SlabsPutTogetherAreTheWhole) {
                 p.begin[axis] = begin;
                 p.size[axis] = static_cast<int>(random.between(1, std::min(where.g.extent[axis] - begin, 17)));
                 begin += p.size[axis];
-                const image slab = draw(oracle::as_library(where.g, p), triangles, GetParam());
+                const image slab = library_image(oracle::as_library(where.g, p), triangles, GetParam());
                 expect_crop(whole, slab, p);
                 if (HasFatalFailure()) return;
                 sums.fragments += slab.counts.fragments;
@@ -140,9 +103,9 @@ TEST_P(Crop, PartsOfAHugeGridAgreeWhereTheyOverlap) {
         }
         const test_grid where = oracle::focused({g, "huge", false, false}, both.as_region());
         const auto triangles = all_kinds(random, where, 10);
-        const image in_a = draw(oracle::as_library(g, a), triangles, GetParam());
-        const image in_b = draw(oracle::as_library(g, b), triangles, GetParam());
-        const image in_both = draw(oracle::as_library(g, both), triangles, GetParam());
+        const image in_a = library_image(oracle::as_library(g, a), triangles, GetParam());
+        const image in_b = library_image(oracle::as_library(g, b), triangles, GetParam());
+        const image in_both = library_image(oracle::as_library(g, both), triangles, GetParam());
         for (const auto& [image, p] : {std::pair(&in_a, a), std::pair(&in_b, b)}) {
             oracle::part shifted = both;
             for (int axis = 0; axis < 3; ++axis) shifted.begin[axis] -= p.begin[axis];
@@ -150,8 +113,8 @@ TEST_P(Crop, PartsOfAHugeGridAgreeWhereTheyOverlap) {
                 for (int y = 0; y < both.size[1]; ++y)
                     for (int x = 0; x < both.size[0]; ++x) {
                         const int i = x + shifted.begin[0], j = y + shifted.begin[1], k = z + shifted.begin[2];
-                        ASSERT_EQ(in_both.ids(x, y, z), image->ids(i, j, k));
-                        ASSERT_EQ(in_both.voxels(x, y, z), image->voxels(i, j, k));
+                        ASSERT_EQ(in_both.last(x, y, z), image->last(i, j, k));
+                        ASSERT_EQ(in_both.places(x, y, z), image->places(i, j, k));
                         ASSERT_TRUE(same_bytes(in_both.sums(x, y, z), image->sums(i, j, k)));
                     }
         }

@@ -31,14 +31,23 @@ inline std::string rule_name(vp::coverage rule) { return rule == vp::coverage::t
 inline std::string rule_of(const ::testing::TestParamInfo<vp::coverage>& info) { return rule_name(info.param); }
 
 // The library's voxels of each triangle, ascending, from one call.
-inline std::vector<voxels> library_sets(const grid& g, const std::vector<world_triangle>& triangles, vp::coverage rule,
-                                        unsigned threads = 2) {
-    const oracle::soup mesh(triangles);
-    vp::cpu_backend be(threads);
-    vp::abuffer<vp::cpu_backend> lists{be};
-    vp::voxelize(be, mesh.view(), oracle::as_library(g), vp::passthrough{}, vp::constant(true), lists, rule).or_throw();
-    return oracle::voxels_by_triangle(lists.to_host(be), triangles.size(), oracle::whole_of(g));
-}
+std::vector<voxels> library_sets(const grid& g, const std::vector<world_triangle>& triangles, vp::coverage rule,
+                                 unsigned threads = 2);
+
+// A framebuffer of occupancy, the last primitive, a sum of floats and what the shader saw of its place, so that a
+// fragment that is lost, doubled or shaded otherwise shows.
+using occupancy_target = vp::target<vp::bit, vp::blend::bit_or>;
+using last_target = vp::target<std::uint32_t, vp::blend::replace>;
+using sum_target = vp::target<glm::vec3, vp::blend::add>;
+using place_target = vp::target<glm::ivec3, vp::blend::max>;
+struct image {
+    vp::host_target<occupancy_target> occupied;
+    vp::host_target<last_target> last;    // 0xffffffff where empty
+    vp::host_target<sum_target> sums;     // of barycentrics
+    vp::host_target<place_target> places; // fragment::voxel; -1 where empty
+    vp::counters counts;
+};
+image library_image(const vp::grid& g, const std::vector<world_triangle>& triangles, vp::coverage rule);
 
 // A triangle given in fixed-point units of an exact grid.
 inline world_triangle from_units(const grid& g, const std::int64_t (&v)[3][3]) {
@@ -72,15 +81,12 @@ inline bool make_exact(const grid& g, std::int64_t multiple, world_triangle& w) 
     return same_units(oracle::snap(g, w.v), v);
 }
 
-// Random triangles of every class for a grid; on grids that are not dense without those that cover much.
-inline std::vector<world_triangle> all_kinds(splitmix64& random, const test_grid& where, int of_each) {
-    std::vector<world_triangle> list;
-    for (const triangle_class kind : oracle::all_triangle_classes) {
-        if (oracle::covers_much(kind) && !where.dense) continue;
-        const int count = oracle::covers_much(kind) ? (of_each + 7) / 8 : of_each;
-        for (int n = 0; n < count; ++n) list.push_back(oracle::make_triangle(random, where, kind));
-    }
-    return list;
+// `count` by the test scale, but never so few that a test means nothing.
+inline int scaled(int count) {
+    return std::max(12, static_cast<int>(count * std::min(1.0, 4.0 * oracle::test_scale())));
 }
+
+// Random triangles of every class for a grid; on grids that are not dense without those that cover much.
+std::vector<world_triangle> all_kinds(splitmix64& random, const test_grid& where, int of_each);
 
 } // namespace theorems
