@@ -107,7 +107,7 @@ template <class Mesh, class VertexShader, class FragmentShader>
                                                    const grid& g, coverage rule, int log2_tile_size,
                                                    std::span<const tile_pair> sorted, const tile_range& item) {
     const auto s = cpu::make_scene(cpu::execution{}, draws, g);
-    const core::voxel_box box = cpu::tile_box(core::tile_grid(g.extent, log2_tile_size), item.tile, g.extent);
+    const core::voxel_box box = core::tile_box(core::tile_grid(g.extent, log2_tile_size), item.tile, g.extent);
     std::vector<covered_voxel> out;
     for (std::uint64_t i = item.first; i < item.last; ++i) {
         const std::uint32_t id = sorted[i].primitive;
