@@ -4,46 +4,27 @@
 // Bad input to the API: every refusal has the code that says what is wrong, has written nothing to the caller's memory
 // and has left no allocation behind. What is odd but defined (positions that are no numbers, a mesh far away) works.
 
+#include "counted_allocations.hpp"
+
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <climits>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <limits>
 #include <new>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-// Counts what this program has allocated and not yet freed.
-namespace {
-std::atomic<std::int64_t> live_allocations{0};
-}
-void* operator new(std::size_t size) {
-    void* const p = std::malloc(size == 0 ? 1 : size);
-    if (p == nullptr) throw std::bad_alloc();
-    ++live_allocations;
-    return p;
-}
-void operator delete(void* p) noexcept {
-    if (p != nullptr) --live_allocations;
-    std::free(p);
-}
-void operator delete(void* p, std::size_t) noexcept { operator delete(p); }
-
-// Sanitizers end the program at an allocation that cannot be had, unless told to fail it as the system would.
-extern "C" const char* __asan_default_options() { return "allocator_may_return_null=1"; }
-extern "C" const char* __tsan_default_options() { return "allocator_may_return_null=1"; }
-
 namespace {
 
 namespace vp = voxelpipe;
+using unit::live_allocations;
 using vp::status_code;
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -51,10 +32,18 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr double dnan = std::numeric_limits<double>::quiet_NaN();
 constexpr double dinfinity = std::numeric_limits<double>::infinity();
 
+// One pipeline for all tests, because compiling it is what they cost most: the third target is off but where one needs
+// large values.
 using floats = vp::target<float, vp::blend::max>;
 using bits = vp::target<vp::bit, vp::blend::bit_or>;
-constexpr auto shader = vp::constant(1.0f, true);
+using large = vp::target<glm::dvec4, vp::blend::replace>;
+const auto shader = vp::constant(1.0f, true, glm::dvec4(1.0));
 constexpr auto payload = vp::constant(7);
+struct by_weight {
+    glm::vec3 operator()(const vp::vertex<float>& v) const { return v.position * vp::get<0>(v); }
+};
+using mesh_type = vp::mesh_view<float>;
+using draw = vp::draw<mesh_type, by_weight, std::remove_const_t<decltype(shader)>>;
 
 // A valid call into memory that shows every write: what a test then breaks one part of.
 struct call {
@@ -66,8 +55,9 @@ struct call {
     vp::grid grid;
     std::vector<float> depths = std::vector<float>(8 * 8 * 8, mark);
     std::vector<std::uint32_t> words = std::vector<std::uint32_t>(8 * 8, bit_mark);
-    vp::framebuffer_view<floats, bits> view;
-    vp::mesh_view<> mesh;
+    std::vector<float> weights;
+    vp::framebuffer_view<floats, bits, large> view;
+    mesh_type mesh;
 
     call() {
         grid.extent = {8, 8, 8};
@@ -76,12 +66,16 @@ struct call {
         vp::get<0>(view.targets).extent = {8, 8, 8};
         vp::get<1>(view.targets).elements = words.data();
         vp::get<1>(view.targets).extent = {8, 8, 8};
+        vp::get<2>(view.targets).load = vp::load_operation::off;
         look();
     }
     call(const call&) = delete; // the views point into it
     call& operator=(const call&) = delete;
 
-    void look() { mesh = {positions, triangles}; } // after the arrays have changed
+    void look() { // after the arrays have changed
+        weights.assign(positions.size(), 1.0f);
+        mesh = {positions, triangles, vp::core::make_pack(vp::array_view<const float>(weights))};
+    }
     bool untouched() const {
         return std::all_of(depths.begin(), depths.end(), [](float x) { return x == mark; }) &&
                std::all_of(words.begin(), words.end(), [](std::uint32_t x) { return x == bit_mark; });
@@ -95,7 +89,7 @@ void expect_refused(const call& c, status_code expected, bool into_lists = true)
         for (const unsigned threads : {1u, 3u}) {
             vp::cpu_backend be(threads);
             const std::int64_t before = live_allocations;
-            const vp::status s = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, c.view, rule);
+            const vp::status s = vp::voxelize(be, c.mesh, c.grid, by_weight{}, shader, c.view, rule);
             EXPECT_EQ(live_allocations, before);
             EXPECT_EQ(s.code, expected) << s.message();
             EXPECT_FALSE(s.ok());
@@ -107,7 +101,7 @@ void expect_refused(const call& c, status_code expected, bool into_lists = true)
             if (!into_lists) continue;
             vp::abuffer<vp::cpu_backend, int> lists{be};
             const std::int64_t before_lists = live_allocations;
-            const vp::status t = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, payload, lists, rule);
+            const vp::status t = vp::voxelize(be, c.mesh, c.grid, by_weight{}, payload, lists, rule);
             EXPECT_EQ(live_allocations, before_lists);
             EXPECT_EQ(t.code, expected) << t.message();
             EXPECT_EQ(lists.num_voxels(), 0u);
@@ -120,7 +114,7 @@ void expect_refused(const call& c, status_code expected, bool into_lists = true)
 TEST(BadInput, TheCallThatTheTestsBreakIsGood) {
     call c;
     vp::cpu_backend be(1);
-    const vp::status s = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, c.view);
+    const vp::status s = vp::voxelize(be, c.mesh, c.grid, by_weight{}, shader, c.view);
     EXPECT_TRUE(s.ok()) << s.message();
     EXPECT_GT(s.counts.voxels, 10u);
     EXPECT_FALSE(c.untouched());
@@ -143,7 +137,6 @@ TEST(BadInput, MeshWithoutTriangles) {
 TEST(BadInput, NoDraws) {
     call c;
     vp::cpu_backend be(1);
-    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_const_t<decltype(shader)>>;
     EXPECT_EQ(vp::voxelize(be, std::span<const draw>{}, c.grid, c.view).code, status_code::empty_mesh);
     EXPECT_TRUE(c.untouched());
     const draw empty{{}, {}, shader}, full{c.mesh, {}, shader};
@@ -176,8 +169,9 @@ TEST(BadInput, IndexOutOfRangeOfItsOwnMeshInALaterDraw) {
     call c;
     vp::cpu_backend be(2);
     const std::vector<glm::vec3> few(c.positions.begin(), c.positions.begin() + 2); // index 2 is one too many here
-    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_const_t<decltype(shader)>>;
-    const draw draws[] = {{c.mesh, {}, shader}, {{few, c.triangles}, {}, shader}};
+    const draw draws[] = {
+        {c.mesh, {}, shader},
+        {{few, c.triangles, vp::core::make_pack(vp::array_view<const float>(c.weights.data(), 2))}, {}, shader}};
     EXPECT_EQ(vp::voxelize(be, std::span<const draw>(draws), c.grid, c.view).code, status_code::index_out_of_range);
     EXPECT_TRUE(c.untouched());
 }
@@ -195,6 +189,7 @@ TEST(BadInput, NullArrays) {
     }
     call c; // a null array of no elements is an empty array
     c.mesh.positions = {nullptr, 0};
+    vp::get<0>(c.mesh.attributes) = {nullptr, 0};
     expect_refused(c, status_code::index_out_of_range);
 }
 
@@ -210,7 +205,6 @@ TEST(BadInput, MoreElementsThanNumbers) {
 
     c.look();
     vp::cpu_backend be(1);
-    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_const_t<decltype(shader)>>;
     draw half{c.mesh, {}, shader}; // two draws that are too many only together
     half.mesh.triangles = {c.triangles.data(), std::size_t{1} << 31};
     const draw draws[] = {half, half};
@@ -218,16 +212,12 @@ TEST(BadInput, MoreElementsThanNumbers) {
     EXPECT_TRUE(c.untouched());
 }
 
-struct by_weight {
-    glm::vec3 operator()(const vp::vertex<float>& v) const { return v.position * vp::get<0>(v); }
-};
-
 TEST(BadInput, AttributesOfAnotherLength) {
     call c;
     vp::cpu_backend be(2);
     const std::vector<float> weights(4, 1.0f);
     const auto with = [&](vp::array_view<const float> attribute) {
-        const vp::mesh_view<float> mesh{c.positions, c.triangles, vp::core::make_pack(attribute)};
+        const mesh_type mesh{c.positions, c.triangles, vp::core::make_pack(attribute)};
         const vp::status s = vp::voxelize(be, mesh, c.grid, by_weight{}, shader, c.view);
         if (!s.ok()) {
             EXPECT_TRUE(c.untouched());
@@ -254,7 +244,7 @@ TEST(BadInput, PositionsThatAreNoNumbersDropTheirTriangle) {
                 c.look();
                 vp::cpu_backend be(2);
                 vp::abuffer<vp::cpu_backend> lists{be};
-                const vp::status s = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, payload, lists);
+                const vp::status s = vp::voxelize(be, c.mesh, c.grid, by_weight{}, payload, lists);
                 ASSERT_TRUE(s.ok()) << s.message();
                 EXPECT_EQ(s.counts.triangles_nonfinite, 1u);
                 EXPECT_EQ(s.counts.triangles_drawn, 1u);
@@ -268,7 +258,7 @@ TEST(BadInput, AMeshOfNothingButBadPositionsIsAnEmptyResult) {
         call c;
         for (glm::vec3& p : c.positions) p = glm::vec3(bad);
         vp::cpu_backend be(2);
-        const vp::status s = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, c.view);
+        const vp::status s = vp::voxelize(be, c.mesh, c.grid, by_weight{}, shader, c.view);
         ASSERT_TRUE(s.ok()) << s.message();
         EXPECT_EQ(s.counts.triangles_dropped(), 2u);
         EXPECT_EQ(s.counts.fragments, 0u);
@@ -281,7 +271,7 @@ TEST(BadInput, AnOriginTooFarToReachDropsEverything) {
     for (const double far : {1e30, -1e300, std::numeric_limits<double>::max()}) {
         c.grid.origin = {far, 0, 0};
         vp::cpu_backend be(1);
-        const vp::status s = vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, c.view);
+        const vp::status s = vp::voxelize(be, c.mesh, c.grid, by_weight{}, shader, c.view);
         ASSERT_TRUE(s.ok()) << s.message();
         EXPECT_EQ(s.counts.triangles_too_far, 2u);
     }
@@ -388,22 +378,21 @@ TEST(BadInput, TargetsWithoutMemory) {
     vp::get<1>(c.view.targets).elements = nullptr;
     vp::get<1>(c.view.targets).load = vp::load_operation::off;
     vp::cpu_backend be(1);
-    EXPECT_TRUE(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, c.view).ok());
+    EXPECT_TRUE(vp::voxelize(be, c.mesh, c.grid, by_weight{}, shader, c.view).ok());
 }
 
 TEST(BadInput, SizesThatCannotBeAddressed) {
-    using large = vp::target<glm::dvec4, vp::blend::replace>;
     const glm::ivec3 extent(vp::grid::max_extent); // 2^60 voxels of 32 bytes
     vp::cpu_backend be(1);
     call c;
     c.grid.extent = extent;
-    vp::framebuffer_view<large> view;
-    view.extent = extent;
-    vp::get<0>(view.targets).extent = extent;
-    vp::get<0>(view.targets).elements = reinterpret_cast<glm::dvec4*>(c.depths.data());
-    const auto white = vp::constant(glm::dvec4(1.0));
-    EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, white, view).code, status_code::size_overflow);
-    EXPECT_TRUE(c.untouched());
+    c.view.extent = extent;
+    vp::get<0>(c.view.targets).load = vp::load_operation::off;
+    vp::get<1>(c.view.targets).load = vp::load_operation::off;
+    vp::get<2>(c.view.targets).load = vp::load_operation::clear;
+    vp::get<2>(c.view.targets).extent = extent;
+    vp::get<2>(c.view.targets).elements = reinterpret_cast<glm::dvec4*>(c.depths.data());
+    expect_refused(c, status_code::size_overflow, false);
     const std::int64_t before = live_allocations;
     using owner = vp::framebuffer<vp::cpu_backend, large>;
     EXPECT_THROW(owner(be, extent), std::length_error);
@@ -414,27 +403,24 @@ TEST(BadInput, SizesThatCannotBeAddressed) {
 }
 
 TEST(BadInput, AFramebufferWithMoreTilesThanNumbersIsRefused) {
-    const glm::ivec3 extent(vp::grid::max_extent); // 2^45 tiles; no memory, because its one target is off
-    vp::cpu_backend be(1);
-    call c;
-    c.grid.extent = extent;
-    vp::framebuffer_view<vp::target<vp::bit, vp::blend::bit_or>> view;
-    view.extent = extent;
-    vp::get<0>(view.targets).load = vp::load_operation::off;
-    EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, vp::constant(true), view).code,
-              status_code::size_overflow);
+    call c; // 2^45 tiles; no memory, because the targets are off
+    c.grid.extent = glm::ivec3(vp::grid::max_extent);
+    c.view.extent = c.grid.extent;
+    vp::get<0>(c.view.targets).load = vp::load_operation::off;
+    vp::get<1>(c.view.targets).load = vp::load_operation::off;
+    expect_refused(c, status_code::size_overflow, false);
 }
 
 TEST(BadInput, AFramebufferOfABadExtentOwnsNothingAndIsRefused) {
     vp::cpu_backend be(1);
     for (const glm::ivec3 extent : {glm::ivec3(0, 8, 8), glm::ivec3(8, -1, 8), glm::ivec3(INT_MIN)}) {
         call c;
-        vp::framebuffer<vp::cpu_backend, floats, bits> fb{be, extent};
+        vp::framebuffer<vp::cpu_backend, floats, bits, large> fb{be, extent};
         EXPECT_EQ(vp::get<0>(fb).to_host(be).size(), 0u);
         c.grid.extent = extent;
-        EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, fb).code, status_code::bad_extent);
+        EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, by_weight{}, shader, fb).code, status_code::bad_extent);
         c.grid.extent = {8, 8, 8};
-        EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, shader, fb).code, status_code::extent_mismatch);
+        EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, by_weight{}, shader, fb).code, status_code::extent_mismatch);
     }
 }
 
@@ -445,7 +431,7 @@ TEST(BadInput, ARefusedCallLeavesEarlierListsAsTheyWere) {
     call c;
     vp::cpu_backend be(2);
     vp::abuffer<vp::cpu_backend, int> lists{be};
-    vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, payload, lists).or_throw();
+    vp::voxelize(be, c.mesh, c.grid, by_weight{}, payload, lists).or_throw();
     const auto before = lists.to_host(be);
     ASSERT_GT(before.voxels.size(), 10u);
     const auto expect_same = [&] {
@@ -458,11 +444,10 @@ TEST(BadInput, ARefusedCallLeavesEarlierListsAsTheyWere) {
     };
     vp::grid bad = c.grid;
     bad.voxel_size.x = -1;
-    EXPECT_FALSE(vp::voxelize(be, c.mesh, bad, vp::passthrough{}, payload, lists).ok());
+    EXPECT_FALSE(vp::voxelize(be, c.mesh, bad, by_weight{}, payload, lists).ok());
     expect_same();
     c.triangles[1].z = 99;
-    EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, vp::passthrough{}, payload, lists).code,
-              status_code::index_out_of_range);
+    EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, by_weight{}, payload, lists).code, status_code::index_out_of_range);
     expect_same();
 }
 
