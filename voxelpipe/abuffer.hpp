@@ -111,6 +111,8 @@ template <class Backend, class Payload = void>
 class abuffer {
     static_assert(std::is_void_v<Payload> || std::is_trivially_copyable_v<Payload>,
                   "voxelpipe: an A-buffer's payload must be trivially copyable");
+    static_assert(!std::is_same_v<Payload, bool>,
+                  "voxelpipe: an A-buffer's payload cannot be bool, whose std::vector is no array; use std::uint8_t");
     template <class T>
     using buffer = typename Backend::template buffer<T>;
 
