@@ -398,12 +398,13 @@ TEST(BadInput, SizesThatCannotBeAddressed) {
     EXPECT_THROW(owner(be, extent), std::length_error);
     // 2^57 bytes can be addressed on paper, but no machine has them.
     using bit_owner = vp::framebuffer<vp::cpu_backend, bits>;
-    static const void* volatile seen; // or a compiler that sees no use leaves the allocation out
+    static const void* volatile seen = nullptr; // or a compiler that sees no use leaves the allocation out
     const auto allocate = [&] {
         const bit_owner fb(be, extent);
         seen = vp::get<0>(fb.view().targets).elements;
     };
     EXPECT_THROW(allocate(), std::bad_alloc);
+    EXPECT_EQ(seen, nullptr);
     EXPECT_EQ(live_allocations, before);
 }
 
