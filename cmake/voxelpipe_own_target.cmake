@@ -8,7 +8,9 @@ function(voxelpipe_own_target)
   foreach(target IN LISTS ARGN)
     target_compile_options(
       ${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-Wall;-Wextra;-Wpedantic;-Wconversion>
-                        $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra>)
+                        $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra>
+                        # GLM 0.9.9: __host__ __device__ on defaulted functions, in headers that are not SYSTEM to nvcc
+                        $<$<COMPILE_LANGUAGE:CUDA>:-diag-suppress=20012>)
     if(VOXELPIPE_WERROR)
       target_compile_options(${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-Werror>
                                                $<$<COMPILE_LANGUAGE:CUDA>:-Werror=all-warnings>)
