@@ -4,11 +4,12 @@ include_guard(GLOBAL)
 
 # voxelpipe_own_target(target...): the warnings that our own code is held to. Never put on an INTERFACE target, so that
 # no user inherits them.
+# nvcc hands the host compiler C++ that it wrote itself, with parentheses of its own around declarators.
 function(voxelpipe_own_target)
   foreach(target IN LISTS ARGN)
     target_compile_options(
       ${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-Wall;-Wextra;-Wpedantic;-Wconversion>
-                        $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra>
+                        $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra,-Wno-parentheses>
                         # GLM 0.9.9: __host__ __device__ on defaulted functions, in headers that are not SYSTEM to nvcc
                         $<$<COMPILE_LANGUAGE:CUDA>:-diag-suppress=20012>)
     if(VOXELPIPE_WERROR)
