@@ -25,10 +25,17 @@
 #include <string>
 #include <vector>
 
+namespace voxelpipe {
+
+inline void PrintTo(coverage rule, std::ostream* os) { *os << (rule == coverage::thin ? "thin" : "conservative"); }
+
+} // namespace voxelpipe
+
 namespace oracle {
 
 namespace vp = voxelpipe;
 
+inline void PrintTo(triangle_class kind, std::ostream* os) { *os << name(kind); }
 inline void PrintTo(const voxel& v, std::ostream* os) { *os << '(' << v.i << ',' << v.j << ',' << v.k << ')'; }
 
 inline vp::grid as_library(const grid& g) {
@@ -119,6 +126,12 @@ inline std::string describe(const grid& g, const world_triangle& t) {
 inline double test_scale() {
     const char* const scale = std::getenv("VOXELPIPE_TEST_SCALE");
     return scale == nullptr ? 1.0 : std::strtod(scale, nullptr);
+}
+
+// `usual`, or another one for every VOXELPIPE_ORACLE_SEED, so that a longer run can look elsewhere.
+inline std::uint64_t seed(std::uint64_t usual) {
+    const char* const offset = std::getenv("VOXELPIPE_ORACLE_SEED");
+    return offset == nullptr ? usual : usual + 1000003 * std::strtoull(offset, nullptr, 10);
 }
 
 // How many triangles all classes together are tested with: VOXELPIPE_ORACLE_TRIANGLES, or `usual` by the test scale.
