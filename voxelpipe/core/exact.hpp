@@ -155,6 +155,16 @@ namespace exact {
 #endif
 }
 
+// The same for |a| <= 2^30, by the sum with 1.5 * 2^52, whose last mantissa bits are the integer: one addition, where a
+// conversion runs at a fraction of that rate on a GPU.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t round_to_int32(double a) {
+#if defined(__CUDA_ARCH__)
+    return __double2loint(__dadd_rn(a, 0x1.8p52));
+#else
+    return static_cast<std::int32_t>(round_to_int64(a));
+#endif
+}
+
 // x*x' + y*y' + z*z' with three roundings: x*x', then two fused steps. V is any type with float members x, y, z.
 template <class V>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float dot(const V& a, const V& b) {

@@ -96,6 +96,23 @@ struct snap_transform {
             exact::round_to_int64(c) - t.offset[2]};
 }
 
+// snap() in 32 bits, relative to the part's first voxel: false where a coordinate of the whole grid is beyond 2^30 units
+// or not a number, which snap() then tells apart. An offset lies in the grid: below 2^25, for F + L <= 24.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool snap_near(const snap_transform& t, float x, float y, float z,
+                                                           std::int32_t (&q)[3]) {
+    constexpr double limit = static_cast<double>(std::int64_t{1} << 30);
+    const double a = exact::mul(exact::to_double(x) - t.origin[0], t.scale[0]);
+    const double b = exact::mul(exact::to_double(y) - t.origin[1], t.scale[1]);
+    const double c = exact::mul(exact::to_double(z) - t.origin[2], t.scale[2]);
+    const auto relative = [](double rounded, std::int64_t offset) {
+        return static_cast<std::int32_t>(static_cast<std::uint32_t>(exact::round_to_int32(rounded)) -
+                                         static_cast<std::uint32_t>(offset));
+    };
+    q[0] = relative(a, t.offset[0]);
+    q[1] = relative(b, t.offset[1]);
+    q[2] = relative(c, t.offset[2]);
+    return a <= limit && a >= -limit && b <= limit && b >= -limit && c <= limit && c >= -limit;
+}
 [[nodiscard]] VOXELPIPE_HD constexpr bool is_drawable(const snapped_position& p) { return p.x > too_far_mark; }
 
 } // namespace voxelpipe::core

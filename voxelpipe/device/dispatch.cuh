@@ -8,6 +8,7 @@
 
 #include <voxelpipe/device/clear_target.cuh>
 #include <voxelpipe/device/coarse_raster.cuh>
+#include <voxelpipe/device/direct_raster.cuh>
 #include <voxelpipe/device/fine_raster.cuh>
 #include <voxelpipe/device/ordered_blend.cuh>
 #include <voxelpipe/device/tile_resolve.cuh>
@@ -217,6 +218,20 @@ template <class Key, class Payload>
            static_cast<std::uint64_t>(g.extent.z);
 }
 
+// ---- which calls need no tiles --------------------------------------------------------------------------------------
+
+// Vertex shaders that cost no more than reading what they made: they run once a corner instead of once a vertex.
+template <class VertexShader>
+inline constexpr bool is_cheap = std::is_same_v<VertexShader, passthrough> || std::is_same_v<VertexShader, transform>;
+
+template <class FragmentShader, class Framebuffer>
+inline constexpr bool can_be_direct = false;
+template <class FragmentShader, class... Targets>
+inline constexpr bool can_be_direct<FragmentShader, framebuffer_view<Targets...>> = core::is_solid<FragmentShader> &&
+                                                                                    (is_direct<Targets>() && ...);
+
+inline constexpr std::size_t most_direct_draws = 16; // each has launches of its own
+
 // ---- a framebuffer call ---------------------------------------------------------------------------------------------
 
 template <class Draw, class Framebuffer, class Selector>
@@ -257,6 +272,12 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, S
     // written.
     template <coverage Rule, bool Run>
     void go(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
+        if constexpr (can_be_direct<FragmentShader, Framebuffer>) {
+            if (is_direct_call()) {
+                go_direct<Rule, Run>(memory, state, stream);
+                return;
+            }
+        }
         // Voxel ids of 32 bits keep the lists of the ordered targets small wherever the grid allows.
         if (!groups::has_ordered || num_voxels(g) < std::numeric_limits<std::uint32_t>::max())
             go_with<Rule, Run, std::uint32_t>(memory, state, stream);
@@ -265,6 +286,83 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, S
     }
 
 private:
+    // Which target can tell first touches; -1 where none can.
+    [[nodiscard]] int find_counting_target() const {
+        int found = -1;
+        core::for_each_index<groups::count>([&]<std::size_t K>() {
+            bool tells = true;
+            for (const draw_type& d : draws)
+                tells = tells && tells_first(voxelpipe::get<K>(fb.targets), voxelpipe::get<K>(d.fragment_shader.values),
+                                             num_primitives);
+            if (tells && found < 0) found = static_cast<int>(K);
+        });
+        return found;
+    }
+
+    [[nodiscard]] bool is_direct_call() const {
+        if (draws.size() > most_direct_draws || core::small_voxels(core::make_snap_transform(g).fraction) == 0)
+            return false;
+        if (!large_list::holds(num_primitives, large_chunks::most_records(g.extent))) return false;
+        if (options.count_voxels && find_counting_target() < 0) return false;
+        bool all = true;
+        core::for_each_index<groups::count>([&]<std::size_t K>() {
+            for (const draw_type& d : draws)
+                all = all && may_be_direct(voxelpipe::get<K>(fb.targets), voxelpipe::get<K>(d.fragment_shader.values),
+                                           num_primitives);
+        });
+        return all;
+    }
+
+    template <coverage Rule, bool Run>
+    void go_direct(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
+        constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
+        state = memory.take<pipeline_state>(1);
+        std::size_t vertices = 0, most_triangles = 0;
+        for (const draw_type& d : draws) {
+            vertices = std::max(vertices, d.mesh.positions.size());
+            most_triangles = std::max(most_triangles, d.mesh.triangles.size());
+        }
+        core::snapped_position* const positions = memory.take<core::snapped_position>(on_the_spot ? 0 : vertices);
+        large_list large{};
+        large.triangles = memory.take<std::uint32_t>(most_triangles);
+        large.first_records = memory.take<unsigned long long>(most_triangles);
+        if constexpr (Run) {
+            large.next = &state->next_large;
+            check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
+            for (const draw_type& d : draws)
+                check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);
+            core::for_each_index<groups::count>([&]<std::size_t K>() {
+                const auto& t = voxelpipe::get<K>(fb.targets);
+                if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
+            });
+            const core::snap_transform snap = core::make_snap_transform(g);
+            const int counting_target = options.count_voxels ? find_counting_target() : -1;
+            for (std::size_t i = 0; i < draws.size(); ++i) {
+                const draw_type& d = draws[i];
+                const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
+                if (num_triangles == 0) continue;
+                if (i != 0) check(cudaMemsetAsync(large.next, 0, sizeof(*large.next), stream));
+                const auto raster = [&](const auto& source) {
+                    using source_type = std::remove_cvref_t<decltype(source)>;
+                    using values_type = decltype(d.fragment_shader.values);
+                    const direct_call<Rule, source_type, Framebuffer, values_type> call{
+                        source,          num_triangles, snap.fraction, g.extent, fb, d.fragment_shader.values,
+                        counting_target, large};
+                    direct_raster(call, state, stream);
+                };
+                if constexpr (on_the_spot) {
+                    raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap,
+                                                              static_cast<std::uint32_t>(i)});
+                } else {
+                    vertex_shade(d.mesh, d.vertex_shader, snap, static_cast<std::uint32_t>(i), positions,
+                                 static_cast<no_varyings*>(nullptr), stream); // nobody reads them
+                    raster(stored_source{
+                        {d.mesh.triangles.data(), positions, 0, static_cast<std::uint32_t>(d.mesh.positions.size())}});
+                }
+            }
+        }
+    }
+
     struct tile_work {
         fine_raster_input in{nullptr, nullptr, nullptr, {glm::ivec3(1), 3}, false, false, false};
         const split_tile* splits = nullptr;

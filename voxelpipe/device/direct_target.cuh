@@ -1,0 +1,255 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Render targets that fragments can be blended into where they lie, by one atomic on global memory: bits, and integers
+// whose stored value is what the blend accumulates. Sums of floats belong to them only where every partial sum is
+// exact, which a shader with constant values lets the host prove; then no order of additions can change a bit.
+
+#include <voxelpipe/device/atomics.cuh>
+#include <voxelpipe/framebuffer.hpp>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <type_traits>
+
+namespace voxelpipe::device {
+
+// direct_value<Blend, T>: one fragment with value v into a stored T.
+//   available     allowed(value, target, most): whether up to `most` fragments of this value give the blend's bits
+//   apply(T*, v)  -> whether the voxel had no fragment yet, where tells_first(target) holds
+template <class Blend, class T>
+struct direct_value {
+    static constexpr bool available = false;
+};
+
+template <class T>
+inline constexpr bool is_atomic_integer = core::is_integer<T> && (sizeof(T) == 4 || sizeof(T) == 8);
+
+template <class T>
+using atomic_word =
+    std::conditional_t<sizeof(T) == 8, std::conditional_t<std::is_signed_v<T>, long long, unsigned long long>,
+                       std::conditional_t<std::is_signed_v<T>, int, unsigned>>;
+template <class T>
+using unsigned_word = std::conditional_t<sizeof(T) == 8, unsigned long long, unsigned>;
+
+template <class T>
+requires is_atomic_integer<T>
+struct direct_value<blend::count, T> {
+    static constexpr bool available = true;
+    template <class V, class Target>
+    [[nodiscard]] static bool allowed(const V&, const Target&, std::uint64_t) {
+        return true;
+    }
+    template <class Target>
+    [[nodiscard]] static bool tells_first(const Target& t, std::uint64_t most) {
+        return t.load == load_operation::clear && t.clear_value == 0 && most < 0xffffffffu;
+    }
+    template <class V>
+    __device__ static bool apply(T* at, const V&) {
+        return atomicAdd(reinterpret_cast<unsigned_word<T>*>(at), unsigned_word<T>{1}) == 0;
+    }
+};
+
+// The integer blends that one atomic does.
+template <class Blend, class T>
+struct direct_integer {
+    static constexpr bool available = true;
+    template <class Target>
+    [[nodiscard]] static bool allowed(T, const Target&, std::uint64_t) {
+        return true;
+    }
+    template <class Target>
+    [[nodiscard]] static bool tells_first(const Target&, std::uint64_t) {
+        return false;
+    }
+    __device__ static bool apply(T* at, T v) {
+        if constexpr (std::is_same_v<Blend, blend::add>)
+            atomicAdd(reinterpret_cast<unsigned_word<T>*>(at), static_cast<unsigned_word<T>>(v));
+        else if constexpr (std::is_same_v<Blend, blend::min>)
+            atomicMin(reinterpret_cast<atomic_word<T>*>(at), static_cast<atomic_word<T>>(v));
+        else if constexpr (std::is_same_v<Blend, blend::max>)
+            atomicMax(reinterpret_cast<atomic_word<T>*>(at), static_cast<atomic_word<T>>(v));
+        else if constexpr (std::is_same_v<Blend, blend::bit_and>)
+            atomicAnd(reinterpret_cast<unsigned_word<T>*>(at), static_cast<unsigned_word<T>>(v));
+        else if constexpr (std::is_same_v<Blend, blend::bit_or>)
+            atomicOr(reinterpret_cast<unsigned_word<T>*>(at), static_cast<unsigned_word<T>>(v));
+        else
+            atomicXor(reinterpret_cast<unsigned_word<T>*>(at), static_cast<unsigned_word<T>>(v));
+        return false;
+    }
+};
+template <class T>
+requires is_atomic_integer<T>
+struct direct_value<blend::add, T> : direct_integer<blend::add, T> {
+};
+template <class T>
+requires is_atomic_integer<T>
+struct direct_value<blend::min, T> : direct_integer<blend::min, T> {
+};
+template <class T>
+requires is_atomic_integer<T>
+struct direct_value<blend::max, T> : direct_integer<blend::max, T> {
+};
+template <class T>
+requires is_atomic_integer<T>
+struct direct_value<blend::bit_and, T> : direct_integer<blend::bit_and, T> {
+};
+template <class T>
+requires is_atomic_integer<T>
+struct direct_value<blend::bit_or, T> : direct_integer<blend::bit_or, T> {
+};
+template <class T>
+requires is_atomic_integer<T>
+struct direct_value<blend::bit_xor, T> : direct_integer<blend::bit_xor, T> {
+};
+
+// Whether clear, clear + value, ..., clear + most * value are all exact in T and none of the terms is rounded by the
+// reproducible sum (quantum 2^Log2Quantum): then addition in T, in any order, is that sum. Zero and what is not finite
+// are left out, for their signs and marks.
+template <class T>
+[[nodiscard]] bool sums_are_exact(T value, T clear, std::uint64_t most, int log2_quantum) {
+    constexpr int digits = std::numeric_limits<T>::digits;
+    if (!std::isfinite(value) || !std::isfinite(clear) || value == 0) return false;
+    if (clear == 0 && std::signbit(clear)) return false;
+    const auto lowest_bit = [](T v) { // exponent of the lowest bit set
+        int exponent = 0;
+        const double fraction = std::frexp(static_cast<double>(v), &exponent);
+        const auto whole = static_cast<std::uint64_t>(std::abs(std::ldexp(fraction, 53)));
+        return exponent - 53 + std::countr_zero(whole);
+    };
+    const int of_value = lowest_bit(value);
+    const int of_clear = clear == 0 ? of_value : lowest_bit(clear);
+    const int unit = of_value < of_clear ? of_value : of_clear;
+    if (unit < log2_quantum || unit < -100) return false;
+    // In units of 2^unit: |clear| + most * |value| <= 2^digits. The doubles are exact below 2^53 and only grow beyond.
+    const double most_units = std::ldexp(std::abs(static_cast<double>(clear)), -unit) +
+                              static_cast<double>(most) * std::ldexp(std::abs(static_cast<double>(value)), -unit);
+    return most_units < std::ldexp(1.0, digits) && std::ldexp(most_units, unit) < 0x1p31;
+}
+
+template <class T>
+requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_value<blend::add, T> {
+    static constexpr bool available = true;
+    template <class Target>
+    [[nodiscard]] static bool allowed(T v, const Target& t, std::uint64_t most) {
+        return t.load == load_operation::clear &&
+               sums_are_exact(v, t.clear_value, most, core::sum_format<T>::log2_quantum);
+    }
+    template <class Target>
+    [[nodiscard]] static bool tells_first(const Target&, std::uint64_t) {
+        return false;
+    }
+    __device__ static bool apply(T* at, T v) {
+        atomicAdd(at, v);
+        return false;
+    }
+};
+
+// Order is free by definition.
+template <class T>
+requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_value<blend::add_unordered, T> {
+    static constexpr bool available = true;
+    template <class Target>
+    [[nodiscard]] static bool allowed(T, const Target&, std::uint64_t) {
+        return true;
+    }
+    template <class Target>
+    [[nodiscard]] static bool tells_first(const Target&, std::uint64_t) {
+        return false;
+    }
+    __device__ static bool apply(T* at, T v) {
+        atomicAdd(at, v);
+        return false;
+    }
+};
+
+// ---- whole targets --------------------------------------------------------------------------------------------------
+
+template <class Target>
+[[nodiscard]] constexpr bool is_direct() {
+    if constexpr (Target::map::is_bit)
+        return method_of<Target>() == blend_method::bits;
+    else
+        return !Target::map::planes &&
+               direct_value<typename Target::blend_type, typename Target::value_type>::available;
+}
+
+// Whether this target, with up to `most` fragments of this value, may be blended in place.
+template <class Target, class Value>
+[[nodiscard]] bool may_be_direct(const target_view<Target>& t, const Value& value, std::uint64_t most) {
+    if (t.load == load_operation::off) return true;
+    if constexpr (Target::map::is_bit)
+        return true;
+    else
+        return direct_value<typename Target::blend_type, typename Target::value_type>::allowed(value, t, most);
+}
+
+// Whether blending in place tells which voxels are touched for the first time.
+template <class Target, class Value>
+[[nodiscard]] bool tells_first(const target_view<Target>& t, const Value& value, std::uint64_t most) {
+    if (t.load == load_operation::off) return false;
+    if constexpr (Target::map::is_bit) {
+        using blend_type = bit_blend<typename Target::blend_type>;
+        if (t.load != load_operation::clear) return false;
+        if constexpr (blend_type::sets)
+            return !t.clear_value && value;
+        else if constexpr (blend_type::clears)
+            return t.clear_value && !value;
+        else
+            return false;
+    } else {
+        return direct_value<typename Target::blend_type, typename Target::value_type>::tells_first(t, most);
+    }
+}
+
+// Fragments of one value in the voxels x0 + i of a row, for the bits i of `mask`; x0 + 31 may lie beyond the extent.
+// Returns how many voxels were touched for the first time, where tells_first holds and count_first asks.
+template <class Target, class Value>
+__device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int x0, int y, int z, word mask,
+                                               const Value& value, bool count_first) {
+    using map = typename Target::map;
+    unsigned first = 0;
+    if constexpr (map::is_bit) {
+        using blend_type = bit_blend<typename Target::blend_type>;
+        bool v = true;
+        if constexpr (!std::is_same_v<typename Target::blend_type, blend::count>) v = value;
+        const auto one = [&](int x, word bits) {
+            word* const w = t.elements + map::cell(t.extent, x, y, z);
+            if constexpr (blend_type::sets) {
+                if (!v) return;
+                const word seen = __ldca(w); // maybe an old one: bits that are set stay set
+                if ((bits & ~seen) == 0) return;
+                if (count_first)
+                    first += static_cast<unsigned>(__popc(bits & ~atomicOr(w, bits)));
+                else
+                    atomicOr(w, bits);
+            } else if constexpr (blend_type::clears) {
+                if (v) return;
+                const word seen = __ldca(w);
+                if ((bits & seen) == 0) return;
+                if (count_first)
+                    first += static_cast<unsigned>(__popc(bits & atomicAnd(w, ~bits)));
+                else
+                    atomicAnd(w, ~bits);
+            } else {
+                if (v) atomicXor(w, bits);
+            }
+        };
+        const int shift = x0 & 31;
+        const word low = mask << shift, high = shift == 0 ? 0 : mask >> (32 - shift);
+        if (low != 0) one(x0, low);
+        if (high != 0) one(x0 + 32, high);
+    } else {
+        for (; mask != 0; mask &= mask - 1) {
+            const int x = x0 + __ffs(static_cast<int>(mask)) - 1;
+            const bool is_first = direct_value<typename Target::blend_type, typename Target::value_type>::apply(
+                t.elements + map::cell(t.extent, x, y, z), value);
+            if (count_first) first += static_cast<unsigned>(is_first);
+        }
+    }
+    return first;
+}
+
+} // namespace voxelpipe::device
