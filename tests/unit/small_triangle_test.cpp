@@ -6,6 +6,7 @@
 
 #include "test_support.hpp"
 
+#include <voxelpipe/core/brick_triangle.hpp>
 #include <voxelpipe/core/coverage.hpp>
 #include <voxelpipe/core/small_triangle.hpp>
 
@@ -75,6 +76,15 @@ bool make_small(const snapped_position (&v)[3], int fraction, const voxel_box& b
     return true;
 }
 
+voxel_box coarsen_box(const voxel_box& box) {
+    voxel_box r{};
+    for (int k = 0; k < 3; ++k) {
+        r.lo[k] = box.lo[k] >> log2_brick;
+        r.hi[k] = box.hi[k] >> log2_brick;
+    }
+    return r;
+}
+
 template <span_rule Rule>
 voxels by_the_general_path(const snapped_position (&v)[3], int fraction, const voxel_box& clip) {
     voxels out;
@@ -90,7 +100,7 @@ voxels by_the_general_path(const snapped_position (&v)[3], int fraction, const v
 
 TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
     generator g;
-    int compared = 0;
+    int compared = 0, tiny = 0, flat = 0, cubes = 0, quads = 0;
     std::uint64_t covered = 0;
     for (const int fraction : {12, 13, 14, 15, 16}) {
         g.fraction = fraction;
@@ -115,12 +125,69 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
                                          static_cast<int>(box.lo[2]) + z});
                 }
             const voxels expected = by_the_general_path<span_rule::conservative>(v, fraction, box);
+            const small_box all{
+                {0, 0, 0}, {last, static_cast<int>(box.hi[1] - box.lo[1]), static_cast<int>(box.hi[2] - box.lo[2])}};
+            if (max3(all.hi[0], all.hi[1], all.hi[2]) < 8) {
+                ++tiny;
+                voxels again;
+                s.rows(all, [&](int y, int z, std::uint32_t bits) {
+                    for (int x = 0; x < 32; ++x)
+                        if (((bits >> x) & 1u) != 0)
+                            again.insert({static_cast<int>(box.lo[0]) + x, static_cast<int>(box.lo[1]) + y,
+                                          static_cast<int>(box.lo[2]) + z});
+                });
+                ASSERT_EQ(again, expected) << "fraction " << fraction << ", triangle " << i;
+            }
+            if (all.hi[0] == 1 && all.hi[1] == 1 && all.hi[2] == 1) {
+                ++cubes;
+                std::uint32_t wanted = 0;
+                for (int k = 0; k < 8; ++k)
+                    wanted |= static_cast<std::uint32_t>(expected.count({static_cast<int>(box.lo[0]) + k % 2,
+                                                                         static_cast<int>(box.lo[1]) + k / 2 % 2,
+                                                                         static_cast<int>(box.lo[2]) + k / 4}))
+                              << k;
+                ASSERT_EQ(cube_bits(s), wanted) << "fraction " << fraction << ", triangle " << i;
+            }
+            for (int y = 0; y <= all.hi[1]; ++y)
+                for (int z = 0; z <= all.hi[2]; ++z) {
+                    const std::uint32_t limit = s.limit_at_y(from, last, y) & s.limit_at_z(from, last, z);
+                    ASSERT_EQ(s.meets_row(y, z) ? s.plane_bits(from, y, z, limit) : 0u, s.row(from, last, y, z));
+                }
+            for (int thick = 0; thick < 3; ++thick) {
+                if (all.hi[thick] != 0) continue;
+                ++flat;
+                const int p = thick == 0 ? 1 : 0, q = thick == 2 ? 1 : 2;
+                const std::int32_t seen[3][2] = {
+                    {t.p[0][p], t.p[0][q]}, {t.p[1][p], t.p[1][q]}, {t.p[2][p], t.p[2][q]}};
+                const small_flat f(seen, fraction);
+                voxels again;
+                if (all.hi[p] == 1 && all.hi[q] == 1) {
+                    ++quads;
+                    ASSERT_EQ(f.quad_bits(), f.row(0, 1, 0) | f.row(0, 1, 1) << 2);
+                }
+                for (int y = 0; y <= all.hi[q]; ++y) {
+                    const std::uint32_t bits = f.row(0, all.hi[p], y);
+                    for (int x = 0; x < 32; ++x) {
+                        if (((bits >> x) & 1u) == 0) continue;
+                        int at[3] = {0, 0, 0};
+                        at[p] = x;
+                        at[q] = y;
+                        again.insert({static_cast<int>(box.lo[0]) + at[0], static_cast<int>(box.lo[1]) + at[1],
+                                      static_cast<int>(box.lo[2]) + at[2]});
+                    }
+                }
+                ASSERT_EQ(again, expected) << "fraction " << fraction << ", triangle " << i;
+            }
             covered += expected.size();
             ASSERT_EQ(rows, expected) << "fraction " << fraction << ", triangle " << i;
         }
     }
     EXPECT_GT(compared, unit::cases(100000));
     EXPECT_GT(covered, static_cast<std::uint64_t>(compared));
+    EXPECT_GT(tiny, compared / 4);
+    EXPECT_GT(flat, compared / 8);
+    EXPECT_GT(cubes, compared / 50);
+    EXPECT_GT(quads, compared / 50);
 }
 
 TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
@@ -164,6 +231,96 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
         }
     }
     EXPECT_GT(compared, unit::cases(80000));
+}
+
+TEST(BrickTriangle, BricksMakeTheGeneralSet) {
+    generator g;
+    std::uint64_t covered = 0, tested = 0, met = 0;
+    for (const int fraction : {12, 13, 14, 15, 16}) {
+        g.fraction = fraction;
+        for (int i = 0; i < unit::cases(600); ++i) {
+            snapped_position v[3];
+            g.triangle(v);
+            const auto stretch = g.number(1, 5); // up to a hundred voxels and more
+            for (auto& p : v) {
+                p.x = v[0].x + (p.x - v[0].x) * stretch;
+                p.y = v[0].y + (p.y - v[0].y) * g.number(1, 3);
+                p.z = v[0].z + (p.z - v[0].z) * stretch;
+            }
+            if (!fits_narrow(v[0], v[1], v[2], fraction)) continue;
+            const voxel_box box = bounds(v[0], v[1], v[2], fraction);
+            const brick_triangle t(v[0], v[1], v[2], box, fraction);
+            const auto setup = setup_triangle<span_rule::thin, std::int64_t>(v[0], v[1], v[2], fraction);
+            voxels found;
+            const voxel_box bricks = coarsen_box(box);
+            for (std::int64_t bz = bricks.lo[2]; bz <= bricks.hi[2]; ++bz)
+                for (std::int64_t by = bricks.lo[1]; by <= bricks.hi[1]; ++by)
+                    for (std::int64_t bx = bricks.lo[0]; bx <= bricks.hi[0]; ++bx) {
+                        ++tested;
+                        const int at[3] = {static_cast<int>(bx * brick_size - box.lo[0]),
+                                           static_cast<int>(by * brick_size - box.lo[1]),
+                                           static_cast<int>(bz * brick_size - box.lo[2])};
+                        if (!t.meets(at[0], at[1], at[2])) continue;
+                        ++met;
+                        const small_conservative s = t.at(at[0], at[1], at[2]);
+                        int lo[3], hi[3];
+                        for (int k = 0; k < 3; ++k) {
+                            lo[k] = at[k] < 0 ? -at[k] : 0;
+                            const int end = static_cast<int>(box.hi[k] - box.lo[k]) - at[k];
+                            hi[k] = end < brick_size ? end : brick_size - 1;
+                        }
+                        const auto turned = to_uvw(setup.axis, at[0], at[1], at[2]);
+                        double first = 0, last = 0;
+                        t.depths(setup.axis, turned[0], turned[1], first, last);
+                        for (int z = lo[2]; z <= hi[2]; ++z)
+                            for (int y = lo[1]; y <= hi[1]; ++y) {
+                                const std::uint32_t limit =
+                                    s.limit_at_y(lo[0], hi[0], y) & s.limit_at_z(lo[0], hi[0], z);
+                                const std::uint32_t bits = s.meets_row(y, z) ? s.plane_bits(lo[0], y, z, limit) : 0;
+                                ASSERT_EQ(bits, s.row(lo[0], hi[0], y, z));
+                                for (int x = 0; x < brick_size; ++x) {
+                                    if (((bits >> x) & 1u) == 0) continue;
+                                    const int p[3] = {at[0] + lo[0] + x, at[1] + y, at[2] + z};
+                                    ASSERT_GE(p[setup.axis], first);
+                                    ASSERT_LE(p[setup.axis], last);
+                                    found.insert({static_cast<int>(box.lo[0]) + p[0],
+                                                  static_cast<int>(box.lo[1]) + p[1],
+                                                  static_cast<int>(box.lo[2]) + p[2]});
+                                }
+                            }
+                    }
+            const voxels expected = by_the_general_path<span_rule::conservative>(v, fraction, box);
+            covered += expected.size();
+            ASSERT_EQ(found, expected) << "fraction " << fraction << ", triangle " << i;
+
+            if (setup.zero_area) continue;
+            const brick_thin thin(v[0], v[1], v[2], box, setup.axis, fraction);
+            const auto last = to_uvw(setup.axis, box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
+            const auto origin = to_uvw(setup.axis, box.lo[0], box.lo[1], box.lo[2]);
+            voxels columns;
+            for (int at_v = 0; at_v <= last[1]; ++at_v)
+                for (int at_u = 0; at_u <= last[0]; at_u += brick_size) {
+                    const int end = static_cast<int>(last[0]) - at_u < brick_size - 1 ? static_cast<int>(last[0]) - at_u
+                                                                                      : brick_size - 1;
+                    bool any = false;
+                    thin.from(at_u, at_v).row<true>(0, end, 0, [&](int u, int w) {
+                        any = true;
+                        const auto p = to_xyz(setup.axis, origin[0] + at_u + u, origin[1] + at_v, origin[2] + w);
+                        columns.insert({static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])});
+                    });
+                    ASSERT_TRUE(!any || thin.meets_row(at_u, at_v));
+                }
+            voxel_box wide = box;
+            for (int k = 0; k < 3; ++k) {
+                wide.lo[k] -= 2;
+                wide.hi[k] += 2;
+            }
+            ASSERT_EQ(columns, by_the_general_path<span_rule::thin>(v, fraction, wide))
+                << "fraction " << fraction << ", triangle " << i;
+        }
+    }
+    EXPECT_GT(covered, 100000u);
+    EXPECT_LT(met, tested);
 }
 
 TEST(SmallTriangle, NearPositionsSnapAsAllDo) {

@@ -96,8 +96,8 @@ struct snap_transform {
             exact::round_to_int64(c) - t.offset[2]};
 }
 
-// snap() in 32 bits, relative to the part's first voxel: false where a coordinate of the whole grid is beyond 2^30 units
-// or not a number, which snap() then tells apart. An offset lies in the grid: below 2^25, for F + L <= 24.
+// snap() in 32 bits, relative to the part's first voxel: false where a coordinate of the whole grid is beyond 2^30
+// units or not a number, which snap() then tells apart. An offset lies in the grid: below 2^25, for F + L <= 24.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool snap_near(const snap_transform& t, float x, float y, float z,
                                                            std::int32_t (&q)[3]) {
     constexpr double limit = static_cast<double>(std::int64_t{1} << 30);

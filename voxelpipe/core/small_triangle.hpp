@@ -77,9 +77,10 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void small_projection(const small_triang
 struct small_conservative {
     small_half_plane xy[3], yz[3], zx[3];
     std::int64_t n[3]; // normal
-    std::int64_t below,
-        above; // a voxel's lowest corner c meets the plane where n . c + below >= 0 and above - n . c >= 0
+    // A voxel's lowest corner c meets the plane where n . c + below >= 0 and above - n . c >= 0.
+    std::int64_t below, above;
 
+    small_conservative() = default; // for brick_triangle to fill
     VOXELPIPE_HD VOXELPIPE_INLINE small_conservative(const small_triangle& t, int fraction) {
         const triple<std::int64_t> normal = small_normal(t);
         small_projection<0, 1>(t, normal[2] < 0, fraction, xy);
@@ -120,6 +121,132 @@ struct small_conservative {
         }
         return bits;
     }
+
+    // What the xy projection leaves of the voxels x0 .. x1 at y, what the zx projection leaves of them at z, whether
+    // the yz projection leaves the row (y, z), and what the plane leaves of `limit` in it: a row is the four together.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t limit_at_y(int x0, int x1, int y) const {
+        return line(xy[0].at(x0, y), xy[1].at(x0, y), xy[2].at(x0, y), xy[0].a, xy[1].a, xy[2].a, x1 - x0);
+    }
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t limit_at_z(int x0, int x1, int z) const {
+        return line(zx[0].at(z, x0), zx[1].at(z, x0), zx[2].at(z, x0), zx[0].b, zx[1].b, zx[2].b, x1 - x0);
+    }
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets_row(int y, int z) const {
+        return (yz[0].at(y, z) | yz[1].at(y, z) | yz[2].at(y, z)) >= 0;
+    }
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t plane_bits(int x0, int y, int z,
+                                                                         std::uint32_t limit) const {
+        const std::int64_t depth = n[0] * x0 + n[1] * y + n[2] * z;
+        std::int64_t lower = depth + below, upper = above - depth;
+        std::uint32_t bits = 0;
+        for (std::uint32_t at = 1; at != 0 && at <= limit; at <<= 1) {
+            bits |= static_cast<std::uint32_t>(~((lower | upper) >> 63)) & at;
+            lower += n[0];
+            upper -= n[0];
+        }
+        return bits & limit;
+    }
+
+    // Calls emit(y, z, bits) for the rows of a box of at most 8 voxels a side; bit 0 is box.lo[0]. What one projection
+    // cuts off a row depends on y or on z alone, so that is found once and not once a voxel.
+    template <class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void rows(const small_box& box, Emit&& emit) const {
+        const int x0 = box.lo[0], x1 = box.hi[0];
+        std::uint64_t by_y = 0; // 8 bits a row
+        for (int y = box.hi[1]; y >= box.lo[1]; --y) by_y = by_y << 8 | limit_at_y(x0, x1, y);
+        for (int z = box.lo[2]; z <= box.hi[2]; ++z) {
+            const std::uint32_t by_z = limit_at_z(x0, x1, z);
+            std::uint64_t left = by_y;
+            for (int y = box.lo[1]; y <= box.hi[1]; ++y, left >>= 8) {
+                const std::uint32_t limit = static_cast<std::uint32_t>(left) & by_z; // by_z has 8 bits
+                if (limit != 0 && meets_row(y, z)) emit(y, z, plane_bits(x0, y, z, limit));
+            }
+        }
+    }
+
+private:
+    // Bit x where three values, stepped x times, are all >= 0; x = 0 .. last.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE static std::uint32_t line(std::int32_t e0, std::int32_t e1,
+                                                                          std::int32_t e2, std::int32_t s0,
+                                                                          std::int32_t s1, std::int32_t s2, int last) {
+        std::uint32_t bits = 0;
+        for (int x = 0; x <= last; ++x) {
+            bits |= (static_cast<std::uint32_t>(~(e0 | e1 | e2)) >> 31) << x;
+            e0 += s0;
+            e1 += s1;
+            e2 += s2;
+        }
+        return bits;
+    }
+};
+
+// The covered voxels of a box of 2 x 2 x 2, bit x + 2 y + 4 z: rows() without loops.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t cube_bits(const small_conservative& s) {
+    // Outside is negative; the sign is moved to the place of the voxels that it concerns.
+    const auto outside = [](const small_half_plane(&h)[3], int a, int b) VOXELPIPE_INLINE_LAMBDA {
+        std::int32_t e = 0;
+        for (int i = 0; i < 3; ++i) e |= h[i].c + (a != 0 ? h[i].a : 0) + (b != 0 ? h[i].b : 0);
+        return static_cast<std::uint32_t>(e >> 31);
+    };
+    std::uint32_t out = 0;
+    for (int a = 0; a < 2; ++a)
+        for (int b = 0; b < 2; ++b) {
+            out |= outside(s.xy, a, b) & (0x11u << (a + 2 * b)); // both z
+            out |= outside(s.yz, a, b) & (0x03u << (2 * a + 4 * b));
+            out |= outside(s.zx, a, b) & (0x05u << (4 * a + b));
+        }
+    for (int z = 0; z < 2; ++z)
+        for (int y = 0; y < 2; ++y) {
+            const std::int64_t depth = (y != 0 ? s.n[1] : 0) + (z != 0 ? s.n[2] : 0);
+            const std::int64_t lower = depth + s.below, upper = s.above - depth;
+            const auto sign = [](std::int64_t v)
+                                  VOXELPIPE_INLINE_LAMBDA { return static_cast<std::uint32_t>(v >> 63); };
+            out |= sign(lower | upper) & (1u << (2 * y + 4 * z));
+            out |= sign((lower + s.n[0]) | (upper - s.n[0])) & (2u << (2 * y + 4 * z));
+        }
+    return ~out & 0xffu;
+}
+
+// A triangle whose bounding box is one voxel thick: a voxel is covered exactly where its square, seen along that axis,
+// meets the projected triangle, since all of the triangle lies within the voxel's thickness.
+struct small_flat {
+    small_half_plane e[3];
+
+    // p: the vertices on the two other axes.
+    VOXELPIPE_HD VOXELPIPE_INLINE small_flat(const std::int32_t (&p)[3][2], int fraction) {
+        small_triangle t{};
+        for (int i = 0; i < 3; ++i) {
+            t.p[i][0] = p[i][0];
+            t.p[i][1] = p[i][1];
+        }
+        const std::int64_t area = static_cast<std::int64_t>(p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) -
+                                  static_cast<std::int64_t>(p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
+        small_projection<0, 1>(t, area < 0, fraction, e);
+    }
+
+    // The covered voxels of 2 x 2, bit x + 2 y: row() without loops.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t quad_bits() const {
+        std::uint32_t out = 0;
+        for (int y = 0; y < 2; ++y)
+            for (int x = 0; x < 2; ++x) {
+                std::int32_t v = 0;
+                for (int i = 0; i < 3; ++i) v |= e[i].c + (x != 0 ? e[i].a : 0) + (y != 0 ? e[i].b : 0);
+                out |= static_cast<std::uint32_t>(v >> 31) & (1u << (x + 2 * y));
+            }
+        return ~out & 15u;
+    }
+
+    // The covered voxels (x0 .. x1, y) of the two axes, bit 0 for x0.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t row(int x0, int x1, int y) const {
+        std::int32_t e0 = e[0].at(x0, y), e1 = e[1].at(x0, y), e2 = e[2].at(x0, y);
+        std::uint32_t bits = 0;
+        for (int x = 0; x <= x1 - x0; ++x) {
+            bits |= (static_cast<std::uint32_t>(~(e0 | e1 | e2)) >> 31) << x;
+            e0 += e[0].a;
+            e1 += e[1].a;
+            e2 += e[2].a;
+        }
+        return bits;
+    }
 };
 
 // ---- thin -----------------------------------------------------------------------------------------------------------
@@ -128,7 +255,10 @@ struct small_conservative {
 struct small_thin {
     int axis;
     small_half_plane uv[3];
-    std::int64_t nu, nv, nw, depth; // depth: at the column's centre, doubled: (depth - nu (2u+1) - nv (2v+1)) / (2 nw)
+    // The depth at a column's centre is (depth - nu (2u + 1) - nv (2v + 1)) / (2 nw).
+    std::int64_t nu, nv, nw, depth;
+
+    small_thin() = default; // for brick_thin to fill
 
     VOXELPIPE_HD VOXELPIPE_INLINE small_thin(const small_triangle& t, const triple<std::int64_t>& normal, int axis_,
                                              int fraction)
@@ -149,14 +279,21 @@ struct small_thin {
     }
 
     // Calls emit(u, w) for the covered columns (u0 .. u1, v). All count from the bounding box; w may lie beyond it.
-    template <class Emit>
+    // Wide: the numbers may be those of a large triangle, whose quotient a double need not hold.
+    template <bool Wide = false, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void row(int u0, int u1, int v, Emit&& emit) const {
         std::int32_t e[3];
         for (int i = 0; i < 3; ++i) e[i] = uv[i].at(u0, v);
         const std::int64_t numerator = depth - nu * (2 * u0 + 1) - nv * (2 * v + 1), divisor = 2 * nw;
-        const double quotient = exact::div(static_cast<double>(numerator), static_cast<double>(divisor));
-        auto w = static_cast<std::int32_t>(quotient);
-        w -= static_cast<std::int32_t>(static_cast<double>(w) > quotient); // towards minus infinity
+        std::int32_t w = 0;
+        constexpr std::int64_t exact_below = std::int64_t{1} << 52;
+        if (!Wide || (numerator < exact_below && numerator > -exact_below)) {
+            const double quotient = exact::div(static_cast<double>(numerator), static_cast<double>(divisor));
+            w = static_cast<std::int32_t>(quotient);
+            w -= static_cast<std::int32_t>(static_cast<double>(w) > quotient); // towards minus infinity
+        } else {
+            w = static_cast<std::int32_t>(exact::floor_div(numerator, divisor));
+        }
         std::int64_t remainder = numerator - w * divisor;
         for (int u = u0; u <= u1; ++u) {
             if ((e[0] | e[1] | e[2]) >= 0) emit(u, w);

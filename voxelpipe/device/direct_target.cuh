@@ -18,7 +18,7 @@ namespace voxelpipe::device {
 
 // direct_value<Blend, T>: one fragment with value v into a stored T.
 //   available     allowed(value, target, most): whether up to `most` fragments of this value give the blend's bits
-//   apply(T*, v)  -> whether the voxel had no fragment yet, where tells_first(target) holds
+//   apply(T*, v)  apply_first(T*, v): whether the voxel had no fragment yet; count has it, where tells_first holds
 template <class Blend, class T>
 struct direct_value {
     static constexpr bool available = false;
@@ -47,8 +47,27 @@ struct direct_value<blend::count, T> {
         return t.load == load_operation::clear && t.clear_value == 0 && most < 0xffffffffu;
     }
     template <class V>
-    __device__ static bool apply(T* at, const V&) {
-        return atomicAdd(reinterpret_cast<unsigned_word<T>*>(at), unsigned_word<T>{1}) == 0;
+    __device__ static void apply(T* at, const V&) {
+        atomicAdd(reinterpret_cast<unsigned_word<T>*>(at), unsigned_word<T>{1});
+    }
+    // Whether the voxel had no fragment yet. Written out, as reduce_or is.
+    template <class V>
+    __device__ static bool apply_first(T* at, const V&) {
+        if constexpr (sizeof(T) == 4) {
+            unsigned old = 0;
+            asm volatile("atom.relaxed.gpu.global.add.u32 %0, [%1], 1;"
+                         : "=r"(old)
+                         : "l"(__cvta_generic_to_global(at))
+                         : "memory");
+            return old == 0;
+        } else {
+            unsigned long long old = 0;
+            asm volatile("atom.relaxed.gpu.global.add.u64 %0, [%1], 1;"
+                         : "=l"(old)
+                         : "l"(__cvta_generic_to_global(at))
+                         : "memory");
+            return old == 0;
+        }
     }
 };
 
@@ -64,7 +83,7 @@ struct direct_integer {
     [[nodiscard]] static bool tells_first(const Target&, std::uint64_t) {
         return false;
     }
-    __device__ static bool apply(T* at, T v) {
+    __device__ static void apply(T* at, T v) {
         if constexpr (std::is_same_v<Blend, blend::add>)
             atomicAdd(reinterpret_cast<unsigned_word<T>*>(at), static_cast<unsigned_word<T>>(v));
         else if constexpr (std::is_same_v<Blend, blend::min>)
@@ -77,7 +96,6 @@ struct direct_integer {
             atomicOr(reinterpret_cast<unsigned_word<T>*>(at), static_cast<unsigned_word<T>>(v));
         else
             atomicXor(reinterpret_cast<unsigned_word<T>*>(at), static_cast<unsigned_word<T>>(v));
-        return false;
     }
 };
 template <class T>
@@ -141,10 +159,7 @@ requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_va
     [[nodiscard]] static bool tells_first(const Target&, std::uint64_t) {
         return false;
     }
-    __device__ static bool apply(T* at, T v) {
-        atomicAdd(at, v);
-        return false;
-    }
+    __device__ static void apply(T* at, T v) { atomicAdd(at, v); }
 };
 
 // Order is free by definition.
@@ -159,11 +174,17 @@ requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_va
     [[nodiscard]] static bool tells_first(const Target&, std::uint64_t) {
         return false;
     }
-    __device__ static bool apply(T* at, T v) {
-        atomicAdd(at, v);
-        return false;
-    }
+    __device__ static void apply(T* at, T v) { atomicAdd(at, v); }
 };
+
+// An or, an and on a word of bits whose old value nobody needs. Written out, so that no compiler merges it with the one
+// that returns something: then a warp would wait for the answer.
+__device__ VOXELPIPE_INLINE void reduce_or(word* at, word bits) {
+    asm volatile("red.relaxed.gpu.global.or.b32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(bits) : "memory");
+}
+__device__ VOXELPIPE_INLINE void reduce_and(word* at, word bits) {
+    asm volatile("red.relaxed.gpu.global.and.b32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(bits) : "memory");
+}
 
 // ---- whole targets --------------------------------------------------------------------------------------------------
 
@@ -224,7 +245,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
                 if (count_first)
                     first += static_cast<unsigned>(__popc(bits & ~atomicOr(w, bits)));
                 else
-                    atomicOr(w, bits);
+                    reduce_or(w, bits);
             } else if constexpr (blend_type::clears) {
                 if (v) return;
                 const word seen = __ldca(w);
@@ -232,7 +253,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
                 if (count_first)
                     first += static_cast<unsigned>(__popc(bits & atomicAnd(w, ~bits)));
                 else
-                    atomicAnd(w, ~bits);
+                    reduce_and(w, ~bits);
             } else {
                 if (v) atomicXor(w, bits);
             }
@@ -244,12 +265,57 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
     } else {
         for (; mask != 0; mask &= mask - 1) {
             const int x = x0 + __ffs(static_cast<int>(mask)) - 1;
-            const bool is_first = direct_value<typename Target::blend_type, typename Target::value_type>::apply(
-                t.elements + map::cell(t.extent, x, y, z), value);
-            if (count_first) first += static_cast<unsigned>(is_first);
+            auto* const at = t.elements + map::cell(t.extent, x, y, z);
+            using method = direct_value<typename Target::blend_type, typename Target::value_type>;
+            if constexpr (std::is_same_v<typename Target::blend_type, blend::count>) {
+                if (count_first) {
+                    first += static_cast<unsigned>(method::apply_first(at, value));
+                    continue;
+                }
+            }
+            method::apply(at, value);
         }
     }
     return first;
+}
+
+// Up to four rows at once, of up to two voxels each: bits of row k in mask[k], at (x, y, z), (x, y + 1, z), (x, y, z +
+// 1) and (x, y + 1, z + 1); row 2 is at (x, y + 1, z) instead where `along_y`. The loads go out together.
+template <class Target, class Value>
+__device__ VOXELPIPE_INLINE unsigned blend_four(const target_view<Target>& t, int x, int y, int z,
+                                                const word (&mask)[4], bool along_y, const Value& value,
+                                                bool count_first) {
+    using map = typename Target::map;
+    const int shift = x & 31;
+    if constexpr (map::is_bit && !map::bricks && bit_blend<typename Target::blend_type>::sets) {
+        if (shift != 31) {
+            if (!value) return 0;
+            const auto row = static_cast<std::ptrdiff_t>((t.extent.x + 31) / 32);
+            const std::ptrdiff_t slice = row * t.extent.y;
+            word* const first = t.elements + map::cell(t.extent, x, y, z);
+            word* const at[4] = {first, first + row, first + (along_y ? row : slice), first + row + slice};
+            word missing[4];
+            for (int k = 0; k < 4; ++k) missing[k] = mask[k] << shift;
+            for (int k = 0; k < 4; ++k)
+                if (missing[k] != 0) missing[k] &= ~__ldca(at[k]); // maybe an old word: bits that are set stay set
+            unsigned touched = 0;
+            for (int k = 0; k < 4; ++k) {
+                if (missing[k] == 0) continue;
+                if (count_first)
+                    touched += static_cast<unsigned>(__popc(missing[k] & ~atomicOr(at[k], missing[k])));
+                else
+                    reduce_or(at[k], missing[k]);
+            }
+            return touched;
+        }
+    }
+    unsigned touched = 0;
+#pragma unroll 1
+    for (int k = 0; k < 4; ++k)
+        if (mask[k] != 0)
+            touched += blend_row(t, x, y + (k == 2 && along_y ? 1 : k % 2), z + (k == 2 && along_y ? 0 : k / 2),
+                                 mask[k], value, count_first);
+    return touched;
 }
 
 } // namespace voxelpipe::device

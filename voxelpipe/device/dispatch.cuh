@@ -231,6 +231,7 @@ inline constexpr bool can_be_direct<FragmentShader, framebuffer_view<Targets...>
                                                                                     (is_direct<Targets>() && ...);
 
 inline constexpr std::size_t most_direct_draws = 16; // each has launches of its own
+inline constexpr int most_direct_extent = 1 << 16;   // bricks are numbered with 16 bits, voxels with 32
 
 // ---- a framebuffer call ---------------------------------------------------------------------------------------------
 
@@ -302,7 +303,8 @@ private:
     [[nodiscard]] bool is_direct_call() const {
         if (draws.size() > most_direct_draws || core::small_voxels(core::make_snap_transform(g).fraction) == 0)
             return false;
-        if (!large_list::holds(num_primitives, large_chunks::most_records(g.extent))) return false;
+        if (!large_list::holds(num_primitives, large_pieces<coverage::thin>::most_records(g.extent))) return false;
+        if (std::max({g.extent.x, g.extent.y, g.extent.z}) > most_direct_extent) return false;
         if (options.count_voxels && find_counting_target() < 0) return false;
         bool all = true;
         core::for_each_index<groups::count>([&]<std::size_t K>() {
