@@ -138,6 +138,14 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
                 });
                 ASSERT_EQ(again, expected) << "fraction " << fraction << ", triangle " << i;
             }
+            voxels longer;
+            s.long_rows(all, [&](int y, int z, std::uint32_t bits) {
+                for (int x = 0; x < 32; ++x)
+                    if (((bits >> x) & 1u) != 0)
+                        longer.insert({static_cast<int>(box.lo[0]) + x, static_cast<int>(box.lo[1]) + y,
+                                       static_cast<int>(box.lo[2]) + z});
+            });
+            ASSERT_EQ(longer, expected) << "fraction " << fraction << ", triangle " << i;
             if (all.hi[0] == 1 && all.hi[1] == 1 && all.hi[2] == 1) {
                 ++cubes;
                 std::uint32_t wanted = 0;

@@ -163,6 +163,21 @@ struct small_conservative {
         }
     }
 
+    // The same for boxes of up to 32 voxels a side.
+    template <class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void long_rows(const small_box& box, Emit&& emit) const {
+        const int x0 = box.lo[0], x1 = box.hi[0];
+        for (int y = box.lo[1]; y <= box.hi[1]; ++y) {
+            const std::uint32_t at_y = limit_at_y(x0, x1, y);
+            if (at_y == 0) continue;
+            for (int z = box.lo[2]; z <= box.hi[2]; ++z) {
+                if (!meets_row(y, z)) continue;
+                const std::uint32_t limit = at_y & limit_at_z(x0, x1, z);
+                if (limit != 0) emit(y, z, plane_bits(x0, y, z, limit));
+            }
+        }
+    }
+
 private:
     // Bit x where three values, stepped x times, are all >= 0; x = 0 .. last.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE static std::uint32_t line(std::int32_t e0, std::int32_t e1,

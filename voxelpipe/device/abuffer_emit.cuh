@@ -7,6 +7,7 @@
 // selected. Memory is in proportion to the fragments (paper section 3, A-buffer).
 
 #include <voxelpipe/device/fragment_shade.cuh>
+#include <voxelpipe/device/list_raster.cuh>
 #include <voxelpipe/device/tile_sort.cuh>
 #include <voxelpipe/device/work_share.cuh>
 
@@ -124,8 +125,18 @@ build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const share_buf
             const capacities& limits, bool counts_triangles, cudaStream_t stream) {
     const fragment_cells<Rule, Scene, Key, Payload, MakePayload> op{
         s, b.keys[0], b.values[0], b.primitives, b.payloads, counts_triangles};
-    share_count(s.geo, op, share, state, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
-    share_emit(s.geo, op, share, state, limits, stage::abuffer_emit, stream);
+    bool listed = false;
+    if constexpr (core::is_solid<decltype(s.one.fragment_shader)>) {
+        listed = is_listable(s.geo);
+        if (listed) {
+            list_count(s.geo, op, share, state, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
+            list_emit(s.geo, op, share, state, limits, stage::abuffer_emit, stream);
+        }
+    }
+    if (!listed) {
+        share_count(s.geo, op, share, state, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
+        share_emit(s.geo, op, share, state, limits, stage::abuffer_emit, stream);
+    }
     fill_end(b.keys[0], b.values[0], share.num_cells, limits.fragments, state, limits, stream);
     cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
     cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);

@@ -4,65 +4,16 @@
 
 // Direct raster: fragments go straight from their triangle into the render targets, without tiles, where the shader is
 // constant and every target takes a fragment by one atomic (direct_target.cuh). Coarse raster, sort and tile images
-// cost a small triangle more than the few voxels that it touches.
-//
-// One kernel reads the mesh once and sorts triangles by what they cost: those of up to 2 x 2 x 1 voxels are written at
-// once; small ones wait in shared memory until there is a full block of them, the smallest a thread each, larger ones
-// eight lanes each; what 32-bit coverage cannot hold goes to a list in global memory, which a second kernel shares out.
+// cost a small triangle more than the few voxels that it touches. Small triangles are small_raster.cuh's; what that
+// leaves goes to a list in global memory, which a second kernel shares out by bricks.
 
-#include <voxelpipe/core/brick_triangle.hpp>
 #include <voxelpipe/device/direct_target.cuh>
-#include <voxelpipe/device/scene.cuh>
+#include <voxelpipe/device/small_raster.cuh>
 #include <voxelpipe/device/tile_image.cuh>
 #include <voxelpipe/device/wide_path.cuh>
 #include <voxelpipe/device/work_share.cuh>
 
 namespace voxelpipe::device {
-
-// ---- triangles ------------------------------------------------------------------------------------------------------
-
-// Snapped vertices of one draw: made by its vertex shader on the spot, where that is cheap and makes no varyings.
-template <class Mesh, class VertexShader>
-struct shading_source {
-    Mesh mesh;
-    VertexShader shader;
-    core::snap_transform snap;
-    std::uint32_t draw;
-
-    [[nodiscard]] __device__ VOXELPIPE_INLINE glm::vec3 shade(std::uint32_t vertex) const {
-        const auto result = shader(core::fetch_vertex(mesh, vertex, draw));
-        return core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result).position;
-    }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(std::uint32_t vertex, std::int32_t (&q)[3]) const {
-        const glm::vec3 p = shade(vertex);
-        return core::snap_near(snap, p.x, p.y, p.z, q);
-    }
-    [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
-        const glm::vec3 p = shade(vertex);
-        return core::snap(snap, p.x, p.y, p.z);
-    }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const { return mesh.triangles[i]; }
-};
-
-// The same from the positions that vertex_shade left.
-struct stored_source {
-    draw_geometry geometry;
-
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(std::uint32_t vertex, std::int32_t (&q)[3]) const {
-        const core::snapped_position p = geometry.positions[vertex];
-        constexpr std::int64_t limit = std::int64_t{1} << 30;
-        q[0] = static_cast<std::int32_t>(p.x);
-        q[1] = static_cast<std::int32_t>(p.y);
-        q[2] = static_cast<std::int32_t>(p.z);
-        return p.x <= limit && p.x >= -limit && p.y <= limit && p.y >= -limit && p.z <= limit && p.z >= -limit;
-    }
-    [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
-        return geometry.positions[vertex];
-    }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const {
-        return geometry.triangles[i];
-    }
-};
 
 // Triangles that the small path cannot take, in order of arrival, each with the number of its first record of 32
 // chunks: a warp finds the triangle of a record by bisection. `next` packs how many triangles and records there are, so
@@ -72,6 +23,8 @@ struct large_list {
     std::uint32_t* triangles;
     unsigned long long* first_records;
     unsigned long long* next;
+    std::uint32_t* mediums; // small triangles that are much work for one thread
+    unsigned long long* num_mediums;
 
     [[nodiscard]] static constexpr bool holds(std::uint64_t triangles, std::uint64_t records_each) {
         return triangles < (std::uint64_t{1} << (64 - record_bits)) &&
@@ -87,10 +40,7 @@ struct large_list {
 template <coverage Rule, class Source, class Framebuffer, class Values>
 struct direct_call {
     static constexpr coverage rule = Rule;
-    Source source;
-    std::uint32_t num_triangles;
-    int fraction;
-    glm::ivec3 extent;
+    raster_input<Source> in;
     Framebuffer fb;
     Values values;
     int counting_target; // which target tells first touches, for the voxel counter; -1: none is wanted
@@ -126,171 +76,6 @@ __device__ VOXELPIPE_INLINE void blend_four_into_all(const Call& call, int x, in
         counts.voxels += blend_four(t, x, y, z, mask, along_y, voxelpipe::get<K>(call.values),
                                     call.counting_target == static_cast<int>(K));
     });
-}
-
-// ---- small triangles ------------------------------------------------------------------------------------------------
-
-inline constexpr int direct_threads = 128;
-#ifndef DMB
-#define DMB 6
-#endif
-inline constexpr int direct_min_blocks = DMB; // per multiprocessor: registers for that many
-inline constexpr int most_side = 8;           // a bounding box of so many voxels a side is one thread's work
-inline constexpr int small_cells = 27;        // one of so many voxels waits apart from the larger ones
-inline constexpr int small_columns = 12;      // the same for thin coverage, in columns of voxels
-inline constexpr int most_columns = 64;       // thin: one thread's work
-inline constexpr int medium_lanes = 8;        // of a warp, for one larger triangle
-
-// Triangles that wait for a full warp of them. Every warp has its own queues: no thread waits for another warp, and the
-// number that wait is a register that all lanes agree on.
-inline constexpr int queue_places = 64; // up to 31 wait when a warp brings up to 32 more
-
-// Triangles relative to their bounding boxes, each in a column of words.
-struct triangle_queue {
-    std::int32_t p[9][queue_places];
-    std::int32_t origin[3][queue_places]; // lowest voxel of the bounding box
-    std::uint32_t part[queue_places];     // small_box, packed
-};
-
-// 5 bits for each of the six numbers of a box.
-[[nodiscard]] VOXELPIPE_HD inline std::uint32_t pack_box(const core::small_box& box) {
-    std::uint32_t packed = 0;
-    for (int i = 0; i < 3; ++i)
-        packed |= static_cast<std::uint32_t>(box.lo[i]) << (10 * i) | static_cast<std::uint32_t>(box.hi[i])
-                                                                          << (10 * i + 5);
-    return packed;
-}
-[[nodiscard]] VOXELPIPE_HD inline core::small_box unpack_box(std::uint32_t packed) {
-    core::small_box box{};
-    for (int i = 0; i < 3; ++i) {
-        box.lo[i] = static_cast<int>(packed >> (10 * i) & 31);
-        box.hi[i] = static_cast<int>(packed >> (10 * i + 5) & 31);
-    }
-    return box;
-}
-
-// The place of a lane that wants one behind the `count` that wait; adds the newcomers. All lanes take part.
-__device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
-    const unsigned who = __ballot_sync(0xffffffffu, wanted);
-    const int place = count + __popc(who & ((1u << threadIdx.x % 32) - 1));
-    count += __popc(who);
-    return place;
-}
-
-// A triangle relative to its bounding box, and what of that box lies in the grid.
-struct near_triangle {
-    core::small_triangle t;
-    std::int32_t lo[3];  // lowest voxel of the bounding box
-    int cells[3];        // its size
-    core::small_box box; // 1 > 0 along an axis where nothing lies in the grid
-    bool is_near;        // otherwise nothing above holds
-    bool is_out;         // no voxel in the grid can be covered
-};
-
-template <class Call>
-__device__ VOXELPIPE_INLINE near_triangle load_near(const Call& call, const glm::uvec3& index) {
-    near_triangle r;
-    r.is_near = call.source.near_position(index.x, r.t.p[0]) & call.source.near_position(index.y, r.t.p[1]) &
-                call.source.near_position(index.z, r.t.p[2]);
-    r.is_out = false;
-    for (int k = 0; k < 3; ++k) {
-        const int extent = k == 0 ? call.extent.x : k == 1 ? call.extent.y : call.extent.z;
-        const std::int32_t low = core::min3(r.t.p[0][k], r.t.p[1][k], r.t.p[2][k]);
-        const std::int32_t high = core::max3(r.t.p[0][k], r.t.p[1][k], r.t.p[2][k]);
-        r.lo[k] = -(-low >> call.fraction) - 1; // ceil - 1: a face touches both sides
-        const std::int32_t last = (high >> call.fraction) - r.lo[k];
-        // A thin fragment may lie one voxel beyond the triangle's own depths.
-        constexpr int beyond = Call::rule == coverage::thin ? 1 : 0;
-        r.is_out = r.is_out || r.lo[k] - beyond >= extent || r.lo[k] + last + beyond < 0;
-        r.box.lo[k] = r.lo[k] < 0 ? -r.lo[k] : 0;
-        r.box.hi[k] = r.lo[k] + last < extent ? last : extent - 1 - r.lo[k];
-        if (r.box.lo[k] > r.box.hi[k]) {
-            r.box.lo[k] = 1;
-            r.box.hi[k] = 0;
-        }
-        r.cells[k] = last + 1;
-        for (int v = 0; v < 3; ++v) r.t.p[v][k] -= r.lo[k] << call.fraction;
-    }
-    return r;
-}
-
-// Thin fragments of the columns in rows first, first + step, ... of a small triangle; false where it has no area.
-template <class Call>
-__device__ VOXELPIPE_INLINE bool raster_thin(const Call& call, const core::small_triangle& t,
-                                             const std::int32_t (&lo)[3], const core::small_box& box, int first,
-                                             int step, direct_counts& counts) {
-    const core::triple<std::int64_t> normal = core::small_normal(t);
-    const std::int64_t mx = core::magnitude(normal[0]), my = core::magnitude(normal[1]),
-                       mz = core::magnitude(normal[2]);
-    if ((mx | my | mz) == 0) return false;
-    const int axis = mx >= my && mx >= mz ? 0 : my >= mz ? 1 : 2;
-    const core::small_thin s(t, normal, axis, call.fraction);
-    const auto begin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
-    const auto end = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
-    const int depth = axis == 0 ? call.extent.x : axis == 1 ? call.extent.y : call.extent.z;
-    const int lowest = axis == 0 ? lo[0] : axis == 1 ? lo[1] : lo[2];
-    for (int v = begin[1] + first; v <= end[1]; v += step)
-        s.row(begin[0], end[0], v, [&](int u, int w) {
-            if (lowest + w < 0 || lowest + w >= depth) return;
-            const auto at = core::to_xyz(axis, u, v, w);
-            blend_into_all(call, lo[0] + at[0], lo[1] + at[1], lo[2] + at[2], 1u, counts);
-        });
-    return true;
-}
-
-// Conservative fragments within a box of at most 32 voxels a side, by medium_lanes neighbouring lanes that all take
-// part: each has rows of its own y, and what the z of a row cuts off is found by one of them for all.
-template <class Call>
-__device__ VOXELPIPE_INLINE void raster_lanes(const Call& call, const core::small_conservative& s,
-                                              const std::int32_t (&lo)[3], const core::small_box& box,
-                                              direct_counts& counts) {
-    const int lane = static_cast<int>(threadIdx.x) % medium_lanes;
-    const unsigned group = ((1u << medium_lanes) - 1) << (threadIdx.x % 32 / medium_lanes * medium_lanes);
-    const int x0 = box.lo[0], x1 = box.hi[0];
-    for (int first_y = box.lo[1]; first_y <= box.hi[1]; first_y += medium_lanes) {
-        const int y = first_y + lane;
-        const word at_y = y <= box.hi[1] ? s.limit_at_y(x0, x1, y) : 0;
-        for (int first_z = box.lo[2]; first_z <= box.hi[2]; first_z += medium_lanes) {
-            const word mine = first_z + lane <= box.hi[2] ? s.limit_at_z(x0, x1, first_z + lane) : 0;
-            const int end = box.hi[2] - first_z + 1 < medium_lanes ? box.hi[2] - first_z + 1 : medium_lanes;
-            for (int k = 0; k < end; ++k) {
-                const word limit = __shfl_sync(group, mine, k, medium_lanes) & at_y;
-                if (limit == 0 || !s.meets_row(y, first_z + k)) continue;
-                blend_into_all(call, lo[0] + x0, lo[1] + y, lo[2] + first_z + k,
-                               s.plane_bits(x0, y, first_z + k, limit), counts);
-            }
-        }
-    }
-}
-
-// A bounding box of at most two voxels along two axes and one along the third: written at once. Most triangles of a
-// fine mesh are of this kind.
-template <class Call>
-__device__ VOXELPIPE_INLINE void raster_quad(const Call& call, const core::small_triangle& t,
-                                             const std::int32_t (&lo)[3], const int (&cells)[3],
-                                             const core::small_box& box, direct_counts& counts) {
-    const int thick = cells[2] == 1 ? 2 : cells[1] == 1 ? 1 : 0;
-    word bits = 0; // p + 2 q, along the other two axes
-    if ((cells[0] > 1) + (cells[1] > 1) + (cells[2] > 1) == 2) {
-        std::int32_t p[3][2];
-        for (int v = 0; v < 3; ++v) {
-            p[v][0] = thick == 0 ? t.p[v][1] : t.p[v][0];
-            p[v][1] = thick == 2 ? t.p[v][1] : t.p[v][2];
-        }
-        bits = core::small_flat(p, call.fraction).quad_bits();
-    } else { // a line of voxels is covered whole
-        const int np = thick == 0 ? cells[1] : cells[0], nq = thick == 2 ? cells[1] : cells[2];
-        bits = np == 2 ? 3u : nq == 2 ? 5u : 1u;
-    }
-    // What lies in the grid.
-    const int p0 = thick == 0 ? box.lo[1] : box.lo[0], p1 = thick == 0 ? box.hi[1] : box.hi[0];
-    const int q0 = thick == 2 ? box.lo[1] : box.lo[2], q1 = thick == 2 ? box.hi[1] : box.hi[2];
-    bits &= (p0 == 0 ? 15u : 10u) & (p1 == 1 ? 15u : 5u) & (q0 == 0 ? 15u : 12u) & (q1 == 1 ? 15u : 3u);
-    // Rows along x: of y and z where the thin axis is x, otherwise one row for each q.
-    const bool rows_of_one = thick == 0;
-    const word mask[4] = {rows_of_one ? bits & 1u : bits & 3u, rows_of_one ? bits >> 1 & 1u : 0u,
-                          rows_of_one ? bits >> 2 & 1u : bits >> 2, rows_of_one ? bits >> 3 : 0u};
-    blend_four_into_all(call, lo[0], lo[1], lo[2], mask, thick == 2, counts);
 }
 
 // ---- large triangles ------------------------------------------------------------------------------------------------
@@ -338,14 +123,14 @@ struct large_pieces {
 // Decides about a triangle in full width; one that is drawn goes to the list.
 template <class Call>
 __device__ __noinline__ core::triangle_class push_large(const Call& call, std::uint32_t triangle, glm::uvec3 index) {
-    const core::snapped_position a = call.source.position(index.x), b = call.source.position(index.y),
-                                 c = call.source.position(index.z);
-    const core::voxel_box whole{{{0, 0, 0}}, {{call.extent.x - 1, call.extent.y - 1, call.extent.z - 1}}};
+    const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
+                                 c = call.in.source.position(index.z);
+    const core::voxel_box whole{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
     core::voxel_box reach{};
-    core::triangle_class kind = core::classify<Call::rule>(a, b, c, call.fraction, whole, reach);
+    core::triangle_class kind = core::classify<Call::rule>(a, b, c, call.in.fraction, whole, reach);
     if (kind != core::triangle_class::drawn) return kind;
     if (Call::rule == coverage::thin && core::has_zero_area(a, b, c)) return core::triangle_class::zero_area;
-    const large_pieces<Call::rule> pieces(reach, core::dominant_axis(a, b, c, call.fraction));
+    const large_pieces<Call::rule> pieces(reach, core::dominant_axis(a, b, c, call.in.fraction));
     call.large.push(triangle, static_cast<unsigned long long>(pieces.records()));
     return kind;
 }
@@ -406,207 +191,69 @@ __global__ void check_indices_kernel(const Index* indices, std::uint64_t count, 
     if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, 1u);
 }
 
-// What one warp keeps in shared memory.
-struct warp_queues {
-    triangle_queue cubes, smalls;                              // bounding boxes of 2 x 2 x 2 voxels; other small ones
-    std::uint32_t larges[queue_places], mediums[queue_places]; // numbers of triangles that are loaded again
-};
-
-// The work of a warp, from the mesh to the targets.
+// Fragments go into the targets.
 template <class Call>
-struct direct_warp {
-    static constexpr bool thin = Call::rule == coverage::thin;
-    using triangle_class = core::triangle_class;
+struct blending_sink {
+    static constexpr bool names_triangles = false;
+    static constexpr bool takes_mediums = true;
 
     const Call& call;
-    warp_queues& queues;
     unsigned* dropped; // by triangle_class, of the block
-    int lane = static_cast<int>(threadIdx.x) % 32;
-    int num_cubes = 0, num_smalls = 0, num_larges = 0, num_mediums = 0;
     direct_counts counts{};
 
-    __device__ VOXELPIPE_INLINE void drop(triangle_class kind) { atomicAdd(&dropped[static_cast<int>(kind)], 1u); }
-
-    __device__ VOXELPIPE_INLINE static void put(triangle_queue& queue, int at, const near_triangle& r) {
-        for (int k = 0; k < 9; ++k) queue.p[k][at] = r.t.p[k / 3][k % 3];
-        for (int k = 0; k < 3; ++k) queue.origin[k][at] = r.lo[k];
-        queue.part[at] = pack_box(r.box);
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool check(std::uint32_t, const glm::uvec3&) {
+        return true; // check_indices has run
     }
-    __device__ VOXELPIPE_INLINE static core::small_box get(const triangle_queue& queue, int at, core::small_triangle& t,
-                                                           std::int32_t (&lo)[3]) {
-        for (int k = 0; k < 9; ++k) t.p[k / 3][k % 3] = queue.p[k][at];
-        for (int k = 0; k < 3; ++k) lo[k] = queue.origin[k][at];
-        return unpack_box(queue.part[at]);
+    __device__ VOXELPIPE_INLINE static void begin(std::uint32_t) {}
+    __device__ VOXELPIPE_INLINE static void end() {}
+    __device__ VOXELPIPE_INLINE static void none(std::uint32_t) {}
+    __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
+        blend_into_all(call, x0, y, z, mask, counts);
     }
-
-    // The last 32 that wait, one a lane; all lanes take part.
-    template <class Raster>
-    __device__ VOXELPIPE_INLINE static void drain(const warp_queues& from, int& count, Raster&& raster) {
-        __syncwarp();
-        raster(from, count - 32 + static_cast<int>(threadIdx.x % 32));
-        __syncwarp();
-        count -= 32;
+    __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4], bool along_y) {
+        blend_four_into_all(call, x, y, z, mask, along_y, counts);
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_cube() {
-        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            core::small_triangle t;
-            std::int32_t lo[3];
-            const core::small_box box = get(from.cubes, at, t, lo);
-            word bits = core::cube_bits(core::small_conservative(t, call.fraction));
-            bits &= (box.lo[0] == 0 ? 0xffu : 0xaau) & (box.hi[0] == 1 ? 0xffu : 0x55u) &
-                    (box.lo[1] == 0 ? 0xffu : 0xccu) & (box.hi[1] == 1 ? 0xffu : 0x33u) &
-                    (box.lo[2] == 0 ? 0xffu : 0xf0u) & (box.hi[2] == 1 ? 0xffu : 0x0fu);
-            const word mask[4] = {bits & 3u, bits >> 2 & 3u, bits >> 4 & 3u, bits >> 6};
-            blend_four_into_all(call, lo[0], lo[1], lo[2], mask, false, counts);
-        };
+    __device__ VOXELPIPE_INLINE core::triangle_class big(std::uint32_t triangle, const glm::uvec3& index) {
+        return push_large(call, triangle, index);
     }
-    __device__ VOXELPIPE_INLINE void raster(const core::small_triangle& t, const std::int32_t (&lo)[3],
-                                            const core::small_box& box) {
-        if constexpr (thin) {
-            if (!raster_thin(call, t, lo, box, 0, 1, counts)) drop(triangle_class::zero_area);
-        } else {
-            const core::small_conservative s(t, call.fraction);
-            s.rows(box, [&](int y, int z, word bits) {
-                blend_into_all(call, lo[0] + box.lo[0], lo[1] + y, lo[2] + z, bits, counts);
-            });
-        }
+    __device__ VOXELPIPE_INLINE void mediums(bool wanted, std::uint32_t triangle) {
+        const unsigned who = __ballot_sync(0xffffffffu, wanted);
+        if (who == 0) return;
+        const unsigned lane = threadIdx.x % 32;
+        unsigned long long first = 0;
+        if (lane == 0) first = atomicAdd(call.large.num_mediums, static_cast<unsigned long long>(__popc(who)));
+        first = __shfl_sync(0xffffffffu, first, 0);
+        if (wanted) call.large.mediums[first + static_cast<unsigned>(__popc(who & ((1u << lane) - 1)))] = triangle;
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_small() {
-        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            core::small_triangle t;
-            std::int32_t lo[3];
-            const core::small_box box = get(from.smalls, at, t, lo);
-            raster(t, lo, box);
-        };
-    }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_large() {
-        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            const near_triangle r = load_near(call, call.source.triangle(from.larges[at]));
-            raster(r.t, r.lo, r.box);
-        };
-    }
-    // All that wait, medium_lanes a triangle.
-    __device__ void drain_mediums() {
-        __syncwarp();
-        for (int first = 0; first < num_mediums; first += 32 / medium_lanes) {
-            const int at = first + lane / medium_lanes;
-            if (at >= num_mediums) continue;
-            const near_triangle r = load_near(call, call.source.triangle(queues.mediums[at]));
-            if constexpr (thin) {
-                const int part = lane % medium_lanes;
-                if (!raster_thin(call, r.t, r.lo, r.box, part, medium_lanes, counts) && part == 0)
-                    drop(triangle_class::zero_area);
-            } else {
-                raster_lanes(call, core::small_conservative(r.t, call.fraction), r.lo, r.box, counts);
-            }
-        }
-        __syncwarp();
-        num_mediums = 0;
-    }
-
-    // The lane's triangle i, with its indices, where there is one.
-    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, const glm::uvec3& index) {
-        const bool valid = i < call.num_triangles;
-        near_triangle r;
-        int most = 0;
-        bool is_quad = false, to_cubes = false, to_smalls = false, to_larges = false, to_mediums = false,
-             is_big = false;
-        if (valid) {
-            r = load_near(call, index);
-            most = core::max3(r.cells[0], r.cells[1], r.cells[2]);
-            is_big = !r.is_near || most > core::small_voxels(call.fraction);
-            if (!is_big && r.is_out) drop(triangle_class::outside);
-            if (!is_big && !r.is_out) {
-                if constexpr (thin) {
-                    const int columns =
-                        core::max3(r.cells[0] * r.cells[1], r.cells[1] * r.cells[2], r.cells[2] * r.cells[0]);
-                    to_smalls = columns <= small_columns;
-                    to_larges = !to_smalls && columns <= most_columns;
-                } else {
-                    is_quad = most <= 2 && core::min3(r.cells[0], r.cells[1], r.cells[2]) == 1;
-                    to_cubes = !is_quad && most == 2;
-                    to_smalls = most > 2 && most <= most_side && r.cells[0] * r.cells[1] * r.cells[2] <= small_cells;
-                    to_larges = most > 2 && !to_smalls && most <= most_side;
-                }
-                to_mediums = !(is_quad || to_cubes || to_smalls || to_larges);
-            }
-        }
-        if constexpr (!thin) {
-            const int at = take_place(to_cubes, num_cubes);
-            if (to_cubes) put(queues.cubes, at, r);
-        }
-        const int small_at = take_place(to_smalls, num_smalls);
-        if (to_smalls) put(queues.smalls, small_at, r);
-        const int large_at = take_place(to_larges, num_larges);
-        if (to_larges) queues.larges[large_at] = i;
-        const int medium_at = take_place(to_mediums, num_mediums);
-        if (to_mediums) queues.mediums[medium_at] = i;
-        if constexpr (!thin) {
-            if (is_quad) raster_quad(call, r.t, r.lo, r.cells, r.box, counts);
-        }
-        if (is_big) {
-            const triangle_class kind = push_large(call, i, index);
-            if (kind != triangle_class::drawn) drop(kind);
-        }
-        __syncwarp();
+    __device__ VOXELPIPE_INLINE void drop(core::triangle_class kind) {
+        atomicAdd(&dropped[static_cast<int>(kind)], 1u);
     }
 };
 
 // Whether a triangle's fragments are found and written, or why it has none, is decided here for each of them.
 template <class Call>
-__global__ __launch_bounds__(direct_threads,
-                             direct_min_blocks) void direct_raster_kernel(const __grid_constant__ Call call,
+__global__ __launch_bounds__(raster_threads,
+                             raster_min_blocks) void direct_raster_kernel(const __grid_constant__ Call call,
                                                                           pipeline_state* state) {
     using core::triangle_class;
-    __shared__ warp_queues queues[direct_threads / 32];
-    __shared__ unsigned dropped[5];
+    constexpr int warps = raster_threads / 32;
+    __shared__ warp_queues queues[warps];
+    __shared__ int left[3][warps];
+    __shared__ unsigned dropped[5]; // by triangle_class
     if (state->index_error != 0) return;
     if (threadIdx.x < 5) dropped[threadIdx.x] = 0;
     __syncthreads();
-    direct_warp<Call> warp{call, queues[threadIdx.x / 32], dropped};
-    // The indices of a batch are loaded while the batch before it is worked on.
-    const auto load_index = [&](std::uint32_t i) {
-        return i < call.num_triangles ? call.source.triangle(i) : glm::uvec3(0);
-    };
-    const std::uint32_t step = gridDim.x * direct_threads;
-    std::uint32_t looked_at = 0, first = blockIdx.x * direct_threads + threadIdx.x / 32 * 32;
-    glm::uvec3 index = load_index(first + static_cast<unsigned>(warp.lane));
-    for (; first < call.num_triangles; first += step) {
-        const glm::uvec3 next = load_index(first + step + static_cast<unsigned>(warp.lane));
-        looked_at += call.num_triangles - first < 32 ? call.num_triangles - first : 32;
-        warp.batch(first + static_cast<unsigned>(warp.lane), index);
-        index = next;
-        if constexpr (Call::rule == coverage::conservative)
-            if (warp.num_cubes >= 32) warp.drain(warp.queues, warp.num_cubes, warp.raster_cube());
-        if (warp.num_smalls >= 32) warp.drain(warp.queues, warp.num_smalls, warp.raster_small());
-        if (warp.num_larges >= 32) warp.drain(warp.queues, warp.num_larges, warp.raster_large());
-        if (warp.num_mediums >= 32) warp.drain_mediums();
-    }
-    if (warp.num_mediums > 0) warp.drain_mediums();
-    // What is left in the block's queues, together.
-    constexpr int warps = direct_threads / 32;
-    __shared__ int left[3][warps];
-    if (threadIdx.x % 32 == 0) {
-        left[0][threadIdx.x / 32] = warp.num_cubes;
-        left[1][threadIdx.x / 32] = warp.num_smalls;
-        left[2][threadIdx.x / 32] = warp.num_larges;
-    }
-    __syncthreads();
-    const auto rest = [&](const int(&counts)[warps], auto&& raster) {
-        int at = static_cast<int>(threadIdx.x), w = 0; // fewer than 32 a warp are left
-        while (w < warps && at >= counts[w]) at -= counts[w++];
-        if (w < warps) raster(queues[w], at);
-    };
-    if constexpr (Call::rule == coverage::conservative) rest(left[0], warp.raster_cube());
-    rest(left[1], warp.raster_small());
-    rest(left[2], warp.raster_large());
+    blending_sink<Call> sink{call, dropped};
+    raster_warp<Call::rule, std::remove_cvref_t<decltype(call.in.source)>, blending_sink<Call>> warp{
+        call.in, queues[threadIdx.x / 32], sink};
+    const unsigned looked_at = warp.run(queues, left);
 
     const auto add = [&](std::uint64_t mine, unsigned long long* total) {
         const unsigned long long sum = block_sum(mine);
         if (threadIdx.x == 0 && sum != 0) atomicAdd(total, sum);
     };
-    add(warp.counts.fragments, &state->fragments);
-    if (call.counting_target >= 0) add(warp.counts.voxels, &state->voxels);
+    add(sink.counts.fragments, &state->fragments);
+    if (call.counting_target >= 0) add(sink.counts.voxels, &state->voxels);
     const unsigned long long all = block_sum(threadIdx.x % 32 == 0 ? looked_at : 0);
     if (threadIdx.x == 0) {
         const auto number = [&](triangle_class kind, unsigned long long* total) {
@@ -630,7 +277,8 @@ struct large_memory {
     std::int16_t bricks[3][most_bricks]; // that wait, in bricks of the grid
 };
 
-// A warp takes a record: 32 pieces of a triangle, a lane each. Conservative: the lanes find the bricks that the
+// What direct_raster_kernel left. medium_lanes take a triangle of the small path; a warp takes a record: 32 pieces of a
+// large triangle, a lane each. Conservative: the lanes find the bricks that the
 // triangle meets in their columns, and medium_lanes of them then take a brick each.
 template <class Call>
 __global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const __grid_constant__ Call call,
@@ -644,9 +292,21 @@ __global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const
     const unsigned long long num = packed >> large_list::record_bits;
     const unsigned long long warps = std::uint64_t{gridDim.x} * large_warps;
     const unsigned lane = threadIdx.x % 32;
-    const core::voxel_box whole{{{0, 0, 0}}, {{call.extent.x - 1, call.extent.y - 1, call.extent.z - 1}}};
-    direct_counts counts;
-    for (unsigned long long r = (std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x) / 32; r < records; r += warps) {
+    const core::voxel_box whole{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
+    blending_sink<Call> sink{call, nullptr};
+    direct_counts& counts = sink.counts;
+    const unsigned long long num_mediums = *call.large.num_mediums;
+    const unsigned long long thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    for (unsigned long long m = thread / medium_lanes; m < num_mediums; m += warps * (32 / medium_lanes)) {
+        const near_triangle near = load_near<Call::rule>(call.in, call.in.source.triangle(call.large.mediums[m]));
+        if constexpr (thin)
+            (void)raster_thin(call.in, near.t, near.lo, near.box, static_cast<int>(lane) % medium_lanes, medium_lanes,
+                              sink);
+        else
+            raster_lanes(core::small_conservative(near.t, call.in.fraction), near.lo, near.box, sink);
+    }
+    __syncwarp();
+    for (unsigned long long r = thread / 32; r < records; r += warps) {
         unsigned long long lo = 0, hi = num; // the last triangle whose records begin at or before r
         while (hi - lo > 1) {
             const unsigned long long middle = lo + (hi - lo) / 2;
@@ -656,27 +316,27 @@ __global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const
                 hi = middle;
         }
         const auto piece = static_cast<std::int64_t>((r - call.large.first_records[lo]) * chunks_per_record + lane);
-        const glm::uvec3 index = call.source.triangle(call.large.triangles[lo]);
-        const core::snapped_position a = call.source.position(index.x), b = call.source.position(index.y),
-                                     c = call.source.position(index.z);
+        const glm::uvec3 index = call.in.source.triangle(call.large.triangles[lo]);
+        const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
+                                     c = call.in.source.position(index.z);
         core::voxel_box reach{};
-        (void)core::classify<Call::rule>(a, b, c, call.fraction, whole, reach);
-        const int axis = core::dominant_axis(a, b, c, call.fraction);
+        (void)core::classify<Call::rule>(a, b, c, call.in.fraction, whole, reach);
+        const int axis = core::dominant_axis(a, b, c, call.in.fraction);
         const large_pieces<Call::rule> pieces(reach, axis);
         const bool valid = piece < pieces.count();
-        if (!core::fits_narrow(a, b, c, call.fraction)) {
+        if (!core::fits_narrow(a, b, c, call.in.fraction)) {
             if (valid) {
                 span_writer<Call> writer{call, counts};
-                for_each_wide_span<rule>(a, b, c, call.fraction, pieces.piece(piece),
+                for_each_wide_span<rule>(a, b, c, call.in.fraction, pieces.piece(piece),
                                          [&](const wide_span& s) { writer.span(axis, s.u, s.v, s.w_first, s.w_last); });
                 writer.flush();
             }
             continue;
         }
-        const core::voxel_box box = core::bounds(a, b, c, call.fraction);
+        const core::voxel_box box = core::bounds(a, b, c, call.in.fraction);
         if constexpr (thin) {
             if (!valid) continue;
-            const core::brick_thin t(a, b, c, box, axis, call.fraction);
+            const core::brick_thin t(a, b, c, box, axis, call.in.fraction);
             const auto origin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
             const auto last = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
             const std::int64_t u0 = pieces.u(piece), v = pieces.v(piece);
@@ -700,7 +360,7 @@ __global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const
             large_memory& memory = memories[threadIdx.x / 32];
             __syncwarp(); // the last triangle's bricks are done
             {
-                const core::brick_triangle t(a, b, c, box, call.fraction);
+                const core::brick_triangle t(a, b, c, box, call.in.fraction);
                 if (lane == 0) memory.triangle = t;
             }
             __syncwarp();
@@ -721,7 +381,7 @@ __global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const
                                          ? static_cast<int>(reach.hi[k]) - corner[k]
                                          : core::brick_size - 1;
                     }
-                    raster_lanes(call, t.at(from[0], from[1], from[2]), corner, part, counts);
+                    raster_lanes(t.at(from[0], from[1], from[2]), corner, part, sink);
                 }
                 __syncwarp();
             };
@@ -780,11 +440,8 @@ inline void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangl
 
 template <class Call>
 void direct_raster(const Call& call, pipeline_state* state, cudaStream_t stream) {
-    const auto batches =
-        static_cast<unsigned>((std::uint64_t{call.num_triangles} + direct_threads - 1) / direct_threads);
-    const unsigned most = static_cast<unsigned>(num_multiprocessors()) * direct_min_blocks;
-    const unsigned blocks = batches < most ? batches : most;
-    direct_raster_kernel<Call><<<blocks, direct_threads, 0, stream>>>(call, state);
+    const unsigned blocks = raster_blocks(call.in.num_triangles);
+    direct_raster_kernel<Call><<<blocks, raster_threads, 0, stream>>>(call, state);
     check(cudaGetLastError(), stage::fine_raster);
     direct_large_kernel<Call>
         <<<static_cast<unsigned>(num_multiprocessors()) * 4, 32 * large_warps, 0, stream>>>(call, state);

@@ -328,8 +328,10 @@ private:
         large_list large{};
         large.triangles = memory.take<std::uint32_t>(most_triangles);
         large.first_records = memory.take<unsigned long long>(most_triangles);
+        large.mediums = memory.take<std::uint32_t>(most_triangles);
         if constexpr (Run) {
             large.next = &state->next_large;
+            large.num_mediums = &state->num_mediums;
             check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
             for (const draw_type& d : draws)
                 check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);
@@ -343,7 +345,7 @@ private:
                 const draw_type& d = draws[i];
                 const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
                 if (num_triangles == 0) continue;
-                if (i != 0) check(cudaMemsetAsync(large.next, 0, sizeof(*large.next), stream));
+                if (i != 0) check(cudaMemsetAsync(large.next, 0, 2 * sizeof(*large.next), stream));
                 const auto raster = [&](const auto& source) {
                     using source_type = std::remove_cvref_t<decltype(source)>;
                     using values_type = decltype(d.fragment_shader.values);

@@ -24,7 +24,7 @@ struct pipeline_state {
     unsigned int index_error;
     unsigned int num_items, num_splits, num_images; // tile split
     unsigned int next_item;                         // fine raster
-    unsigned long long next_large;                  // direct raster, of one draw: large_list::next
+    unsigned long long next_large, num_mediums;     // direct raster, of one draw: large_list
 };
 
 // How many elements the arrays of a call have. What does not fit is counted, not written.

@@ -254,12 +254,10 @@ __global__ __launch_bounds__(threads_per_block,
     return bytes;
 }
 
-// Counts the cells of every primitive and where each one's begin.
+// Counts the cells of the large primitives, then where every primitive's cells begin.
 template <class Op>
-void share_count(const geometry& geo, const Op& op, const share_buffers& b, pipeline_state* state, void* scan_storage,
-                 std::size_t scan_bytes, stage where, cudaStream_t stream) {
-    share_count_small<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state);
-    check(cudaGetLastError(), where);
+void share_count_rest(const geometry& geo, const Op& op, const share_buffers& b, pipeline_state* state,
+                      void* scan_storage, std::size_t scan_bytes, stage where, cudaStream_t stream) {
     share_count_large<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state);
     check(cudaGetLastError(), where);
     check(cub::DeviceScan::ExclusiveScan(scan_storage, scan_bytes, static_cast<const std::uint32_t*>(b.counts),
@@ -267,13 +265,28 @@ void share_count(const geometry& geo, const Op& op, const share_buffers& b, pipe
           where);
 }
 
+// Counts the cells of every primitive and where each one's begin.
+template <class Op>
+void share_count(const geometry& geo, const Op& op, const share_buffers& b, pipeline_state* state, void* scan_storage,
+                 std::size_t scan_bytes, stage where, cudaStream_t stream) {
+    share_count_small<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state);
+    check(cudaGetLastError(), where);
+    share_count_rest(geo, op, b, state, scan_storage, scan_bytes, where, stream);
+}
+
+template <class Op>
+void share_emit_rest(const geometry& geo, const Op& op, const share_buffers& b, const pipeline_state* state,
+                     const capacities& limits, stage where, cudaStream_t stream) {
+    share_emit_large<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
+    check(cudaGetLastError(), where);
+}
+
 template <class Op>
 void share_emit(const geometry& geo, const Op& op, const share_buffers& b, const pipeline_state* state,
                 const capacities& limits, stage where, cudaStream_t stream) {
     share_emit_small<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
     check(cudaGetLastError(), where);
-    share_emit_large<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
-    check(cudaGetLastError(), where);
+    share_emit_rest(geo, op, b, state, limits, where, stream);
 }
 
 } // namespace voxelpipe::device

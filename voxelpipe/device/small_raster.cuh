@@ -1,0 +1,444 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Raster of small triangles without tiles: one kernel reads the mesh once and sorts triangles by what they cost. Those
+// of up to 2 x 2 x 1 voxels are done at once; small ones wait in shared memory until there is a full warp of them, the
+// smallest a thread each, larger ones eight lanes each; the rest is handed on. What is done with the fragments is the
+// sink's: blending (direct_raster.cuh), or counting and listing (list_raster.cuh).
+
+#include <voxelpipe/core/brick_triangle.hpp>
+#include <voxelpipe/device/scene.cuh>
+#include <voxelpipe/device/vertex_shade.cuh>
+
+namespace voxelpipe::device {
+
+// ---- triangles ------------------------------------------------------------------------------------------------------
+
+// Snapped vertices of one draw: made by its vertex shader on the spot, where that is cheap and makes no varyings.
+template <class Mesh, class VertexShader>
+struct shading_source {
+    Mesh mesh;
+    VertexShader shader;
+    core::snap_transform snap;
+    std::uint32_t draw;
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE glm::vec3 shade(std::uint32_t vertex) const {
+        const auto result = shader(core::fetch_vertex(mesh, vertex, draw));
+        return core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result).position;
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(std::uint32_t vertex, std::int32_t (&q)[3]) const {
+        const glm::vec3 p = shade(vertex);
+        return core::snap_near(snap, p.x, p.y, p.z, q);
+    }
+    [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
+        const glm::vec3 p = shade(vertex);
+        return core::snap(snap, p.x, p.y, p.z);
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const { return mesh.triangles[i]; }
+};
+
+// The same from the positions that vertex_shade left.
+struct stored_source {
+    draw_geometry geometry;
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(std::uint32_t vertex, std::int32_t (&q)[3]) const {
+        const core::snapped_position p = geometry.positions[vertex];
+        constexpr std::int64_t limit = std::int64_t{1} << 30;
+        q[0] = static_cast<std::int32_t>(p.x);
+        q[1] = static_cast<std::int32_t>(p.y);
+        q[2] = static_cast<std::int32_t>(p.z);
+        return p.x <= limit && p.x >= -limit && p.y <= limit && p.y >= -limit && p.z <= limit && p.z >= -limit;
+    }
+    [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
+        return geometry.positions[vertex];
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const {
+        return geometry.triangles[i];
+    }
+};
+
+// What a kernel is given of one draw.
+template <class Source>
+struct raster_input {
+    Source source;
+    std::uint32_t num_triangles;
+    int fraction;
+    glm::ivec3 extent;
+};
+
+using word = std::uint32_t;
+
+// ---- small triangles ------------------------------------------------------------------------------------------------
+
+inline constexpr int raster_threads = 128;
+inline constexpr int raster_min_blocks = 5; // per multiprocessor: registers for that many
+inline constexpr int most_side = 8;         // a bounding box of so many voxels a side is one thread's work
+inline constexpr int small_cells = 27;      // one of so many voxels waits apart from the larger ones
+inline constexpr int small_columns = 12;    // the same for thin coverage, in columns of voxels
+inline constexpr int most_columns = 64;     // thin: one thread's work
+inline constexpr int medium_lanes = 8;      // of a warp, for one larger triangle
+inline constexpr int most_medium_side = 16; // of its bounding box, in voxels
+
+// Triangles that wait for a full warp of them. Every warp has its own queues: no thread waits for another warp, and the
+// number that wait is a register that all lanes agree on.
+inline constexpr int queue_places = 64; // up to 31 wait when a warp brings up to 32 more
+
+// Triangles relative to their bounding boxes, each in a column of words.
+struct triangle_queue {
+    std::int32_t p[9][queue_places];
+    std::int32_t origin[3][queue_places]; // lowest voxel of the bounding box
+    std::uint32_t part[queue_places];     // small_box, packed
+    std::uint32_t triangle[queue_places]; // its number, where the sink wants it
+};
+
+// 5 bits for each of the six numbers of a box.
+[[nodiscard]] VOXELPIPE_HD inline std::uint32_t pack_box(const core::small_box& box) {
+    std::uint32_t packed = 0;
+    for (int i = 0; i < 3; ++i)
+        packed |= static_cast<std::uint32_t>(box.lo[i]) << (10 * i) | static_cast<std::uint32_t>(box.hi[i])
+                                                                          << (10 * i + 5);
+    return packed;
+}
+[[nodiscard]] VOXELPIPE_HD inline core::small_box unpack_box(std::uint32_t packed) {
+    core::small_box box{};
+    for (int i = 0; i < 3; ++i) {
+        box.lo[i] = static_cast<int>(packed >> (10 * i) & 31);
+        box.hi[i] = static_cast<int>(packed >> (10 * i + 5) & 31);
+    }
+    return box;
+}
+
+// The place of a lane that wants one behind the `count` that wait; adds the newcomers. All lanes take part.
+__device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
+    const unsigned who = __ballot_sync(0xffffffffu, wanted);
+    const int place = count + __popc(who & ((1u << threadIdx.x % 32) - 1));
+    count += __popc(who);
+    return place;
+}
+
+// A triangle relative to its bounding box, and what of that box lies in the grid.
+struct near_triangle {
+    core::small_triangle t;
+    std::int32_t lo[3];  // lowest voxel of the bounding box
+    int cells[3];        // its size
+    core::small_box box; // 1 > 0 along an axis where nothing lies in the grid
+    bool is_near;        // otherwise nothing above holds
+    bool is_out;         // no voxel in the grid can be covered
+};
+
+template <coverage Rule, class Source>
+__device__ VOXELPIPE_INLINE near_triangle load_near(const raster_input<Source>& call, const glm::uvec3& index) {
+    near_triangle r;
+    r.is_near = call.source.near_position(index.x, r.t.p[0]) & call.source.near_position(index.y, r.t.p[1]) &
+                call.source.near_position(index.z, r.t.p[2]);
+    r.is_out = false;
+    for (int k = 0; k < 3; ++k) {
+        const int extent = k == 0 ? call.extent.x : k == 1 ? call.extent.y : call.extent.z;
+        const std::int32_t low = core::min3(r.t.p[0][k], r.t.p[1][k], r.t.p[2][k]);
+        const std::int32_t high = core::max3(r.t.p[0][k], r.t.p[1][k], r.t.p[2][k]);
+        r.lo[k] = -(-low >> call.fraction) - 1; // ceil - 1: a face touches both sides
+        const std::int32_t last = (high >> call.fraction) - r.lo[k];
+        // A thin fragment may lie one voxel beyond the triangle's own depths.
+        constexpr int beyond = Rule == coverage::thin ? 1 : 0;
+        r.is_out = r.is_out || r.lo[k] - beyond >= extent || r.lo[k] + last + beyond < 0;
+        r.box.lo[k] = r.lo[k] < 0 ? -r.lo[k] : 0;
+        r.box.hi[k] = r.lo[k] + last < extent ? last : extent - 1 - r.lo[k];
+        if (r.box.lo[k] > r.box.hi[k]) {
+            r.box.lo[k] = 1;
+            r.box.hi[k] = 0;
+        }
+        r.cells[k] = last + 1;
+        for (int v = 0; v < 3; ++v) r.t.p[v][k] -= r.lo[k] << call.fraction;
+    }
+    return r;
+}
+
+// Thin fragments of the columns in rows first, first + step, ... of a small triangle; false where it has no area.
+template <class Source, class Sink>
+__device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, const core::small_triangle& t,
+                                             const std::int32_t (&lo)[3], const core::small_box& box, int first,
+                                             int step, Sink& sink) {
+    const core::triple<std::int64_t> normal = core::small_normal(t);
+    const std::int64_t mx = core::magnitude(normal[0]), my = core::magnitude(normal[1]),
+                       mz = core::magnitude(normal[2]);
+    if ((mx | my | mz) == 0) return false;
+    const int axis = mx >= my && mx >= mz ? 0 : my >= mz ? 1 : 2;
+    const core::small_thin s(t, normal, axis, call.fraction);
+    const auto begin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
+    const auto end = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
+    const int depth = axis == 0 ? call.extent.x : axis == 1 ? call.extent.y : call.extent.z;
+    const int lowest = axis == 0 ? lo[0] : axis == 1 ? lo[1] : lo[2];
+    for (int v = begin[1] + first; v <= end[1]; v += step)
+        s.row(begin[0], end[0], v, [&](int u, int w) {
+            if (lowest + w < 0 || lowest + w >= depth) return;
+            const auto at = core::to_xyz(axis, u, v, w);
+            sink.row(lo[0] + at[0], lo[1] + at[1], lo[2] + at[2], 1u);
+        });
+    return true;
+}
+
+// Conservative fragments within a box of at most 32 voxels a side, by medium_lanes neighbouring lanes that all take
+// part: each has rows of its own y, and what the z of a row cuts off is found by one of them for all.
+template <class Sink>
+__device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s, const std::int32_t (&lo)[3],
+                                              const core::small_box& box, Sink& sink) {
+    const int lane = static_cast<int>(threadIdx.x) % medium_lanes;
+    const unsigned group = ((1u << medium_lanes) - 1) << (threadIdx.x % 32 / medium_lanes * medium_lanes);
+    const int x0 = box.lo[0], x1 = box.hi[0];
+    for (int first_y = box.lo[1]; first_y <= box.hi[1]; first_y += medium_lanes) {
+        const int y = first_y + lane;
+        const word at_y = y <= box.hi[1] ? s.limit_at_y(x0, x1, y) : 0;
+        for (int first_z = box.lo[2]; first_z <= box.hi[2]; first_z += medium_lanes) {
+            const word mine = first_z + lane <= box.hi[2] ? s.limit_at_z(x0, x1, first_z + lane) : 0;
+            const int end = box.hi[2] - first_z + 1 < medium_lanes ? box.hi[2] - first_z + 1 : medium_lanes;
+            for (int k = 0; k < end; ++k) {
+                const word limit = __shfl_sync(group, mine, k, medium_lanes) & at_y;
+                if (limit == 0 || !s.meets_row(y, first_z + k)) continue;
+                sink.row(lo[0] + x0, lo[1] + y, lo[2] + first_z + k, s.plane_bits(x0, y, first_z + k, limit));
+            }
+        }
+    }
+}
+
+// A bounding box of at most two voxels along two axes and one along the third: written at once. Most triangles of a
+// fine mesh are of this kind.
+template <class Source, class Sink>
+__device__ VOXELPIPE_INLINE void raster_quad(const raster_input<Source>& call, const core::small_triangle& t,
+                                             const std::int32_t (&lo)[3], const int (&cells)[3],
+                                             const core::small_box& box, Sink& sink) {
+    const int thick = cells[2] == 1 ? 2 : cells[1] == 1 ? 1 : 0;
+    word bits = 0; // p + 2 q, along the other two axes
+    if ((cells[0] > 1) + (cells[1] > 1) + (cells[2] > 1) == 2) {
+        std::int32_t p[3][2];
+        for (int v = 0; v < 3; ++v) {
+            p[v][0] = thick == 0 ? t.p[v][1] : t.p[v][0];
+            p[v][1] = thick == 2 ? t.p[v][1] : t.p[v][2];
+        }
+        bits = core::small_flat(p, call.fraction).quad_bits();
+    } else { // a line of voxels is covered whole
+        const int np = thick == 0 ? cells[1] : cells[0], nq = thick == 2 ? cells[1] : cells[2];
+        bits = np == 2 ? 3u : nq == 2 ? 5u : 1u;
+    }
+    // What lies in the grid.
+    const int p0 = thick == 0 ? box.lo[1] : box.lo[0], p1 = thick == 0 ? box.hi[1] : box.hi[0];
+    const int q0 = thick == 2 ? box.lo[1] : box.lo[2], q1 = thick == 2 ? box.hi[1] : box.hi[2];
+    bits &= (p0 == 0 ? 15u : 10u) & (p1 == 1 ? 15u : 5u) & (q0 == 0 ? 15u : 12u) & (q1 == 1 ? 15u : 3u);
+    // Rows along x: of y and z where the thin axis is x, otherwise one row for each q.
+    const bool rows_of_one = thick == 0;
+    const word mask[4] = {rows_of_one ? bits & 1u : bits & 3u, rows_of_one ? bits >> 1 & 1u : 0u,
+                          rows_of_one ? bits >> 2 & 1u : bits >> 2, rows_of_one ? bits >> 3 : 0u};
+    sink.four(lo[0], lo[1], lo[2], mask, thick == 2);
+}
+
+// What one warp keeps in shared memory.
+struct warp_queues {
+    triangle_queue cubes, smalls;       // bounding boxes of 2 x 2 x 2 voxels; other small ones
+    std::uint32_t larges[queue_places]; // numbers of triangles that are loaded again
+};
+
+// The work of a warp, from the mesh to a sink:
+//   names_triangles   whether begin and end are wanted
+//   takes_mediums     whether mediums(wanted, triangle), which all lanes call, takes those that are much for a thread
+//   check(triangle, index)   whether the indices may be used
+//   begin(triangle), row(x0, y, z, mask), four(x, y, z, masks, along_y), end(): the fragments of one triangle, as rows
+//   of
+//                     bits along x (direct_target.cuh)
+//   none(triangle)    it has no fragments
+//   big(triangle, index)   what this path does not take; says whether it is drawn
+//   drop(class)       counts a triangle that is not drawn
+template <coverage Rule, class Source, class Sink>
+struct raster_warp {
+    static constexpr bool thin = Rule == coverage::thin;
+    using triangle_class = core::triangle_class;
+
+    const raster_input<Source>& call;
+    warp_queues& queues;
+    Sink& sink;
+    int lane = static_cast<int>(threadIdx.x) % 32;
+    int num_cubes = 0, num_smalls = 0, num_larges = 0;
+
+    __device__ VOXELPIPE_INLINE static void put(triangle_queue& queue, int at, const near_triangle& r,
+                                                std::uint32_t triangle) {
+        for (int k = 0; k < 9; ++k) queue.p[k][at] = r.t.p[k / 3][k % 3];
+        for (int k = 0; k < 3; ++k) queue.origin[k][at] = r.lo[k];
+        queue.part[at] = pack_box(r.box);
+        if constexpr (Sink::names_triangles) queue.triangle[at] = triangle;
+    }
+    __device__ VOXELPIPE_INLINE static core::small_box get(const triangle_queue& queue, int at, core::small_triangle& t,
+                                                           std::int32_t (&lo)[3]) {
+        for (int k = 0; k < 9; ++k) t.p[k / 3][k % 3] = queue.p[k][at];
+        for (int k = 0; k < 3; ++k) lo[k] = queue.origin[k][at];
+        return unpack_box(queue.part[at]);
+    }
+
+    // The last 32 that wait, one a lane; all lanes take part.
+    template <class Raster>
+    __device__ VOXELPIPE_INLINE static void drain(const warp_queues& from, int& count, Raster&& raster) {
+        __syncwarp();
+        raster(from, count - 32 + static_cast<int>(threadIdx.x % 32));
+        __syncwarp();
+        count -= 32;
+    }
+    __device__ VOXELPIPE_INLINE void begin(const triangle_queue& queue, int at) {
+        if constexpr (Sink::names_triangles) sink.begin(queue.triangle[at]);
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_cube() {
+        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
+            core::small_triangle t;
+            std::int32_t lo[3];
+            const core::small_box box = get(from.cubes, at, t, lo);
+            word bits = core::cube_bits(core::small_conservative(t, call.fraction));
+            bits &= (box.lo[0] == 0 ? 0xffu : 0xaau) & (box.hi[0] == 1 ? 0xffu : 0x55u) &
+                    (box.lo[1] == 0 ? 0xffu : 0xccu) & (box.hi[1] == 1 ? 0xffu : 0x33u) &
+                    (box.lo[2] == 0 ? 0xffu : 0xf0u) & (box.hi[2] == 1 ? 0xffu : 0x0fu);
+            const word mask[4] = {bits & 3u, bits >> 2 & 3u, bits >> 4 & 3u, bits >> 6};
+            begin(from.cubes, at);
+            sink.four(lo[0], lo[1], lo[2], mask, false);
+            sink.end();
+        };
+    }
+    __device__ VOXELPIPE_INLINE void raster(const core::small_triangle& t, const std::int32_t (&lo)[3],
+                                            const core::small_box& box) {
+        if constexpr (thin) {
+            if (!raster_thin(call, t, lo, box, 0, 1, sink)) sink.drop(triangle_class::zero_area);
+        } else {
+            const core::small_conservative s(t, call.fraction);
+            const auto emit = [&](int y, int z, word bits)
+                                  VOXELPIPE_INLINE_LAMBDA { sink.row(lo[0] + box.lo[0], lo[1] + y, lo[2] + z, bits); };
+            const int most = core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) + 1;
+            if (Sink::takes_mediums || most <= most_side)
+                s.rows(box, emit);
+            else
+                s.long_rows(box, emit);
+        }
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_small() {
+        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
+            core::small_triangle t;
+            std::int32_t lo[3];
+            const core::small_box box = get(from.smalls, at, t, lo);
+            begin(from.smalls, at);
+            raster(t, lo, box);
+            sink.end();
+        };
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_large() {
+        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
+            const near_triangle r = load_near<Rule>(call, call.source.triangle(from.larges[at]));
+            sink.begin(from.larges[at]);
+            raster(r.t, r.lo, r.box);
+            sink.end();
+        };
+    }
+    // Columns of voxels that the triangle can touch, at most.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static int columns(const near_triangle& r) {
+        return core::max3(r.cells[0] * r.cells[1], r.cells[1] * r.cells[2], r.cells[2] * r.cells[0]);
+    }
+
+    // The lane's triangle i, with its indices, where there is one.
+    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, const glm::uvec3& index) {
+        const bool valid = i < call.num_triangles && sink.check(i, index);
+        near_triangle r;
+        int most = 0;
+        bool is_quad = false, to_cubes = false, to_smalls = false, to_larges = false, to_mediums = false,
+             is_big = false;
+        if (valid) {
+            r = load_near<Rule>(call, index);
+            most = core::max3(r.cells[0], r.cells[1], r.cells[2]);
+            is_big = !r.is_near || most > core::small_voxels(call.fraction) || most > most_medium_side;
+            if (!is_big && r.is_out) {
+                sink.drop(triangle_class::outside);
+                sink.none(i);
+            }
+            if (!is_big && !r.is_out) {
+                if constexpr (thin) {
+                    to_smalls = columns(r) <= small_columns;
+                    to_larges = !to_smalls && (!Sink::takes_mediums || columns(r) <= most_columns);
+                } else {
+                    is_quad = most <= 2 && core::min3(r.cells[0], r.cells[1], r.cells[2]) == 1;
+                    to_cubes = !is_quad && most == 2;
+                    to_smalls = most > 2 && most <= most_side && r.cells[0] * r.cells[1] * r.cells[2] <= small_cells;
+                    to_larges = most > 2 && !to_smalls && (!Sink::takes_mediums || most <= most_side);
+                }
+                to_mediums = !(is_quad || to_cubes || to_smalls || to_larges);
+                if (thin && to_mediums) { // a small one finds out when it is drawn
+                    const core::triple<std::int64_t> normal = core::small_normal(r.t);
+                    if ((normal[0] | normal[1] | normal[2]) == 0) {
+                        sink.drop(triangle_class::zero_area);
+                        to_mediums = false;
+                    }
+                }
+            }
+        }
+        if constexpr (!thin) {
+            const int at = take_place(to_cubes, num_cubes);
+            if (to_cubes) put(queues.cubes, at, r, i);
+        }
+        const int small_at = take_place(to_smalls, num_smalls);
+        if (to_smalls) put(queues.smalls, small_at, r, i);
+        const int large_at = take_place(to_larges, num_larges);
+        if (to_larges) queues.larges[large_at] = i;
+        if constexpr (Sink::takes_mediums) sink.mediums(to_mediums, i);
+        if constexpr (!thin) {
+            if (is_quad) {
+                sink.begin(i);
+                raster_quad(call, r.t, r.lo, r.cells, r.box, sink);
+                sink.end();
+            }
+        }
+        if (is_big) {
+            const triangle_class kind = sink.big(i, index);
+            if (kind != triangle_class::drawn) sink.drop(kind);
+        }
+        __syncwarp();
+    }
+
+    // All batches of this warp, then what is left in the queues of the block's warps, together. All threads of the
+    // block take part. Returns how many triangles the warp looked at.
+    template <int Warps>
+    __device__ VOXELPIPE_INLINE unsigned run(const warp_queues (&all)[Warps], int (&left)[3][Warps]) {
+        // The indices of a batch are loaded while the batch before it is worked on.
+        const auto load_index = [&](std::uint32_t i) {
+            return i < call.num_triangles ? call.source.triangle(i) : glm::uvec3(0);
+        };
+        const std::uint32_t step = gridDim.x * Warps * 32;
+        unsigned looked_at = 0;
+        std::uint32_t first = blockIdx.x * Warps * 32 + threadIdx.x / 32 * 32;
+        glm::uvec3 index = load_index(first + static_cast<unsigned>(lane));
+        for (; first < call.num_triangles; first += step) {
+            const glm::uvec3 next = load_index(first + step + static_cast<unsigned>(lane));
+            looked_at += call.num_triangles - first < 32 ? call.num_triangles - first : 32;
+            batch(first + static_cast<unsigned>(lane), index);
+            index = next;
+            if constexpr (!thin)
+                if (num_cubes >= 32) drain(queues, num_cubes, raster_cube());
+            if (num_smalls >= 32) drain(queues, num_smalls, raster_small());
+            if (num_larges >= 32) drain(queues, num_larges, raster_large());
+        }
+        if (lane == 0) {
+            left[0][threadIdx.x / 32] = num_cubes;
+            left[1][threadIdx.x / 32] = num_smalls;
+            left[2][threadIdx.x / 32] = num_larges;
+        }
+        __syncthreads();
+        const auto rest = [&](const int(&counts)[Warps], auto&& raster_one) {
+            int at = static_cast<int>(threadIdx.x), w = 0; // fewer than 32 a warp are left
+            while (w < Warps && at >= counts[w]) at -= counts[w++];
+            if (w < Warps) raster_one(all[w], at);
+        };
+        if constexpr (!thin) rest(left[0], raster_cube());
+        rest(left[1], raster_small());
+        rest(left[2], raster_large());
+        return looked_at;
+    }
+};
+
+// Blocks of a kernel that runs raster_warp: what fits the device at once.
+[[nodiscard]] inline unsigned raster_blocks(std::uint64_t num_triangles) {
+    const std::uint64_t batches = (num_triangles + raster_threads - 1) / raster_threads;
+    const std::uint64_t most = static_cast<std::uint64_t>(num_multiprocessors()) * raster_min_blocks;
+    return static_cast<unsigned>(batches < most ? batches : most);
+}
+
+} // namespace voxelpipe::device
