@@ -9,6 +9,7 @@
 #   scripts/bench.sh --scaling [OPTION...]   the GPU's scaling curves, and plots of what is in build/bench-gpu/bench/results
 #   scripts/bench.sh --tune [OPTION...]      sweeps the fine raster's policies on the GPU
 #   scripts/bench.sh --plot                  only the plots
+#   scripts/bench.sh --nvbench [OPTION...]   the table's cells under NVBench (its options; caches are flushed between calls)
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 gpu_folder=build/bench-gpu
@@ -25,18 +26,22 @@ build_gpu() {
     cmake --build "$gpu_folder" -j "$jobs" --target "$@"
 }
 
+# python_modules FILE: what bench/FILE names, in .venv.
+python_modules() {
+    cmp -s "bench/$1" ".venv/bench-$1" && return 0
+    need_packages python3 python3-venv
+    say "installing what bench/$1 names into .venv"
+    [[ -x .venv/bin/python ]] || python3 -m venv .venv
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check -r "bench/$1"
+    cp "bench/$1" ".venv/bench-$1"
+}
+
 plot() {
     local files=()
     [[ -f $results/gpu_scaling.csv ]] && files+=(--scaling "$results/gpu_scaling.csv")
     [[ -f $results/gpu.csv ]] && files+=(--table "$results/gpu.csv")
     [[ ${#files[@]} -gt 0 ]] || die "there is nothing to plot in $results"
-    need_packages python3 python3-venv
-    if ! cmp -s bench/requirements.txt .venv/bench-requirements.txt; then
-        say "installing matplotlib into .venv"
-        [[ -x .venv/bin/python ]] || python3 -m venv .venv
-        .venv/bin/python -m pip install --quiet --disable-pip-version-check -r bench/requirements.txt
-        cp bench/requirements.txt .venv/bench-requirements.txt
-    fi
+    python_modules requirements.txt
     .venv/bin/python bench/plot.py "${files[@]}" "$results"
 }
 
@@ -55,6 +60,11 @@ case ${1:-} in
         "$gpu_folder/bench/tune/bench_gpu_tune" "${@:2}"
         ;;
     --plot) plot ;;
+    --nvbench)
+        python_modules requirements-nvbench.txt
+        build_gpu bench_gpu_nvbench
+        "$gpu_folder/bench/gpu/bench_gpu_nvbench" "${@:2}"
+        ;;
     *)
         need_packages "${build_packages[@]}" libbenchmark-dev
         say "building the benchmarks (build/bench)"

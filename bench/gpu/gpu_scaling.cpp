@@ -12,6 +12,7 @@
 #include "device_record.hpp"
 #include "generated_on_device.hpp"
 #include "machine.hpp"
+#include "output.hpp"
 #include "scene_choice.hpp"
 
 #include <CLI/CLI.hpp>
@@ -19,7 +20,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <iostream>
 
 namespace {
@@ -66,11 +66,6 @@ private:
     std::vector<std::string> notes_;
     bool differs_ = false;
 };
-
-void say(const std::string& text) {
-    std::fprintf(stderr, "%s\n", text.c_str());
-    std::fflush(stderr);
-}
 
 void scaling::leave_out(const std::string& what, const std::exception& why) {
     notes_.push_back("left out: " + what + " (" + why.what() + ")");
@@ -201,14 +196,8 @@ int scaling::run(const std::string& command) {
     for (const std::string& n : notes_) text += "- " + n + "\n";
     text += "\n" + table_.markdown();
     const std::filesystem::path folder = how_.out;
-    std::filesystem::create_directories(folder);
-    const auto write = [&](const char* name, const std::string& content) {
-        std::ofstream out(folder / name);
-        out << content;
-        if (!out.flush()) throw std::runtime_error((folder / name).string() + " cannot be written");
-    };
-    write("gpu_scaling.md", text);
-    write("gpu_scaling.csv", table_.csv());
+    write_file(folder / "gpu_scaling.md", text);
+    write_file(folder / "gpu_scaling.csv", table_.csv());
     std::cout << text << "\nwritten to " << folder.string() << ": gpu_scaling.md and gpu_scaling.csv\n";
     return differs_ ? 1 : 0;
 }
@@ -233,10 +222,8 @@ int main(int argc, char** argv) {
     app.add_flag("--no-baseline", how.no_baseline, "Leave out the baseline");
     app.add_option("--out", how.out, "Folder for gpu_scaling.md and gpu_scaling.csv")->capture_default_str();
     CLI11_PARSE(app, argc, argv);
-    std::string command = std::filesystem::path(argv[0]).filename().string();
-    for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
     try {
-        return scaling(how).run(command);
+        return scaling(how).run(bench::command_line(argc, argv));
     } catch (const std::exception& e) {
         std::fprintf(stderr, "bench_gpu_scaling: %s\n", e.what());
         return 1;

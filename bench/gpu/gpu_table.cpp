@@ -9,12 +9,12 @@
 #include "device_record.hpp"
 #include "floors.hpp"
 #include "machine.hpp"
+#include "output.hpp"
 #include "scene_choice.hpp"
 
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <map>
 
@@ -33,11 +33,6 @@ struct options {
     std::string out = VOXELPIPE_BENCH_OUTPUT_DIR;
 };
 
-void say(const std::string& text) {
-    std::fprintf(stderr, "%s\n", text.c_str());
-    std::fflush(stderr);
-}
-
 // Throws where the results differ: a wrong figure is worse than none.
 sample time_baseline(const gpu::session& s, gpu::prepared_cell& cell, const options& how) {
     (void)cell.call();
@@ -55,12 +50,6 @@ void measure(gpu::session& s, const gpu::resident_mesh& mesh, const vp::grid& gr
     row.whole = gpu::time_calls(s, how.repeat, [&] { (void)cell->call(); });
     if (!how.no_async && cell->prepare_async()) row.async = gpu::time_calls(s, how.repeat, [&] { cell->call_async(); });
     if (!how.no_baseline && cell->prepare_baseline()) row.baseline = time_baseline(s, *cell, how);
-}
-
-void write_file(const std::filesystem::path& file, const std::string& text) {
-    std::ofstream out(file);
-    out << text;
-    if (!out.flush()) throw std::runtime_error(file.string() + " cannot be written");
 }
 
 // Two cells that must agree: the A-buffer keeps exactly the fragments that the framebuffers blend.
@@ -144,7 +133,6 @@ int run(const options& how, const std::string& command) {
     if (!agree) text += "- **cells of one scene disagree in the number of fragments**\n";
     text += "\n" + gpu_table_short(rows).markdown() + "\n## Geometric means\n\n" + gpu_means(rows).markdown();
     const std::filesystem::path folder = how.out;
-    std::filesystem::create_directories(folder);
     write_file(folder / "gpu.md", text);
     write_file(folder / "gpu.csv", gpu_table_all(rows).csv());
     std::cout << text << "\nwritten to " << folder.string() << ": gpu.md and gpu.csv\n";
@@ -176,10 +164,8 @@ int main(int argc, char** argv) {
     app.add_flag("--no-async", how.no_async, "Leave out voxelize_async");
     app.add_option("--out", how.out, "Folder for gpu.md and gpu.csv")->capture_default_str();
     CLI11_PARSE(app, argc, argv);
-    std::string command = std::filesystem::path(argv[0]).filename().string();
-    for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
     try {
-        return run(how, command);
+        return run(how, bench::command_line(argc, argv));
     } catch (const std::exception& e) {
         std::fprintf(stderr, "bench_gpu_table: %s\n", e.what());
         return 1;
