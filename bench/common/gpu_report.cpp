@@ -179,7 +179,9 @@ table gpu_means(const std::vector<gpu_row>& rows) {
             target += r.of_target() >= 1;
         }
         if (cells == 0) return;
-        const double least = *std::min_element(fastest.begin(), fastest.end());
+        double least = 0; // of those that have a figure
+        for (const double f : fastest)
+            if (f > 0 && (least == 0 || f < least)) least = f;
         const bool anchored = least > 0;
         t.add_row({name, std::to_string(cells), times(geometric_mean(fastest)), times(least),
                    anchored ? std::to_string(least_goal) : "-", anchored ? std::to_string(target) : "-",

@@ -5,6 +5,7 @@
 
 #include "gpu_report.hpp"
 #include "machine.hpp"
+#include "output.hpp"
 #include "published_gpu_figures.hpp"
 #include "scene_choice.hpp"
 
@@ -14,6 +15,8 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+
+#include <unistd.h>
 
 namespace {
 
@@ -131,12 +134,13 @@ TEST(GpuReport, MeansCountTheCellsThatReachTheirGoals) {
     std::vector<gpu_row> rows{row("dragon", 512, gpu_cell::bit_conservative, 0.110 / 8),
                               row("dragon", 128, gpu_cell::bit_conservative, 0.058 / 2),
                               row("dragon", 512, gpu_cell::abuffer_conservative, 1.0)};
+    rows.push_back(row("room", 512, gpu_cell::bit_conservative, 1)); // no figure
     rows.push_back(row("dragon", 1024, gpu_cell::bit_conservative, 1));
     rows.back().whole = {};
     rows.back().failure = "out of memory";
     const std::string text = gpu_means(rows).csv();
     // number, mean of 8 and 2, least, at 1.5 or more, at the target
-    EXPECT_NE(text.find("bit_conservative,2,4.00 ×,2.00 ×,2,1,"), std::string::npos) << text;
+    EXPECT_NE(text.find("bit_conservative,3,4.00 ×,2.00 ×,2,1,"), std::string::npos) << text;
     EXPECT_NE(text.find("abuffer_conservative,1,-,-,-,-,"), std::string::npos) << text;
     EXPECT_NE(text.find("all with a figure,2,4.00 ×"), std::string::npos) << text;
 }
@@ -172,6 +176,18 @@ TEST(MachineRecord, CommitIsWhatTheCallerSays) {
     EXPECT_EQ(describe_machine().commit, "0123456789ab");
     ASSERT_EQ(unsetenv("VOXELPIPE_COMMIT"), 0);
     EXPECT_FALSE(describe_machine().commit.empty());
+}
+
+TEST(Output, FilesAndTheCommand) {
+    const std::filesystem::path folder =
+        std::filesystem::temp_directory_path() / ("voxelpipe_bench_report_test_" + std::to_string(getpid()));
+    std::filesystem::remove_all(folder);
+    write_file(folder / "a" / "b.csv", "1,2\n");
+    EXPECT_EQ(std::filesystem::file_size(folder / "a" / "b.csv"), 4u);
+    EXPECT_THROW(write_file(folder / "a", "a folder"), std::runtime_error);
+    std::filesystem::remove_all(folder);
+    const char* const words[] = {"/somewhere/bench_gpu_table", "--mesh", "dragon"};
+    EXPECT_EQ(command_line(3, words), "bench_gpu_table --mesh dragon");
 }
 
 } // namespace
