@@ -3,6 +3,8 @@
 
 #include "cell_factories.hpp"
 
+#include <string>
+
 namespace bench::gpu {
 
 std::unique_ptr<prepared_cell> prepare(session& s, const resident_mesh& mesh, const vp::grid& grid, gpu_cell cell) {
@@ -22,6 +24,30 @@ std::unique_ptr<prepared_cell> prepare(session& s, const resident_mesh& mesh, co
         return make_abuffer(s, mesh, grid, rule);
     }
     throw std::invalid_argument("no such cell");
+}
+
+cell_times time_cell(const session& s, prepared_cell& cell, const cell_choice& how) {
+    cell_times t;
+    const bool compare = how.baseline && cell.prepare_baseline();
+    if (compare) cell.call_baseline();
+    const auto must_agree = [&](const char* form) {
+        if (!compare) return;
+        if (const std::uint64_t n = cell.differences(); n != 0)
+            throw std::runtime_error(std::string(form) + " differs from the baseline in " + std::to_string(n) +
+                                     " words");
+    };
+    t.whole = time_calls(s, how.repeat, [&] { t.counts = cell.call(); });
+    must_agree("voxelize");
+    if (how.async && cell.prepare_async()) {
+        t.async = time_calls(s, how.repeat, [&] { cell.call_async(); });
+        must_agree("voxelize_async");
+    }
+    if (compare) {
+        repetition repeat = how.repeat;
+        repeat.seconds = how.baseline_seconds;
+        t.baseline = time_calls(s, repeat, [&] { cell.call_baseline(); });
+    }
+    return t;
 }
 
 } // namespace bench::gpu

@@ -37,6 +37,21 @@ public:
     virtual std::uint64_t differences() { return 0; }
 };
 
+// What is timed of a cell; runs = 0 where it has no such form.
+struct cell_times {
+    vp::counters counts;
+    sample whole, async, baseline;
+};
+struct cell_choice {
+    repetition repeat;
+    double baseline_seconds = 1; // fewer runs of the baseline once it took so long
+    bool async = true, baseline = true;
+};
+
+// Times a cell. With the baseline, what the last timed call of each form left is compared with it; throws
+// std::runtime_error where they differ, for a wrong figure is worse than none.
+[[nodiscard]] cell_times time_cell(const session& s, prepared_cell& cell, const cell_choice& how);
+
 // The mesh and the session must outlive the cell.
 [[nodiscard]] std::unique_ptr<prepared_cell> prepare(session& s, const resident_mesh& mesh, const vp::grid& grid,
                                                      gpu_cell cell);

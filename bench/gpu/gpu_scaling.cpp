@@ -33,9 +33,7 @@ struct options {
     std::uint64_t fragments = std::uint64_t{1} << 22;
     std::uint64_t most_triangles = 100'000'000;
     int resolution = 512, most_resolution = 2048;
-    gpu::repetition repeat{2, 10, 3, 2};
-    double baseline_seconds = 0.5;
-    bool no_baseline = false;
+    gpu::cell_choice choice{{2, 10, 3, 2}, 0.5};
     std::string out = VOXELPIPE_BENCH_OUTPUT_DIR;
 };
 
@@ -64,7 +62,7 @@ private:
     gpu::clock_watch watch_;
     table table_;
     std::vector<std::string> notes_;
-    bool differs_ = false;
+    bool failed_ = false;
 };
 
 void scaling::leave_out(const std::string& what, const std::exception& why) {
@@ -88,32 +86,25 @@ void scaling::point(const std::string& series, const std::string& variant, doubl
         const std::string name = series + " " + variant + " " + significant(x) + " " + std::string(name_of(kind));
         try {
             const auto cell = gpu::prepare(session_, mesh, grid, kind);
-            const std::uint64_t fragments = cell->call().fragments;
-            const sample whole = gpu::time_calls(session_, how_.repeat, [&] { (void)cell->call(); });
-            sample async, baseline;
-            if (cell->prepare_async()) async = gpu::time_calls(session_, how_.repeat, [&] { cell->call_async(); });
-            if (!how_.no_baseline && cell->prepare_baseline()) {
-                cell->call_baseline();
-                if (cell->differences() != 0) {
-                    differs_ = true;
-                    notes_.push_back(name + ": differs from the baseline");
-                }
-                gpu::repetition repeat = how_.repeat;
-                repeat.seconds = how_.baseline_seconds;
-                baseline = gpu::time_calls(session_, repeat, [&] { cell->call_baseline(); });
-            }
+            const gpu::cell_times t = gpu::time_cell(session_, *cell, how_.choice);
+            const std::uint64_t fragments = t.counts.fragments;
+            const sample& whole = t.whole;
             watch_.read();
             const auto count = static_cast<double>(mesh.triangles.size());
             const auto ms = [](const sample& s) { return s.runs == 0 ? std::string{} : significant(s.median, 4); };
             table_.add_row({series, variant, std::string(name_of(kind)), significant(x, 6),
                             std::to_string(grid.extent.x), std::to_string(mesh.triangles.size()),
                             std::to_string(fragments), ms(whole), significant(whole.low_quartile, 4),
-                            significant(whole.high_quartile, 4), std::to_string(whole.runs), ms(async), ms(baseline),
-                            significant(count / whole.median * 1e-3),
+                            significant(whole.high_quartile, 4), std::to_string(whole.runs), ms(t.async),
+                            ms(t.baseline), significant(count / whole.median * 1e-3),
                             significant(static_cast<double>(fragments) / whole.median * 1e-3)});
             say(name + ": " + significant(whole.median) + " ms, " + std::to_string(fragments) + " fragments");
         } catch (const gpu::out_of_device_memory& e) {
             leave_out(name, e);
+        } catch (const std::exception& e) {
+            failed_ = true;
+            notes_.push_back("failed: " + name + ": " + e.what());
+            say(notes_.back());
         }
         session_.trim();
     }
@@ -189,8 +180,8 @@ int scaling::run(const std::string& command) {
     }
     std::string text = "# GPU scaling\n\n" + gpu::describe_device(watch_) + "- clocks over the run: " + watch_.range() +
                        "\n" + describe_machine().markdown() + "- command: `" + command +
-                       "`\n- times: milliseconds, medians of at most " + std::to_string(how_.repeat.runs) +
-                       " calls after " + std::to_string(how_.repeat.warmups) +
+                       "`\n- times: milliseconds, medians of at most " + std::to_string(how_.choice.repeat.runs) +
+                       " calls after " + std::to_string(how_.choice.repeat.warmups) +
                        " warm-ups, CUDA events around the whole call, clear included, mesh on the device\n"
                        "- baseline: one thread a triangle, atomics in global memory, the same sets\n";
     for (const std::string& n : notes_) text += "- " + n + "\n";
@@ -199,7 +190,7 @@ int scaling::run(const std::string& command) {
     write_file(folder / "gpu_scaling.md", text);
     write_file(folder / "gpu_scaling.csv", table_.csv());
     std::cout << text << "\nwritten to " << folder.string() << ": gpu_scaling.md and gpu_scaling.csv\n";
-    return differs_ ? 1 : 0;
+    return failed_ ? 1 : 0;
 }
 
 } // namespace
@@ -217,9 +208,9 @@ int main(int argc, char** argv) {
         ->capture_default_str()
         ->check(CLI::Range(64, 2048));
     app.add_option("--most-resolution", how.most_resolution, "Where the series grid ends")->capture_default_str();
-    app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
-    app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
-    app.add_flag("--no-baseline", how.no_baseline, "Leave out the baseline");
+    app.add_option("--runs", how.choice.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
+    app.add_option("--seconds", how.choice.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
+    app.add_flag("!--no-baseline", how.choice.baseline, "Leave out the baseline");
     app.add_option("--out", how.out, "Folder for gpu_scaling.md and gpu_scaling.csv")->capture_default_str();
     CLI11_PARSE(app, argc, argv);
     try {

@@ -27,30 +27,9 @@ struct options {
     std::string scenes = VOXELPIPE_SCENES_DIR;
     std::vector<std::string> meshes, cells; // empty: the five scenes, all cells
     std::vector<int> resolutions{128, 512, 1024};
-    gpu::repetition repeat;
-    double baseline_seconds = 1;
-    bool no_baseline = false, no_async = false;
+    gpu::cell_choice choice;
     std::string out = VOXELPIPE_BENCH_OUTPUT_DIR;
 };
-
-// Throws where the results differ: a wrong figure is worse than none.
-sample time_baseline(const gpu::session& s, gpu::prepared_cell& cell, const options& how) {
-    (void)cell.call();
-    cell.call_baseline();
-    if (const std::uint64_t n = cell.differences(); n != 0)
-        throw std::runtime_error("differs from the baseline in " + std::to_string(n) + " words");
-    gpu::repetition repeat = how.repeat;
-    repeat.seconds = how.baseline_seconds;
-    return gpu::time_calls(s, repeat, [&] { cell.call_baseline(); });
-}
-
-void measure(gpu::session& s, const gpu::resident_mesh& mesh, const vp::grid& grid, const options& how, gpu_row& row) {
-    const auto cell = gpu::prepare(s, mesh, grid, row.cell);
-    row.fragments = cell->call().fragments;
-    row.whole = gpu::time_calls(s, how.repeat, [&] { (void)cell->call(); });
-    if (!how.no_async && cell->prepare_async()) row.async = gpu::time_calls(s, how.repeat, [&] { cell->call_async(); });
-    if (!how.no_baseline && cell->prepare_baseline()) row.baseline = time_baseline(s, *cell, how);
-}
 
 // Two cells that must agree: the A-buffer keeps exactly the fragments that the framebuffers blend.
 bool same_fragments(const std::vector<gpu_row>& rows) {
@@ -99,9 +78,13 @@ int run(const options& how, const std::string& command) {
                 row.triangles = data.triangles.size();
                 row.published = published_anchor(data.name, n, c);
                 try {
-                    measure(session, mesh, grid, how, row);
+                    const auto cell = gpu::prepare(session, mesh, grid, c);
+                    const gpu::cell_times t = gpu::time_cell(session, *cell, how.choice);
+                    row.fragments = t.counts.fragments;
+                    row.whole = t.whole;
+                    row.async = t.async;
+                    row.baseline = t.baseline;
                 } catch (const std::exception& e) {
-                    row.whole = row.async = row.baseline = {};
                     row.failure = e.what();
                 }
                 watch.read();
@@ -119,7 +102,8 @@ int run(const options& how, const std::string& command) {
     std::string text = "# GPU table\n\n" + gpu::describe_device(watch) + "- clocks over the run: " + watch.range() +
                        "\n- device copy, read and write: " + significant(bandwidth * 1e-12) + " TB/s\n" +
                        record.markdown() + "- command: `" + command + "`\n- times: milliseconds, medians of " +
-                       std::to_string(how.repeat.runs) + " calls after " + std::to_string(how.repeat.warmups) +
+                       std::to_string(how.choice.repeat.runs) + " calls after " +
+                       std::to_string(how.choice.repeat.warmups) +
                        " warm-ups, CUDA events around the whole call, clear included, mesh on the device; the caches "
                        "are not flushed between calls\n"
                        "- async: voxelize_async in the caller's memory\n"
@@ -156,12 +140,12 @@ int main(int argc, char** argv) {
             gpu_cell cell{};
             return parse(name, cell) ? std::string{} : "no cell is called " + name;
         });
-    app.add_option("--runs", how.repeat.runs, "Timed calls a figure")->capture_default_str();
-    app.add_option("--warmups", how.repeat.warmups, "Calls before them")->capture_default_str();
-    app.add_option("--baseline-seconds", how.baseline_seconds, "Fewer runs of the baseline once it took so long")
+    app.add_option("--runs", how.choice.repeat.runs, "Timed calls a figure")->capture_default_str();
+    app.add_option("--warmups", how.choice.repeat.warmups, "Calls before them")->capture_default_str();
+    app.add_option("--baseline-seconds", how.choice.baseline_seconds, "Fewer runs of the baseline once it took so long")
         ->capture_default_str();
-    app.add_flag("--no-baseline", how.no_baseline, "Leave out the baseline and the comparison with it");
-    app.add_flag("--no-async", how.no_async, "Leave out voxelize_async");
+    app.add_flag("!--no-baseline", how.choice.baseline, "Leave out the baseline and the comparison with it");
+    app.add_flag("!--no-async", how.choice.async, "Leave out voxelize_async");
     app.add_option("--out", how.out, "Folder for gpu.md and gpu.csv")->capture_default_str();
     CLI11_PARSE(app, argc, argv);
     try {
