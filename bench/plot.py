@@ -17,7 +17,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  (the backend has to be chosen first)
-from matplotlib.ticker import NullFormatter  # noqa: E402
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
 
 CELL_NAMES = {
     "bit_conservative": "bit, conservative",
@@ -69,7 +69,8 @@ def reference(axes, xy, slope, name):
     else:
         left = max(x0, x1 * (low / y1) ** (1 / slope))
     axes.plot([left, x1], [y1 * (left / x1) ** slope, y1], ":", color=REFERENCE, linewidth=1.5, zorder=0)
-    axes.annotate(name, (left, y1 * (left / x1) ** slope), xytext=(0, -10), textcoords="offset points", fontsize=8,
+    below = 10 if slope < 3 else 20
+    axes.annotate(name, (left, y1 * (left / x1) ** slope), xytext=(0, -below), textcoords="offset points", fontsize=8,
                   color="#707070")
 
 
@@ -100,6 +101,8 @@ def plot_series(name, rows, label, out):
             draw(axes, whole, color=colour, marker="o", markersize=4, label="voxelize" + of)
         axes.set_xscale("log")
         axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
+        axes.yaxis.set_minor_formatter(NullFormatter())
         axes.set_title(CELL_NAMES[cell], fontsize=10)
         axes.grid(True, which="major", color="#e4e4e4", linewidth=0.8)
         axes.set_axisbelow(True)
@@ -110,6 +113,10 @@ def plot_series(name, rows, label, out):
             sizes = sorted({int(float(r["x"])) for r in rows})
             axes.set_xticks(sizes, [str(n) for n in sizes])
             axes.xaxis.set_minor_formatter(NullFormatter())
+    low, high = panels.flat[0].get_ylim()
+    if high / low < 100:  # less than two decades: label 2 and 5 as well
+        for axes in panels.flat:
+            axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     for line in panels:
         line[0].set_ylabel(y_name)
     panels.flat[0].legend(fontsize=8, frameon=False)
@@ -139,6 +146,9 @@ def plot_ahead(rows, label, out):
         axes.annotate(f"{goal} × {text}", (goal, 1), xycoords=("data", "axes fraction"), rotation=90, fontsize=7,
                       va="top", ha="right", color="#606060")
     axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g} ×"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_yticks(range(len(cells)), [CELL_NAMES[c] for c in cells])
     axes.invert_yaxis()
     axes.grid(True, axis="x", color="#eeeeee")

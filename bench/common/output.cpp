@@ -23,7 +23,11 @@ void write_file(const std::filesystem::path& file, const std::string& text) {
 
 std::string command_line(int argc, const char* const* argv) {
     std::string text = std::filesystem::path(argv[0]).filename().string();
-    for (int i = 1; i < argc; ++i) text += std::string(" ") + argv[i];
+    for (int i = 1; i < argc; ++i) {
+        const std::filesystem::path word = argv[i];
+        text += ' ';
+        text += (word.is_absolute() ? word.filename() : word).string();
+    }
     return text;
 }
 

@@ -15,7 +15,7 @@ void say(const std::string& line);
 // Throws std::runtime_error where the file cannot be written; makes its folder.
 void write_file(const std::filesystem::path& file, const std::string& text);
 
-// The program's name without its folder, and its arguments: for the record.
+// The program's name and its arguments, absolute paths without their folders: for the record.
 [[nodiscard]] std::string command_line(int argc, const char* const* argv);
 
 } // namespace bench

@@ -83,7 +83,7 @@ void scaling::try_mesh(const std::string& what, Make&& make) {
 void scaling::point(const std::string& series, const std::string& variant, double x, const gpu::resident_mesh& mesh,
                     const vp::grid& grid, const std::vector<gpu_cell>& cells) {
     for (const gpu_cell kind : cells) {
-        const std::string name = series + " " + variant + " " + significant(x) + " " + std::string(name_of(kind));
+        const std::string name = series + " " + variant + " " + plain(x) + " " + std::string(name_of(kind));
         try {
             const auto cell = gpu::prepare(session_, mesh, grid, kind);
             const gpu::cell_times t = gpu::time_cell(session_, *cell, how_.choice);
@@ -92,11 +92,11 @@ void scaling::point(const std::string& series, const std::string& variant, doubl
             watch_.read();
             const auto count = static_cast<double>(mesh.triangles.size());
             const auto ms = [](const sample& s) { return s.runs == 0 ? std::string{} : significant(s.median, 4); };
-            table_.add_row({series, variant, std::string(name_of(kind)), significant(x, 6),
-                            std::to_string(grid.extent.x), std::to_string(mesh.triangles.size()),
-                            std::to_string(fragments), ms(whole), significant(whole.low_quartile, 4),
-                            significant(whole.high_quartile, 4), std::to_string(whole.runs), ms(t.async),
-                            ms(t.baseline), significant(count / whole.median * 1e-3),
+            table_.add_row({series, variant, std::string(name_of(kind)), plain(x), std::to_string(grid.extent.x),
+                            std::to_string(mesh.triangles.size()), std::to_string(fragments), ms(whole),
+                            significant(whole.low_quartile, 4), significant(whole.high_quartile, 4),
+                            std::to_string(whole.runs), ms(t.async), ms(t.baseline),
+                            significant(count / whole.median * 1e-3),
                             significant(static_cast<double>(fragments) / whole.median * 1e-3)});
             say(name + ": " + significant(whole.median) + " ms, " + std::to_string(fragments) + " fragments");
         } catch (const gpu::out_of_device_memory& e) {
@@ -143,7 +143,7 @@ void scaling::size() {
     const gpu_cell pilot = gpu_cell::bit_conservative;
     for (const double edge : {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 0.8 * n}) {
         if (edge > 0.8 * n) continue;
-        try_mesh("edges of " + significant(edge) + " voxels", [&] {
+        try_mesh("edges of " + plain(edge) + " voxels", [&] {
             // How many fragments such a triangle gives, from a few of them.
             constexpr std::uint64_t some = 2000;
             const gpu::resident_mesh few = gpu::scattered_triangles(some, edge, n, 1);

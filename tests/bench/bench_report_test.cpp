@@ -145,6 +145,14 @@ TEST(GpuReport, MeansCountTheCellsThatReachTheirGoals) {
     EXPECT_NE(text.find("all with a figure,2,4.00 ×"), std::string::npos) << text;
 }
 
+TEST(Numbers, WholeOnesHaveNoDecimals) {
+    EXPECT_EQ(plain(100017228), "100017228");
+    EXPECT_EQ(plain(0.1), "0.1");
+    EXPECT_EQ(plain(409.6), "409.6");
+    EXPECT_EQ(significant(0.012345), "0.0123");
+    EXPECT_EQ(significant(1234), "1234");
+}
+
 TEST(GpuReport, EveryRowHasEveryColumn) {
     std::vector<gpu_row> rows{row("dragon", 512, gpu_cell::bit_thin, 0.5), row("room", 512, gpu_cell::bit_thin, 0.5)};
     rows.push_back(row("room", 128, gpu_cell::abuffer_thin, 1));
@@ -186,8 +194,8 @@ TEST(Output, FilesAndTheCommand) {
     EXPECT_EQ(std::filesystem::file_size(folder / "a" / "b.csv"), 4u);
     EXPECT_THROW(write_file(folder / "a", "a folder"), std::runtime_error);
     std::filesystem::remove_all(folder);
-    const char* const words[] = {"/somewhere/bench_gpu_table", "--mesh", "dragon"};
-    EXPECT_EQ(command_line(3, words), "bench_gpu_table --mesh dragon");
+    const char* const words[] = {"/somewhere/bench_gpu_table", "--mesh", "dragon", "--out", "/tmp/out"};
+    EXPECT_EQ(command_line(5, words), "bench_gpu_table --mesh dragon --out out");
 }
 
 } // namespace
