@@ -6,12 +6,13 @@
 #   make demo [MODEL=file.glb] [RESOLUTION=256]   a glTF model becomes voxels, files and a picture in demo/
 #   make test                                     builds everything and runs all tests
 #   make bench                                    the CPU table
+#   make bench-gpu                                the GPU table (needs nvcc and a GPU); make bench-scaling: its curves
 #   make clean                                    removes build/ and demo/
 
 MODEL ?=
 RESOLUTION ?= 256
 
-.PHONY: demo test bench clean
+.PHONY: demo test bench bench-gpu bench-scaling bench-tune clean
 .DEFAULT_GOAL := demo
 
 demo:
@@ -22,6 +23,15 @@ test:
 
 bench:
 	@scripts/bench.sh
+
+bench-gpu:
+	@scripts/bench.sh --gpu
+
+bench-scaling:
+	@scripts/bench.sh --scaling
+
+bench-tune:
+	@scripts/bench.sh --tune
 
 clean:
 	rm -rf build demo

@@ -3,11 +3,11 @@
 
 #include "machine.hpp"
 
-#include <array>
-#include <cstdio>
+#include "built_commit.hpp"
+
+#include <cstdlib>
 #include <ctime>
 #include <fstream>
-#include <memory>
 #include <thread>
 
 #include <malloc.h>
@@ -31,16 +31,6 @@ std::string field(const char* file, const std::string& key) {
     return "";
 }
 
-std::string output_of(const std::string& command) {
-    const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(command.c_str(), "r"), pclose);
-    std::string out;
-    if (pipe == nullptr) return out;
-    std::array<char, 256> part{};
-    while (std::fgets(part.data(), part.size(), pipe.get()) != nullptr) out += part.data();
-    while (!out.empty() && out.back() == '\n') out.pop_back();
-    return out;
-}
-
 } // namespace
 
 machine_record describe_machine() {
@@ -56,9 +46,9 @@ machine_record describe_machine() {
     m.compiler = "g++ " __VERSION__;
 #endif
     m.flags = VOXELPIPE_BENCH_FLAGS;
-    m.commit =
-        output_of("git -C '" VOXELPIPE_SOURCE_DIR "' describe --always --abbrev=12 --dirty --exclude='*' 2>/dev/null");
-    if (m.commit.empty()) m.commit = "unknown";
+    // What the program was built from, unless whoever carried it here says otherwise.
+    const char* const told = std::getenv("VOXELPIPE_COMMIT");
+    m.commit = told != nullptr ? told : VOXELPIPE_BENCH_COMMIT;
     const std::time_t now = std::time(nullptr);
     char text[32];
     std::tm utc{};

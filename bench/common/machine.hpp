@@ -14,7 +14,7 @@ struct machine_record {
     std::string system;   // kernel and distribution
     std::string compiler; // of this program
     std::string flags;    // what this program was compiled with
-    std::string commit;   // of the source tree, "-dirty" where it has changes; "unknown" outside git
+    std::string commit;   // built from; "-dirty" where it had changes, "unknown" outside git; or $VOXELPIPE_COMMIT
     std::string date;     // UTC
     std::string load;     // load average of the last minute: near 0 on a quiet machine
 

@@ -95,4 +95,13 @@ std::string significant(double value, int digits) {
     return text;
 }
 
+std::string plain(double value) {
+    char text[64];
+    if (value == std::rint(value) && std::fabs(value) < 0x1p53)
+        std::snprintf(text, sizeof text, "%.0f", value);
+    else
+        std::snprintf(text, sizeof text, "%.6g", value);
+    return text;
+}
+
 } // namespace bench

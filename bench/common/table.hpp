@@ -27,4 +27,7 @@ private:
 // A number with `digits` significant digits and no exponent, thousands not grouped: 0.0123, 1.23, 1230.
 std::string significant(double value, int digits = 3);
 
+// A number as short as it can be read back to six digits, no exponent where it is whole: 972, 0.1, 100017228.
+std::string plain(double value);
+
 } // namespace bench

@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "cell_factories.hpp"
+
+#include <string>
+
+namespace bench::gpu {
+
+std::unique_ptr<prepared_cell> prepare(session& s, const resident_mesh& mesh, const vp::grid& grid, gpu_cell cell) {
+    const vp::coverage rule = is_thin(cell) ? vp::coverage::thin : vp::coverage::conservative;
+    switch (cell) {
+    case gpu_cell::bit_conservative:
+    case gpu_cell::bit_thin:
+        return make_bits(s, mesh, grid, rule);
+    case gpu_cell::float_add_conservative:
+        return make_float_add(s, mesh, grid, rule);
+    case gpu_cell::float_add_unordered_conservative:
+        return make_float_add_unordered(s, mesh, grid, rule);
+    case gpu_cell::float_add_varying_conservative:
+        return make_float_add_varying(s, mesh, grid, rule);
+    case gpu_cell::abuffer_thin:
+    case gpu_cell::abuffer_conservative:
+        return make_abuffer(s, mesh, grid, rule);
+    }
+    throw std::invalid_argument("no such cell");
+}
+
+cell_times time_cell(const session& s, prepared_cell& cell, const cell_choice& how) {
+    cell_times t;
+    const bool compare = how.baseline && cell.prepare_baseline();
+    if (compare) cell.call_baseline();
+    const auto must_agree = [&](const char* form) {
+        if (!compare) return;
+        if (const std::uint64_t n = cell.differences(); n != 0)
+            throw std::runtime_error(std::string(form) + " differs from the baseline in " + std::to_string(n) +
+                                     " words");
+    };
+    t.whole = time_calls(s, how.repeat, [&] { t.counts = cell.call(); });
+    must_agree("voxelize");
+    if (how.async && cell.prepare_async()) {
+        t.async = time_calls(s, how.repeat, [&] { cell.call_async(); });
+        must_agree("voxelize_async");
+    }
+    if (compare) {
+        repetition repeat = how.repeat;
+        repeat.seconds = how.baseline_seconds;
+        t.baseline = time_calls(s, repeat, [&] { cell.call_baseline(); });
+    }
+    return t;
+}
+
+} // namespace bench::gpu

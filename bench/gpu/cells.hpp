@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// One cell of the table, ready to be called over and over: a mesh on the device, a grid, a target and a coverage rule,
+// behind an interface, so that each pipeline is instantiated in one source file and every benchmark only loops.
+
+#include "gpu_report.hpp"
+#include "session.hpp"
+
+#include <voxelpipe/status.hpp>
+
+#include <memory>
+
+namespace bench::gpu {
+
+namespace vp = voxelpipe;
+
+class prepared_cell {
+public:
+    prepared_cell() = default;
+    virtual ~prepared_cell() = default;
+    prepared_cell(const prepared_cell&) = delete;
+    prepared_cell& operator=(const prepared_cell&) = delete;
+
+    // The whole of vp::voxelize, clear included; throws where it fails.
+    virtual vp::counters call() = 0;
+
+    // vp::voxelize_async in memory that was found to suffice; false where there is no such form.
+    virtual bool prepare_async() { return false; }
+    virtual void call_async() {}
+
+    // The baseline (baseline/one_thread_a_triangle.cuh) with its clear; false where it has no such output.
+    virtual bool prepare_baseline() { return false; }
+    virtual void call_baseline() {}
+    // Elements in which the last results of call() and of call_baseline() differ.
+    virtual std::uint64_t differences() { return 0; }
+};
+
+// What is timed of a cell; runs = 0 where it has no such form.
+struct cell_times {
+    vp::counters counts;
+    sample whole, async, baseline;
+};
+struct cell_choice {
+    repetition repeat;
+    double baseline_seconds = 1; // fewer runs of the baseline once it took so long
+    bool async = true, baseline = true;
+};
+
+// Times a cell. With the baseline, what the last timed call of each form left is compared with it; throws
+// std::runtime_error where they differ, for a wrong figure is worse than none.
+[[nodiscard]] cell_times time_cell(const session& s, prepared_cell& cell, const cell_choice& how);
+
+// The mesh and the session must outlive the cell.
+[[nodiscard]] std::unique_ptr<prepared_cell> prepare(session& s, const resident_mesh& mesh, const vp::grid& grid,
+                                                     gpu_cell cell);
+
+} // namespace bench::gpu
