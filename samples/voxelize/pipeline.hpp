@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The tool's pipeline, a template over the backend: instantiated for cpu_backend in voxelizer.cpp, and ready to be so
-// for another backend in a translation unit of its compiler. Takes a scene, uploads it, draws every slab of the grid
-// into a framebuffer of all wanted targets and resolves it into the volume.
+// The tool's pipeline, a template over the backend: instantiated for cpu_backend in voxelizer.cpp and for cuda_backend
+// in cuda_device.cu. Takes a scene, uploads it, draws every slab of the grid into a framebuffer of all wanted targets
+// and resolves it into the volume.
 
 #include "parallel.hpp"
 #include "surface.hpp"
@@ -43,7 +43,9 @@ template <class Backend, class Reference>
 template <class Backend>
 class pipeline {
 public:
-    pipeline(Backend& backend, scene&& model, const voxelize_request& request, voxelize_stats& stats)
+    // A backend in host memory takes the scene's arrays over one by one, so that they are not held twice. Another one
+    // leaves the scene as it is.
+    pipeline(Backend& backend, scene& model, const voxelize_request& request, voxelize_stats& stats)
         : backend_{backend}, request_{request}, stats_{stats} {
         for (const target wanted : request.targets) wanted_[static_cast<std::size_t>(wanted)] = true;
         const stage_timer timer{*this, "upload"};
@@ -146,7 +148,7 @@ private:
             const std::span<const glm::u8vec4> texels{reinterpret_cast<const glm::u8vec4*>(source.rgba.data()),
                                                       source.rgba.size() / 4};
             texels_.push_back({backend_, texels});
-            source.rgba = {};
+            if constexpr (memory_is_host<Backend>) source.rgba = {};
         }
     }
 
@@ -191,7 +193,7 @@ private:
         first_triangle_.push_back(num_triangles_);
         material_of_.push_back(static_cast<std::int32_t>(part.material));
         num_triangles_ += part.triangles.size();
-        part = {};
+        if constexpr (memory_is_host<Backend>) part = {};
     }
 
     // ---- slabs -----------------------------------------------------------------------------------------------------
