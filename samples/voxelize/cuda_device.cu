@@ -8,10 +8,49 @@
 #include <voxelpipe/device/backend.cuh>
 
 #include <algorithm>
-#include <chrono>
 #include <stdexcept>
 
 namespace voxelize {
+
+namespace {
+
+// Any error as an exception; a lack of memory as the pipeline knows it.
+void check(cudaError_t error) {
+    if (error == cudaSuccess) return;
+    (void)cudaGetLastError();
+    if (error == cudaErrorMemoryAllocation) throw std::bad_alloc{};
+    throw std::runtime_error(std::string("CUDA says: ") + cudaGetErrorString(error));
+}
+
+template <class T, class Value>
+__global__ void work_out(T* out, std::size_t first, std::size_t count, const Value value) {
+    const std::size_t i = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    if (i < count) out[i] = value(first + i);
+}
+
+} // namespace
+
+// Values are worked out on the device, piece by piece, and each piece is copied to where it belongs.
+template <>
+struct memory_access<vp::cuda_backend> {
+    static constexpr bool on_host = false;
+
+    template <class T, class Value>
+    static void read(vp::cuda_backend& backend, T* out, std::size_t count, const Value& value, int) {
+        constexpr std::size_t piece = (std::size_t{32} << 20) / sizeof(T);
+        vp::cuda_backend::buffer<T> buffer{backend, std::min(count, piece)};
+        for (std::size_t first = 0; first < count; first += piece) {
+            const std::size_t size = std::min(piece, count - first);
+            constexpr unsigned threads = 256;
+            work_out<<<static_cast<unsigned>((size + threads - 1) / threads), threads, 0, backend.stream>>>(
+                buffer.data(), first, size, value);
+            check(cudaGetLastError());
+            check(
+                cudaMemcpyAsync(out + first, buffer.data(), size * sizeof(T), cudaMemcpyDeviceToHost, backend.stream));
+        }
+        check(cudaStreamSynchronize(backend.stream));
+    }
+};
 
 namespace {
 
@@ -61,7 +100,7 @@ public:
             refused_ = held_ + bytes;
             throw std::bad_alloc{};
         }
-        if (error != cudaSuccess) throw std::runtime_error(std::string("CUDA says: ") + cudaGetErrorString(error));
+        check(error);
         held_ += bytes;
         most_ = std::max(most_, held_);
         return memory;

@@ -17,9 +17,6 @@
 
 namespace voxelize {
 
-template <>
-inline constexpr bool memory_is_host<vp::cpu_backend> = true;
-
 double volume_bytes(const voxelize_request& request) {
     double voxel = 0;
     for (const target id : request.targets) {
