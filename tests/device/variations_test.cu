@@ -16,7 +16,8 @@
 using namespace device_test;
 namespace blend = voxelpipe::blend;
 
-namespace {
+// Named, so that nvcc does not miss a use of what only the library's concepts ask for.
+namespace resources {
 
 // ---- memory resources: the forms that cuda_backend takes ------------------------------------------------------------
 
@@ -74,6 +75,10 @@ struct library_form : account {
 };
 static_assert(cuda::mr::async_resource_with<library_form, cuda::mr::device_accessible>);
 
+} // namespace resources
+
+namespace {
+
 using list = vp::framebuffer<vp::cuda_backend, vp::target<float, blend::add>, vp::target<std::uint32_t, blend::count>>;
 
 template <class Resource>
@@ -91,9 +96,9 @@ std::vector<float> sums_through(Resource& resource, cudaStream_t stream) {
 }
 
 TEST(Variations, EveryFormOfMemoryResourceServes) {
-    async_form first;
-    stream_first_form second;
-    library_form third;
+    resources::async_form first;
+    resources::stream_first_form second;
+    resources::library_form third;
     cudaStream_t stream = nullptr;
     ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
     const auto expected = sums_through(first, stream);
@@ -102,8 +107,7 @@ TEST(Variations, EveryFormOfMemoryResourceServes) {
         cuda::mr::async_resource_ref<cuda::mr::device_accessible> reference{third};
         expect_same_bytes(expected, sums_through(reference, stream), "cuda::mr::async_resource_ref");
     }
-    for (const account* a : {static_cast<const account*>(&first), static_cast<const account*>(&second),
-                             static_cast<const account*>(&third)}) {
+    for (const resources::account* a : std::initializer_list<const resources::account*>{&first, &second, &third}) {
         EXPECT_GT(a->calls, 5);
         EXPECT_EQ(a->live, 0u);
     }
