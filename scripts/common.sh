@@ -92,7 +92,7 @@ configure() {
     local preset=$1 log
     shift
     local options=("$@")
-    command -v ccache >/dev/null && options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+    command -v ccache >/dev/null && options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_CUDA_COMPILER_LAUNCHER=ccache)
     [[ -f .venv/requirements.txt ]] && options+=("-DVOXELPIPE_PYTHON=$root/.venv/bin/python")
     [[ -d .deps ]] && options+=("-DCMAKE_PREFIX_PATH=$root/.deps${CMAKE_PREFIX_PATH:+;${CMAKE_PREFIX_PATH//:/;}}")
     mkdir -p build

@@ -7,11 +7,12 @@
 #   default     the equality suite, scenes included where VOXELPIPE_SCENES_DIR has them
 #   fast_math   the suite without the scenes, built with -use_fast_math
 #   no_fmad     the same with --fmad=false
+#   tool        the files that voxelize writes on the GPU against those that it writes on the CPU
 #   sanitizer   compute-sanitizer memcheck, racecheck, initcheck and synccheck over a reduced suite
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 parts=("$@")
-[[ ${#parts[@]} -gt 0 ]] || parts=(default fast_math no_fmad sanitizer)
+[[ ${#parts[@]} -gt 0 ]] || parts=(default fast_math no_fmad tool sanitizer)
 results="${VOXELPIPE_RESULTS:-tests/gpu_results}"
 mkdir -p "$results"
 
@@ -61,16 +62,16 @@ run_program() {
     if [[ $failed -gt 0 ]]; then grep -vE '^\[ (RUN|      OK)' "$log" | head -n 40; fi
 }
 
-# build_suite FOLDER FLAG...
+# build_suite FOLDER FLAG... (with target="..." that instead of the device tests, samples="ON" with the tool)
 build_suite() {
     local folder=$1
     shift
     cmake -S . -B "build/$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DVOXELPIPE_ENABLE_CUDA=ON \
-        -DVOXELPIPE_BUILD_SAMPLES=OFF -DVOXELPIPE_BUILD_BENCH=OFF -DCMAKE_CUDA_ARCHITECTURES="$architecture" \
+        -DVOXELPIPE_BUILD_SAMPLES="${samples:-OFF}" -DVOXELPIPE_BUILD_BENCH=OFF -DCMAKE_CUDA_ARCHITECTURES="$architecture" \
         -DCMAKE_CUDA_FLAGS="$*" ${CMAKE_PREFIX_PATH:+-DCMAKE_PREFIX_PATH="$CMAKE_PREFIX_PATH"} \
         $([[ -d .deps ]] && printf -- '-DCMAKE_PREFIX_PATH=%s/.deps' "$root") >"build/configure-$folder.log" 2>&1 ||
         { tail -n 40 "build/configure-$folder.log"; die "cmake could not configure $folder"; }
-    cmake --build "build/$folder" -j "$jobs" --target device_tests -- -k 0 >"build/make-$folder.log" 2>&1 || {
+    cmake --build "build/$folder" -j "$jobs" --target "${target:-device_tests}" -- -k 0 >"build/make-$folder.log" 2>&1 || {
         grep -E 'error|FAILED' "build/make-$folder.log" | head -n 20
         printf 'note: %s did not build completely\n' "$folder" | tee -a "$record"
         failures=$((failures + 1))
@@ -100,6 +101,10 @@ for part in "${parts[@]}"; do
     no_fmad)
         build_suite gpu-no-fmad --fmad=false
         run_suite no_fmad gpu-no-fmad
+        ;;
+    tool)
+        samples=ON target=voxelize_gpu_files_test build_suite gpu-tool
+        run_program tool voxelize_gpu_files_test build/gpu-tool/tests/voxelize/voxelize_gpu_files_test
         ;;
     sanitizer)
         command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"

@@ -34,8 +34,9 @@ cp -L "$(system_include tiny_gltf.h)/tiny_gltf.h" "$prefix/include/"
 cp -L "$(system_include stb/stb_image.h)"/stb/stb_image*.h "$prefix/include/stb/"
 cp -rL "$(system_include minizip/zip.h)/minizip" "$prefix/include/"
 cp -L "$(system_include zlib.h)/zlib.h" "$prefix/include/"
-zconf=$(find /usr/include -name zconf.h | head -n 1)
-cp -L "${zconf:?no zconf.h under /usr/include}" "$prefix/include/"
+# Beside zlib.h or in the architecture's folder; other packages bring one of their own, of another version.
+zconf=$(find /usr/local/include /usr/include /usr/include/*-linux-gnu -maxdepth 1 -name zconf.h 2>/dev/null | head -n 1) || true
+cp -L "${zconf:?no zconf.h beside zlib.h}" "$prefix/include/"
 for library in libz.a libminizip.a; do
     archive=$(find /usr/lib /usr/local/lib -name "$library" 2>/dev/null | head -n 1)
     cp -L "${archive:?no $library under /usr/lib}" "$prefix/lib/"

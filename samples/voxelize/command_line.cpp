@@ -80,7 +80,9 @@ std::string footer() {
     for (const format& entry : formats()) line(entry.extension, entry.description);
     text += "\nEXIT CODES\n"
             "  0 done   1 wrong command line   2 the model cannot be used   3 not enough memory\n"
-            "  4 an output cannot be written   5 the backend is not there   70 a bug of this program\n"
+            "  4 an output cannot be written   5 --backend cuda cannot be used   70 a bug of this program\n"
+            "  5 is: built without CUDA, no driver, a driver too old, no GPU, or one that there is no code for; too\n"
+            "  little memory on the GPU is 3, as on the machine. With --backend auto the CPU does the work instead.\n"
             "\nEXAMPLES\n"
             "  voxelize helmet.glb -o helmet.vox -o helmet.png --resolution 256\n"
             "  voxelize part.glb -o part.npy --voxel-size 0.5 --coverage thin\n"
@@ -184,7 +186,8 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
     const std::map<std::string, backend_choice> backends{
         {"auto", backend_choice::automatic}, {"cpu", backend_choice::cpu}, {"cuda", backend_choice::cuda}};
     app.add_option("--backend", options.voxelize.backend,
-                   "cpu, cuda, or auto: cuda where it is there. All give the same bytes. Default: auto")
+                   "cpu, cuda (the first GPU that CUDA shows), or auto: cuda where it can be used, otherwise cpu. All "
+                   "give the same bytes. Default: auto")
         ->transform(CLI::CheckedTransformer(backends).description(""))
         ->option_text("NAME")
         ->group("Computation");
@@ -196,7 +199,15 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
            "--work-memory",
            [&options](int mebibytes) { options.voxelize.work_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
            "MiB for sums that exist only on the way; a grid that needs more is computed in slabs, with the same "
-           "result. Default: 128")
+           "result. Default: 128, on a GPU up to 1024")
+        ->check(CLI::Range(1, 1 << 20).description(""))
+        ->option_text("MIB")
+        ->group("Computation");
+    app.add_option_function<int>(
+           "--device-memory",
+           [&options](int mebibytes) { options.voxelize.device_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
+           "The most MiB of a GPU's memory to take; where that is too little, auto turns to the CPU. Default: all that "
+           "is free")
         ->check(CLI::Range(1, 1 << 20).description(""))
         ->option_text("MIB")
         ->group("Computation");

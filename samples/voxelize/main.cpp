@@ -42,6 +42,7 @@ void run(const command_line& options) {
     bar.start("voxelizing");
     report.request.progress = [&bar](double done) { bar.show(done); };
     const volume voxels = run_voxelizer(std::move(model), report.request, report.stats);
+    for (const std::string& warning : report.stats.warnings) report.warnings.push_back(warning);
     if (report.stats.triangles_dropped != 0)
         report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
                                   " triangles are dropped: a position is not finite, or too far from the grid");

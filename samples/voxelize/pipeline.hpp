@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The tool's pipeline, a template over the backend: instantiated for cpu_backend in voxelizer.cpp, and ready to be so
-// for another backend in a translation unit of its compiler. Takes a scene, uploads it, draws every slab of the grid
-// into a framebuffer of all wanted targets and resolves it into the volume.
+// The tool's pipeline, a template over the backend: instantiated for cpu_backend in voxelizer.cpp and for cuda_backend
+// in cuda_device.cu. Takes a scene, uploads it, draws every slab of the grid into a framebuffer of all wanted targets
+// and resolves it into the volume.
 
 #include "parallel.hpp"
+#include "resolve.hpp"
 #include "surface.hpp"
 #include "voxelizer.hpp"
 
@@ -14,42 +15,44 @@
 #include <algorithm>
 #include <bitset>
 #include <chrono>
-#include <cstring>
 #include <memory>
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace voxelize {
 
-// Whether the host can read a backend's memory where it is; specialise it before the pipeline is instantiated.
+// How the host reads a backend's memory. This is for memory that it reads where it lies; other backends specialise it
+// before the pipeline is instantiated.
 template <class Backend>
-inline constexpr bool memory_is_host = false;
+struct memory_access {
+    static constexpr bool on_host = true;
 
-// Elements of a render target in host memory.
-template <class Backend, class Reference>
-[[nodiscard]] auto host_elements(Backend& backend, const Reference& target) {
-    if constexpr (memory_is_host<Backend>) {
-        using target_type = typename Reference::target_type;
-        const auto& view = target.view();
-        return std::span<const typename target_type::element_type>(view.elements,
-                                                                   target_type::map::elements(view.extent));
-    } else {
-        return target.to_host(backend);
+    // out[i] = value(i) for every i < count. `out` is host memory, what `value` reads is the backend's.
+    template <class T, class Value>
+    static void read(Backend&, T* out, std::size_t count, const Value& value, int threads) {
+        constexpr std::size_t block = 1 << 16;
+        parallel_for((count + block - 1) / block, threads, [&](std::size_t b) {
+            for (std::size_t i = b * block; i < std::min(count, (b + 1) * block); ++i) out[i] = value(i);
+        });
     }
-}
+};
 
 template <class Backend>
 class pipeline {
 public:
-    pipeline(Backend& backend, scene&& model, const voxelize_request& request, voxelize_stats& stats)
+    // A backend in host memory takes the scene's arrays over one by one, so that they are not held twice. Another one
+    // leaves the scene as it is.
+    pipeline(Backend& backend, scene& model, const voxelize_request& request, voxelize_stats& stats)
         : backend_{backend}, request_{request}, stats_{stats} {
         for (const target wanted : request.targets) wanted_[static_cast<std::size_t>(wanted)] = true;
         const stage_timer timer{*this, "upload"};
         tables_.push_back({backend_, one(make_color_tables())});
         upload_pictures(model);
         for (primitive& part : model.primitives) upload_primitive(part, model);
+        draw_table_.push_back({backend_, numbered_draws_});
         stats_.triangles = num_triangles_;
         if (wants(target::triangle) && num_triangles_ > INT32_MAX)
             throw std::runtime_error("more triangles than --target triangle can number");
@@ -146,7 +149,7 @@ private:
             const std::span<const glm::u8vec4> texels{reinterpret_cast<const glm::u8vec4*>(source.rgba.data()),
                                                       source.rgba.size() / 4};
             texels_.push_back({backend_, texels});
-            source.rgba = {};
+            if constexpr (memory_access<Backend>::on_host) source.rgba = {};
         }
     }
 
@@ -188,10 +191,9 @@ private:
         bits_draws_.push_back({mesh, vp::passthrough{}, vp::constant(true, 1U)});
 
         any_mask_ = any_mask_ || m.alpha == alpha_mode::mask;
-        first_triangle_.push_back(num_triangles_);
-        material_of_.push_back(static_cast<std::int32_t>(part.material));
+        numbered_draws_.push_back({num_triangles_, static_cast<std::int32_t>(part.material)});
         num_triangles_ += part.triangles.size();
-        part = {};
+        if constexpr (memory_access<Backend>::on_host) part = {};
     }
 
     // ---- slabs -----------------------------------------------------------------------------------------------------
@@ -254,8 +256,8 @@ private:
         bits_framebuffer& framebuffer = framebuffer_for(bits_framebuffer_, part.extent, enabled);
         draw_reporting(bits_draws_, part, framebuffer);
         const stage_timer timer{*this, "resolve"};
-        if (wants(target::occupancy)) copy(result, target::occupancy, elements_of<0>(framebuffer), begin);
-        if (wants(target::count)) copy(result, target::count, elements_of<1>(framebuffer), begin);
+        if (wants(target::occupancy)) copy<0>(result, target::occupancy, framebuffer, begin);
+        if (wants(target::count)) copy<1>(result, target::count, framebuffer, begin);
     }
 
     void draw_surface(volume& result, const voxelpipe::grid& part, int begin) {
@@ -263,22 +265,29 @@ private:
         if (enabled_targets()[triangle]) vp::get<triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
         draw_reporting(draws_, part, framebuffer);
         const stage_timer timer{*this, "resolve"};
-        if (wants(target::occupancy)) copy(result, target::occupancy, elements_of<occupancy>(framebuffer), begin);
-        if (wants(target::count)) copy(result, target::count, elements_of<count>(framebuffer), begin);
+        if (wants(target::occupancy)) copy<occupancy>(result, target::occupancy, framebuffer, begin);
+        if (wants(target::count)) copy<count>(result, target::count, framebuffer, begin);
         if (wants(target::color))
-            resolve_color(result, elements_of<color_sum>(framebuffer), elements_of<count>(framebuffer), begin);
-        if (wants(target::color_max)) copy(result, target::color_max, elements_of<color_max>(framebuffer), begin);
-        if (wants(target::color_replace))
-            copy(result, target::color_replace, elements_of<color_last>(framebuffer), begin);
-        if (wants(target::normal)) resolve_normal(result, elements_of<normal_sum>(framebuffer), begin);
-        if (wants(target::triangle)) copy(result, target::triangle, elements_of<triangle>(framebuffer), begin);
-        if (wants(target::material)) resolve_material(result, elements_of<triangle>(framebuffer), begin);
-        if (wants(target::depth)) copy(result, target::depth, elements_of<depth>(framebuffer), begin);
+            resolve<glm::u8vec4>(result, target::color, part.extent, begin,
+                                 mean_color{elements_of<color_sum>(framebuffer), elements_of<count>(framebuffer),
+                                            tables_.front().data()});
+        if (wants(target::color_max)) copy<color_max>(result, target::color_max, framebuffer, begin);
+        if (wants(target::color_replace)) copy<color_last>(result, target::color_replace, framebuffer, begin);
+        if (wants(target::normal))
+            resolve<glm::vec3>(result, target::normal, part.extent, begin,
+                               unit_normal{elements_of<normal_sum>(framebuffer)});
+        if (wants(target::triangle)) copy<triangle>(result, target::triangle, framebuffer, begin);
+        if (wants(target::material))
+            resolve<std::int32_t>(result, target::material, part.extent, begin,
+                                  material_of_triangle{elements_of<triangle>(framebuffer), draw_table_.front().data(),
+                                                       draw_table_.front().size()});
+        if (wants(target::depth)) copy<depth>(result, target::depth, framebuffer, begin);
     }
 
+    // Elements of a target, in the backend's memory.
     template <std::size_t I, class Framebuffer>
-    [[nodiscard]] auto elements_of(Framebuffer& framebuffer) {
-        return host_elements(backend_, vp::get<I>(framebuffer));
+    [[nodiscard]] static auto* elements_of(Framebuffer& framebuffer) {
+        return std::as_const(vp::get<I>(framebuffer).view().elements);
     }
 
     // The backend counts work of its own; the bar runs from 0 to 1 for each slab.
@@ -304,58 +313,24 @@ private:
         return reinterpret_cast<T*>(c->data.data() + layer * static_cast<std::size_t>(begin));
     }
 
-    template <class Elements>
-    void copy(volume& result, target id, const Elements& elements, int begin) {
-        std::memcpy(channel_at<std::byte>(result, id, begin), elements.data(), elements.size() * sizeof(elements[0]));
+    // A target as it is.
+    template <std::size_t I, class Framebuffer>
+    void copy(volume& result, target id, Framebuffer& framebuffer, int begin) {
+        const auto* const elements = elements_of<I>(framebuffer);
+        using element = std::remove_cvref_t<decltype(*elements)>;
+        using map = typename std::remove_cvref_t<decltype(vp::get<I>(framebuffer))>::target_type::map;
+        memory_access<Backend>::read(backend_, channel_at<element>(result, id, begin),
+                                     map::elements(framebuffer.extent()), as_it_is<element>{elements},
+                                     thread_count(request_.threads));
     }
 
-    // VISIT(i) for every voxel of a slab, in blocks, on several threads.
-    template <class Visit>
-    void for_each_voxel(std::size_t voxels, Visit visit) {
-        constexpr std::size_t block = 1 << 16;
-        parallel_for((voxels + block - 1) / block, thread_count(request_.threads), [&](std::size_t b) {
-            for (std::size_t i = b * block; i < std::min(voxels, (b + 1) * block); ++i) visit(i);
-        });
-    }
-
-    template <class Sums, class Counts>
-    void resolve_color(volume& result, const Sums& sums, const Counts& counts, int begin) {
-        auto* out = channel_at<glm::u8vec4>(result, target::color, begin);
-        const color_tables tables = make_color_tables();
-        for_each_voxel(counts.size(), [&](std::size_t i) {
-            if (counts[i] == 0) return;
-            const auto n = static_cast<float>(counts[i]);
-            glm::vec4 mean;
-            for (int c = 0; c < 4; ++c) mean[c] = std::min(vp::exact::div(sums[i][c], n), 1.0F);
-            out[i] = encode(tables, mean);
-        });
-    }
-
-    template <class Sums>
-    void resolve_normal(volume& result, const Sums& sums, int begin) {
-        auto* out = channel_at<glm::vec3>(result, target::normal, begin);
-        for_each_voxel(sums.size(), [&](std::size_t i) {
-            const double x = sums[i].x;
-            const double y = sums[i].y;
-            const double z = sums[i].z;
-            const double length = vp::exact::sqrt(vp::exact::fma(z, z, vp::exact::fma(y, y, vp::exact::mul(x, x))));
-            if (length > 0)
-                out[i] = {static_cast<float>(x / length), static_cast<float>(y / length),
-                          static_cast<float>(z / length)};
-        });
-    }
-
-    template <class Triangles>
-    void resolve_material(volume& result, const Triangles& triangles, int begin) {
-        auto* out = channel_at<std::int32_t>(result, target::material, begin);
-        for_each_voxel(triangles.size(), [&](std::size_t i) {
-            if (triangles[i] == UINT32_MAX) {
-                out[i] = -1;
-                return;
-            }
-            const auto next = std::upper_bound(first_triangle_.begin(), first_triangle_.end(), triangles[i]);
-            out[i] = material_of_[static_cast<std::size_t>(next - first_triangle_.begin()) - 1];
-        });
+    // A channel that is worked out from targets: VALUE(i) for every voxel of the slab.
+    template <class T, class Value>
+    void resolve(volume& result, target id, glm::ivec3 extent, int begin, const Value& value) {
+        const std::size_t voxels = static_cast<std::size_t>(extent.x) * static_cast<std::size_t>(extent.y) *
+                                   static_cast<std::size_t>(extent.z);
+        memory_access<Backend>::read(backend_, channel_at<T>(result, id, begin), voxels, value,
+                                     thread_count(request_.threads));
     }
 
     Backend& backend_;
@@ -377,8 +352,8 @@ private:
     std::vector<bits_draw> bits_draws_;
     std::unique_ptr<surface_framebuffer> surface_framebuffer_;
     std::unique_ptr<bits_framebuffer> bits_framebuffer_;
-    std::vector<std::uint64_t> first_triangle_; // of each draw
-    std::vector<std::int32_t> material_of_;
+    std::vector<numbered_draw> numbered_draws_;
+    std::vector<buffer<numbered_draw>> draw_table_;
     std::uint64_t num_triangles_ = 0;
 };
 

@@ -60,8 +60,12 @@ void print_text(std::ostream& stream, const run_report& report) {
     if (grid.voxel_size.y != grid.voxel_size.x || grid.voxel_size.z != grid.voxel_size.x)
         stream << " x " << grid.voxel_size.y << " x " << grid.voxel_size.z;
     stream << " from (" << grid.origin.x << ", " << grid.origin.y << ", " << grid.origin.z << ")\n";
-    line("backend") << report.stats.backend << ", " << report.stats.threads << " threads, " << report.stats.slabs
-                    << (report.stats.slabs == 1 ? " slab\n" : " slabs\n");
+    line("backend") << report.stats.backend << ", ";
+    if (!report.stats.device.empty()) stream << report.stats.device << ", ";
+    stream << report.stats.threads << " threads, " << report.stats.slabs
+           << (report.stats.slabs == 1 ? " slab" : " slabs");
+    if (!report.stats.no_cuda.empty()) stream << " (not cuda: " << report.stats.no_cuda << ')';
+    stream << '\n';
     line("triangles") << report.stats.triangles;
     if (report.stats.triangles_dropped != 0) stream << " (" << report.stats.triangles_dropped << " dropped)";
     stream << '\n';
@@ -77,6 +81,8 @@ void print_text(std::ostream& stream, const run_report& report) {
         total += time;
     }
     line("all ms") << std::setw(10) << total << '\n';
+    if (report.stats.device_memory != 0)
+        line("GPU memory MiB") << std::setw(10) << static_cast<double>(report.stats.device_memory) / (1 << 20) << '\n';
     line("peak memory MiB") << std::setw(10) << static_cast<double>(report.peak_memory) / (1 << 20) << '\n';
 }
 
@@ -92,6 +98,8 @@ void print_json(std::ostream& stream, const run_report& report) {
     root["targets"] = json::array();
     for (const target id : report.request.targets) root["targets"].push_back(info_of(id).name);
     root["backend"] = report.stats.backend;
+    if (!report.stats.device.empty()) root["device"] = report.stats.device;
+    if (!report.stats.no_cuda.empty()) root["no_cuda"] = report.stats.no_cuda;
     root["threads"] = report.stats.threads;
     root["slabs"] = report.stats.slabs;
     root["triangles"] = report.stats.triangles;
@@ -106,6 +114,7 @@ void print_json(std::ostream& stream, const run_report& report) {
         total += time;
     }
     root["ms"]["total"] = total;
+    if (report.stats.device_memory != 0) root["device_memory_bytes"] = report.stats.device_memory;
     root["peak_memory_bytes"] = report.peak_memory;
     root["materials"] = report.materials;
     root["files"] = json::array();

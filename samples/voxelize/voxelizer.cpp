@@ -2,20 +2,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "voxelizer.hpp"
 
+#include "cuda_device.hpp"
 #include "pipeline.hpp"
 
 #include <cpu_ref/backend.hpp>
 
 #include <unistd.h>
 
+#include <chrono>
 #include <cmath>
 #include <new>
+#include <optional>
 #include <utility>
 
 namespace voxelize {
-
-template <>
-inline constexpr bool memory_is_host<vp::cpu_backend> = true;
 
 double volume_bytes(const voxelize_request& request) {
     double voxel = 0;
@@ -38,14 +38,14 @@ void check_memory(const voxelize_request& request) {
                            " MiB: take fewer targets or voxels");
 }
 
-volume run_on_cpu(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
+volume run_on_cpu(scene& model, const voxelize_request& request, voxelize_stats& stats) {
     const int threads = thread_count(request.threads);
     vp::cpu_backend backend{static_cast<unsigned>(threads)};
     vp::cpu::stage_times times;
     backend.times = &times;
     stats.backend = "cpu";
     stats.threads = threads;
-    volume result = pipeline<vp::cpu_backend>{backend, std::move(model), request, stats}.run();
+    volume result = pipeline<vp::cpu_backend>{backend, model, request, stats}.run();
 
     // The pipeline's own stages in place of their sum.
     std::vector<std::pair<std::string, double>> stages;
@@ -64,14 +64,43 @@ volume run_on_cpu(scene&& model, const voxelize_request& request, voxelize_stats
     return result;
 }
 
+// The GPU, where it can be used: stats.no_cuda says why where it cannot.
+std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_stats& stats) {
+    const auto start = std::chrono::steady_clock::now();
+    const cuda_facts facts = look_for_cuda();
+    stats.no_cuda = why_not(facts);
+    if (!stats.no_cuda.empty()) {
+        if (request.backend == backend_choice::cuda)
+            throw backend_error("--backend cuda: " + stats.no_cuda + "; use --backend cpu");
+        return std::nullopt;
+    }
+    const voxelize_stats before = stats;
+    try {
+        if (const std::string why = why_too_large(facts, model, request); !why.empty()) throw device_memory_error(why);
+        const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - start;
+        stats.milliseconds.emplace_back("cuda_start", time.count());
+        if (request.work_memory == 0) request.work_memory = default_work_memory(facts);
+        return run_on_cuda(facts, model, request, stats);
+    } catch (const device_memory_error& error) {
+        if (request.backend == backend_choice::cuda)
+            throw memory_error(std::string("--backend cuda: ") + error.what() + "; use --backend cpu");
+        stats = before;
+        stats.no_cuda = error.what();
+        stats.warnings.push_back(stats.no_cuda + "; the CPU does the work");
+        return std::nullopt;
+    }
+}
+
 } // namespace
 
 volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
     check_memory(request);
-    if (request.backend == backend_choice::cuda)
-        throw backend_error("this program was built without the CUDA backend; use --backend cpu");
     try {
-        return run_on_cpu(std::move(model), request, stats);
+        if (request.backend != backend_choice::cpu)
+            if (std::optional<volume> result = try_cuda(model, request, stats)) return std::move(*result);
+        voxelize_request on_cpu = request;
+        if (on_cpu.work_memory == 0) on_cpu.work_memory = std::uint64_t{128} << 20;
+        return run_on_cpu(model, on_cpu, stats);
     } catch (const std::bad_alloc&) {
         throw memory_error("not enough memory: take fewer targets or voxels");
     }

@@ -30,14 +30,19 @@ struct voxelize_request {
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
     backend_choice backend = backend_choice::automatic;
     int threads = 0; // 0: all cores
-    // Bytes for what exists only while the pipeline runs. A grid that needs more is computed in slabs along z.
-    std::uint64_t work_memory = std::uint64_t{128} << 20;
+    // Bytes for what exists only while the pipeline runs. A grid that needs more is computed in slabs along z. 0: what
+    // suits the backend.
+    std::uint64_t work_memory = 0;
+    std::uint64_t device_memory = 0;      // most bytes to take of a GPU's memory; 0: all that is free
     std::function<void(double)> progress; // called with 0..1, one call at a time; may be empty
 };
 
 struct voxelize_stats {
-    std::string backend; // "cpu"
-    int threads = 0;     // that it ran on
+    std::string backend;             // "cpu" or "cuda"
+    std::string device;              // the GPU's name
+    std::string no_cuda;             // why the choice between the two fell on the CPU
+    std::uint64_t device_memory = 0; // the most that was held there, in bytes
+    int threads = 0;                 // on the CPU
     int slabs = 0;
     std::uint64_t triangles = 0;
     std::uint64_t triangles_dropped = 0;   // a position that is not finite, or too far from the grid to be snapped
@@ -45,6 +50,7 @@ struct voxelize_stats {
     std::uint64_t fragments_discarded = 0; // by an alpha mask
     std::uint64_t voxels = 0;              // with at least one fragment
     std::vector<std::pair<std::string, double>> milliseconds; // stage -> time, in pipeline order
+    std::vector<std::string> warnings;                        // one line each
 };
 
 // The grid's voxels do not fit into memory.
@@ -57,8 +63,9 @@ struct backend_error : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-// Consumes the scene: its arrays move to the backend. Throws memory_error, backend_error, and std::runtime_error for
-// what the library refuses.
+// Consumes the scene: its arrays move to the backend. The backend `automatic` is the first GPU where that can be used,
+// the CPU otherwise, with a warning where only the GPU's memory was too small. Throws memory_error, backend_error, and
+// std::runtime_error for what the library refuses.
 [[nodiscard]] volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
 
 // Bytes of the volume that a request gives.

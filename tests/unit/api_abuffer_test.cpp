@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The A-buffer on cpu_backend, against the oracle's fragments: order, offsets, payloads, discard, crop, reuse.
+// The A-buffer on a backend, against the oracle's fragments: order, offsets, payloads, discard, crop, reuse.
 
 #include "api_model.hpp"
 
@@ -12,6 +12,7 @@
 namespace {
 
 namespace vp = voxelpipe;
+using unit::backend_type;
 using unit::mark;
 
 const glm::ivec3 extent{70, 35, 33};
@@ -79,12 +80,13 @@ class AbufferLists : public ::testing::TestWithParam<vp::coverage> {};
 TEST_P(AbufferLists, AreTheOraclesFragmentsByVoxelAndPrimitive) {
     const unit::small_mesh a = unit::make_mesh(1, 120, extent), b = unit::make_mesh(2, 60, extent);
     using draw = vp::draw<vp::mesh_view<>, vp::passthrough, payload_shader>;
-    vp::cpu_backend backend{2};
-    vp::abuffer<vp::cpu_backend, payload> lists{backend};
+    backend_type backend = unit::make_backend();
+    const auto on_a = a.on(backend), on_b = b.on(backend);
+    vp::abuffer<backend_type, payload> lists{backend};
     const vp::grid whole = unit::unit_grid(extent);
     for (const bool discards : {false, true})
         for (const vp::grid& grid : {whole, whole.crop({5, 6, 7}, {60, 20, 25}), whole.crop({0, 0, 32}, {70, 35, 1})}) {
-            const draw draws[]{{a.view(), {}, {discards}}, {b.view(), {}, {discards}}};
+            const draw draws[]{{on_a.view(), {}, {discards}}, {on_b.view(), {}, {discards}}};
             const vp::status s = vp::voxelize(backend, std::span<const draw>(draws), grid, lists, GetParam());
             ASSERT_TRUE(s.ok()) << s.message();
             const auto expected = expected_lists(grid, GetParam(), {a, b}, discards);
@@ -99,10 +101,10 @@ TEST_P(AbufferLists, AreTheOraclesFragmentsByVoxelAndPrimitive) {
 
 TEST_P(AbufferLists, WithoutPayloadHoldTheNumbersAlone) {
     const unit::small_mesh mesh = unit::make_mesh(3, 150, extent);
-    vp::cpu_backend backend{2};
-    vp::abuffer<vp::cpu_backend> lists{backend};
+    backend_type backend = unit::make_backend();
+    vp::abuffer<backend_type> lists{backend};
     const vp::grid grid = unit::unit_grid(extent);
-    vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, vp::constant(), lists, GetParam()).or_throw();
+    vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, vp::constant(), lists, GetParam()).or_throw();
     expect_equal(lists.to_host(backend), grid, expected_lists(grid, GetParam(), {mesh}, false));
     EXPECT_EQ(lists.payloads.size(), 0u);
 }
@@ -116,14 +118,14 @@ struct sum_shader {
 
 TEST(Abuffer, FoldedWithABlendIsTheFramebuffer) {
     const unit::small_mesh mesh = unit::make_mesh(4, 200, extent);
-    vp::cpu_backend backend{2};
+    backend_type backend = unit::make_backend();
     const vp::grid grid = unit::unit_grid(extent);
-    vp::abuffer<vp::cpu_backend, float> lists{backend};
+    vp::abuffer<backend_type, float> lists{backend};
     using target = vp::target<float, vp::blend::add>;
-    vp::framebuffer<vp::cpu_backend, target> fb{backend, extent};
+    vp::framebuffer<backend_type, target> fb{backend, extent};
     for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin}) {
-        vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, sum_shader{}, lists, rule).or_throw();
-        vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, sum_shader{}, fb, rule).or_throw();
+        vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, sum_shader{}, lists, rule).or_throw();
+        vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, sum_shader{}, fb, rule).or_throw();
         std::vector<float> folded(static_cast<std::size_t>(extent.x * extent.y * extent.z), 0.0f);
         for (const auto& [voxel, fragments] : lists.to_host(backend)) {
             auto sum = target::traits::begin(0.0f);
@@ -143,10 +145,10 @@ TEST(Abuffer, IsEmptyWhereNothingIsCovered) {
     unit::small_mesh far;
     far.positions = {{1000, 0, 0}, {1001, 0, 0}, {1000, 1, 0}};
     far.triangles = {{0, 1, 2}};
-    vp::cpu_backend backend{2};
-    vp::abuffer<vp::cpu_backend, float> lists{backend};
+    backend_type backend = unit::make_backend();
+    vp::abuffer<backend_type, float> lists{backend};
     const vp::status s =
-        vp::voxelize(backend, far.view(), unit::unit_grid(extent), vp::passthrough{}, sum_shader{}, lists);
+        vp::voxelize(backend, far.on(backend), unit::unit_grid(extent), vp::passthrough{}, sum_shader{}, lists);
     ASSERT_TRUE(s.ok());
     EXPECT_EQ(s.counts.triangles_outside, 1u);
     EXPECT_EQ(lists.num_voxels(), 0u);
@@ -162,9 +164,9 @@ TEST(Abuffer, HoldsManyFragmentsOfOneVoxel) {
     unit::small_mesh m;
     m.positions = {{1.25f, 1.25f, 1.25f}, {1.75f, 1.25f, 1.25f}, {1.25f, 1.75f, 1.25f}};
     m.triangles.assign(static_cast<std::size_t>(unit::cases(1'000'000)), {0, 1, 2});
-    vp::cpu_backend backend{2};
-    vp::abuffer<vp::cpu_backend> lists{backend};
-    vp::voxelize(backend, m.view(), unit::unit_grid(glm::ivec3(3)), vp::passthrough{}, vp::constant(), lists)
+    backend_type backend = unit::make_backend();
+    vp::abuffer<backend_type> lists{backend};
+    vp::voxelize(backend, m.on(backend), unit::unit_grid(glm::ivec3(3)), vp::passthrough{}, vp::constant(), lists)
         .or_throw();
     const auto host = lists.to_host(backend);
     ASSERT_EQ(host.voxels, (std::vector<std::uint64_t>{13}));

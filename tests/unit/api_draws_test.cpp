@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Draws on cpu_backend: transforms, attributes and varyings, order across draws, crops, counters, what a fragment
+// Draws on a backend: transforms, attributes and varyings, order across draws, crops, counters, what a fragment
 // shader is told.
 
 #include "api_model.hpp"
@@ -14,6 +14,7 @@ namespace {
 
 namespace vp = voxelpipe;
 namespace blend = voxelpipe::blend;
+using unit::backend_type;
 
 const glm::ivec3 extent{41, 33, 36};
 
@@ -35,11 +36,14 @@ TEST(Draws, AreOrderedAndPlacedByTheirTransforms) {
     glm::mat4 turn = glm::rotate(glm::translate(glm::mat4(1.0f), {3, 5, -2}), 0.4f, {1, 2, 3});
     const glm::mat4 identity(1.0f), scale = glm::scale(identity, {0.75f, 1.25f, 0.5f});
     using draw = vp::draw<vp::mesh_view<>, vp::transform, id_shader>;
-    const std::vector<draw> draws{
-        {a.view(), {identity}, {}}, {b.view(), {turn}, {}}, {empty.view(), {identity}, {}}, {a.view(), {scale}, {}}};
+    backend_type backend = unit::make_backend();
+    const auto on_a = a.on(backend), on_b = b.on(backend), on_empty = empty.on(backend);
+    const std::vector<draw> draws{{on_a.view(), {identity}, {}},
+                                  {on_b.view(), {turn}, {}},
+                                  {on_empty.view(), {identity}, {}},
+                                  {on_a.view(), {scale}, {}}};
     const vp::grid grid = unit::unit_grid(extent);
-    vp::cpu_backend backend{2};
-    vp::framebuffer<vp::cpu_backend, id_target> fb{backend, extent};
+    vp::framebuffer<backend_type, id_target> fb{backend, extent};
     const vp::status s = vp::voxelize(backend, std::span<const draw>(draws), grid, fb);
     ASSERT_TRUE(s.ok()) << s.message();
     EXPECT_EQ(s.counts.triangles_in, 130u);
@@ -65,33 +69,38 @@ TEST(Draws, TransformPointIsThreeFusedSteps) {
     }
 }
 
+struct crop_shader {
+    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+        return vp::outputs(unit::mark(f.primitive, f.voxel), f.barycentric);
+    }
+};
+
 // A part of the grid gives the crop of the whole, with voxels and counts of its own.
 TEST(Crop, IsTheCropOfTheWhole) {
     const unit::small_mesh mesh = unit::make_mesh(4, 150, extent);
     vp::grid grid = unit::unit_grid(extent);
     grid.voxel_size = {1.0, 0.9, 1.3};
-    struct shader {
-        VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
-            return vp::outputs(unit::mark(f.primitive, f.voxel), f.barycentric);
-        }
-    };
     using targets =
-        vp::framebuffer<vp::cpu_backend, vp::target<std::uint64_t, blend::add>, vp::target<glm::vec3, blend::max>>;
-    vp::cpu_backend backend{2};
+        vp::framebuffer<backend_type, vp::target<std::uint64_t, blend::add>, vp::target<glm::vec3, blend::max>>;
+    backend_type backend = unit::make_backend();
     for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin}) {
         targets whole{backend, extent};
-        vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, shader{}, whole, rule).or_throw();
+        vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, crop_shader{}, whole, rule).or_throw();
         const glm::ivec3 begin{7, 9, 3}, size{30, 11, 33};
         targets part{backend, size};
-        const auto s =
-            vp::voxelize(backend, mesh.view(), grid.crop(begin, size), vp::passthrough{}, shader{}, part, rule);
+        const auto s = vp::voxelize(backend, mesh.on(backend), grid.crop(begin, size), vp::passthrough{}, crop_shader{},
+                                    part, rule);
         ASSERT_TRUE(s.ok()) << s.message();
         std::uint64_t occupied = 0;
+        const auto whole_sums = vp::get<0>(whole).to_host_target(backend);
+        const auto whole_maxima = vp::get<1>(whole).to_host_target(backend);
+        const auto part_sums = vp::get<0>(part).to_host_target(backend);
+        const auto part_maxima = vp::get<1>(part).to_host_target(backend);
         unit::for_each_voxel(size, [&](int x, int y, int z) {
-            const std::uint64_t a = vp::get<0>(whole).view()(x + begin.x, y + begin.y, z + begin.z);
-            ASSERT_EQ(vp::get<0>(part).view()(x, y, z), a) << x << ' ' << y << ' ' << z;
-            const glm::vec3 b = vp::get<1>(whole).view()(x + begin.x, y + begin.y, z + begin.z);
-            const glm::vec3 c = vp::get<1>(part).view()(x, y, z);
+            const std::uint64_t a = whole_sums(x + begin.x, y + begin.y, z + begin.z);
+            ASSERT_EQ(part_sums(x, y, z), a) << x << ' ' << y << ' ' << z;
+            const glm::vec3 b = whole_maxima(x + begin.x, y + begin.y, z + begin.z);
+            const glm::vec3 c = part_maxima(x, y, z);
             ASSERT_EQ(std::memcmp(&b, &c, sizeof b), 0);
             occupied += a != 0 ? 1 : 0;
         });
@@ -103,14 +112,14 @@ TEST(Crop, IsTheCropOfTheWhole) {
 TEST(Crop, SlabsAddUp) {
     const unit::small_mesh mesh = unit::make_mesh(5, 100, extent);
     const vp::grid grid = unit::unit_grid(extent);
-    vp::cpu_backend backend{2};
-    vp::framebuffer<vp::cpu_backend, vp::target<std::uint32_t, blend::count>> whole{backend, extent};
-    const auto all = vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, vp::constant(0u), whole);
+    backend_type backend = unit::make_backend();
+    vp::framebuffer<backend_type, vp::target<std::uint32_t, blend::count>> whole{backend, extent};
+    const auto all = vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, vp::constant(0u), whole);
     std::uint64_t fragments = 0, voxels = 0;
     for (int first = 0; first < extent.z; first += 5) {
         const glm::ivec3 size{extent.x, extent.y, std::min(5, extent.z - first)};
-        vp::framebuffer<vp::cpu_backend, vp::target<std::uint32_t, blend::count>> slab{backend, size};
-        const auto s = vp::voxelize(backend, mesh.view(), grid.crop({0, 0, first}, size), vp::passthrough{},
+        vp::framebuffer<backend_type, vp::target<std::uint32_t, blend::count>> slab{backend, size};
+        const auto s = vp::voxelize(backend, mesh.on(backend), grid.crop({0, 0, first}, size), vp::passthrough{},
                                     vp::constant(0u), slab);
         ASSERT_TRUE(s.ok());
         fragments += s.counts.fragments;
@@ -137,10 +146,11 @@ TEST(Counters, SayWhatBecameOfEveryTriangle) {
     add({2, 2, 2}, {3, 3, 3}, {4, 4, 4});         // a segment
     add({-9, 2, 2}, {-8, 3, 3}, {-9, 4, 4});      // outside
     add({-9, 2, 2}, {-9, 2, 2}, {-9, 2, 2});      // outside and a point
-    vp::cpu_backend backend{2};
+    backend_type backend = unit::make_backend();
     const vp::grid grid = unit::unit_grid(extent);
-    vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, blend::bit_or>> fb{backend, extent};
-    const auto conservative = vp::voxelize(backend, m.view(), grid, vp::passthrough{}, vp::constant(true), fb).counts;
+    vp::framebuffer<backend_type, vp::target<vp::bit, blend::bit_or>> fb{backend, extent};
+    const auto conservative =
+        vp::voxelize(backend, m.on(backend), grid, vp::passthrough{}, vp::constant(true), fb).counts;
     EXPECT_EQ(conservative.triangles_in, 9u);
     EXPECT_EQ(conservative.triangles_nonfinite, 3u);
     EXPECT_EQ(conservative.triangles_too_far, 1u);
@@ -149,7 +159,8 @@ TEST(Counters, SayWhatBecameOfEveryTriangle) {
     EXPECT_EQ(conservative.triangles_outside, 2u);
     EXPECT_EQ(conservative.triangles_drawn, 3u);
     const auto thin =
-        vp::voxelize(backend, m.view(), grid, vp::passthrough{}, vp::constant(true), fb, vp::coverage::thin).counts;
+        vp::voxelize(backend, m.on(backend), grid, vp::passthrough{}, vp::constant(true), fb, vp::coverage::thin)
+            .counts;
     EXPECT_EQ(thin.triangles_nonfinite, 3u);
     EXPECT_EQ(thin.triangles_too_far, 1u);
     EXPECT_EQ(thin.triangles_drawn, 1u);
@@ -158,7 +169,7 @@ TEST(Counters, SayWhatBecameOfEveryTriangle) {
 }
 
 // ---- what shaders are told
-// ---------------------------------------------------------------------------------------------
+// -------------------------------------------------------------------------------------------
 
 struct surface {
     glm::vec2 uv;
@@ -189,9 +200,9 @@ TEST(Fragment, KnowsItsPlaceOnTheTriangle) {
     const std::vector<glm::uvec3> triangles{{0, 1, 2}, {1, 2, 3}};
     const std::vector<glm::vec2> uv{{0, 0}, {20, 0}, {0, 10}, {20, 10}};
     const std::vector<std::uint32_t> ids{5, 6, 7, 8};
-    vp::cpu_backend backend{2};
-    const vp::mesh<vp::cpu_backend, glm::vec2, std::uint32_t> mesh{backend, positions, triangles, uv, ids};
-    vp::abuffer<vp::cpu_backend, told> lists{backend};
+    backend_type backend = unit::make_backend();
+    const vp::mesh<backend_type, glm::vec2, std::uint32_t> mesh{backend, positions, triangles, uv, ids};
+    vp::abuffer<backend_type, told> lists{backend};
     const vp::grid grid = unit::unit_grid(extent);
     vp::voxelize(backend, mesh, grid, surface_vertex{0.5f}, surface_fragment{}, lists, vp::coverage::thin).or_throw();
     const auto host = lists.to_host(backend);
@@ -215,26 +226,27 @@ TEST(Fragment, KnowsItsPlaceOnTheTriangle) {
     EXPECT_GT(fragments, 200u);
 }
 
+struct place_shader {
+    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+        return vp::outputs(glm::vec4(f.normal, f.front_facing ? 1.0f : 0.0f), f.barycentric, f.axis);
+    }
+};
+
 TEST(Fragment, OfAZeroAreaTriangleHasDefinedValues) {
     unit::small_mesh m;
     m.positions = {{1.5f, 1.5f, 1.5f}, {5.5f, 2.5f, 3.5f}, {1.5f, 1.5f, 1.5f}};
     m.triangles = {{0, 1, 2}};
-    struct shader {
-        VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
-            return vp::outputs(glm::vec4(f.normal, f.front_facing ? 1.0f : 0.0f), f.barycentric, f.axis);
-        }
-    };
-    vp::cpu_backend backend{1};
-    vp::framebuffer<vp::cpu_backend, vp::target<glm::vec4, blend::replace>, vp::target<glm::vec3, blend::replace>,
+    backend_type backend = unit::make_backend();
+    vp::framebuffer<backend_type, vp::target<glm::vec4, blend::replace>, vp::target<glm::vec3, blend::replace>,
                     vp::target<int, blend::replace>>
         fb{backend, extent};
     vp::get<2>(fb).clear(-1);
-    const auto s = vp::voxelize(backend, m.view(), unit::unit_grid(extent), vp::passthrough{}, shader{}, fb);
+    const auto s = vp::voxelize(backend, m.on(backend), unit::unit_grid(extent), vp::passthrough{}, place_shader{}, fb);
     EXPECT_GE(s.counts.voxels, 5u);
-    EXPECT_EQ(vp::get<0>(fb).view()(1, 1, 1), glm::vec4(0, 0, 0, 1));
-    EXPECT_EQ(vp::get<1>(fb).view()(1, 1, 1), glm::vec3(1.0f / 3.0f));
-    EXPECT_EQ(vp::get<2>(fb).view()(1, 1, 1), 0);
-    EXPECT_EQ(vp::get<2>(fb).view()(9, 9, 9), -1);
+    EXPECT_EQ(vp::get<0>(fb).to_host_target(backend)(1, 1, 1), glm::vec4(0, 0, 0, 1));
+    EXPECT_EQ(vp::get<1>(fb).to_host_target(backend)(1, 1, 1), glm::vec3(1.0f / 3.0f));
+    EXPECT_EQ(vp::get<2>(fb).to_host_target(backend)(1, 1, 1), 0);
+    EXPECT_EQ(vp::get<2>(fb).to_host_target(backend)(9, 9, 9), -1);
 }
 
 } // namespace

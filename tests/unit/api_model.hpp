@@ -2,13 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the API tests share: small meshes, the fragments that the oracle gives for them in primitive order, and values
-// that depend on primitive and voxel, so that a fragment in the wrong place or order shows.
+// What the API tests share: the backend that they run on, small meshes, the fragments that the oracle gives for them in
+// primitive order, and values that depend on primitive and voxel, so that a fragment in the wrong place or order shows.
+//
+// The same test files are compiled twice: by the C++ compiler for cpu_backend, and by nvcc for cuda_backend
+// (tests/device).
 
 #include "oracle.hpp"
 #include "test_support.hpp"
 
 #include <cpu_ref/backend.hpp>
+#include <voxelpipe/voxelpipe.hpp>
 
 #include <cstdint>
 #include <cstring>
@@ -18,10 +22,21 @@ namespace unit {
 
 namespace vp = voxelpipe;
 
+#if defined(__CUDACC__)
+using backend_type = vp::cuda_backend;
+[[nodiscard]] inline backend_type make_backend() { return backend_type{}; }
+#else
+using backend_type = vp::cpu_backend;
+[[nodiscard]] inline backend_type make_backend() { return backend_type{2}; }
+#endif
+
 struct small_mesh {
     std::vector<glm::vec3> positions;
     std::vector<glm::uvec3> triangles;
-    [[nodiscard]] vp::mesh_view<> view() const { return {positions, triangles}; }
+    [[nodiscard]] vp::mesh_view<> view() const { return {positions, triangles}; } // in host memory
+
+    // A copy in the backend's memory.
+    [[nodiscard]] vp::mesh<backend_type> on(backend_type& backend) const { return {backend, positions, triangles}; }
 };
 
 // `count` triangles of all sizes in and round a grid of `extent` unit voxels at the origin.

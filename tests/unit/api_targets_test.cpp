@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Render targets on cpu_backend: many types and blends in one pass, clear, load, off, discard, user types, against
+// Render targets on a backend: many types and blends in one pass, clear, load, off, discard, user types, against
 // folds over the oracle's fragments.
 
 #include "api_model.hpp"
@@ -14,6 +14,7 @@ namespace {
 
 namespace vp = voxelpipe;
 namespace blend = voxelpipe::blend;
+using unit::backend_type;
 using unit::mark;
 
 const glm::ivec3 extent{45, 34, 37};
@@ -49,7 +50,7 @@ struct mark_shader {
 };
 
 using framebuffer =
-    vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, blend::bit_xor>, vp::target<std::uint32_t, blend::replace>,
+    vp::framebuffer<backend_type, vp::target<vp::bit, blend::bit_xor>, vp::target<std::uint32_t, blend::replace>,
                     vp::target<float, blend::add>, vp::target<glm::vec3, blend::max, vp::layout::planar>,
                     vp::target<std::int16_t, blend::min, vp::layout::tiled>, vp::target<vp::half, blend::add>,
                     vp::target<std::uint64_t, blend::count>, vp::target<record, chain>>;
@@ -99,9 +100,10 @@ class Targets : public ::testing::TestWithParam<vp::coverage> {};
 TEST_P(Targets, EightInOnePassAreTheFoldsOfTheOraclesFragments) {
     const unit::small_mesh mesh = unit::make_mesh(1, 120, extent);
     const vp::grid grid = unit::unit_grid(extent);
-    vp::cpu_backend backend{2};
+    backend_type backend = unit::make_backend();
     framebuffer fb{backend, extent};
-    const vp::status s = vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, mark_shader{}, fb, GetParam());
+    const vp::status s =
+        vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, mark_shader{}, fb, GetParam());
     ASSERT_TRUE(s.ok()) << s.message();
     const model expected(unit::fragments_of(grid, GetParam(), {mesh}), extent);
     EXPECT_EQ(s.counts.fragments, expected.fragments);
@@ -138,23 +140,23 @@ INSTANTIATE_TEST_SUITE_P(Both, Targets, ::testing::Values(vp::coverage::conserva
                          [](const auto& p) { return p.param == vp::coverage::thin ? "thin" : "conservative"; });
 
 // ---- load operations
-// ---------------------------------------------------------------------------------------------------
+// -------------------------------------------------------------------------------------------------
 
 struct two_values {
     VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
         return vp::outputs(f.triangle + 1u, static_cast<float>(f.triangle));
     }
 };
-using two = vp::framebuffer<vp::cpu_backend, vp::target<std::uint32_t, blend::add>, vp::target<float, blend::add>>;
+using two = vp::framebuffer<backend_type, vp::target<std::uint32_t, blend::add>, vp::target<float, blend::add>>;
 
 TEST(LoadOperation, ClearSetsEveryVoxelAndCountsAsAFirstTerm) {
     const unit::small_mesh mesh = unit::make_mesh(2, 40, extent);
-    vp::cpu_backend backend{2};
+    backend_type backend = unit::make_backend();
     two fb{backend, extent};
     vp::get<0>(fb).clear(1000u);
     vp::get<1>(fb).clear(0.5f);
     const auto grid = unit::unit_grid(extent);
-    vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, two_values{}, fb).or_throw();
+    vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, two_values{}, fb).or_throw();
     std::vector<std::uint32_t> sums(static_cast<std::size_t>(extent.x * extent.y * extent.z), 1000u);
     std::vector<float> floats(sums.size(), 0.5f); // small numbers: a plain sum is exact
     for (const auto& f : unit::fragments_of(grid, vp::coverage::conservative, {mesh})) {
@@ -167,7 +169,7 @@ TEST(LoadOperation, ClearSetsEveryVoxelAndCountsAsAFirstTerm) {
     // Load blends onto what is there: the same triangles once more.
     vp::get<0>(fb).load();
     vp::get<1>(fb).load();
-    vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, two_values{}, fb).or_throw();
+    vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, two_values{}, fb).or_throw();
     for (std::size_t i = 0; i < sums.size(); ++i) {
         sums[i] = 2 * sums[i] - 1000;
         floats[i] = 2 * floats[i] - 0.5f;
@@ -178,28 +180,28 @@ TEST(LoadOperation, ClearSetsEveryVoxelAndCountsAsAFirstTerm) {
     // Off: neither read nor written.
     vp::get<0>(fb).off();
     vp::get<1>(fb).clear(-1.0f);
-    vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, two_values{}, fb).or_throw();
+    vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, two_values{}, fb).or_throw();
     EXPECT_TRUE(unit::same_bytes(vp::get<0>(fb).to_host(backend), sums));
     EXPECT_FALSE(unit::same_bytes(vp::get<1>(fb).to_host(backend), floats));
 }
 
 TEST(LoadOperation, DisabledTargetsNeedNoMemory) {
     const unit::small_mesh mesh = unit::make_mesh(3, 40, extent);
-    vp::cpu_backend backend{2};
+    backend_type backend = unit::make_backend();
     two both{backend, extent}, second{backend, extent, 0b10};
     EXPECT_EQ(vp::get<0>(second).view().elements, nullptr);
     EXPECT_EQ(vp::get<0>(second).to_host(backend).size(), 0u);
     const auto grid = unit::unit_grid(extent);
     for (two* fb : {&both, &second})
-        vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, two_values{}, *fb).or_throw();
+        vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, two_values{}, *fb).or_throw();
     EXPECT_TRUE(unit::same_bytes(vp::get<1>(both).to_host(backend), vp::get<1>(second).to_host(backend)));
 }
 
 TEST(LoadOperation, UntouchedVoxelsKeepTheirBits) {
     // A NaN that is not the canonical one and -0 survive where no fragment falls, under clear and under load.
     const float odd_nan = std::bit_cast<float>(0xffc12345u);
-    vp::cpu_backend backend{2};
-    vp::framebuffer<vp::cpu_backend, vp::target<float, blend::add>> fb{backend, extent};
+    backend_type backend = unit::make_backend();
+    vp::framebuffer<backend_type, vp::target<float, blend::add>> fb{backend, extent};
     unit::small_mesh one;
     one.positions = {{1.5f, 1.5f, 1.5f}, {1.6f, 1.5f, 1.5f}, {1.5f, 1.6f, 1.5f}};
     one.triangles = {{0, 1, 2}};
@@ -207,7 +209,7 @@ TEST(LoadOperation, UntouchedVoxelsKeepTheirBits) {
     for (const float start : {odd_nan, -0.0f}) {
         vp::get<0>(fb).clear(start);
         for (int pass = 0; pass < 2; ++pass) {
-            vp::voxelize(backend, one.view(), grid, vp::passthrough{}, vp::constant(1.0f), fb).or_throw();
+            vp::voxelize(backend, one.on(backend), grid, vp::passthrough{}, vp::constant(1.0f), fb).or_throw();
             const auto values = vp::get<0>(fb).to_host(backend);
             for (std::size_t i = 0; i < values.size(); ++i) {
                 if (i == unit::linear(extent, {1, 1, 1})) continue;
@@ -219,56 +221,61 @@ TEST(LoadOperation, UntouchedVoxelsKeepTheirBits) {
 }
 
 TEST(LoadOperation, BitsClearToOneUpToTheExtentAndPaddingToZero) {
-    vp::cpu_backend backend{2};
+    backend_type backend = unit::make_backend();
     unit::small_mesh far;
     far.positions = {{1000, 0, 0}, {1001, 0, 0}, {1000, 1, 0}};
     far.triangles = {{0, 1, 2}};
     for (const int nx : {1, 31, 32, 33, 70}) {
         const glm::ivec3 e{nx, 3, 9};
-        vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, blend::bit_and>,
+        vp::framebuffer<backend_type, vp::target<vp::bit, blend::bit_and>,
                         vp::target<vp::bit, blend::bit_and, vp::layout::tiled>>
             fb{backend, e};
         vp::get<0>(fb).clear(true);
         vp::get<1>(fb).clear(true);
-        vp::voxelize(backend, far.view(), unit::unit_grid(e), vp::passthrough{}, vp::constant(false, false), fb)
+        vp::voxelize(backend, far.on(backend), unit::unit_grid(e), vp::passthrough{}, vp::constant(false, false), fb)
             .or_throw();
         for (const auto& words : {vp::get<0>(fb).to_host(backend), vp::get<1>(fb).to_host(backend)}) {
             int bits = 0;
             for (const std::uint32_t w : words) bits += std::popcount(w);
             EXPECT_EQ(bits, nx * 3 * 9);
         }
+        const auto linear = vp::get<0>(fb).to_host_target(backend);
+        const auto tiled = vp::get<1>(fb).to_host_target(backend);
         unit::for_each_voxel(e, [&](int x, int y, int z) {
-            ASSERT_TRUE(vp::get<0>(fb).view()(x, y, z));
-            ASSERT_TRUE(vp::get<1>(fb).view()(x, y, z));
+            ASSERT_TRUE(linear(x, y, z));
+            ASSERT_TRUE(tiled(x, y, z));
         });
     }
 }
 
+struct layout_shader {
+    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+        const glm::vec3 v = vector_of(mark(f.primitive, f.voxel));
+        return vp::outputs(v, v, v, v.x > 0, v.x > 0);
+    }
+};
+
 TEST(Layouts, HoldTheSameValues) {
     const unit::small_mesh mesh = unit::make_mesh(4, 100, extent);
-    vp::cpu_backend backend{2};
-    struct shader {
-        VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
-            const glm::vec3 v = vector_of(mark(f.primitive, f.voxel));
-            return vp::outputs(v, v, v, v.x > 0, v.x > 0);
-        }
-    };
-    vp::framebuffer<vp::cpu_backend, vp::target<glm::vec3, blend::min>,
+    backend_type backend = unit::make_backend();
+    vp::framebuffer<backend_type, vp::target<glm::vec3, blend::min>,
                     vp::target<glm::vec3, blend::min, vp::layout::planar>,
                     vp::target<glm::vec3, blend::min, vp::layout::tiled>, vp::target<vp::bit, blend::bit_or>,
                     vp::target<vp::bit, blend::bit_or, vp::layout::tiled>>
         fb{backend, extent};
-    vp::voxelize(backend, mesh.view(), unit::unit_grid(extent), vp::passthrough{}, shader{}, fb).or_throw();
+    vp::voxelize(backend, mesh.on(backend), unit::unit_grid(extent), vp::passthrough{}, layout_shader{}, fb).or_throw();
     const auto a = vp::get<0>(fb).to_host_target(backend);
     const auto b = vp::get<1>(fb).to_host_target(backend);
     const auto c = vp::get<2>(fb).to_host_target(backend);
+    const auto linear = vp::get<3>(fb).to_host_target(backend);
+    const auto tiled = vp::get<4>(fb).to_host_target(backend);
     int set = 0;
     unit::for_each_voxel(extent, [&](int x, int y, int z) {
         const glm::vec3 va = a(x, y, z), vb = b(x, y, z), vc = c(x, y, z);
         ASSERT_EQ(std::memcmp(&va, &vb, sizeof va), 0);
         ASSERT_EQ(std::memcmp(&va, &vc, sizeof va), 0);
-        ASSERT_EQ(vp::get<3>(fb).view()(x, y, z), vp::get<4>(fb).view()(x, y, z));
-        set += vp::get<3>(fb).view()(x, y, z) ? 1 : 0;
+        ASSERT_EQ(linear(x, y, z), tiled(x, y, z));
+        set += linear(x, y, z) ? 1 : 0;
     });
     EXPECT_GT(set, 100);
 }
@@ -277,13 +284,15 @@ TEST(FramebufferView, WritesIntoMemoryOfTheCallers) {
     const unit::small_mesh mesh = unit::make_mesh(5, 30, extent);
     using target = vp::target<std::uint32_t, blend::add>;
     const std::size_t n = target::map::elements(extent);
-    std::vector<std::uint32_t> memory(n + 2, 0xabababab);
+    backend_type backend = unit::make_backend();
+    const std::vector<std::uint32_t> before(n + 2, 0xabababab);
+    backend_type::buffer<std::uint32_t> buffer{backend, before};
     vp::framebuffer_view<target> fb{extent, {}};
-    vp::get<0>(fb.targets) = {memory.data() + 1, extent, vp::load_operation::clear, 0u};
-    vp::cpu_backend backend{2};
+    vp::get<0>(fb.targets) = {buffer.data() + 1, extent, vp::load_operation::clear, 0u};
     const vp::status s =
-        vp::voxelize(backend, mesh.view(), unit::unit_grid(extent), vp::passthrough{}, vp::constant(1u), fb);
+        vp::voxelize(backend, mesh.on(backend), unit::unit_grid(extent), vp::passthrough{}, vp::constant(1u), fb);
     ASSERT_TRUE(s.ok());
+    const auto memory = buffer.to_host(backend);
     std::uint64_t sum = 0;
     for (std::size_t i = 1; i <= n; ++i) sum += memory[i];
     EXPECT_EQ(sum, s.counts.fragments);
@@ -293,12 +302,12 @@ TEST(FramebufferView, WritesIntoMemoryOfTheCallers) {
 
 TEST(CountVoxels, CanBeSwitchedOffWithoutChangingAnything) {
     const unit::small_mesh mesh = unit::make_mesh(6, 80, extent);
-    vp::cpu_backend backend{2};
-    vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, blend::bit_or>> a{backend, extent}, b{backend, extent};
+    backend_type backend = unit::make_backend();
+    vp::framebuffer<backend_type, vp::target<vp::bit, blend::bit_or>> a{backend, extent}, b{backend, extent};
     const auto grid = unit::unit_grid(extent);
-    const auto with = vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, vp::constant(true), a,
+    const auto with = vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, vp::constant(true), a,
                                    {vp::coverage::conservative, true});
-    const auto without = vp::voxelize(backend, mesh.view(), grid, vp::passthrough{}, vp::constant(true), b,
+    const auto without = vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, vp::constant(true), b,
                                       {vp::coverage::conservative, false});
     EXPECT_TRUE(unit::same_bytes(vp::get<0>(a).to_host(backend), vp::get<0>(b).to_host(backend)));
     std::uint64_t bits = 0;

@@ -2,10 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Tile size and block size of the fine raster, from the bytes of shared memory that a voxel's targets need. Numbers
-// only. Results do not depend on them; a backend may be given another selector.
+// Tile size and block size of the fine raster, from the bits of shared memory that a voxel's targets need and from the
+// architecture. Numbers only. Results do not depend on them; a backend may be given another selector: a constexpr
+// functor (bits of a voxel, compute capability) -> policy, or (bits of a voxel) -> policy for all architectures.
+//
+// A policy is part of a kernel's type, so it is chosen at compile time for each architecture of the program's list, and
+// at run time among those by the device (with_policy). Architectures with equal policies share one kernel.
 
+#include <voxelpipe/tuning/architecture.hpp>
+
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 namespace voxelpipe::tuning {
 
@@ -13,22 +22,74 @@ struct fine_raster_policy {
     int threads_per_block; // a multiple of 32, at most 1024
     int log2_tile_size;    // 3, 4 or 5: a tile is a cube of 8, 16 or 32 voxels
     int min_blocks_per_sm; // what the registers have to leave room for
+
+    friend constexpr bool operator==(const fine_raster_policy&, const fine_raster_policy&) = default;
 };
 
-// Two blocks with tiles of 48 KB fit the shared memory of every architecture from sm_80 on (sm_86 and sm_89 have 100 KB
-// a multiprocessor, sm_80 164, sm_90 228); bits take 32^3 voxels in 4 KB.
-struct fine_raster_selector {
-    static constexpr int tile_bytes = 49 * 1024;
+// One row an architecture. Beside a row stands what it was measured on.
+struct fine_raster_numbers {
+    int capability;
+    int threads_per_block;
+    int min_blocks_per_sm;
+    int tile_bytes;    // the tile is the largest that needs no more than this
+    int blocks_per_sm; // persistent blocks that the host starts on a multiprocessor; 0: as many as fit
+};
 
-    constexpr fine_raster_policy operator()(int bits_per_voxel) const {
+inline constexpr std::array fine_raster_table{
+    fine_raster_numbers{80, 256, 2, 49 * 1024, 0},  // not measured
+    fine_raster_numbers{86, 256, 2, 49 * 1024, 0},  // not measured
+    fine_raster_numbers{89, 256, 2, 49 * 1024, 0},  // not measured
+    fine_raster_numbers{90, 256, 2, 49 * 1024, 0},  // NVIDIA H200: the records of bench/results; no other was tried
+    fine_raster_numbers{100, 256, 2, 49 * 1024, 0}, // not measured
+    fine_raster_numbers{120, 256, 2, 49 * 1024, 0}, // not measured
+};
+
+[[nodiscard]] constexpr const fine_raster_numbers& fine_raster_numbers_of(int capability) {
+    return fine_raster_table[last_not_above(fine_raster_table, capability)];
+}
+
+// Targets that need more than this together are drawn in several fine passes over the same tiles: 8^3 voxels of 190
+// bytes are 95 KB, which a block can have on every architecture beside 4 KB of its own.
+inline constexpr int most_bits_per_voxel = 190 * 8;
+static_assert(most_bits_per_voxel / 8 * 512 <= portable_shared_per_block() - 4 * 1024);
+
+struct fine_raster_selector {
+    constexpr fine_raster_policy operator()(int bits_per_voxel, int capability = architectures[0].capability) const {
+        const fine_raster_numbers& numbers = fine_raster_numbers_of(capability);
         int log2_size = 5;
-        while (log2_size > 3 && (std::int64_t{bits_per_voxel} << (3 * log2_size)) / 8 > tile_bytes) --log2_size;
-        return {256, log2_size, 2};
+        while (log2_size > 3 && (std::int64_t{bits_per_voxel} << (3 * log2_size)) / 8 > numbers.tile_bytes) --log2_size;
+        return {numbers.threads_per_block, log2_size, numbers.min_blocks_per_sm};
     }
 };
 
-// Targets that need more than this together are drawn in several fine passes over the same tiles: 8^3 voxels of 190
-// bytes are 95 KB, which a block can have on every architecture from sm_80 on.
-inline constexpr int most_bits_per_voxel = 190 * 8;
+// The policy that a selector gives, whichever arguments it takes.
+template <class Selector>
+[[nodiscard]] constexpr fine_raster_policy select_policy(int bits_per_voxel, int capability) {
+    if constexpr (std::is_invocable_v<const Selector&, int, int>)
+        return Selector{}(bits_per_voxel, capability);
+    else
+        return Selector{}(bits_per_voxel);
+}
+
+// Whether code of this architecture can be asked for a policy: false for the kernels that only another architecture of
+// the list uses, whose bodies may then be left empty.
+template <class Selector>
+[[nodiscard]] constexpr bool is_policy_of(const fine_raster_policy& policy, int bits_per_voxel, int capability) {
+    return policy == select_policy<Selector>(bits_per_voxel, capability);
+}
+
+// Calls f.template operator()<Policy>() with the policy for the code that a device of this compute capability runs. On
+// the host. I: entries of the list that are still to be looked at, from its end, less one.
+template <class Selector, int BitsPerVoxel, std::size_t I = compiled_architectures().size() - 1, class F>
+auto with_policy(int device_capability, const F& f) {
+    constexpr int capability = compiled_architectures()[I].capability;
+    constexpr fine_raster_policy policy = select_policy<Selector>(BitsPerVoxel, capability);
+    if constexpr (I == 0) {
+        return f.template operator()<policy>();
+    } else {
+        if (device_capability >= capability) return f.template operator()<policy>();
+        return with_policy<Selector, BitsPerVoxel, I - 1>(device_capability, f);
+    }
+}
 
 } // namespace voxelpipe::tuning

@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// The part of cuda_device.hpp that needs no CUDA: what the facts mean.
+#include "cuda_device.hpp"
+
+#include <algorithm>
+
+namespace voxelize {
+
+namespace {
+
+std::string version(int number) { return std::to_string(number / 1000) + '.' + std::to_string(number % 1000 / 10); }
+
+std::string mebibytes(std::uint64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; }
+
+// Never less than there is.
+std::string at_least_mebibytes(std::uint64_t bytes) { return mebibytes(bytes + (1 << 20) - 1); }
+
+template <class T>
+std::uint64_t bytes_of(const std::vector<T>& list) {
+    return list.size() * sizeof(T);
+}
+
+std::uint64_t bytes_of(const scene& model) {
+    std::uint64_t bytes = 0;
+    for (const primitive& part : model.primitives)
+        bytes += bytes_of(part.positions) + bytes_of(part.triangles) + bytes_of(part.texcoords) + bytes_of(part.colors);
+    for (const picture& image : model.images) bytes += bytes_of(image.rgba);
+    return bytes;
+}
+
+} // namespace
+
+std::string why_not(const cuda_facts& facts) {
+    if (!facts.built_in) return "this program was built without CUDA";
+    if (facts.driver == 0) return "there is no NVIDIA driver";
+    if (facts.driver_too_old)
+        return "the NVIDIA driver serves CUDA " + version(facts.driver) + " and this program needs CUDA " +
+               version(facts.runtime) + ", so the driver is too old";
+    if (!facts.error.empty()) return "CUDA says: " + facts.error;
+    if (facts.devices == 0) return "the NVIDIA driver finds no GPU";
+    if (!facts.has_kernel)
+        return "this program has no code for the " + facts.name + " (compute capability " +
+               std::to_string(facts.capability / 10) + '.' + std::to_string(facts.capability % 10) + "), only for " +
+               facts.architectures;
+    return {};
+}
+
+std::uint64_t default_work_memory(const cuda_facts& facts) {
+    return std::clamp<std::uint64_t>(facts.free_memory / 4, std::uint64_t{16} << 20, std::uint64_t{1} << 30);
+}
+
+std::string why_too_large(const cuda_facts& facts, const scene& model, const voxelize_request& request) {
+    std::uint64_t room = facts.free_memory;
+    if (request.device_memory != 0) room = std::min(room, request.device_memory);
+    // What the pipeline makes of a triangle comes on top; that is seen when it runs.
+    const std::uint64_t needed = bytes_of(model);
+    if (needed <= room) return {};
+    return "the model needs " + at_least_mebibytes(needed) + " of GPU memory, and of the " +
+           mebibytes(facts.total_memory) + " of the " + facts.name + ' ' + mebibytes(room) + " may be used";
+}
+
+} // namespace voxelize

@@ -1,0 +1,165 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// --backend cuda and auto where there is no GPU to use: what the program says, what it ends with, and that auto gives
+// the CPU's bytes. Machines that are not at hand are played by facts, and by driver libraries that the tests bring.
+#include "tool_runner.hpp"
+#include "tool_scenes.hpp"
+
+#include <cuda_device.hpp>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+
+namespace {
+
+using tool_test::outcome;
+using tool_test::read_file;
+using tool_test::run;
+using tool_test::scratch_folder;
+
+// A machine on which everything is as it should be.
+voxelize::cuda_facts good_facts() {
+    voxelize::cuda_facts facts;
+    facts.built_in = true;
+    facts.runtime = 13000;
+    facts.driver = 13010;
+    facts.devices = 1;
+    facts.name = "NVIDIA Test";
+    facts.capability = 90;
+    facts.has_kernel = true;
+    facts.free_memory = std::uint64_t{8} << 30;
+    facts.total_memory = std::uint64_t{10} << 30;
+    facts.architectures = "8.0, 9.0";
+    return facts;
+}
+
+TEST(CudaFacts, EveryReasonHasALineOfItsOwn) {
+    using voxelize::why_not;
+    EXPECT_EQ("", why_not(good_facts()));
+    EXPECT_EQ("this program was built without CUDA", why_not({}));
+    voxelize::cuda_facts facts = good_facts();
+    facts.driver = 0;
+    facts.devices = 0;
+    EXPECT_EQ("there is no NVIDIA driver", why_not(facts));
+    facts = good_facts();
+    facts.driver = 12040;
+    facts.driver_too_old = true;
+    EXPECT_EQ("the NVIDIA driver serves CUDA 12.4 and this program needs CUDA 13.0, so the driver is too old",
+              why_not(facts));
+    facts = good_facts();
+    facts.devices = 0;
+    facts.has_kernel = false;
+    EXPECT_EQ("the NVIDIA driver finds no GPU", why_not(facts));
+    facts = good_facts();
+    facts.capability = 75;
+    facts.has_kernel = false;
+    EXPECT_EQ("this program has no code for the NVIDIA Test (compute capability 7.5), only for 8.0, 9.0",
+              why_not(facts));
+    facts = good_facts();
+    facts.error = "unknown error";
+    EXPECT_EQ("CUDA says: unknown error", why_not(facts));
+}
+
+TEST(CudaFacts, AModelLargerThanTheGpusMemoryIsSeenBeforehand) {
+    voxelize::scene model;
+    model.primitives.resize(2);
+    model.primitives[1].positions.resize(100000); // 1.2 MB
+    model.images.resize(1);
+    model.images[0].rgba.resize(3 << 20);
+    voxelize::voxelize_request request;
+    voxelize::cuda_facts facts = good_facts();
+    EXPECT_EQ("", why_too_large(facts, model, request));
+    facts.free_memory = 4 << 20;
+    EXPECT_EQ("the model needs 5 MiB of GPU memory, and of the 10240 MiB of the NVIDIA Test 4 MiB may be used",
+              why_too_large(facts, model, request));
+    facts = good_facts();
+    request.device_memory = 2 << 20;
+    EXPECT_NE(std::string::npos, why_too_large(facts, model, request).find("NVIDIA Test 2 MiB may be used"));
+    request.device_memory = 5 << 20;
+    EXPECT_EQ("", why_too_large(facts, model, request));
+}
+
+TEST(CudaFacts, SlabsAreAQuarterOfTheFreeMemoryWithinBounds) {
+    voxelize::cuda_facts facts = good_facts();
+    EXPECT_EQ(std::uint64_t{1} << 30, default_work_memory(facts));
+    facts.free_memory = 400 << 20;
+    EXPECT_EQ(100U << 20, default_work_memory(facts));
+    facts.free_memory = 0;
+    EXPECT_EQ(16U << 20, default_work_memory(facts));
+}
+
+// The program with --backend cuda ends with 5 and one line that names the reason; auto does the CPU's work, without a
+// warning, and --stats gives the reason.
+void expect_no_cuda(const std::string& reason) {
+    const scratch_folder folder;
+    const std::string model = folder / "m.glb";
+    gltf_test::small_world().write_glb(model);
+    const std::vector<std::string> common{"-r", "20", "-q", "-t", "occupancy,color,triangle"};
+    const auto arguments = [&](const std::string& out, const std::string& backend) {
+        std::vector<std::string> list{model, "-o", out, "--backend", backend};
+        list.insert(list.end(), common.begin(), common.end());
+        return list;
+    };
+    const outcome cuda = run(folder, arguments(folder / "cuda.npz", "cuda"));
+    EXPECT_EQ(5, cuda.code);
+    EXPECT_EQ("", cuda.out);
+    EXPECT_EQ("voxelize: --backend cuda: " + reason + "; use --backend cpu\n", cuda.err);
+    EXPECT_FALSE(std::filesystem::exists(folder / "cuda.npz"));
+
+    ASSERT_EQ(0, run(folder, arguments(folder / "cpu.npz", "cpu")).code);
+    std::vector<std::string> list = arguments(folder / "auto.npz", "auto");
+    list.insert(list.end(), {"--stats", "json"});
+    const outcome automatic = run(folder, list);
+    ASSERT_EQ(0, automatic.code) << automatic.err;
+    EXPECT_EQ("", automatic.err);
+    const auto stats = nlohmann::json::parse(automatic.out);
+    EXPECT_EQ("cpu", stats["backend"]);
+    EXPECT_EQ(reason, stats["no_cuda"]);
+    EXPECT_FALSE(stats.contains("device"));
+    EXPECT_EQ(read_file(folder / "cpu.npz"), read_file(folder / "auto.npz"));
+
+    list.back() = "text";
+    EXPECT_NE(std::string::npos, run(folder, list).out.find("(not cuda: " + reason + ")\n"));
+}
+
+#if VOXELPIPE_TOOL_HAS_CUDA
+
+// Runs the rest of the test with this folder's libcuda.so.1 in place of a driver.
+class driver_from {
+public:
+    explicit driver_from(const char* folder) {
+        if (const char* before = std::getenv("LD_LIBRARY_PATH")) kept_ = before;
+        setenv("LD_LIBRARY_PATH", folder, 1);
+    }
+    ~driver_from() { setenv("LD_LIBRARY_PATH", kept_.c_str(), 1); }
+    driver_from(const driver_from&) = delete;
+    driver_from& operator=(const driver_from&) = delete;
+
+private:
+    std::string kept_;
+};
+
+TEST(CudaChoice, WithoutADriver) {
+    if (voxelize::look_for_cuda().driver != 0) GTEST_SKIP() << "there is a driver";
+    expect_no_cuda("there is no NVIDIA driver");
+}
+TEST(CudaChoice, WithADriverThatIsTooOld) {
+    const driver_from old(VOXELPIPE_OLD_DRIVER);
+    const int runtime = voxelize::look_for_cuda().runtime;
+    expect_no_cuda("the NVIDIA driver serves CUDA 10.1 and this program needs CUDA " + std::to_string(runtime / 1000) +
+                   '.' + std::to_string(runtime % 1000 / 10) + ", so the driver is too old");
+}
+TEST(CudaChoice, WithADriverThatFindsNoGpu) {
+    const driver_from idle(VOXELPIPE_IDLE_DRIVER);
+    expect_no_cuda("the NVIDIA driver finds no GPU");
+}
+
+#else
+
+TEST(CudaChoice, WithoutCudaInTheProgram) { expect_no_cuda("this program was built without CUDA"); }
+
+#endif
+
+} // namespace
