@@ -12,17 +12,24 @@
 
 namespace voxelpipe::cpu {
 
+// The same bytes; padding within a value, if it has any, may then say no.
+template <class... Ts>
+[[nodiscard]] bool same_values(const solid<Ts...>& a, const solid<Ts...>& b) {
+    bool same = true;
+    core::for_each_index<sizeof...(Ts)>([&]<std::size_t I>() {
+        const auto &x = get<I>(a.values), &y = get<I>(b.values);
+        // Equal bytes are equal values; where equal values differ in bytes, the draws are shaded one by one.
+        same = same && std::memcmp(&x, &y, sizeof(x)) == 0; // NOLINT(bugprone-suspicious-memory-comparison)
+    });
+    return same;
+}
+
 // Whether all draws give the same values; those that differ are shaded fragment by fragment.
 template <class Scene>
 [[nodiscard]] bool same_values(const Scene& s) {
-    using shader = typename Scene::fragment_shader;
-    if constexpr (std::is_empty_v<shader>) {
-        return true;
-    } else {
-        for (const auto& d : s.draws)
-            if (std::memcmp(&d.fragment_shader, &s.draws[0].fragment_shader, sizeof(shader)) != 0) return false;
-        return true;
-    }
+    for (const auto& d : s.draws)
+        if (!same_values(d.fragment_shader, s.draws[0].fragment_shader)) return false;
+    return true;
 }
 
 // Blends for which folding the same value a second time changes nothing.
