@@ -6,7 +6,7 @@
 // so a stable bucketing leaves each voxel's list sorted), and rows of voxels are then put in the order of the whole
 // grid. Memory is in proportion to the fragments: nothing is dense but one tile's counters per thread.
 
-#include <cpu_ref/pipeline.hpp>
+#include <cpu_ref/tile_fragments.hpp>
 
 #include <array>
 
@@ -47,7 +47,7 @@ struct abuffer_scratch {
 
 template <coverage Rule, class Payload, class Key, class Scene>
 void bucket_tile(const Scene& s, const core::tile_grid& tiles, const tile_range& range,
-                 const std::vector<tile_pair<Key>>& pairs, std::uint32_t worker, abuffer_scratch<Payload>& scratch) {
+                 const raw_array<tile_pair<Key>>& pairs, std::uint32_t worker, abuffer_scratch<Payload>& scratch) {
     static_assert(tile_voxels <= 65536);
     constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
     const core::voxel_box box = core::tile_box(tiles, range.tile, s.where.extent);
@@ -55,15 +55,15 @@ void bucket_tile(const Scene& s, const core::tile_grid& tiles, const tile_range&
     scratch.fragments.clear();
     for (std::size_t i = range.first; i < range.last; ++i) {
         const std::uint32_t id = pairs[i].primitive;
-        shade_fragments<Rule>(s, id, box, [&](int x, int y, int z, const auto& out) VOXELPIPE_INLINE_LAMBDA {
+        shade_in_tile<Rule>(s, id, box, [&](int x, int y, int z, const auto& out) VOXELPIPE_INLINE_LAMBDA {
             if (!out.keep) {
                 ++scratch.counts.fragments_discarded;
                 return;
             }
-            const int row = (z - z0) * tile_size + (y - y0), column = x - x0;
-            const auto voxel = static_cast<std::size_t>(row * tile_size + column);
+            const int row = y + tile_size * z;
+            const std::size_t voxel = tile_voxel(row, x);
             ++scratch.count[voxel];
-            scratch.touched[static_cast<std::size_t>(row)] |= 1u << column;
+            scratch.touched[static_cast<std::size_t>(row)] |= 1u << x;
             if constexpr (has_payload)
                 scratch.fragments.push_back({id, static_cast<std::uint16_t>(voxel), get<0>(out.values)});
             else
@@ -145,20 +145,19 @@ template <coverage Rule, class Key, class Scene, class Backend, class Payload>
     coarse.pairs = {};
 
     const stopwatch watch(how.times, &stage_times::abuffer_emit);
-    std::vector<row_segment> segments;
+    std::size_t num_segments = 0;
+    for (const auto& w : scratch) num_segments += w->segments.size();
+    raw_array<row_segment> segments(num_segments);
+    row_segment* next_segment = segments.begin();
     for (const auto& w : scratch) {
-        segments.insert(segments.end(), w->segments.begin(), w->segments.end());
+        next_segment = std::copy(w->segments.begin(), w->segments.end(), next_segment);
         w->segments = {};
         result.counts.fragments += w->counts.fragments;
         result.counts.fragments_discarded += w->counts.fragments_discarded;
     }
-    {
-        std::vector<row_segment> other;
-        const std::uint64_t keys = static_cast<std::uint64_t>(s.where.extent.z) *
-                                   static_cast<std::uint64_t>(s.where.extent.y) *
-                                   static_cast<std::uint64_t>(tiles.tiles.x);
-        radix_sort(how.threads, segments, other, static_cast<int>(std::bit_width(keys - 1)));
-    }
+    const std::uint64_t keys = static_cast<std::uint64_t>(s.where.extent.z) *
+                               static_cast<std::uint64_t>(s.where.extent.y) * static_cast<std::uint64_t>(tiles.tiles.x);
+    radix_sort(how.threads, segments, static_cast<int>(std::bit_width(keys - 1)));
     // Each segment's place in the result; the counts of the whole follow.
     struct place {
         std::uint64_t voxel, fragment;

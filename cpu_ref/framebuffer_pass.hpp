@@ -4,8 +4,9 @@
 
 // Fine raster into render targets: every tile's triangles in order, each fragment shaded and folded into its targets.
 // Blends that accumulate in their own format (reproducible sums) keep a tile of accumulators; all others work in place.
+// A shader that gives every fragment the same values takes the way of solid_tile.hpp.
 
-#include <cpu_ref/pipeline.hpp>
+#include <cpu_ref/solid_tile.hpp>
 
 #include <array>
 #include <atomic>
@@ -102,13 +103,13 @@ void raster_tile(const Scene& s, const core::voxel_box& box, const std::uint32_t
     for (std::size_t i = 0; i < count; ++i) {
         const std::uint32_t id =
             *reinterpret_cast<const std::uint32_t*>(reinterpret_cast<const std::byte*>(primitives) + i * stride);
-        shade_fragments<Rule>(s, id, box, [&](int x, int y, int z, const auto& out) VOXELPIPE_INLINE_LAMBDA {
+        shade_in_tile<Rule>(s, id, box, [&](int column, int j, int k, const auto& out) VOXELPIPE_INLINE_LAMBDA {
             if (!out.keep) {
                 ++discarded;
                 return;
             }
             ++fragments;
-            const int row = (z - z0) * tile_size + (y - y0), column = x - x0;
+            const int row = k * tile_size + j, x = x0 + column, y = y0 + j, z = z0 + k;
             bool first = false;
             if constexpr (Track) {
                 std::uint32_t& word = scratch.touched[static_cast<std::size_t>(row)];
@@ -122,8 +123,9 @@ void raster_tile(const Scene& s, const core::voxel_box& box, const std::uint32_t
                 if constexpr (works_in_place<target_type>) {
                     blend_in_place(t, x, y, z, get<I>(out.values));
                 } else {
-                    auto& sum = get<I>(scratch.sums)[static_cast<std::size_t>(row * tile_size + column)];
-                    if (first) sum = target_type::traits::begin(t(x, y, z));
+                    auto& sum = get<I>(scratch.sums)[tile_voxel(row, column)];
+                    if (first)
+                        sum = target_type::traits::begin(t.load == load_operation::clear ? t.clear_value : t(x, y, z));
                     target_type::traits::apply(sum, get<I>(out.values));
                 }
             });
@@ -161,6 +163,93 @@ void resolve_tile(const core::voxel_box& box, const framebuffer_view<Targets...>
     }
 }
 
+template <class... Targets>
+void clear_targets(const execution& how, const framebuffer_view<Targets...>& fb) {
+    const stopwatch watch(how.times, &stage_times::clear);
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        const auto& t = get<I>(fb.targets);
+        if (t.load == load_operation::clear) clear_target(how, t);
+    });
+}
+
+template <coverage Rule, class Key, class Scene, class... Targets>
+void raster_tiles(const execution& how, const Scene& s, const core::tile_grid& tiles,
+                  const std::vector<tile_range>& ranges, const raw_array<tile_pair<Key>>& pairs, unsigned workers,
+                  const framebuffer_view<Targets...>& fb, bool count_voxels, counters& counts) {
+    // All memory is there before the first voxel is written.
+    std::vector<std::unique_ptr<tile_scratch<Targets...>>> scratch;
+    for (unsigned w = 0; w < workers; ++w) {
+        scratch.push_back(std::make_unique<tile_scratch<Targets...>>());
+        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            using target_type = typename core::pack_element<I, Targets...>::type;
+            if constexpr (!works_in_place<target_type>)
+                if (get<I>(fb.targets).load != load_operation::off)
+                    get<I>(scratch.back()->sums) =
+                        std::make_unique_for_overwrite<typename target_type::traits::accumulator[]>(tile_voxels);
+        });
+    }
+    clear_targets(how, fb);
+    const stopwatch watch(how.times, &stage_times::fine_raster);
+    progress_meter meter(how, ranges.size());
+    parallel_for(how.threads, ranges.size(), [&](unsigned worker, std::size_t r) {
+        const tile_range& range = ranges[r];
+        const core::voxel_box box = core::tile_box(tiles, range.tile, s.where.extent);
+        const std::uint32_t* const primitives = &pairs[range.first].primitive;
+        const std::size_t count = range.last - range.first;
+        constexpr std::size_t stride = sizeof(tile_pair<Key>);
+        auto& mine = *scratch[worker];
+        if (count_voxels || !all_in_place<Targets...>) {
+            raster_tile<Rule, true>(s, box, primitives, stride, count, fb, mine);
+            resolve_tile(box, fb, mine);
+        } else if constexpr (all_in_place<Targets...>) {
+            raster_tile<Rule, false>(s, box, primitives, stride, count, fb, mine);
+        }
+        meter.advance();
+    });
+    for (const auto& w : scratch) {
+        counts.fragments += w->counts.fragments;
+        counts.fragments_discarded += w->counts.fragments_discarded;
+        counts.voxels += w->counts.voxels;
+    }
+}
+
+template <coverage Rule, class Key, class Scene, class... Targets>
+void raster_solid_tiles(const execution& how, const Scene& s, const core::tile_grid& tiles,
+                        const std::vector<tile_range>& ranges, const raw_array<tile_pair<Key>>& pairs, unsigned workers,
+                        const framebuffer_view<Targets...>& fb, counters& counts) {
+    bool repeats = false;
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        using target_type = typename core::pack_element<I, Targets...>::type;
+        if (!target_folds_once<target_type> && get<I>(fb.targets).load != load_operation::off) repeats = true;
+    });
+    std::vector<std::unique_ptr<solid_scratch>> scratch;
+    for (unsigned w = 0; w < workers; ++w) {
+        scratch.push_back(std::make_unique<solid_scratch>());
+        if (repeats) scratch.back()->repeats = std::make_unique<std::uint32_t[]>(tile_voxels);
+    }
+    clear_targets(how, fb);
+    const stopwatch watch(how.times, &stage_times::fine_raster);
+    progress_meter meter(how, ranges.size());
+    parallel_for(how.threads, ranges.size(), [&](unsigned worker, std::size_t r) {
+        const tile_range& range = ranges[r];
+        const core::voxel_box box = core::tile_box(tiles, range.tile, s.where.extent);
+        const std::uint32_t* const primitives = &pairs[range.first].primitive;
+        const std::size_t count = range.last - range.first;
+        constexpr std::size_t stride = sizeof(tile_pair<Key>);
+        auto& mine = *scratch[worker];
+        if (repeats)
+            cover_tile<Rule, true>(s, box, primitives, stride, count, mine);
+        else
+            cover_tile<Rule, false>(s, box, primitives, stride, count, mine);
+        resolve_solid_tile(box, fb, s.draws[0].fragment_shader.values, mine);
+        meter.advance();
+    });
+    for (const auto& w : scratch) {
+        counts.fragments += w->counts.fragments;
+        counts.voxels += w->counts.voxels;
+    }
+}
+
 template <coverage Rule, class Key, class Scene, class... Targets>
 [[nodiscard]] status draw_framebuffer(const execution& how, const Scene& s, const framebuffer_view<Targets...>& fb,
                                       bool count_voxels) {
@@ -175,49 +264,15 @@ template <coverage Rule, class Key, class Scene, class... Targets>
     }
     const std::vector<tile_range> ranges = tile_sort(how, coarse.pairs, tiles.count());
 
-    // All memory is there before the first voxel is written.
     const unsigned workers =
         static_cast<unsigned>(std::max<std::size_t>(1, std::min<std::size_t>(how.threads, ranges.size())));
-    std::vector<std::unique_ptr<tile_scratch<Targets...>>> scratch;
-    for (unsigned w = 0; w < workers; ++w) {
-        scratch.push_back(std::make_unique<tile_scratch<Targets...>>());
-        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-            using target_type = typename core::pack_element<I, Targets...>::type;
-            if constexpr (!works_in_place<target_type>)
-                if (get<I>(fb.targets).load != load_operation::off)
-                    get<I>(scratch.back()->sums) =
-                        std::make_unique_for_overwrite<typename target_type::traits::accumulator[]>(tile_voxels);
-        });
+    bool solid = false;
+    if constexpr (core::is_solid<typename Scene::fragment_shader>) {
+        solid = same_values(s);
+        if (solid) raster_solid_tiles<Rule>(how, s, tiles, ranges, coarse.pairs, workers, fb, result.counts);
     }
-    {
-        const stopwatch watch(how.times, &stage_times::clear);
-        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-            const auto& t = get<I>(fb.targets);
-            if (t.load == load_operation::clear) clear_target(how, t);
-        });
-    }
-    const stopwatch watch(how.times, &stage_times::fine_raster);
-    progress_meter meter(how, ranges.size());
-    parallel_for(how.threads, ranges.size(), [&](unsigned worker, std::size_t r) {
-        const tile_range& range = ranges[r];
-        const core::voxel_box box = core::tile_box(tiles, range.tile, s.where.extent);
-        const std::uint32_t* const primitives = &coarse.pairs[range.first].primitive;
-        const std::size_t count = range.last - range.first;
-        constexpr std::size_t stride = sizeof(tile_pair<Key>);
-        auto& mine = *scratch[worker];
-        if (count_voxels || !all_in_place<Targets...>) {
-            raster_tile<Rule, true>(s, box, primitives, stride, count, fb, mine);
-            resolve_tile(box, fb, mine);
-        } else if constexpr (all_in_place<Targets...>) {
-            raster_tile<Rule, false>(s, box, primitives, stride, count, fb, mine);
-        }
-        meter.advance();
-    });
-    for (const auto& w : scratch) {
-        result.counts.fragments += w->counts.fragments;
-        result.counts.fragments_discarded += w->counts.fragments_discarded;
-        if (count_voxels) result.counts.voxels += w->counts.voxels;
-    }
+    if (!solid) raster_tiles<Rule>(how, s, tiles, ranges, coarse.pairs, workers, fb, count_voxels, result.counts);
+    if (!count_voxels) result.counts.voxels = 0;
     return result;
 }
 

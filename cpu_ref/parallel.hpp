@@ -10,9 +10,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace voxelpipe::cpu {
@@ -52,9 +54,29 @@ void parallel_for(unsigned num_threads, std::size_t num_items, Work&& work) {
     if (error) std::rethrow_exception(error);
 }
 
-// Sorts items by the lowest key_bits bits of item.key, stably. `scratch` is resized to match and left unspecified.
+// A fixed number of values that start uninitialised: they are all written, by several threads, before they are read.
+template <class T>
+class raw_array {
+public:
+    raw_array() = default;
+    explicit raw_array(std::size_t size) : data_(std::make_unique_for_overwrite<T[]>(size)), size_(size) {}
+
+    [[nodiscard]] T* begin() { return data_.get(); }
+    [[nodiscard]] T* end() { return data_.get() + size_; }
+    [[nodiscard]] const T* begin() const { return data_.get(); }
+    [[nodiscard]] const T* end() const { return data_.get() + size_; }
+    [[nodiscard]] T& operator[](std::size_t i) { return data_[i]; }
+    [[nodiscard]] const T& operator[](std::size_t i) const { return data_[i]; }
+    [[nodiscard]] std::size_t size() const { return size_; }
+
+private:
+    std::unique_ptr<T[]> data_;
+    std::size_t size_ = 0;
+};
+
+// Sorts items by the lowest key_bits bits of item.key, stably.
 template <class Item>
-void radix_sort(unsigned num_threads, std::vector<Item>& items, std::vector<Item>& scratch, int key_bits) {
+void radix_sort(unsigned num_threads, raw_array<Item>& items, int key_bits) {
     constexpr int max_digit_bits = 13; // 32 KB of counters: one pass up to 8192 keys, cache-friendly scatter beyond
     if (key_bits <= 0 || items.size() < 2) return;
     const int passes = (key_bits + max_digit_bits - 1) / max_digit_bits;
@@ -63,7 +85,7 @@ void radix_sort(unsigned num_threads, std::vector<Item>& items, std::vector<Item
     const std::size_t blocks = items.size() < 65536 ? 1 : std::max(1u, num_threads);
     const std::size_t block_size = (items.size() + blocks - 1) / blocks;
     std::vector<std::size_t> counts(blocks * num_digits);
-    scratch.resize(items.size());
+    raw_array<Item> scratch(items.size());
     for (int pass = 0; pass < passes; ++pass) {
         const int shift = pass * digit_bits;
         const auto digit = [&](const Item& i) {
@@ -87,7 +109,7 @@ void radix_sort(unsigned num_threads, std::vector<Item>& items, std::vector<Item
             const std::size_t last = std::min(items.size(), (b + 1) * block_size);
             for (std::size_t i = b * block_size; i < last; ++i) scratch[c[digit(items[i])]++] = items[i];
         });
-        items.swap(scratch);
+        std::swap(items, scratch);
     }
 }
 

@@ -63,6 +63,11 @@ inline constexpr int tile_size = 1 << log2_tile_size;
 inline constexpr std::size_t tile_rows = std::size_t{tile_size} * tile_size;
 inline constexpr std::size_t tile_voxels = tile_rows * tile_size;
 
+// The number of a voxel within its tile; a row is y + tile_size * z.
+[[nodiscard]] constexpr std::size_t tile_voxel(int row, int x) {
+    return static_cast<std::size_t>(row) * tile_size + static_cast<std::size_t>(x);
+}
+
 // ---- vertex shade
 // ----------------------------------------------------------------------------------------------------
 
@@ -111,6 +116,7 @@ template <class Mesh, class VertexShader, class FragmentShader>
 template <class Mesh, class VertexShader, class FragmentShader>
 struct scene {
     using varyings = draw_varyings<Mesh, VertexShader, FragmentShader>;
+    using fragment_shader = FragmentShader;
 
     std::span<const draw<Mesh, VertexShader, FragmentShader>> draws;
     std::vector<shaded_vertices<varyings>> vertices; // per draw
@@ -165,11 +171,37 @@ struct tile_pair {
     std::uint32_t primitive;
 };
 
+// The pairs of one block of triangles, as they come.
+template <class Key>
+class pair_list {
+public:
+    pair_list() = default;
+    explicit pair_list(std::size_t capacity)
+        : pairs_(std::make_unique_for_overwrite<tile_pair<Key>[]>(capacity)), capacity_(capacity) {}
+    VOXELPIPE_INLINE void push(Key tile, std::uint32_t primitive) {
+        if (size_ == capacity_) grow();
+        pairs_[size_++] = {tile, primitive};
+    }
+    [[nodiscard]] const tile_pair<Key>* begin() const { return pairs_.get(); }
+    [[nodiscard]] const tile_pair<Key>* end() const { return pairs_.get() + size_; }
+    [[nodiscard]] std::size_t size() const { return size_; }
+
+private:
+    void grow() {
+        auto larger = std::make_unique_for_overwrite<tile_pair<Key>[]>(2 * capacity_);
+        std::copy(begin(), end(), larger.get());
+        pairs_ = std::move(larger);
+        capacity_ *= 2;
+    }
+    std::unique_ptr<tile_pair<Key>[]> pairs_;
+    std::size_t size_ = 0, capacity_ = 0;
+};
+
 template <class Key>
 struct coarse_result {
     status_code code = status_code::ok;
     counters counts{};
-    std::vector<tile_pair<Key>> pairs; // by ascending primitive
+    raw_array<tile_pair<Key>> pairs; // by ascending primitive
 };
 
 template <coverage Rule, class Key, class Scene>
@@ -179,10 +211,16 @@ template <coverage Rule, class Key, class Scene>
     const std::size_t n = s.first_primitive.back();
     const std::size_t blocks = (n + block - 1) / block;
     const core::voxel_box whole = s.whole_box();
-    std::vector<coarse_result<Key>> parts(blocks);
+    struct block_result {
+        status_code code = status_code::ok;
+        counters counts{};
+        pair_list<Key> pairs;
+    };
+    std::vector<block_result> parts(blocks);
     parallel_for(how.threads, blocks, [&](unsigned, std::size_t b) {
-        coarse_result<Key>& part = parts[b];
-        part.pairs.reserve(block + block / 4);
+        block_result& part = parts[b];
+        pair_list<Key> pairs(block + block / 4);
+        counters counts{};
         const std::size_t last = std::min(n, (b + 1) * block);
         for (std::size_t i = b * block; i < last; ++i) {
             const auto id = static_cast<std::uint32_t>(i);
@@ -200,31 +238,32 @@ template <coverage Rule, class Key, class Scene>
                 kind = core::triangle_class::zero_area;
             switch (kind) {
             case core::triangle_class::nonfinite:
-                ++part.counts.triangles_nonfinite;
+                ++counts.triangles_nonfinite;
                 break;
             case core::triangle_class::too_far:
-                ++part.counts.triangles_too_far;
+                ++counts.triangles_too_far;
                 break;
             case core::triangle_class::zero_area:
-                ++part.counts.triangles_zero_area;
+                ++counts.triangles_zero_area;
                 break;
             case core::triangle_class::outside:
-                ++part.counts.triangles_outside;
+                ++counts.triangles_outside;
                 break;
             case core::triangle_class::drawn:
-                ++part.counts.triangles_drawn;
-                core::for_each_tile<Rule>(a, b_, c, s.snap.fraction, reach, tiles, [&](std::uint64_t tile) {
-                    part.pairs.push_back({static_cast<Key>(tile), id});
-                });
+                ++counts.triangles_drawn;
+                core::for_each_tile<Rule>(a, b_, c, s.snap.fraction, reach, tiles,
+                                          [&](std::uint64_t tile) { pairs.push(static_cast<Key>(tile), id); });
                 break;
             }
         }
+        part.pairs = std::move(pairs);
+        part.counts = counts;
     });
 
     coarse_result<Key> all;
     std::vector<std::size_t> first(blocks + 1, 0);
     for (std::size_t b = 0; b < blocks; ++b) {
-        const coarse_result<Key>& part = parts[b];
+        const block_result& part = parts[b];
         if (part.code != status_code::ok) {
             all.code = part.code;
             return all;
@@ -237,10 +276,9 @@ template <coverage Rule, class Key, class Scene>
         first[b + 1] = first[b] + part.pairs.size();
     }
     all.counts.triangles_in = n;
-    all.pairs.resize(first[blocks]);
+    all.pairs = raw_array<tile_pair<Key>>(first[blocks]);
     parallel_for(how.threads, blocks, [&](unsigned, std::size_t b) {
-        std::copy(parts[b].pairs.begin(), parts[b].pairs.end(),
-                  all.pairs.begin() + static_cast<std::ptrdiff_t>(first[b]));
+        std::copy(parts[b].pairs.begin(), parts[b].pairs.end(), all.pairs.begin() + first[b]);
         parts[b].pairs = {};
     });
     return all;
@@ -256,13 +294,10 @@ struct tile_range {
 };
 
 template <class Key>
-[[nodiscard]] std::vector<tile_range> tile_sort(const execution& how, std::vector<tile_pair<Key>>& pairs,
+[[nodiscard]] std::vector<tile_range> tile_sort(const execution& how, raw_array<tile_pair<Key>>& pairs,
                                                 std::uint64_t num_tiles) {
     const stopwatch watch(how.times, &stage_times::tile_sort);
-    {
-        std::vector<tile_pair<Key>> scratch;
-        radix_sort(how.threads, pairs, scratch, static_cast<int>(std::bit_width(num_tiles - 1)));
-    }
+    radix_sort(how.threads, pairs, static_cast<int>(std::bit_width(num_tiles - 1)));
     std::vector<tile_range> ranges;
     for (std::size_t i = 0; i < pairs.size();) {
         std::size_t j = i + 1;
@@ -315,19 +350,6 @@ VOXELPIPE_INLINE void shade_fragments(const Scene& s, std::uint32_t id, const co
                 }
             });
     };
-    using shader = std::remove_cvref_t<decltype(d.fragment_shader)>;
-    if constexpr (Rule == coverage::conservative && core::is_solid<shader>) {
-        // A shader that reads nothing needs no setup where coverage is plain from the bounding box.
-        const core::voxel_box all = core::bounds(a, b, c, s.snap.fraction);
-        if (core::is_line_of_voxels(all)) {
-            const core::voxel_box here = core::intersect(all, box);
-            for (auto z = static_cast<int>(here.lo[2]); z <= static_cast<int>(here.hi[2]); ++z)
-                for (auto y = static_cast<int>(here.lo[1]); y <= static_cast<int>(here.hi[1]); ++y)
-                    for (auto x = static_cast<int>(here.lo[0]); x <= static_cast<int>(here.hi[0]); ++x)
-                        visit(x, y, z, d.fragment_shader(f));
-            return;
-        }
-    }
     constexpr auto rule = core::to_rule(Rule);
     if (core::fits_narrow(a, b, c, s.snap.fraction))
         run(core::setup_triangle<rule, std::int64_t>(a, b, c, s.snap.fraction));

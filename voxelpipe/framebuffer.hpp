@@ -89,7 +89,7 @@ struct host_target {
 template <class Target>
 [[nodiscard]] constexpr bool fits_memory(glm::ivec3 extent) {
     if (extent.x <= 0 || extent.y <= 0 || extent.z <= 0) return true;
-    const auto round_up = [](int n) { return static_cast<uint128>((static_cast<std::uint64_t>(n) + 31) / 32 * 32); };
+    const auto round_up = [](int n) { return (static_cast<uint128>(n) + 31) / 32 * 32; };
     const uint128 bytes =
         round_up(extent.x) * round_up(extent.y) * round_up(extent.z) * sizeof(typename Target::value_type);
     return bytes <= static_cast<uint128>(std::numeric_limits<std::ptrdiff_t>::max());

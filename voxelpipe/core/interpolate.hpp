@@ -139,8 +139,9 @@ struct all_allowed<pack<Ms*...>> : std::bool_constant<(member_traits<Ms>::allowe
 
 template <class V>
 consteval bool is_varyings() {
+    // Two conditions: the second must not be asked of what is no aggregate.
     if constexpr (!std::is_aggregate_v<V> || !std::is_trivially_copyable_v<V>)
-        return false;
+        return false; // NOLINT(bugprone-branch-clone)
     else if constexpr (num_members<V>() > max_varyings_members)
         return false;
     else

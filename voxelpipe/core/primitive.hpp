@@ -28,9 +28,10 @@ enum class triangle_class : std::uint8_t { drawn, nonfinite, too_far, zero_area,
 
 // Whether a triangle is drawn, and if not why. `reach` receives the voxels that it may touch, cut to the grid.
 template <coverage Rule>
-[[nodiscard]] VOXELPIPE_HD inline triangle_class classify(const snapped_position& a, const snapped_position& b,
-                                                          const snapped_position& c, int fraction,
-                                                          const voxel_box& whole, voxel_box& reach) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE triangle_class classify(const snapped_position& a,
+                                                                    const snapped_position& b,
+                                                                    const snapped_position& c, int fraction,
+                                                                    const voxel_box& whole, voxel_box& reach) {
     if (!is_drawable(a) || !is_drawable(b) || !is_drawable(c)) {
         const bool nonfinite = a.x == nonfinite_mark || b.x == nonfinite_mark || c.x == nonfinite_mark;
         return nonfinite ? triangle_class::nonfinite : triangle_class::too_far;
@@ -59,7 +60,7 @@ template <coverage Rule>
 }
 
 // A box of voxels in units of 2^log2_size voxels.
-[[nodiscard]] VOXELPIPE_HD constexpr voxel_box coarsen(const voxel_box& box, int log2_size) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr voxel_box coarsen(const voxel_box& box, int log2_size) {
     voxel_box r{};
     for (int i = 0; i < 3; ++i) {
         r.lo[i] = box.lo[i] >> log2_size;
@@ -84,15 +85,26 @@ VOXELPIPE_HD void for_each_tile_in(const snapped_position& a, const snapped_posi
                     });
 }
 
-// The same for all of the triangle's `reach` (voxels); one that lies in one tile needs no test.
+// The same for all of the triangle's `reach` (voxels). One that lies in one tile needs no test, nor does one whose
+// bounding box is a line of tiles (is_line_of_voxels). Inlined, because most triangles do lie in one tile.
 template <coverage Rule, class Emit>
-VOXELPIPE_HD void for_each_tile(const snapped_position& a, const snapped_position& b, const snapped_position& c,
-                                int fraction, const voxel_box& reach, const tile_grid& tiles, Emit&& emit) {
+VOXELPIPE_HD VOXELPIPE_INLINE void for_each_tile(const snapped_position& a, const snapped_position& b,
+                                                 const snapped_position& c, int fraction, const voxel_box& reach,
+                                                 const tile_grid& tiles, Emit&& emit) {
     const voxel_box box = coarsen(reach, tiles.log2_size);
-    if (box.lo[0] == box.hi[0] && box.lo[1] == box.hi[1] && box.lo[2] == box.hi[2])
+    if (box.lo[0] == box.hi[0] && box.lo[1] == box.hi[1] && box.lo[2] == box.hi[2]) {
         emit(tiles.index(box.lo[0], box.lo[1], box.lo[2]));
-    else
-        for_each_tile_in<Rule>(a, b, c, fraction, box, tiles, emit);
+        return;
+    }
+    if constexpr (Rule == coverage::conservative) {
+        if (is_line_of_voxels(bounds(a, b, c, fraction + tiles.log2_size))) {
+            for (std::int64_t z = box.lo[2]; z <= box.hi[2]; ++z)
+                for (std::int64_t y = box.lo[1]; y <= box.hi[1]; ++y)
+                    for (std::int64_t x = box.lo[0]; x <= box.hi[0]; ++x) emit(tiles.index(x, y, z));
+            return;
+        }
+    }
+    for_each_tile_in<Rule>(a, b, c, fraction, box, tiles, emit);
 }
 
 // The voxels of a tile, cut to the extent.

@@ -1,0 +1,156 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Tiles of a scene whose shader gives every fragment the same values: only which voxels are covered matters, and for
+// blends where a repetition counts, how often. A tile's coverage is gathered in one bit (and one number) a voxel, and
+// the targets are touched once a voxel at its end, with as many folds as there were fragments.
+
+#include <cpu_ref/tile_fragments.hpp>
+
+#include <array>
+
+namespace voxelpipe::cpu {
+
+// The same bytes; padding within a value, if it has any, may then say no.
+template <class... Ts>
+[[nodiscard]] bool same_values(const solid<Ts...>& a, const solid<Ts...>& b) {
+    bool same = true;
+    core::for_each_index<sizeof...(Ts)>([&]<std::size_t I>() {
+        const auto &x = get<I>(a.values), &y = get<I>(b.values);
+        // Equal bytes are equal values; where equal values differ in bytes, the draws are shaded one by one.
+        same = same && std::memcmp(&x, &y, sizeof(x)) == 0; // NOLINT(bugprone-suspicious-memory-comparison)
+    });
+    return same;
+}
+
+// Whether all draws give the same values; those that differ are shaded fragment by fragment.
+template <class Scene>
+[[nodiscard]] bool same_values(const Scene& s) {
+    for (const auto& d : s.draws)
+        if (!same_values(d.fragment_shader, s.draws[0].fragment_shader)) return false;
+    return true;
+}
+
+// Blends for which folding the same value a second time changes nothing.
+template <class Blend, class T>
+inline constexpr bool folds_once = std::is_same_v<Blend, blend::replace> || std::is_same_v<Blend, blend::min> ||
+                                   std::is_same_v<Blend, blend::max> || std::is_same_v<Blend, blend::bit_and> ||
+                                   std::is_same_v<Blend, blend::bit_or> ||
+                                   (std::is_same_v<Blend, blend::add_saturate> && std::is_same_v<T, bool>);
+
+template <class Target>
+inline constexpr bool target_folds_once = folds_once<typename Target::blend_type, typename Target::value_type>;
+
+// What one thread keeps for the tile that it is at.
+struct solid_scratch {
+    std::array<std::uint32_t, tile_rows> touched{};
+    std::unique_ptr<std::uint32_t[]> repeats; // fragments of each voxel; where a target needs them
+    counters counts{};
+};
+
+template <coverage Rule, bool Repeats, class Scene>
+void cover_tile(const Scene& s, const core::voxel_box& tile, const std::uint32_t* primitives, std::size_t stride,
+                std::size_t count, solid_scratch& scratch) {
+    std::uint32_t* const touched = scratch.touched.data();
+    [[maybe_unused]] std::uint32_t* const repeats = scratch.repeats.get();
+    std::uint64_t fragments = 0;
+    const auto along_x = [&](int row, std::uint32_t bits) VOXELPIPE_INLINE_LAMBDA {
+        touched[row] |= bits;
+        const int width = interval_width(bits);
+        fragments += static_cast<unsigned>(width);
+        if constexpr (Repeats) {
+            std::uint32_t* const r = repeats + tile_voxel(row, std::countr_zero(bits));
+            for (int i = 0; i < width; ++i) ++r[i];
+        }
+    };
+    const auto across = [&](int row, int step, int x, std::uint32_t bits) VOXELPIPE_INLINE_LAMBDA {
+        const int width = interval_width(bits);
+        fragments += static_cast<unsigned>(width);
+        int at = row + std::countr_zero(bits) * step;
+        for (int i = 0; i < width; ++i, at += step) {
+            touched[at] |= 1u << x;
+            if constexpr (Repeats) ++repeats[tile_voxel(at, x)];
+        }
+    };
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t id =
+            *reinterpret_cast<const std::uint32_t*>(reinterpret_cast<const std::byte*>(primitives) + i * stride);
+        cover_in_tile<Rule>(gathered_triangle<Scene>(s, id), s.snap.fraction, tile, along_x, across);
+    }
+    scratch.counts.fragments += fragments;
+}
+
+template <class Target>
+void resolve_solid_target(const core::voxel_box& tile, const target_view<Target>& t,
+                          const typename Target::value_type& value, const solid_scratch& scratch) {
+    using map = typename Target::map;
+    using traits = typename Target::traits;
+    const auto x0 = static_cast<int>(tile.lo[0]), y0 = static_cast<int>(tile.lo[1]), z0 = static_cast<int>(tile.lo[2]);
+    [[maybe_unused]] std::uint32_t from_zero = 0, from_one = 0;
+    if constexpr (map::is_bit && target_folds_once<Target>) {
+        // A row of a tile is a word of the target: what becomes of a 0 and of a 1 goes for all its voxels at once.
+        const auto folded = [&](bool stored) {
+            auto a = traits::begin(stored);
+            traits::apply(a, value);
+            return traits::end(a) ? ~0u : 0u;
+        };
+        from_zero = folded(false);
+        from_one = folded(true);
+    }
+    const auto fold = [&](const typename Target::value_type& stored, std::uint32_t n) {
+        auto a = traits::begin(stored);
+        for (std::uint32_t i = 0; i < n; ++i) traits::apply(a, value);
+        return traits::end(a);
+    };
+    // A target that was cleared needs not be read, and has few different results.
+    constexpr std::uint32_t num_known = target_folds_once<Target> ? 2 : 16;
+    [[maybe_unused]] std::array<typename Target::value_type, num_known> known{};
+    [[maybe_unused]] std::uint32_t known_end = 0;
+    [[maybe_unused]] const auto onto_clear = [&](std::uint32_t n) {
+        if (n >= num_known) return fold(t.clear_value, n);
+        for (; known_end <= n; ++known_end) known[known_end] = fold(t.clear_value, known_end);
+        return known[n];
+    };
+    for (std::size_t row = 0; row < tile_rows; ++row) {
+        std::uint32_t word = scratch.touched[row];
+        if (word == 0) continue;
+        const int y = y0 + static_cast<int>(row) % tile_size, z = z0 + static_cast<int>(row) / tile_size;
+        if constexpr (map::is_bit && target_folds_once<Target>) {
+            std::uint32_t& stored = t.elements[map::cell(t.extent, x0, y, z)];
+            stored = (stored & ~word) | (word & ((stored & from_one) | (~stored & from_zero)));
+        } else {
+            for (; word != 0; word &= word - 1) {
+                const int column = std::countr_zero(word), x = x0 + column;
+                const std::uint32_t n =
+                    target_folds_once<Target> ? 1 : scratch.repeats[row * tile_size + static_cast<std::size_t>(column)];
+                t.store(x, y, z, t.load == load_operation::clear ? onto_clear(n) : fold(t(x, y, z), n));
+            }
+        }
+    }
+}
+
+// Ends the tile: the targets get their values, voxels are counted, the marks are wiped.
+template <class Values, class... Targets>
+void resolve_solid_tile(const core::voxel_box& tile, const framebuffer_view<Targets...>& fb, const Values& values,
+                        solid_scratch& scratch) {
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        const auto& t = get<I>(fb.targets);
+        using target_type = typename core::pack_element<I, Targets...>::type;
+        // A count target ignores the value, whatever its type.
+        typename target_type::value_type value{};
+        if constexpr (!std::is_same_v<typename target_type::blend_type, blend::count>) value = get<I>(values);
+        if (t.load != load_operation::off) resolve_solid_target<target_type>(tile, t, value, scratch);
+    });
+    for (std::size_t row = 0; row < tile_rows; ++row) {
+        std::uint32_t word = scratch.touched[row];
+        if (word == 0) continue;
+        scratch.touched[row] = 0;
+        scratch.counts.voxels += static_cast<unsigned>(std::popcount(word));
+        if (scratch.repeats != nullptr)
+            for (; word != 0; word &= word - 1)
+                scratch.repeats[row * tile_size + static_cast<std::size_t>(std::countr_zero(word))] = 0;
+    }
+}
+
+} // namespace voxelpipe::cpu
