@@ -43,8 +43,9 @@ void check_bijection() {
             } else if constexpr (map::components > 1) {
                 typename map::value v;
                 for (int c = 0; c < map::components; ++c)
+                    // Small enough for every element type.
                     v[c] = static_cast<typename vp::core::vector_traits<T>::element>(
-                        static_cast<float>(i * 4 + static_cast<std::uint32_t>(c)));
+                        static_cast<float>((i * 4 + static_cast<std::uint32_t>(c)) % 251));
                 return v;
             } else {
                 return static_cast<typename map::value>(i + 1);

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include <ctime>
 #include <filesystem>
 
 using gltf_test::builder;
@@ -278,7 +278,7 @@ TEST(GltfMalformed, LostGeometryIsAnErrorByName) {
 
 // A few hundred bytes that ask for gigabytes: refused at once.
 TEST(GltfMalformed, BombsAreRefusedBeforeMemoryIsTaken) {
-    const auto start = std::chrono::steady_clock::now();
+    const std::clock_t start = std::clock(); // of the processor: other work on the machine does not count
     const std::string zeros = after([](json& root, json&) {
         root["accessors"][0].erase("bufferView");
         root["accessors"][0]["count"] = 4294967295;
@@ -295,7 +295,7 @@ TEST(GltfMalformed, BombsAreRefusedBeforeMemoryIsTaken) {
     for (int i = 0; i < 400000; ++i) many["materials"].push_back(json::object());
     const std::string objects = error_of(many.dump());
     EXPECT_NE(std::string::npos, objects.find("MiB")) << objects;
-    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+    EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 60.0);
 }
 
 TEST(GltfMalformed, PicturesLargerThanTheirBytesAreRefused) {

@@ -73,10 +73,11 @@ using word = std::uint32_t;
 
 inline constexpr int raster_threads = 128;
 inline constexpr int raster_min_blocks = 5; // per multiprocessor: registers for that many
-inline constexpr int most_side = 8;         // a bounding box of so many voxels a side is one thread's work
+inline constexpr int most_side = 8;         // a bounding box of so many voxels a side has rows of a byte
+inline constexpr int most_cells = 512;      // one of so many voxels is one thread's work
 inline constexpr int small_cells = 27;      // one of so many voxels waits apart from the larger ones
 inline constexpr int small_columns = 12;    // the same for thin coverage, in columns of voxels
-inline constexpr int most_columns = 64;     // thin: one thread's work
+inline constexpr int most_columns = 96;     // thin: one thread's work
 inline constexpr int medium_lanes = 8;      // of a warp, for one larger triangle
 inline constexpr int most_medium_side = 16; // of its bounding box, in voxels
 
@@ -307,7 +308,7 @@ struct raster_warp {
             const auto emit = [&](int y, int z, word bits)
                                   VOXELPIPE_INLINE_LAMBDA { sink.row(lo[0] + box.lo[0], lo[1] + y, lo[2] + z, bits); };
             const int most = core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) + 1;
-            if (Sink::takes_mediums || most <= most_side)
+            if (most <= most_side)
                 s.rows(box, emit);
             else
                 s.long_rows(box, emit);
@@ -359,7 +360,8 @@ struct raster_warp {
                     is_quad = most <= 2 && core::min3(r.cells[0], r.cells[1], r.cells[2]) == 1;
                     to_cubes = !is_quad && most == 2;
                     to_smalls = most > 2 && most <= most_side && r.cells[0] * r.cells[1] * r.cells[2] <= small_cells;
-                    to_larges = most > 2 && !to_smalls && (!Sink::takes_mediums || most <= most_side);
+                    to_larges = most > 2 && !to_smalls &&
+                                (!Sink::takes_mediums || r.cells[0] * r.cells[1] * r.cells[2] <= most_cells);
                 }
                 to_mediums = !(is_quad || to_cubes || to_smalls || to_larges);
                 if (thin && to_mediums) { // a small one finds out when it is drawn
