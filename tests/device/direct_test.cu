@@ -1,0 +1,151 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Constant shaders, which are drawn without tiles where every target takes a fragment by one atomic: every such target
+// against cpu_backend, byte for byte, and the border between this way and the tiles.
+
+#include "device_test.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace {
+
+using namespace device_test;
+namespace blend = voxelpipe::blend;
+
+// Cleared and loaded, with and without the voxel counter, a grid that cuts triangles off at every side.
+template <class... Targets, class... Values>
+void compare_constants(Values... values) {
+    for (const vp::coverage rule : both_rules) {
+        const mesh_data m = mixed_triangles(3000, 60.0f, 81);
+        expect_same<Targets...>(m, box_grid({60, 47, 71}), vp::passthrough{}, vp::constant(values...), rule);
+        expect_same<Targets...>(m, box_grid({97, 9, 31}), vp::passthrough{}, vp::constant(values...),
+                                vp::voxelize_options{rule, false}, start::load);
+        expect_same<Targets...>(mixed_triangles(200, 1.0f, 82), box_grid({1, 1, 1}), vp::passthrough{},
+                                vp::constant(values...), rule);
+    }
+}
+
+template <class T>
+void compare_integers(T value) {
+    compare_constants<vp::target<T, blend::add>, vp::target<T, blend::min>, vp::target<T, blend::max>,
+                      vp::target<T, blend::bit_and>, vp::target<T, blend::bit_or>, vp::target<T, blend::bit_xor>,
+                      vp::target<T, blend::count>>(value, value, value, value, value, value, value);
+}
+
+TEST(Direct, Unsigned32) { compare_integers<std::uint32_t>(0x9234567u); }
+TEST(Direct, Signed32) { compare_integers<std::int32_t>(-7654321); }
+TEST(Direct, Unsigned64) { compare_integers<std::uint64_t>(0x923456789abcdef1u); }
+TEST(Direct, Signed64) { compare_integers<std::int64_t>(-765432123456789); }
+
+TEST(Direct, Bits) {
+    using vp::layout::tiled;
+    for (const bool value : {false, true}) {
+        compare_constants<vp::target<vp::bit, blend::bit_or>, vp::target<vp::bit, blend::bit_and>,
+                          vp::target<vp::bit, blend::bit_xor>, vp::target<vp::bit, blend::count>>(value, value, value,
+                                                                                                  value);
+        compare_constants<vp::target<vp::bit, blend::bit_or, tiled>, vp::target<vp::bit, blend::min, tiled>,
+                          vp::target<std::uint32_t, blend::count, tiled>>(value, value, value);
+    }
+}
+
+// Exact partial sums, and values that have none and take the tiles.
+TEST(Direct, Sums) {
+    for (const float value : {1.0f, -0.75f, 0.1f, 3e9f, 1e-20f, std::numeric_limits<float>::infinity()})
+        compare_constants<vp::target<float, blend::add>, vp::target<double, blend::add>>(value,
+                                                                                         static_cast<double>(value));
+}
+
+TEST(Direct, SumsAreExactOnlyWhereProven) {
+    using vp::device::sums_are_exact;
+    constexpr std::uint64_t limit = std::uint64_t{1} << 24;
+    EXPECT_TRUE(sums_are_exact(1.0f, 0.0f, limit - 1, -32));
+    EXPECT_FALSE(sums_are_exact(1.0f, 0.0f, limit, -32));
+    EXPECT_FALSE(sums_are_exact(1.0f, 1.0f, limit - 1, -32)); // what is there already counts
+    EXPECT_TRUE(sums_are_exact(-0.5f, 0.0f, limit - 1, -32));
+    EXPECT_TRUE(sums_are_exact(3.0f, 0.25f, 1000, -32));
+    EXPECT_FALSE(sums_are_exact(0.1f, 0.0f, 100, -32));                // 24 bits leave no room
+    EXPECT_TRUE(sums_are_exact(0.1f, 0.0f, 1, -32));                   // one alone is exact
+    EXPECT_FALSE(sums_are_exact(std::ldexp(1.0f, -33), 0.0f, 1, -32)); // below the quantum
+    EXPECT_FALSE(sums_are_exact(std::ldexp(1.0f, 31), 0.0f, 1, -32));  // infinite by definition
+    EXPECT_FALSE(sums_are_exact(0.0f, 0.0f, 1, -32));
+    EXPECT_FALSE(sums_are_exact(1.0f, -0.0f, 1, -32));
+    EXPECT_FALSE(sums_are_exact(std::numeric_limits<float>::quiet_NaN(), 0.0f, 1, -32));
+    EXPECT_FALSE(sums_are_exact(1.0f, std::numeric_limits<float>::infinity(), 1, -32));
+    EXPECT_TRUE(sums_are_exact(0.1, 0.0, 1, -64));
+    EXPECT_FALSE(sums_are_exact(1.0, 0.0, std::uint64_t{1} << 53, -64));
+}
+
+// Several draws with transforms and constants of their own, by both ways of making positions.
+struct shift {
+    float by;
+    template <class Vertex>
+    VOXELPIPE_HD glm::vec3 operator()(const Vertex& v) const {
+        return glm::vec3(vp::exact::add(v.position.x, by), v.position.y, v.position.z);
+    }
+};
+
+template <class Backend, class VertexShader>
+std::vector<std::uint32_t> draw_several(const std::vector<mesh_data>& meshes, const std::vector<VertexShader>& shaders,
+                                        const vp::grid& g, vp::counters& counts) {
+    Backend be{};
+    using target = vp::target<std::uint32_t, blend::add>;
+    vp::framebuffer<Backend, target> fb{be, g.extent};
+    std::vector<vp::mesh<Backend>> on_backend;
+    for (const mesh_data& m : meshes) on_backend.emplace_back(be, m.positions, m.triangles);
+    using draw = vp::draw<vp::mesh_view<>, VertexShader, vp::solid<std::uint32_t>>;
+    std::vector<draw> draws;
+    for (std::size_t i = 0; i < meshes.size(); ++i)
+        draws.push_back({on_backend[i].view(), shaders[i], vp::constant(static_cast<std::uint32_t>(3 * i + 1))});
+    const vp::status s =
+        vp::voxelize(be, std::span<const draw>(draws), g, fb, vp::voxelize_options{vp::coverage::conservative, false});
+    EXPECT_TRUE(s.ok()) << s.message();
+    counts = s.counts;
+    return vp::get<0>(fb).to_host(be);
+}
+
+template <class VertexShader>
+void compare_draws(const std::vector<VertexShader>& shaders) {
+    std::vector<mesh_data> meshes;
+    for (std::uint32_t i = 0; i < shaders.size(); ++i) meshes.push_back(mixed_triangles(400, 60.0f, 90 + i));
+    add_triangle(meshes[1], {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
+    vp::counters a{}, b{};
+    const vp::grid g = box_grid({60, 64, 70}).crop({7, 5, 3}, {41, 52, 60});
+    const auto on_cpu = draw_several<vp::cpu_backend>(meshes, shaders, g, a);
+    const auto on_gpu = draw_several<vp::cuda_backend>(meshes, shaders, g, b);
+    expect_same_bytes(on_cpu, on_gpu, "draws");
+    expect_same_counts(a, b);
+}
+
+TEST(Direct, SeveralDraws) {
+    glm::mat4 turned(1.0f);
+    turned[0] = {0.0f, 1.0f, 0.0f, 0.0f};
+    turned[1] = {1.0f, 0.0f, 0.0f, 0.0f};
+    compare_draws<vp::transform>({vp::transform{}, vp::transform{turned}, vp::transform{}});
+    compare_draws<shift>({shift{0.0f}, shift{2.5f}, shift{-9.0f}});
+}
+
+// A bad index leaves the targets as they were, cleared ones too.
+TEST(Direct, BadIndexWritesNothing) {
+    vp::cuda_backend be;
+    mesh_data m = mixed_triangles(500, 20.0f, 95);
+    using target = vp::target<vp::bit, blend::bit_or>;
+    const vp::grid g = box_grid({20, 20, 20});
+    vp::framebuffer<vp::cuda_backend, target> fb{be, g.extent};
+    const vp::mesh<vp::cuda_backend> good(be, m.positions, m.triangles);
+    ASSERT_TRUE(vp::voxelize(be, good, g, vp::passthrough{}, vp::constant(true), fb).ok());
+    const auto before = vp::get<0>(fb).to_host(be);
+    m.triangles[321].y = static_cast<std::uint32_t>(m.positions.size());
+    const vp::mesh<vp::cuda_backend> bad(be, m.positions, m.triangles);
+    EXPECT_EQ(vp::voxelize(be, bad, g, vp::passthrough{}, vp::constant(true), fb).code,
+              vp::status_code::index_out_of_range);
+    EXPECT_EQ(vp::get<0>(fb).to_host(be), before);
+}
+
+} // namespace
