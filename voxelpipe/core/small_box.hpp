@@ -17,7 +17,7 @@ namespace voxelpipe::core {
 
 // Whether all sides of a bounding box are at most `size` voxels.
 [[nodiscard]] VOXELPIPE_HD constexpr bool is_within(const voxel_box& box, int size) {
-    return (box.hi[0] - box.lo[0] < size) & (box.hi[1] - box.lo[1] < size) & (box.hi[2] - box.lo[2] < size);
+    return max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) < size;
 }
 
 // One projection of a small triangle onto (x, y): bits along x of the rows y = 0 .. Size - 1. Coordinates are relative
