@@ -327,7 +327,7 @@ TEST(BrickTriangle, BricksMakeTheGeneralSet) {
                 << "fraction " << fraction << ", triangle " << i;
         }
     }
-    EXPECT_GT(covered, 100000u);
+    EXPECT_GT(covered, static_cast<std::uint64_t>(150 * unit::cases(600)));
     EXPECT_LT(met, tested);
 }
 
