@@ -4,9 +4,11 @@
 
 // Fine raster: persistent blocks take work items (a tile and a run of its triangles), keep the tile in shared memory,
 // shade and blend atomically, and store it, or leave an image of it where the tile is split (paper section 4, fine
-// raster). The triangles of a batch are cut into units of about the same cost, and threads take units, not triangles:
-// one triangle that fills the tile and a thousand in one voxel keep the block equally busy.
+// raster). Small triangles leave their fragments in a queue, from which every thread shades one at a time; larger ones
+// are cut into units of about the same cost, and threads take units: one triangle that fills the tile and a thousand in
+// one voxel keep the block equally busy.
 
+#include <voxelpipe/device/small_raster.cuh>
 #include <voxelpipe/device/tile_image.cuh>
 #include <voxelpipe/device/tile_split.cuh>
 #include <voxelpipe/device/work_share.cuh>
@@ -77,62 +79,142 @@ __device__ void block_prefix(int value, int* sums) {
     __syncthreads();
 }
 
-// Calls visit(x, y, z, primitive, output) for every fragment of the item's triangles in the tile; all threads of the
-// block take part.
-template <coverage Rule, int Threads, class Scene, class Visit>
+// ---- small triangles ------------------------------------------------------------------------------------------------
+
+inline constexpr int fragment_places = 4096;  // of the queue
+inline constexpr int most_queue_cells = 1024; // voxels of a bounding box within the tile, for its fragments to go there
+
+// A triangle's bounding box, and the part of it that lies in a tile.
+template <coverage Rule>
+struct small_part {
+    raster_input<stored_source> in;
+    near_triangle t;
+    bool is_small;
+
+    __device__ VOXELPIPE_INLINE small_part(const geometry& geo, const core::voxel_box& tile, std::uint32_t id)
+        : in{{geo.draw(geo.find_draw(id))}, 0, geo.snap.fraction, geo.extent} {
+        const draw_geometry& d = in.source.geometry;
+        t = load_near<Rule>(in, d.triangles[id - d.first_primitive]);
+        is_small = t.is_near && core::max3(t.cells[0], t.cells[1], t.cells[2]) <= core::small_voxels(in.fraction);
+        int cells = 1;
+        for (int k = 0; k < 3; ++k) {
+            const int lo = static_cast<int>(tile.lo[k]) - t.lo[k], hi = static_cast<int>(tile.hi[k]) - t.lo[k];
+            if (lo > t.box.lo[k]) t.box.lo[k] = lo;
+            if (hi < t.box.hi[k]) t.box.hi[k] = hi;
+            cells *= t.box.hi[k] - t.box.lo[k] + 1;
+        }
+        is_small = is_small && cells <= most_queue_cells;
+    }
+
+    // Calls row(x, y, z, bits) for the rows of fragments in the tile.
+    template <class Row>
+    __device__ VOXELPIPE_INLINE void rows(const core::voxel_box& tile, Row&& row) const {
+        if constexpr (Rule == coverage::thin) {
+            struct sink {
+                const core::voxel_box& tile;
+                Row& to;
+                // The depth of a thin fragment is its own; the columns are the tile's.
+                __device__ VOXELPIPE_INLINE void row(int x, int y, int z, word bits) {
+                    if (x >= tile.lo[0] && x <= tile.hi[0] && y >= tile.lo[1] && y <= tile.hi[1] && z >= tile.lo[2] &&
+                        z <= tile.hi[2])
+                        to(x, y, z, bits);
+                }
+            } within{tile, row};
+            (void)raster_thin(in, t.t, t.lo, t.box, 0, 1, within); // a zero area is in no tile
+        } else {
+            if (t.box.empty()) return;
+            const core::small_conservative s(t.t, in.fraction);
+            const auto emit = [&](int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
+                if (bits != 0) row(t.lo[0] + t.box.lo[0], t.lo[1] + y, t.lo[2] + z, bits);
+            };
+            const core::small_box& box = t.box;
+            if (core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) < most_side)
+                s.rows(box, emit);
+            else
+                s.long_rows(box, emit);
+        }
+    }
+};
+
+// ---- all triangles of a work item -----------------------------------------------------------------------------------
+
+// What a block keeps of a batch of as many triangles as it has threads.
+template <int Threads>
+struct batch_memory {
+    int sums[Threads];
+    std::uint32_t ids[Threads];
+    unit_list lists[Threads];
+    std::uint32_t fragments[fragment_places]; // voxel of the tile, 15 bits, and the triangle's place in the batch
+    std::uint8_t in_units[Threads];           // whether the fragments of the triangle come from its units
+    int num_fragments;
+};
+static_assert(sizeof(batch_memory<256>) + 1024 <= tuning::batch_bytes);
+
+// Calls visit(i, primitive, output) for every fragment of the item's triangles in the tile, with the voxel's number in
+// it; all threads of the block take part.
+template <coverage Rule, int Log2Size, int Threads, class Scene, class Visit>
 __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, const std::uint32_t* primitives,
                                   std::uint32_t count, Visit&& visit) {
-    __shared__ int sums[Threads];
-    __shared__ std::uint32_t ids[Threads];
-    __shared__ unit_list lists[Threads];
+    __shared__ batch_memory<Threads> m;
+    constexpr int size = 1 << Log2Size;
     const int fraction = s.geo.snap.fraction;
+    const int x0 = static_cast<int>(tile.lo[0]), y0 = static_cast<int>(tile.lo[1]), z0 = static_cast<int>(tile.lo[2]);
+    const auto place = [&](int x, int y, int z) { return ((z - z0) * size + (y - y0)) * size + (x - x0); };
     for (std::uint32_t first = 0; first < count; first += Threads) {
         const std::uint32_t mine = first + threadIdx.x;
+        if (threadIdx.x == 0) m.num_fragments = 0;
+        __syncthreads();
         int units = 0;
         if (mine < count) {
             const std::uint32_t id = primitives[mine];
-            const loaded_triangle t = s.geo.load(id);
-            core::voxel_box reach{};
-            (void)core::classify<Rule>(t.a, t.b, t.c, fraction, tile, reach);
-            ids[threadIdx.x] = id;
-            if (!reach.empty()) lists[threadIdx.x] = unit_list::make(t, fraction, tile, reach, units);
+            const small_part<Rule> part(s.geo, tile, id);
+            bool whole = part.is_small; // all of it is in the queue
+            if (whole)
+                part.rows(tile, [&](int x, int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
+                    const auto from = static_cast<std::uint32_t>(place(x, y, z)) | threadIdx.x << 15;
+                    int at = atomicAdd(&m.num_fragments, __popc(bits));
+                    for (; bits != 0 && at < fragment_places; bits &= bits - 1)
+                        m.fragments[at++] = from + static_cast<std::uint32_t>(__ffs(static_cast<int>(bits)) - 1);
+                    whole = whole && bits == 0;
+                });
+            m.ids[threadIdx.x] = id;
+            m.in_units[threadIdx.x] = static_cast<std::uint8_t>(!whole);
+            if (!whole) {
+                const loaded_triangle t = s.geo.load(id);
+                core::voxel_box reach{};
+                (void)core::classify<Rule>(t.a, t.b, t.c, fraction, tile, reach);
+                if (!reach.empty()) m.lists[threadIdx.x] = unit_list::make(t, fraction, tile, reach, units);
+            }
         }
-        block_prefix<Threads>(units, sums);
-        const int all = sums[Threads - 1];
+        block_prefix<Threads>(units, m.sums); // all fragments are there then as well
+        const int waiting = m.num_fragments < fragment_places ? m.num_fragments : fragment_places;
+        for (int f = static_cast<int>(threadIdx.x); f < waiting; f += Threads) {
+            const std::uint32_t packed = m.fragments[f];
+            if (m.in_units[packed >> 15] != 0) continue;
+            const std::uint32_t triangle = m.ids[packed >> 15];
+            const auto i = static_cast<int>(packed & 0x7fffu);
+            visit(i, triangle,
+                  shade_fragment<false>(s, triangle, x0 + i % size, y0 + i / size % size, z0 + i / (size * size)));
+        }
+        const int all = m.sums[Threads - 1];
         for (int u = static_cast<int>(threadIdx.x); u < all; u += Threads) {
             int lo = 0, hi = Threads - 1; // the first triangle whose sum is beyond u
             while (lo < hi) {
                 const int middle = (lo + hi) / 2;
-                if (sums[middle] > u)
+                if (m.sums[middle] > u)
                     hi = middle;
                 else
                     lo = middle + 1;
             }
-            const int unit = u - (lo == 0 ? 0 : sums[lo - 1]);
-            const std::uint32_t id = ids[lo];
-            const loaded_triangle t = s.geo.load(id);
-            shade_fragments<Rule>(s, t, id, lists[lo].unit(tile, unit),
-                                  [&](int x, int y, int z, const auto& out) { visit(x, y, z, id, out); });
+            const int unit = u - (lo == 0 ? 0 : m.sums[lo - 1]);
+            const std::uint32_t triangle = m.ids[lo];
+            const loaded_triangle t = s.geo.load(triangle);
+            shade_fragments<Rule>(s, t, triangle, m.lists[lo].unit(tile, unit),
+                                  [&](int x, int y, int z, const auto& out) { visit(place(x, y, z), triangle, out); });
         }
         __syncthreads();
     }
 }
-
-// The one image of a tile that is not split.
-template <class Image>
-struct single_source {
-    const word* tile;
-    template <class Blend>
-    __device__ typename Blend::cell cell(int offset, int i) const {
-        return Blend::load(tile + offset, i, Image::voxels);
-    }
-    template <class BitBlend>
-    __device__ word bits(int offset, int w) const {
-        return tile[offset + w];
-    }
-    __device__ std::uint32_t winner(int i) const { return tile[Image::winner_at + i]; }
-    __device__ word touched(int w) const { return tile[Image::touched_at + w]; }
-};
 
 struct fine_raster_input {
     const std::uint32_t* primitives; // of the sorted pairs
@@ -163,21 +245,18 @@ __global__ __launch_bounds__(Threads, MinBlocks) void fine_raster_kernel(const _
         Image::clear(tile_words);
         __syncthreads();
         const core::voxel_box box = core::tile_box(in.tiles, item.tile, s.geo.extent);
-        const auto x0 = static_cast<int>(box.lo[0]), y0 = static_cast<int>(box.lo[1]), z0 = static_cast<int>(box.lo[2]);
-        for_each_fragment<Rule, Threads>(s, box, in.primitives + item.first, item.count,
-                                         [&](int x, int y, int z, std::uint32_t id, const auto& out) {
-                                             if (!out.keep) {
-                                                 ++discarded;
-                                                 return;
-                                             }
-                                             ++fragments;
-                                             const int i = ((z - z0) * Image::size + (y - y0)) * Image::size + (x - x0);
-                                             Image::blend(tile_words, i, id, out.values, in.track);
-                                         });
+        for_each_fragment<Rule, Image::log2_size, Threads>(s, box, in.primitives + item.first, item.count,
+                                                           [&](int i, std::uint32_t id, const auto& out) {
+                                                               if (!out.keep) {
+                                                                   ++discarded;
+                                                                   return;
+                                                               }
+                                                               ++fragments;
+                                                               Image::blend(tile_words, i, id, out.values, in.track);
+                                                           });
         __syncthreads();
         if (item.image == no_image) {
-            touched += store_tile<Image>(s, fb, box, single_source<Image>{tile_words}, static_cast<int>(threadIdx.x),
-                                         Threads, in.track);
+            touched += store_tile<Image>(s, fb, box, tile_words, in.track);
         } else {
             word* const image = in.images + std::size_t{item.image} * Image::words;
             for (int i = static_cast<int>(threadIdx.x); i < Image::words; i += Threads) image[i] = tile_words[i];

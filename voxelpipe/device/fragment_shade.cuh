@@ -88,19 +88,20 @@ __device__ VOXELPIPE_INLINE void shade_fragments(const Scene& s, const loaded_tr
     }
 }
 
-// The output of the primitive's fragment in voxel (x, y, z), which it covers.
-template <class Scene>
+// The output of the primitive's fragment in voxel (x, y, z), which it covers. MayBeWide: whether the triangle may need
+// more than 64 bits (core::fits_narrow).
+template <bool MayBeWide = true, class Scene>
 __device__ auto shade_fragment(const Scene& s, std::uint32_t id, int x, int y, int z) {
     const loaded_triangle tri = s.geo.load(id);
     fragment_source<Scene> source(s, tri, id);
     const int fraction = s.geo.snap.fraction;
     // Barycentrics and the normal do not depend on the coverage rule; thin needs the least set-up.
-    if (core::fits_narrow(tri.a, tri.b, tri.c, fraction)) {
+    if (!MayBeWide || core::fits_narrow(tri.a, tri.b, tri.c, fraction)) {
         const auto t = core::setup_triangle<core::span_rule::thin, std::int64_t>(tri.a, tri.b, tri.c, fraction);
         const auto p = core::to_uvw(t.axis, x, y, z);
         source.begin_triangle(t);
         source.begin_column(core::barycentric(t, p[0], p[1]));
-    } else {
+    } else if constexpr (MayBeWide) {
         const wide_triangle t = set_up_wide(tri.a, tri.b, tri.c, fraction, s.normal_factors);
         const auto p = core::to_uvw(t.axis, x, y, z);
         source.begin_triangle(t);

@@ -134,7 +134,7 @@ inline constexpr int threads_per_block = 256; // of kernels that have no tuning 
 // Blocks of a grid-stride or persistent kernel: enough to fill the device, no more than there is work.
 [[nodiscard]] inline unsigned fill_device(std::uint64_t items, unsigned blocks_per_multiprocessor = 8) {
     const auto most = static_cast<std::uint64_t>(num_multiprocessors()) * blocks_per_multiprocessor;
-    const std::uint64_t wanted = num_blocks(items);
+    const std::uint64_t wanted = items / threads_per_block + 1; // may be more than a launch can have
     return static_cast<unsigned>(wanted < 1 ? 1 : wanted < most ? wanted : most);
 }
 

@@ -38,6 +38,7 @@ template <class Target>
 //   planes of the atomic targets, words of the bit targets, the winner plane, a bit a voxel that is touched.
 template <int Log2Size, class Framebuffer, std::size_t... I>
 struct tile_image {
+    static constexpr int log2_size = Log2Size;
     static constexpr int size = 1 << Log2Size;
     static constexpr int voxels = 1 << (3 * Log2Size);
     static constexpr std::size_t num_targets = sizeof...(I);
@@ -123,77 +124,99 @@ __device__ void store_bit(const target_view<Target>& t, int x, int y, int z, boo
         atomicAnd(w, ~mask);
 }
 
-// Source gives the tile's words, from one image or merged from several:
-//   cell<Blend>(offset, i)   bits<BitBlend>(offset, w)   winner(i)   touched(w)
-// Writes every touched voxel of the tile whose index is this thread's (from `first`, `step` apart) and returns how many
-// voxels it found touched.
-template <class Image, class Scene, class Framebuffer, class Source>
-__device__ std::uint32_t store_tile(const Scene& s, const Framebuffer& fb, const core::voxel_box& box,
-                                    const Source& source, int first, int step, bool track) {
-    const auto x0 = static_cast<int>(box.lo[0]), y0 = static_cast<int>(box.lo[1]), z0 = static_cast<int>(box.lo[2]);
-    const int rows_y = static_cast<int>(box.hi[1]) - y0 + 1, rows_z = static_cast<int>(box.hi[2]) - z0 + 1;
+// A voxel of a tile in the framebuffer.
+struct voxel_place {
+    int x, y, z;
+};
+
+template <class Image>
+[[nodiscard]] __device__ VOXELPIPE_INLINE voxel_place place_in_tile(const core::voxel_box& box, int i) {
+    constexpr int size = Image::size;
+    return {static_cast<int>(box.lo[0]) + i % size, static_cast<int>(box.lo[1]) + i / size % size,
+            static_cast<int>(box.lo[2]) + i / (size * size)};
+}
+
+template <class Image>
+inline constexpr int rows_per_word = 32 / Image::size; // of a tile's bits
+
+// Row r of the tile for bit target K, of which `bits` is the whole word that the row is in.
+template <class Image, std::size_t K, class Framebuffer>
+__device__ void store_bit_row(const Framebuffer& fb, const core::voxel_box& box, int r, word bits) {
+    using t = typename Image::template target<K>;
+    using blend_type = bit_blend<typename t::blend_type>;
+    constexpr int size = Image::size;
+    const auto x0 = static_cast<int>(box.lo[0]), y = static_cast<int>(box.lo[1]) + r % size,
+               z = static_cast<int>(box.lo[2]) + r / size;
+    const auto& view = voxelpipe::get<K>(fb.targets);
+    if (view.load == load_operation::off || y > box.hi[1] || z > box.hi[2]) return;
+    word v = bits >> (r % rows_per_word<Image> * size);
+    if constexpr (size < 32) v &= (1u << size) - 1;
+    if (v == (size < 32 ? blend_type::neutral & ((1u << (size & 31)) - 1) : blend_type::neutral)) return;
+    auto* const rows = reinterpret_cast<bit_row<size>*>(view.elements + t::map::cell(view.extent, x0 & ~31, y, z));
+    bit_row<size>& stored = rows[(x0 & 31) / size];
+    word value = stored;
+    blend_type::merge(value, v);
+    stored = static_cast<bit_row<size>>(value);
+}
+
+// A touched voxel of atomic target K.
+template <class Image, std::size_t K, class Framebuffer, class Cell>
+__device__ void store_cell(const Framebuffer& fb, const voxel_place& at, const Cell& cell) {
+    using t = typename Image::template target<K>;
+    const auto& view = voxelpipe::get<K>(fb.targets);
+    if (view.load == load_operation::off) return;
+    const auto stored = view.load == load_operation::clear ? view.clear_value : view(at.x, at.y, at.z);
+    view.store(at.x, at.y, at.z, value_blend<typename t::blend_type, typename t::value_type>::finish(cell, stored));
+}
+
+// A touched voxel of the targets whose last fragment wins: shades that fragment. winner: its primitive + 1.
+template <class Image, class Scene, class Framebuffer>
+__device__ void store_winners(const Scene& s, const Framebuffer& fb, const voxel_place& at, word winner) {
+    const auto out = shade_fragment(s, winner - 1, at.x, at.y, at.z);
+    Image::for_each_target([&]<std::size_t K>() {
+        using t = typename Image::template target<K>;
+        if constexpr (method_of<t>() == blend_method::winner) {
+            const auto& view = voxelpipe::get<K>(fb.targets);
+            if (view.load == load_operation::off) return;
+            if constexpr (t::map::is_bit)
+                store_bit(view, at.x, at.y, at.z, voxelpipe::get<K>(out.values));
+            else
+                view.store(at.x, at.y, at.z, core::canonical(voxelpipe::get<K>(out.values)));
+        }
+    });
+}
+
+// Writes every touched voxel of a tile that is not split, from its image in shared memory, and returns how many voxels
+// this thread found touched. All threads of the block take part.
+template <class Image, class Scene, class Framebuffer>
+__device__ std::uint32_t store_tile(const Scene& s, const Framebuffer& fb, const core::voxel_box& box, const word* tile,
+                                    bool track) {
+    const int first = static_cast<int>(threadIdx.x), step = static_cast<int>(blockDim.x);
     constexpr int size = Image::size;
     std::uint32_t num_touched = 0;
     if (track)
         for (int w = first; w < Image::voxels / 32; w += step)
-            num_touched += static_cast<std::uint32_t>(__popc(source.touched(w)));
-
+            num_touched += static_cast<std::uint32_t>(__popc(tile[Image::touched_at + w]));
     if constexpr (Image::has_bits) {
-        constexpr int per_word = 32 / size; // rows in a word of the image
-        for (int r = first; r < size * size; r += step) {
-            const int y = r % size, z = r / size;
-            if (y >= rows_y || z >= rows_z) continue;
+        for (int r = first; r < size * size; r += step)
             Image::for_each_target([&]<std::size_t K>() {
-                using t = typename Image::template target<K>;
-                if constexpr (method_of<t>() == blend_method::bits) {
-                    using blend_type = bit_blend<typename t::blend_type>;
-                    const auto& view = voxelpipe::get<K>(fb.targets);
-                    if (view.load == load_operation::off) return;
-                    word v = source.template bits<blend_type>(Image::template offset<K>(), r / per_word);
-                    v >>= r % per_word * size;
-                    if constexpr (size < 32) v &= (1u << size) - 1;
-                    if (v == (size < 32 ? blend_type::neutral & ((1u << (size & 31)) - 1) : blend_type::neutral))
-                        return;
-                    auto* const rows = reinterpret_cast<bit_row<size>*>(
-                        view.elements + t::map::cell(view.extent, x0 & ~31, y0 + y, z0 + z));
-                    bit_row<size>& stored = rows[(x0 & 31) / size];
-                    word value = stored;
-                    blend_type::merge(value, v);
-                    stored = static_cast<bit_row<size>>(value);
-                }
+                if constexpr (method_of<typename Image::template target<K>>() == blend_method::bits)
+                    store_bit_row<Image, K>(fb, box, r, tile[Image::template offset<K>() + r / rows_per_word<Image>]);
             });
-        }
     }
     if constexpr (Image::has_atomic || Image::has_winner) {
         for (int i = first; i < Image::voxels; i += step) {
-            if (((source.touched(i >> 5) >> (i & 31)) & 1u) == 0) continue;
-            const int x = x0 + i % size, y = y0 + i / size % size, z = z0 + i / (size * size);
+            if (((tile[Image::touched_at + (i >> 5)] >> (i & 31)) & 1u) == 0) continue;
+            const voxel_place at = place_in_tile<Image>(box, i);
             Image::for_each_target([&]<std::size_t K>() {
                 using t = typename Image::template target<K>;
                 if constexpr (method_of<t>() == blend_method::atomic) {
                     using blend_type = value_blend<typename t::blend_type, typename t::value_type>;
-                    const auto& view = voxelpipe::get<K>(fb.targets);
-                    if (view.load == load_operation::off) return;
-                    const auto stored = view.load == load_operation::clear ? view.clear_value : view(x, y, z);
-                    view.store(
-                        x, y, z,
-                        blend_type::finish(source.template cell<blend_type>(Image::template offset<K>(), i), stored));
+                    store_cell<Image, K>(fb, at,
+                                         blend_type::load(tile + Image::template offset<K>(), i, Image::voxels));
                 }
             });
-            if constexpr (Image::has_winner) {
-                const auto out = shade_fragment(s, source.winner(i) - 1, x, y, z);
-                Image::for_each_target([&]<std::size_t K>() {
-                    using t = typename Image::template target<K>;
-                    if constexpr (method_of<t>() == blend_method::winner) {
-                        const auto& view = voxelpipe::get<K>(fb.targets);
-                        if (view.load == load_operation::off) return;
-                        if constexpr (t::map::is_bit)
-                            store_bit(view, x, y, z, voxelpipe::get<K>(out.values));
-                        else
-                            view.store(x, y, z, core::canonical(voxelpipe::get<K>(out.values)));
-                    }
-                });
-            }
+            if constexpr (Image::has_winner) store_winners<Image>(s, fb, at, tile[Image::winner_at + i]);
         }
     }
     return num_touched;
