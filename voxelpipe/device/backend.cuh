@@ -148,14 +148,13 @@ public:
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              const framebuffer_view<Targets...>& fb, const voxelize_options& options,
                              std::uint64_t triangles_in) {
-        using call_type =
-            device::framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, framebuffer_view<Targets...>, Selector>;
         return attempt(triangles_in, [&](const device::capacities& limits, device::pipeline_state& state) {
-            const call_type call{draws, g, fb, options, static_cast<std::uint32_t>(triangles_in), limits};
-            if (options.rule == coverage::thin)
-                launch<coverage::thin>(call, state);
-            else
-                launch<coverage::conservative>(call, state);
+            device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits, [&](const auto& call) {
+                if (options.rule == coverage::thin)
+                    launch<coverage::thin>(call, state);
+                else
+                    launch<coverage::conservative>(call, state);
+            });
         });
     }
 
