@@ -18,5 +18,6 @@
 
 #if defined(__CUDACC__)
 #include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/device/abuffer_async.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>
 #endif

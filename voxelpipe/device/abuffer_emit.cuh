@@ -151,10 +151,16 @@ build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const share_buf
 
 // ---- into an A-buffer -----------------------------------------------------------------------------------------------
 
+// What became of the lists, for readers on the device: both 0 where the call failed.
+struct list_counts {
+    std::uint64_t voxels, fragments;
+};
+
+// By all threads of a grid.
 template <class Key, class Payload>
-__global__ void copy_lists_kernel(fragment_lists<Key, Payload> lists, std::uint64_t num_voxels,
-                                  std::uint64_t num_fragments, std::uint64_t* voxels, std::uint64_t* offsets,
-                                  std::uint32_t* primitives, Payload* payloads) {
+__device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint64_t num_voxels,
+                           std::uint64_t num_fragments, std::uint64_t* voxels, std::uint64_t* offsets,
+                           std::uint32_t* primitives, Payload* payloads) {
     const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
     for (std::uint64_t i = thread; i < num_voxels; i += threads) {
@@ -172,6 +178,29 @@ __global__ void copy_lists_kernel(fragment_lists<Key, Payload> lists, std::uint6
             payloads[i] = lists.payloads[v];
         }
     }
+}
+
+template <class Key, class Payload>
+__global__ void copy_lists_kernel(fragment_lists<Key, Payload> lists, std::uint64_t num_voxels,
+                                  std::uint64_t num_fragments, std::uint64_t* voxels, std::uint64_t* offsets,
+                                  std::uint32_t* primitives, Payload* payloads) {
+    copy_lists(lists, num_voxels, num_fragments, voxels, offsets, primitives, payloads);
+}
+
+// The same with the numbers that the state holds, where the host does not wait for them. Leaves them in the counters.
+template <class Key, class Payload>
+__global__ void publish_lists_kernel(fragment_lists<Key, Payload> lists, pipeline_state* state, capacities limits,
+                                     list_counts* counts, std::uint64_t* voxels, std::uint64_t* offsets,
+                                     std::uint32_t* primitives, Payload* payloads) {
+    const bool failed = has_failed(*state, limits);
+    const std::uint64_t num_voxels = failed ? 0 : state->list_voxels;
+    const std::uint64_t num_fragments = failed ? 0 : state->list_fragments;
+    if (blockIdx.x == 0 && threadIdx.x == 0) {
+        *counts = {num_voxels, num_fragments};
+        state->voxels = num_voxels; // has_failed reads neither of the two
+        state->fragments = num_fragments;
+    }
+    copy_lists(lists, num_voxels, num_fragments, voxels, offsets, primitives, payloads);
 }
 
 } // namespace voxelpipe::device

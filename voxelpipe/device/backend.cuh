@@ -111,6 +111,17 @@ public:
         }
 
     private:
+        friend cuda_backend;
+        // Within a call: what goes wrong belongs in the call's status, with the stage that asked for the memory.
+        buffer(cuda_backend& backend, std::size_t count, stage where) : count_(count) {
+            try {
+                block_ = device_block(count * sizeof(T), backend.resource, backend.stream);
+            } catch (const device::cuda_failure& e) {
+                throw device::cuda_failure{e.error, where};
+            } catch (const std::bad_alloc&) {
+                throw device::cuda_failure{cudaErrorMemoryAllocation, where};
+            }
+        }
         template <class F>
         static void translate(F&& f) {
             try {
@@ -137,14 +148,13 @@ public:
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              const framebuffer_view<Targets...>& fb, const voxelize_options& options,
                              std::uint64_t triangles_in) {
-        using call_type =
-            device::framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, framebuffer_view<Targets...>, Selector>;
         return attempt(triangles_in, [&](const device::capacities& limits, device::pipeline_state& state) {
-            const call_type call{draws, g, fb, options, static_cast<std::uint32_t>(triangles_in), limits};
-            if (options.rule == coverage::thin)
-                launch<coverage::thin>(call, state);
-            else
-                launch<coverage::conservative>(call, state);
+            device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits, [&](const auto& call) {
+                if (options.rule == coverage::thin)
+                    launch<coverage::thin>(call, state);
+                else
+                    launch<coverage::conservative>(call, state);
+            });
         });
     }
 
@@ -237,10 +247,10 @@ private:
         return workspace_.data();
     }
 
-    void read_state(const device::pipeline_state* d_state, device::pipeline_state& state) const {
-        device::check(cudaMemcpyAsync(&state, d_state, sizeof(state), cudaMemcpyDeviceToHost, stream),
-                      stage::tile_resolve);
-        device::check(cudaStreamSynchronize(stream), stage::tile_resolve);
+    // `where`: the last stage of the call, which a failure that shows only here is put down to.
+    void read_state(const device::pipeline_state* d_state, device::pipeline_state& state, stage where) const {
+        device::check(cudaMemcpyAsync(&state, d_state, sizeof(state), cudaMemcpyDeviceToHost, stream), where);
+        device::check(cudaStreamSynchronize(stream), where);
     }
 
     template <coverage Rule, class Call>
@@ -250,7 +260,7 @@ private:
         call.template go<Rule, false>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
         call.template go<Rule, true>(memory, d_state, stream);
-        read_state(d_state, state);
+        read_state(d_state, state, stage::tile_resolve);
     }
 
     template <coverage Rule, class Key, class Call, class Payload>
@@ -260,20 +270,21 @@ private:
         (void)call.template go<Rule, false, Key>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
         const auto sorted = call.template go<Rule, true, Key>(memory, d_state, stream);
-        read_state(d_state, state);
+        read_state(d_state, state, stage::abuffer_emit);
         if (device::has_failed(state, call.limits)) return;
         using payload = payload_storage<Payload>;
         constexpr bool has_payload = abuffer<cuda_backend, Payload>::has_payload;
-        buffer<std::uint64_t> voxels(*this, state.list_voxels);
-        buffer<std::uint64_t> offsets(*this, state.list_voxels == 0 ? 0 : state.list_voxels + 1);
-        buffer<std::uint32_t> primitives(*this, state.list_fragments);
-        buffer<payload> payloads(*this, has_payload ? state.list_fragments : 0);
+        constexpr stage where = stage::abuffer_emit;
+        buffer<std::uint64_t> voxels(*this, state.list_voxels, where);
+        buffer<std::uint64_t> offsets(*this, state.list_voxels == 0 ? 0 : state.list_voxels + 1, where);
+        buffer<std::uint32_t> primitives(*this, state.list_fragments, where);
+        buffer<payload> payloads(*this, has_payload ? state.list_fragments : 0, where);
         if (state.list_fragments != 0) {
             device::
                 copy_lists_kernel<<<device::fill_device(state.list_fragments), device::threads_per_block, 0, stream>>>(
                     sorted, state.list_voxels, state.list_fragments, voxels.data(), offsets.data(), primitives.data(),
                     payloads.data());
-            device::check(cudaGetLastError(), stage::abuffer_emit);
+            device::check(cudaGetLastError(), where);
         }
         lists.voxels = std::move(voxels);
         lists.offsets = std::move(offsets);

@@ -235,19 +235,18 @@ inline constexpr int most_direct_extent = 1 << 16;   // bricks are numbered with
 
 // ---- a framebuffer call ---------------------------------------------------------------------------------------------
 
-template <class Draw, class Framebuffer, class Selector>
+template <class Draw, class Framebuffer, tuning::fine_raster_policy Policy>
 struct framebuffer_call;
-template <class Mesh, class VertexShader, class FragmentShader, class Framebuffer, class Selector>
-struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, Selector> {
+template <class Mesh, class VertexShader, class FragmentShader, class Framebuffer, tuning::fine_raster_policy Policy>
+struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, Policy> {
     using draw_type = draw<Mesh, VertexShader, FragmentShader>;
     using scene_buffers = scene_memory<Mesh, VertexShader, FragmentShader>;
     using scene_type = typename scene_buffers::scene_type;
     using groups = target_groups<Framebuffer>;
     using values = decltype(std::declval<typename scene_type::fragment_output>().values);
-    static constexpr auto policy = Selector{}(groups::most_bits());
     static constexpr bool in_tiles = groups::num_groups() > 0;
     template <int Group>
-    using image = decltype(image_type<policy.log2_tile_size, Framebuffer>(typename groups::template indices<Group>{}));
+    using image = decltype(image_type<Policy.log2_tile_size, Framebuffer>(typename groups::template indices<Group>{}));
 
     std::span<const draw_type> draws;
     grid g;
@@ -255,7 +254,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, S
     voxelize_options options;
     std::uint32_t num_primitives;
     capacities limits;
-    core::tile_grid tiles{g.extent, policy.log2_tile_size};
+    core::tile_grid tiles{g.extent, Policy.log2_tile_size};
 
     [[nodiscard]] static std::uint32_t pairs_per_item(std::uint64_t pair_capacity) {
         return static_cast<std::uint32_t>(std::max<std::uint64_t>(512, pair_capacity / 1024));
@@ -443,7 +442,7 @@ private:
         in.count_fragments = Group == 0 && !groups::has_ordered;
         in.count_voxels = in.count_fragments && options.count_voxels;
         in.track = in.count_voxels || image_words::has_atomic || image_words::has_winner;
-        draw_tiles<Rule, image_words, policy.threads_per_block, policy.min_blocks_per_sm>(s, fb, in, work.splits, state,
+        draw_tiles<Rule, image_words, Policy.threads_per_block, Policy.min_blocks_per_sm>(s, fb, in, work.splits, state,
                                                                                           limits, stream);
     }
 
@@ -469,6 +468,18 @@ private:
         check(cudaGetLastError(), stage::fine_raster);
     }
 };
+
+// Calls f with the call whose policy is the selector's for the current device.
+template <class Selector, class Draw, class Framebuffer, class F>
+auto with_framebuffer_call(std::span<const Draw> draws, const grid& g, const Framebuffer& fb,
+                           const voxelize_options& options, std::uint64_t triangles, const capacities& limits,
+                           const F& f) {
+    return tuning::with_policy<Selector, target_groups<Framebuffer>::most_bits()>(
+        compute_capability(), [&]<tuning::fine_raster_policy Policy>() {
+            return f(framebuffer_call<Draw, Framebuffer, Policy>{draws, g, fb, options,
+                                                                 static_cast<std::uint32_t>(triangles), limits});
+        });
+}
 
 // ---- an A-buffer call -----------------------------------------------------------------------------------------------
 

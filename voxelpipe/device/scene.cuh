@@ -131,6 +131,15 @@ inline constexpr int threads_per_block = 256; // of kernels that have no tuning 
     return count;
 }
 
+// Of the current device: 90 for 9.0.
+[[nodiscard]] inline int compute_capability() {
+    int device = 0, major = 0, minor = 0;
+    check(cudaGetDevice(&device));
+    check(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device));
+    check(cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, device));
+    return 10 * major + minor;
+}
+
 // Blocks of a grid-stride or persistent kernel: enough to fill the device, no more than there is work.
 [[nodiscard]] inline unsigned fill_device(std::uint64_t items, unsigned blocks_per_multiprocessor = 8) {
     const auto most = static_cast<std::uint64_t>(num_multiprocessors()) * blocks_per_multiprocessor;

@@ -49,18 +49,16 @@ template <class Call>
     return {l.tile_pairs, l.tile_records, l.fragments, l.fragment_records};
 }
 
-template <class Mesh, class VertexShader, class FragmentShader, class... Targets>
-[[nodiscard]] auto make_call(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
-                             const framebuffer_view<Targets...>& fb, const voxelize_options& options,
-                             std::uint64_t triangles, const workspace_limits& limits) {
-    return framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, framebuffer_view<Targets...>,
-                            tuning::fine_raster_selector>{
-        draws, g, fb, options, static_cast<std::uint32_t>(triangles), to_capacities(limits)};
+template <class Draw, class Framebuffer, class F>
+auto with_call(std::span<const Draw> draws, const grid& g, const Framebuffer& fb, const voxelize_options& options,
+               std::uint64_t triangles, const workspace_limits& limits, const F& f) {
+    return with_framebuffer_call<tuning::fine_raster_selector>(draws, g, fb, options, triangles, to_capacities(limits),
+                                                               f);
 }
 
 } // namespace device
 
-// Bytes that voxelize_async needs for such a call; 0 where the arguments are refused.
+// Bytes that voxelize_async needs for such a call on the current device; 0 where the arguments are refused.
 template <class Mesh, class VertexShader, class FragmentShader, class... Targets>
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                           const grid& g, const framebuffer_view<Targets...>& fb,
@@ -68,7 +66,8 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
     const status s = core::validate_draws(draws);
     if (!s.ok() || !validate(g).ok()) return 0;
     try {
-        return device::bytes_of(device::make_call(draws, g, fb, options, s.counts.triangles_in, limits), options.rule);
+        return device::with_call(draws, g, fb, options, s.counts.triangles_in, limits,
+                                 [&](const auto& call) { return device::bytes_of(call, options.rule); });
     } catch (const device::cuda_failure&) {
         return 0;
     }
@@ -87,19 +86,21 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
         status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         try {
-            const auto call = device::make_call(draws, g, fb, options, s.counts.triangles_in, workspace.limits);
-            const std::size_t need = device::bytes_of(call, options.rule);
-            if (workspace.memory == nullptr || workspace.bytes < need) {
-                s.code = status_code::capacity_exceeded;
-                s.required = {workspace.limits.tile_pairs, workspace.limits.fragments, need};
-                return s;
-            }
-            device::arena memory(workspace.memory);
-            device::pipeline_state* state = nullptr; // the first thing in the workspace
-            if (options.rule == coverage::thin)
-                call.template go<coverage::thin, true>(memory, state, backend.stream);
-            else
-                call.template go<coverage::conservative, true>(memory, state, backend.stream);
+            const auto launch = [&](const auto& call) {
+                const std::size_t need = device::bytes_of(call, options.rule);
+                if (workspace.memory == nullptr || workspace.bytes < need) {
+                    s.code = status_code::capacity_exceeded;
+                    s.required = {workspace.limits.tile_pairs, workspace.limits.fragments, need};
+                    return;
+                }
+                device::arena memory(workspace.memory);
+                device::pipeline_state* state = nullptr; // the first thing in the workspace
+                if (options.rule == coverage::thin)
+                    call.template go<coverage::thin, true>(memory, state, backend.stream);
+                else
+                    call.template go<coverage::conservative, true>(memory, state, backend.stream);
+            };
+            device::with_call(draws, g, fb, options, s.counts.triangles_in, workspace.limits, launch);
         } catch (const device::cuda_failure& e) {
             return device::to_status(e);
         }

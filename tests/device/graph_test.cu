@@ -1,0 +1,292 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Calls in a CUDA graph, replayed with changed vertices, and on two streams at once: the way without tiles, the
+// fragment lists of constant and of shaded fragments; capacities of the lists that are too small. All against
+// cpu_backend.
+
+#include "cells.hpp"
+
+#include <voxelpipe/device/abuffer_async.cuh>
+
+#include <functional>
+#include <span>
+#include <string>
+
+namespace {
+
+using namespace device_test;
+namespace blend = voxelpipe::blend;
+
+struct stream_owner {
+    cudaStream_t stream = nullptr;
+    stream_owner() { cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking); }
+    ~stream_owner() { cudaStreamDestroy(stream); }
+};
+
+// What a call launches, to be launched again.
+class captured_graph {
+public:
+    captured_graph(cudaStream_t stream, const std::function<vp::status()>& call) {
+        EXPECT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
+        const vp::status s = call();
+        EXPECT_EQ(cudaStreamEndCapture(stream, &graph_), cudaSuccess);
+        EXPECT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(cudaGraphInstantiate(&instance_, graph_, 0), cudaSuccess);
+    }
+    captured_graph(const captured_graph&) = delete;
+    captured_graph& operator=(const captured_graph&) = delete;
+    ~captured_graph() {
+        cudaGraphExecDestroy(instance_);
+        cudaGraphDestroy(graph_);
+    }
+    void launch(cudaStream_t stream) const { ASSERT_EQ(cudaGraphLaunch(instance_, stream), cudaSuccess); }
+
+private:
+    cudaGraph_t graph_ = nullptr;
+    cudaGraphExec_t instance_ = nullptr;
+};
+
+// Meshes with the same triangles and other vertices, of which the first is on the device.
+struct moving_mesh {
+    std::vector<mesh_data> poses;
+    vp::cuda_backend::buffer<glm::vec3> positions;
+    vp::cuda_backend::buffer<glm::uvec3> triangles;
+
+    moving_mesh(vp::cuda_backend& be, int count, float size, std::uint32_t seed)
+        : poses{mixed_triangles(count, size, seed), mixed_triangles(count, size, seed + 1)},
+          positions(be, vp::array_view<const glm::vec3>(poses[0].positions)),
+          triangles(be, vp::array_view<const glm::uvec3>(poses[0].triangles)) {
+        poses[1].triangles = poses[0].triangles;
+        poses.push_back(poses[0]);
+    }
+    [[nodiscard]] vp::mesh_view<> view() const { return {positions.view(), triangles.view(), {}}; }
+    void pose(vp::cuda_backend& be, const mesh_data& m) {
+        ASSERT_EQ(cudaMemcpyAsync(positions.data(), m.positions.data(), m.positions.size() * sizeof(glm::vec3),
+                                  cudaMemcpyHostToDevice, be.stream),
+                  cudaSuccess);
+    }
+};
+
+// Targets that are all drawn without tiles.
+using bits = vp::target<vp::bit, blend::bit_or>;
+using hits = vp::target<std::uint32_t, blend::count>;
+using sums = vp::target<float, blend::add>;
+using direct_draw = vp::draw<vp::mesh_view<>, vp::passthrough, decltype(vp::constant(true, 1u, 1.0f))>;
+template <class Backend>
+using direct_framebuffer = vp::framebuffer<Backend, bits, hits, sums>;
+
+void expect_direct(const mesh_data& m, const vp::grid& g, const vp::voxelize_options& options, vp::cuda_backend& be,
+                   direct_framebuffer<vp::cuda_backend>& fb, const vp::status& s) {
+    vp::cpu_backend cpu;
+    direct_framebuffer<vp::cpu_backend> expected{cpu, g.extent};
+    vp::mesh<vp::cpu_backend> mesh(cpu, m.positions, m.triangles);
+    const vp::status reference =
+        vp::voxelize(cpu, mesh, g, vp::passthrough{}, vp::constant(true, 1u, 1.0f), expected, options);
+    ASSERT_TRUE(reference.ok()) << reference.message();
+    ASSERT_TRUE(s.ok()) << s.message();
+    EXPECT_GT(s.counts.voxels, 0u);
+    expect_same_counts(reference.counts, s.counts);
+    expect_same_bytes(vp::get<0>(expected).to_host(cpu), vp::get<0>(fb).to_host(be), "bits");
+    expect_same_bytes(vp::get<1>(expected).to_host(cpu), vp::get<1>(fb).to_host(be), "hits");
+    expect_same_bytes(vp::get<2>(expected).to_host(cpu), vp::get<2>(fb).to_host(be), "sums");
+}
+
+TEST(Graph, WithoutTilesIsReplayedWithChangedVertices) {
+    const vp::grid g = box_grid({64, 57, 71});
+    for (const vp::coverage rule : both_rules) {
+        stream_owner owner;
+        vp::cuda_backend be{owner.stream};
+        moving_mesh mesh(be, 3000, 60.0f, 91);
+        direct_framebuffer<vp::cuda_backend> fb{be, g.extent};
+        const direct_draw d{mesh.view(), {}, vp::constant(true, 1u, 1.0f)};
+        const std::span<const direct_draw> draws(&d, 1);
+        const vp::workspace_limits limits{}; // this way has no lists that could overflow
+        const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), rule, limits);
+        ASSERT_GT(bytes, 0u);
+        vp::cuda_backend::buffer<std::byte> memory(be, bytes);
+        const vp::workspace_view workspace{memory.data(), bytes, limits};
+        const captured_graph graph(be.stream,
+                                   [&] { return vp::voxelize_async(be, draws, g, fb.view(), rule, workspace); });
+        for (const mesh_data& m : mesh.poses) {
+            mesh.pose(be, m);
+            graph.launch(be.stream);
+            expect_direct(m, g, rule, be, fb, vp::read_status(be, workspace));
+        }
+    }
+}
+
+TEST(Graph, TwoStreamsAtOnceWithoutTiles) {
+    const vp::grid g = box_grid({64, 57, 71});
+    stream_owner streams[2];
+    vp::cuda_backend first{streams[0].stream}, second{streams[1].stream};
+    vp::cuda_backend* const backends[2] = {&first, &second};
+    std::vector<moving_mesh> meshes;
+    std::vector<direct_framebuffer<vp::cuda_backend>> fbs;
+    std::vector<vp::cuda_backend::buffer<std::byte>> memory;
+    std::vector<vp::workspace_view> views;
+    std::vector<direct_draw> draws;
+    for (std::uint32_t k = 0; k < 2; ++k) {
+        meshes.emplace_back(*backends[k], 4000, 60.0f, 93 + 2 * k);
+        fbs.emplace_back(*backends[k], g.extent);
+        draws.push_back({meshes[k].view(), {}, vp::constant(true, 1u, 1.0f)});
+        const std::size_t bytes =
+            vp::workspace_bytes(std::span<const direct_draw>(&draws[k], 1), g, fbs[k].view(), {}, {});
+        ASSERT_GT(bytes, 0u);
+        memory.emplace_back(*backends[k], bytes);
+        views.push_back({memory[k].data(), bytes, {}});
+    }
+    for (int round = 0; round < 5; ++round)
+        for (std::size_t k = 0; k < 2; ++k) {
+            const vp::status s = vp::voxelize_async(*backends[k], std::span<const direct_draw>(&draws[k], 1), g,
+                                                    fbs[k].view(), {}, views[k]);
+            ASSERT_TRUE(s.ok()) << s.message();
+        }
+    for (std::size_t k = 0; k < 2; ++k)
+        expect_direct(meshes[k].poses[0], g, {}, *backends[k], fbs[k], vp::read_status(*backends[k], views[k]));
+}
+
+// ---- fragment lists -------------------------------------------------------------------------------------------------
+
+template <class Payload, class FragmentShader>
+void expect_lists(const mesh_data& m, const vp::grid& g, const FragmentShader& fs, const vp::voxelize_options& options,
+                  const vp::host_abuffer<Payload>& lists, const vp::status& s) {
+    vp::cpu_backend cpu;
+    vp::abuffer<vp::cpu_backend, Payload> expected{cpu};
+    vp::mesh<vp::cpu_backend> mesh(cpu, m.positions, m.triangles);
+    const vp::status reference = vp::voxelize(cpu, mesh, g, vp::passthrough{}, fs, expected, options);
+    ASSERT_TRUE(reference.ok()) << reference.message();
+    ASSERT_TRUE(s.ok()) << s.message();
+    EXPECT_GT(lists.voxels.size(), 0u);
+    expect_same_counts(reference.counts, s.counts);
+    const auto h = expected.to_host(cpu);
+    EXPECT_EQ(h.extent, lists.extent);
+    expect_same_bytes(h.voxels, lists.voxels, "voxels");
+    expect_same_bytes(h.offsets, lists.offsets, "offsets");
+    expect_same_bytes(h.primitives, lists.primitives, "primitives");
+    if constexpr (!std::is_void_v<Payload>) expect_same_bytes(h.payloads, lists.payloads, "payloads");
+}
+
+// Memory with a pattern behind it that must stay.
+struct guarded_memory {
+    static constexpr std::size_t guard = 1 << 16;
+    std::size_t bytes;
+    vp::cuda_backend::buffer<unsigned char> memory;
+
+    guarded_memory(vp::cuda_backend& be, std::size_t bytes_) : bytes(bytes_), memory(be, bytes_ + guard) {
+        EXPECT_EQ(cudaMemsetAsync(memory.data(), 0x5a, bytes + guard, be.stream), cudaSuccess);
+    }
+    void expect_untouched_behind(vp::cuda_backend& be) const {
+        const std::vector<unsigned char> host = memory.to_host(be);
+        for (std::size_t i = bytes; i < host.size(); ++i) ASSERT_EQ(host[i], 0x5a) << i - bytes;
+    }
+};
+
+template <class Payload, class FragmentShader>
+void compare_replayed_lists(const FragmentShader& fs, std::uint32_t seed) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;
+    const vp::grid g = box_grid({40, 33, 47});
+    for (const vp::coverage rule : both_rules) {
+        stream_owner owner;
+        vp::cuda_backend be{owner.stream};
+        moving_mesh mesh(be, 2000, 40.0f, seed);
+        const draw_type d{mesh.view(), {}, fs};
+        const std::span<const draw_type> draws(&d, 1);
+        const vp::workspace_limits limits{0, 0, 1 << 21, 1 << 16};
+        vp::abuffer_view<Payload> lists;
+        const std::size_t bytes = vp::workspace_bytes(draws, g, lists, rule, limits);
+        ASSERT_GT(bytes, 0u);
+        const guarded_memory memory(be, bytes);
+        const vp::workspace_view workspace{const_cast<unsigned char*>(memory.memory.data()), bytes, limits};
+        const captured_graph graph(be.stream, [&] { return vp::voxelize_async(be, draws, g, lists, rule, workspace); });
+        for (const mesh_data& m : mesh.poses) {
+            mesh.pose(be, m);
+            graph.launch(be.stream);
+            const vp::status s = vp::read_status(be, workspace);
+            expect_lists<Payload>(m, g, fs, rule, lists.to_host(be), s);
+        }
+        memory.expect_untouched_behind(be);
+    }
+}
+
+TEST(Graph, ListsOfConstantFragmentsAreReplayedWithChangedVertices) {
+    compare_replayed_lists<void>(vp::constant(true), 101);
+}
+TEST(Graph, ListsWithPayloadsAreReplayedWithChangedVertices) {
+    compare_replayed_lists<double>(any_values<vp::target<double, blend::replace>>{}, 103);
+}
+
+template <class Payload, class FragmentShader>
+void compare_overflowing_lists(const FragmentShader& fs, std::uint32_t seed) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;
+    vp::cuda_backend be;
+    const mesh_data m = mixed_triangles(2000, 150.0f, seed);
+    const vp::grid g = box_grid({150, 150, 150});
+    const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+    const draw_type d{mesh.view(), {}, fs};
+    const std::span<const draw_type> draws(&d, 1);
+    vp::workspace_limits limits{0, 0, 10, 1};
+    vp::abuffer_view<Payload> lists;
+    EXPECT_EQ(vp::voxelize_async(be, draws, g, lists, {}, {nullptr, 0, limits}).code,
+              vp::status_code::capacity_exceeded);
+    EXPECT_EQ(lists.counts, nullptr);
+    int failures = 0;
+    for (bool done = false; !done; ++failures) {
+        ASSERT_LT(failures, 4);
+        const std::size_t bytes = vp::workspace_bytes(draws, g, lists, {}, limits);
+        ASSERT_GT(bytes, 0u);
+        const guarded_memory memory(be, bytes);
+        const vp::workspace_view workspace{const_cast<unsigned char*>(memory.memory.data()), bytes, limits};
+        ASSERT_TRUE(vp::voxelize_async(be, draws, g, lists, {}, workspace).ok());
+        const vp::status s = vp::read_status(be, workspace, &limits);
+        done = s.ok();
+        if (done) {
+            expect_lists<Payload>(m, g, fs, {}, lists.to_host(be), s);
+        } else {
+            ASSERT_EQ(s.code, vp::status_code::capacity_exceeded);
+            EXPECT_GT(s.required.fragments, 10u);
+            EXPECT_EQ(lists.to_host(be).voxels.size(), 0u);
+            EXPECT_EQ(lists.to_host(be).primitives.size(), 0u);
+        }
+        memory.expect_untouched_behind(be);
+    }
+    EXPECT_GT(failures, 1); // counts the last try too
+}
+
+TEST(Graph, ListsThatDoNotFitSayWhatIsNeeded) {
+    compare_overflowing_lists<void>(vp::constant(true), 105);
+    compare_overflowing_lists<double>(any_values<vp::target<double, blend::replace>>{}, 106);
+}
+
+// Refuses what would take it beyond `most`.
+struct limited_resource {
+    std::size_t live = 0, most = std::size_t{1} << 40;
+    void* allocate_async(std::size_t bytes, std::size_t, cudaStream_t stream) {
+        void* p = nullptr;
+        if (live + bytes > most || cudaMallocAsync(&p, bytes, stream) != cudaSuccess) throw std::bad_alloc();
+        live += bytes;
+        return p;
+    }
+    void deallocate_async(void* p, std::size_t bytes, std::size_t, cudaStream_t stream) {
+        cudaFreeAsync(p, stream);
+        live -= bytes;
+    }
+};
+
+TEST(Lists, NoMemoryForTheCopyIsInTheStatus) {
+    limited_resource resource;
+    vp::cuda_backend be{nullptr, resource};
+    const mesh_data m = mixed_triangles(500, 20.0f, 107);
+    const vp::grid g = box_grid({20, 20, 20});
+    const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+    vp::abuffer<vp::cuda_backend> first{be}, second{be};
+    ASSERT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), first).ok());
+    resource.most = resource.live; // the workspace is there already
+    const vp::status s = vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), second);
+    EXPECT_EQ(s.code, vp::status_code::out_of_memory);
+    EXPECT_EQ(s.where, vp::stage::abuffer_emit);
+    EXPECT_EQ(second.num_voxels(), 0u);
+    EXPECT_EQ(second.num_fragments(), 0u);
+}
+
+} // namespace

@@ -1,0 +1,150 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// voxelize_async into fragment lists: an A-buffer call that never waits and never allocates. The lists and their counts
+// lie in the caller's workspace, so a CUDA graph can capture the call and replay it with changed vertices. Capacities
+// are fixed beforehand; where the fragments do not fit, the lists are empty, and read_status says what was needed.
+
+#include <voxelpipe/device/voxelize_async.cuh>
+
+namespace voxelpipe {
+
+using device::list_counts;
+
+// Lists in device memory, laid out as in abuffer. Filled in by voxelize_async: the pointers go into its workspace and
+// hold for as long as that is used for the same call; what they point to is there when the stream has passed the call.
+template <class Payload = void>
+struct abuffer_view {
+    using payload_type = payload_storage<Payload>;
+
+    const list_counts* counts = nullptr;       // how many voxels and fragments there are; none where the call failed
+    const std::uint64_t* voxels = nullptr;     // occupied voxels, ascending
+    const std::uint64_t* offsets = nullptr;    // one more than voxels, where there are any
+    const std::uint32_t* primitives = nullptr; // one per fragment
+    const payload_type* payloads = nullptr;    // one per fragment; null where Payload is void
+    glm::ivec3 extent{0};
+
+    // Copies, then waits. Throws std::runtime_error with the CUDA error.
+    [[nodiscard]] host_abuffer<Payload> to_host(cuda_backend& backend) const {
+        host_abuffer<Payload> h;
+        h.extent = extent;
+        if (counts == nullptr) return h;
+        const auto copy = [&](void* to, const void* from, std::size_t bytes) {
+            if (bytes != 0) device::check(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, backend.stream));
+        };
+        try {
+            list_counts n{};
+            copy(&n, counts, sizeof(n));
+            device::check(cudaStreamSynchronize(backend.stream));
+            h.voxels.resize(n.voxels);
+            h.offsets.resize(n.voxels == 0 ? 0 : n.voxels + 1);
+            h.primitives.resize(n.fragments);
+            h.payloads.resize(std::is_void_v<Payload> ? 0 : n.fragments);
+            copy(h.voxels.data(), voxels, h.voxels.size() * sizeof(std::uint64_t));
+            copy(h.offsets.data(), offsets, h.offsets.size() * sizeof(std::uint64_t));
+            copy(h.primitives.data(), primitives, h.primitives.size() * sizeof(std::uint32_t));
+            copy(h.payloads.data(), payloads, h.payloads.size() * sizeof(payload_type));
+            device::check(cudaStreamSynchronize(backend.stream));
+        } catch (const device::cuda_failure& e) {
+            throw std::runtime_error(std::string("voxelpipe: ") + cudaGetErrorString(e.error));
+        }
+        return h;
+    }
+};
+
+namespace device {
+
+inline constexpr std::uint64_t most_list_fragments = 0xfffffff0u; // they are numbered with 32 bits
+
+// Carves the memory and, with Run, launches every stage and sets the view.
+template <coverage Rule, bool Run, class Key, class Payload, class Call>
+void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
+    pipeline_state* state = nullptr; // the first thing in the workspace: read_status looks there
+    const auto sorted = call.template go<Rule, Run, Key>(memory, state, stream);
+    const std::size_t room = call.limits.fragments;
+    auto* const counts = memory.take<list_counts>(1);
+    auto* const voxels = memory.take<std::uint64_t>(room);
+    auto* const offsets = memory.take<std::uint64_t>(room + 1);
+    auto* const primitives = memory.take<std::uint32_t>(room);
+    auto* const payloads = std::is_void_v<Payload> ? nullptr : memory.take<payload_storage<Payload>>(room);
+    if constexpr (Run) {
+        publish_lists_kernel<<<fill_device(room), threads_per_block, 0, stream>>>(
+            sorted, state, call.limits, counts, voxels, offsets, primitives, payloads);
+        check(cudaGetLastError(), stage::abuffer_emit);
+        lists = {counts, voxels, offsets, primitives, payloads, call.g.extent};
+    }
+}
+
+template <bool Run, class Payload, class Call>
+void list_async(const Call& call, coverage rule, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
+    const bool small = num_voxels(call.g) < std::numeric_limits<std::uint32_t>::max();
+    if (rule == coverage::thin)
+        small ? list_async<coverage::thin, Run, std::uint32_t>(call, memory, lists, stream)
+              : list_async<coverage::thin, Run, std::uint64_t>(call, memory, lists, stream);
+    else
+        small ? list_async<coverage::conservative, Run, std::uint32_t>(call, memory, lists, stream)
+              : list_async<coverage::conservative, Run, std::uint64_t>(call, memory, lists, stream);
+}
+
+template <class Call, class Payload>
+[[nodiscard]] std::size_t list_bytes(const Call& call, coverage rule, abuffer_view<Payload> lists) {
+    arena plan;
+    list_async<false>(call, rule, plan, lists, nullptr);
+    return plan.used();
+}
+
+} // namespace device
+
+// Bytes that voxelize_async needs for such a call; 0 where the arguments are refused. Of the limits, only `fragments`
+// and `fragment_records` count here.
+template <class Mesh, class VertexShader, class FragmentShader, class Payload>
+[[nodiscard]] std::size_t workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
+                                          const grid& g, const abuffer_view<Payload>& lists,
+                                          const voxelize_options& options, const workspace_limits& limits) {
+    using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
+    const status s = core::validate_draws(draws);
+    if (!s.ok() || !validate(g).ok() || limits.fragments > device::most_list_fragments) return 0;
+    try {
+        const call_type call{draws, g, static_cast<std::uint32_t>(s.counts.triangles_in),
+                             device::to_capacities(limits)};
+        return device::list_bytes(call, options.rule, lists);
+    } catch (const device::cuda_failure&) {
+        return 0;
+    }
+}
+
+// Puts the call on the backend's stream, sets `lists` to where its results will be, and returns. A status other than ok
+// means that nothing was launched, or that a launch failed; what the device finds out is in read_status.
+template <class Mesh, class VertexShader, class FragmentShader, class Payload>
+[[nodiscard]] status
+voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
+               abuffer_view<Payload>& lists, const voxelize_options& options, const workspace_view& workspace) {
+    if constexpr (core::shaders_fit_payload<Mesh, VertexShader, FragmentShader, Payload>()) {
+        using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
+        lists = {};
+        if (const status s = validate(g); !s.ok()) return s;
+        status s = core::validate_draws(draws);
+        if (!s.ok()) return s;
+        if (workspace.limits.fragments > device::most_list_fragments) return core::failure(status_code::size_overflow);
+        try {
+            const call_type call{draws, g, static_cast<std::uint32_t>(s.counts.triangles_in),
+                                 device::to_capacities(workspace.limits)};
+            const std::size_t need = device::list_bytes(call, options.rule, lists);
+            if (workspace.memory == nullptr || workspace.bytes < need) {
+                s.code = status_code::capacity_exceeded;
+                s.required = {0, workspace.limits.fragments, need};
+                return s;
+            }
+            device::arena memory(workspace.memory);
+            device::list_async<true>(call, options.rule, memory, lists, backend.stream);
+        } catch (const device::cuda_failure& e) {
+            return device::to_status(e);
+        }
+        return s;
+    } else {
+        return {};
+    }
+}
+
+} // namespace voxelpipe
