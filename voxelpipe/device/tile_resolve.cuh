@@ -168,7 +168,7 @@ template <coverage Rule, class Image, int Threads, int MinBlocks, class Scene, c
 void draw_tiles(const Scene& s, const Framebuffer& fb, const fine_raster_input& in, const split_tile* splits,
                 pipeline_state* state, const capacities& limits, cudaStream_t stream) {
     const auto kernel = fine_raster_kernel<Rule, Image, Threads, MinBlocks, Scene, Framebuffer>;
-    if (Image::bytes > 32 * 1024) // static shared memory counts too
+    if (Image::bytes > 16 * 1024) // static shared memory counts too, and 48 KB need no asking
         check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(Image::bytes)),
               stage::fine_raster);
     int blocks = 0;
