@@ -29,7 +29,10 @@ TEST(Tuning, PoliciesAreLegalWhereverTheyAreUsed) {
             ASSERT_TRUE(p.threads_per_block >= 32 && p.threads_per_block <= 1024);
             ASSERT_TRUE(p.log2_tile_size >= 3 && p.log2_tile_size <= 5);
             ASSERT_LE(p.threads_per_block * p.min_blocks_per_sm, a.threads_per_sm);
-            ASSERT_LE((std::int64_t{bits} << (3 * p.log2_tile_size)) / 8, a.shared_per_block - tuning::batch_bytes) << bits;
+            ASSERT_EQ(p.blocks_per_sm, tuning::fine_raster_numbers_of(a.capability).blocks_per_sm);
+            ASSERT_TRUE(p.blocks_per_sm >= 0 && p.threads_per_block * p.blocks_per_sm <= a.threads_per_sm);
+            ASSERT_LE((std::int64_t{bits} << (3 * p.log2_tile_size)) / 8, a.shared_per_block - tuning::batch_bytes)
+                << bits;
         }
 }
 

@@ -442,8 +442,8 @@ private:
         in.count_fragments = Group == 0 && !groups::has_ordered;
         in.count_voxels = in.count_fragments && options.count_voxels;
         in.track = in.count_voxels || image_words::has_atomic || image_words::has_winner;
-        draw_tiles<Rule, image_words, Policy.threads_per_block, Policy.min_blocks_per_sm>(s, fb, in, work.splits, state,
-                                                                                          limits, stream);
+        draw_tiles<Rule, image_words, Policy.threads_per_block, Policy.min_blocks_per_sm>(
+            s, fb, in, work.splits, state, limits, Policy.blocks_per_sm, stream);
     }
 
     template <coverage Rule, bool Run, class Key>

@@ -163,16 +163,17 @@ __global__ void restart_items(State* state) {
     state->next_item = 0;
 }
 
-// One fine pass over the work items for the targets of one image type.
+// One fine pass over the work items for the targets of one image type. blocks_per_sm: see fine_raster_policy.
 template <coverage Rule, class Image, int Threads, int MinBlocks, class Scene, class Framebuffer>
 void draw_tiles(const Scene& s, const Framebuffer& fb, const fine_raster_input& in, const split_tile* splits,
-                pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+                pipeline_state* state, const capacities& limits, int blocks_per_sm, cudaStream_t stream) {
     const auto kernel = fine_raster_kernel<Rule, Image, Threads, MinBlocks, Scene, Framebuffer>;
     if (Image::bytes > 16 * 1024) // static shared memory counts too, and 48 KB need no asking
         check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(Image::bytes)),
               stage::fine_raster);
     int blocks = 0;
     check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, Threads, Image::bytes), stage::fine_raster);
+    if (blocks_per_sm != 0 && blocks_per_sm < blocks) blocks = blocks_per_sm;
     restart_items<<<1, 1, 0, stream>>>(state);
     check(cudaGetLastError(), stage::fine_raster);
     kernel<<<static_cast<unsigned>((blocks < 1 ? 1 : blocks) * num_multiprocessors()), Threads, Image::bytes, stream>>>(

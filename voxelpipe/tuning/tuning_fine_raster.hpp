@@ -6,8 +6,9 @@
 // architecture. Numbers only. Results do not depend on them; a backend may be given another selector: a constexpr
 // functor (bits of a voxel, compute capability) -> policy, or (bits of a voxel) -> policy for all architectures.
 //
-// A policy is part of a kernel's type, so it is chosen at compile time for each architecture of the program's list, and
-// at run time among those by the device (with_policy). Architectures with equal policies share one kernel.
+// A policy is part of a kernel's type, all but blocks_per_sm, so it is chosen at compile time for each architecture of
+// the program's list, and at run time among those by the device (with_policy). Architectures with equal policies share
+// one kernel.
 
 #include <voxelpipe/tuning/architecture.hpp>
 
@@ -22,6 +23,7 @@ struct fine_raster_policy {
     int threads_per_block; // a multiple of 32, at most 1024
     int log2_tile_size;    // 3, 4 or 5: a tile is a cube of 8, 16 or 32 voxels
     int min_blocks_per_sm; // what the registers have to leave room for
+    int blocks_per_sm = 0; // persistent blocks that the host starts on a multiprocessor; 0: as many as fit
 
     friend constexpr bool operator==(const fine_raster_policy&, const fine_raster_policy&) = default;
 };
@@ -31,8 +33,8 @@ struct fine_raster_numbers {
     int capability;
     int threads_per_block;
     int min_blocks_per_sm;
-    int tile_bytes;    // the tile is the largest that needs no more than this
-    int blocks_per_sm; // persistent blocks that the host starts on a multiprocessor; 0: as many as fit
+    int tile_bytes; // the tile is the largest that needs no more than this
+    int blocks_per_sm;
 };
 
 inline constexpr std::array fine_raster_table{
@@ -59,7 +61,7 @@ struct fine_raster_selector {
         const fine_raster_numbers& numbers = fine_raster_numbers_of(capability);
         int log2_size = 5;
         while (log2_size > 3 && (std::int64_t{bits_per_voxel} << (3 * log2_size)) / 8 > numbers.tile_bytes) --log2_size;
-        return {numbers.threads_per_block, log2_size, numbers.min_blocks_per_sm};
+        return {numbers.threads_per_block, log2_size, numbers.min_blocks_per_sm, numbers.blocks_per_sm};
     }
 };
 
