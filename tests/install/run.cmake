@@ -6,6 +6,7 @@
 #   no_nvcc        the same, with no CUDA compiler to be found, and a configure of the project itself without one
 #   bare_compiler  the same prefix, one compiler call and no CMake
 #   fetch_content  FetchContent of the source tree as a subproject
+# find_package builds with optimisation; the others, where finding, compiling and linking is all there is to see, without.
 cmake_minimum_required(VERSION 3.24)
 
 function(run)
@@ -42,8 +43,12 @@ set(environment "${CMAKE_COMMAND}" -E env)
 if(WAY STREQUAL "no_nvcc")
   list(APPEND environment --unset=CUDACXX --unset=CUDA_PATH --unset=CUDA_HOME PATH=/usr/bin:/bin)
 endif()
+set(build_type Debug)
+if(WAY STREQUAL "find_package")
+  set(build_type Release)
+endif()
 set(configure ${environment} "${CMAKE_COMMAND}" -G "${GENERATOR}" "-DCMAKE_CXX_COMPILER=${CXX_COMPILER}"
-              "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}" "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}" -DCMAKE_BUILD_TYPE=Release)
+              "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}" "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}" -DCMAKE_BUILD_TYPE=${build_type})
 
 if(WAY STREQUAL "fetch_content")
   run(${configure} -S "${consumer}" -B "${build}" -DCONSUMER_USES=FetchContent
