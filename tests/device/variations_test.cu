@@ -22,12 +22,13 @@ namespace resources {
 // ---- memory resources: the forms that cuda_backend takes ------------------------------------------------------------
 
 struct account {
-    std::size_t live = 0;
+    std::size_t live = 0, total = 0;
     int calls = 0;
     void* take(std::size_t bytes, cudaStream_t stream) {
         void* p = nullptr;
         if (cudaMallocAsync(&p, bytes, stream) != cudaSuccess) throw std::bad_alloc();
         live += bytes;
+        total += bytes;
         ++calls;
         return p;
     }
@@ -118,9 +119,9 @@ TEST(Variations, EveryFormOfMemoryResourceServes) {
 
 // ---- policies -------------------------------------------------------------------------------------------------------
 
-template <int Threads, int Log2Size, int MinBlocks>
+template <int Threads, int Log2Size, int MinBlocks, int Blocks = 0>
 struct fixed_policy {
-    constexpr vp::tuning::fine_raster_policy operator()(int) const { return {Threads, Log2Size, MinBlocks}; }
+    constexpr vp::tuning::fine_raster_policy operator()(int) const { return {Threads, Log2Size, MinBlocks, Blocks}; }
 };
 
 using several = vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_xor>, vp::target<float, blend::add>,
@@ -156,8 +157,7 @@ several_results results_of(vp::cuda_backend& be, several& fb, const vp::status& 
 }
 
 template <class Selector>
-several_results with(const mesh_data& m, const vp::grid& g, vp::coverage rule) {
-    vp::cuda_backend be;
+several_results with(const mesh_data& m, const vp::grid& g, vp::coverage rule, vp::cuda_backend be = {}) {
     const vp::mesh mesh{be, m.positions, m.triangles};
     several fb{be, g.extent};
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, several_values>;
@@ -176,7 +176,58 @@ TEST(Variations, ThePolicyDoesNotShow) {
         expect_same_results(expected, with<fixed_policy<32, 3, 1>>(m, g, rule));
         expect_same_results(expected, with<fixed_policy<128, 3, 4>>(m, g, rule));
         expect_same_results(expected, with<fixed_policy<512, 4, 1>>(m, g, rule));
+        expect_same_results(expected, with<fixed_policy<512, 4, 1, 1>>(m, g, rule));
     }
+}
+
+// Small tiles for the code of one architecture, larger ones for all others.
+template <int Capability>
+struct small_tiles_for {
+    constexpr vp::tuning::fine_raster_policy operator()(int bits, int capability) const {
+        return capability == Capability ? fixed_policy<32, 3, 1>{}(bits) : fixed_policy<512, 4, 1>{}(bits);
+    }
+};
+
+__global__ void any_kernel() {}
+
+// The compute capability whose code the current device runs, from the code itself.
+int running_capability() {
+    cudaFuncAttributes attributes{};
+    EXPECT_EQ(cudaFuncGetAttributes(&attributes, any_kernel), cudaSuccess);
+    return attributes.ptxVersion;
+}
+
+struct policy_run {
+    several_results results;
+    std::size_t bytes; // of all allocations: the tile's size shows in the workspace's
+};
+template <class Selector>
+policy_run measure(const mesh_data& m, const vp::grid& g) {
+    resources::async_form counted;
+    policy_run r{with<Selector>(m, g, vp::coverage::conservative, vp::cuda_backend{nullptr, counted}), 0};
+    r.bytes = counted.total;
+    return r;
+}
+
+TEST(Variations, TheSelectorIsAskedForTheArchitectureThatRuns) {
+    const mesh_data m = mixed_triangles(60, 60.0f, 93); // few: the first try's memory is enough
+    const vp::grid g = box_grid({61, 50, 67});
+    const policy_run small = measure<fixed_policy<32, 3, 1>>(m, g), large = measure<fixed_policy<512, 4, 1>>(m, g);
+    ASSERT_NE(small.bytes, large.bytes);
+    int times_small = 0;
+    const auto expect_own = [&]<int Capability>(std::integral_constant<int, Capability>) {
+        const policy_run r = measure<small_tiles_for<Capability>>(m, g);
+        const bool runs = Capability == running_capability();
+        times_small += runs;
+        EXPECT_EQ(r.bytes, runs ? small.bytes : large.bytes) << Capability;
+        expect_same_results(small.results, r.results);
+    };
+    [&]<std::size_t... I>(std::index_sequence<I...>) {
+        (expect_own(std::integral_constant<int, vp::tuning::compiled_architectures()[I].capability>{}), ...);
+    }
+    (std::make_index_sequence<vp::tuning::compiled_architectures().size()>{});
+    EXPECT_EQ(times_small, 1);
+    EXPECT_EQ(measure<small_tiles_for<0>>(m, g).bytes, large.bytes); // no such architecture
 }
 
 // ---- order and company ----------------------------------------------------------------------------------------------
