@@ -17,7 +17,7 @@
 #include <voxelpipe/voxelize.hpp>
 
 #if defined(__CUDACC__)
-#include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/device/abuffer_async.cuh>
+#include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>
 #endif

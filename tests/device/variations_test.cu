@@ -215,14 +215,17 @@ TEST(Variations, TheSelectorIsAskedForTheArchitectureThatRuns) {
     const policy_run small = measure<fixed_policy<32, 3, 1>>(m, g), large = measure<fixed_policy<512, 4, 1>>(m, g);
     ASSERT_NE(small.bytes, large.bytes);
     int times_small = 0;
-    vp::core::for_each_index<vp::tuning::compiled_architectures().size()>([&]<std::size_t I>() {
-        constexpr int capability = vp::tuning::compiled_architectures()[I].capability;
-        const policy_run r = measure<small_tiles_for<capability>>(m, g);
-        const bool runs = capability == running_capability();
+    const auto expect_own = [&]<int Capability>(std::integral_constant<int, Capability>) {
+        const policy_run r = measure<small_tiles_for<Capability>>(m, g);
+        const bool runs = Capability == running_capability();
         times_small += runs;
-        EXPECT_EQ(r.bytes, runs ? small.bytes : large.bytes) << capability;
+        EXPECT_EQ(r.bytes, runs ? small.bytes : large.bytes) << Capability;
         expect_same_results(small.results, r.results);
-    });
+    };
+    [&]<std::size_t... I>(std::index_sequence<I...>) {
+        (expect_own(std::integral_constant<int, vp::tuning::compiled_architectures()[I].capability>{}), ...);
+    }
+    (std::make_index_sequence<vp::tuning::compiled_architectures().size()>{});
     EXPECT_EQ(times_small, 1);
     EXPECT_EQ(measure<small_tiles_for<0>>(m, g).bytes, large.bytes); // no such architecture
 }
