@@ -7,9 +7,11 @@
 
 #include <voxelpipe/device/dispatch.cuh>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -148,7 +150,8 @@ public:
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              const framebuffer_view<Targets...>& fb, const voxelize_options& options,
                              std::uint64_t triangles_in) {
-        return attempt(triangles_in, [&](const device::capacities& limits, device::pipeline_state& state) {
+        const call_key key{triangles_in, g.extent, g.offset, options.rule, false};
+        return attempt(key, [&](const device::capacities& limits, device::pipeline_state& state) {
             device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits, [&](const auto& call) {
                 if (options.rule == coverage::thin)
                     launch<coverage::thin>(call, state);
@@ -164,7 +167,8 @@ public:
                              std::uint64_t triangles_in) {
         using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
         lists = abuffer<cuda_backend, Payload>(*this);
-        status s = attempt(triangles_in, [&](const device::capacities& limits, device::pipeline_state& state) {
+        const call_key key{triangles_in, g.extent, g.offset, options.rule, true};
+        status s = attempt(key, [&](const device::capacities& limits, device::pipeline_state& state) {
             const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits};
             const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
             if (options.rule == coverage::thin)
@@ -186,12 +190,21 @@ public:
     void release() { workspace_ = {}; }
 
 private:
-    // Runs the stages with the capacities of the last call, waits, and once more where something did not fit.
+    // What tells calls apart that may need different capacities, as far as the host knows.
+    struct call_key {
+        std::uint64_t triangles;
+        glm::ivec3 extent, offset;
+        coverage rule;
+        bool lists;
+        friend bool operator==(const call_key&, const call_key&) = default;
+    };
+
+    // Runs the stages with capacities that should do, waits, and once more where something did not fit.
     template <class Launch>
-    [[nodiscard]] status attempt(std::uint64_t triangles_in, Launch&& launch_stages) {
+    [[nodiscard]] status attempt(const call_key& key, Launch&& launch_stages) {
         status s;
         try {
-            device::capacities limits = guess(triangles_in);
+            device::capacities limits = guess(key);
             for (int tries = 0;; ++tries) {
                 device::pipeline_state state{};
                 launch_stages(limits, state);
@@ -201,6 +214,8 @@ private:
                 }
                 if (!device::has_failed(state, limits)) {
                     s = device::to_status(state);
+                    last_ = key;
+                    needed_ = {state.tile_pairs, state.tile_records, state.list_fragments, state.fragment_records};
                     break;
                 }
                 // A pass that overflowed its records did not count all of its cells: the next try may need a third.
@@ -214,14 +229,16 @@ private:
                 raise(limits.tile_records, state.tile_records);
                 raise(limits.fragments, state.list_fragments);
                 raise(limits.fragment_records, state.fragment_records);
-                known_ = limits;
+                most_ = {std::max(most_.tile_pairs, limits.tile_pairs),
+                         std::max(most_.tile_records, limits.tile_records), std::max(most_.fragments, limits.fragments),
+                         std::max(most_.fragment_records, limits.fragment_records)};
             }
         } catch (const device::cuda_failure& e) {
             s = device::to_status(e);
         } catch (const std::bad_alloc&) {
             s = core::failure(status_code::out_of_memory);
         }
-        s.counts.triangles_in = triangles_in;
+        s.counts.triangles_in = key.triangles;
         return s;
     }
 
@@ -229,13 +246,18 @@ private:
         if (need > capacity) capacity = need + need / 16;
     }
 
-    [[nodiscard]] device::capacities guess(std::uint64_t triangles) const {
-        const auto at_least = [](unsigned long long known, std::uint64_t first) {
-            return known > first ? known : first;
+    // A call like the last one needs about as much, and what is sorted is what there is room for. Otherwise what a
+    // first call needs, or more where an earlier one did.
+    [[nodiscard]] device::capacities guess(const call_key& key) const {
+        const bool known = last_ == key;
+        const auto room = [&](unsigned long long needed, unsigned long long most, std::uint64_t first) {
+            return known && needed != 0 ? needed + needed / 16 + 1024 : std::max<unsigned long long>(most, first);
         };
-        return {at_least(known_.tile_pairs, triangles + triangles / 4 + 16384),
-                at_least(known_.tile_records, triangles / 16 + 4096), at_least(known_.fragments, 4 * triangles + 65536),
-                at_least(known_.fragment_records, triangles / 16 + 4096)};
+        const std::uint64_t n = key.triangles;
+        return {room(needed_.tile_pairs, most_.tile_pairs, n + n / 4 + 16384),
+                room(needed_.tile_records, most_.tile_records, n / 16 + 4096),
+                room(needed_.fragments, most_.fragments, 4 * n + 65536),
+                room(needed_.fragment_records, most_.fragment_records, n / 16 + 4096)};
     }
 
     // The workspace, at least so large.
@@ -292,7 +314,9 @@ private:
         lists.payloads = std::move(payloads);
     }
 
-    device::capacities known_{};
+    device::capacities most_{};    // that any call has needed
+    std::optional<call_key> last_; // the call that
+    device::capacities needed_{};  // needed this
     device_block workspace_;
 };
 
