@@ -2,10 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A-buffer: every fragment, ordered by (voxel, primitive). Count -> scan -> emit leaves the fragments by ascending
-// primitive; a stable sort by voxel over just the bits in use gives the order; the first fragment of each voxel is then
-// selected. Memory is in proportion to the fragments (paper section 3, A-buffer).
+// A-buffer: every fragment, ordered by (voxel, primitive). Fragments of a shader that computes are counted, given their
+// places by a scan and written by ascending primitive; those of a constant one are listed in one pass, in any order
+// (list_raster.cuh). A stable radix sort by voxel over just the bits in use follows, and the first fragment of each
+// voxel is selected; what was listed in any order is then put in order within each voxel (fragment_order.cuh). Memory is
+// in proportion to the fragments (paper section 3, A-buffer).
 
+#include <voxelpipe/device/fragment_order.cuh>
 #include <voxelpipe/device/fragment_shade.cuh>
 #include <voxelpipe/device/list_raster.cuh>
 #include <voxelpipe/device/tile_sort.cuh>
@@ -49,14 +52,14 @@ struct fragment_cells {
     }
     [[nodiscard]] __device__ static bool keep(const cell& c) { return c.out.keep; }
     __device__ void store(unsigned long long at, std::uint32_t primitive, const cell& c) const {
-        keys[at] = static_cast<Key>(c.voxel);
+        std::uint32_t value = primitive;
         if constexpr (has_payload) {
-            values[at] = static_cast<std::uint32_t>(at);
+            value = static_cast<std::uint32_t>(at);
             primitives[at] = primitive;
             payloads[at] = MakePayload{}(c.out);
-        } else {
-            values[at] = primitive;
         }
+        keys[at] = static_cast<Key>(c.voxel);
+        values[at] = value;
     }
 };
 
@@ -101,12 +104,34 @@ template <class Key, class Payload>
 struct list_buffers {
     Key* keys[2];
     std::uint32_t* values[2];
+    int bits;
     std::uint32_t* primitives;          // by place; null without payloads
     Payload* payloads;                  // by place
     unsigned long long* first_of_voxel; // fragment numbers, ascending; list_voxels of them
     void* storage;
     std::size_t storage_bytes;
-    int bits;
+};
+
+// Arrays for counting and writing the fragments of shaders that compute.
+struct list_memory {
+    share_buffers share;
+    void* storage; // of the scan
+    std::size_t storage_bytes;
+
+    list_memory(arena& memory, std::uint32_t num_primitives, unsigned long long record_capacity)
+        : share{}, storage_bytes(share_scan_bytes(num_primitives)) {
+        share.counts = memory.take<std::uint32_t>(num_primitives);
+        share.offsets = memory.take<unsigned long long>(num_primitives);
+        share.records = memory.take<chunk_record>(record_capacity);
+        share.record_capacity = record_capacity;
+        storage = memory.take<std::byte>(storage_bytes);
+    }
+    [[nodiscard]] list_memory with(pipeline_state* state) const {
+        list_memory m = *this;
+        m.share.num_records = &state->fragment_records;
+        m.share.num_cells = &state->list_fragments;
+        return m;
+    }
 };
 
 // The sorted lists, where they came to lie.
@@ -114,39 +139,67 @@ template <class Key, class Payload>
 struct fragment_lists {
     const Key* keys;
     const std::uint32_t* values;
-    const std::uint32_t* primitives;
-    const Payload* payloads;
+    const std::uint32_t* primitives; // null: a value is a primitive
+    const Payload* payloads;         // null: all are `payload`
     const unsigned long long* first_of_voxel;
+    Payload payload;
+
+    [[nodiscard]] __device__ std::uint32_t primitive(std::uint64_t i) const {
+        const std::uint32_t value = values[i];
+        return primitives == nullptr ? value : primitives[value];
+    }
+    [[nodiscard]] __device__ const Payload& payload_of(std::uint64_t i) const {
+        return payloads == nullptr ? payload : payloads[values[i]];
+    }
 };
 
-template <coverage Rule, class MakePayload, class Scene, class Key, class Payload>
-[[nodiscard]] fragment_lists<Key, Payload>
-build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const share_buffers& share, pipeline_state* state,
-            const capacities& limits, bool counts_triangles, cudaStream_t stream) {
-    const fragment_cells<Rule, Scene, Key, Payload, MakePayload> op{
-        s, b.keys[0], b.values[0], b.primitives, b.payloads, counts_triangles};
-    bool listed = false;
-    if constexpr (core::is_solid<decltype(s.one.fragment_shader)>) {
-        listed = is_listable(s.geo);
-        if (listed) {
-            list_count(s.geo, op, share, state, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
-            list_emit(s.geo, op, share, state, limits, stage::abuffer_emit, stream);
-        }
-    }
-    if (!listed) {
-        share_count(s.geo, op, share, state, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
-        share_emit(s.geo, op, share, state, limits, stage::abuffer_emit, stream);
-    }
-    fill_end(b.keys[0], b.values[0], share.num_cells, limits.fragments, state, limits, stream);
+// What was listed, sorted by voxel, and the first fragment of each.
+template <class Key, class Payload>
+[[nodiscard]] fragment_lists<Key, Payload> sort_lists(const list_buffers<Key, Payload>& b, pipeline_state* state,
+                                                      const capacities& limits, cudaStream_t stream) {
+    fill_end(b.keys[0], b.values[0], &state->list_fragments, limits.fragments, state, limits, stream);
     cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
     cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
     sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
+    fragment_lists<Key, Payload> lists{};
+    lists.keys = keys.Current();
+    lists.values = values.Current();
+    lists.primitives = b.primitives;
+    lists.payloads = b.payloads;
+    lists.first_of_voxel = b.first_of_voxel;
     std::size_t bytes = b.storage_bytes;
     check(cub::DeviceSelect::If(b.storage, bytes, thrust::counting_iterator<unsigned long long>(0), b.first_of_voxel,
                                 &state->list_voxels, limits.fragments,
-                                is_first_of_voxel<Key>{keys.Current(), state, limits}, stream),
+                                is_first_of_voxel<Key>{lists.keys, state, limits}, stream),
           stage::abuffer_emit);
-    return {keys.Current(), values.Current(), b.primitives, b.payloads, b.first_of_voxel};
+    return lists;
+}
+
+// The same for primitives that were listed in any order.
+template <class Payload>
+[[nodiscard]] fragment_lists<std::uint32_t, Payload> sort_unordered(const list_buffers<std::uint32_t, Payload>& b,
+                                                                    const order_lists& lists, pipeline_state* state,
+                                                                    const capacities& limits, cudaStream_t stream) {
+    fragment_lists<std::uint32_t, Payload> sorted = sort_lists(b, state, limits, stream);
+    const bool second = sorted.values == b.values[1], second_key = sorted.keys == b.keys[1];
+    order_fragments(
+        {b.first_of_voxel, b.values[second ? 1 : 0], b.values[second ? 0 : 1], b.keys[second_key ? 0 : 1], lists},
+        state, limits, stream);
+    sorted.values = b.values[second ? 0 : 1];
+    sorted.primitives = nullptr; // a value is a primitive
+    sorted.payloads = nullptr;
+    return sorted;
+}
+
+template <coverage Rule, class MakePayload, class Scene, class Key, class Payload>
+[[nodiscard]] fragment_lists<Key, Payload>
+build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const list_memory& m, pipeline_state* state,
+            const capacities& limits, bool counts_triangles, cudaStream_t stream) {
+    const fragment_cells<Rule, Scene, Key, Payload, MakePayload> op{
+        s, b.keys[0], b.values[0], b.primitives, b.payloads, counts_triangles};
+    share_count(s.geo, op, m.share, state, m.storage, m.storage_bytes, stage::abuffer_emit, stream);
+    share_emit(s.geo, op, m.share, state, limits, stage::abuffer_emit, stream);
+    return sort_lists(b, state, limits, stream);
 }
 
 // ---- into an A-buffer -----------------------------------------------------------------------------------------------
@@ -170,12 +223,11 @@ __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint6
     }
     if (thread == 0 && num_voxels != 0) offsets[num_voxels] = num_fragments;
     for (std::uint64_t i = thread; i < num_fragments; i += threads) {
-        const std::uint32_t v = lists.values[i];
         if constexpr (std::is_same_v<Payload, no_payload>) {
-            primitives[i] = v;
+            primitives[i] = lists.values[i];
         } else {
-            primitives[i] = lists.primitives[v];
-            payloads[i] = lists.payloads[v];
+            primitives[i] = lists.primitive(i);
+            payloads[i] = lists.payload_of(i);
         }
     }
 }

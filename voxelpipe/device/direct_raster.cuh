@@ -26,6 +26,20 @@ struct large_list {
     std::uint32_t* mediums; // small triangles that are much work for one thread
     unsigned long long* num_mediums;
 
+    [[nodiscard]] static large_list take(arena& memory, std::size_t num_triangles) {
+        large_list l{};
+        l.triangles = memory.take<std::uint32_t>(num_triangles);
+        l.first_records = memory.take<unsigned long long>(num_triangles);
+        l.mediums = memory.take<std::uint32_t>(num_triangles);
+        return l;
+    }
+    // With its counters, which are zeroed.
+    [[nodiscard]] large_list with(pipeline_state* state) const {
+        large_list l = *this;
+        l.next = &state->next_large;
+        l.num_mediums = &state->num_mediums;
+        return l;
+    }
     [[nodiscard]] static constexpr bool holds(std::uint64_t triangles, std::uint64_t records_each) {
         return triangles < (std::uint64_t{1} << (64 - record_bits)) &&
                triangles * records_each < (std::uint64_t{1} << record_bits);
@@ -37,46 +51,19 @@ struct large_list {
     }
 };
 
-template <coverage Rule, class Source, class Framebuffer, class Values>
+// One draw. Output says where its fragments go, and has the sink that takes them there: framebuffer_output, or
+// list_output (list_raster.cuh).
+template <coverage Rule, class Source, class Output>
 struct direct_call {
     static constexpr coverage rule = Rule;
+    using source_type = Source;
+    using sink = typename Output::template sink<direct_call>;
     raster_input<Source> in;
-    Framebuffer fb;
-    Values values;
-    int counting_target; // which target tells first touches, for the voxel counter; -1: none is wanted
+    Output out;
     large_list large;
 };
 
-// Fragments and first touches of one thread.
-struct direct_counts {
-    unsigned fragments = 0, voxels = 0; // a thread cannot write 2^32 before the largest list ends
-};
-
-// Fragments in the voxels x0 + i of a row, for the bits i of the mask, into every target.
-template <class Call>
-__device__ VOXELPIPE_INLINE void blend_into_all(const Call& call, int x0, int y, int z, word mask,
-                                                direct_counts& counts) {
-    if (mask == 0) return;
-    counts.fragments += static_cast<unsigned>(__popc(mask));
-    core::for_each_index<targets_of<decltype(call.fb)>::count>([&]<std::size_t K>() {
-        const auto& t = voxelpipe::get<K>(call.fb.targets);
-        if (t.load == load_operation::off) return;
-        counts.voxels +=
-            blend_row(t, x0, y, z, mask, voxelpipe::get<K>(call.values), call.counting_target == static_cast<int>(K));
-    });
-}
-
-template <class Call>
-__device__ VOXELPIPE_INLINE void blend_four_into_all(const Call& call, int x, int y, int z, const word (&mask)[4],
-                                                     bool along_y, direct_counts& counts) {
-    counts.fragments += static_cast<unsigned>(__popc(mask[0] | mask[1] << 2 | mask[2] << 4 | mask[3] << 6));
-    core::for_each_index<targets_of<decltype(call.fb)>::count>([&]<std::size_t K>() {
-        const auto& t = voxelpipe::get<K>(call.fb.targets);
-        if (t.load == load_operation::off) return;
-        counts.voxels += blend_four(t, x, y, z, mask, along_y, voxelpipe::get<K>(call.values),
-                                    call.counting_target == static_cast<int>(K));
-    });
-}
+inline constexpr int most_direct_extent = 1 << 16; // bricks are numbered with 16 bits, voxels with 32
 
 // ---- large triangles ------------------------------------------------------------------------------------------------
 
@@ -136,22 +123,21 @@ __device__ __noinline__ core::triangle_class push_large(const Call& call, std::u
 }
 
 // Rows of bits along x from spans of columns: columns next to each other with one voxel at the same depth become one.
-template <class Call>
+template <class Sink>
 struct span_writer {
-    const Call& call;
-    direct_counts& counts;
+    Sink& sink;
     int x = 0, y = 0, z = 0; // of the row that waits
     word mask = 0;
 
     __device__ VOXELPIPE_INLINE void flush() {
-        blend_into_all(call, x, y, z, mask, counts);
+        if (mask != 0) sink.row(x, y, z, mask);
         mask = 0;
     }
     __device__ VOXELPIPE_INLINE void span(int axis, int u, int v, int w0, int w1) {
         if (axis == 0) {
             for (int at = w0; at <= w1; at += 32) {
                 const int n = w1 - at + 1;
-                blend_into_all(call, at, u, v, n >= 32 ? ~0u : (1u << n) - 1, counts);
+                sink.row(at, u, v, n >= 32 ? ~0u : (1u << n) - 1);
             }
             return;
         }
@@ -191,29 +177,14 @@ __global__ void check_indices_kernel(const Index* indices, std::uint64_t count, 
     if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, 1u);
 }
 
-// Fragments go into the targets.
+// What every sink of a direct call does with triangles that have no fragments here.
 template <class Call>
-struct blending_sink {
-    static constexpr bool names_triangles = false;
-    static constexpr bool takes_mediums = true;
-
+struct direct_sink {
     const Call& call;
-    unsigned* dropped; // by triangle_class, of the block
-    direct_counts counts{};
+    unsigned* dropped; // by triangle_class, of the block; null where all triangles are drawn
 
-    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool check(std::uint32_t, const glm::uvec3&) {
-        return true; // check_indices has run
-    }
-    __device__ VOXELPIPE_INLINE static void begin(std::uint32_t) {}
-    __device__ VOXELPIPE_INLINE static void end() {}
-    __device__ VOXELPIPE_INLINE static void none(std::uint32_t) {}
-    __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
-        blend_into_all(call, x0, y, z, mask, counts);
-    }
-    __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4], bool along_y) {
-        blend_four_into_all(call, x, y, z, mask, along_y, counts);
-    }
-    __device__ VOXELPIPE_INLINE core::triangle_class big(std::uint32_t triangle, const glm::uvec3& index) {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE core::triangle_class big(std::uint32_t triangle,
+                                                                       const glm::uvec3& index) {
         return push_large(call, triangle, index);
     }
     __device__ VOXELPIPE_INLINE void mediums(bool wanted, std::uint32_t triangle) {
@@ -230,30 +201,87 @@ struct blending_sink {
     }
 };
 
+// Fragments go into the targets.
+template <class Call>
+struct blending_sink : direct_sink<Call> {
+    static constexpr bool names_triangles = false;
+    static constexpr bool buffers = false;
+    static constexpr bool checks_indices = false; // check_indices has run
+    static constexpr int min_blocks = raster_min_blocks;
+    struct memory {};
+
+    // Fragments and first touches of one thread, which cannot write 2^32 before the largest list ends.
+    unsigned fragments = 0, voxels = 0;
+
+    __device__ VOXELPIPE_INLINE blending_sink(const Call& call, unsigned* dropped, memory&)
+        : direct_sink<Call>{call, dropped} {}
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool check(const glm::uvec3&) { return true; }
+    __device__ VOXELPIPE_INLINE static void begin(std::uint32_t) {}
+    // In the voxels x0 + i of a row, for the bits i of the mask.
+    __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
+        if (mask == 0) return;
+        fragments += static_cast<unsigned>(__popc(mask));
+        each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
+            voxels += blend_row(t, x0, y, z, mask, voxelpipe::get<K>(this->call.out.values), count_first);
+        });
+    }
+    __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4], bool along_y) {
+        fragments += static_cast<unsigned>(__popc(mask[0] | mask[1] << 2 | mask[2] << 4 | mask[3] << 6));
+        each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
+            voxels += blend_four(t, x, y, z, mask, along_y, voxelpipe::get<K>(this->call.out.values), count_first);
+        });
+    }
+    // Adds up; all threads of the block take part.
+    __device__ void finish(pipeline_state* state) const {
+        const auto add = [](unsigned mine, unsigned long long* total) {
+            const unsigned long long sum = block_sum(mine);
+            if (threadIdx.x == 0 && sum != 0) atomicAdd(total, sum);
+        };
+        add(fragments, &state->fragments);
+        if (this->call.out.counting_target >= 0) add(voxels, &state->voxels);
+    }
+
+private:
+    template <class F>
+    __device__ VOXELPIPE_INLINE void each_target(F&& f) const {
+        core::for_each_index<targets_of<decltype(this->call.out.fb)>::count>([&]<std::size_t K>() {
+            const auto& t = voxelpipe::get<K>(this->call.out.fb.targets);
+            if (t.load != load_operation::off)
+                f.template operator()<K>(t, this->call.out.counting_target == static_cast<int>(K));
+        });
+    }
+};
+
+template <class Framebuffer, class Values>
+struct framebuffer_output {
+    template <class Call>
+    using sink = blending_sink<Call>;
+    Framebuffer fb;
+    Values values;
+    int counting_target; // which target tells first touches, for the voxel counter; -1: none is wanted
+};
+
 // Whether a triangle's fragments are found and written, or why it has none, is decided here for each of them.
 template <class Call>
 __global__ __launch_bounds__(raster_threads,
-                             raster_min_blocks) void direct_raster_kernel(const __grid_constant__ Call call,
-                                                                          pipeline_state* state) {
+                             Call::sink::min_blocks) void direct_raster_kernel(const __grid_constant__ Call call,
+                                                                               pipeline_state* state) {
     using core::triangle_class;
+    using sink_type = typename Call::sink;
     constexpr int warps = raster_threads / 32;
     __shared__ warp_queues queues[warps];
+    __shared__ typename sink_type::memory memories[warps];
     __shared__ int left[3][warps];
     __shared__ unsigned dropped[5]; // by triangle_class
-    if (state->index_error != 0) return;
+    if constexpr (!sink_type::checks_indices) {
+        if (state->index_error != 0) return;
+    }
     if (threadIdx.x < 5) dropped[threadIdx.x] = 0;
     __syncthreads();
-    blending_sink<Call> sink{call, dropped};
-    raster_warp<Call::rule, std::remove_cvref_t<decltype(call.in.source)>, blending_sink<Call>> warp{
-        call.in, queues[threadIdx.x / 32], sink};
+    sink_type sink(call, dropped, memories[threadIdx.x / 32]);
+    raster_warp<Call::rule, typename Call::source_type, sink_type> warp{call.in, queues[threadIdx.x / 32], sink};
     const unsigned looked_at = warp.run(queues, left);
-
-    const auto add = [&](std::uint64_t mine, unsigned long long* total) {
-        const unsigned long long sum = block_sum(mine);
-        if (threadIdx.x == 0 && sum != 0) atomicAdd(total, sum);
-    };
-    add(sink.counts.fragments, &state->fragments);
-    if (call.counting_target >= 0) add(sink.counts.voxels, &state->voxels);
+    sink.finish(state);
     const unsigned long long all = block_sum(threadIdx.x % 32 == 0 ? looked_at : 0);
     if (threadIdx.x == 0) {
         const auto number = [&](triangle_class kind, unsigned long long* total) {
@@ -285,7 +313,9 @@ __global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const
                                                                            pipeline_state* state) {
     constexpr bool thin = Call::rule == coverage::thin;
     constexpr auto rule = core::to_rule(Call::rule);
+    using sink_type = typename Call::sink;
     __shared__ large_memory memories[thin ? 1 : large_warps];
+    __shared__ typename sink_type::memory sink_memories[large_warps];
     if (state->index_error != 0) return;
     const unsigned long long packed = *call.large.next;
     const unsigned long long records = packed & ((1ull << large_list::record_bits) - 1);
@@ -293,17 +323,13 @@ __global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const
     const unsigned long long warps = std::uint64_t{gridDim.x} * large_warps;
     const unsigned lane = threadIdx.x % 32;
     const core::voxel_box whole{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
-    blending_sink<Call> sink{call, nullptr};
-    direct_counts& counts = sink.counts;
+    sink_type sink(call, nullptr, sink_memories[threadIdx.x / 32]);
     const unsigned long long num_mediums = *call.large.num_mediums;
     const unsigned long long thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    for (unsigned long long m = thread / medium_lanes; m < num_mediums; m += warps * (32 / medium_lanes)) {
-        const near_triangle near = load_near<Call::rule>(call.in, call.in.source.triangle(call.large.mediums[m]));
-        if constexpr (thin)
-            (void)raster_thin(call.in, near.t, near.lo, near.box, static_cast<int>(lane) % medium_lanes, medium_lanes,
-                              sink);
-        else
-            raster_lanes(core::small_conservative(near.t, call.in.fraction), near.lo, near.box, sink);
+    constexpr unsigned at_once = 32 / medium_lanes; // triangles of a warp
+    for (unsigned long long first = thread / 32 * at_once; first < num_mediums; first += warps * at_once) {
+        const unsigned long long m = first + lane / medium_lanes;
+        raster_medium<Call::rule>(call.in, m < num_mediums, m < num_mediums ? call.large.mediums[m] : 0, sink);
     }
     __syncwarp();
     for (unsigned long long r = thread / 32; r < records; r += warps) {
@@ -316,6 +342,7 @@ __global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const
                 hi = middle;
         }
         const auto piece = static_cast<std::int64_t>((r - call.large.first_records[lo]) * chunks_per_record + lane);
+        sink.begin(call.large.triangles[lo]);
         const glm::uvec3 index = call.in.source.triangle(call.large.triangles[lo]);
         const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
                                      c = call.in.source.position(index.z);
@@ -325,37 +352,40 @@ __global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const
         const large_pieces<Call::rule> pieces(reach, axis);
         const bool valid = piece < pieces.count();
         if (!core::fits_narrow(a, b, c, call.in.fraction)) {
-            if (valid) {
-                span_writer<Call> writer{call, counts};
+            feed(sink, [&] {
+                if (!valid) return;
+                span_writer<sink_type> writer{sink};
                 for_each_wide_span<rule>(a, b, c, call.in.fraction, pieces.piece(piece),
                                          [&](const wide_span& s) { writer.span(axis, s.u, s.v, s.w_first, s.w_last); });
                 writer.flush();
-            }
+            });
             continue;
         }
         const core::voxel_box box = core::bounds(a, b, c, call.in.fraction);
         if constexpr (thin) {
-            if (!valid) continue;
-            const core::brick_thin t(a, b, c, box, axis, call.in.fraction);
-            const auto origin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
-            const auto last = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
-            const std::int64_t u0 = pieces.u(piece), v = pieces.v(piece);
-            if (v < origin[1] || v > last[1]) continue; // reach is a voxel wider
-            const auto u = static_cast<int>(u0 - origin[0]), at_v = static_cast<int>(v - origin[1]);
-            if (!t.meets_row(u, at_v)) continue;
-            // Columns of the bounding box, within the grid.
-            const std::int64_t from = u0 > origin[0] ? u0 : origin[0], to = u0 + core::brick_size - 1;
-            const std::int64_t begin = from > pieces.lo[0] ? from : pieces.lo[0];
-            const std::int64_t end = core::min3(to, last[0], pieces.hi[0]);
-            span_writer<Call> writer{call, counts};
-            t.from(u, at_v).template row<true>(static_cast<int>(begin - u0), static_cast<int>(end - u0), 0,
-                                               [&](int column, int depth) {
-                                                   const std::int64_t w = origin[2] + depth;
-                                                   if (w < pieces.lo[2] || w > pieces.hi[2]) return;
-                                                   writer.span(axis, static_cast<int>(u0) + column, static_cast<int>(v),
-                                                               static_cast<int>(w), static_cast<int>(w));
-                                               });
-            writer.flush();
+            feed(sink, [&] {
+                if (!valid) return;
+                const core::brick_thin t(a, b, c, box, axis, call.in.fraction);
+                const auto origin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
+                const auto last = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
+                const std::int64_t u0 = pieces.u(piece), v = pieces.v(piece);
+                if (v < origin[1] || v > last[1]) return; // reach is a voxel wider
+                const auto u = static_cast<int>(u0 - origin[0]), at_v = static_cast<int>(v - origin[1]);
+                if (!t.meets_row(u, at_v)) return;
+                // Columns of the bounding box, within the grid.
+                const std::int64_t from = u0 > origin[0] ? u0 : origin[0], to = u0 + core::brick_size - 1;
+                const std::int64_t begin = from > pieces.lo[0] ? from : pieces.lo[0];
+                const std::int64_t end = core::min3(to, last[0], pieces.hi[0]);
+                span_writer<sink_type> writer{sink};
+                t.from(u, at_v).template row<true>(
+                    static_cast<int>(begin - u0), static_cast<int>(end - u0), 0, [&](int column, int depth) {
+                        const std::int64_t w = origin[2] + depth;
+                        if (w < pieces.lo[2] || w > pieces.hi[2]) return;
+                        writer.span(axis, static_cast<int>(u0) + column, static_cast<int>(v), static_cast<int>(w),
+                                    static_cast<int>(w));
+                    });
+                writer.flush();
+            });
         } else {
             large_memory& memory = memories[threadIdx.x / 32];
             __syncwarp(); // the last triangle's bricks are done
@@ -369,19 +399,21 @@ __global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const
                 __syncwarp();
                 for (int first = 0; first < n; first += 32 / medium_lanes) {
                     const int at = first + static_cast<int>(lane) / medium_lanes;
-                    if (at >= n) continue;
-                    std::int32_t corner[3]; // in the grid
-                    int from[3];            // the same from the bounding box
-                    core::small_box part;
-                    for (int k = 0; k < 3; ++k) {
-                        corner[k] = memory.bricks[k][at] * core::brick_size;
-                        from[k] = corner[k] - static_cast<int>(box.lo[k]);
-                        part.lo[k] = reach.lo[k] > corner[k] ? static_cast<int>(reach.lo[k]) - corner[k] : 0;
-                        part.hi[k] = reach.hi[k] - corner[k] < core::brick_size - 1
-                                         ? static_cast<int>(reach.hi[k]) - corner[k]
-                                         : core::brick_size - 1;
-                    }
-                    raster_lanes(t.at(from[0], from[1], from[2]), corner, part, sink);
+                    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                        if (at >= n) return;
+                        std::int32_t corner[3]; // in the grid
+                        int from[3];            // the same from the bounding box
+                        core::small_box part;
+                        for (int k = 0; k < 3; ++k) {
+                            corner[k] = memory.bricks[k][at] * core::brick_size;
+                            from[k] = corner[k] - static_cast<int>(box.lo[k]);
+                            part.lo[k] = reach.lo[k] > corner[k] ? static_cast<int>(reach.lo[k]) - corner[k] : 0;
+                            part.hi[k] = reach.hi[k] - corner[k] < core::brick_size - 1
+                                             ? static_cast<int>(reach.hi[k]) - corner[k]
+                                             : core::brick_size - 1;
+                        }
+                        raster_lanes(t.at(from[0], from[1], from[2]), corner, part, sink);
+                    });
                 }
                 __syncwarp();
             };
@@ -422,12 +454,7 @@ __global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const
             raster_bricks(waiting);
         }
     }
-    const unsigned long long fragments = block_sum(counts.fragments);
-    if (threadIdx.x == 0 && fragments != 0) atomicAdd(&state->fragments, fragments);
-    if (call.counting_target >= 0) {
-        const unsigned long long voxels = block_sum(counts.voxels);
-        if (threadIdx.x == 0 && voxels != 0) atomicAdd(&state->voxels, voxels);
-    }
+    sink.finish(state);
 }
 
 inline void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangles, std::uint64_t num_vertices,
@@ -439,13 +466,13 @@ inline void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangl
 }
 
 template <class Call>
-void direct_raster(const Call& call, pipeline_state* state, cudaStream_t stream) {
-    const unsigned blocks = raster_blocks(call.in.num_triangles);
+void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream) {
+    const unsigned blocks = raster_blocks(call.in.num_triangles, Call::sink::min_blocks);
     direct_raster_kernel<Call><<<blocks, raster_threads, 0, stream>>>(call, state);
-    check(cudaGetLastError(), stage::fine_raster);
+    check(cudaGetLastError(), where);
     direct_large_kernel<Call>
         <<<static_cast<unsigned>(num_multiprocessors()) * 4, 32 * large_warps, 0, stream>>>(call, state);
-    check(cudaGetLastError(), stage::fine_raster);
+    check(cudaGetLastError(), where);
 }
 
 } // namespace voxelpipe::device

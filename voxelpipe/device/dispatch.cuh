@@ -195,20 +195,19 @@ private:
 
 // Fragment lists with payloads of one type.
 template <class Key, class Payload>
-[[nodiscard]] list_buffers<Key, Payload> take_lists(arena& memory, std::uint32_t num_primitives,
-                                                    std::uint64_t num_voxels, unsigned long long capacity) {
+[[nodiscard]] list_buffers<Key, Payload> take_lists(arena& memory, std::uint64_t num_voxels,
+                                                    unsigned long long capacity) {
     constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
     list_buffers<Key, Payload> b{};
     for (int i = 0; i < 2; ++i) {
         b.keys[i] = memory.take<Key>(capacity);
         b.values[i] = memory.take<std::uint32_t>(capacity);
     }
+    b.bits = key_bits(num_voxels);
+    b.storage_bytes = std::max(select_bytes<Key>(capacity), sort_bytes<Key>(capacity, b.bits));
     b.primitives = memory.take<std::uint32_t>(has_payload ? capacity : 0);
     b.payloads = memory.take<Payload>(has_payload ? capacity : 0);
     b.first_of_voxel = memory.take<unsigned long long>(capacity);
-    b.bits = key_bits(num_voxels);
-    b.storage_bytes =
-        std::max({sort_bytes<Key>(capacity, b.bits), select_bytes<Key>(capacity), share_scan_bytes(num_primitives)});
     b.storage = memory.take<std::byte>(b.storage_bytes);
     return b;
 }
@@ -231,7 +230,6 @@ inline constexpr bool can_be_direct<FragmentShader, framebuffer_view<Targets...>
                                                                                     (is_direct<Targets>() && ...);
 
 inline constexpr std::size_t most_direct_draws = 16; // each has launches of its own
-inline constexpr int most_direct_extent = 1 << 16;   // bricks are numbered with 16 bits, voxels with 32
 
 // ---- a framebuffer call ---------------------------------------------------------------------------------------------
 
@@ -324,13 +322,8 @@ private:
             most_triangles = std::max(most_triangles, d.mesh.triangles.size());
         }
         core::snapped_position* const positions = memory.take<core::snapped_position>(on_the_spot ? 0 : vertices);
-        large_list large{};
-        large.triangles = memory.take<std::uint32_t>(most_triangles);
-        large.first_records = memory.take<unsigned long long>(most_triangles);
-        large.mediums = memory.take<std::uint32_t>(most_triangles);
+        const large_list large = large_list::take(memory, most_triangles);
         if constexpr (Run) {
-            large.next = &state->next_large;
-            large.num_mediums = &state->num_mediums;
             check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
             for (const draw_type& d : draws)
                 check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);
@@ -344,14 +337,15 @@ private:
                 const draw_type& d = draws[i];
                 const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
                 if (num_triangles == 0) continue;
-                if (i != 0) check(cudaMemsetAsync(large.next, 0, 2 * sizeof(*large.next), stream));
+                if (i != 0) check(cudaMemsetAsync(&state->next_large, 0, 2 * sizeof(state->next_large), stream));
                 const auto raster = [&](const auto& source) {
                     using source_type = std::remove_cvref_t<decltype(source)>;
                     using values_type = decltype(d.fragment_shader.values);
-                    const direct_call<Rule, source_type, Framebuffer, values_type> call{
-                        source,          num_triangles, snap.fraction, g.extent, fb, d.fragment_shader.values,
-                        counting_target, large};
-                    direct_raster(call, state, stream);
+                    const direct_call<Rule, source_type, framebuffer_output<Framebuffer, values_type>> call{
+                        {source, num_triangles, snap.fraction, g.extent},
+                        {fb, d.fragment_shader.values, counting_target},
+                        large.with(state)};
+                    direct_raster(call, state, stage::fine_raster, stream);
                 };
                 if constexpr (on_the_spot) {
                     raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap,
@@ -449,15 +443,12 @@ private:
     template <coverage Rule, bool Run, class Key>
     [[nodiscard]] fragment_lists<Key, values> list_fragments(arena& memory, const scene_type& s, pipeline_state* state,
                                                              cudaStream_t stream) const {
-        share_buffers share = take_share(memory, num_primitives, limits.fragment_records);
-        const auto lists = take_lists<Key, values>(memory, num_primitives, num_voxels(g), limits.fragments);
-        if constexpr (Run) {
-            share.num_records = &state->fragment_records;
-            share.num_cells = &state->list_fragments;
-            return build_lists<Rule, all_values>(s, lists, share, state, limits, !in_tiles, stream);
-        } else {
+        const auto lists = take_lists<Key, values>(memory, num_voxels(g), limits.fragments);
+        const list_memory share(memory, num_primitives, limits.fragment_records);
+        if constexpr (Run)
+            return build_lists<Rule, all_values>(s, lists, share.with(state), state, limits, !in_tiles, stream);
+        else
             return {};
-        }
     }
 
     template <class Key, std::size_t... I>
@@ -500,15 +491,51 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     template <coverage Rule, bool Run, class Key>
     [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
         state = memory.take<pipeline_state>(1);
+        if constexpr (Run) check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
+        const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
+        if constexpr (core::is_solid<FragmentShader> && sizeof(Key) == sizeof(std::uint32_t)) {
+            if (is_listable(draws.size(), num_primitives, core::make_snap_transform(g).fraction, g.extent))
+                return go_direct<Rule, Run>(memory, lists, state, stream);
+        }
         const scene_buffers buffers(memory, draws);
-        share_buffers share = take_share(memory, num_primitives, limits.fragment_records);
-        const auto lists = take_lists<Key, Payload>(memory, num_primitives, num_voxels(g), limits.fragments);
+        const list_memory share(memory, num_primitives, limits.fragment_records);
+        if constexpr (Run)
+            return build_lists<Rule, first_value>(buffers.shade(draws, g, stream), lists, share.with(state), state,
+                                                  limits, true, stream);
+        else
+            return {};
+    }
+
+private:
+    // One draw of a constant shader.
+    template <coverage Rule, bool Run, class Key>
+    [[nodiscard]] fragment_lists<Key, Payload> go_direct(arena& memory, const list_buffers<Key, Payload>& lists,
+                                                         pipeline_state* state, cudaStream_t stream) const {
+        constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
+        const draw_type& d = draws[0];
+        core::snapped_position* const positions =
+            memory.take<core::snapped_position>(on_the_spot ? 0 : d.mesh.positions.size());
+        const large_list large = large_list::take(memory, num_primitives);
+        const order_lists order = order_lists::take(memory, limits.fragments);
         if constexpr (Run) {
-            check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
-            const scene_type s = buffers.shade(draws, g, stream);
-            share.num_records = &state->fragment_records;
-            share.num_cells = &state->list_fragments;
-            return build_lists<Rule, first_value>(s, lists, share, state, limits, true, stream);
+            const core::snap_transform snap = core::make_snap_transform(g);
+            const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
+            const auto raster = [&](const auto& source) {
+                const raster_input<std::remove_cvref_t<decltype(source)>> in{source, num_primitives, snap.fraction,
+                                                                             g.extent};
+                list_raster<Rule>(in, num_vertices, large.with(state), lists.keys[0], lists.values[0], state, limits,
+                                  stream);
+            };
+            if constexpr (on_the_spot) {
+                raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, 0});
+            } else {
+                vertex_shade(d.mesh, d.vertex_shader, snap, 0, positions, static_cast<no_varyings*>(nullptr), stream);
+                raster(stored_source{{d.mesh.triangles.data(), positions, 0, num_vertices}});
+            }
+            fragment_lists<Key, Payload> sorted = sort_unordered(lists, order, state, limits, stream);
+            if constexpr (!std::is_same_v<Payload, no_payload>)
+                sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
+            return sorted;
         } else {
             return {};
         }

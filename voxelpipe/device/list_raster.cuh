@@ -2,182 +2,163 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The two passes of work_share.cuh, count and emit, for fragments of a constant shader: small triangles go through
-// small_raster.cuh, which knows their fragments without shading any. Larger ones are cut into chunks as before. The
-// fragments and their order are those of the other way.
+// Fragment lists of a constant shader: direct_raster.cuh with a sink that appends what it finds to one list, in any
+// order. One pass: no fragment is counted before it is written, and none is shaded. A warp gathers fragments in shared
+// memory and takes room in the list for all of them at once.
 
-#include <voxelpipe/device/small_raster.cuh>
-#include <voxelpipe/device/work_share.cuh>
+#include <voxelpipe/device/direct_raster.cuh>
 
 namespace voxelpipe::device {
 
-// Counts the fragments of every triangle; larger triangles leave records of chunks.
-template <class Op>
-struct counting_sink {
+template <class Call>
+struct listing_sink : direct_sink<Call> {
     static constexpr bool names_triangles = true;
-    static constexpr bool takes_mediums = false;
+    static constexpr bool buffers = true;
+    static constexpr bool checks_indices = true;
+    static constexpr int min_blocks = list_min_blocks;
+    static constexpr unsigned room = 448;    // with the queues, 48 KB for a block
+    static constexpr unsigned flush_at = 64; // less may wait: a round of thin triangles brings up to 384
+    struct memory {
+        std::uint32_t voxels[room], triangles[room];
+        unsigned n;
+    };
 
-    const geometry& geo;
-    const Op& op;
-    const share_buffers& b;
-    unsigned* dropped; // by triangle_class, of the block
-    unsigned* bad;     // of the block: whether an index is none of a vertex
-    std::uint32_t triangle = 0, n = 0;
-    unsigned fragments = 0;
-
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(std::uint32_t i, const glm::uvec3& index) {
-        const bool ok =
-            index.x < geo.one.num_vertices && index.y < geo.one.num_vertices && index.z < geo.one.num_vertices;
-        if (!ok) {
-            *bad = 1;
-            none(i);
-        }
+    __device__ VOXELPIPE_INLINE listing_sink(const Call& call, unsigned* dropped, memory& m)
+        : direct_sink<Call>{call, dropped}, m_(m) {
+        if (threadIdx.x % 32 == 0) m_.n = 0;
+        __syncwarp();
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(const glm::uvec3& index) const {
+        const std::uint32_t num = this->call.out.num_vertices;
+        const bool ok = index.x < num && index.y < num && index.z < num;
+        if (!ok) atomicOr(&this->call.out.state->index_error, 1u);
         return ok;
     }
-    __device__ VOXELPIPE_INLINE void begin(std::uint32_t i) {
-        triangle = i;
-        n = 0;
-    }
-    __device__ VOXELPIPE_INLINE void row(int, int, int, std::uint32_t mask) {
-        n += static_cast<unsigned>(__popc(mask));
-    }
-    __device__ VOXELPIPE_INLINE void four(int, int, int, const std::uint32_t (&mask)[4], bool) {
-        for (int k = 0; k < 4; ++k) n += static_cast<unsigned>(__popc(mask[k]));
-    }
-    __device__ VOXELPIPE_INLINE void end() {
-        b.counts[triangle] = n;
-        fragments += n;
-    }
-    __device__ VOXELPIPE_INLINE void none(std::uint32_t i) { b.counts[i] = 0; }
+    __device__ VOXELPIPE_INLINE void begin(std::uint32_t triangle) { triangle_ = triangle; }
     __device__ VOXELPIPE_INLINE void drop(core::triangle_class kind) {
-        atomicAdd(&dropped[static_cast<int>(kind)], 1u);
+        if (!straight_) direct_sink<Call>::drop(kind); // once, where a triangle comes twice
     }
-    __device__ __noinline__ core::triangle_class big(std::uint32_t i, const glm::uvec3& index) {
-        b.counts[i] = 0; // share_count_large adds to it
-        const core::snapped_position p = geo.one.positions[index.x], q = geo.one.positions[index.y],
-                                     r = geo.one.positions[index.z];
-        core::voxel_box reach{};
-        const core::triangle_class kind = core::classify<Op::rule>(p, q, r, geo.snap.fraction, geo.whole_box(), reach);
-        if (kind != core::triangle_class::drawn) return kind;
-        if (Op::rule == coverage::thin && core::has_zero_area(p, q, r)) return core::triangle_class::zero_area;
-        const chunk_grid chunks(op.cells(reach), core::dominant_axis(p, q, r, geo.snap.fraction));
-        const auto records = static_cast<unsigned long long>(chunks.records());
-        const unsigned long long first = atomicAdd(b.num_records, records);
-        for (unsigned long long k = 0; k < records && first + k < b.record_capacity; ++k)
-            b.records[first + k] = {i, static_cast<std::uint32_t>(k)};
-        return kind;
+    __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
+        if (mask == 0) return;
+        write_row(atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask))), voxel(x0, y, z), mask);
     }
-};
-
-// Writes the fragments of every small triangle to their places.
-template <class Op>
-struct listing_sink {
-    static constexpr bool names_triangles = true;
-    static constexpr bool takes_mediums = false;
-
-    const geometry& geo;
-    const Op& op;
-    const share_buffers& b;
-    std::uint32_t triangle = 0;
-    unsigned long long at = 0;
-
-    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool check(std::uint32_t, const glm::uvec3&) { return true; }
-    __device__ VOXELPIPE_INLINE void begin(std::uint32_t i) {
-        triangle = i;
-        at = b.offsets[i];
+    __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4], bool along_y) {
+        unsigned at =
+            atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask[0] | mask[1] << 2 | mask[2] << 4 | mask[3] << 6)));
+        const std::uint32_t first = voxel(x, y, z), row = voxel(0, 1, 0), slice = voxel(0, 0, 1);
+        at = write_row(at, first, mask[0]);
+        at = write_row(at, first + row, mask[1]);
+        at = write_row(at, first + (along_y ? row : slice), mask[2]);
+        write_row(at, first + row + slice, mask[3]);
     }
-    __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, std::uint32_t mask) {
-        const std::uint64_t first =
-            (static_cast<std::uint64_t>(z) * static_cast<std::uint64_t>(geo.extent.y) + static_cast<std::uint64_t>(y)) *
-                static_cast<std::uint64_t>(geo.extent.x) +
-            static_cast<std::uint64_t>(x0);
+    // Between triangles, by all lanes. True: the shared memory was too small for what came since the last time; it has
+    // been counted and has to come once more, to be written to the list at once.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool settle() {
+        const unsigned n = m_.n;
+        __syncwarp();
+        if (straight_) {
+            straight_ = false;
+            restart();
+            return false;
+        }
+        if (n > room) {
+            flush(kept_);
+            base_ = take(n - kept_);
+            kept_ = 0;
+            straight_ = true;
+            restart();
+            return true;
+        }
+        kept_ = n;
+        if (n >= flush_at) {
+            flush(n);
+            kept_ = 0;
+            restart();
+        }
+        return false;
+    }
+    __device__ void finish(pipeline_state*) {
+        __syncwarp();
+        flush(kept_);
+    }
+
+private:
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t voxel(int x, int y, int z) const { // modulo 2^32
+        const glm::ivec3& e = this->call.in.extent;
+        return (static_cast<std::uint32_t>(z) * static_cast<std::uint32_t>(e.y) + static_cast<std::uint32_t>(y)) *
+                   static_cast<std::uint32_t>(e.x) +
+               static_cast<std::uint32_t>(x);
+    }
+    __device__ VOXELPIPE_INLINE unsigned write_row(unsigned at, std::uint32_t first, word mask) {
         for (; mask != 0; mask &= mask - 1)
-            op.store(
-                at++, triangle,
-                {first + static_cast<unsigned>(__ffs(static_cast<int>(mask)) - 1), {op.s.one.fragment_shader.values}});
+            write(at++, first + static_cast<unsigned>(__ffs(static_cast<int>(mask)) - 1));
+        return at;
     }
-    __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const std::uint32_t (&mask)[4], bool along_y) {
-#pragma unroll 1
-        for (int k = 0; k < 4; ++k)
-            if (mask[k] != 0) row(x, y + (k == 2 && along_y ? 1 : k % 2), z + (k == 2 && along_y ? 0 : k / 2), mask[k]);
+    __device__ VOXELPIPE_INLINE void write(unsigned at, std::uint32_t voxel) {
+        if (!straight_) {
+            if (at >= room) return;
+            m_.voxels[at] = voxel;
+            m_.triangles[at] = triangle_;
+        } else if (base_ + at < this->call.out.capacity) {
+            this->call.out.voxels[base_ + at] = voxel;
+            this->call.out.triangles[base_ + at] = triangle_;
+        }
     }
-    __device__ VOXELPIPE_INLINE static void end() {}
-    __device__ VOXELPIPE_INLINE static void none(std::uint32_t) {}
-    __device__ VOXELPIPE_INLINE static void drop(core::triangle_class) {}
-    __device__ VOXELPIPE_INLINE static core::triangle_class big(std::uint32_t, const glm::uvec3&) {
-        return core::triangle_class::drawn; // share_emit_large has it
+    // Room in the list for n fragments; what is beyond its capacity is counted only.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long take(unsigned n) const {
+        unsigned long long first = 0;
+        if (threadIdx.x % 32 == 0)
+            first = atomicAdd(&this->call.out.state->list_fragments, static_cast<unsigned long long>(n));
+        return __shfl_sync(0xffffffffu, first, 0);
     }
+    __device__ VOXELPIPE_INLINE void flush(unsigned n) const {
+        if (n == 0) return;
+        const unsigned long long first = take(n);
+        for (unsigned i = threadIdx.x % 32; i < n && first + i < this->call.out.capacity; i += 32) {
+            this->call.out.voxels[first + i] = m_.voxels[i];
+            this->call.out.triangles[first + i] = m_.triangles[i];
+        }
+    }
+    __device__ VOXELPIPE_INLINE void restart() {
+        __syncwarp();
+        if (threadIdx.x % 32 == 0) m_.n = 0;
+        __syncwarp();
+    }
+
+    memory& m_;
+    unsigned kept_ = 0;           // of the memory; what lies behind belongs to this round
+    bool straight_ = false;       // this round goes to the list at once,
+    unsigned long long base_ = 0; // from here on
+    std::uint32_t triangle_ = 0;
 };
 
-template <class Op>
-__global__ __launch_bounds__(raster_threads,
-                             raster_min_blocks) void list_count_kernel(const __grid_constant__ geometry geo,
-                                                                       const __grid_constant__ Op op, share_buffers b,
-                                                                       pipeline_state* state) {
-    using core::triangle_class;
-    constexpr int warps = raster_threads / 32;
-    __shared__ warp_queues queues[warps];
-    __shared__ int left[3][warps];
-    __shared__ unsigned dropped[5], bad;
-    if (threadIdx.x < 5) dropped[threadIdx.x] = 0;
-    if (threadIdx.x == 0) bad = 0;
-    __syncthreads();
-    const raster_input<stored_source> in{{geo.one}, geo.num_primitives, geo.snap.fraction, geo.extent};
-    counting_sink<Op> sink{geo, op, b, dropped, &bad};
-    raster_warp<Op::rule, stored_source, counting_sink<Op>> warp{in, queues[threadIdx.x / 32], sink};
-    const unsigned looked_at = warp.run(queues, left);
+struct list_output {
+    template <class Call>
+    using sink = listing_sink<Call>;
 
-    const unsigned long long fragments = block_sum(sink.fragments);
-    const unsigned long long all = block_sum(threadIdx.x % 32 == 0 ? looked_at : 0);
-    if (threadIdx.x != 0) return;
-    if (fragments != 0) atomicAdd(b.num_cells, fragments);
-    if (bad != 0) atomicOr(&state->index_error, 1u);
-    if (!op.counts_triangles) return;
-    const auto number = [&](triangle_class kind, unsigned long long* total) {
-        const unsigned n = dropped[static_cast<int>(kind)];
-        if (n != 0) atomicAdd(total, static_cast<unsigned long long>(n));
-        return n;
-    };
-    const unsigned none =
-        number(triangle_class::nonfinite, &state->nonfinite) + number(triangle_class::too_far, &state->too_far) +
-        number(triangle_class::zero_area, &state->zero_area) + number(triangle_class::outside, &state->outside);
-    if (all != none) atomicAdd(&state->drawn, all - none);
+    std::uint32_t* voxels; // by fragment
+    std::uint32_t* triangles;
+    unsigned long long capacity;
+    std::uint32_t num_vertices;
+    pipeline_state* state;
+};
+
+// Whether the fragments of one draw of a constant shader can be listed this way.
+[[nodiscard]] inline bool is_listable(std::size_t num_draws, std::uint64_t num_triangles, int fraction,
+                                      glm::ivec3 extent) {
+    return num_draws == 1 && core::small_voxels(fraction) > 0 &&
+           std::max({extent.x, extent.y, extent.z}) <= most_direct_extent &&
+           large_list::holds(num_triangles, large_pieces<coverage::thin>::most_records(extent));
 }
 
-template <class Op>
-__global__ __launch_bounds__(raster_threads,
-                             raster_min_blocks) void list_emit_kernel(const __grid_constant__ geometry geo,
-                                                                      const __grid_constant__ Op op, share_buffers b,
-                                                                      const pipeline_state* state, capacities limits) {
-    constexpr int warps = raster_threads / 32;
-    __shared__ warp_queues queues[warps];
-    __shared__ int left[3][warps];
-    if (has_failed(*state, limits)) return;
-    const raster_input<stored_source> in{{geo.one}, geo.num_primitives, geo.snap.fraction, geo.extent};
-    listing_sink<Op> sink{geo, op, b};
-    raster_warp<Op::rule, stored_source, listing_sink<Op>> warp{in, queues[threadIdx.x / 32], sink};
-    (void)warp.run(queues, left);
-}
-
-// Whether the fragments of a scene can be listed this way.
-[[nodiscard]] inline bool is_listable(const geometry& geo) {
-    return geo.num_draws == 1 && core::small_voxels(geo.snap.fraction) > 0;
-}
-
-template <class Op>
-void list_count(const geometry& geo, const Op& op, const share_buffers& b, pipeline_state* state, void* scan_storage,
-                std::size_t scan_bytes, stage where, cudaStream_t stream) {
-    list_count_kernel<<<raster_blocks(geo.num_primitives), raster_threads, 0, stream>>>(geo, op, b, state);
-    check(cudaGetLastError(), where);
-    share_count_rest(geo, op, b, state, scan_storage, scan_bytes, where, stream);
-}
-
-template <class Op>
-void list_emit(const geometry& geo, const Op& op, const share_buffers& b, const pipeline_state* state,
-               const capacities& limits, stage where, cudaStream_t stream) {
-    list_emit_kernel<<<raster_blocks(geo.num_primitives), raster_threads, 0, stream>>>(geo, op, b, state, limits);
-    check(cudaGetLastError(), where);
-    share_emit_rest(geo, op, b, state, limits, where, stream);
+// Appends the fragments of a draw to two arrays of limits.fragments elements each; counts them in the state.
+template <coverage Rule, class Source>
+void list_raster(const raster_input<Source>& in, std::uint32_t num_vertices, const large_list& large,
+                 std::uint32_t* voxels, std::uint32_t* triangles, pipeline_state* state, const capacities& limits,
+                 cudaStream_t stream) {
+    const direct_call<Rule, Source, list_output> call{
+        in, {voxels, triangles, limits.fragments, num_vertices, state}, large};
+    direct_raster(call, state, stage::abuffer_emit, stream);
 }
 
 } // namespace voxelpipe::device

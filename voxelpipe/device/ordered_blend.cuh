@@ -33,8 +33,7 @@ __global__ void fold_kernel(fragment_lists<Key, Values> lists, const __grid_cons
             const auto& view = voxelpipe::get<K>(fb.targets);
             if (view.load == load_operation::off) return;
             auto a = t::traits::begin(view(x, y, z));
-            for (std::uint64_t i = first; i < last; ++i)
-                t::traits::apply(a, voxelpipe::get<K>(lists.payloads[lists.values[i]]));
+            for (std::uint64_t i = first; i < last; ++i) t::traits::apply(a, voxelpipe::get<K>(lists.payload_of(i)));
             if constexpr (t::map::is_bit)
                 store_bit(view, x, y, z, t::traits::end(a));
             else

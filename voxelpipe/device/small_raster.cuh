@@ -5,7 +5,7 @@
 // Raster of small triangles without tiles: one kernel reads the mesh once and sorts triangles by what they cost. Those
 // of up to 2 x 2 x 1 voxels are done at once; small ones wait in shared memory until there is a full warp of them, the
 // smallest a thread each, larger ones eight lanes each; the rest is handed on. What is done with the fragments is the
-// sink's: blending (direct_raster.cuh), or counting and listing (list_raster.cuh).
+// sink's: blending (direct_raster.cuh) or listing (list_raster.cuh).
 
 #include <voxelpipe/core/brick_triangle.hpp>
 #include <voxelpipe/device/scene.cuh>
@@ -15,7 +15,7 @@ namespace voxelpipe::device {
 
 // ---- triangles ------------------------------------------------------------------------------------------------------
 
-// Snapped vertices of one draw: made by its vertex shader on the spot, where that is cheap and makes no varyings.
+// The mesh, shaded on the spot: for vertex shaders that are cheap and make no varyings.
 template <class Mesh, class VertexShader>
 struct shading_source {
     Mesh mesh;
@@ -38,7 +38,7 @@ struct shading_source {
     [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const { return mesh.triangles[i]; }
 };
 
-// The same from the positions that vertex_shade left.
+// The positions that vertex_shade left.
 struct stored_source {
     draw_geometry geometry;
 
@@ -73,6 +73,7 @@ using word = std::uint32_t;
 
 inline constexpr int raster_threads = 128;
 inline constexpr int raster_min_blocks = 5; // per multiprocessor: registers for that many
+inline constexpr int list_min_blocks = 4;   // the same where the sink buffers fragments in shared memory
 inline constexpr int most_side = 8;         // a bounding box of so many voxels a side has rows of a byte
 inline constexpr int most_cells = 512;      // one of so many voxels is one thread's work
 inline constexpr int small_cells = 27;      // one of so many voxels waits apart from the larger ones
@@ -238,14 +239,46 @@ struct warp_queues {
     std::uint32_t larges[queue_places]; // numbers of triangles that are loaded again
 };
 
+// Runs f, which gives a sink fragments, on all lanes of a warp. A sink that buffers them may find that there were too
+// many, and then wants them once more.
+template <class Sink, class F>
+__device__ VOXELPIPE_INLINE void feed(Sink& sink, F&& f) {
+    if constexpr (Sink::buffers) {
+        do {
+            f();
+            __syncwarp();
+        } while (sink.settle());
+    } else {
+        f();
+    }
+}
+
+// A triangle by medium_lanes neighbouring lanes, where it is wanted. All lanes of the warp take part.
+template <coverage Rule, class Source, class Sink>
+__device__ VOXELPIPE_INLINE void raster_medium(const raster_input<Source>& call, bool wanted, std::uint32_t triangle,
+                                               Sink& sink) {
+    near_triangle near;
+    if (wanted) near = load_near<Rule>(call, call.source.triangle(triangle));
+    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+        if (!wanted) return;
+        sink.begin(triangle);
+        if constexpr (Rule == coverage::thin) {
+            const int lane = static_cast<int>(threadIdx.x) % medium_lanes;
+            const bool has_area = raster_thin(call, near.t, near.lo, near.box, lane, medium_lanes, sink);
+            if (!has_area && lane == 0) sink.drop(core::triangle_class::zero_area);
+        } else {
+            raster_lanes(core::small_conservative(near.t, call.fraction), near.lo, near.box, sink);
+        }
+    });
+}
+
 // The work of a warp, from the mesh to a sink:
-//   names_triangles   whether begin and end are wanted
-//   takes_mediums     whether mediums(wanted, triangle), which all lanes call, takes those that are much for a thread
-//   check(triangle, index)   whether the indices may be used
-//   begin(triangle), row(x0, y, z, mask), four(x, y, z, masks, along_y), end(): the fragments of one triangle, as rows
-//   of
+//   names_triangles   whether begin is wanted
+//   buffers           whether settle(), which all lanes call between triangles, is wanted (feed)
+//   mediums(wanted, triangle)   takes those that are much for a thread; all lanes call it
+//   check(index)      whether the indices may be used
+//   begin(triangle), row(x0, y, z, mask), four(x, y, z, masks, along_y): the fragments of one triangle, as rows of
 //                     bits along x (direct_target.cuh)
-//   none(triangle)    it has no fragments
 //   big(triangle, index)   what this path does not take; says whether it is drawn
 //   drop(class)       counts a triangle that is not drawn
 template <coverage Rule, class Source, class Sink>
@@ -275,9 +308,9 @@ struct raster_warp {
 
     // The last 32 that wait, one a lane; all lanes take part.
     template <class Raster>
-    __device__ VOXELPIPE_INLINE static void drain(const warp_queues& from, int& count, Raster&& raster) {
+    __device__ VOXELPIPE_INLINE void drain(const warp_queues& from, int& count, Raster&& raster) {
         __syncwarp();
-        raster(from, count - 32 + static_cast<int>(threadIdx.x % 32));
+        feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA { raster(from, count - 32 + static_cast<int>(threadIdx.x % 32)); });
         __syncwarp();
         count -= 32;
     }
@@ -296,7 +329,6 @@ struct raster_warp {
             const word mask[4] = {bits & 3u, bits >> 2 & 3u, bits >> 4 & 3u, bits >> 6};
             begin(from.cubes, at);
             sink.four(lo[0], lo[1], lo[2], mask, false);
-            sink.end();
         };
     }
     __device__ VOXELPIPE_INLINE void raster(const core::small_triangle& t, const std::int32_t (&lo)[3],
@@ -321,7 +353,6 @@ struct raster_warp {
             const core::small_box box = get(from.smalls, at, t, lo);
             begin(from.smalls, at);
             raster(t, lo, box);
-            sink.end();
         };
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_large() {
@@ -329,7 +360,6 @@ struct raster_warp {
             const near_triangle r = load_near<Rule>(call, call.source.triangle(from.larges[at]));
             sink.begin(from.larges[at]);
             raster(r.t, r.lo, r.box);
-            sink.end();
         };
     }
     // Columns of voxels that the triangle can touch, at most.
@@ -337,31 +367,26 @@ struct raster_warp {
         return core::max3(r.cells[0] * r.cells[1], r.cells[1] * r.cells[2], r.cells[2] * r.cells[0]);
     }
 
-    // The lane's triangle i, with its indices, where there is one.
-    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, const glm::uvec3& index) {
-        const bool valid = i < call.num_triangles && sink.check(i, index);
-        near_triangle r;
+    // The lane's triangle i, where there is one.
+    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, const glm::uvec3& index) {
         int most = 0;
         bool is_quad = false, to_cubes = false, to_smalls = false, to_larges = false, to_mediums = false,
              is_big = false;
+        near_triangle r;
         if (valid) {
             r = load_near<Rule>(call, index);
             most = core::max3(r.cells[0], r.cells[1], r.cells[2]);
             is_big = !r.is_near || most > core::small_voxels(call.fraction) || most > most_medium_side;
-            if (!is_big && r.is_out) {
-                sink.drop(triangle_class::outside);
-                sink.none(i);
-            }
+            if (!is_big && r.is_out) sink.drop(triangle_class::outside);
             if (!is_big && !r.is_out) {
                 if constexpr (thin) {
                     to_smalls = columns(r) <= small_columns;
-                    to_larges = !to_smalls && (!Sink::takes_mediums || columns(r) <= most_columns);
+                    to_larges = !to_smalls && columns(r) <= most_columns;
                 } else {
                     is_quad = most <= 2 && core::min3(r.cells[0], r.cells[1], r.cells[2]) == 1;
                     to_cubes = !is_quad && most == 2;
                     to_smalls = most > 2 && most <= most_side && r.cells[0] * r.cells[1] * r.cells[2] <= small_cells;
-                    to_larges = most > 2 && !to_smalls &&
-                                (!Sink::takes_mediums || r.cells[0] * r.cells[1] * r.cells[2] <= most_cells);
+                    to_larges = most > 2 && !to_smalls && r.cells[0] * r.cells[1] * r.cells[2] <= most_cells;
                 }
                 to_mediums = !(is_quad || to_cubes || to_smalls || to_larges);
                 if (thin && to_mediums) { // a small one finds out when it is drawn
@@ -381,13 +406,13 @@ struct raster_warp {
         if (to_smalls) put(queues.smalls, small_at, r, i);
         const int large_at = take_place(to_larges, num_larges);
         if (to_larges) queues.larges[large_at] = i;
-        if constexpr (Sink::takes_mediums) sink.mediums(to_mediums, i);
+        sink.mediums(to_mediums, i);
         if constexpr (!thin) {
-            if (is_quad) {
+            feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                if (!is_quad) return;
                 sink.begin(i);
                 raster_quad(call, r.t, r.lo, r.cells, r.box, sink);
-                sink.end();
-            }
+            });
         }
         if (is_big) {
             const triangle_class kind = sink.big(i, index);
@@ -400,18 +425,18 @@ struct raster_warp {
     // block take part. Returns how many triangles the warp looked at.
     template <int Warps>
     __device__ VOXELPIPE_INLINE unsigned run(const warp_queues (&all)[Warps], int (&left)[3][Warps]) {
+        const std::uint32_t step = gridDim.x * Warps * 32;
         // The indices of a batch are loaded while the batch before it is worked on.
         const auto load_index = [&](std::uint32_t i) {
             return i < call.num_triangles ? call.source.triangle(i) : glm::uvec3(0);
         };
-        const std::uint32_t step = gridDim.x * Warps * 32;
-        unsigned looked_at = 0;
-        std::uint32_t first = blockIdx.x * Warps * 32 + threadIdx.x / 32 * 32;
+        const std::uint32_t begin = blockIdx.x * Warps * 32 + threadIdx.x / 32 * 32;
+        std::uint32_t first = begin;
         glm::uvec3 index = load_index(first + static_cast<unsigned>(lane));
         for (; first < call.num_triangles; first += step) {
             const glm::uvec3 next = load_index(first + step + static_cast<unsigned>(lane));
-            looked_at += call.num_triangles - first < 32 ? call.num_triangles - first : 32;
-            batch(first + static_cast<unsigned>(lane), index);
+            const std::uint32_t i = first + static_cast<unsigned>(lane);
+            batch(i, i < call.num_triangles && sink.check(index), index);
             index = next;
             if constexpr (!thin)
                 if (num_cubes >= 32) drain(queues, num_cubes, raster_cube());
@@ -427,19 +452,33 @@ struct raster_warp {
         const auto rest = [&](const int(&counts)[Warps], auto&& raster_one) {
             int at = static_cast<int>(threadIdx.x), w = 0; // fewer than 32 a warp are left
             while (w < Warps && at >= counts[w]) at -= counts[w++];
-            if (w < Warps) raster_one(all[w], at);
+            feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                if (w < Warps) raster_one(all[w], at);
+            });
         };
         if constexpr (!thin) rest(left[0], raster_cube());
         rest(left[1], raster_small());
-        rest(left[2], raster_large());
-        return looked_at;
+        // A lane each, the larger ones would keep a few lanes busy long after all others.
+        int num = 0;
+        for (const int n : left[2]) num += n;
+        for (int start = 0; start < num; start += Warps * 32 / medium_lanes) {
+            int at = start + static_cast<int>(threadIdx.x) / medium_lanes, w = 0;
+            while (w < Warps && at >= left[2][w]) at -= left[2][w++];
+            raster_medium<Rule>(call, w < Warps, w < Warps ? all[w].larges[at] : 0, sink);
+        }
+
+        if (begin >= call.num_triangles) return 0;
+        const std::uint32_t batches = (call.num_triangles - begin - 1) / step + 1;
+        const std::uint32_t of_last = call.num_triangles - (begin + (batches - 1) * step);
+        return (batches - 1) * 32 + (of_last < 32 ? of_last : 32);
     }
 };
 
 // Blocks of a kernel that runs raster_warp: what fits the device at once.
-[[nodiscard]] inline unsigned raster_blocks(std::uint64_t num_triangles) {
+[[nodiscard]] inline unsigned raster_blocks(std::uint64_t num_triangles, int per_multiprocessor = raster_min_blocks) {
     const std::uint64_t batches = (num_triangles + raster_threads - 1) / raster_threads;
-    const std::uint64_t most = static_cast<std::uint64_t>(num_multiprocessors()) * raster_min_blocks;
+    const std::uint64_t most =
+        static_cast<std::uint64_t>(num_multiprocessors()) * static_cast<unsigned>(per_multiprocessor);
     return static_cast<unsigned>(batches < most ? batches : most);
 }
 
