@@ -8,6 +8,7 @@
 
 #include <voxelpipe/device/fragment_shade.cuh>
 #include <voxelpipe/device/list_raster.cuh>
+#include <voxelpipe/device/stage_clock.cuh>
 #include <voxelpipe/device/tile_sort.cuh>
 #include <voxelpipe/device/work_share.cuh>
 
@@ -122,7 +123,7 @@ struct fragment_lists {
 template <coverage Rule, class MakePayload, class Scene, class Key, class Payload>
 [[nodiscard]] fragment_lists<Key, Payload>
 build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const share_buffers& share, pipeline_state* state,
-            const capacities& limits, bool counts_triangles, cudaStream_t stream) {
+            const capacities& limits, bool counts_triangles, cudaStream_t stream, stage_clock* clock = nullptr) {
     const fragment_cells<Rule, Scene, Key, Payload, MakePayload> op{
         s, b.keys[0], b.values[0], b.primitives, b.payloads, counts_triangles};
     bool listed = false;
@@ -137,15 +138,18 @@ build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const share_buf
         share_count(s.geo, op, share, state, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
         share_emit(s.geo, op, share, state, limits, stage::abuffer_emit, stream);
     }
+    end_stage(clock, &stage_times::fine_raster);
     fill_end(b.keys[0], b.values[0], share.num_cells, limits.fragments, state, limits, stream);
     cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
     cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
     sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
+    end_stage(clock, &stage_times::tile_sort);
     std::size_t bytes = b.storage_bytes;
     check(cub::DeviceSelect::If(b.storage, bytes, thrust::counting_iterator<unsigned long long>(0), b.first_of_voxel,
                                 &state->list_voxels, limits.fragments,
                                 is_first_of_voxel<Key>{keys.Current(), state, limits}, stream),
           stage::abuffer_emit);
+    end_stage(clock, &stage_times::abuffer_emit);
     return {keys.Current(), values.Current(), b.primitives, b.payloads, b.first_of_voxel};
 }
 

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -140,6 +141,10 @@ public:
 
     cudaStream_t stream = nullptr; // not owned
     memory_resource resource;      // where all memory comes from
+    // Where voxelize adds up the time of each stage, if anywhere: by events on the stream, which a call without it does
+    // not record. They are read after the call's wait, where fragment lists wait once more, for their copy.
+    // voxelize_async has no times.
+    stage_times* times = nullptr;
 
     // What voxelize calls; arguments are validated. `Selector` picks tile and block size (tuning/); results do not
     // depend on it.
@@ -148,8 +153,10 @@ public:
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              const framebuffer_view<Targets...>& fb, const voxelize_options& options,
                              std::uint64_t triangles_in) {
-        return attempt(triangles_in, [&](const device::capacities& limits, device::pipeline_state& state) {
-            device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits, [&](const auto& call) {
+        return attempt(triangles_in, [&](const device::capacities& limits, device::pipeline_state& state,
+                                         device::stage_clock* clock) {
+            device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits, [&](auto call) {
+                call.clock = clock;
                 if (options.rule == coverage::thin)
                     launch<coverage::thin>(call, state);
                 else
@@ -164,8 +171,9 @@ public:
                              std::uint64_t triangles_in) {
         using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
         lists = abuffer<cuda_backend, Payload>(*this);
-        status s = attempt(triangles_in, [&](const device::capacities& limits, device::pipeline_state& state) {
-            const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits};
+        status s = attempt(triangles_in, [&](const device::capacities& limits, device::pipeline_state& state,
+                                             device::stage_clock* clock) {
+            const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
             const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
             if (options.rule == coverage::thin)
                 small ? fill<coverage::thin, std::uint32_t>(call, lists, state)
@@ -191,10 +199,12 @@ private:
     [[nodiscard]] status attempt(std::uint64_t triangles_in, Launch&& launch_stages) {
         status s;
         try {
+            std::optional<device::stage_clock> clock;
+            if (times != nullptr) clock.emplace(stream);
             device::capacities limits = guess(triangles_in);
             for (int tries = 0;; ++tries) {
                 device::pipeline_state state{};
-                launch_stages(limits, state);
+                launch_stages(limits, state, clock ? &*clock : nullptr);
                 if (state.index_error != 0) {
                     s = core::failure(status_code::index_out_of_range, stage::coarse_raster);
                     break;
@@ -216,6 +226,7 @@ private:
                 raise(limits.fragment_records, state.fragment_records);
                 known_ = limits;
             }
+            if (clock) clock->read(*times);
         } catch (const device::cuda_failure& e) {
             s = device::to_status(e);
         } catch (const std::bad_alloc&) {
@@ -259,6 +270,7 @@ private:
         device::arena plan;
         call.template go<Rule, false>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
+        if (call.clock != nullptr) call.clock->start();
         call.template go<Rule, true>(memory, d_state, stream);
         read_state(d_state, state, stage::tile_resolve);
     }
@@ -269,6 +281,7 @@ private:
         device::arena plan;
         (void)call.template go<Rule, false, Key>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
+        if (call.clock != nullptr) call.clock->start();
         const auto sorted = call.template go<Rule, true, Key>(memory, d_state, stream);
         read_state(d_state, state, stage::abuffer_emit);
         if (device::has_failed(state, call.limits)) return;
@@ -280,11 +293,13 @@ private:
         buffer<std::uint32_t> primitives(*this, state.list_fragments, where);
         buffer<payload> payloads(*this, has_payload ? state.list_fragments : 0, where);
         if (state.list_fragments != 0) {
+            if (call.clock != nullptr) call.clock->start(); // leaves the wait and the allocations out
             device::
                 copy_lists_kernel<<<device::fill_device(state.list_fragments), device::threads_per_block, 0, stream>>>(
                     sorted, state.list_voxels, state.list_fragments, voxels.data(), offsets.data(), primitives.data(),
                     payloads.data());
             device::check(cudaGetLastError(), where);
+            device::end_stage(call.clock, &stage_times::abuffer_emit);
         }
         lists.voxels = std::move(voxels);
         lists.offsets = std::move(offsets);
