@@ -18,12 +18,6 @@ namespace {
 using namespace device_test;
 namespace blend = voxelpipe::blend;
 
-struct stream_owner {
-    cudaStream_t stream = nullptr;
-    stream_owner() { cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking); }
-    ~stream_owner() { cudaStreamDestroy(stream); }
-};
-
 // What a call launches, to be launched again.
 class captured_graph {
 public:
@@ -261,23 +255,8 @@ TEST(Graph, ListsThatDoNotFitSayWhatIsNeeded) {
     compare_overflowing_lists<double>(any_values<vp::target<double, blend::replace>>{}, 106);
 }
 
-// Refuses what would take it beyond `most`.
-struct limited_resource {
-    std::size_t live = 0, most = std::size_t{1} << 40;
-    void* allocate_async(std::size_t bytes, std::size_t, cudaStream_t stream) {
-        void* p = nullptr;
-        if (live + bytes > most || cudaMallocAsync(&p, bytes, stream) != cudaSuccess) throw std::bad_alloc();
-        live += bytes;
-        return p;
-    }
-    void deallocate_async(void* p, std::size_t bytes, std::size_t, cudaStream_t stream) {
-        cudaFreeAsync(p, stream);
-        live -= bytes;
-    }
-};
-
 TEST(Lists, NoMemoryForTheCopyIsInTheStatus) {
-    limited_resource resource;
+    counting_resource resource;
     vp::cuda_backend be{nullptr, resource};
     const mesh_data m = mixed_triangles(500, 20.0f, 107);
     const vp::grid g = box_grid({20, 20, 20});

@@ -132,24 +132,6 @@ TEST(Pipeline, BadArgumentsAreRefused) {
               vp::status_code::empty_mesh);
 }
 
-// Counts what it gives out, and can refuse.
-struct counting_resource {
-    std::size_t live = 0, most = std::size_t{1} << 40;
-    int calls = 0;
-    void* allocate_async(std::size_t bytes, std::size_t, cudaStream_t stream) {
-        if (live + bytes > most) throw std::bad_alloc();
-        void* p = nullptr;
-        if (cudaMallocAsync(&p, bytes, stream) != cudaSuccess) throw std::bad_alloc();
-        live += bytes;
-        ++calls;
-        return p;
-    }
-    void deallocate_async(void* p, std::size_t bytes, std::size_t, cudaStream_t stream) {
-        cudaFreeAsync(p, stream);
-        live -= bytes;
-    }
-};
-
 TEST(Pipeline, MemoryComesFromTheResource) {
     counting_resource resource;
     {
@@ -233,12 +215,6 @@ TEST(Pipeline, ResultsDoNotDependOnThePolicy) {
         expect_same_counts(a, c);
     }
 }
-
-struct stream_owner {
-    cudaStream_t stream = nullptr;
-    stream_owner() { cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking); }
-    ~stream_owner() { cudaStreamDestroy(stream); }
-};
 
 using one_draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<float>>;
 
