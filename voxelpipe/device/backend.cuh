@@ -7,6 +7,7 @@
 
 #include <voxelpipe/device/dispatch.cuh>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -214,8 +215,8 @@ private:
                     break;
                 }
                 // A pass that overflowed its records did not count all of its cells: the next try may need a third.
-                constexpr std::uint64_t most = 0xfffffff0u; // pairs and fragments are numbered with 32 bits
-                if (tries == 4 || state.tile_pairs > most || state.list_fragments > most) {
+                if (tries == 4 || state.tile_pairs > core::most_numbered ||
+                    state.list_fragments > core::most_numbered) {
                     s = core::failure(status_code::out_of_memory, stage::coarse_raster);
                     s.required = {state.tile_pairs, state.list_fragments, 0};
                     break;
@@ -224,6 +225,7 @@ private:
                 raise(limits.tile_records, state.tile_records);
                 raise(limits.fragments, state.list_fragments);
                 raise(limits.fragment_records, state.fragment_records);
+                keep_numbered(limits);
                 known_ = limits;
             }
             if (clock) clock->read(*times);
@@ -240,13 +242,21 @@ private:
         if (need > capacity) capacity = need + need / 16;
     }
 
+    static void keep_numbered(device::capacities& limits) {
+        limits.tile_pairs = std::min<unsigned long long>(limits.tile_pairs, core::most_numbered);
+        limits.fragments = std::min<unsigned long long>(limits.fragments, core::most_numbered);
+    }
+
     [[nodiscard]] device::capacities guess(std::uint64_t triangles) const {
         const auto at_least = [](unsigned long long known, std::uint64_t first) {
             return known > first ? known : first;
         };
-        return {at_least(known_.tile_pairs, triangles + triangles / 4 + 16384),
-                at_least(known_.tile_records, triangles / 16 + 4096), at_least(known_.fragments, 4 * triangles + 65536),
-                at_least(known_.fragment_records, triangles / 16 + 4096)};
+        device::capacities limits{at_least(known_.tile_pairs, triangles + triangles / 4 + 16384),
+                                  at_least(known_.tile_records, triangles / 16 + 4096),
+                                  at_least(known_.fragments, 4 * triangles + 65536),
+                                  at_least(known_.fragment_records, triangles / 16 + 4096)};
+        keep_numbered(limits);
+        return limits;
     }
 
     // The workspace, at least so large.
