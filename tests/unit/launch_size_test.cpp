@@ -34,8 +34,8 @@ TEST(LaunchSize, LoopingKernelsFillTheDeviceAndNoMore) {
                     const std::uint64_t blocks = core::blocks_to_fill(items, threads, multiprocessors, each);
                     ASSERT_GE(blocks, 1u);
                     ASSERT_LE(blocks, core::most_blocks);
-                    const auto room = static_cast<unsigned __int128>(multiprocessors) * each;
-                    const auto reached = static_cast<unsigned __int128>(blocks) * threads;
+                    const auto room = std::uint64_t{multiprocessors} * each;
+                    const auto reached = blocks * threads;
                     // Every item has a thread, or the device is full, or the grid is.
                     ASSERT_TRUE(reached >= items || blocks >= room || blocks == core::most_blocks)
                         << items << ' ' << threads << ' ' << multiprocessors << ' ' << each << ": " << blocks;
