@@ -7,6 +7,7 @@
 #include "cells.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 
 using namespace device_test;
@@ -83,10 +84,21 @@ struct model {
     [[nodiscard]] std::span<const draw_type> all() const { return draws; }
 };
 
-// Parts of different sizes, large triangles among them.
+// Parts of different sizes, large triangles among them; those far beyond the grid, which take long, in the smallest
+// part only.
 std::vector<mesh_data> make_parts() {
     std::vector<mesh_data> parts;
-    for (std::uint32_t k = 0; k < 4; ++k) parts.push_back(mixed_triangles(300 << (2 * k), 90.0f, 110 + k));
+    for (std::uint32_t k = 0; k < 4; ++k) {
+        mesh_data m = mixed_triangles(300 << (2 * k), 90.0f, 110 + k);
+        if (k != 0)
+            std::erase_if(m.triangles, [&](const glm::uvec3& t) {
+                for (int i = 0; i < 3; ++i)
+                    for (int a = 0; a < 3; ++a)
+                        if (std::abs(m.positions[t[i]][a]) > 1000.0f) return true; // not NaN
+                return false;
+            });
+        parts.push_back(std::move(m));
+    }
     add_triangle(parts[2], {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
     add_triangle(parts[0], {10.0f, -20.0f, 95.0f}, {80.0f, 120.0f, 3.0f}, {-30.0f, 60.0f, 40.0f});
     return parts;
