@@ -62,20 +62,19 @@ constexpr cell_kind cell_kinds[]{
 struct our_run {
     unsigned threads;
     bench::timing time;
-    vp::cpu::stage_times stages; // medians, milliseconds
+    vp::stage_times stages; // medians, milliseconds
     std::uint64_t peak_bytes;
     vp::counters counts;
 };
 
-vp::cpu::stage_times median_of(const std::vector<vp::cpu::stage_times>& runs) {
-    const auto pick = [&](double vp::cpu::stage_times::*field) {
+vp::stage_times median_of(const std::vector<vp::stage_times>& runs) {
+    vp::stage_times medians;
+    for (const auto& [name, field] : vp::stage_time_fields) {
         std::vector<double> v;
-        for (const auto& r : runs) v.push_back(r.*field);
-        return bench::median(v);
-    };
-    using t = vp::cpu::stage_times;
-    return {pick(&t::vertex_shade), pick(&t::coarse_raster), pick(&t::tile_sort),
-            pick(&t::clear),        pick(&t::fine_raster),   pick(&t::abuffer_emit)};
+        for (const vp::stage_times& r : runs) v.push_back(r.*field);
+        medians.*field = bench::median(v);
+    }
+    return medians;
 }
 
 // Times `call(backend)`, which returns a status.
@@ -84,9 +83,9 @@ our_run time_ours(unsigned threads, const options& how, Call&& call) {
     vp::cpu_backend backend{threads};
     our_run run{};
     run.threads = threads;
-    vp::cpu::stage_times times{};
+    vp::stage_times times{};
     backend.times = &times;
-    std::vector<vp::cpu::stage_times> all;
+    std::vector<vp::stage_times> all;
     bench::reset_peak_memory();
     run.time = bench::measure(
         {1, 3, 20, how.seconds},

@@ -61,8 +61,8 @@ public:
     cpu_backend() = default;
     explicit cpu_backend(unsigned num_threads) : threads(num_threads) {}
 
-    unsigned threads = 0;              // 0: as many as the machine runs at once
-    cpu::stage_times* times = nullptr; // where to add up the time of each stage, if anywhere
+    unsigned threads = 0;         // 0: as many as the machine runs at once
+    stage_times* times = nullptr; // where to add up the time of each stage, if anywhere
     std::function<void(std::uint64_t done, std::uint64_t total)> progress; // called from any thread, one call at a time
 
     // What voxelize calls; arguments are validated. Exceptions of a user's shader or progress function pass through.

@@ -10,6 +10,7 @@
 #include <voxelpipe/core/coverage.hpp>
 #include <voxelpipe/core/interpolate.hpp>
 #include <voxelpipe/core/primitive.hpp>
+#include <voxelpipe/stage_times.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <algorithm>
@@ -25,11 +26,6 @@
 #include <vector>
 
 namespace voxelpipe::cpu {
-
-// Milliseconds spent in each stage of the last voxelize.
-struct stage_times {
-    double vertex_shade = 0, coarse_raster = 0, tile_sort = 0, clear = 0, fine_raster = 0, abuffer_emit = 0;
-};
 
 // What the stages need to know of how they run.
 struct execution {

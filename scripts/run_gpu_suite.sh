@@ -7,12 +7,13 @@
 #   default     the equality suite, scenes included where VOXELPIPE_SCENES_DIR has them
 #   fast_math   the suite without the scenes, built with -use_fast_math
 #   no_fmad     the same with --fmad=false
+#   plain_constexpr  part of it, built without --expt-relaxed-constexpr
 #   tool        the files that voxelize writes on the GPU against those that it writes on the CPU
 #   sanitizer   compute-sanitizer memcheck, racecheck, initcheck and synccheck over a reduced suite
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 parts=("$@")
-[[ ${#parts[@]} -gt 0 ]] || parts=(default fast_math no_fmad tool sanitizer)
+[[ ${#parts[@]} -gt 0 ]] || parts=(default fast_math no_fmad plain_constexpr tool sanitizer)
 results="${VOXELPIPE_RESULTS:-tests/gpu_results}"
 mkdir -p "$results"
 
@@ -29,7 +30,7 @@ record="$results/$(date -u +%Y-%m-%dT%H%M%SZ).txt"
 {
     printf 'device: %s\ndriver: %s\nCUDA: %s\nclocks (SM, memory): %s\ncommit: %s\n\n' \
         "$device" "$driver" "$toolkit" "$clocks" "$commit"
-    printf '%-12s %-28s %8s %8s %8s\n' part program passed failed seconds
+    printf '%-15s %-28s %8s %8s %8s\n' part program passed failed seconds
 } >"$record"
 
 # Scenes are decoded beside the build, never inside the project.
@@ -57,7 +58,7 @@ run_program() {
     failed="$(grep -E '^\[  FAILED  \]' "$log" | grep -cE 'ms\)$' || true)"
     [[ $status -eq 0 || $failed -gt 0 ]] || failed=1
     [[ $passed -gt 0 || $failed -gt 0 ]] || failed=1
-    printf '%-12s %-28s %8d %8d %8d\n' "$part" "$name" "$passed" "$failed" $((SECONDS - start)) | tee -a "$record"
+    printf '%-15s %-28s %8d %8d %8d\n' "$part" "$name" "$passed" "$failed" $((SECONDS - start)) | tee -a "$record"
     failures=$((failures + failed))
     if [[ $failed -gt 0 ]]; then grep -vE '^\[ (RUN|      OK)' "$log" | head -n 40; fi
 }
@@ -101,6 +102,10 @@ for part in "${parts[@]}"; do
     no_fmad)
         build_suite gpu-no-fmad --fmad=false
         run_suite no_fmad gpu-no-fmad
+        ;;
+    plain_constexpr)
+        target=plain_constexpr_test build_suite gpu-plain-constexpr
+        run_program plain_constexpr plain_constexpr_test build/gpu-plain-constexpr/tests/device/plain_constexpr_test
         ;;
     tool)
         samples=ON target=voxelize_gpu_files_test build_suite gpu-tool

@@ -8,6 +8,7 @@
 // A blend of your own is a functor with   static constexpr bool order_free;  T identity() const;  T combine(T, T) const
 // (or templates of them). One that is not order-free is folded in triangle order.
 
+#include <voxelpipe/core/bits.hpp>
 #include <voxelpipe/core/pack.hpp>
 #include <voxelpipe/core/reproducible_sum.hpp>
 
@@ -88,9 +89,9 @@ template <class T>
 [[nodiscard]] VOXELPIPE_HD T canonical(T v) {
     if constexpr (is_floating<T>) {
         using bits = typename float_bits<T>::type;
-        const auto raw = std::bit_cast<bits>(v);
+        const auto raw = core::bit_cast<bits>(v);
         constexpr bits absolute = static_cast<bits>(~bits{0}) >> 1;
-        return (raw & absolute) > float_bits<T>::infinity ? std::bit_cast<T>(float_bits<T>::nan) : v;
+        return (raw & absolute) > float_bits<T>::infinity ? core::bit_cast<T>(float_bits<T>::nan) : v;
     } else if constexpr (vector_traits<T>::components > 1) {
         for (int i = 0; i < vector_traits<T>::components; ++i) v[i] = canonical(v[i]);
         return v;
@@ -104,7 +105,7 @@ template <class T>
 [[nodiscard]] VOXELPIPE_HD auto order_key(T v) {
     using bits = typename float_bits<T>::type;
     using key = std::make_signed_t<bits>;
-    const auto raw = std::bit_cast<bits>(canonical(v));
+    const auto raw = core::bit_cast<bits>(canonical(v));
     constexpr bits absolute = static_cast<bits>(~bits{0}) >> 1;
     return static_cast<key>((raw & ~absolute) != 0 ? raw ^ absolute : raw);
 }
@@ -165,9 +166,9 @@ struct blend_traits<blend::min, T> : in_place_blend<T> {
     VOXELPIPE_HD
     static T identity() {
         if constexpr (is_floating<T>)
-            return std::bit_cast<T>(float_bits<T>::nan); // the greatest value of the order
+            return core::bit_cast<T>(float_bits<T>::nan); // the greatest value of the order
         else
-            return std::numeric_limits<T>::max();
+            return core::greatest<T>;
     }
     VOXELPIPE_HD
     static void apply(T& a, T v) {
@@ -182,9 +183,9 @@ struct blend_traits<blend::max, T> : in_place_blend<T> {
     static T identity() {
         if constexpr (is_floating<T>) {
             using bits = typename float_bits<T>::type;
-            return std::bit_cast<T>(static_cast<bits>(float_bits<T>::infinity | ~(static_cast<bits>(~bits{0}) >> 1)));
+            return core::bit_cast<T>(static_cast<bits>(float_bits<T>::infinity | ~(static_cast<bits>(~bits{0}) >> 1)));
         } else {
-            return std::numeric_limits<T>::lowest();
+            return core::lowest<T>;
         }
     }
     VOXELPIPE_HD
@@ -253,7 +254,7 @@ struct reproducible_blend {
     static constexpr bool order_free = true;
     using accumulator = typename sum_format<T>::sum;
     VOXELPIPE_HD
-    static T identity() { return std::bit_cast<T>(typename float_bits<T>::type{0}); }
+    static T identity() { return core::bit_cast<T>(typename float_bits<T>::type{0}); }
     VOXELPIPE_HD
     static accumulator begin(T stored) {
         accumulator a{};
@@ -274,7 +275,7 @@ struct reproducible_blend {
         using bits = typename float_bits<T>::type;
         constexpr int mantissa_bits = std::is_same_v<T, half> ? 10 : std::is_same_v<T, float> ? 23 : 52;
         constexpr int exponent_bits = std::is_same_v<T, half> ? 5 : std::is_same_v<T, float> ? 8 : 11;
-        return std::bit_cast<T>(static_cast<bits>(round_sum(a, Log2Quantum, mantissa_bits, exponent_bits)));
+        return core::bit_cast<T>(static_cast<bits>(round_sum(a, Log2Quantum, mantissa_bits, exponent_bits)));
     }
 };
 template <class T>
@@ -289,7 +290,7 @@ requires is_floating<T>
 struct blend_traits<blend::add_unordered, T> : in_place_blend<T> {
     static constexpr bool order_free = false;
     VOXELPIPE_HD
-    static T identity() { return std::bit_cast<T>(typename float_bits<T>::type{0}); }
+    static T identity() { return core::bit_cast<T>(typename float_bits<T>::type{0}); }
     VOXELPIPE_HD
     static void apply(T& a, T v) {
         if constexpr (std::is_same_v<T, half>)
@@ -309,7 +310,7 @@ requires(std::is_unsigned_v<T>) struct blend_traits<blend::add_saturate, T> : in
         if constexpr (std::is_same_v<T, bool>)
             a = a || v;
         else
-            a = static_cast<T>(a + v) < a ? std::numeric_limits<T>::max() : static_cast<T>(a + v);
+            a = static_cast<T>(a + v) < a ? core::greatest<T> : static_cast<T>(a + v);
     }
 };
 // Signed ones go up and down: sum first, clamp at the end.
@@ -331,8 +332,8 @@ requires(is_integer<T>&& std::is_signed_v<T>) struct blend_traits<blend::add_sat
     VOXELPIPE_HD
     static T end(const accumulator& a) {
         const int128 sum = (static_cast<int128>(a.top) << 64) | a.limb[0];
-        if (sum > std::numeric_limits<T>::max()) return std::numeric_limits<T>::max();
-        if (sum < std::numeric_limits<T>::lowest()) return std::numeric_limits<T>::lowest();
+        if (sum > core::greatest<T>) return core::greatest<T>;
+        if (sum < core::lowest<T>) return core::lowest<T>;
         return static_cast<T>(sum);
     }
 };

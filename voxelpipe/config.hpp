@@ -17,18 +17,30 @@
 
 #if defined(__CUDACC__)
 #if !defined(__CUDACC_RELAXED_CONSTEXPR__)
-// GLM 1.0.2 and later silently lose vector arithmetic on the device without this flag.
-#error "VoxelPipe under nvcc needs --expt-relaxed-constexpr (the CMake target voxelpipe::cuda carries it)"
+#include <glm/fwd.hpp> // its version
+#if GLM_VERSION_MAJOR > 1 || (GLM_VERSION_MAJOR == 1 && (GLM_VERSION_MINOR > 0 || GLM_VERSION_PATCH > 1))
+// These silently lose vector arithmetic on the device without this flag.
+#error                                                                                                                 \
+    "VoxelPipe with GLM 1.0.2 or later needs nvcc's --expt-relaxed-constexpr (the CMake target voxelpipe::cuda has it)"
+#endif
 #endif
 #define VOXELPIPE_HD __host__ __device__
+// Before a function template of both that calls what it is given, which may be the host's or the device's only; and
+// around a lambda that does.
+#define VOXELPIPE_ANY_CALLABLE _Pragma("nv_exec_check_disable")
+#define VOXELPIPE_CALLS_ANY _Pragma("nv_diagnostic push") _Pragma("nv_diag_suppress 20013, 20014, 20015")
+#define VOXELPIPE_CALLS_ANY_END _Pragma("nv_diagnostic pop")
 #else
 #define VOXELPIPE_HD
+#define VOXELPIPE_ANY_CALLABLE
+#define VOXELPIPE_CALLS_ANY
+#define VOXELPIPE_CALLS_ANY_END
 #endif
 
 // Forced only where the compiler optimises, and always in device code: with the sanitizers' checks in every copy a file
 // would take nearly three times as long to compile. Both may be defined beforehand, as the preset `fuzz` does.
 #if !defined(VOXELPIPE_INLINE)
-#if (defined(__GNUC__) || defined(__clang__)) && (defined(__OPTIMIZE__) || defined(__CUDACC__))
+#if (defined(__GNUC__) || defined(__clang__)) && (defined(__OPTIMIZE__) || defined(__CUDA_ARCH__))
 #define VOXELPIPE_INLINE inline __attribute__((always_inline))
 #define VOXELPIPE_INLINE_LAMBDA __attribute__((always_inline)) // between a lambda's parameters and its body
 #else

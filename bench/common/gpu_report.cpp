@@ -163,6 +163,23 @@ table gpu_table_short(const std::vector<gpu_row>& rows) {
     return t;
 }
 
+table gpu_stage_table(const std::vector<gpu_row>& rows) {
+    std::vector<std::string> columns{"scene", "resolution", "cell"};
+    for (const auto& [name, field] : voxelpipe::stage_time_fields) columns.emplace_back(name);
+    columns.insert(columns.end(), {"all stages", "call"});
+    table t(columns);
+    for (const gpu_row& r : rows) {
+        const double sum = voxelpipe::sum_of(r.stages);
+        if (sum <= 0) continue;
+        std::vector<std::string> cells{r.scene, std::to_string(r.resolution), std::string(name_of(r.cell))};
+        for (const auto& [name, field] : voxelpipe::stage_time_fields) cells.push_back(ms(r.stages.*field));
+        cells.push_back(ms(sum));
+        cells.push_back(ms(r.whole.median));
+        t.add_row(std::move(cells));
+    }
+    return t;
+}
+
 table gpu_means(const std::vector<gpu_row>& rows) {
     table t({"cells", "number", "ahead of the fastest", "least of it", "at 1.5 × or more", "at the target",
              "ahead of the baseline", "ours / floor"});

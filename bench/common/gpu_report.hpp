@@ -8,6 +8,8 @@
 #include "statistics.hpp"
 #include "table.hpp"
 
+#include <voxelpipe/stage_times.hpp>
+
 #include <array>
 #include <cstdint>
 #include <string>
@@ -64,6 +66,7 @@ struct gpu_row {
     std::uint64_t triangles = 0, fragments = 0;
     sample whole, async, baseline; // runs = 0 where there is none
     double floor_ms = 0;           // measured in the same run
+    voxelpipe::stage_times stages; // medians of calls of their own; all 0 where they were not asked for
     gpu_anchor published;
     std::string failure; // what went wrong; then there are no times
 
@@ -77,6 +80,8 @@ struct gpu_row {
 [[nodiscard]] table gpu_table_all(const std::vector<gpu_row>& rows);
 // What a person reads.
 [[nodiscard]] table gpu_table_short(const std::vector<gpu_row>& rows);
+// Milliseconds of every stage beside the whole call's, in a column each; rows that have them.
+[[nodiscard]] table gpu_stage_table(const std::vector<gpu_row>& rows);
 // A line a kind of cell, one for the cells with a target of their own, and one for all with an anchor.
 [[nodiscard]] table gpu_means(const std::vector<gpu_row>& rows);
 

@@ -4,6 +4,7 @@
 #include "cell_factories.hpp"
 
 #include <string>
+#include <vector>
 
 namespace bench::gpu {
 
@@ -26,6 +27,26 @@ std::unique_ptr<prepared_cell> prepare(session& s, const resident_mesh& mesh, co
     throw std::invalid_argument("no such cell");
 }
 
+namespace {
+
+vp::stage_times time_stages(prepared_cell& cell, int runs) {
+    std::vector<vp::stage_times> all(static_cast<std::size_t>(runs));
+    for (vp::stage_times& times : all) {
+        cell.set_times(&times);
+        (void)cell.call();
+    }
+    cell.set_times(nullptr);
+    vp::stage_times medians;
+    for (const auto& [name, field] : vp::stage_time_fields) {
+        std::vector<double> values;
+        for (const vp::stage_times& times : all) values.push_back(times.*field);
+        medians.*field = summarize(std::move(values)).median;
+    }
+    return medians;
+}
+
+} // namespace
+
 cell_times time_cell(const session& s, prepared_cell& cell, const cell_choice& how) {
     cell_times t;
     const bool compare = how.baseline && cell.prepare_baseline();
@@ -41,6 +62,10 @@ cell_times time_cell(const session& s, prepared_cell& cell, const cell_choice& h
     if (how.async && cell.prepare_async()) {
         t.async = time_calls(s, how.repeat, [&] { cell.call_async(); });
         must_agree("voxelize_async");
+    }
+    if (how.stage_runs > 0) {
+        t.stages = time_stages(cell, how.stage_runs);
+        must_agree("voxelize with stage times");
     }
     if (compare) {
         repetition repeat = how.repeat;

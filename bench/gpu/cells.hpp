@@ -8,6 +8,7 @@
 #include "gpu_report.hpp"
 #include "session.hpp"
 
+#include <voxelpipe/stage_times.hpp>
 #include <voxelpipe/status.hpp>
 
 #include <memory>
@@ -25,6 +26,8 @@ public:
 
     // The whole of vp::voxelize, clear included; throws where it fails.
     virtual vp::counters call() = 0;
+    // Where call() adds up the time of each stage from now on; null: nowhere.
+    virtual void set_times(vp::stage_times* times) = 0;
 
     // vp::voxelize_async in memory that was found to suffice; false where there is no such form.
     virtual bool prepare_async() { return false; }
@@ -41,11 +44,13 @@ public:
 struct cell_times {
     vp::counters counts;
     sample whole, async, baseline;
+    vp::stage_times stages; // medians
 };
 struct cell_choice {
     repetition repeat;
     double baseline_seconds = 1; // fewer runs of the baseline once it took so long
     bool async = true, baseline = true;
+    int stage_runs = 5; // calls of their own, for the time of each stage; 0: none
 };
 
 // Times a cell. With the baseline, what the last timed call of each form left is compared with it; throws

@@ -19,6 +19,7 @@ public:
         check(s);
         return s.counts;
     }
+    void set_times(vp::stage_times* times) override { backend_.times = times; }
 
 private:
     vp::cuda_backend backend_;

@@ -40,6 +40,7 @@ public:
         check(s);
         return s.counts;
     }
+    void set_times(vp::stage_times* times) override { backend_.times = times; }
 
     bool prepare_async() override {
         vp::workspace_limits limits = vp::workspace_limits::for_triangles(draw_.mesh.triangles.size());

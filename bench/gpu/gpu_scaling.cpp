@@ -33,7 +33,7 @@ struct options {
     std::uint64_t fragments = std::uint64_t{1} << 22;
     std::uint64_t most_triangles = 100'000'000;
     int resolution = 512, most_resolution = 2048;
-    gpu::cell_choice choice{{2, 10, 3, 2}, 0.5};
+    gpu::cell_choice choice{{2, 10, 3, 2}, 0.5, true, true, 0}; // no stage times
     std::string out = VOXELPIPE_BENCH_OUTPUT_DIR;
 };
 

@@ -84,6 +84,7 @@ int run(const options& how, const std::string& command) {
                     row.whole = t.whole;
                     row.async = t.async;
                     row.baseline = t.baseline;
+                    row.stages = t.stages;
                 } catch (const std::exception& e) {
                     row.failure = e.what();
                 }
@@ -99,9 +100,10 @@ int run(const options& how, const std::string& command) {
     }
 
     const bench::machine_record record = describe_machine();
-    std::string text = "# GPU table\n\n" + gpu::describe_device(watch) + "- clocks over the run: " + watch.range() +
-                       "\n- device copy, read and write: " + significant(bandwidth * 1e-12) + " TB/s\n" +
-                       record.markdown() + "- command: `" + command + "`\n- times: milliseconds, medians of " +
+    const std::string measured = gpu::describe_device(watch) + "- clocks over the run: " + watch.range() +
+                                 "\n- device copy, read and write: " + significant(bandwidth * 1e-12) + " TB/s\n" +
+                                 record.markdown() + "- command: `" + command + "`\n";
+    std::string text = "# GPU table\n\n" + measured + "- times: milliseconds, medians of " +
                        std::to_string(how.choice.repeat.runs) + " calls after " +
                        std::to_string(how.choice.repeat.warmups) +
                        " warm-ups, CUDA events around the whole call, clear included, mesh on the device; the caches "
@@ -119,7 +121,20 @@ int run(const options& how, const std::string& command) {
     const std::filesystem::path folder = how.out;
     write_file(folder / "gpu.md", text);
     write_file(folder / "gpu.csv", gpu_table_all(rows).csv());
-    std::cout << text << "\nwritten to " << folder.string() << ": gpu.md and gpu.csv\n";
+    std::string files = "gpu.md and gpu.csv";
+    if (const table stages = gpu_stage_table(rows); !stages.empty()) {
+        write_file(folder / "gpu_stages.md",
+                   "# Stages of the GPU table\n\n" + measured + "- milliseconds: medians of " +
+                       std::to_string(how.choice.stage_runs) +
+                       " calls of vp::voxelize with an event at the end of each stage, after the table's own; an event "
+                       "takes a few microseconds of the stream, so short calls come out longer than without\n"
+                       "- call: the whole call without events, as in the table\n"
+                       "- which stage a call without tiles has: docs/design.md, \"Stage times\"\n\n" +
+                       stages.markdown());
+        write_file(folder / "gpu_stages.csv", stages.csv());
+        files += ", gpu_stages.md and gpu_stages.csv";
+    }
+    std::cout << text << "\nwritten to " << folder.string() << ": " << files << "\n";
     const bool failed = std::any_of(rows.begin(), rows.end(), [](const gpu_row& r) { return !r.failure.empty(); });
     return failed || !agree ? 1 : 0;
 }
@@ -145,6 +160,8 @@ int main(int argc, char** argv) {
     app.add_option("--baseline-seconds", how.choice.baseline_seconds, "Fewer runs of the baseline once it took so long")
         ->capture_default_str();
     app.add_flag("!--no-baseline", how.choice.baseline, "Leave out the baseline and the comparison with it");
+    app.add_option("--stage-runs", how.choice.stage_runs, "Calls a cell for the time of each stage; 0: none")
+        ->capture_default_str();
     app.add_flag("!--no-async", how.choice.async, "Leave out voxelize_async");
     app.add_option("--out", how.out, "Folder for gpu.md and gpu.csv")->capture_default_str();
     CLI11_PARSE(app, argc, argv);

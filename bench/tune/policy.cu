@@ -34,6 +34,7 @@ public:
         check(s);
         return s.counts;
     }
+    void set_times(vp::stage_times* times) override { backend_.times = times; }
     bool prepare_baseline() override {
         baseline_words_ = device_array<std::uint32_t>(Target::map::elements(grid_.extent));
         return true;

@@ -157,7 +157,11 @@ volume run_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request
     stats.device = facts.name;
     stats.threads = thread_count(request.threads);
     try {
+        vp::stage_times times;
+        backend.times = &times;
         volume result = pipeline<vp::cuda_backend>{backend, model, request, stats}.run();
+        constexpr std::string_view absent[] = {"abuffer_emit"};
+        show_stages(stats, times, absent, "cuda_calls"); // launches, memory, the waits for the counters
         stats.device_memory = memory.most();
         return result;
     } catch (const std::bad_alloc&) {

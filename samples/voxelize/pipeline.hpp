@@ -18,6 +18,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -39,6 +40,24 @@ struct memory_access {
         });
     }
 };
+
+// Puts the library's stages, without those named in `absent`, in the place of their sum, "voxelize". `rest`: what the
+// sum holds beside them; empty where that is nothing to show.
+inline void show_stages(voxelize_stats& stats, const vp::stage_times& times, std::span<const std::string_view> absent,
+                        const std::string& rest) {
+    std::vector<std::pair<std::string, double>> stages;
+    for (auto& [name, time] : stats.milliseconds) {
+        if (name != "voxelize") {
+            stages.emplace_back(name, time);
+            continue;
+        }
+        for (const auto& [stage, field] : vp::stage_time_fields)
+            if (std::find(absent.begin(), absent.end(), stage) == absent.end())
+                stages.emplace_back(stage, times.*field);
+        if (!rest.empty()) stages.emplace_back(rest, std::max(0.0, time - vp::sum_of(times)));
+    }
+    stats.milliseconds = std::move(stages);
+}
 
 template <class Backend>
 class pipeline {

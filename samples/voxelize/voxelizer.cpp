@@ -41,26 +41,14 @@ void check_memory(const voxelize_request& request) {
 volume run_on_cpu(scene& model, const voxelize_request& request, voxelize_stats& stats) {
     const int threads = thread_count(request.threads);
     vp::cpu_backend backend{static_cast<unsigned>(threads)};
-    vp::cpu::stage_times times;
+    vp::stage_times times;
     backend.times = &times;
     stats.backend = "cpu";
     stats.threads = threads;
     volume result = pipeline<vp::cpu_backend>{backend, model, request, stats}.run();
 
-    // The pipeline's own stages in place of their sum.
-    std::vector<std::pair<std::string, double>> stages;
-    for (auto& [name, time] : stats.milliseconds) {
-        if (name != "voxelize") {
-            stages.emplace_back(name, time);
-            continue;
-        }
-        stages.emplace_back("vertex_shade", times.vertex_shade);
-        stages.emplace_back("coarse_raster", times.coarse_raster);
-        stages.emplace_back("tile_sort", times.tile_sort);
-        stages.emplace_back("clear", times.clear);
-        stages.emplace_back("fine_raster", times.fine_raster);
-    }
-    stats.milliseconds = std::move(stages);
+    constexpr std::string_view absent[] = {"tile_split", "tile_resolve", "abuffer_emit"};
+    show_stages(stats, times, absent, "");
     return result;
 }
 

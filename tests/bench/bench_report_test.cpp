@@ -167,6 +167,17 @@ TEST(GpuReport, EveryRowHasEveryColumn) {
     EXPECT_NE(gpu_table_short(rows).markdown().find("0.267"), std::string::npos) << "the 2011 figure";
 }
 
+TEST(GpuReport, StagesOfTheRowsThatHaveThem) {
+    std::vector<gpu_row> rows{row("dragon", 512, gpu_cell::bit_thin, 0.5), row("room", 512, gpu_cell::bit_thin, 0.5)};
+    EXPECT_TRUE(gpu_stage_table(rows).empty());
+    rows[1].stages.clear = 0.25;
+    rows[1].stages.fine_raster = 0.125;
+    const std::string csv = gpu_stage_table(rows).csv();
+    EXPECT_EQ(csv, "scene,resolution,cell,vertex_shade,coarse_raster,tile_sort,tile_split,clear,fine_raster,"
+                   "tile_resolve,abuffer_emit,all stages,call\n"
+                   "room,512,bit_thin,,,,,0.2500,0.1250,,,0.3750,0.5000\n");
+}
+
 TEST(SceneChoice, AbsentScenesHaveStandInsAndSaySo) {
     std::vector<std::string> notes;
     const std::vector<std::string> names = available_scenes("", notes);

@@ -19,6 +19,10 @@ namespace device_test {
     return h ^ (h >> 16);
 }
 
+inline constexpr float nan =
+    std::numeric_limits<float>::quiet_NaN(); // device code may read it, but not call what gave it
+inline constexpr float infinity = std::numeric_limits<float>::infinity();
+
 template <class T>
 struct any_value {
     VOXELPIPE_HD static T make(std::uint32_t h, float f) {
@@ -30,9 +34,9 @@ struct any_value {
             case 0:
                 return static_cast<T>(wide);
             case 1:
-                return std::numeric_limits<T>::max();
+                return vp::core::greatest<T>;
             case 2:
-                return std::numeric_limits<T>::lowest();
+                return vp::core::lowest<T>;
             default:
                 return static_cast<T>(wide % 100);
             }
@@ -40,9 +44,9 @@ struct any_value {
             const float sign = (h & 64u) != 0 ? -1.0f : 1.0f;
             switch (h % 29) {
             case 0:
-                return static_cast<T>(std::numeric_limits<float>::quiet_NaN());
+                return static_cast<T>(nan);
             case 1:
-                return static_cast<T>(sign * std::numeric_limits<float>::infinity());
+                return static_cast<T>(sign * infinity);
             case 2:
                 return static_cast<T>(sign * 0.0f);
             case 3:

@@ -15,6 +15,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <new>
 #include <random>
 #include <string>
 #include <vector>
@@ -196,6 +197,31 @@ void expect_same_lists(const mesh_data& m, const vp::grid& g, const VertexShader
     expect_same_bytes(ha.primitives, hb.primitives, "primitives");
     if constexpr (!std::is_void_v<Payload>) expect_same_bytes(ha.payloads, hb.payloads, "payloads");
 }
+
+// Counts what it gives out, and refuses what would take it beyond `most`.
+struct counting_resource {
+    std::size_t live = 0, most = std::size_t{1} << 40; // bytes
+    int calls = 0;
+    void* allocate_async(std::size_t bytes, std::size_t, cudaStream_t stream) {
+        void* p = nullptr;
+        if (live + bytes > most || cudaMallocAsync(&p, bytes, stream) != cudaSuccess) throw std::bad_alloc();
+        live += bytes;
+        ++calls;
+        return p;
+    }
+    void deallocate_async(void* p, std::size_t bytes, std::size_t, cudaStream_t stream) {
+        cudaFreeAsync(p, stream);
+        live -= bytes;
+    }
+};
+
+struct stream_owner {
+    cudaStream_t stream = nullptr;
+    stream_owner() { cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking); }
+    stream_owner(const stream_owner&) = delete;
+    stream_owner& operator=(const stream_owner&) = delete;
+    ~stream_owner() { cudaStreamDestroy(stream); }
+};
 
 inline constexpr vp::coverage both_rules[] = {vp::coverage::thin, vp::coverage::conservative};
 

@@ -1,15 +1,16 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Calls in a CUDA graph, replayed with changed vertices, and on two streams at once: the way without tiles, the
-// fragment lists of constant and of shaded fragments; capacities of the lists that are too small. All against
-// cpu_backend.
+// Calls in a CUDA graph, replayed with changed vertices, and on several streams at once: the way without tiles, the
+// fragment lists of constant and of shaded fragments, of several draws and in grids beyond 32 bits; capacities of the
+// lists that are too small. All against cpu_backend.
 
 #include "cells.hpp"
 
 #include <voxelpipe/device/abuffer_async.cuh>
 
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 
@@ -17,12 +18,6 @@ namespace {
 
 using namespace device_test;
 namespace blend = voxelpipe::blend;
-
-struct stream_owner {
-    cudaStream_t stream = nullptr;
-    stream_owner() { cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking); }
-    ~stream_owner() { cudaStreamDestroy(stream); }
-};
 
 // What a call launches, to be launched again.
 class captured_graph {
@@ -97,6 +92,8 @@ TEST(Graph, WithoutTilesIsReplayedWithChangedVertices) {
     for (const vp::coverage rule : both_rules) {
         stream_owner owner;
         vp::cuda_backend be{owner.stream};
+        vp::stage_times times;
+        be.times = &times; // for voxelize: a call that never waits has none to give, and captures no events
         moving_mesh mesh(be, 3000, 60.0f, 91);
         direct_framebuffer<vp::cuda_backend> fb{be, g.extent};
         const direct_draw d{mesh.view(), {}, vp::constant(true, 1u, 1.0f)};
@@ -113,6 +110,7 @@ TEST(Graph, WithoutTilesIsReplayedWithChangedVertices) {
             graph.launch(be.stream);
             expect_direct(m, g, rule, be, fb, vp::read_status(be, workspace));
         }
+        EXPECT_EQ(times, vp::stage_times{});
     }
 }
 
@@ -148,13 +146,16 @@ TEST(Graph, TwoStreamsAtOnceWithoutTiles) {
 
 // ---- fragment lists -------------------------------------------------------------------------------------------------
 
+// `parts`: the mesh of each draw.
 template <class Payload, class FragmentShader>
-void expect_lists(const mesh_data& m, const vp::grid& g, const FragmentShader& fs, const vp::voxelize_options& options,
-                  const vp::host_abuffer<Payload>& lists, const vp::status& s) {
+void expect_lists(const std::vector<mesh_data>& parts, const vp::grid& g, const FragmentShader& fs,
+                  const vp::voxelize_options& options, const vp::host_abuffer<Payload>& lists, const vp::status& s) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;
     vp::cpu_backend cpu;
     vp::abuffer<vp::cpu_backend, Payload> expected{cpu};
-    vp::mesh<vp::cpu_backend> mesh(cpu, m.positions, m.triangles);
-    const vp::status reference = vp::voxelize(cpu, mesh, g, vp::passthrough{}, fs, expected, options);
+    std::vector<draw_type> draws;
+    for (const mesh_data& m : parts) draws.push_back({{m.positions, m.triangles}, {}, fs});
+    const vp::status reference = vp::voxelize(cpu, std::span<const draw_type>(draws), g, expected, options);
     ASSERT_TRUE(reference.ok()) << reference.message();
     ASSERT_TRUE(s.ok()) << s.message();
     EXPECT_GT(lists.voxels.size(), 0u);
@@ -203,7 +204,7 @@ void compare_replayed_lists(const FragmentShader& fs, std::uint32_t seed) {
             mesh.pose(be, m);
             graph.launch(be.stream);
             const vp::status s = vp::read_status(be, workspace);
-            expect_lists<Payload>(m, g, fs, rule, lists.to_host(be), s);
+            expect_lists<Payload>({m}, g, fs, rule, lists.to_host(be), s);
         }
         memory.expect_untouched_behind(be);
     }
@@ -241,7 +242,7 @@ void compare_overflowing_lists(const FragmentShader& fs, std::uint32_t seed) {
         const vp::status s = vp::read_status(be, workspace, &limits);
         done = s.ok();
         if (done) {
-            expect_lists<Payload>(m, g, fs, {}, lists.to_host(be), s);
+            expect_lists<Payload>({m}, g, fs, {}, lists.to_host(be), s);
         } else {
             ASSERT_EQ(s.code, vp::status_code::capacity_exceeded);
             EXPECT_GT(s.required.fragments, 10u);
@@ -258,23 +259,77 @@ TEST(Graph, ListsThatDoNotFitSayWhatIsNeeded) {
     compare_overflowing_lists<double>(any_values<vp::target<double, blend::replace>>{}, 106);
 }
 
-// Refuses what would take it beyond `most`.
-struct limited_resource {
-    std::size_t live = 0, most = std::size_t{1} << 40;
-    void* allocate_async(std::size_t bytes, std::size_t, cudaStream_t stream) {
-        void* p = nullptr;
-        if (live + bytes > most || cudaMallocAsync(&p, bytes, stream) != cudaSuccess) throw std::bad_alloc();
-        live += bytes;
-        return p;
+// A call that waits for nothing, of several draws, on a stream of its own.
+template <class Payload, class FragmentShader>
+class list_call {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;
+
+public:
+    list_call(std::vector<mesh_data> parts, const vp::grid& g, const FragmentShader& fs, vp::coverage rule)
+        : parts_(std::move(parts)), grid_(g), shader_(fs), options_(rule) {
+        for (const mesh_data& m : parts_) meshes_.emplace_back(backend_, m.positions, m.triangles);
+        for (const auto& m : meshes_) draws_.push_back({m.view(), {}, shader_});
+        const vp::workspace_limits limits{0, 0, 1 << 17, 1 << 16};
+        const std::size_t bytes = vp::workspace_bytes(draws(), grid_, lists_, options_, limits);
+        EXPECT_GT(bytes, 0u);
+        memory_ = std::make_unique<guarded_memory>(backend_, bytes);
+        workspace_ = {const_cast<unsigned char*>(memory_->memory.data()), bytes, limits};
     }
-    void deallocate_async(void* p, std::size_t bytes, std::size_t, cudaStream_t stream) {
-        cudaFreeAsync(p, stream);
-        live -= bytes;
+    void launch() {
+        const vp::status s = vp::voxelize_async(backend_, draws(), grid_, lists_, options_, workspace_);
+        ASSERT_TRUE(s.ok()) << s.message();
     }
+    void expect_the_cpus() {
+        const vp::status s = vp::read_status(backend_, workspace_);
+        expect_lists<Payload>(parts_, grid_, shader_, options_, lists_.to_host(backend_), s);
+        memory_->expect_untouched_behind(backend_);
+    }
+
+private:
+    [[nodiscard]] std::span<const draw_type> draws() const { return draws_; }
+
+    stream_owner owner_;
+    vp::cuda_backend backend_{owner_.stream};
+    std::vector<mesh_data> parts_;
+    vp::grid grid_;
+    FragmentShader shader_;
+    vp::voxelize_options options_;
+    std::vector<vp::mesh<vp::cuda_backend>> meshes_;
+    std::vector<draw_type> draws_;
+    vp::abuffer_view<Payload> lists_;
+    std::unique_ptr<guarded_memory> memory_;
+    vp::workspace_view workspace_;
 };
 
+using any_double = any_values<vp::target<double, blend::replace>>;
+
+template <class Payload, class FragmentShader>
+void compare_list_calls(const FragmentShader& fs, std::uint32_t seed) {
+    // The last voxel of the far corner is number 2^33 - 1.
+    std::vector<mesh_data> far{mixed_triangles(150, 100.0f, seed), mixed_triangles(200, 60.0f, seed + 1)};
+    for (mesh_data& m : far)
+        for (glm::vec3& p : m.positions) p += glm::vec3(1960.0f, 1970.0f, 1980.0f);
+    add_triangle(far[1], {2047.2f, 2047.3f, 2047.9f}, {2047.8f, 2047.1f, 2047.2f}, {2047.4f, 2047.9f, 2047.5f});
+    const std::vector<mesh_data> several{mixed_triangles(500, 40.0f, seed + 2), mixed_triangles(1, 40.0f, seed + 3),
+                                         mixed_triangles(900, 40.0f, seed + 4)};
+    for (const vp::coverage rule : both_rules) {
+        list_call<Payload, FragmentShader> small(several, box_grid({40, 33, 47}), fs, rule);
+        list_call<Payload, FragmentShader> one_far({far[1]}, box_grid({2048, 2048, 2048}), fs, rule);
+        list_call<Payload, FragmentShader> all_far(far, box_grid({2048, 2048, 2048}), fs, rule);
+        // Three streams at once, over and over.
+        for (int round = 0; round < 5; ++round)
+            for (auto* call : {&small, &one_far, &all_far}) call->launch();
+        for (auto* call : {&small, &one_far, &all_far}) call->expect_the_cpus();
+    }
+}
+
+TEST(Graph, ListsOfSeveralDrawsAndLargeGridsOnStreamsAtOnce) {
+    compare_list_calls<void>(vp::constant(true), 120);
+    compare_list_calls<double>(any_double{}, 130);
+}
+
 TEST(Lists, NoMemoryForTheCopyIsInTheStatus) {
-    limited_resource resource;
+    counting_resource resource;
     vp::cuda_backend be{nullptr, resource};
     const mesh_data m = mixed_triangles(500, 20.0f, 107);
     const vp::grid g = box_grid({20, 20, 20});

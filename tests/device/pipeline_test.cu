@@ -132,24 +132,6 @@ TEST(Pipeline, BadArgumentsAreRefused) {
               vp::status_code::empty_mesh);
 }
 
-// Counts what it gives out, and can refuse.
-struct counting_resource {
-    std::size_t live = 0, most = std::size_t{1} << 40;
-    int calls = 0;
-    void* allocate_async(std::size_t bytes, std::size_t, cudaStream_t stream) {
-        if (live + bytes > most) throw std::bad_alloc();
-        void* p = nullptr;
-        if (cudaMallocAsync(&p, bytes, stream) != cudaSuccess) throw std::bad_alloc();
-        live += bytes;
-        ++calls;
-        return p;
-    }
-    void deallocate_async(void* p, std::size_t bytes, std::size_t, cudaStream_t stream) {
-        cudaFreeAsync(p, stream);
-        live -= bytes;
-    }
-};
-
 TEST(Pipeline, MemoryComesFromTheResource) {
     counting_resource resource;
     {
@@ -234,12 +216,6 @@ TEST(Pipeline, ResultsDoNotDependOnThePolicy) {
     }
 }
 
-struct stream_owner {
-    cudaStream_t stream = nullptr;
-    stream_owner() { cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking); }
-    ~stream_owner() { cudaStreamDestroy(stream); }
-};
-
 using one_draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<float>>;
 
 TEST(Pipeline, TwoStreamsAtOnce) {
@@ -321,7 +297,7 @@ TEST(Pipeline, AGraphIsReplayedWithChangedVertices) {
     cudaGraphDestroy(graph);
 }
 
-TEST(Pipeline, AWorkspaceThatIsTooSmallSaysWhatIsNeeded) {
+void start_too_small(vp::workspace_limits limits) {
     vp::cuda_backend be;
     mesh_data m = mixed_triangles(3000, 60.0f, 40);
     const vp::grid g = box_grid({200, 200, 200});
@@ -329,12 +305,11 @@ TEST(Pipeline, AWorkspaceThatIsTooSmallSaysWhatIsNeeded) {
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
     const one_draw d{mesh.view(), {}, vp::constant(0.3f)};
     const std::span<const one_draw> draws(&d, 1);
-    vp::workspace_limits limits{10, 1, 0, 0};
     EXPECT_EQ(vp::voxelize_async(be, draws, g, fb.view(), {}, {nullptr, 0, limits}).code,
               vp::status_code::capacity_exceeded);
     cudaMemset(const_cast<float*>(vp::get<0>(fb).view().elements), 0x5a, 8000000 * sizeof(float));
     bool done = false;
-    for (int tries = 0; tries < 4 && !done; ++tries) {
+    for (int tries = 0; tries < 5 && !done; ++tries) {
         const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), {}, limits);
         vp::cuda_backend::buffer<std::byte> memory(be, bytes);
         const vp::workspace_view workspace{memory.data(), bytes, limits};
@@ -351,6 +326,46 @@ TEST(Pipeline, AWorkspaceThatIsTooSmallSaysWhatIsNeeded) {
     vp::counters counts;
     expect_same_bytes(run_policy<vp::tuning::fine_raster_selector>(m, g, vp::coverage::conservative, counts),
                       vp::get<0>(fb).to_host(be), "after retry");
+}
+
+TEST(Pipeline, AWorkspaceThatIsTooSmallSaysWhatIsNeeded) {
+    start_too_small({10, 1, 0, 0});
+    start_too_small({}); // no room at all: nothing may be launched with no blocks
+}
+
+TEST(Pipeline, AWorkspaceBeyond32BitsIsRefused) {
+    vp::cuda_backend be;
+    const mesh_data m = mixed_triangles(5, 20.0f, 42);
+    const vp::grid g = box_grid({20, 20, 20});
+    vp::mesh mesh{be, m.positions, m.triangles};
+    vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
+    const one_draw d{mesh.view(), {}, vp::constant(0.3f)};
+    const std::span<const one_draw> draws(&d, 1);
+    for (const vp::workspace_limits limits : {vp::workspace_limits{std::uint64_t{1} << 32, 1, 0, 0},
+                                              vp::workspace_limits{1, 1, std::uint64_t{1} << 40, 1}}) {
+        EXPECT_EQ(vp::workspace_bytes(draws, g, fb.view(), {}, limits), 0u);
+        EXPECT_EQ(vp::voxelize_async(be, draws, g, fb.view(), {}, {nullptr, 0, limits}).code,
+                  vp::status_code::size_overflow);
+    }
+}
+
+// The arithmetic is tests/unit/launch_size_test.cpp's; here with this device's multiprocessors.
+TEST(Pipeline, LaunchesFillTheDevice) {
+    int device = 0;
+    cudaDeviceProp properties{};
+    ASSERT_EQ(cudaGetDevice(&device), cudaSuccess);
+    ASSERT_EQ(cudaGetDeviceProperties(&properties, device), cudaSuccess);
+    const auto multiprocessors = static_cast<unsigned>(properties.multiProcessorCount);
+    for (int bit = 32; bit < 64; ++bit) {
+        const std::uint64_t items = std::uint64_t{1} << bit;
+        EXPECT_EQ(vp::device::fill_device(items), 8 * multiprocessors) << bit;
+        EXPECT_EQ(vp::device::fill_device(items, 4), 4 * multiprocessors) << bit;
+        EXPECT_GE(vp::device::raster_blocks(items), multiprocessors) << bit;
+        EXPECT_LE(vp::device::raster_blocks(items), static_cast<unsigned>(properties.maxGridSize[0])) << bit;
+    }
+    EXPECT_EQ(vp::device::fill_device(0), 1u);
+    EXPECT_EQ(vp::device::num_blocks(0), 1u);
+    EXPECT_GE(vp::device::raster_blocks(1), 1u);
 }
 
 // add_unordered is not the same bits: it stays within the rounding of its additions.

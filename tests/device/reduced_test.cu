@@ -40,4 +40,100 @@ TEST(Reduced, Lists) {
         expect_same_lists<void>(m, box_grid({30, 21, 33}), vp::passthrough{}, vp::constant(true), rule);
 }
 
+// Stage times are asked for without a change to what a call gives: they are parts of the call, and a call that is not
+// asked for them leaves them alone.
+template <class Call>
+vp::stage_times time_stages(vp::cuda_backend& be, const Call& call) {
+    cudaEvent_t begin = nullptr, end = nullptr;
+    EXPECT_EQ(cudaEventCreate(&begin), cudaSuccess);
+    EXPECT_EQ(cudaEventCreate(&end), cudaSuccess);
+    vp::stage_times times;
+    be.times = &times;
+    EXPECT_EQ(cudaEventRecord(begin, be.stream), cudaSuccess);
+    const vp::status s = call();
+    EXPECT_EQ(cudaEventRecord(end, be.stream), cudaSuccess);
+    EXPECT_EQ(cudaEventSynchronize(end), cudaSuccess);
+    be.times = nullptr;
+    EXPECT_TRUE(s.ok()) << s.message();
+    float whole = 0;
+    EXPECT_EQ(cudaEventElapsedTime(&whole, begin, end), cudaSuccess);
+    for (const auto& [name, field] : vp::stage_time_fields) EXPECT_GE(times.*field, 0.0) << name;
+    EXPECT_GT(vp::sum_of(times), 0.0);
+    EXPECT_LE(vp::sum_of(times), whole + 0.01); // events are good to half a microsecond each
+    const vp::stage_times before = times;
+    EXPECT_TRUE(call().ok());
+    EXPECT_EQ(before, times);
+    cudaEventDestroy(begin);
+    cudaEventDestroy(end);
+    return times;
+}
+
+TEST(Reduced, StageTimesOfTilesAndOrderedTargets) {
+    using fb_type = vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>,
+                                    vp::target<double, blend::max>, vp::target<std::uint32_t, blend::replace>,
+                                    vp::target<std::uint32_t, newest>>;
+    const any_values<vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>, vp::target<double, blend::max>,
+                     vp::target<std::uint32_t, blend::replace>, vp::target<std::uint32_t, newest>>
+        shader;
+    const mesh_data m = mixed_triangles(300, 30.0f, 63);
+    const vp::grid g = box_grid({30, 21, 33});
+    vp::cuda_backend be;
+    fb_type timed{be, g.extent}, plain{be, g.extent};
+    const auto draw = [&](fb_type& fb) {
+        return draw_framebuffer(be, fb, m, g, vp::passthrough{}, shader, {}, start::clear);
+    };
+    ASSERT_TRUE(draw(plain).ok());
+    const vp::stage_times times = time_stages(be, [&] { return draw(timed); });
+    EXPECT_GT(times.vertex_shade, 0.0);
+    EXPECT_GT(times.coarse_raster, 0.0);
+    EXPECT_GT(times.tile_sort, 0.0);
+    EXPECT_GT(times.tile_split, 0.0);
+    EXPECT_GT(times.clear, 0.0);
+    EXPECT_GT(times.fine_raster, 0.0);
+    EXPECT_GT(times.tile_resolve, 0.0);
+    EXPECT_GT(times.abuffer_emit, 0.0); // the ordered target's lists
+    vp::core::for_each_index<5>([&]<std::size_t I>() {
+        expect_same_bytes(vp::get<I>(plain).to_host(be), vp::get<I>(timed).to_host(be), "timed");
+    });
+}
+
+TEST(Reduced, StageTimesWithoutTiles) {
+    using fb_type = vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>>;
+    const mesh_data m = mixed_triangles(300, 30.0f, 64);
+    const vp::grid g = box_grid({30, 21, 33});
+    vp::cuda_backend be;
+    fb_type timed{be, g.extent}, plain{be, g.extent};
+    const auto draw = [&](fb_type& fb) {
+        return draw_framebuffer(be, fb, m, g, vp::passthrough{}, vp::constant(true), {}, start::clear);
+    };
+    ASSERT_TRUE(draw(plain).ok());
+    const vp::stage_times times = time_stages(be, [&] { return draw(timed); });
+    EXPECT_GT(times.coarse_raster, 0.0);
+    EXPECT_GT(times.clear, 0.0);
+    EXPECT_GT(times.fine_raster, 0.0);
+    for (const double none : {times.vertex_shade, times.tile_sort, times.tile_split, times.tile_resolve})
+        EXPECT_EQ(none, 0.0);
+    expect_same_bytes(vp::get<0>(plain).to_host(be), vp::get<0>(timed).to_host(be), "timed");
+}
+
+TEST(Reduced, StageTimesOfLists) {
+    const mesh_data m = mixed_triangles(300, 30.0f, 65);
+    const vp::grid g = box_grid({30, 21, 33});
+    vp::cuda_backend be;
+    const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+    vp::abuffer<vp::cuda_backend, void> timed{be}, plain{be};
+    const auto draw = [&](vp::abuffer<vp::cuda_backend, void>& lists) {
+        return vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), lists);
+    };
+    ASSERT_TRUE(draw(plain).ok());
+    const vp::stage_times times = time_stages(be, [&] { return draw(timed); });
+    for (const double some : {times.vertex_shade, times.fine_raster, times.tile_sort, times.abuffer_emit})
+        EXPECT_GT(some, 0.0);
+    EXPECT_EQ(times.coarse_raster, 0.0);
+    const auto a = plain.to_host(be), b = timed.to_host(be);
+    expect_same_bytes(a.voxels, b.voxels, "voxels");
+    expect_same_bytes(a.offsets, b.offsets, "offsets");
+    expect_same_bytes(a.primitives, b.primitives, "primitives");
+}
+
 } // namespace

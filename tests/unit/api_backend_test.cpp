@@ -147,7 +147,7 @@ TEST(Progress, RisesToTheTotalOneCallAtATime) {
 TEST(StageTimes, AreAddedUp) {
     const unit::small_mesh mesh = unit::make_mesh(4, 2000, extent);
     vp::cpu_backend backend{2};
-    vp::cpu::stage_times times{};
+    vp::stage_times times{};
     backend.times = &times;
     vp::framebuffer<vp::cpu_backend, vp::target<float, blend::add>> fb{backend, extent};
     vp::abuffer<vp::cpu_backend> lists{backend};

@@ -59,8 +59,15 @@ void expect_same_files(const scratch_folder& folder, const fs::path& model, std:
         EXPECT_EQ(stats[0][count], stats[1][count]) << count;
     EXPECT_NE("", stats[1]["device"]);
     EXPECT_LT(0, stats[1]["device_memory_bytes"]);
-    for (const char* stage : {"cuda_start", "upload", "voxelize", "resolve"})
-        EXPECT_TRUE(stats[1]["ms"].contains(stage)) << stage;
+    double sum = 0;
+    for (const char* stage : {"read", "cuda_start", "upload", "vertex_shade", "coarse_raster", "tile_sort", "tile_split",
+                              "clear", "fine_raster", "tile_resolve", "cuda_calls", "resolve", "write"}) {
+        ASSERT_TRUE(stats[1]["ms"].contains(stage)) << stage;
+        EXPECT_LE(0.0, stats[1]["ms"][stage]) << stage;
+        sum += stats[1]["ms"][stage].get<double>();
+    }
+    EXPECT_LT(0.0, stats[1]["ms"]["fine_raster"]);
+    EXPECT_NEAR(sum, stats[1]["ms"]["total"], 1e-6);
     // Some formats take a file for each target.
     ASSERT_EQ(stats[0]["files"].size(), stats[1]["files"].size());
     EXPECT_LE(names.size(), stats[0]["files"].size());

@@ -74,6 +74,7 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row(const half_plane<Int> (&
 
 // Calls emit(u, v, w_first, w_last) for every column that holds covered voxels inside `clip` (x y z, in voxels of the
 // setup's fraction). u, v and w are absolute voxel indices. Spans of one triangle do not overlap.
+VOXELPIPE_ANY_CALLABLE
 template <span_rule Rule, class Int, class Emit>
 VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<Int>& t, const voxel_box& clip,
                                                            Emit&& emit) {
@@ -148,10 +149,12 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<
                 return (t.vw[0].b * w + r[0]) | (t.vw[1].b * w + r[1]) | (t.vw[2].b * w + r[2]) |
                        (t.wu[0].a * w + s[0]) | (t.wu[1].a * w + s[1]) | (t.wu[2].a * w + s[2]);
             };
+            VOXELPIPE_CALLS_ANY
             const auto out = [&](std::int64_t u, Int w0, Int w1) VOXELPIPE_INLINE_LAMBDA {
                 emit(t.origin[0] + u, t.origin[1] + v, t.origin[2] + static_cast<std::int64_t>(w0),
                      t.origin[2] + static_cast<std::int64_t>(w1));
             };
+            VOXELPIPE_CALLS_ANY_END
             if (Rule == span_rule::conservative && hi[2] - lo[2] < 4) {
                 // Few voxels deep: asking each end whether the plane passes it costs less than two divisions.
                 for (std::int64_t u = u_lo; u <= u_hi; ++u) {
@@ -198,6 +201,7 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<
 
 // Whole path for one triangle: picks the integer width, sets up, enumerates. emit(setup, u, v, w_first, w_last) is
 // called with either width of setup.
+VOXELPIPE_ANY_CALLABLE
 template <span_rule Rule, class Emit>
 VOXELPIPE_HD constexpr void rasterize(const snapped_position& a, const snapped_position& b, const snapped_position& c,
                                       int fraction, const voxel_box& clip, Emit&& emit) {

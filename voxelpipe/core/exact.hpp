@@ -8,6 +8,7 @@
 // Also: exact integer helpers (floor division, floor shift) and conversions between integers and floats.
 
 #include <voxelpipe/config.hpp>
+#include <voxelpipe/core/bits.hpp>
 
 #include <bit>
 #include <cmath>
@@ -254,7 +255,7 @@ template <class Int>
     const bool negative = a < 0;
     const uint128 magnitude = negative ? uint128{0} - static_cast<uint128>(a) : static_cast<uint128>(a);
     const std::uint64_t bits = round_to_binary(magnitude, 0, 52, 11) | (negative ? std::uint64_t{1} << 63 : 0);
-    return std::bit_cast<double>(bits);
+    return core::bit_cast<double>(bits);
 }
 
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double to_double(std::int64_t a) { return static_cast<double>(a); }

@@ -6,6 +6,7 @@
 // Holds the sub-voxel format, the snapping formula and the table of integer widths that the rest of core/ relies on.
 
 #include <voxelpipe/config.hpp>
+#include <voxelpipe/core/bits.hpp>
 #include <voxelpipe/core/exact.hpp>
 
 #include <cstdint>
@@ -79,7 +80,7 @@ struct snap_transform {
 };
 
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_finite(float a) {
-    return (std::bit_cast<std::uint32_t>(a) & 0x7f800000u) != 0x7f800000u;
+    return (core::bit_cast<std::uint32_t>(a) & 0x7f800000u) != 0x7f800000u;
 }
 
 // The snapped position relative to the rasterised part's first voxel, or a mark where it cannot be drawn.

@@ -5,9 +5,9 @@
 // half: IEEE 754 binary16 storage with exact conversions (to nearest, ties to even), the same bits on every compiler.
 // It stores and converts; arithmetic is done in float by the caller.
 
+#include <voxelpipe/core/bits.hpp>
 #include <voxelpipe/core/exact.hpp>
 
-#include <bit>
 #include <cstdint>
 
 namespace voxelpipe {
@@ -37,14 +37,14 @@ struct half {
             const int shift = 11 - exact::bit_width(static_cast<std::uint64_t>(mantissa));
             r = (static_cast<std::uint32_t>(113 - shift) << 23) | (((mantissa << shift) & 0x3ffu) << 13);
         }
-        return std::bit_cast<float>(sign | r);
+        return core::bit_cast<float>(sign | r);
     }
 
     friend constexpr bool operator==(half a, half b) = default; // bitwise
 
 private:
     [[nodiscard]] VOXELPIPE_HD static std::uint16_t from_float(float value) {
-        const auto raw = std::bit_cast<std::uint32_t>(value);
+        const auto raw = core::bit_cast<std::uint32_t>(value);
         const auto sign = static_cast<std::uint16_t>((raw >> 16) & 0x8000u);
         const std::uint32_t exponent = (raw >> 23) & 0xffu;
         const std::uint32_t mantissa = raw & 0x7fffffu;

@@ -56,11 +56,15 @@ template <std::size_t N>
 struct member_traits<std::array<float, N>> {
     static constexpr bool allowed = true;
     using array = std::array<float, N>;
+    struct plain { // std::array's functions are the host's
+        float f[N];
+    };
     VOXELPIPE_HD
     static array mix(const array& a, const array& b, const array& c, float t1, float t2) {
-        array r;
-        for (std::size_t i = 0; i < N; ++i) r[i] = member_traits<float>::mix(a[i], b[i], c[i], t1, t2);
-        return r;
+        const auto p = core::bit_cast<plain>(a), q = core::bit_cast<plain>(b), r = core::bit_cast<plain>(c);
+        plain m;
+        for (std::size_t i = 0; i < N; ++i) m.f[i] = member_traits<float>::mix(p.f[i], q.f[i], r.f[i], t1, t2);
+        return core::bit_cast<array>(m);
     }
 };
 template <class T>

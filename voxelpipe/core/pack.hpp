@@ -79,11 +79,15 @@ template <class First, class... Rest>
         return {static_cast<First&&>(first), make_pack(static_cast<Rest&&>(rest)...)};
 }
 
+VOXELPIPE_ANY_CALLABLE
+template <class F, std::size_t... I>
+VOXELPIPE_HD constexpr void for_each_index(F&& f, std::index_sequence<I...>) {
+    (f.template operator()<I>(), ...);
+}
 // Calls f.template operator()<I>() for I = 0 .. N - 1, in order.
 template <std::size_t N, class F>
 VOXELPIPE_HD constexpr void for_each_index(F&& f) {
-    [&]<std::size_t... I>(std::index_sequence<I...>) { (f.template operator()<I>(), ...); }
-    (std::make_index_sequence<N>{});
+    for_each_index(static_cast<F&&>(f), std::make_index_sequence<N>{});
 }
 
 } // namespace core

@@ -71,11 +71,13 @@ template <coverage Rule>
 
 // Calls emit(tile) for each tile within `box` (tiles) that the triangle has work in: exactly the tiles whose closed box
 // it meets (conservative), or the tiles that its plane passes within its columns (thin).
+VOXELPIPE_ANY_CALLABLE
 template <coverage Rule, class Emit>
 VOXELPIPE_HD void for_each_tile_in(const snapped_position& a, const snapped_position& b, const snapped_position& c,
                                    int fraction, const voxel_box& box, const tile_grid& tiles, Emit&& emit) {
     // A tile is a voxel of a coarser grid: the same exact coverage, 2^log2_size times larger.
     constexpr auto rule = Rule == coverage::thin ? span_rule::columns : span_rule::conservative;
+    VOXELPIPE_CALLS_ANY
     rasterize<rule>(a, b, c, fraction + tiles.log2_size, box,
                     [&](const auto& t, std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
                         for (std::int64_t w = w0; w <= w1; ++w) {
@@ -83,10 +85,12 @@ VOXELPIPE_HD void for_each_tile_in(const snapped_position& a, const snapped_posi
                             emit(tiles.index(p[0], p[1], p[2]));
                         }
                     });
+    VOXELPIPE_CALLS_ANY_END
 }
 
 // The same for all of the triangle's `reach` (voxels). One that lies in one tile needs no test, nor does one whose
 // bounding box is a line of tiles (is_line_of_voxels). Inlined, because most triangles do lie in one tile.
+VOXELPIPE_ANY_CALLABLE
 template <coverage Rule, class Emit>
 VOXELPIPE_HD VOXELPIPE_INLINE void for_each_tile(const snapped_position& a, const snapped_position& b,
                                                  const snapped_position& c, int fraction, const voxel_box& reach,

@@ -6,9 +6,9 @@
 // saturating signed integers. Terms become fixed point by one rounding, the integer sum is exact for up to 2^32 terms,
 // and the result is rounded once (docs/design.md, "Reproducible addition").
 
+#include <voxelpipe/core/bits.hpp>
 #include <voxelpipe/core/half.hpp>
 
-#include <bit>
 #include <cstdint>
 
 namespace voxelpipe::core {
@@ -97,8 +97,8 @@ struct sum_format<double> {
 template <int Log2Quantum>
 VOXELPIPE_HD inline void add_float(wide_sum<1>& s, float term) {
     static_assert(Log2Quantum >= -126 && Log2Quantum <= 64);
-    constexpr double scale = std::bit_cast<double>(static_cast<std::uint64_t>(1023 - Log2Quantum) << 52);
-    if ((std::bit_cast<std::uint32_t>(term) & 0x7fffffffu) > 0x7f800000u) {
+    constexpr double scale = core::bit_cast<double>(static_cast<std::uint64_t>(1023 - Log2Quantum) << 52);
+    if ((core::bit_cast<std::uint32_t>(term) & 0x7fffffffu) > 0x7f800000u) {
         s.marks |= sum_nan;
         return;
     }
@@ -118,7 +118,7 @@ VOXELPIPE_HD inline void add_half(wide_sum<1>& s, half term) {
 
 template <int Log2Quantum>
 VOXELPIPE_HD inline void add_double(wide_sum<2>& s, double term) {
-    const auto bits = std::bit_cast<std::uint64_t>(term);
+    const auto bits = core::bit_cast<std::uint64_t>(term);
     const bool negative = (bits >> 63) != 0;
     const int exponent = static_cast<int>((bits >> 52) & 0x7ffu);
     const std::uint64_t mantissa = bits & ((std::uint64_t{1} << 52) - 1);

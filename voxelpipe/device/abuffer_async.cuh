@@ -55,8 +55,6 @@ struct abuffer_view {
 
 namespace device {
 
-inline constexpr std::uint64_t most_list_fragments = 0xfffffff0u; // they are numbered with 32 bits
-
 // Carves the memory and, with Run, launches every stage and sets the view.
 template <coverage Rule, bool Run, class Key, class Payload, class Call>
 void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
@@ -104,7 +102,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
                                           const voxelize_options& options, const workspace_limits& limits) {
     using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
     const status s = core::validate_draws(draws);
-    if (!s.ok() || !validate(g).ok() || limits.fragments > device::most_list_fragments) return 0;
+    if (!s.ok() || !validate(g).ok() || limits.fragments > core::most_numbered) return 0;
     try {
         const call_type call{draws, g, static_cast<std::uint32_t>(s.counts.triangles_in),
                              device::to_capacities(limits)};
@@ -126,7 +124,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         if (const status s = validate(g); !s.ok()) return s;
         status s = core::validate_draws(draws);
         if (!s.ok()) return s;
-        if (workspace.limits.fragments > device::most_list_fragments) return core::failure(status_code::size_overflow);
+        if (workspace.limits.fragments > core::most_numbered) return core::failure(status_code::size_overflow);
         try {
             const call_type call{draws, g, static_cast<std::uint32_t>(s.counts.triangles_in),
                                  device::to_capacities(workspace.limits)};

@@ -5,12 +5,13 @@
 // A-buffer: every fragment, ordered by (voxel, primitive). Fragments of a shader that computes are counted, given their
 // places by a scan and written by ascending primitive; those of a constant one are listed in one pass, in any order
 // (list_raster.cuh). A stable radix sort by voxel over just the bits in use follows, and the first fragment of each
-// voxel is selected; what was listed in any order is then put in order within each voxel (fragment_order.cuh). Memory is
-// in proportion to the fragments (paper section 3, A-buffer).
+// voxel is selected; what was listed in any order is then put in order within each voxel (fragment_order.cuh). Memory
+// is in proportion to the fragments (paper section 3, A-buffer).
 
 #include <voxelpipe/device/fragment_order.cuh>
 #include <voxelpipe/device/fragment_shade.cuh>
 #include <voxelpipe/device/list_raster.cuh>
+#include <voxelpipe/device/stage_clock.cuh>
 #include <voxelpipe/device/tile_sort.cuh>
 #include <voxelpipe/device/work_share.cuh>
 
@@ -156,11 +157,13 @@ struct fragment_lists {
 // What was listed, sorted by voxel, and the first fragment of each.
 template <class Key, class Payload>
 [[nodiscard]] fragment_lists<Key, Payload> sort_lists(const list_buffers<Key, Payload>& b, pipeline_state* state,
-                                                      const capacities& limits, cudaStream_t stream) {
+                                                      const capacities& limits, cudaStream_t stream,
+                                                      stage_clock* clock) {
     fill_end(b.keys[0], b.values[0], &state->list_fragments, limits.fragments, state, limits, stream);
     cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
     cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
     sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
+    end_stage(clock, &stage_times::tile_sort);
     fragment_lists<Key, Payload> lists{};
     lists.keys = keys.Current();
     lists.values = values.Current();
@@ -172,19 +175,21 @@ template <class Key, class Payload>
                                 &state->list_voxels, limits.fragments,
                                 is_first_of_voxel<Key>{lists.keys, state, limits}, stream),
           stage::abuffer_emit);
+    end_stage(clock, &stage_times::abuffer_emit);
     return lists;
 }
 
 // The same for primitives that were listed in any order.
 template <class Payload>
-[[nodiscard]] fragment_lists<std::uint32_t, Payload> sort_unordered(const list_buffers<std::uint32_t, Payload>& b,
-                                                                    const order_lists& lists, pipeline_state* state,
-                                                                    const capacities& limits, cudaStream_t stream) {
-    fragment_lists<std::uint32_t, Payload> sorted = sort_lists(b, state, limits, stream);
+[[nodiscard]] fragment_lists<std::uint32_t, Payload>
+sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_lists& lists, pipeline_state* state,
+               const capacities& limits, cudaStream_t stream, stage_clock* clock) {
+    fragment_lists<std::uint32_t, Payload> sorted = sort_lists(b, state, limits, stream, clock);
     const bool second = sorted.values == b.values[1], second_key = sorted.keys == b.keys[1];
     order_fragments(
         {b.first_of_voxel, b.values[second ? 1 : 0], b.values[second ? 0 : 1], b.keys[second_key ? 0 : 1], lists},
         state, limits, stream);
+    end_stage(clock, &stage_times::abuffer_emit);
     sorted.values = b.values[second ? 0 : 1];
     sorted.primitives = nullptr; // a value is a primitive
     sorted.payloads = nullptr;
@@ -194,12 +199,13 @@ template <class Payload>
 template <coverage Rule, class MakePayload, class Scene, class Key, class Payload>
 [[nodiscard]] fragment_lists<Key, Payload>
 build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const list_memory& m, pipeline_state* state,
-            const capacities& limits, bool counts_triangles, cudaStream_t stream) {
+            const capacities& limits, bool counts_triangles, cudaStream_t stream, stage_clock* clock) {
     const fragment_cells<Rule, Scene, Key, Payload, MakePayload> op{
         s, b.keys[0], b.values[0], b.primitives, b.payloads, counts_triangles};
     share_count(s.geo, op, m.share, state, m.storage, m.storage_bytes, stage::abuffer_emit, stream);
     share_emit(s.geo, op, m.share, state, limits, stage::abuffer_emit, stream);
-    return sort_lists(b, state, limits, stream);
+    end_stage(clock, &stage_times::fine_raster);
+    return sort_lists(b, state, limits, stream, clock);
 }
 
 // ---- into an A-buffer -----------------------------------------------------------------------------------------------

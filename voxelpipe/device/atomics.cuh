@@ -10,6 +10,7 @@
 // atomics wherever the blend allows (64-bit ones are compare-and-swap loops), floats through order-keeping integers.
 
 #include <voxelpipe/blend.hpp>
+#include <voxelpipe/core/bits.hpp>
 
 #include <cstdint>
 #include <cstring>
@@ -59,7 +60,7 @@ struct key_map {
             using bits = typename core::float_bits<S>::type;
             constexpr bits absolute = static_cast<bits>(~bits{0}) >> 1;
             const auto raw = static_cast<bits>(k);
-            return std::bit_cast<S>(static_cast<bits>(k < 0 ? raw ^ absolute : raw));
+            return core::bit_cast<S>(static_cast<bits>(k < 0 ? raw ^ absolute : raw));
         } else {
             return static_cast<S>(k);
         }
@@ -73,9 +74,7 @@ struct extremum {
     static constexpr bool is_min = std::is_same_v<Blend, blend::min>;
     using map = key_map<S>;
     using cell = typename map::key;
-    __device__ static cell neutral() {
-        return is_min ? std::numeric_limits<cell>::max() : std::numeric_limits<cell>::lowest();
-    }
+    __device__ static cell neutral() { return is_min ? core::greatest<cell> : core::lowest<cell>; }
     __device__ static cell* at(word* plane, int i) {
         if constexpr (words == 2)
             return as_cells<cell>(plane) + i;
@@ -316,7 +315,7 @@ requires(core::is_integer<S>&& std::is_unsigned_v<S>) struct scalar_blend<blend:
     __device__ static void merge(cell& a, cell b) { a = plus(a, b); }
     __device__ static S finish(cell c, S stored) {
         const cell sum = plus(c, stored);
-        return sum > std::numeric_limits<S>::max() ? std::numeric_limits<S>::max() : static_cast<S>(sum);
+        return sum > core::greatest<S> ? core::greatest<S> : static_cast<S>(sum);
     }
 };
 
@@ -473,7 +472,7 @@ struct bit_blend {
 };
 
 template <class Target>
-[[nodiscard]] constexpr blend_method method_of() {
+[[nodiscard]] VOXELPIPE_HD constexpr blend_method method_of() {
     using blend_type = typename Target::blend_type;
     if constexpr (std::is_same_v<blend_type, blend::replace>)
         return blend_method::winner;

@@ -142,6 +142,10 @@ public:
 
     cudaStream_t stream = nullptr; // not owned
     memory_resource resource;      // where all memory comes from
+    // Where voxelize adds up the time of each stage, if anywhere: by events on the stream, which a call without it does
+    // not record. They are read after the call's wait, where fragment lists wait once more, for their copy.
+    // voxelize_async has no times.
+    stage_times* times = nullptr;
 
     // What voxelize calls; arguments are validated. `Selector` picks tile and block size (tuning/); results do not
     // depend on it.
@@ -151,14 +155,16 @@ public:
                              const framebuffer_view<Targets...>& fb, const voxelize_options& options,
                              std::uint64_t triangles_in) {
         const call_key key{triangles_in, g.extent, g.offset, options.rule, false};
-        return attempt(key, [&](const device::capacities& limits, device::pipeline_state& state) {
-            device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits, [&](const auto& call) {
-                if (options.rule == coverage::thin)
-                    launch<coverage::thin>(call, state);
-                else
-                    launch<coverage::conservative>(call, state);
+        return attempt(
+            key, [&](const device::capacities& limits, device::pipeline_state& state, device::stage_clock* clock) {
+                device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits, [&](auto call) {
+                    call.clock = clock;
+                    if (options.rule == coverage::thin)
+                        launch<coverage::thin>(call, state);
+                    else
+                        launch<coverage::conservative>(call, state);
+                });
             });
-        });
     }
 
     template <class Mesh, class VertexShader, class FragmentShader, class Payload>
@@ -168,16 +174,17 @@ public:
         using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
         lists = abuffer<cuda_backend, Payload>(*this);
         const call_key key{triangles_in, g.extent, g.offset, options.rule, true};
-        status s = attempt(key, [&](const device::capacities& limits, device::pipeline_state& state) {
-            const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits};
-            const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
-            if (options.rule == coverage::thin)
-                small ? fill<coverage::thin, std::uint32_t>(call, lists, state)
-                      : fill<coverage::thin, std::uint64_t>(call, lists, state);
-            else
-                small ? fill<coverage::conservative, std::uint32_t>(call, lists, state)
-                      : fill<coverage::conservative, std::uint64_t>(call, lists, state);
-        });
+        status s = attempt(
+            key, [&](const device::capacities& limits, device::pipeline_state& state, device::stage_clock* clock) {
+                const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
+                const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
+                if (options.rule == coverage::thin)
+                    small ? fill<coverage::thin, std::uint32_t>(call, lists, state)
+                          : fill<coverage::thin, std::uint64_t>(call, lists, state);
+                else
+                    small ? fill<coverage::conservative, std::uint32_t>(call, lists, state)
+                          : fill<coverage::conservative, std::uint64_t>(call, lists, state);
+            });
         if (s.ok()) {
             lists.extent = g.extent;
             s.counts.fragments = lists.num_fragments();
@@ -204,10 +211,12 @@ private:
     [[nodiscard]] status attempt(const call_key& key, Launch&& launch_stages) {
         status s;
         try {
+            std::optional<device::stage_clock> clock;
+            if (times != nullptr) clock.emplace(stream);
             device::capacities limits = guess(key);
             for (int tries = 0;; ++tries) {
                 device::pipeline_state state{};
-                launch_stages(limits, state);
+                launch_stages(limits, state, clock ? &*clock : nullptr);
                 if (state.index_error != 0) {
                     s = core::failure(status_code::index_out_of_range, stage::coarse_raster);
                     break;
@@ -219,8 +228,8 @@ private:
                     break;
                 }
                 // A pass that overflowed its records did not count all of its cells: the next try may need a third.
-                constexpr std::uint64_t most = 0xfffffff0u; // pairs and fragments are numbered with 32 bits
-                if (tries == 4 || state.tile_pairs > most || state.list_fragments > most) {
+                if (tries == 4 || state.tile_pairs > core::most_numbered ||
+                    state.list_fragments > core::most_numbered) {
                     s = core::failure(status_code::out_of_memory, stage::coarse_raster);
                     s.required = {state.tile_pairs, state.list_fragments, 0};
                     break;
@@ -229,10 +238,12 @@ private:
                 raise(limits.tile_records, state.tile_records);
                 raise(limits.fragments, state.list_fragments);
                 raise(limits.fragment_records, state.fragment_records);
+                keep_numbered(limits);
                 most_ = {std::max(most_.tile_pairs, limits.tile_pairs),
                          std::max(most_.tile_records, limits.tile_records), std::max(most_.fragments, limits.fragments),
                          std::max(most_.fragment_records, limits.fragment_records)};
             }
+            if (clock) clock->read(*times);
         } catch (const device::cuda_failure& e) {
             s = device::to_status(e);
         } catch (const std::bad_alloc&) {
@@ -246,6 +257,11 @@ private:
         if (need > capacity) capacity = need + need / 16;
     }
 
+    static void keep_numbered(device::capacities& limits) {
+        limits.tile_pairs = std::min<unsigned long long>(limits.tile_pairs, core::most_numbered);
+        limits.fragments = std::min<unsigned long long>(limits.fragments, core::most_numbered);
+    }
+
     // A call like the last one needs about as much, and what is sorted is what there is room for. Otherwise what a
     // first call needs, or more where an earlier one did.
     [[nodiscard]] device::capacities guess(const call_key& key) const {
@@ -254,10 +270,12 @@ private:
             return known && needed != 0 ? needed + needed / 16 + 1024 : std::max<unsigned long long>(most, first);
         };
         const std::uint64_t n = key.triangles;
-        return {room(needed_.tile_pairs, most_.tile_pairs, n + n / 4 + 16384),
-                room(needed_.tile_records, most_.tile_records, n / 16 + 4096),
-                room(needed_.fragments, most_.fragments, 4 * n + 65536),
-                room(needed_.fragment_records, most_.fragment_records, n / 16 + 4096)};
+        device::capacities limits{room(needed_.tile_pairs, most_.tile_pairs, n + n / 4 + 16384),
+                                  room(needed_.tile_records, most_.tile_records, n / 16 + 4096),
+                                  room(needed_.fragments, most_.fragments, 4 * n + 65536),
+                                  room(needed_.fragment_records, most_.fragment_records, n / 16 + 4096)};
+        keep_numbered(limits);
+        return limits;
     }
 
     // The workspace, at least so large.
@@ -281,6 +299,7 @@ private:
         device::arena plan;
         call.template go<Rule, false>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
+        if (call.clock != nullptr) call.clock->start();
         call.template go<Rule, true>(memory, d_state, stream);
         read_state(d_state, state, stage::tile_resolve);
     }
@@ -291,6 +310,7 @@ private:
         device::arena plan;
         (void)call.template go<Rule, false, Key>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
+        if (call.clock != nullptr) call.clock->start();
         const auto sorted = call.template go<Rule, true, Key>(memory, d_state, stream);
         read_state(d_state, state, stage::abuffer_emit);
         if (device::has_failed(state, call.limits)) return;
@@ -302,11 +322,13 @@ private:
         buffer<std::uint32_t> primitives(*this, state.list_fragments, where);
         buffer<payload> payloads(*this, has_payload ? state.list_fragments : 0, where);
         if (state.list_fragments != 0) {
+            if (call.clock != nullptr) call.clock->start(); // leaves the wait and the allocations out
             device::
                 copy_lists_kernel<<<device::fill_device(state.list_fragments), device::threads_per_block, 0, stream>>>(
                     sorted, state.list_voxels, state.list_fragments, voxels.data(), offsets.data(), primitives.data(),
                     payloads.data());
             device::check(cudaGetLastError(), where);
+            device::end_stage(call.clock, &stage_times::abuffer_emit);
         }
         lists.voxels = std::move(voxels);
         lists.offsets = std::move(offsets);

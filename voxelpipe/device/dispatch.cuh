@@ -11,6 +11,7 @@
 #include <voxelpipe/device/direct_raster.cuh>
 #include <voxelpipe/device/fine_raster.cuh>
 #include <voxelpipe/device/ordered_blend.cuh>
+#include <voxelpipe/device/stage_clock.cuh>
 #include <voxelpipe/device/tile_resolve.cuh>
 #include <voxelpipe/device/tile_sort.cuh>
 #include <voxelpipe/device/tile_split.cuh>
@@ -253,6 +254,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     std::uint32_t num_primitives;
     capacities limits;
     core::tile_grid tiles{g.extent, Policy.log2_tile_size};
+    stage_clock* clock = nullptr; // where the call is asked for its times
 
     [[nodiscard]] static std::uint32_t pairs_per_item(std::uint64_t pair_capacity) {
         return static_cast<std::uint32_t>(std::max<std::uint64_t>(512, pair_capacity / 1024));
@@ -327,10 +329,12 @@ private:
             check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
             for (const draw_type& d : draws)
                 check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);
+            end_stage(clock, &stage_times::coarse_raster);
             core::for_each_index<groups::count>([&]<std::size_t K>() {
                 const auto& t = voxelpipe::get<K>(fb.targets);
                 if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
             });
+            end_stage(clock, &stage_times::clear);
             const core::snap_transform snap = core::make_snap_transform(g);
             const int counting_target = options.count_voxels ? find_counting_target() : -1;
             for (std::size_t i = 0; i < draws.size(); ++i) {
@@ -346,6 +350,7 @@ private:
                         {fb, d.fragment_shader.values, counting_target},
                         large.with(state)};
                     direct_raster(call, state, stage::fine_raster, stream);
+                    end_stage(clock, &stage_times::fine_raster);
                 };
                 if constexpr (on_the_spot) {
                     raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap,
@@ -353,6 +358,7 @@ private:
                 } else {
                     vertex_shade(d.mesh, d.vertex_shader, snap, static_cast<std::uint32_t>(i), positions,
                                  static_cast<no_varyings*>(nullptr), stream); // nobody reads them
+                    end_stage(clock, &stage_times::vertex_shade);
                     raster(stored_source{
                         {d.mesh.triangles.data(), positions, 0, static_cast<std::uint32_t>(d.mesh.positions.size())}});
                 }
@@ -373,6 +379,7 @@ private:
         if constexpr (Run) {
             check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
             s = buffers.shade(draws, g, stream);
+            end_stage(clock, &stage_times::vertex_shade);
         }
         tile_work work;
         if constexpr (in_tiles) work = sort_tiles<Rule, Run>(memory, s, state, stream);
@@ -383,6 +390,7 @@ private:
                 const auto& t = voxelpipe::get<K>(fb.targets);
                 if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
             });
+            end_stage(clock, &stage_times::clear);
             if constexpr (in_tiles) {
                 [&]<int... G>(std::integer_sequence<int, G...>) { (draw_group<Rule, G>(s, work, state, stream), ...); }
                 (std::make_integer_sequence<int, groups::num_groups()>{});
@@ -418,10 +426,13 @@ private:
             const tile_cells<Rule> op{tiles, keys[0], primitives[0]};
             share_count(s.geo, op, share, state, storage, storage_bytes, stage::coarse_raster, stream);
             share_emit(s.geo, op, share, state, limits, stage::coarse_raster, stream);
+            end_stage(clock, &stage_times::coarse_raster);
             fill_end(keys[0], primitives[0], share.num_cells, limits.tile_pairs, state, limits, stream);
             cub::DoubleBuffer<std::uint32_t> k(keys[0], keys[1]), v(primitives[0], primitives[1]);
             sort_by_cell(k, v, limits.tile_pairs, bits, storage, storage_bytes, stage::tile_sort, stream);
+            end_stage(clock, &stage_times::tile_sort);
             tile_split(k.Current(), split, state, limits, stream);
+            end_stage(clock, &stage_times::tile_split);
             work.in = {v.Current(), split.items, images, tiles, false, false, false};
             work.splits = split.splits;
         }
@@ -437,7 +448,7 @@ private:
         in.count_voxels = in.count_fragments && options.count_voxels;
         in.track = in.count_voxels || image_words::has_atomic || image_words::has_winner;
         draw_tiles<Rule, image_words, Policy.threads_per_block, Policy.min_blocks_per_sm>(
-            s, fb, in, work.splits, state, limits, Policy.blocks_per_sm, stream);
+            s, fb, in, work.splits, state, limits, Policy.blocks_per_sm, stream, clock);
     }
 
     template <coverage Rule, bool Run, class Key>
@@ -446,7 +457,7 @@ private:
         const auto lists = take_lists<Key, values>(memory, num_voxels(g), limits.fragments);
         const list_memory share(memory, num_primitives, limits.fragment_records);
         if constexpr (Run)
-            return build_lists<Rule, all_values>(s, lists, share.with(state), state, limits, !in_tiles, stream);
+            return build_lists<Rule, all_values>(s, lists, share.with(state), state, limits, !in_tiles, stream, clock);
         else
             return {};
     }
@@ -457,6 +468,7 @@ private:
         fold_kernel<Key, values, Framebuffer, I...><<<fill_device(limits.fragments), threads_per_block, 0, stream>>>(
             lists, fb, state, limits, options.count_voxels);
         check(cudaGetLastError(), stage::fine_raster);
+        end_stage(clock, &stage_times::fine_raster);
     }
 };
 
@@ -486,6 +498,7 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     grid g;
     std::uint32_t num_primitives;
     capacities limits;
+    stage_clock* clock = nullptr;
 
     // Carves the memory and, with `run`, launches the stages up to the sorted lists.
     template <coverage Rule, bool Run, class Key>
@@ -499,11 +512,13 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
         }
         const scene_buffers buffers(memory, draws);
         const list_memory share(memory, num_primitives, limits.fragment_records);
-        if constexpr (Run)
-            return build_lists<Rule, first_value>(buffers.shade(draws, g, stream), lists, share.with(state), state,
-                                                  limits, true, stream);
-        else
+        if constexpr (Run) {
+            const scene_type s = buffers.shade(draws, g, stream);
+            end_stage(clock, &stage_times::vertex_shade);
+            return build_lists<Rule, first_value>(s, lists, share.with(state), state, limits, true, stream, clock);
+        } else {
             return {};
+        }
     }
 
 private:
@@ -530,9 +545,11 @@ private:
                 raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, 0});
             } else {
                 vertex_shade(d.mesh, d.vertex_shader, snap, 0, positions, static_cast<no_varyings*>(nullptr), stream);
+                end_stage(clock, &stage_times::vertex_shade);
                 raster(stored_source{{d.mesh.triangles.data(), positions, 0, num_vertices}});
             }
-            fragment_lists<Key, Payload> sorted = sort_unordered(lists, order, state, limits, stream);
+            end_stage(clock, &stage_times::fine_raster);
+            fragment_lists<Key, Payload> sorted = sort_unordered(lists, order, state, limits, stream, clock);
             if constexpr (!std::is_same_v<Payload, no_payload>)
                 sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
             return sorted;

@@ -5,12 +5,14 @@
 // What the kernels know of a call: geometry (triangles and snapped positions, all that the coarse stages read), scene
 // (geometry with the draws' shaders and varyings), and pipeline_state, the counters and flags of a call in progress.
 
+#include <voxelpipe/core/launch_size.hpp>
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/device/memory.cuh>
 #include <voxelpipe/voxelize.hpp>
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 namespace voxelpipe::device {
 
@@ -120,8 +122,10 @@ struct scene {
 
 inline constexpr int threads_per_block = 256; // of kernels that have no tuning of their own
 
-[[nodiscard]] inline unsigned num_blocks(std::uint64_t items, unsigned per_block = threads_per_block) {
-    return static_cast<unsigned>((items + per_block - 1) / per_block);
+// Of a kernel with a thread an item.
+[[nodiscard]] inline unsigned num_blocks(std::uint64_t items) {
+    VOXELPIPE_ASSERT(items <= std::numeric_limits<std::uint32_t>::max()); // validated: see core::most_numbered
+    return core::blocks_for_each(static_cast<std::uint32_t>(items), threads_per_block);
 }
 
 [[nodiscard]] inline int num_multiprocessors() {
@@ -142,9 +146,8 @@ inline constexpr int threads_per_block = 256; // of kernels that have no tuning 
 
 // Blocks of a grid-stride or persistent kernel: enough to fill the device, no more than there is work.
 [[nodiscard]] inline unsigned fill_device(std::uint64_t items, unsigned blocks_per_multiprocessor = 8) {
-    const auto most = static_cast<std::uint64_t>(num_multiprocessors()) * blocks_per_multiprocessor;
-    const std::uint64_t wanted = items / threads_per_block + 1; // may be more than a launch can have
-    return static_cast<unsigned>(wanted < 1 ? 1 : wanted < most ? wanted : most);
+    return core::blocks_to_fill(items, threads_per_block, static_cast<std::uint32_t>(num_multiprocessors()),
+                                blocks_per_multiprocessor);
 }
 
 // Copies a few host values to the device as kernel arguments: no host memory has to outlive the call, and a captured

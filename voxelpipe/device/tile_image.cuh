@@ -25,7 +25,7 @@ struct targets_of<framebuffer_view<Targets...>> {
 
 // Bits of a tile that one voxel of the target takes, in a tile image.
 template <class Target>
-[[nodiscard]] constexpr int bits_per_voxel() {
+[[nodiscard]] VOXELPIPE_HD constexpr int bits_per_voxel() {
     if constexpr (method_of<Target>() == blend_method::atomic)
         return 32 * value_blend<typename Target::blend_type, typename Target::value_type>::words;
     else if constexpr (method_of<Target>() == blend_method::bits)
@@ -45,7 +45,7 @@ struct tile_image {
     template <std::size_t K>
     using target = typename targets_of<Framebuffer>::template at<K>;
 
-    static constexpr int words_of(int bits) { return voxels / 32 * bits; }
+    VOXELPIPE_HD static constexpr int words_of(int bits) { return voxels / 32 * bits; }
     static constexpr bool has_winner = ((method_of<target<I>>() == blend_method::winner) || ...);
     static constexpr bool has_atomic = ((method_of<target<I>>() == blend_method::atomic) || ...);
     static constexpr bool has_bits = ((method_of<target<I>>() == blend_method::bits) || ...);
@@ -56,7 +56,7 @@ struct tile_image {
 
     // First word of target K's planes.
     template <std::size_t K>
-    static constexpr int offset() {
+    VOXELPIPE_HD static constexpr int offset() {
         int at = 0;
         bool before = true;
         ((before = before && I != K, at += before ? words_of(bits_per_voxel<target<I>>()) : 0), ...);

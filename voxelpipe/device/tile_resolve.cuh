@@ -7,6 +7,7 @@
 // thread.
 
 #include <voxelpipe/device/fine_raster.cuh>
+#include <voxelpipe/device/stage_clock.cuh>
 
 namespace voxelpipe::device {
 
@@ -166,7 +167,8 @@ __global__ void restart_items(State* state) {
 // One fine pass over the work items for the targets of one image type. blocks_per_sm: see fine_raster_policy.
 template <coverage Rule, class Image, int Threads, int MinBlocks, class Scene, class Framebuffer>
 void draw_tiles(const Scene& s, const Framebuffer& fb, const fine_raster_input& in, const split_tile* splits,
-                pipeline_state* state, const capacities& limits, int blocks_per_sm, cudaStream_t stream) {
+                pipeline_state* state, const capacities& limits, int blocks_per_sm, cudaStream_t stream,
+                stage_clock* clock = nullptr) {
     const auto kernel = fine_raster_kernel<Rule, Image, Threads, MinBlocks, Scene, Framebuffer>;
     if (Image::bytes > 16 * 1024) // static shared memory counts too, and 48 KB need no asking
         check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(Image::bytes)),
@@ -179,9 +181,11 @@ void draw_tiles(const Scene& s, const Framebuffer& fb, const fine_raster_input& 
     kernel<<<static_cast<unsigned>((blocks < 1 ? 1 : blocks) * num_multiprocessors()), Threads, Image::bytes, stream>>>(
         s, fb, in, state, limits);
     check(cudaGetLastError(), stage::fine_raster);
+    end_stage(clock, &stage_times::fine_raster);
     tile_resolve_kernel<Image, Scene, Framebuffer>
         <<<fill_device(std::uint64_t{1} << 40, 4), threads_per_block, 0, stream>>>(s, fb, in, splits, state, limits);
     check(cudaGetLastError(), stage::tile_resolve);
+    end_stage(clock, &stage_times::tile_resolve);
 }
 
 } // namespace voxelpipe::device

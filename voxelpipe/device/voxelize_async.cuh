@@ -45,6 +45,10 @@ template <class Call>
     return plan.used();
 }
 
+// Pairs and fragments are numbered with 32 bits.
+[[nodiscard]] inline bool are_numbered(const workspace_limits& l) {
+    return l.tile_pairs <= core::most_numbered && l.fragments <= core::most_numbered;
+}
 [[nodiscard]] inline capacities to_capacities(const workspace_limits& l) {
     return {l.tile_pairs, l.tile_records, l.fragments, l.fragment_records};
 }
@@ -64,7 +68,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
                                           const grid& g, const framebuffer_view<Targets...>& fb,
                                           const voxelize_options& options, const workspace_limits& limits) {
     const status s = core::validate_draws(draws);
-    if (!s.ok() || !validate(g).ok()) return 0;
+    if (!s.ok() || !validate(g).ok() || !device::are_numbered(limits)) return 0;
     try {
         return device::with_call(draws, g, fb, options, s.counts.triangles_in, limits,
                                  [&](const auto& call) { return device::bytes_of(call, options.rule); });
@@ -85,6 +89,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
         if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
         status s = core::validate_draws(draws);
         if (!s.ok()) return s;
+        if (!device::are_numbered(workspace.limits)) return core::failure(status_code::size_overflow);
         try {
             const auto launch = [&](const auto& call) {
                 const std::size_t need = device::bytes_of(call, options.rule);

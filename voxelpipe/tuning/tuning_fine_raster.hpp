@@ -74,13 +74,6 @@ template <class Selector>
         return Selector{}(bits_per_voxel);
 }
 
-// Whether code of this architecture can be asked for a policy: false for the kernels that only another architecture of
-// the list uses, whose bodies may then be left empty.
-template <class Selector>
-[[nodiscard]] constexpr bool is_policy_of(const fine_raster_policy& policy, int bits_per_voxel, int capability) {
-    return policy == select_policy<Selector>(bits_per_voxel, capability);
-}
-
 // Calls f.template operator()<Policy>() with the policy for the code that a device of this compute capability runs. On
 // the host. I: entries of the list that are still to be looked at, from its end, less one.
 template <class Selector, int BitsPerVoxel, std::size_t I = compiled_architectures().size() - 1, class F>

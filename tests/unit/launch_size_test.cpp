@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Numbers of blocks for any number of items: a count that is cut to 32 bits leaves a device idle, or work undone.
+
+#include <voxelpipe/core/launch_size.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace {
+
+namespace core = voxelpipe::core;
+
+// Around every power of two, 2^63 and the largest number included.
+std::vector<std::uint64_t> numbers(int most_bits) {
+    std::vector<std::uint64_t> all{0};
+    for (int bit = 0; bit < most_bits; ++bit) {
+        const std::uint64_t power = std::uint64_t{1} << bit;
+        for (const std::uint64_t n : {power - 1, power, power + 1, power + power / 3}) all.push_back(n);
+    }
+    all.push_back(most_bits == 64 ? std::numeric_limits<std::uint64_t>::max() : (std::uint64_t{1} << most_bits) - 1);
+    return all;
+}
+
+TEST(LaunchSize, LoopingKernelsFillTheDeviceAndNoMore) {
+    for (const std::uint64_t items : numbers(64))
+        for (const std::uint32_t threads : {32u, 128u, 256u, 1024u})
+            for (const std::uint32_t multiprocessors : {0u, 1u, 7u, 132u, 1000u, 0xffffffffu})
+                for (const std::uint32_t each : {0u, 1u, 4u, 8u, 16u, 0xffffffffu}) {
+                    const std::uint64_t blocks = core::blocks_to_fill(items, threads, multiprocessors, each);
+                    ASSERT_GE(blocks, 1u);
+                    ASSERT_LE(blocks, core::most_blocks);
+                    const auto room = std::uint64_t{multiprocessors} * each;
+                    const auto reached = blocks * threads;
+                    // Every item has a thread, or the device is full, or the grid is.
+                    ASSERT_TRUE(reached >= items || blocks >= room || blocks == core::most_blocks)
+                        << items << ' ' << threads << ' ' << multiprocessors << ' ' << each << ": " << blocks;
+                    // No block without an item but the one that there must be, and none beyond what fits the device.
+                    if (blocks > 1) {
+                        ASSERT_LT(reached - threads, items);
+                        ASSERT_LE(blocks, room);
+                    }
+                }
+}
+
+TEST(LaunchSize, TwoToTheFortyItemsFillTheDevice) {
+    EXPECT_EQ(core::blocks_to_fill(std::uint64_t{1} << 40, 256, 132, 8), 132u * 8u);
+    EXPECT_EQ(core::blocks_to_fill((std::uint64_t{1} << 40) + 1, 256, 132, 4), 132u * 4u);
+    EXPECT_EQ(core::blocks_to_fill(std::uint64_t{1} << 63, 256, 132, 8), 132u * 8u);
+    EXPECT_EQ(core::blocks_to_fill(0, 256, 132, 8), 1u);
+    EXPECT_EQ(core::blocks_to_fill(257, 256, 132, 8), 2u);
+}
+
+TEST(LaunchSize, AThreadAnItem) {
+    for (const std::uint64_t n : numbers(32)) {
+        const auto items = static_cast<std::uint32_t>(n);
+        for (const std::uint32_t threads : {32u, 128u, 256u, 1024u}) {
+            const std::uint64_t blocks = core::blocks_for_each(items, threads);
+            ASSERT_GE(blocks, 1u);
+            ASSERT_LE(blocks, core::most_blocks);
+            ASSERT_GE(blocks * threads, items);
+            ASSERT_TRUE(blocks == 1 || (blocks - 1) * threads < items);
+        }
+    }
+    EXPECT_EQ(core::blocks_for_each(0xffffffffu, 256), 1u << 24);
+}
+
+} // namespace
