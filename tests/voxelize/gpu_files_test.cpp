@@ -60,8 +60,8 @@ void expect_same_files(const scratch_folder& folder, const fs::path& model, std:
     EXPECT_NE("", stats[1]["device"]);
     EXPECT_LT(0, stats[1]["device_memory_bytes"]);
     double sum = 0;
-    for (const char* stage : {"read", "cuda_start", "upload", "vertex_shade", "coarse_raster", "tile_sort", "tile_split",
-                              "clear", "fine_raster", "tile_resolve", "cuda_calls", "resolve", "write"}) {
+    for (const char* stage : {"read", "cuda_start", "upload", "vertex_shade", "coarse_raster", "tile_sort",
+                              "tile_split", "clear", "fine_raster", "tile_resolve", "cuda_calls", "resolve", "write"}) {
         ASSERT_TRUE(stats[1]["ms"].contains(stage)) << stage;
         EXPECT_LE(0.0, stats[1]["ms"][stage]) << stage;
         sum += stats[1]["ms"][stage].get<double>();
