@@ -48,12 +48,12 @@ decode_scenes() {
 }
 
 failures=0
-# run_program PART LABEL COMMAND...: counts what the program's tests say, and a crash as a failure.
+# run_program PART LABEL COMMAND...: counts what the program's tests say, and a crash or no end in time as a failure.
 run_program() {
     local part=$1 name=$2 start=$SECONDS log passed failed status=0
     shift 2
     log="build/gpu-$part-$name.log"
-    "$@" >"$log" 2>&1 || status=$?
+    timeout "${VOXELPIPE_PROGRAM_SECONDS:-900}" "$@" >"$log" 2>&1 || status=$?
     passed="$(grep -cE '^\[       OK \]' "$log" || true)"
     failed="$(grep -E '^\[  FAILED  \]' "$log" | grep -cE 'ms\)$' || true)"
     [[ $status -eq 0 || $failed -gt 0 ]] || failed=1
