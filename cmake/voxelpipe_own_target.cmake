@@ -20,3 +20,10 @@ function(voxelpipe_own_target)
     endif()
   endforeach()
 endfunction()
+
+# voxelpipe_hot_target(target...): code that is quick to compile and works long in tests: see VOXELPIPE_HOT_OPTIONS.
+function(voxelpipe_hot_target)
+  foreach(target IN LISTS ARGN)
+    target_compile_options(${target} PRIVATE ${VOXELPIPE_HOT_OPTIONS})
+  endforeach()
+endfunction()

@@ -45,16 +45,18 @@ struct abuffer_scratch {
     counters counts{};
 };
 
-template <coverage Rule, class Payload, class Key, class Scene>
-void bucket_tile(const Scene& s, const core::tile_grid& tiles, const tile_range& range,
-                 const raw_array<tile_pair<Key>>& pairs, std::uint32_t worker, abuffer_scratch<Payload>& scratch) {
+// `primitives` are `stride` bytes apart: those of sorted pairs, whatever their key's type.
+template <coverage Rule, class Payload, class Scene>
+void bucket_tile(const Scene& s, const core::tile_grid& tiles, std::uint64_t tile, const std::uint32_t* primitives,
+                 std::size_t stride, std::size_t count, std::uint32_t worker, abuffer_scratch<Payload>& scratch) {
     static_assert(tile_voxels <= 65536);
     constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
-    const core::voxel_box box = core::tile_box(tiles, range.tile, s.where.extent);
+    const core::voxel_box box = core::tile_box(tiles, tile, s.where.extent);
     const auto x0 = static_cast<int>(box.lo[0]), y0 = static_cast<int>(box.lo[1]), z0 = static_cast<int>(box.lo[2]);
     scratch.fragments.clear();
-    for (std::size_t i = range.first; i < range.last; ++i) {
-        const std::uint32_t id = pairs[i].primitive;
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t id =
+            *reinterpret_cast<const std::uint32_t*>(reinterpret_cast<const std::byte*>(primitives) + i * stride);
         shade_in_tile<Rule>(s, id, box, [&](int x, int y, int z, const auto& out) VOXELPIPE_INLINE_LAMBDA {
             if (!out.keep) {
                 ++scratch.counts.fragments_discarded;
@@ -138,7 +140,9 @@ template <coverage Rule, class Key, class Scene, class Backend, class Payload>
         const stopwatch watch(how.times, &stage_times::fine_raster);
         progress_meter meter(how, ranges.size());
         parallel_for(how.threads, ranges.size(), [&](unsigned worker, std::size_t r) {
-            bucket_tile<Rule>(s, tiles, ranges[r], coarse.pairs, worker, *scratch[worker]);
+            const tile_range& range = ranges[r];
+            bucket_tile<Rule>(s, tiles, range.tile, &coarse.pairs[range.first].primitive, sizeof(tile_pair<Key>),
+                              range.last - range.first, worker, *scratch[worker]);
             meter.advance();
         });
     }

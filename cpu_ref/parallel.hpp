@@ -19,13 +19,12 @@
 
 namespace voxelpipe::cpu {
 
-// Calls work(worker, item) for item = 0 .. num_items - 1, each once, on up to num_threads threads; worker <
-// num_threads. The first exception is rethrown here after all threads have stopped.
-template <class Work>
-void parallel_for(unsigned num_threads, std::size_t num_items, Work&& work) {
+// parallel_for for work(context, worker, item).
+inline void parallel_items(unsigned num_threads, std::size_t num_items,
+                           void (*work)(const void*, unsigned, std::size_t), const void* context) {
     const auto workers = static_cast<unsigned>(std::min<std::size_t>(num_threads, num_items));
     if (workers <= 1) {
-        for (std::size_t i = 0; i < num_items; ++i) work(0u, i);
+        for (std::size_t i = 0; i < num_items; ++i) work(context, 0u, i);
         return;
     }
     std::atomic<std::size_t> next{0};
@@ -33,7 +32,7 @@ void parallel_for(unsigned num_threads, std::size_t num_items, Work&& work) {
     std::mutex error_mutex;
     const auto loop = [&](unsigned worker) {
         try {
-            for (std::size_t i = next.fetch_add(1); i < num_items; i = next.fetch_add(1)) work(worker, i);
+            for (std::size_t i = next.fetch_add(1); i < num_items; i = next.fetch_add(1)) work(context, worker, i);
         } catch (...) {
             next.store(num_items);
             const std::lock_guard lock(error_mutex);
@@ -52,6 +51,17 @@ void parallel_for(unsigned num_threads, std::size_t num_items, Work&& work) {
     loop(0);
     for (std::thread& t : threads) t.join();
     if (error) std::rethrow_exception(error);
+}
+
+// Calls work(worker, item) for item = 0 .. num_items - 1, each once, on up to num_threads threads; worker <
+// num_threads. The first exception is rethrown here after all threads have stopped. Items are pieces of work that a
+// call through a pointer costs nothing against; so the threads' code is compiled once, not once a loop.
+template <class Work>
+void parallel_for(unsigned num_threads, std::size_t num_items, const Work& work) {
+    const auto call = [](const void* w, unsigned worker, std::size_t item) {
+        (*static_cast<const Work*>(w))(worker, item);
+    };
+    parallel_items(num_threads, num_items, call, &work);
 }
 
 // A fixed number of values that start uninitialised: they are all written, by several threads, before they are read.

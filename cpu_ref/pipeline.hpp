@@ -109,16 +109,16 @@ template <class Mesh, class VertexShader, class FragmentShader>
 // ---- the scene as the raster stages see it
 // ---------------------------------------------------------------------------
 
-template <class Mesh, class VertexShader, class FragmentShader>
-struct scene {
-    using varyings = draw_varyings<Mesh, VertexShader, FragmentShader>;
-    using fragment_shader = FragmentShader;
-
-    std::span<const draw<Mesh, VertexShader, FragmentShader>> draws;
-    std::vector<shaded_vertices<varyings>> vertices; // per draw
-    std::vector<std::uint32_t> first_primitive;      // per draw, and one more: the total
+// What is covered, whatever the shaders: what needs no more than this is compiled once, not once a shader.
+struct geometry {
+    struct part { // a draw
+        array_view<const glm::uvec3> triangles;
+        const core::snapped_position* positions = nullptr; // owned by the scene
+        std::size_t num_vertices = 0;
+    };
+    std::vector<part> parts;
+    std::vector<std::uint32_t> first_primitive; // per draw, and one more: the total
     core::snap_transform snap{};
-    core::triple<double> normal_factors{};
     grid where{};
 
     struct primitive {
@@ -127,16 +127,26 @@ struct scene {
     };
     [[nodiscard]] primitive find(std::uint32_t id) const {
         std::uint32_t d = 0;
-        if (draws.size() > 1)
+        if (parts.size() > 1)
             d = static_cast<std::uint32_t>(std::upper_bound(first_primitive.begin(), first_primitive.end() - 1, id) -
                                            first_primitive.begin()) -
                 1;
         const std::uint32_t t = id - first_primitive[d];
-        return {d, t, draws[d].mesh.triangles[t]};
+        return {d, t, parts[d].triangles[t]};
     }
     [[nodiscard]] core::voxel_box whole_box() const {
         return {{{0, 0, 0}}, {{where.extent.x - 1, where.extent.y - 1, where.extent.z - 1}}};
     }
+};
+
+template <class Mesh, class VertexShader, class FragmentShader>
+struct scene : geometry {
+    using varyings = draw_varyings<Mesh, VertexShader, FragmentShader>;
+    using fragment_shader = FragmentShader;
+
+    std::span<const draw<Mesh, VertexShader, FragmentShader>> draws;
+    std::vector<shaded_vertices<varyings>> vertices; // per draw
+    core::triple<double> normal_factors{};
 };
 
 template <class Mesh, class VertexShader, class FragmentShader>
@@ -147,14 +157,17 @@ make_scene(const execution& how, std::span<const draw<Mesh, VertexShader, Fragme
     s.where = g;
     s.snap = core::make_snap_transform(g);
     s.normal_factors = core::normal_factors(g);
+    s.vertices = vertex_shade(how, draws, s.snap);
+    s.parts.reserve(draws.size());
     s.first_primitive.reserve(draws.size() + 1);
     std::uint32_t first = 0;
-    for (const auto& d : draws) {
+    for (std::size_t d = 0; d < draws.size(); ++d) {
+        const auto& mesh = draws[d].mesh;
+        s.parts.push_back({mesh.triangles, s.vertices[d].positions.get(), mesh.positions.size()});
         s.first_primitive.push_back(first);
-        first += static_cast<std::uint32_t>(d.mesh.triangles.size());
+        first += static_cast<std::uint32_t>(mesh.triangles.size());
     }
     s.first_primitive.push_back(first);
-    s.vertices = vertex_shade(how, draws, s.snap);
     return s;
 }
 
@@ -200,8 +213,8 @@ struct coarse_result {
     raw_array<tile_pair<Key>> pairs; // by ascending primitive
 };
 
-template <coverage Rule, class Key, class Scene>
-[[nodiscard]] coarse_result<Key> coarse_raster(const execution& how, const Scene& s, const core::tile_grid& tiles) {
+template <coverage Rule, class Key>
+[[nodiscard]] coarse_result<Key> coarse_raster(const execution& how, const geometry& s, const core::tile_grid& tiles) {
     const stopwatch watch(how.times, &stage_times::coarse_raster);
     constexpr std::size_t block = 8192;
     const std::size_t n = s.first_primitive.back();
@@ -221,12 +234,13 @@ template <coverage Rule, class Key, class Scene>
         for (std::size_t i = b * block; i < last; ++i) {
             const auto id = static_cast<std::uint32_t>(i);
             const auto tri = s.find(id);
-            const std::size_t num_vertices = s.draws[tri.draw].mesh.positions.size();
+            const geometry::part& in = s.parts[tri.draw];
+            const std::size_t num_vertices = in.num_vertices;
             if (tri.index.x >= num_vertices || tri.index.y >= num_vertices || tri.index.z >= num_vertices) {
                 part.code = status_code::index_out_of_range;
                 return;
             }
-            const core::snapped_position* p = s.vertices[tri.draw].positions.get();
+            const core::snapped_position* const p = in.positions;
             const auto &a = p[tri.index.x], &b_ = p[tri.index.y], &c = p[tri.index.z];
             core::voxel_box reach{};
             core::triangle_class kind = core::classify<Rule>(a, b_, c, s.snap.fraction, whole, reach);

@@ -49,8 +49,8 @@ struct solid_scratch {
     counters counts{};
 };
 
-template <coverage Rule, bool Repeats, class Scene>
-void cover_tile(const Scene& s, const core::voxel_box& tile, const std::uint32_t* primitives, std::size_t stride,
+template <coverage Rule, bool Repeats>
+void cover_tile(const geometry& s, const core::voxel_box& tile, const std::uint32_t* primitives, std::size_t stride,
                 std::size_t count, solid_scratch& scratch) {
     std::uint32_t* const touched = scratch.touched.data();
     [[maybe_unused]] std::uint32_t* const repeats = scratch.repeats.get();
@@ -76,7 +76,7 @@ void cover_tile(const Scene& s, const core::voxel_box& tile, const std::uint32_t
     for (std::size_t i = 0; i < count; ++i) {
         const std::uint32_t id =
             *reinterpret_cast<const std::uint32_t*>(reinterpret_cast<const std::byte*>(primitives) + i * stride);
-        cover_in_tile<Rule>(gathered_triangle<Scene>(s, id), s.snap.fraction, tile, along_x, across);
+        cover_in_tile<Rule>(gathered_triangle(s, id), s.snap.fraction, tile, along_x, across);
     }
     scratch.counts.fragments += fragments;
 }

@@ -17,24 +17,23 @@ namespace voxelpipe::cpu {
     return std::countr_zero(~(std::uint64_t{bits} >> std::countr_zero(bits)));
 }
 
-template <class Scene>
 struct gathered_triangle {
-    typename Scene::primitive where;
+    geometry::primitive where;
     const core::snapped_position &a, &b, &c;
 
-    gathered_triangle(const Scene& s, std::uint32_t id) : gathered_triangle(s.find(id), s) {}
+    gathered_triangle(const geometry& s, std::uint32_t id) : gathered_triangle(s.find(id), s) {}
 
 private:
-    gathered_triangle(const typename Scene::primitive& p, const Scene& s)
-        : where(p), a(s.vertices[p.draw].positions[p.index.x]), b(s.vertices[p.draw].positions[p.index.y]),
-          c(s.vertices[p.draw].positions[p.index.z]) {}
+    gathered_triangle(const geometry::primitive& p, const geometry& s)
+        : where(p), a(s.parts[p.draw].positions[p.index.x]), b(s.parts[p.draw].positions[p.index.y]),
+          c(s.parts[p.draw].positions[p.index.z]) {}
 };
 
 // The voxels of one triangle in the tile, each once: calls along_x(row, bits) with an interval of bits, or
 // across(row, stride, x, bits), which means bit x of the rows row + i * stride for the ones i of an interval of bits.
 // An interval may be empty.
-template <coverage Rule, class Scene, class AlongX, class Across>
-VOXELPIPE_INLINE void cover_in_tile(const gathered_triangle<Scene>& tri, int fraction, const core::voxel_box& tile,
+template <coverage Rule, class AlongX, class Across>
+VOXELPIPE_INLINE void cover_in_tile(const gathered_triangle& tri, int fraction, const core::voxel_box& tile,
                                     AlongX&& along_x, Across&& across) {
     constexpr auto rule = core::to_rule(Rule);
     if constexpr (Rule == coverage::conservative) {
@@ -96,7 +95,7 @@ VOXELPIPE_INLINE void cover_in_tile(const gathered_triangle<Scene>& tri, int fra
 // by force: the fragment's fields that a shader does not read are then seen to be unused, and cost nothing.
 template <coverage Rule, class Scene, class Visit>
 VOXELPIPE_INLINE void shade_in_tile(const Scene& s, std::uint32_t id, const core::voxel_box& tile, Visit&& visit) {
-    const gathered_triangle<Scene> tri(s, id);
+    const gathered_triangle tri(s, id);
     const auto& d = s.draws[tri.where.draw];
     if constexpr (core::is_solid<typename Scene::fragment_shader>) {
         const auto out = d.fragment_shader(tri); // which reads nothing of what it is given

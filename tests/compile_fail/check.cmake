@@ -1,12 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# cmake -DMODE=fails|control -DCOMPILER=... -DINCLUDES=a|b -DSOURCE=file.cpp -P check.cmake
+# cmake -DMODE=fails|control -DCOMPILER=... -DINCLUDES=a|b -DPRELUDE=file.hpp -DSOURCE=file.cpp -P check.cmake
+# cmake -DMODE=prelude ... precompiles PRELUDE, with which the others then start.
 cmake_minimum_required(VERSION 3.24)
 
 string(REPLACE "|" ";" includes "${INCLUDES}")
 list(REMOVE_DUPLICATES includes)
 list(TRANSFORM includes PREPEND "-I")
+# Localised compilers translate `error:`.
+set(ENV{LC_ALL} C)
+
+if(MODE STREQUAL "prelude")
+  execute_process(COMMAND "${COMPILER}" -std=c++20 ${includes} -x c++-header "${PRELUDE}" -o "${PRELUDE}.gch"
+                  RESULT_VARIABLE result ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "the library's headers have to compile, but:\n${output}")
+  endif()
+  return()
+endif()
+
 file(STRINGS "${SOURCE}" header LIMIT_COUNT 12)
 set(expected "")
 set(max_errors 1)
@@ -30,8 +43,10 @@ if(MODE STREQUAL "control")
 else()
   list(APPEND command ${flags})
 endif()
-# Localised compilers translate `error:`.
-set(ENV{LC_ALL} C)
+# Other flags make a precompiled header useless, and clang refuse it.
+if(MODE STREQUAL "control" OR flags STREQUAL "")
+  list(APPEND command -include "${PRELUDE}")
+endif()
 execute_process(COMMAND ${command} "${SOURCE}" RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
 
 if(MODE STREQUAL "control")

@@ -116,24 +116,30 @@ TEST(Reduced, StageTimesWithoutTiles) {
     expect_same_bytes(vp::get<0>(plain).to_host(be), vp::get<0>(timed).to_host(be), "timed");
 }
 
+// One draw of a constant shader is listed on the spot; several have their vertices shaded first.
 TEST(Reduced, StageTimesOfLists) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<bool>>;
     const mesh_data m = mixed_triangles(300, 30.0f, 65);
     const vp::grid g = box_grid({30, 21, 33});
     vp::cuda_backend be;
     const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
-    vp::abuffer<vp::cuda_backend, void> timed{be}, plain{be};
-    const auto draw = [&](vp::abuffer<vp::cuda_backend, void>& lists) {
-        return vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), lists);
-    };
-    ASSERT_TRUE(draw(plain).ok());
-    const vp::stage_times times = time_stages(be, [&] { return draw(timed); });
-    for (const double some : {times.vertex_shade, times.fine_raster, times.tile_sort, times.abuffer_emit})
-        EXPECT_GT(some, 0.0);
-    EXPECT_EQ(times.coarse_raster, 0.0);
-    const auto a = plain.to_host(be), b = timed.to_host(be);
-    expect_same_bytes(a.voxels, b.voxels, "voxels");
-    expect_same_bytes(a.offsets, b.offsets, "offsets");
-    expect_same_bytes(a.primitives, b.primitives, "primitives");
+    for (const std::size_t num_draws : {std::size_t{1}, std::size_t{2}}) {
+        SCOPED_TRACE(std::to_string(num_draws) + " draws");
+        const std::vector<draw_type> draws(num_draws, draw_type{mesh.view(), {}, vp::constant(true)});
+        vp::abuffer<vp::cuda_backend, void> timed{be}, plain{be};
+        const auto draw = [&](vp::abuffer<vp::cuda_backend, void>& lists) {
+            return vp::voxelize(be, std::span<const draw_type>(draws), g, lists);
+        };
+        ASSERT_TRUE(draw(plain).ok());
+        const vp::stage_times times = time_stages(be, [&] { return draw(timed); });
+        for (const double some : {times.fine_raster, times.tile_sort, times.abuffer_emit}) EXPECT_GT(some, 0.0);
+        EXPECT_EQ(times.vertex_shade > 0.0, num_draws > 1);
+        EXPECT_EQ(times.coarse_raster, 0.0);
+        const auto a = plain.to_host(be), b = timed.to_host(be);
+        expect_same_bytes(a.voxels, b.voxels, "voxels");
+        expect_same_bytes(a.offsets, b.offsets, "offsets");
+        expect_same_bytes(a.primitives, b.primitives, "primitives");
+    }
 }
 
 } // namespace
