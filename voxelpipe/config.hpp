@@ -38,7 +38,8 @@
 #endif
 
 // Forced only where the compiler optimises, and always in device code: with the sanitizers' checks in every copy a file
-// would take nearly three times as long to compile. Both may be defined beforehand, as the presets `fuzz` and `tsan` do.
+// would take nearly three times as long to compile. Both may be defined beforehand, as the presets `fuzz` and `tsan`
+// do.
 #if !defined(VOXELPIPE_INLINE)
 #if (defined(__GNUC__) || defined(__clang__)) && (defined(__OPTIMIZE__) || defined(__CUDA_ARCH__))
 #define VOXELPIPE_INLINE inline __attribute__((always_inline))

@@ -5,6 +5,8 @@
 
 #include "cells.hpp"
 
+#include <span>
+
 using namespace device_test;
 namespace blend = voxelpipe::blend;
 
