@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A-buffer: every fragment, ordered by (voxel, primitive). Fragments of a shader that computes are counted, given their
-// places by a scan and written by ascending primitive; those of a constant one are listed in one pass, in any order
-// (list_raster.cuh). A stable radix sort by voxel over just the bits in use follows, and the first fragment of each
-// voxel is selected; what was listed in any order is then put in order within each voxel (fragment_order.cuh). Memory
-// is in proportion to the fragments (paper section 3, A-buffer).
+// A-buffer: every fragment, ordered by (voxel, primitive). Fragments are counted, given their places by a
+// scan and written by ascending primitive; those of one draw with a constant shader are listed in one pass, in any
+// order (list_raster.cuh). A stable radix sort by voxel over just the bits in use follows, and the first fragment of
+// each voxel is selected; what was listed in any order is then put in order within each voxel (fragment_order.cuh).
+// Memory is in proportion to the fragments (paper section 3, A-buffer).
 
 #include <voxelpipe/device/fragment_order.cuh>
 #include <voxelpipe/device/fragment_shade.cuh>
@@ -113,7 +113,7 @@ struct list_buffers {
     std::size_t storage_bytes;
 };
 
-// Arrays for counting and writing the fragments of shaders that compute.
+// Arrays for counting and writing fragments.
 struct list_memory {
     share_buffers share;
     void* storage; // of the scan

@@ -3,8 +3,10 @@
 #pragma once
 
 // cuda_backend: the pipeline on an NVIDIA GPU, with the bits of cpu_backend. All work, copies and memory go through one
-// stream of the current device; a call to voxelize waits once, for the counters in its status.
+// stream of the current device; a call to voxelize waits once, for the counters in its status, unless it has to run
+// again.
 
+#include <voxelpipe/core/call_room.hpp>
 #include <voxelpipe/device/dispatch.cuh>
 
 #include <algorithm>
@@ -154,9 +156,9 @@ public:
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              const framebuffer_view<Targets...>& fb, const voxelize_options& options,
                              std::uint64_t triangles_in) {
-        const call_key key{triangles_in, g.extent, g.offset, options.rule, false};
         return attempt(
-            key, [&](const device::capacities& limits, device::pipeline_state& state, device::stage_clock* clock) {
+            framebuffer_room_, {triangles_in, g.extent, g.offset, options.rule},
+            [&](const device::capacities& limits, device::pipeline_state& state, device::stage_clock* clock) {
                 device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits, [&](auto call) {
                     call.clock = clock;
                     if (options.rule == coverage::thin)
@@ -173,18 +175,18 @@ public:
                              std::uint64_t triangles_in) {
         using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
         lists = abuffer<cuda_backend, Payload>(*this);
-        const call_key key{triangles_in, g.extent, g.offset, options.rule, true};
-        status s = attempt(
-            key, [&](const device::capacities& limits, device::pipeline_state& state, device::stage_clock* clock) {
-                const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
-                const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
-                if (options.rule == coverage::thin)
-                    small ? fill<coverage::thin, std::uint32_t>(call, lists, state)
-                          : fill<coverage::thin, std::uint64_t>(call, lists, state);
-                else
-                    small ? fill<coverage::conservative, std::uint32_t>(call, lists, state)
-                          : fill<coverage::conservative, std::uint64_t>(call, lists, state);
-            });
+        status s =
+            attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
+                    [&](const device::capacities& limits, device::pipeline_state& state, device::stage_clock* clock) {
+                        const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
+                        const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
+                        if (options.rule == coverage::thin)
+                            small ? fill<coverage::thin, std::uint32_t>(call, lists, state)
+                                  : fill<coverage::thin, std::uint64_t>(call, lists, state);
+                        else
+                            small ? fill<coverage::conservative, std::uint32_t>(call, lists, state)
+                                  : fill<coverage::conservative, std::uint64_t>(call, lists, state);
+                    });
         if (s.ok()) {
             lists.extent = g.extent;
             s.counts.fragments = lists.num_fragments();
@@ -202,46 +204,41 @@ private:
         std::uint64_t triangles;
         glm::ivec3 extent, offset;
         coverage rule;
-        bool lists;
         friend bool operator==(const call_key&, const call_key&) = default;
     };
+    using room = core::call_room<call_key, 4>; // of tile pairs, tile records, fragments, fragment records
 
     // Runs the stages with capacities that should do, waits, and once more where something did not fit.
     template <class Launch>
-    [[nodiscard]] status attempt(const call_key& key, Launch&& launch_stages) {
+    [[nodiscard]] status attempt(room& memory, const call_key& key, Launch&& launch_stages) {
         status s;
         try {
             std::optional<device::stage_clock> clock;
             if (times != nullptr) clock.emplace(stream);
-            device::capacities limits = guess(key);
+            const std::uint64_t n = key.triangles;
+            room::lengths there = memory.guess(key, {n + n / 4 + 16384, n / 16 + 4096, 4 * n + 65536, n / 16 + 4096});
             for (int tries = 0;; ++tries) {
+                const device::capacities limits{there[0], there[1], there[2], there[3]};
                 device::pipeline_state state{};
                 launch_stages(limits, state, clock ? &*clock : nullptr);
                 if (state.index_error != 0) {
                     s = core::failure(status_code::index_out_of_range, stage::coarse_raster);
                     break;
                 }
+                const room::lengths needed{state.tile_pairs, state.tile_records, state.list_fragments,
+                                           state.fragment_records};
                 if (!device::has_failed(state, limits)) {
                     s = device::to_status(state);
-                    last_ = key;
-                    needed_ = {state.tile_pairs, state.tile_records, state.list_fragments, state.fragment_records};
+                    memory.fitted(key, needed);
                     break;
                 }
                 // A pass that overflowed its records did not count all of its cells: the next try may need a third.
-                if (tries == 4 || state.tile_pairs > core::most_numbered ||
-                    state.list_fragments > core::most_numbered) {
+                if (tries == 4 || needed[0] > core::most_numbered || needed[2] > core::most_numbered) {
                     s = core::failure(status_code::out_of_memory, stage::coarse_raster);
                     s.required = {state.tile_pairs, state.list_fragments, 0};
                     break;
                 }
-                raise(limits.tile_pairs, state.tile_pairs);
-                raise(limits.tile_records, state.tile_records);
-                raise(limits.fragments, state.list_fragments);
-                raise(limits.fragment_records, state.fragment_records);
-                keep_numbered(limits);
-                most_ = {std::max(most_.tile_pairs, limits.tile_pairs),
-                         std::max(most_.tile_records, limits.tile_records), std::max(most_.fragments, limits.fragments),
-                         std::max(most_.fragment_records, limits.fragment_records)};
+                memory.raise(there, needed);
             }
             if (clock) clock->read(*times);
         } catch (const device::cuda_failure& e) {
@@ -251,31 +248,6 @@ private:
         }
         s.counts.triangles_in = key.triangles;
         return s;
-    }
-
-    static void raise(unsigned long long& capacity, unsigned long long need) {
-        if (need > capacity) capacity = need + need / 16;
-    }
-
-    static void keep_numbered(device::capacities& limits) {
-        limits.tile_pairs = std::min<unsigned long long>(limits.tile_pairs, core::most_numbered);
-        limits.fragments = std::min<unsigned long long>(limits.fragments, core::most_numbered);
-    }
-
-    // A call like the last one needs about as much, and what is sorted is what there is room for. Otherwise what a
-    // first call needs, or more where an earlier one did.
-    [[nodiscard]] device::capacities guess(const call_key& key) const {
-        const bool known = last_ == key;
-        const auto room = [&](unsigned long long needed, unsigned long long most, std::uint64_t first) {
-            return known && needed != 0 ? needed + needed / 16 + 1024 : std::max<unsigned long long>(most, first);
-        };
-        const std::uint64_t n = key.triangles;
-        device::capacities limits{room(needed_.tile_pairs, most_.tile_pairs, n + n / 4 + 16384),
-                                  room(needed_.tile_records, most_.tile_records, n / 16 + 4096),
-                                  room(needed_.fragments, most_.fragments, 4 * n + 65536),
-                                  room(needed_.fragment_records, most_.fragment_records, n / 16 + 4096)};
-        keep_numbered(limits);
-        return limits;
     }
 
     // The workspace, at least so large.
@@ -336,9 +308,7 @@ private:
         lists.payloads = std::move(payloads);
     }
 
-    device::capacities most_{};    // that any call has needed
-    std::optional<call_key> last_; // the call that
-    device::capacities needed_{};  // needed this
+    room framebuffer_room_{{true, false, true, false}}, list_room_{{true, false, true, false}};
     device_block workspace_;
 };
 

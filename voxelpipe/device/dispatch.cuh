@@ -206,8 +206,10 @@ template <class Key, class Payload>
     }
     b.bits = key_bits(num_voxels);
     b.storage_bytes = std::max(select_bytes<Key>(capacity), sort_bytes<Key>(capacity, b.bits));
-    b.primitives = memory.take<std::uint32_t>(has_payload ? capacity : 0);
-    b.payloads = memory.take<Payload>(has_payload ? capacity : 0);
+    if constexpr (has_payload) {
+        b.primitives = memory.take<std::uint32_t>(capacity);
+        b.payloads = memory.take<Payload>(capacity);
+    }
     b.first_of_voxel = memory.take<unsigned long long>(capacity);
     b.storage = memory.take<std::byte>(b.storage_bytes);
     return b;

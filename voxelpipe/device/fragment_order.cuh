@@ -129,9 +129,11 @@ __global__ void order_voxels_kernel(const __grid_constant__ Buffers b, const pip
             if (kind == k) b.lists.voxels[k][at] = r;
         if (kind == lists::run_list)
             for (std::uint32_t k = 0; k < entries; ++k) {
-                const std::uint64_t from = std::uint64_t{k} * most_of_block;
-                const std::uint64_t length = r.length - from < most_of_block ? r.length - from : most_of_block;
-                b.lists.runs[at + k] = {{r.begin + from, length}, r};
+                voxel_run& entry = b.lists.runs[at + k];
+                entry.voxel = r;
+                entry.run.begin = r.begin + std::uint64_t{k} * most_of_block;
+                const std::uint64_t rest = r.begin + r.length - entry.run.begin;
+                entry.run.length = rest < most_of_block ? rest : most_of_block;
             }
     }
 }

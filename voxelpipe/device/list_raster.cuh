@@ -16,7 +16,7 @@ struct listing_sink : direct_sink<Call> {
     static constexpr bool buffers = true;
     static constexpr bool checks_indices = true;
     static constexpr int min_blocks = list_min_blocks;
-    static constexpr unsigned room = 448;    // with the queues, 48 KB for a block
+    static constexpr unsigned room = 448;    // with the queues, less than 48 KB for a block
     static constexpr unsigned flush_at = 64; // less may wait: a round of thin triangles brings up to 384
     struct memory {
         std::uint32_t voxels[room], triangles[room];

@@ -52,7 +52,7 @@ struct chunk_grid {
     }
 };
 
-// Where the passes keep their numbers. counts and offsets have an element per primitive, offsets one more.
+// Where the passes keep their numbers. counts and offsets have an element per primitive.
 struct share_buffers {
     std::uint32_t* counts;
     unsigned long long* offsets;
