@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // What the materials of a model come to in the voxelize program's files: pictures and how they are laid on, colours and
-// what they are multiplied with, masks.
+// what they are multiplied with, masks, both sides of faces.
 #include "tool_runner.hpp"
 #include "tool_scenes.hpp"
 
@@ -10,7 +10,9 @@
 #include <glm/gtc/type_precision.hpp>
 #include <glm/vec3.hpp>
 
+#include <array>
 #include <numbers>
+#include <utility>
 
 using gltf_test::builder;
 using gltf_test::json;
@@ -151,6 +153,43 @@ TEST(Tool, AlphaMaskLeavesHoles) {
         for (std::size_t y = 0; y < 8; ++y)
             for (std::size_t x = 0; x < 8; ++x)
                 EXPECT_EQ(x < 4, bits.at<std::uint8_t>(y * 8 + x) != 0) << x << ' ' << y;
+    }
+}
+
+// A leaning square, once as it is and once seen from behind.
+TEST(Tool, BothSidesOfAFaceCount) {
+    const scratch_folder folder;
+    const auto voxels = [&](bool clockwise, bool double_sided, const std::string& coverage) {
+        builder file;
+        const int material = gltf_test::add_material(file, {0.2, 0.4, 0.6, 1}, {{"doubleSided", double_sided}});
+        json& square = gltf_test::add_square(file, 0);
+        square["material"] = material;
+        if (clockwise) square["indices"] = file.accessor(std::vector<std::uint8_t>{0, 2, 1, 0, 3, 2}, "SCALAR");
+        file.root["nodes"].back()["rotation"] = {0.2, 0.3, 0.1, 0.9};
+        file.write_glb(folder / "m.glb");
+        const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-r", "24", "--coverage",
+                                            coverage, "-t", "occupancy,color,normal"});
+        EXPECT_EQ(0, result.code) << result.err;
+        return std::array{read_npy(folder / "o.occupancy.npy"), read_npy(folder / "o.color.npy"),
+                          read_npy(folder / "o.normal.npy")};
+    };
+    for (const char* coverage : {"conservative", "thin"}) {
+        const auto front = voxels(false, false, coverage);
+        std::size_t covered = 0;
+        for (std::size_t i = 0; i < front[0].voxels(); ++i) covered += front[0].at<std::uint8_t>(i) != 0;
+        EXPECT_LT(200U, covered) << coverage;
+        for (const auto& [clockwise, double_sided] :
+             {std::pair{true, false}, std::pair{false, true}, std::pair{true, true}}) {
+            SCOPED_TRACE(std::string(coverage) + (clockwise ? ", clockwise" : "") + (double_sided ? ", double" : ""));
+            const auto other = voxels(clockwise, double_sided, coverage);
+            EXPECT_TRUE(front[0].data == other[0].data) << "occupancy";
+            EXPECT_TRUE(front[1].data == other[1].data) << "color";
+            ASSERT_EQ(front[2].voxels(), other[2].voxels());
+            for (std::size_t i = 0; i < front[2].voxels(); ++i) { // only normals tell front from back
+                const glm::vec3 expected = front[2].at<glm::vec3>(i) * (clockwise ? -1.0F : 1.0F);
+                ASSERT_EQ(expected, other[2].at<glm::vec3>(i)) << i;
+            }
+        }
     }
 }
 
