@@ -149,7 +149,9 @@ TEST(Tool, EveryPictureOptionChangesThePicture) {
     EXPECT_TRUE(plain == picture({"--azimuth", "35", "--elevation", "25", "--zoom", "1", "--fov", "28", "--samples",
                                   "2", "--background", "sky", "--up", "y"}));
     EXPECT_TRUE(plain == picture({"--compression", "9", "--depth-axis", "x", "--threads", "1"}));
-    // Without colours it is the picture of the occupancy alone.
+    // Without colours it is the picture of the occupancy alone, whether or not colours are computed.
+    for (const char* targets : {"occupancy", "occupancy,color"})
+        EXPECT_TRUE(picture({"--no-color"}) == picture({"--no-color", "--target", targets})) << targets;
     EXPECT_TRUE(picture({"--no-color"}) == picture({"--target", "occupancy"}));
 }
 
