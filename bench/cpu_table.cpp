@@ -41,8 +41,7 @@ struct options {
     std::string out = VOXELPIPE_BENCH_OUTPUT_DIR;
 };
 
-// ---- one cell
-// --------------------------------------------------------------------------------------------------------
+// ---- one cell -------------------------------------------------------------------------------------------------------
 
 enum class output_kind { bits, sums, lists };
 
@@ -179,8 +178,7 @@ cell_result run_cell(const bench::mesh_data& mesh, const vp::grid& grid, const c
     return result;
 }
 
-// ---- tables
-// ----------------------------------------------------------------------------------------------------------
+// ---- tables ---------------------------------------------------------------------------------------------------------
 
 std::string baseline_text(const cell_result& r) {
     if (r.baseline_ran) return significant(r.baseline.wall_ms);

@@ -64,8 +64,7 @@ inline constexpr std::size_t tile_voxels = tile_rows * tile_size;
     return static_cast<std::size_t>(row) * tile_size + static_cast<std::size_t>(x);
 }
 
-// ---- vertex shade
-// ----------------------------------------------------------------------------------------------------
+// ---- vertex shade ---------------------------------------------------------------------------------------------------
 
 // The vertices of one draw after the vertex shader, snapped; varyings stay empty where there are none.
 template <class Varyings>
@@ -106,8 +105,7 @@ template <class Mesh, class VertexShader, class FragmentShader>
     return shaded;
 }
 
-// ---- the scene as the raster stages see it
-// ---------------------------------------------------------------------------
+// ---- the scene as the raster stages see it --------------------------------------------------------------------------
 
 // What is covered, whatever the shaders: what needs no more than this is compiled once, not once a shader.
 struct geometry {
@@ -171,8 +169,7 @@ make_scene(const execution& how, std::span<const draw<Mesh, VertexShader, Fragme
     return s;
 }
 
-// ---- coarse raster
-// ---------------------------------------------------------------------------------------------------
+// ---- coarse raster --------------------------------------------------------------------------------------------------
 
 template <class Key>
 struct tile_pair {
@@ -294,8 +291,7 @@ template <coverage Rule, class Key>
     return all;
 }
 
-// ---- tile sort
-// -------------------------------------------------------------------------------------------------------
+// ---- tile sort ------------------------------------------------------------------------------------------------------
 
 // The sorted pairs of one tile: [first, last).
 struct tile_range {
@@ -318,8 +314,7 @@ template <class Key>
     return ranges;
 }
 
-// ---- fragments
-// -------------------------------------------------------------------------------------------------------
+// ---- fragments ------------------------------------------------------------------------------------------------------
 
 // Calls visit(x, y, z, fragment shader's output) for every fragment of one primitive within `box` (voxels of the
 // computed part of the grid). All of it is inlined by force: the fragment's fields that a shader does not read are then

@@ -25,8 +25,7 @@ namespace voxelpipe {
 
 struct no_varyings {};
 
-// ---- vertex shader
-// ---------------------------------------------------------------------------------------------------
+// ---- vertex shader --------------------------------------------------------------------------------------------------
 
 template <class... Attributes>
 struct vertex {
@@ -75,8 +74,7 @@ struct transform {
     }
 };
 
-// ---- fragment shader
-// -------------------------------------------------------------------------------------------------
+// ---- fragment shader ------------------------------------------------------------------------------------------------
 
 // One triangle in one voxel. Barycentrics, varyings and depth-like values are taken at the centre of the voxel's column
 // along the triangle's dominant axis, projected onto the triangle's plane: they extrapolate where that centre lies
@@ -233,8 +231,7 @@ template <class Mesh, class VertexShader, class FragmentShader>
 
 } // namespace core
 
-// ---- draws
-// -----------------------------------------------------------------------------------------------------------
+// ---- draws ----------------------------------------------------------------------------------------------------------
 
 // A mesh with its shaders: the two functors carry the transform and the shader data. Does not own the mesh.
 template <class Mesh, class VertexShader, class FragmentShader>

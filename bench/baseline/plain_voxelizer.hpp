@@ -94,8 +94,7 @@ void voxelize(const mesh_data& mesh, const vp::grid& grid, vp::coverage rule, Em
     }
 }
 
-// ---- outputs
-// ---------------------------------------------------------------------------------------------------------
+// ---- outputs --------------------------------------------------------------------------------------------------------
 
 // Bits, 32 along x to a word, rows padded to words: what a linear target of bits holds.
 inline void bits(const mesh_data& mesh, const vp::grid& grid, vp::coverage rule, std::vector<std::uint32_t>& words) {

@@ -3,6 +3,7 @@
 #include "command_line.hpp"
 
 #include "exit_code.hpp"
+#include "formats/binvox.hpp"
 
 #include <voxelpipe/config.hpp>
 
@@ -140,7 +141,7 @@ struct raw_options {
 
 void describe(CLI::App& app, command_line& options, raw_options& raw) {
     app.add_option("INPUT", options.input, "glTF 2.0 model, .glb or .gltf")->required()->option_text(" ");
-    app.add_option("-o,--output", options.outputs, "Write the voxels to FILE (required); may be repeated")
+    app.add_option("-o,--output", options.outputs, "Write the voxels to FILE (required); one -o for each file")
         ->required()
         ->allow_extra_args(false)
         ->option_text("FILE");
@@ -300,6 +301,11 @@ void understand_outputs(command_line& options, const raw_options& raw) {
         }
         if (std::count(options.outputs.begin(), options.outputs.end(), output) > 1)
             throw usage_error("\"" + output.string() + "\" is given twice");
+        // Now, not when all is computed.
+        if (const auto& size = options.grid.voxel_size;
+            size && found->extension == ".binvox" && !are_cubic({size->x, size->y, size->z}))
+            throw usage_error("\"" + output.string() +
+                              "\": .binvox has one voxel size for all axes, --voxel-size has several");
         needs_occupancy = needs_occupancy || found->needs_occupancy;
         shows_colors = shows_colors || found->extension == ".vox" || found->extension == ".png";
     }

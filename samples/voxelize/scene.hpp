@@ -49,7 +49,8 @@ struct material {
     std::int32_t texture = no_texture; // index into scene::textures
     alpha_mode alpha = alpha_mode::opaque;
     float alpha_cutoff = 0.5F;
-    // Recorded, without an effect on coverage: a voxelization has no viewer, so neither side is culled.
+    // As the file says; nothing here asks for it. A voxelization has no viewer: both sides of every face count,
+    // double-sided or not. Normals are the front's, the side from which the corners run counter-clockwise.
     bool double_sided = false;
 };
 

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "formats/formats.hpp"
+#include "formats/binvox.hpp"
 #include "test_volumes.hpp"
 
+#include <array>
 #include <sstream>
 
 using namespace voxelize;
@@ -103,4 +104,10 @@ TEST_F(Binvox, RefusesVoxelsThatAreNoCubes) {
         EXPECT_NE(std::string(e.what()).find("one voxel size"), std::string::npos) << e.what();
     }
     EXPECT_TRUE(names().empty());
+
+    EXPECT_TRUE(voxelize::are_cubic({0.1, 0.1, 0.1}));
+    EXPECT_TRUE(voxelize::are_cubic({1, 1 + 1e-12, 1 - 1e-12})); // rounding
+    const std::array<double, 3> others[]{{1, 1, 2}, {1, 2, 1}, {2, 1, 1}};
+    for (const std::array<double, 3>& size : others)
+        EXPECT_FALSE(voxelize::are_cubic(size)) << size[0] << ' ' << size[1] << ' ' << size[2];
 }

@@ -3,8 +3,9 @@
 
 // Fuzzing the API: bytes become a grid, a crop of it, a mesh and a coverage rule; the library's A-buffer and
 // framebuffer must be the oracle's voxels, and bad input must be refused with the right code. A libFuzzer target, or,
-// built with VOXELPIPE_FUZZ_REPLAY by any compiler, a program that runs the files and folders it is given, and without
-// arguments pseudo-random inputs (VOXELPIPE_FUZZ_INPUTS of them, 15000 if unset).
+// built with VOXELPIPE_FUZZ_REPLAY by any compiler, a program that runs the files and folders it is given (and fails
+// where there are none in them), and without arguments pseudo-random inputs (VOXELPIPE_FUZZ_INPUTS of them, 15000 if
+// unset).
 
 #include "library.hpp"
 
@@ -248,10 +249,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 namespace {
 
-void replay(const std::filesystem::path& path) {
+// Gives the number of files.
+std::size_t replay(const std::filesystem::path& path) {
     if (std::filesystem::is_directory(path)) {
-        for (const auto& entry : std::filesystem::directory_iterator(path)) replay(entry.path());
-        return;
+        std::size_t count = 0;
+        for (const auto& entry : std::filesystem::directory_iterator(path)) count += replay(entry.path());
+        return count;
     }
     std::ifstream file(path, std::ios::binary);
     if (!file) fail("cannot read " + path.string());
@@ -259,6 +262,7 @@ void replay(const std::filesystem::path& path) {
     std::printf("%s, %zu bytes\n", path.string().c_str(), bytes.size());
     std::fflush(stdout); // before a crash
     LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+    return 1;
 }
 
 // Many bytes of zero and of small numbers among random ones: without a fuzzer's feedback, what hits ties and corners.
@@ -284,8 +288,12 @@ void random_inputs(std::uint64_t count) {
 } // namespace
 
 int main(int argc, char** argv) {
-    for (int n = 1; n < argc; ++n) replay(argv[n]);
-    if (argc > 1) return 0;
+    if (argc > 1) {
+        std::size_t count = 0;
+        for (int n = 1; n < argc; ++n) count += replay(argv[n]);
+        std::printf("replayed %zu files\n", count);
+        return count != 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    }
     const char* const inputs = std::getenv("VOXELPIPE_FUZZ_INPUTS");
     random_inputs(inputs != nullptr ? std::strtoull(inputs, nullptr, 10) : 15000);
     return 0;

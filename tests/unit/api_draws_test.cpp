@@ -168,8 +168,7 @@ TEST(Counters, SayWhatBecameOfEveryTriangle) {
     EXPECT_GE(thin.triangles_zero_area, 2u);
 }
 
-// ---- what shaders are told
-// -------------------------------------------------------------------------------------------
+// ---- what shaders are told ------------------------------------------------------------------------------------------
 
 struct surface {
     glm::vec2 uv;

@@ -19,8 +19,7 @@ using unit::mark;
 
 const glm::ivec3 extent{45, 34, 37};
 
-// ---- values of a fragment, by shader and by model
-// --------------------------------------------------------------------
+// ---- values of a fragment, by shader and by model -------------------------------------------------------------------
 
 struct record { // a user's struct, with a hash chain that shows every change of order
     std::uint64_t chain;
@@ -139,8 +138,7 @@ TEST_P(Targets, EightInOnePassAreTheFoldsOfTheOraclesFragments) {
 INSTANTIATE_TEST_SUITE_P(Both, Targets, ::testing::Values(vp::coverage::conservative, vp::coverage::thin),
                          [](const auto& p) { return p.param == vp::coverage::thin ? "thin" : "conservative"; });
 
-// ---- load operations
-// -------------------------------------------------------------------------------------------------
+// ---- load operations ------------------------------------------------------------------------------------------------
 
 struct two_values {
     VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program on every glTF file below VOXELPIPE_GLTF_DIR, and on models that the test writes: it ends with 0 exactly
 // where the model loads and has triangles, otherwise with 2 and one line. And the bytes that it computes are those that
-// golden_volumes.txt keeps, under every compiler and flag: coverage, colours, normals, depths.
+// golden_volumes.txt keeps: coverage, colours, normals, depths. The table does not know of compilers and flags: .ci/run
+// compares with it what g++ and clang++ make, what sanitizers see, and what -march=native with contraction gives.
 //
 // VOXELPIPE_WRITE_GOLDEN_VOLUMES=FILE in the environment writes the table of what is computed now, to be reviewed.
 #include "tool_runner.hpp"

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// The voxelize program, end to end, on models that the tests write.
+// The voxelize program, end to end, on models that the tests write. Its options: tool_options_test.cpp; what materials
+// come to: tool_materials_test.cpp.
 #include "tool_runner.hpp"
 #include "tool_scenes.hpp"
 
@@ -23,25 +24,6 @@ using tool_test::scratch_folder;
 namespace {
 
 constexpr const char* all_targets = "occupancy,count,color,color-max,color-replace,normal,material,triangle,depth";
-
-TEST(Tool, HelpNamesEverything) {
-    const scratch_folder folder;
-    const outcome help = run(folder, {"--help"});
-    EXPECT_EQ(0, help.code);
-    EXPECT_EQ("", help.err);
-    for (const voxelize::target_info& entry : voxelize::target_table)
-        EXPECT_NE(std::string::npos, help.out.find("  " + std::string(entry.name))) << entry.name;
-    for (const voxelize::format& entry : voxelize::formats())
-        EXPECT_NE(std::string::npos, help.out.find("  " + std::string(entry.extension))) << entry.extension;
-    for (const char* part : {"INPUT", "--resolution N", "EXIT CODES", "EXAMPLES", "--stats"})
-        EXPECT_NE(std::string::npos, help.out.find(part)) << part;
-    std::istringstream lines(help.out);
-    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 120U) << line;
-
-    const outcome version = run(folder, {"--version"});
-    EXPECT_EQ(0, version.code);
-    EXPECT_EQ(0U, version.out.find("voxelize ")) << version.out;
-}
 
 TEST(Tool, WrongCommandLinesAreExplained) {
     const scratch_folder folder;
@@ -79,6 +61,7 @@ TEST(Tool, WrongCommandLinesAreExplained) {
     expect({model, "-o", out, "--threads", "-1"}, "--threads");
     expect({model, "-o", out, "--image-size", "100"}, "--image-size");
     expect({model, "-o", out, "--background", "mauve"}, "mauve");
+    expect({model, "-o", out, "-o", folder / "o.binvox", "--voxel-size", "1,1,2"}, "one voxel size for all axes");
     expect({model, "-o", out, "--no-such-option"}, "--no-such-option");
     expect({model, model, "-o", out}, "m.glb");
 }
@@ -124,30 +107,6 @@ TEST(Tool, OtherFailuresHaveTheirOwnCodes) {
     EXPECT_NE(std::string::npos, large.err.find("MiB")) << large.err;
 }
 
-// (x, y) of the one layer of a grid, as sRGB and alpha.
-glm::u8vec4 pixel(const array& colors, std::size_t x, std::size_t y) {
-    return colors.at<glm::u8vec4>(y * colors.shape[2] + x);
-}
-
-TEST(Tool, PicturesStandUpright) {
-    const scratch_folder folder;
-    builder file;
-    const std::vector<std::uint8_t> quarters{255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255};
-    const int material = gltf_test::add_textured_material(file, 2, 2, quarters);
-    gltf_test::add_square(file, 0)["material"] = material;
-    file.write_glb(folder / "m.glb");
-    const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "color", "--origin", "0,0,-0.5",
-                                        "--voxel-size", "0.125,0.125,1", "--extent", "8,8,1"});
-    ASSERT_EQ(0, result.code) << result.err;
-    const array colors = read_npy(folder / "o.npy");
-    EXPECT_EQ((std::vector<std::size_t>{1, 8, 8, 4}), colors.shape);
-    EXPECT_EQ("|u1", colors.type);
-    EXPECT_EQ(glm::u8vec4(255, 0, 0, 255), pixel(colors, 0, 7)); // the picture's top left
-    EXPECT_EQ(glm::u8vec4(0, 255, 0, 255), pixel(colors, 7, 7));
-    EXPECT_EQ(glm::u8vec4(0, 0, 255, 255), pixel(colors, 0, 0));
-    EXPECT_EQ(glm::u8vec4(255, 255, 255, 255), pixel(colors, 7, 0));
-}
-
 // Three squares in one layer: red below green below a blue that is half transparent.
 TEST(Tool, ColorsMeetAsTheirTargetSays) {
     const scratch_folder folder;
@@ -173,29 +132,6 @@ TEST(Tool, ColorsMeetAsTheirTargetSays) {
     EXPECT_EQ(4, read_npy(folder / "o.triangle.npy").at<std::int32_t>(0)); // the lower right one of the third square
     EXPECT_EQ(0.0F, read_npy(folder / "o.depth.npy").at<float>(0));
     EXPECT_EQ(glm::vec3(0, 0, 1), read_npy(folder / "o.normal.npy").at<glm::vec3>(0));
-}
-
-TEST(Tool, AlphaMaskLeavesHoles) {
-    const scratch_folder folder;
-    builder file;
-    const std::vector<std::uint8_t> left_only{255, 255, 255, 128, 255, 255, 255, 126};
-    const int material = gltf_test::add_textured_material(file, 2, 1, left_only, {{"alphaMode", "MASK"}});
-    gltf_test::add_square(file, 0)["material"] = material;
-    file.write_glb(folder / "m.glb");
-    // By the targets that need shading and by occupancy alone, which elsewhere takes a shorter way.
-    for (const char* targets : {"occupancy", "occupancy,color"}) {
-        const outcome result =
-            run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-o", folder / "o.npz", "-t", targets, "--origin",
-                         "0,0,-0.5", "--voxel-size", "0.125,0.125,1", "--extent", "8,8,1", "--stats", "json"});
-        ASSERT_EQ(0, result.code) << result.err;
-        const json stats = json::parse(result.out);
-        EXPECT_EQ(32, stats["voxels"]);
-        EXPECT_LT(31, stats["fragments_discarded"]);
-        const array bits = read_npy(folder / (targets == std::string("occupancy") ? "o.npy" : "o.occupancy.npy"));
-        for (std::size_t y = 0; y < 8; ++y)
-            for (std::size_t x = 0; x < 8; ++x)
-                EXPECT_EQ(x < 4, bits.at<std::uint8_t>(y * 8 + x) != 0) << x << ' ' << y;
-    }
 }
 
 TEST(Tool, AllTargetsAgreeOnWhatIsCovered) {
@@ -346,6 +282,8 @@ TEST(Tool, GridsAreWhatWasAskedFor) {
     EXPECT_EQ(json({9, 5, 3}), lattice["extent"]);
     EXPECT_EQ(json({0.0, 0.0, -0.5}), lattice["origin"]);
     EXPECT_EQ(json({5, 3, 5}), grid({"--voxel-size", "0.5,0.5,0.125"})["extent"]);
+    EXPECT_EQ(json({5, 3, 2}), grid({"--voxel-size", "0.5,0.5,0.5", "-o", folder / "o.binvox"})["extent"]);
+    EXPECT_TRUE(std::filesystem::exists(folder / "o.binvox"));
     EXPECT_EQ(json({7, 5, 7}), grid({"--voxel-size", "0.5,0.5,0.125", "--padding", "1"})["extent"]);
 
     const json exact = grid({"--origin", "-1,0.5,0", "--voxel-size", "0.1,0.2,0.3", "--extent", "7,6,5"});

@@ -175,8 +175,7 @@ template <class V>
 // a + t*(b - a), two roundings; exact at t = 0 and wherever a == b.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float lerp(float a, float b, float t) { return fma(t, sub(b, a), a); }
 
-// ---- integers
-// --------------------------------------------------------------------------------------------------------
+// ---- integers -------------------------------------------------------------------------------------------------------
 
 // floor(a / 2^bits)
 template <class Int>

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// World positions become fixed point here, once; from then on only integers decide coverage (docs/design.md, "Snap").
-// Holds the sub-voxel format, the snapping formula and the table of integer widths that the rest of core/ relies on.
+// World positions become fixed point here, once; from then on only integers decide coverage (docs/design.md,
+// "Snapping"). Holds the sub-voxel format, the snapping formula and the table of integer widths that the rest of core/
+// relies on.
 
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/core/bits.hpp>
@@ -20,11 +21,11 @@ struct snapped_position {
 inline constexpr std::int64_t nonfinite_mark = INT64_MIN;
 inline constexpr std::int64_t too_far_mark = INT64_MIN + 1;
 
-// ---- the table of widths
-// --------------------------------------------------------------------------------------------- F = fraction bits, L =
-// log2 of the largest extent (rounded up), e = bits of the largest edge of a triangle. A triangle's normal component is
-// twice the area of its projection, hence at most the area of the projected box: 2e bits. In voxel units the plane at a
-// voxel needs 3 * 2^(2e) * 2^e / 2^F, doubled for the voxel centre: 3e - F + 2.6 bits.
+// ---- the table of widths --------------------------------------------------------------------------------------------
+// F = fraction bits, L = log2 of the largest extent (rounded up), e = bits of the largest edge of a triangle. A
+// triangle's normal component is twice the area of its projection, hence at most the area of the projected box: 2e
+// bits. In voxel units the plane at a voxel needs 3 * 2^(2e) * 2^e / 2^F, doubled for the voxel centre: 3e - F + 2.6
+// bits.
 inline constexpr int max_log2_extent = 20;   // a million voxels an axis
 inline constexpr int coordinate_bits = 40;   // |q| <= 2^40: beyond, a position is "too far"
 inline constexpr int narrow_plane_bits = 62; // the 64-bit path keeps a bit to spare
@@ -68,8 +69,7 @@ static_assert(fraction_bits(1024) == 14 && fraction_bits(128) == 16 && fraction_
 static_assert(fraction_bits(257) == 15 && fraction_bits(4096) == 12);
 static_assert(narrow_edge_bits(14) == 24 && narrow_edge_bits(13) == 24 && narrow_edge_bits(12) == 23);
 
-// ---- snapping
-// --------------------------------------------------------------------------------------------------------
+// ---- snapping -------------------------------------------------------------------------------------------------------
 
 // World to sub-voxel units, per axis: q = rne((double(p) - origin) * scale). Computed once on the host.
 struct snap_transform {

@@ -68,8 +68,7 @@ struct sum_magnitude {
     return {negative, (static_cast<uint128>(top) << 96) | (low >> 32) | sticky, 32};
 }
 
-// ---- the fixed-point format of each floating type
-// ---------------------------------------------------------------------
+// ---- the fixed-point format of each floating type -------------------------------------------------------------------
 
 template <class T>
 struct sum_format;

@@ -77,11 +77,16 @@ void add_bits(run_writer& runs, std::uint32_t bits, int n) {
 
 } // namespace
 
+bool are_cubic(const std::array<double, 3>& voxel_size) {
+    constexpr double tolerance = 1e-9; // relative
+    const auto [x, y, z] = voxel_size;
+    return std::abs(x - y) <= tolerance * x && std::abs(x - z) <= tolerance * x;
+}
+
 std::vector<std::filesystem::path> write_binvox(const volume& v, const std::filesystem::path& path,
                                                 const write_options& options) {
     const double sx = v.voxel_size[0], sy = v.voxel_size[1], sz = v.voxel_size[2];
-    constexpr double tolerance = 1e-9; // relative: what fitting a grid loses by rounding
-    if (std::abs(sx - sy) > tolerance * sx || std::abs(sx - sz) > tolerance * sx)
+    if (!are_cubic(v.voxel_size))
         throw write_error(path, ".binvox has one voxel size for all axes, but this grid's are " + number(sx) + ", " +
                                     number(sy) + " and " + number(sz));
     const channel& bits = *v.occupancy();

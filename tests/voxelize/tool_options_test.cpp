@@ -1,0 +1,217 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// The options of the voxelize program: the help names them all, and those of pictures and files do what it says.
+#include "tool_runner.hpp"
+#include "tool_scenes.hpp"
+
+#include <formats/formats.hpp>
+#include <targets.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+#include <sstream>
+
+using gltf_test::builder;
+using tool_test::outcome;
+using tool_test::read_file;
+using tool_test::run;
+using tool_test::scratch_folder;
+
+namespace {
+
+// All that the program takes, as the help writes it.
+std::set<std::string> all_options() {
+    return {"-o,--output FILE",
+            "-t,--target NAME",
+            "-r,--resolution N",
+            "--padding N",
+            "-s,--voxel-size S[,SY,SZ]",
+            "--origin X,Y,Z",
+            "--extent NX,NY,NZ",
+            "--coverage RULE",
+            "--depth-axis AXIS",
+            "--backend NAME",
+            "-j,--threads N",
+            "--work-memory MIB",
+            "--device-memory MIB",
+            "--image-size WxH",
+            "--azimuth DEG",
+            "--elevation DEG",
+            "--zoom F",
+            "--fov DEG",
+            "--samples N",
+            "--background COLOUR",
+            "--no-color",
+            "--no-edges",
+            "--no-ground",
+            "--up AXIS",
+            "--compression N",
+            "--stats [json]",
+            "-q,--quiet",
+            "-h,--help",
+            "--version"};
+}
+
+// The first column of the help, which the parser writes; each entry must have a description beside or below it.
+std::set<std::string> options_of(const std::string& help) {
+    constexpr std::size_t column = 28; // where descriptions begin
+    std::set<std::string> options;
+    std::istringstream lines(help.substr(0, help.find("TARGETS (")));
+    for (std::string line; std::getline(lines, line);) {
+        if (line.rfind("  -", 0) != 0) continue;
+        const bool beside = line.size() > column && line[column - 1] == ' ';
+        std::string name = line.substr(2, beside ? column - 2 : std::string::npos);
+        name.erase(name.find_last_not_of(' ') + 1);
+        EXPECT_TRUE(options.insert(name).second) << name << " stands there twice";
+        if (!beside) std::getline(lines, line);
+        EXPECT_TRUE(line.size() > column && line[column] != ' ') << name << " is not described";
+    }
+    return options;
+}
+
+TEST(Tool, HelpNamesEverything) {
+    const scratch_folder folder;
+    const outcome help = run(folder, {"--help"});
+    EXPECT_EQ(0, help.code);
+    EXPECT_EQ("", help.err);
+    for (const voxelize::target_info& entry : voxelize::target_table)
+        EXPECT_NE(std::string::npos, help.out.find("  " + std::string(entry.name))) << entry.name;
+    for (const voxelize::format& entry : voxelize::formats())
+        EXPECT_NE(std::string::npos, help.out.find("  " + std::string(entry.extension))) << entry.extension;
+    EXPECT_EQ(all_options(), options_of(help.out));
+    for (const char* part : {"INPUT", "EXIT CODES", "EXAMPLES", "one -o for each file"})
+        EXPECT_NE(std::string::npos, help.out.find(part)) << part;
+    std::istringstream lines(help.out);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 120U) << line;
+
+    const outcome version = run(folder, {"--version"});
+    EXPECT_EQ(0, version.code);
+    EXPECT_EQ(0U, version.out.find("voxelize ")) << version.out;
+}
+
+// Of a PNG: where its header has width and height (their low bytes; the high ones are 0 here) and the kind of its
+// pixels.
+constexpr std::size_t png_width = 19, png_height = 23, png_kind = 25;
+
+TEST(Tool, EveryPictureOptionChangesThePicture) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const auto picture = [&](const std::vector<std::string>& how, const std::string& size = "64x48") {
+        const std::string out = folder / "o.png";
+        std::filesystem::remove(out);
+        std::vector<std::string> arguments{folder / "m.glb", "-q", "-r", "5", "-o", out, "--image-size", size};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        const std::string bytes = read_file(out);
+        EXPECT_LT(png_kind, bytes.size());
+        return bytes;
+    };
+    const std::string plain = picture({});
+    std::map<std::string, std::string> seen{{plain, "no option"}};
+    const std::vector<std::vector<std::string>> changes{{"--azimuth", "60"},
+                                                        {"--azimuth", "-60"},
+                                                        {"--elevation", "60"},
+                                                        {"--elevation", "-25"},
+                                                        {"--zoom", "1.5"},
+                                                        {"--zoom", "0.5"},
+                                                        {"--fov", "0"},
+                                                        {"--fov", "60"},
+                                                        {"--samples", "1"},
+                                                        {"--samples", "3"},
+                                                        {"--background", "white"},
+                                                        {"--background", "dark"},
+                                                        {"--background", "transparent"},
+                                                        {"--background", "#ff0000"},
+                                                        {"--background", "#ff0000,#0000ff"},
+                                                        {"--no-color"},
+                                                        {"--no-edges"},
+                                                        {"--no-ground"},
+                                                        {"--up", "z"}};
+    for (const std::vector<std::string>& how : changes) {
+        const std::string name = how[0] + (how.size() > 1 ? ' ' + how[1] : "");
+        const std::string bytes = picture(how);
+        const auto [same, fresh] = seen.emplace(bytes, name);
+        EXPECT_TRUE(fresh) << name << " gives the picture of " << same->second;
+        EXPECT_EQ(name == "--background transparent" ? 6 : 2, bytes[png_kind]) << name; // RGBA, RGB
+        EXPECT_EQ(64, bytes[png_width]) << name;
+        EXPECT_EQ(48, bytes[png_height]) << name;
+    }
+    const std::string tall = picture({}, "30x40");
+    EXPECT_EQ(30, tall[png_width]);
+    EXPECT_EQ(40, tall[png_height]);
+
+    // What leaves it as it is: the defaults, spelt out, and options of other files.
+    EXPECT_TRUE(plain == picture({"--azimuth", "35", "--elevation", "25", "--zoom", "1", "--fov", "28", "--samples",
+                                  "2", "--background", "sky", "--up", "y"}));
+    EXPECT_TRUE(plain == picture({"--compression", "9", "--depth-axis", "x", "--threads", "1"}));
+    // Without colours it is the picture of the occupancy alone, whether or not colours are computed.
+    for (const char* targets : {"occupancy", "occupancy,color"})
+        EXPECT_TRUE(picture({"--no-color"}) == picture({"--no-color", "--target", targets})) << targets;
+    EXPECT_TRUE(picture({"--no-color"}) == picture({"--target", "occupancy"}));
+}
+
+// What a chunk of a .vox with one model holds.
+std::string vox_chunk(const std::string& file, const std::string& name) {
+    const std::size_t at = file.find(name); // then the length of the content, of the children, the content
+    if (at == std::string::npos || at + 12 > file.size()) return {};
+    return file.substr(at + 12, static_cast<unsigned char>(file[at + 4]));
+}
+
+// One triangle in voxel (0, 1, 2) of a grid of 5 x 4 x 3. MagicaVoxel's z is up.
+TEST(Tool, UpTurnsTheVox) {
+    const scratch_folder folder;
+    builder file;
+    const int positions =
+        file.accessor(std::vector<float>{0.2F, 1.2F, 2.2F, 0.8F, 1.2F, 2.2F, 0.2F, 1.8F, 2.4F}, "VEC3");
+    file.mesh({{"POSITION", positions}});
+    file.write_glb(folder / "m.glb");
+    const auto vox = [&](const std::vector<std::string>& how) {
+        const std::string out = folder / "o.vox";
+        std::vector<std::string> arguments{folder / "m.glb", "-q",    "-o",           out, "--origin", "0,0,0",
+                                           "--extent",       "5,4,3", "--voxel-size", "1"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        return read_file(out);
+    };
+    const auto ints = [](std::initializer_list<char> values) { // little-endian
+        std::string bytes;
+        for (const char value : values) bytes += {value, '\0', '\0', '\0'};
+        return bytes;
+    };
+    const std::string y = vox({});
+    EXPECT_EQ(ints({5, 3, 4}), vox_chunk(y, "SIZE"));
+    EXPECT_EQ((ints({1}) + std::string{0, 0, 1}), vox_chunk(y, "XYZI").substr(0, 7)); // (i, 3 - 1 - k, j)
+    EXPECT_EQ(y, vox({"--up", "y"}));
+    const std::string z = vox({"--up", "z"});
+    EXPECT_EQ(ints({5, 4, 3}), vox_chunk(z, "SIZE"));
+    EXPECT_EQ((ints({1}) + std::string{0, 1, 2}), vox_chunk(z, "XYZI").substr(0, 7));
+}
+
+TEST(Tool, CompressionIsAChoice) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    for (const char* extension : {".npz", ".vti", ".nrrd"}) {
+        const auto file = [&](const std::vector<std::string>& how) {
+            const std::string out = folder / std::string("o").append(extension);
+            std::vector<std::string> arguments{folder / "m.glb", "-q", "-r", "40", "-t", "color", "-o", out};
+            arguments.insert(arguments.end(), how.begin(), how.end());
+            const outcome result = run(folder, arguments);
+            EXPECT_EQ(0, result.code) << result.err;
+            return read_file(out);
+        };
+        const std::string stored = file({"--compression", "0"});
+        const std::string fast = file({"--compression", "1"});
+        const std::string small = file({"--compression", "9"});
+        EXPECT_TRUE(fast == file({})) << extension; // the default
+        EXPECT_GT(stored.size(), 2 * fast.size()) << extension;
+        EXPECT_GT(fast.size(), small.size()) << extension;
+    }
+}
+
+} // namespace
