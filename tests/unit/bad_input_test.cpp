@@ -82,6 +82,11 @@ struct call {
     }
 };
 
+// Indices are looked at where triangles are; all else is refused before any stage has run.
+vp::stage refusing_stage(status_code code) {
+    return code == status_code::index_out_of_range ? vp::stage::coarse_raster : vp::stage::validate;
+}
+
 // The call must be refused with `expected` by framebuffer and A-buffer alike, for both rules and any number of threads.
 // `into_lists`: whether what is wrong concerns an A-buffer too.
 void expect_refused(const call& c, status_code expected, bool into_lists = true) {
@@ -92,11 +97,13 @@ void expect_refused(const call& c, status_code expected, bool into_lists = true)
             const vp::status s = vp::voxelize(be, c.mesh, c.grid, by_weight{}, shader, c.view, rule);
             EXPECT_EQ(live_allocations, before);
             EXPECT_EQ(s.code, expected) << s.message();
+            EXPECT_EQ(s.where, refusing_stage(expected)) << s.message();
             EXPECT_FALSE(s.ok());
             EXPECT_EQ(s.counts.fragments, 0u);
             EXPECT_EQ(s.counts.voxels, 0u);
             EXPECT_THROW(s.or_throw(), std::runtime_error);
-            EXPECT_NE(s.message().find(vp::to_string(expected)), std::string::npos);
+            EXPECT_EQ(s.message(),
+                      std::string(vp::to_string(refusing_stage(expected))) + ": " + vp::to_string(expected));
             EXPECT_TRUE(c.untouched());
             if (!into_lists) continue;
             vp::abuffer<vp::cpu_backend, int> lists{be};
@@ -104,6 +111,7 @@ void expect_refused(const call& c, status_code expected, bool into_lists = true)
             const vp::status t = vp::voxelize(be, c.mesh, c.grid, by_weight{}, payload, lists, rule);
             EXPECT_EQ(live_allocations, before_lists);
             EXPECT_EQ(t.code, expected) << t.message();
+            EXPECT_EQ(t.where, refusing_stage(expected)) << t.message();
             EXPECT_EQ(lists.num_voxels(), 0u);
             EXPECT_EQ(lists.num_fragments(), 0u);
             EXPECT_EQ(lists.offsets.size(), 0u);
