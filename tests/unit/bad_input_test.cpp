@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Bad input to the API: every refusal has the code that says what is wrong, has written nothing to the caller's memory
-// and has left no allocation behind. What is odd but defined (positions that are no numbers, a mesh far away) works.
+// and has left no allocation behind; so has a call that memory was refused to, at whatever allocation. What is odd but
+// defined (positions that are no numbers, a mesh far away) works.
 
 #include "counted_allocations.hpp"
 
@@ -17,6 +18,7 @@
 #include <cstdint>
 #include <limits>
 #include <new>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -463,6 +465,168 @@ TEST(BadInput, ARefusedCallLeavesEarlierListsAsTheyWere) {
     c.triangles[1].z = 99;
     EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, by_weight{}, payload, lists).code, status_code::index_out_of_range);
     expect_same();
+}
+
+// ---- memory ----
+
+// Several tiles, and so many triangles (nearly all of them outside) that every stage shares its work among threads.
+struct large_call : call {
+    large_call() {
+        grid.extent = {70, 8, 8};
+        view.extent = grid.extent;
+        depths.resize(70 * 8 * 8);
+        words.resize(3 * 8 * 8);
+        vp::get<0>(view.targets).elements = depths.data();
+        vp::get<0>(view.targets).extent = grid.extent;
+        vp::get<1>(view.targets).elements = words.data();
+        vp::get<1>(view.targets).extent = grid.extent;
+        positions = {{1, 1, 1}, {69, 1, 2}, {1, 6, 3}, {500, 1, 1}, {501, 1, 1}, {500, 2, 1}};
+        triangles.assign(17000, {3, 4, 5});
+        triangles.front() = {0, 1, 2};
+        triangles.back() = {2, 1, 0};
+        look();
+        wipe();
+    }
+    void wipe() {
+        std::fill(depths.begin(), depths.end(), mark);
+        std::fill(words.begin(), words.end(), bit_mark);
+    }
+};
+
+// Calls attempt() with 0, 1, 2, ... allocations granted until it needs no more; look(status) after each. Gives how many
+// attempts went well although they were refused an allocation.
+template <class Attempt, class Look>
+int refuse_each_allocation(const Attempt& attempt, const Look& look) {
+    int well_in_spite = 0;
+    for (std::int64_t granted = 0; granted < 1000; ++granted) {
+        const std::int64_t live = live_allocations;
+        unit::allocations_left = granted;
+        const vp::status s = attempt();
+        const bool refused = unit::allocations_left.exchange(unit::no_end_of_allocations) < 0;
+        if (!s.ok()) {
+            EXPECT_TRUE(refused);
+            EXPECT_EQ(live_allocations, live) << granted << ": " << s.message();
+            EXPECT_EQ(s.code, status_code::out_of_memory) << s.message();
+            EXPECT_NE(s.where, vp::stage::validate);
+            EXPECT_EQ(s.counts.triangles_in, 17000u);
+            EXPECT_EQ(s.counts.fragments, 0u);
+            EXPECT_EQ(s.counts.voxels, 0u);
+        }
+        look(s);
+        if (!refused) {
+            EXPECT_TRUE(s.ok()) << s.message();
+            EXPECT_GT(granted, 10);
+            return well_in_spite;
+        }
+        well_in_spite += s.ok() ? 1 : 0;
+    }
+    ADD_FAILURE() << "no end of allocations";
+    return well_in_spite;
+}
+
+// The stages of failed calls, each once, as they came. With several threads their order may depend on who came first.
+struct failed_stages {
+    std::vector<vp::stage> list;
+    void note(const vp::status& s) {
+        if (!s.ok() && (list.empty() || list.back() != s.where)) list.push_back(s.where);
+    }
+};
+
+TEST(OutOfMemory, OfAFramebufferLeavesTheTargetsAlone) {
+    for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
+        for (const unsigned threads : {1u, 3u})
+            for (const bool same_values : {true, false}) { // two ways through cpu_backend
+                large_call c;
+                vp::cpu_backend be(threads);
+                draw draws[] = {{c.mesh, {}, shader}, {c.mesh, {}, shader}};
+                for (draw& d : draws) d.mesh.triangles = {c.triangles.data(), c.triangles.size() / 2};
+                draws[1].mesh.triangles = {c.triangles.data() + 8500, 8500};
+                if (!same_values) draws[1].fragment_shader = vp::constant(2.0f, false, glm::dvec4(2.0));
+                const auto attempt = [&] {
+                    return vp::voxelize(be, std::span<const draw>(draws), c.grid, c.view, rule);
+                };
+                ASSERT_TRUE(attempt().ok());
+                const std::vector<float> depths = c.depths;
+                const std::vector<std::uint32_t> words = c.words;
+                ASSERT_FALSE(c.untouched());
+                c.wipe();
+                failed_stages failed;
+                const int well_in_spite = refuse_each_allocation(attempt, [&](const vp::status& s) {
+                    failed.note(s);
+                    EXPECT_TRUE(s.ok() ? c.depths == depths && c.words == words : c.untouched()) << s.message();
+                    c.wipe();
+                });
+                using vp::stage;
+                const std::vector expected{stage::vertex_shade, stage::coarse_raster, stage::tile_sort,
+                                           stage::fine_raster};
+                if (threads == 1) {
+                    EXPECT_EQ(failed.list, expected);
+                }
+                // A thread that cannot be had is done without, above all once the targets are being written.
+                EXPECT_EQ(well_in_spite > 0, threads > 1);
+            }
+}
+
+TEST(OutOfMemory, OfAnAbufferLeavesEarlierListsAlone) {
+    for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
+        for (const unsigned threads : {1u, 3u}) {
+            const call earlier;
+            const large_call c;
+            vp::cpu_backend be(threads);
+            vp::abuffer<vp::cpu_backend, int> lists{be};
+            const auto attempt = [&] { return vp::voxelize(be, c.mesh, c.grid, by_weight{}, payload, lists, rule); };
+            const auto draw_earlier = [&] {
+                vp::voxelize(be, earlier.mesh, earlier.grid, by_weight{}, payload, lists, rule).or_throw();
+            };
+            ASSERT_TRUE(attempt().ok());
+            const auto expected = lists.to_host(be);
+            draw_earlier();
+            const auto before = lists.to_host(be);
+            ASSERT_GT(expected.voxels.size(), 100u);
+            ASSERT_NE(expected.voxels.size(), before.voxels.size());
+            failed_stages failed;
+            refuse_each_allocation(attempt, [&](const vp::status& s) {
+                failed.note(s);
+                const auto& same = s.ok() ? expected : before;
+                const auto got = lists.to_host(be);
+                EXPECT_EQ(got.voxels, same.voxels) << s.message();
+                EXPECT_EQ(got.offsets, same.offsets);
+                EXPECT_EQ(got.primitives, same.primitives);
+                EXPECT_EQ(got.payloads, same.payloads);
+                EXPECT_EQ(got.extent, same.extent);
+                if (s.ok()) draw_earlier();
+            });
+            using vp::stage;
+            const std::vector all{stage::vertex_shade, stage::coarse_raster, stage::tile_sort, stage::fine_raster,
+                                  stage::abuffer_emit};
+            if (threads == 1) {
+                EXPECT_EQ(failed.list, all);
+            }
+        }
+}
+
+TEST(OutOfMemory, OfBuffersIsAnException) {
+    call c;
+    vp::cpu_backend be(1);
+    const std::int64_t live = live_allocations;
+    const auto allocate = [&](std::int64_t granted) {
+        unit::allocations_left = granted;
+        bool thrown = false;
+        try {
+            const vp::mesh<vp::cpu_backend> m{be, c.positions, c.triangles};
+            const vp::framebuffer<vp::cpu_backend, floats> fb{be, {8, 8, 8}};
+            vp::get<0>(fb.view().targets).elements[0] = m.view().positions[0].x;
+        } catch (const std::bad_alloc&) {
+            thrown = true;
+        }
+        unit::allocations_left = unit::no_end_of_allocations;
+        EXPECT_EQ(live_allocations, live);
+        return thrown;
+    };
+    EXPECT_TRUE(allocate(0));
+    EXPECT_TRUE(allocate(1));
+    EXPECT_TRUE(allocate(2));
+    EXPECT_FALSE(allocate(3));
 }
 
 } // namespace
