@@ -11,7 +11,7 @@
 #include <cstdlib>
 #include <new>
 
-// NOLINTBEGIN(bugprone-reserved-identifier): the linker's names
+// NOLINTBEGIN(bugprone-reserved-identifier): names that linker and sanitizers ask for
 extern "C" {
 void* __real_aligned_alloc(std::size_t alignment, std::size_t size);
 void __real_free(void* p);
@@ -56,8 +56,8 @@ void __wrap_free(void* p) {
     if (p != nullptr) --unit::live_allocations;
     __real_free(p);
 }
-// NOLINTEND(bugprone-reserved-identifier)
 
 // Sanitizers end the program at an allocation that cannot be had, unless told to fail it as the system would.
 extern "C" const char* __asan_default_options() { return "allocator_may_return_null=1"; }
 extern "C" const char* __tsan_default_options() { return "allocator_may_return_null=1"; }
+// NOLINTEND(bugprone-reserved-identifier)
