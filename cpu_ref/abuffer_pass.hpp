@@ -132,6 +132,7 @@ template <coverage Rule, class Key, class Scene, class Backend, class Payload>
     }
     const std::vector<tile_range> ranges = tile_sort(how, coarse.pairs, tiles.count());
 
+    how.enter(stage::fine_raster);
     const unsigned workers =
         static_cast<unsigned>(std::max<std::size_t>(1, std::min<std::size_t>(how.threads, ranges.size())));
     std::vector<std::unique_ptr<abuffer_scratch<payload>>> scratch;
@@ -148,6 +149,7 @@ template <coverage Rule, class Key, class Scene, class Backend, class Payload>
     }
     coarse.pairs = {};
 
+    how.enter(stage::abuffer_emit);
     const stopwatch watch(how.times, &stage_times::abuffer_emit);
     std::size_t num_segments = 0;
     for (const auto& w : scratch) num_segments += w->segments.size();

@@ -69,20 +69,22 @@ public:
     template <class Draws, class Output>
     [[nodiscard]] status run(const Draws& draws, const grid& g, Output& out, const voxelize_options& options,
                              std::uint64_t triangles_in) {
+        stage at = stage::validate;
         const cpu::execution how{threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency()), times,
-                                 &progress};
+                                 &progress, &at};
+        const auto out_of_memory = [&] {
+            status failed = core::failure(status_code::out_of_memory, at);
+            failed.counts.triangles_in = triangles_in;
+            return failed;
+        };
         try {
             const auto s = cpu::make_scene(how, draws, g);
             return options.rule == coverage::thin ? pass<coverage::thin>(how, s, out, options)
                                                   : pass<coverage::conservative>(how, s, out, options);
         } catch (const std::bad_alloc&) {
-            status failed = core::failure(status_code::out_of_memory);
-            failed.counts.triangles_in = triangles_in;
-            return failed;
+            return out_of_memory();
         } catch (const std::length_error&) { // a vector longer than can be: the same thing
-            status failed = core::failure(status_code::out_of_memory);
-            failed.counts.triangles_in = triangles_in;
-            return failed;
+            return out_of_memory();
         }
     }
 

@@ -12,6 +12,7 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <new>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -39,14 +40,14 @@ inline void parallel_items(unsigned num_threads, std::size_t num_items,
             if (!error) error = std::current_exception();
         }
     };
+    // Where the machine gives no more threads, or no memory for one, those that are there do the work: so a loop whose
+    // items need no memory cannot fail for want of it.
     std::vector<std::thread> threads;
-    threads.reserve(workers - 1);
-    for (unsigned w = 1; w < workers; ++w) {
-        try {
-            threads.emplace_back(loop, w);
-        } catch (const std::system_error&) {
-            break; // the machine gives no more threads: the ones there do the work
-        }
+    try {
+        threads.reserve(workers - 1);
+        for (unsigned w = 1; w < workers; ++w) threads.emplace_back(loop, w);
+    } catch (const std::system_error&) {
+    } catch (const std::bad_alloc&) {
     }
     loop(0);
     for (std::thread& t : threads) t.join();

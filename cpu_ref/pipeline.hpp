@@ -32,6 +32,11 @@ struct execution {
     unsigned threads = 1;
     stage_times* times = nullptr;
     const std::function<void(std::uint64_t done, std::uint64_t total)>* progress = nullptr;
+    stage* at = nullptr; // where to note the stage that runs, for the status of a call that fails
+
+    void enter(stage s) const {
+        if (at != nullptr) *at = s;
+    }
 };
 
 // Adds the time until its end to one of the stage times.
@@ -80,6 +85,7 @@ template <class Mesh, class VertexShader, class FragmentShader>
 [[nodiscard]] auto vertex_shade(const execution& how, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                 const core::snap_transform& snap) {
     using varyings = draw_varyings<Mesh, VertexShader, FragmentShader>;
+    how.enter(stage::vertex_shade);
     const stopwatch watch(how.times, &stage_times::vertex_shade);
     std::vector<shaded_vertices<varyings>> shaded(draws.size());
     for (std::size_t d = 0; d < draws.size(); ++d) {
@@ -212,6 +218,7 @@ struct coarse_result {
 
 template <coverage Rule, class Key>
 [[nodiscard]] coarse_result<Key> coarse_raster(const execution& how, const geometry& s, const core::tile_grid& tiles) {
+    how.enter(stage::coarse_raster);
     const stopwatch watch(how.times, &stage_times::coarse_raster);
     constexpr std::size_t block = 8192;
     const std::size_t n = s.first_primitive.back();
@@ -302,6 +309,7 @@ struct tile_range {
 template <class Key>
 [[nodiscard]] std::vector<tile_range> tile_sort(const execution& how, raw_array<tile_pair<Key>>& pairs,
                                                 std::uint64_t num_tiles) {
+    how.enter(stage::tile_sort);
     const stopwatch watch(how.times, &stage_times::tile_sort);
     radix_sort(how.threads, pairs, static_cast<int>(std::bit_width(num_tiles - 1)));
     std::vector<tile_range> ranges;

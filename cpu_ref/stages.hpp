@@ -85,7 +85,8 @@ struct tile_range {
     return out;
 }
 
-// Tile split: no work item has more than max_pairs pairs; a tile with more becomes several virtual tiles, in order.
+// Tile split: no work item has more than max_pairs (1 or more) pairs; a tile with more becomes several virtual tiles,
+// in order.
 [[nodiscard]] inline std::vector<tile_range> work_items(std::span<const tile_range> ranges, std::uint64_t max_pairs) {
     std::vector<tile_range> out;
     for (const tile_range& r : ranges)

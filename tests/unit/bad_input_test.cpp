@@ -2,12 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Bad input to the API: every refusal has the code that says what is wrong, has written nothing to the caller's memory
-// and has left no allocation behind. What is odd but defined (positions that are no numbers, a mesh far away) works.
+// and has left no allocation behind; so has a call that memory was refused to, at whatever allocation. What is odd but
+// defined (positions that are no numbers, a mesh far away) works.
 
+#include "breakable_call.hpp"
 #include "counted_allocations.hpp"
-
-#include <cpu_ref/backend.hpp>
-#include <voxelpipe/voxelpipe.hpp>
 
 #include <gtest/gtest.h>
 
@@ -17,14 +16,14 @@
 #include <cstdint>
 #include <limits>
 #include <new>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace {
 
-namespace vp = voxelpipe;
-using unit::live_allocations;
+using namespace unit;
 using vp::status_code;
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -32,55 +31,10 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr double dnan = std::numeric_limits<double>::quiet_NaN();
 constexpr double dinfinity = std::numeric_limits<double>::infinity();
 
-// One pipeline for all tests, because compiling it is what they cost most: the third target is off but where one needs
-// large values.
-using floats = vp::target<float, vp::blend::max>;
-using bits = vp::target<vp::bit, vp::blend::bit_or>;
-using large = vp::target<glm::dvec4, vp::blend::replace>;
-const auto shader = vp::constant(1.0f, true, glm::dvec4(1.0));
-constexpr auto payload = vp::constant(7);
-struct by_weight {
-    glm::vec3 operator()(const vp::vertex<float>& v) const { return v.position * vp::get<0>(v); }
-};
-using mesh_type = vp::mesh_view<float>;
-using draw = vp::draw<mesh_type, by_weight, std::remove_const_t<decltype(shader)>>;
-
-// A valid call into memory that shows every write: what a test then breaks one part of.
-struct call {
-    static constexpr float mark = -12345.0f;
-    static constexpr std::uint32_t bit_mark = 0x5a5a5a5au;
-
-    std::vector<glm::vec3> positions = {{1, 1, 1}, {6, 1, 2}, {1, 6, 3}};
-    std::vector<glm::uvec3> triangles = {{0, 1, 2}, {2, 1, 0}};
-    vp::grid grid;
-    std::vector<float> depths = std::vector<float>(8 * 8 * 8, mark);
-    std::vector<std::uint32_t> words = std::vector<std::uint32_t>(8 * 8, bit_mark);
-    std::vector<float> weights;
-    vp::framebuffer_view<floats, bits, large> view;
-    mesh_type mesh;
-
-    call() {
-        grid.extent = {8, 8, 8};
-        view.extent = {8, 8, 8};
-        vp::get<0>(view.targets).elements = depths.data();
-        vp::get<0>(view.targets).extent = {8, 8, 8};
-        vp::get<1>(view.targets).elements = words.data();
-        vp::get<1>(view.targets).extent = {8, 8, 8};
-        vp::get<2>(view.targets).load = vp::load_operation::off;
-        look();
-    }
-    call(const call&) = delete; // the views point into it
-    call& operator=(const call&) = delete;
-
-    void look() { // after the arrays have changed
-        weights.assign(positions.size(), 1.0f);
-        mesh = {positions, triangles, vp::core::make_pack(vp::array_view<const float>(weights))};
-    }
-    bool untouched() const {
-        return std::all_of(depths.begin(), depths.end(), [](float x) { return x == mark; }) &&
-               std::all_of(words.begin(), words.end(), [](std::uint32_t x) { return x == bit_mark; });
-    }
-};
+// Indices are looked at where triangles are; all else is refused before any stage has run.
+vp::stage refusing_stage(status_code code) {
+    return code == status_code::index_out_of_range ? vp::stage::coarse_raster : vp::stage::validate;
+}
 
 // The call must be refused with `expected` by framebuffer and A-buffer alike, for both rules and any number of threads.
 // `into_lists`: whether what is wrong concerns an A-buffer too.
@@ -92,11 +46,13 @@ void expect_refused(const call& c, status_code expected, bool into_lists = true)
             const vp::status s = vp::voxelize(be, c.mesh, c.grid, by_weight{}, shader, c.view, rule);
             EXPECT_EQ(live_allocations, before);
             EXPECT_EQ(s.code, expected) << s.message();
+            EXPECT_EQ(s.where, refusing_stage(expected)) << s.message();
             EXPECT_FALSE(s.ok());
             EXPECT_EQ(s.counts.fragments, 0u);
             EXPECT_EQ(s.counts.voxels, 0u);
             EXPECT_THROW(s.or_throw(), std::runtime_error);
-            EXPECT_NE(s.message().find(vp::to_string(expected)), std::string::npos);
+            EXPECT_EQ(s.message(),
+                      std::string(vp::to_string(refusing_stage(expected))) + ": " + vp::to_string(expected));
             EXPECT_TRUE(c.untouched());
             if (!into_lists) continue;
             vp::abuffer<vp::cpu_backend, int> lists{be};
@@ -104,6 +60,7 @@ void expect_refused(const call& c, status_code expected, bool into_lists = true)
             const vp::status t = vp::voxelize(be, c.mesh, c.grid, by_weight{}, payload, lists, rule);
             EXPECT_EQ(live_allocations, before_lists);
             EXPECT_EQ(t.code, expected) << t.message();
+            EXPECT_EQ(t.where, refusing_stage(expected)) << t.message();
             EXPECT_EQ(lists.num_voxels(), 0u);
             EXPECT_EQ(lists.num_fragments(), 0u);
             EXPECT_EQ(lists.offsets.size(), 0u);
@@ -455,6 +412,144 @@ TEST(BadInput, ARefusedCallLeavesEarlierListsAsTheyWere) {
     c.triangles[1].z = 99;
     EXPECT_EQ(vp::voxelize(be, c.mesh, c.grid, by_weight{}, payload, lists).code, status_code::index_out_of_range);
     expect_same();
+}
+
+// ---- memory ----
+
+// Calls attempt() with 0, 1, 2, ... allocations granted until it needs no more; look(status) after each. Gives how many
+// attempts went well although they were refused an allocation.
+template <class Attempt, class Look>
+int refuse_each_allocation(const Attempt& attempt, const Look& look) {
+    int well_in_spite = 0;
+    for (std::int64_t granted = 0; granted < 1000; ++granted) {
+        const std::int64_t live = live_allocations;
+        unit::allocations_left = granted;
+        const vp::status s = attempt();
+        const bool refused = unit::allocations_left.exchange(unit::no_end_of_allocations) < 0;
+        if (!s.ok()) {
+            EXPECT_TRUE(refused);
+            EXPECT_EQ(live_allocations, live) << granted << ": " << s.message();
+            EXPECT_EQ(s.code, status_code::out_of_memory) << s.message();
+            EXPECT_NE(s.where, vp::stage::validate);
+            EXPECT_EQ(s.counts.triangles_in, 17000u);
+            EXPECT_EQ(s.counts.fragments, 0u);
+            EXPECT_EQ(s.counts.voxels, 0u);
+        }
+        look(s);
+        if (!refused) {
+            EXPECT_TRUE(s.ok()) << s.message();
+            EXPECT_GT(granted, 10);
+            return well_in_spite;
+        }
+        well_in_spite += s.ok() ? 1 : 0;
+    }
+    ADD_FAILURE() << "no end of allocations";
+    return well_in_spite;
+}
+
+// The stages of failed calls, each once, as they came. With several threads their order may depend on who came first.
+struct failed_stages {
+    std::vector<vp::stage> list;
+    void note(const vp::status& s) {
+        if (!s.ok() && (list.empty() || list.back() != s.where)) list.push_back(s.where);
+    }
+};
+
+TEST(OutOfMemory, OfAFramebufferLeavesTheTargetsAlone) {
+    for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
+        for (const unsigned threads : {1u, 3u})
+            for (const bool same_values : {true, false}) { // two ways through cpu_backend
+                large_call c;
+                vp::cpu_backend be(threads);
+                draw draws[] = {{c.mesh, {}, shader}, {c.mesh, {}, shader}};
+                for (draw& d : draws) d.mesh.triangles = {c.triangles.data(), c.triangles.size() / 2};
+                draws[1].mesh.triangles = {c.triangles.data() + 8500, 8500};
+                if (!same_values) draws[1].fragment_shader = vp::constant(2.0f, false, glm::dvec4(2.0));
+                const auto attempt = [&] {
+                    return vp::voxelize(be, std::span<const draw>(draws), c.grid, c.view, rule);
+                };
+                ASSERT_TRUE(attempt().ok());
+                const std::vector<float> depths = c.depths;
+                const std::vector<std::uint32_t> words = c.words;
+                ASSERT_FALSE(c.untouched());
+                c.wipe();
+                failed_stages failed;
+                const int well_in_spite = refuse_each_allocation(attempt, [&](const vp::status& s) {
+                    failed.note(s);
+                    EXPECT_TRUE(s.ok() ? c.depths == depths && c.words == words : c.untouched()) << s.message();
+                    c.wipe();
+                });
+                using vp::stage;
+                const std::vector expected{stage::vertex_shade, stage::coarse_raster, stage::tile_sort,
+                                           stage::fine_raster};
+                if (threads == 1) {
+                    EXPECT_EQ(failed.list, expected);
+                }
+                // A thread that cannot be had is done without, above all once the targets are being written.
+                EXPECT_EQ(well_in_spite > 0, threads > 1);
+            }
+}
+
+TEST(OutOfMemory, OfAnAbufferLeavesEarlierListsAlone) {
+    for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
+        for (const unsigned threads : {1u, 3u}) {
+            const call earlier;
+            const large_call c;
+            vp::cpu_backend be(threads);
+            vp::abuffer<vp::cpu_backend, int> lists{be};
+            const auto attempt = [&] { return vp::voxelize(be, c.mesh, c.grid, by_weight{}, payload, lists, rule); };
+            const auto draw_earlier = [&] {
+                vp::voxelize(be, earlier.mesh, earlier.grid, by_weight{}, payload, lists, rule).or_throw();
+            };
+            ASSERT_TRUE(attempt().ok());
+            const auto expected = lists.to_host(be);
+            draw_earlier();
+            const auto before = lists.to_host(be);
+            ASSERT_GT(expected.voxels.size(), 100u);
+            ASSERT_NE(expected.voxels.size(), before.voxels.size());
+            failed_stages failed;
+            refuse_each_allocation(attempt, [&](const vp::status& s) {
+                failed.note(s);
+                const auto& same = s.ok() ? expected : before;
+                const auto got = lists.to_host(be);
+                EXPECT_EQ(got.voxels, same.voxels) << s.message();
+                EXPECT_EQ(got.offsets, same.offsets);
+                EXPECT_EQ(got.primitives, same.primitives);
+                EXPECT_EQ(got.payloads, same.payloads);
+                EXPECT_EQ(got.extent, same.extent);
+                if (s.ok()) draw_earlier();
+            });
+            using vp::stage;
+            const std::vector all{stage::vertex_shade, stage::coarse_raster, stage::tile_sort, stage::fine_raster,
+                                  stage::abuffer_emit};
+            if (threads == 1) {
+                EXPECT_EQ(failed.list, all);
+            }
+        }
+}
+
+TEST(OutOfMemory, OfBuffersIsAnException) {
+    call c;
+    vp::cpu_backend be(1);
+    const std::int64_t live = live_allocations;
+    const auto allocate = [&](std::int64_t granted) {
+        unit::allocations_left = granted;
+        bool thrown = false;
+        try {
+            const vp::mesh<vp::cpu_backend> m{be, c.positions, c.triangles};
+            const vp::framebuffer<vp::cpu_backend, floats> fb{be, {8, 8, 8}};
+            vp::get<0>(fb.view().targets).elements[0] = m.view().positions[0].x;
+        } catch (const std::bad_alloc&) {
+            thrown = true;
+        }
+        unit::allocations_left = unit::no_end_of_allocations;
+        EXPECT_EQ(live_allocations, live);
+        return thrown;
+    };
+    EXPECT_TRUE(allocate(0));
+    EXPECT_TRUE(allocate(1));
+    EXPECT_TRUE(allocate(2));
+    EXPECT_FALSE(allocate(3));
 }
 
 } // namespace
