@@ -39,12 +39,16 @@ decode_scenes() {
     [[ -e $scenes/vpmesh.py ]] || { printf 'note: no scenes at %s; generated meshes stand in\n' "$scenes" | tee -a "$record"; return 0; }
     export VOXELPIPE_VPM_DIR="${TMPDIR:-/tmp}/voxelpipe-scenes"
     mkdir -p "$VOXELPIPE_VPM_DIR"
-    local archive name
+    local archive name part decoders=()
     for archive in "$scenes"/*.vpz; do
         name="$(basename "$archive" .vpz)"
-        [[ -e $VOXELPIPE_VPM_DIR/$name.vpm ]] || python3 "$scenes/vpmesh.py" decode "$archive" "$VOXELPIPE_VPM_DIR/$name.vpm" >/dev/null &
+        part="$VOXELPIPE_VPM_DIR/$name.part"
+        [[ -e $VOXELPIPE_VPM_DIR/$name.vpm ]] && continue
+        { python3 "$scenes/vpmesh.py" decode "$archive" "$part" >/dev/null && mv "$part" "${part%.part}.vpm"; } &
+        decoders+=($!)
     done
-    wait
+    local decoder
+    for decoder in "${decoders[@]}"; do wait "$decoder" || die "a scene of $scenes could not be decoded"; done
 }
 
 failures=0
@@ -113,7 +117,7 @@ for part in "${parts[@]}"; do
         ;;
     sanitizer)
         command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"
-        [[ -e build/gpu/tests/device/device_reduced_test ]] || build_suite gpu
+        target=device_reduced_test build_suite gpu # of this commit, whatever lies there
         for tool in memcheck racecheck initcheck synccheck; do
             run_program sanitizer "$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 \
                 build/gpu/tests/device/device_reduced_test
