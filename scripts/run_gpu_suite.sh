@@ -56,7 +56,7 @@ failures=0
 run_program() {
     local part=$1 name=$2 start=$SECONDS log passed failed status=0
     shift 2
-    log="build/gpu-$part-$name.log"
+    log="build/gpu-$part-${name//[ ,]/-}.log"
     timeout "${VOXELPIPE_PROGRAM_SECONDS:-900}" "$@" >"$log" 2>&1 || status=$?
     passed="$(grep -cE '^\[       OK \]' "$log" || true)"
     failed="$(grep -E '^\[  FAILED  \]' "$log" | grep -cE 'ms\)$' || true)"
@@ -117,10 +117,14 @@ for part in "${parts[@]}"; do
         ;;
     sanitizer)
         command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"
-        target=device_reduced_test build_suite gpu # of this commit, whatever lies there
+        # Of this commit, whatever lies there.
+        target=device_reduced_test build_suite gpu
+        target=device_fragment_order_test build_suite gpu
         for tool in memcheck racecheck initcheck synccheck; do
             run_program sanitizer "$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 \
                 build/gpu/tests/device/device_reduced_test
+            run_program sanitizer "$tool, fragment order" compute-sanitizer --tool "$tool" --error-exitcode 9 \
+                build/gpu/tests/device/device_fragment_order_test --gtest_filter='*AtTheLimits:*NothingWhereTheCallHasFailed'
         done
         ;;
     *) die "no part is called $part" ;;

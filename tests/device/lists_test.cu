@@ -1,0 +1,76 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Lists of constant shaders, which take a way of their own: with a payload, through vertex shaders that run on the spot
+// and through one that does not, with triangles of every size and voxels of many fragments.
+
+#include "device_test.hpp"
+
+#include <algorithm>
+#include <random>
+
+using namespace device_test;
+
+namespace {
+
+// Not one of the shaders that run once a corner: its positions are stored first.
+struct shift {
+    float by;
+    template <class Vertex>
+    VOXELPIPE_HD glm::vec3 operator()(const Vertex& v) const {
+        return glm::vec3(vp::exact::add(v.position.x, by), v.position.y, v.position.z);
+    }
+};
+
+template <class Payload, class FragmentShader>
+void compare(const FragmentShader& shader, std::uint32_t seed) {
+    const mesh_data m = mixed_triangles(3000, 50.0f, seed);
+    vp::grid crop = box_grid({31, 40, 22});
+    crop.offset = {9, 0, 13};
+    crop.whole = {50, 43, 47};
+    vp::transform turned;
+    turned.matrix =
+        glm::mat4(0.0f, 0.9f, 0.0f, 0.0f, 0.0f, 0.0f, 1.1f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.5f, 0.0f, -2.0f, 1.0f);
+    for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
+        for (const vp::grid& g : {box_grid({50, 43, 47}), crop}) {
+            expect_same_lists<Payload>(m, g, vp::passthrough{}, shader, rule);
+            expect_same_lists<Payload>(m, g, turned, shader, rule);
+            expect_same_lists<Payload>(m, g, shift{2.5f}, shader, rule);
+        }
+}
+
+TEST(Lists, WithoutPayload) { compare<void>(vp::constant(true), 120); }
+
+TEST(Lists, WithAConstantPayload) { compare<float>(vp::constant(0.5f), 121); }
+
+// More than a warp, a block and a run of a block takes.
+TEST(Lists, VoxelsOfManyFragments) {
+    std::mt19937 random(122);
+    std::uniform_real_distribution<float> unit(0.0f, 1.0f);
+    mesh_data m;
+    for (const int count : {20, 200, 700, 2000, 9000}) {
+        const glm::vec3 corner(static_cast<float>(3 * (count % 7)), static_cast<float>(count % 11), 5.0f);
+        for (int i = 0; i < count; ++i) {
+            const auto point = [&] { return corner + 0.9f * glm::vec3(unit(random), unit(random), unit(random)); };
+            add_triangle(m, point(), point(), point());
+        }
+    }
+    std::shuffle(m.triangles.begin(), m.triangles.end(), random);
+    for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
+        expect_same_lists<float>(m, box_grid({24, 20, 16}), vp::passthrough{}, vp::constant(2.0f), rule);
+}
+
+// Slivers across the grid and triangles without area, alone.
+TEST(Lists, SliversAndZeroArea) {
+    mesh_data m;
+    for (int i = 0; i < 400; ++i) {
+        const float at = 0.1f * static_cast<float>(i);
+        add_triangle(m, {-3.0f, at, 0.3f * at}, {70.0f, 0.7f * at, at}, {70.0f, 0.7f * at + 1e-3f, at});
+        add_triangle(m, {at, at, at}, {at + 1.0f, at + 1.0f, at + 1.0f}, {at + 0.5f, at + 0.5f, at + 0.5f});
+        add_triangle(m, {at, 5.0f, 6.0f}, {at, 5.0f, 6.0f}, {at, 5.0f, 6.0f});
+    }
+    for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
+        expect_same_lists<void>(m, box_grid({64, 48, 40}), vp::passthrough{}, vp::constant(true), rule);
+}
+
+} // namespace
