@@ -89,6 +89,15 @@ inline mesh_data mixed_triangles(int count, float size, std::uint32_t seed) {
     return m;
 }
 
+// A vertex shader that does not run on the spot: its positions are stored first.
+struct shift {
+    float by;
+    template <class Vertex>
+    VOXELPIPE_HD glm::vec3 operator()(const Vertex& v) const {
+        return glm::vec3(vp::exact::add(v.position.x, by), v.position.y, v.position.z);
+    }
+};
+
 inline vp::grid box_grid(glm::ivec3 extent) {
     vp::grid g;
     g.extent = extent;
@@ -177,6 +186,16 @@ void expect_same(const mesh_data& m, const vp::grid& g, const VertexShader& vs, 
     });
 }
 
+// Lists that were copied to the host.
+template <class Payload>
+void expect_same_on_host(const vp::host_abuffer<Payload>& a, const vp::host_abuffer<Payload>& b) {
+    EXPECT_EQ(a.extent, b.extent);
+    expect_same_bytes(a.voxels, b.voxels, "voxels");
+    expect_same_bytes(a.offsets, b.offsets, "offsets");
+    expect_same_bytes(a.primitives, b.primitives, "primitives");
+    if constexpr (!std::is_void_v<Payload>) expect_same_bytes(a.payloads, b.payloads, "payloads");
+}
+
 template <class Payload, class VertexShader, class FragmentShader>
 void expect_same_lists(const mesh_data& m, const vp::grid& g, const VertexShader& vs, const FragmentShader& fs,
                        vp::voxelize_options options) {
@@ -190,12 +209,7 @@ void expect_same_lists(const mesh_data& m, const vp::grid& g, const VertexShader
     const vp::status sb = vp::voxelize(gpu, mb, g, vs, fs, b, options);
     ASSERT_EQ(sa.code, sb.code) << sb.message();
     expect_same_counts(sa.counts, sb.counts);
-    const auto ha = a.to_host(cpu), hb = b.to_host(gpu);
-    EXPECT_EQ(ha.extent, hb.extent);
-    expect_same_bytes(ha.voxels, hb.voxels, "voxels");
-    expect_same_bytes(ha.offsets, hb.offsets, "offsets");
-    expect_same_bytes(ha.primitives, hb.primitives, "primitives");
-    if constexpr (!std::is_void_v<Payload>) expect_same_bytes(ha.payloads, hb.payloads, "payloads");
+    expect_same_on_host(a.to_host(cpu), b.to_host(gpu));
 }
 
 // Counts what it gives out, and refuses what would take it beyond `most`.

@@ -83,14 +83,6 @@ TEST(Direct, SumsAreExactOnlyWhereProven) {
 }
 
 // Several draws with transforms and constants of their own, by both ways of making positions.
-struct shift {
-    float by;
-    template <class Vertex>
-    VOXELPIPE_HD glm::vec3 operator()(const Vertex& v) const {
-        return glm::vec3(vp::exact::add(v.position.x, by), v.position.y, v.position.z);
-    }
-};
-
 template <class Backend, class VertexShader>
 std::vector<std::uint32_t> draw_several(const std::vector<mesh_data>& meshes, const std::vector<VertexShader>& shaders,
                                         const vp::grid& g, vp::counters& counts) {

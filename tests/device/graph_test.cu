@@ -160,12 +160,7 @@ void expect_lists(const std::vector<mesh_data>& parts, const vp::grid& g, const 
     ASSERT_TRUE(s.ok()) << s.message();
     EXPECT_GT(lists.voxels.size(), 0u);
     expect_same_counts(reference.counts, s.counts);
-    const auto h = expected.to_host(cpu);
-    EXPECT_EQ(h.extent, lists.extent);
-    expect_same_bytes(h.voxels, lists.voxels, "voxels");
-    expect_same_bytes(h.offsets, lists.offsets, "offsets");
-    expect_same_bytes(h.primitives, lists.primitives, "primitives");
-    if constexpr (!std::is_void_v<Payload>) expect_same_bytes(h.payloads, lists.payloads, "payloads");
+    expect_same_on_host(expected.to_host(cpu), lists);
 }
 
 // Memory with a pattern behind it that must stay.

@@ -13,15 +13,6 @@ using namespace device_test;
 
 namespace {
 
-// Not one of the shaders that run once a corner: its positions are stored first.
-struct shift {
-    float by;
-    template <class Vertex>
-    VOXELPIPE_HD glm::vec3 operator()(const Vertex& v) const {
-        return glm::vec3(vp::exact::add(v.position.x, by), v.position.y, v.position.z);
-    }
-};
-
 template <class Payload, class FragmentShader>
 void compare(const FragmentShader& shader, std::uint32_t seed) {
     const mesh_data m = mixed_triangles(3000, 50.0f, seed);
