@@ -80,6 +80,7 @@ namespace core {
         t.origin[a] = g.origin[a];
         t.scale[a] = static_cast<double>(std::int64_t{1} << t.fraction) / g.voxel_size[a];
         t.offset[a] = std::int64_t{g.offset[a]} << t.fraction;
+        t.shift[a] = exact::rounding_shift(t.offset[a]);
     }
     return t;
 }

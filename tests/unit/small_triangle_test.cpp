@@ -171,7 +171,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
                 voxels again;
                 if (all.hi[p] == 1 && all.hi[q] == 1) {
                     ++quads;
-                    ASSERT_EQ(f.quad_bits(), f.row(0, 1, 0) | f.row(0, 1, 1) << 2);
+                    ASSERT_EQ(quad_bits(f.e), f.row(0, 1, 0) | f.row(0, 1, 1) << 2);
                 }
                 for (int y = 0; y <= all.hi[q]; ++y) {
                     const std::uint32_t bits = f.row(0, all.hi[p], y);
@@ -200,7 +200,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
 
 TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
     generator g;
-    int compared = 0;
+    int compared = 0, cubes = 0, beyond = 0;
     for (const int fraction : {12, 13, 14, 15, 16}) {
         g.fraction = fraction;
         for (int i = 0; i < unit::cases(40000); ++i) {
@@ -229,6 +229,19 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
                     rows.insert({static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])});
                 });
             }
+            if (max3(last[0], last[1], last[2]) < 2) { // all columns at once
+                ++cubes;
+                voxels again;
+                const std::uint32_t columns = quad_bits(s.uv), depths = cube_depths(s);
+                for (int at = 0; at < 4; ++at) {
+                    const int u = at & 1, row = at >> 1, w = static_cast<int>(depths >> 2 * at & 3u) - 1;
+                    if ((columns >> at & 1u) == 0 || u > last[0] || row > last[1]) continue;
+                    beyond += static_cast<int>(w < 0 || w > last[2]);
+                    const auto p = to_xyz(s.axis, origin[0] + u, origin[1] + row, origin[2] + w);
+                    again.insert({static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])});
+                }
+                ASSERT_EQ(again, rows) << "fraction " << fraction << ", triangle " << i;
+            }
             voxel_box wide = box; // the depth may leave the bounding box
             for (int k = 0; k < 3; ++k) {
                 wide.lo[k] -= 2;
@@ -239,6 +252,8 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
         }
     }
     EXPECT_GT(compared, unit::cases(80000));
+    EXPECT_GT(cubes, unit::cases(5000));
+    EXPECT_GT(beyond, unit::cases(100));
 }
 
 TEST(BrickTriangle, BricksMakeTheGeneralSet) {
@@ -333,8 +348,9 @@ TEST(BrickTriangle, BricksMakeTheGeneralSet) {
 
 TEST(SmallTriangle, NearPositionsSnapAsAllDo) {
     generator g;
-    const snap_transform t{
-        {-1.25, 3.5, 0.1}, {16384.0 / 0.013, 16384.0 / 0.017, 16384.0 / 0.3}, {0, 5 << 14, 900 << 14}, 14};
+    snap_transform t{
+        {-1.25, 3.5, 0.1}, {16384.0 / 0.013, 16384.0 / 0.017, 16384.0 / 0.3}, {0, 5 << 14, 900 << 14}, 14, {}};
+    for (int k = 0; k < 3; ++k) t.shift[k] = voxelpipe::exact::rounding_shift(t.offset[k]);
     std::uniform_real_distribution<float> place(-40.0f, 40.0f);
     for (int i = 0; i < unit::cases(100000); ++i) {
         const float x = place(g.random), y = place(g.random), z = place(g.random) * 20;

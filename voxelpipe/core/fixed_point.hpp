@@ -77,6 +77,7 @@ struct snap_transform {
     double scale[3];        // 2^F / voxel_size, rounded once
     std::int64_t offset[3]; // first voxel of the part of the grid that is rasterised, in sub-voxel units
     int fraction;           // F
+    double shift[3];        // exact::rounding_shift of the offsets
 };
 
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_finite(float a) {
@@ -97,22 +98,23 @@ struct snap_transform {
             exact::round_to_int64(c) - t.offset[2]};
 }
 
-// snap() in 32 bits, relative to the part's first voxel: false where a coordinate of the whole grid is beyond 2^30
-// units or not a number, which snap() then tells apart. An offset lies in the grid: below 2^25, for F + L <= 24.
+// snap() in 32 bits, relative to the part's first voxel: false where a coordinate of the whole grid reaches 2^30 units
+// or is not a number, which snap() then tells apart. An offset lies in the grid, below 2^25, for F + L <= 24; it is
+// even, for F > 0.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool snap_near(const snap_transform& t, float x, float y, float z,
                                                            std::int32_t (&q)[3]) {
-    constexpr double limit = static_cast<double>(std::int64_t{1} << 30);
     const double a = exact::mul(exact::to_double(x) - t.origin[0], t.scale[0]);
     const double b = exact::mul(exact::to_double(y) - t.origin[1], t.scale[1]);
     const double c = exact::mul(exact::to_double(z) - t.origin[2], t.scale[2]);
-    const auto relative = [](double rounded, std::int64_t offset) {
-        return static_cast<std::int32_t>(static_cast<std::uint32_t>(exact::round_to_int32(rounded)) -
-                                         static_cast<std::uint32_t>(offset));
-    };
-    q[0] = relative(a, t.offset[0]);
-    q[1] = relative(b, t.offset[1]);
-    q[2] = relative(c, t.offset[2]);
-    return a <= limit && a >= -limit && b <= limit && b >= -limit && c <= limit && c >= -limit;
+    q[0] = exact::round_to_int32(a, t.shift[0]);
+    q[1] = exact::round_to_int32(b, t.shift[1]);
+    q[2] = exact::round_to_int32(c, t.shift[2]);
+    // Magnitudes in the order of their high words, where infinities and NaNs come last.
+    constexpr std::uint32_t magnitude = 0x7fffffffu, limit = 0x41d00000u; // 2^30
+    const std::uint32_t ha = exact::high_word(a) & magnitude, hb = exact::high_word(b) & magnitude,
+                        hc = exact::high_word(c) & magnitude;
+    const std::uint32_t most = ha > hb ? ha : hb;
+    return (most > hc ? most : hc) < limit;
 }
 [[nodiscard]] VOXELPIPE_HD constexpr bool is_drawable(const snapped_position& p) { return p.x > too_far_mark; }
 

@@ -66,6 +66,18 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void small_projection(const small_triang
     }
 }
 
+// The voxels of 2 x 2 that three half-planes leave, bit x + 2 y.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::uint32_t quad_bits(const small_half_plane (&e)[3]) {
+    std::uint32_t out = 0;
+    for (int y = 0; y < 2; ++y)
+        for (int x = 0; x < 2; ++x) {
+            std::int32_t v = 0;
+            for (int i = 0; i < 3; ++i) v |= e[i].c + (x != 0 ? e[i].a : 0) + (y != 0 ? e[i].b : 0);
+            out |= static_cast<std::uint32_t>(v >> 31) & (1u << (x + 2 * y));
+        }
+    return ~out & 15u;
+}
+
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr triple<std::int64_t> small_normal(const small_triangle& t) {
     const std::int64_t e1x = t.p[1][0] - t.p[0][0], e1y = t.p[1][1] - t.p[0][1], e1z = t.p[1][2] - t.p[0][2];
     const std::int64_t e2x = t.p[2][0] - t.p[0][0], e2y = t.p[2][1] - t.p[0][1], e2z = t.p[2][2] - t.p[0][2];
@@ -238,18 +250,6 @@ struct small_flat {
         small_projection<0, 1>(t, area < 0, fraction, e);
     }
 
-    // The covered voxels of 2 x 2, bit x + 2 y: row() without loops.
-    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t quad_bits() const {
-        std::uint32_t out = 0;
-        for (int y = 0; y < 2; ++y)
-            for (int x = 0; x < 2; ++x) {
-                std::int32_t v = 0;
-                for (int i = 0; i < 3; ++i) v |= e[i].c + (x != 0 ? e[i].a : 0) + (y != 0 ? e[i].b : 0);
-                out |= static_cast<std::uint32_t>(v >> 31) & (1u << (x + 2 * y));
-            }
-        return ~out & 15u;
-    }
-
     // The covered voxels (x0 .. x1, y) of the two axes, bit 0 for x0.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t row(int x0, int x1, int y) const {
         std::int32_t e0 = e[0].at(x0, y), e1 = e[1].at(x0, y), e2 = e[2].at(x0, y);
@@ -325,5 +325,21 @@ struct small_thin {
         }
     }
 };
+
+// The depths of the columns (u, v) of 2 x 2 of a bounding box that is at most two voxels deep: w + 1 in two bits, at 2
+// u + 4 v. Only for columns that the triangle touches, whose depth at their centre is within a voxel of the triangle's
+// own: row() without its division.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t cube_depths(const small_thin& s) {
+    const std::int64_t divisor = 2 * s.nw, first = s.depth - s.nu - s.nv;
+    std::uint32_t packed = 0;
+    for (int v = 0; v < 2; ++v)
+        for (int u = 0; u < 2; ++u) {
+            const std::int64_t n = first - (u != 0 ? 2 * s.nu : 0) - (v != 0 ? 2 * s.nv : 0);
+            const int w =
+                static_cast<int>(n >= 0) + static_cast<int>(n >= divisor) + static_cast<int>(n >= 2 * divisor);
+            packed |= static_cast<std::uint32_t>(w) << (2 * u + 4 * v);
+        }
+    return packed;
+}
 
 } // namespace voxelpipe::core

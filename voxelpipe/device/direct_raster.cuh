@@ -211,7 +211,7 @@ struct blending_sink : direct_sink<Call> {
     struct memory {};
 
     // Fragments and first touches of one thread, which cannot write 2^32 before the largest list ends.
-    unsigned fragments = 0, voxels = 0;
+    unsigned fragments = 0, touched = 0;
 
     __device__ VOXELPIPE_INLINE blending_sink(const Call& call, unsigned* dropped, memory&)
         : direct_sink<Call>{call, dropped} {}
@@ -222,14 +222,25 @@ struct blending_sink : direct_sink<Call> {
         if (mask == 0) return;
         fragments += static_cast<unsigned>(__popc(mask));
         each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
-            voxels += blend_row(t, x0, y, z, mask, voxelpipe::get<K>(this->call.out.values), count_first);
+            touched += blend_row(t, x0, y, z, mask, voxelpipe::get<K>(this->call.out.values), count_first);
         });
     }
-    __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4], bool along_y) {
+    // Rows as in blend_rows.
+    __device__ VOXELPIPE_INLINE void two(int x, int y, int z, const word (&mask)[2], bool along_y) {
+        fragments += static_cast<unsigned>(__popc(mask[0] | mask[1] << 2));
+        rows(x, y, z, mask, along_y);
+    }
+    __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4]) {
         fragments += static_cast<unsigned>(__popc(mask[0] | mask[1] << 2 | mask[2] << 4 | mask[3] << 6));
-        each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
-            voxels += blend_four(t, x, y, z, mask, along_y, voxelpipe::get<K>(this->call.out.values), count_first);
-        });
+        rows(x, y, z, mask, false);
+    }
+    // The voxels position(i) for the bits i of a mask.
+    template <class Position>
+    __device__ VOXELPIPE_INLINE void voxels(word bits, const Position& position) {
+        for (; bits != 0; bits &= bits - 1) {
+            const glm::ivec3 p = position(__ffs(static_cast<int>(bits)) - 1);
+            row(p.x, p.y, p.z, 1u);
+        }
     }
     // Adds up; all threads of the block take part.
     __device__ void finish(pipeline_state* state) const {
@@ -238,10 +249,16 @@ struct blending_sink : direct_sink<Call> {
             if (threadIdx.x == 0 && sum != 0) atomicAdd(total, sum);
         };
         add(fragments, &state->fragments);
-        if (this->call.out.counting_target >= 0) add(voxels, &state->voxels);
+        if (this->call.out.counting_target >= 0) add(touched, &state->voxels);
     }
 
 private:
+    template <int N>
+    __device__ VOXELPIPE_INLINE void rows(int x, int y, int z, const word (&mask)[N], bool along_y) {
+        each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
+            touched += blend_rows(t, x, y, z, mask, along_y, voxelpipe::get<K>(this->call.out.values), count_first);
+        });
+    }
     template <class F>
     __device__ VOXELPIPE_INLINE void each_target(F&& f) const {
         core::for_each_index<targets_of<decltype(this->call.out.fb)>::count>([&]<std::size_t K>() {

@@ -279,27 +279,38 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
     return first;
 }
 
-// Up to four rows at once, of up to two voxels each: bits of row k in mask[k], at (x, y, z), (x, y + 1, z), (x, y, z +
-// 1) and (x, y + 1, z + 1); row 2 is at (x, y + 1, z) instead where `along_y`. The loads go out together.
-template <class Target, class Value>
-__device__ VOXELPIPE_INLINE unsigned blend_four(const target_view<Target>& t, int x, int y, int z,
-                                                const word (&mask)[4], bool along_y, const Value& value,
+// Two or four rows at once, of up to two voxels each, whose loads go out together: bits of row k in mask[k]. Two are at
+// (x, y, z) and (x, y + 1, z), where `along_y`, otherwise (x, y, z + 1). Four are at (x, y, z), (x, y + 1, z), (x, y, z
+// + 1) and (x, y + 1, z + 1).
+template <int N, class Target, class Value>
+__device__ VOXELPIPE_INLINE unsigned blend_rows(const target_view<Target>& t, int x, int y, int z,
+                                                const word (&mask)[N], bool along_y, const Value& value,
                                                 bool count_first) {
+    static_assert(N == 2 || N == 4);
     using map = typename Target::map;
     const int shift = x & 31;
+    word all = 0;
+    for (int k = 0; k < N; ++k) all |= mask[k];
     if constexpr (map::is_bit && !map::bricks && bit_blend<typename Target::blend_type>::sets) {
-        if (shift != 31) {
+        if (shift != 31 || all < 2) { // within a word
             if (!value) return 0;
             const auto row = static_cast<std::ptrdiff_t>((t.extent.x + 31) / 32);
             const std::ptrdiff_t slice = row * t.extent.y;
-            word* const first = t.elements + map::cell(t.extent, x, y, z);
-            word* const at[4] = {first, first + row, first + (along_y ? row : slice), first + row + slice};
-            word missing[4];
-            for (int k = 0; k < 4; ++k) missing[k] = mask[k] << shift;
-            for (int k = 0; k < 4; ++k)
+            word* at[N];
+            at[0] = t.elements + map::cell(t.extent, x, y, z);
+            if constexpr (N == 2) {
+                at[1] = at[0] + (along_y ? row : slice);
+            } else {
+                at[1] = at[0] + row;
+                at[2] = at[0] + slice;
+                at[3] = at[1] + slice;
+            }
+            word missing[N];
+            for (int k = 0; k < N; ++k) missing[k] = mask[k] << shift;
+            for (int k = 0; k < N; ++k)
                 if (missing[k] != 0) missing[k] &= ~__ldca(at[k]); // maybe an old word: bits that are set stay set
             unsigned touched = 0;
-            for (int k = 0; k < 4; ++k) {
+            for (int k = 0; k < N; ++k) {
                 if (missing[k] == 0) continue;
                 if (count_first)
                     touched += static_cast<unsigned>(__popc(missing[k] & ~atomicOr(at[k], missing[k])));
@@ -311,10 +322,11 @@ __device__ VOXELPIPE_INLINE unsigned blend_four(const target_view<Target>& t, in
     }
     unsigned touched = 0;
 #pragma unroll 1
-    for (int k = 0; k < 4; ++k)
-        if (mask[k] != 0)
-            touched += blend_row(t, x, y + (k == 2 && along_y ? 1 : k % 2), z + (k == 2 && along_y ? 0 : k / 2),
-                                 mask[k], value, count_first);
+    for (int k = 0; k < N; ++k) {
+        if (mask[k] == 0) continue;
+        const int dy = N == 2 ? (along_y ? k : 0) : k % 2;
+        touched += blend_row(t, x, y + dy, z + (N == 2 ? k - dy : k / 2), mask[k], value, count_first);
+    }
     return touched;
 }
 

@@ -89,19 +89,21 @@ template <coverage Rule>
 struct small_part {
     raster_input<stored_source> in;
     near_triangle t;
+    core::small_box box; // the part
     bool is_small;
 
     __device__ VOXELPIPE_INLINE small_part(const geometry& geo, const core::voxel_box& tile, std::uint32_t id)
         : in{{geo.draw(geo.find_draw(id))}, 0, geo.snap.fraction, geo.extent} {
         const draw_geometry& d = in.source.geometry;
-        t = load_near<Rule>(in, d.triangles[id - d.first_primitive]);
-        is_small = t.is_near && core::max3(t.cells[0], t.cells[1], t.cells[2]) <= core::small_voxels(in.fraction);
+        t = load_near(in, d.triangles[id - d.first_primitive]);
+        is_small = t.is_near && t.most() <= core::small_voxels(in.fraction);
+        box = t.part(geo.extent);
         int cells = 1;
         for (int k = 0; k < 3; ++k) {
             const int lo = static_cast<int>(tile.lo[k]) - t.lo[k], hi = static_cast<int>(tile.hi[k]) - t.lo[k];
-            if (lo > t.box.lo[k]) t.box.lo[k] = lo;
-            if (hi < t.box.hi[k]) t.box.hi[k] = hi;
-            cells *= t.box.hi[k] - t.box.lo[k] + 1;
+            if (lo > box.lo[k]) box.lo[k] = lo;
+            if (hi < box.hi[k]) box.hi[k] = hi;
+            cells *= box.hi[k] - box.lo[k] + 1;
         }
         is_small = is_small && cells <= most_queue_cells;
     }
@@ -120,14 +122,13 @@ struct small_part {
                         to(x, y, z, bits);
                 }
             } within{tile, row};
-            (void)raster_thin(in, t.t, t.lo, t.box, 0, 1, within); // a zero area is in no tile
+            (void)raster_thin(in, t.relative(in.fraction), t.lo, box, 0, 1, within); // a zero area is in no tile
         } else {
-            if (t.box.empty()) return;
-            const core::small_conservative s(t.t, in.fraction);
+            if (box.empty()) return;
+            const core::small_conservative s(t.relative(in.fraction), in.fraction);
             const auto emit = [&](int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
-                if (bits != 0) row(t.lo[0] + t.box.lo[0], t.lo[1] + y, t.lo[2] + z, bits);
+                if (bits != 0) row(t.lo[0] + box.lo[0], t.lo[1] + y, t.lo[2] + z, bits);
             };
-            const core::small_box& box = t.box;
             if (core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) < most_side)
                 s.rows(box, emit);
             else

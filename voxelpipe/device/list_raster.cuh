@@ -42,13 +42,25 @@ struct listing_sink : direct_sink<Call> {
         if (mask == 0) return;
         write_row(atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask))), voxel(x0, y, z), mask);
     }
-    __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4], bool along_y) {
+    __device__ VOXELPIPE_INLINE void two(int x, int y, int z, const word (&mask)[2], bool along_y) {
+        const unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask[0] | mask[1] << 2)));
+        write_row(write_row(at, voxel(x, y, z), mask[0]), along_y ? voxel(x, y + 1, z) : voxel(x, y, z + 1), mask[1]);
+    }
+    template <class Position>
+    __device__ VOXELPIPE_INLINE void voxels(word bits, const Position& position) {
+        if (bits == 0) return;
+        for (unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(bits))); bits != 0; bits &= bits - 1) {
+            const glm::ivec3 p = position(__ffs(static_cast<int>(bits)) - 1);
+            write(at++, voxel(p.x, p.y, p.z));
+        }
+    }
+    __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4]) {
         unsigned at =
             atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask[0] | mask[1] << 2 | mask[2] << 4 | mask[3] << 6)));
         const std::uint32_t first = voxel(x, y, z), row = voxel(0, 1, 0), slice = voxel(0, 0, 1);
         at = write_row(at, first, mask[0]);
         at = write_row(at, first + row, mask[1]);
-        at = write_row(at, first + (along_y ? row : slice), mask[2]);
+        at = write_row(at, first + slice, mask[2]);
         write_row(at, first + row + slice, mask[3]);
     }
     // Between triangles, by all lanes. True: the shared memory was too small for what came since the last time; it has

@@ -81,35 +81,17 @@ inline constexpr int small_columns = 12;    // the same for thin coverage, in co
 inline constexpr int most_columns = 96;     // thin: one thread's work
 inline constexpr int medium_lanes = 8;      // of a warp, for one larger triangle
 inline constexpr int most_medium_side = 16; // of its bounding box, in voxels
+static_assert(most_medium_side <= core::small_voxels(16) && most_medium_side <= core::small_voxels(12));
 
 // Triangles that wait for a full warp of them. Every warp has its own queues: no thread waits for another warp, and the
 // number that wait is a register that all lanes agree on.
 inline constexpr int queue_places = 64; // up to 31 wait when a warp brings up to 32 more
 
-// Triangles relative to their bounding boxes, each in a column of words.
+// Triangles by their vertices, each in a column of words.
 struct triangle_queue {
-    std::int32_t p[9][queue_places];
-    std::int32_t origin[3][queue_places]; // lowest voxel of the bounding box
-    std::uint32_t part[queue_places];     // small_box, packed
+    std::int32_t q[9][queue_places];
     std::uint32_t triangle[queue_places]; // its number, where the sink wants it
 };
-
-// 5 bits for each of the six numbers of a box.
-[[nodiscard]] VOXELPIPE_HD inline std::uint32_t pack_box(const core::small_box& box) {
-    std::uint32_t packed = 0;
-    for (int i = 0; i < 3; ++i)
-        packed |= static_cast<std::uint32_t>(box.lo[i]) << (10 * i) | static_cast<std::uint32_t>(box.hi[i])
-                                                                          << (10 * i + 5);
-    return packed;
-}
-[[nodiscard]] VOXELPIPE_HD inline core::small_box unpack_box(std::uint32_t packed) {
-    core::small_box box{};
-    for (int i = 0; i < 3; ++i) {
-        box.lo[i] = static_cast<int>(packed >> (10 * i) & 31);
-        box.hi[i] = static_cast<int>(packed >> (10 * i + 5) & 31);
-    }
-    return box;
-}
 
 // The place of a lane that wants one behind the `count` that wait; adds the newcomers. All lanes take part.
 __device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
@@ -119,40 +101,62 @@ __device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
     return place;
 }
 
-// A triangle relative to its bounding box, and what of that box lies in the grid.
+// A triangle whose vertices are less than 2^30 units from the grid's origin, and its bounding box.
 struct near_triangle {
-    core::small_triangle t;
-    std::int32_t lo[3];  // lowest voxel of the bounding box
-    int cells[3];        // its size
-    core::small_box box; // 1 > 0 along an axis where nothing lies in the grid
-    bool is_near;        // otherwise nothing above holds
-    bool is_out;         // no voxel in the grid can be covered
+    std::int32_t q[3][3]; // [vertex][axis], in units of 2^-F voxel from the first voxel of what is rasterised
+    std::int32_t lo[3];   // lowest voxel of the bounding box
+    int last[3];          // its highest voxel, counted from the lowest
+    bool is_near;         // otherwise nothing above holds
+
+    __device__ VOXELPIPE_INLINE void find_box(int fraction) {
+        for (int k = 0; k < 3; ++k) {
+            const std::int32_t low = core::min3(q[0][k], q[1][k], q[2][k]),
+                               high = core::max3(q[0][k], q[1][k], q[2][k]);
+            // ceil - 1: a face touches both sides. Unsigned, for whatever is not near.
+            lo[k] = static_cast<std::int32_t>(static_cast<std::uint32_t>(low) - 1u) >> fraction;
+            last[k] = (high >> fraction) - lo[k];
+        }
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE int most() const { return core::max3(last[0], last[1], last[2]) + 1; }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_inside(const glm::ivec3& extent) const {
+        return (lo[0] | lo[1] | lo[2] | (extent.x - 1 - lo[0] - last[0]) | (extent.y - 1 - lo[1] - last[1]) |
+                (extent.z - 1 - lo[2] - last[2])) >= 0;
+    }
+    // Whether no voxel of the grid can be covered; a thin fragment may lie one voxel beyond the triangle's own depths.
+    template <coverage Rule>
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_outside(const glm::ivec3& extent) const {
+        constexpr int beyond = Rule == coverage::thin ? 1 : 0;
+        return lo[0] - beyond >= extent.x || lo[1] - beyond >= extent.y || lo[2] - beyond >= extent.z ||
+               lo[0] + last[0] + beyond < 0 || lo[1] + last[1] + beyond < 0 || lo[2] + last[2] + beyond < 0;
+    }
+    // What of the box lies in the grid; 1 > 0 along an axis where nothing does.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE core::small_box part(const glm::ivec3& extent) const {
+        core::small_box box;
+        for (int k = 0; k < 3; ++k) {
+            const int end = (k == 0 ? extent.x : k == 1 ? extent.y : extent.z) - 1 - lo[k];
+            box.lo[k] = lo[k] < 0 ? -lo[k] : 0;
+            box.hi[k] = last[k] < end ? last[k] : end;
+            if (box.lo[k] > box.hi[k]) {
+                box.lo[k] = 1;
+                box.hi[k] = 0;
+            }
+        }
+        return box;
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE core::small_triangle relative(int fraction) const {
+        core::small_triangle t;
+        for (int k = 0; k < 3; ++k)
+            for (int v = 0; v < 3; ++v) t.p[v][k] = q[v][k] - (lo[k] << fraction);
+        return t;
+    }
 };
 
-template <coverage Rule, class Source>
+template <class Source>
 __device__ VOXELPIPE_INLINE near_triangle load_near(const raster_input<Source>& call, const glm::uvec3& index) {
     near_triangle r;
-    r.is_near = call.source.near_position(index.x, r.t.p[0]) & call.source.near_position(index.y, r.t.p[1]) &
-                call.source.near_position(index.z, r.t.p[2]);
-    r.is_out = false;
-    for (int k = 0; k < 3; ++k) {
-        const int extent = k == 0 ? call.extent.x : k == 1 ? call.extent.y : call.extent.z;
-        const std::int32_t low = core::min3(r.t.p[0][k], r.t.p[1][k], r.t.p[2][k]);
-        const std::int32_t high = core::max3(r.t.p[0][k], r.t.p[1][k], r.t.p[2][k]);
-        r.lo[k] = -(-low >> call.fraction) - 1; // ceil - 1: a face touches both sides
-        const std::int32_t last = (high >> call.fraction) - r.lo[k];
-        // A thin fragment may lie one voxel beyond the triangle's own depths.
-        constexpr int beyond = Rule == coverage::thin ? 1 : 0;
-        r.is_out = r.is_out || r.lo[k] - beyond >= extent || r.lo[k] + last + beyond < 0;
-        r.box.lo[k] = r.lo[k] < 0 ? -r.lo[k] : 0;
-        r.box.hi[k] = r.lo[k] + last < extent ? last : extent - 1 - r.lo[k];
-        if (r.box.lo[k] > r.box.hi[k]) {
-            r.box.lo[k] = 1;
-            r.box.hi[k] = 0;
-        }
-        r.cells[k] = last + 1;
-        for (int v = 0; v < 3; ++v) r.t.p[v][k] -= r.lo[k] << call.fraction;
-    }
+    r.is_near = call.source.near_position(index.x, r.q[0]) & call.source.near_position(index.y, r.q[1]) &
+                call.source.near_position(index.z, r.q[2]);
+    r.find_box(call.fraction);
     return r;
 }
 
@@ -177,6 +181,39 @@ __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, c
             const auto at = core::to_xyz(axis, u, v, w);
             sink.row(lo[0] + at[0], lo[1] + at[1], lo[2] + at[2], 1u);
         });
+    return true;
+}
+
+// The same for a bounding box of at most two voxels a side, all columns at once. Most triangles of a fine mesh are of
+// this kind.
+template <class Source, class Sink>
+__device__ VOXELPIPE_INLINE bool raster_thin_cube(const raster_input<Source>& call, const near_triangle& r,
+                                                  Sink& sink) {
+    const core::small_triangle t = r.relative(call.fraction);
+    const core::triple<std::int64_t> normal = core::small_normal(t);
+    const std::int64_t mx = core::magnitude(normal[0]), my = core::magnitude(normal[1]),
+                       mz = core::magnitude(normal[2]);
+    if ((mx | my | mz) == 0) return false;
+    const int axis = mx >= my && mx >= mz ? 0 : my >= mz ? 1 : 2;
+    const core::small_thin s(t, normal, axis, call.fraction);
+    const std::uint32_t depths = core::cube_depths(s);
+    const auto last = core::to_uvw(axis, r.last[0], r.last[1], r.last[2]);
+    word columns = core::quad_bits(s.uv) & (last[0] == 0 ? 5u : 15u) & (last[1] == 0 ? 3u : 15u);
+    const auto position = [&](int column) VOXELPIPE_INLINE_LAMBDA {
+        const int w = static_cast<int>(depths >> 2 * column & 3u) - 1;
+        const auto at = core::to_xyz(axis, column & 1, column >> 1, w);
+        return glm::ivec3(r.lo[0] + at[0], r.lo[1] + at[1], r.lo[2] + at[2]);
+    };
+    // A voxel beyond the box on both sides of it counts.
+    const bool inside = (r.lo[0] - 1 | r.lo[1] - 1 | r.lo[2] - 1 | (call.extent.x - 3 - r.lo[0]) |
+                         (call.extent.y - 3 - r.lo[1]) | (call.extent.z - 3 - r.lo[2])) >= 0;
+    if (!inside)
+        for (int i = 0; i < 4; ++i) {
+            const glm::ivec3 p = position(i);
+            if (p.x < 0 || p.y < 0 || p.z < 0 || p.x >= call.extent.x || p.y >= call.extent.y || p.z >= call.extent.z)
+                columns &= ~(1u << i);
+        }
+    sink.voxels(columns, position);
     return true;
 }
 
@@ -206,36 +243,41 @@ __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s,
 // A bounding box of at most two voxels along two axes and one along the third: written at once. Most triangles of a
 // fine mesh are of this kind.
 template <class Source, class Sink>
-__device__ VOXELPIPE_INLINE void raster_quad(const raster_input<Source>& call, const core::small_triangle& t,
-                                             const std::int32_t (&lo)[3], const int (&cells)[3],
-                                             const core::small_box& box, Sink& sink) {
-    const int thick = cells[2] == 1 ? 2 : cells[1] == 1 ? 1 : 0;
-    word bits = 0; // p + 2 q, along the other two axes
-    if ((cells[0] > 1) + (cells[1] > 1) + (cells[2] > 1) == 2) {
+__device__ VOXELPIPE_INLINE void raster_quad(const raster_input<Source>& call, const near_triangle& r, bool inside,
+                                             Sink& sink) {
+    const int shape = r.last[0] + 2 * r.last[1] + 4 * r.last[2];
+    const int thick = shape < 4 ? 2 : shape < 6 ? 1 : 0; // along which axis it is one voxel
+    word bits = shape == 0 ? 1u : shape == 1 ? 3u : 5u;  // p + 2 q, along the other two; a line is covered whole
+    if ((shape & (shape - 1)) != 0) {
         std::int32_t p[3][2];
+        const std::int32_t lo_p = (thick == 0 ? r.lo[1] : r.lo[0]) << call.fraction,
+                           lo_q = (thick == 2 ? r.lo[1] : r.lo[2]) << call.fraction;
         for (int v = 0; v < 3; ++v) {
-            p[v][0] = thick == 0 ? t.p[v][1] : t.p[v][0];
-            p[v][1] = thick == 2 ? t.p[v][1] : t.p[v][2];
+            p[v][0] = (thick == 0 ? r.q[v][1] : r.q[v][0]) - lo_p;
+            p[v][1] = (thick == 2 ? r.q[v][1] : r.q[v][2]) - lo_q;
         }
-        bits = core::small_flat(p, call.fraction).quad_bits();
-    } else { // a line of voxels is covered whole
-        const int np = thick == 0 ? cells[1] : cells[0], nq = thick == 2 ? cells[1] : cells[2];
-        bits = np == 2 ? 3u : nq == 2 ? 5u : 1u;
+        bits = core::quad_bits(core::small_flat(p, call.fraction).e);
     }
-    // What lies in the grid.
-    const int p0 = thick == 0 ? box.lo[1] : box.lo[0], p1 = thick == 0 ? box.hi[1] : box.hi[0];
-    const int q0 = thick == 2 ? box.lo[1] : box.lo[2], q1 = thick == 2 ? box.hi[1] : box.hi[2];
-    bits &= (p0 == 0 ? 15u : 10u) & (p1 == 1 ? 15u : 5u) & (q0 == 0 ? 15u : 12u) & (q1 == 1 ? 15u : 3u);
-    // Rows along x: of y and z where the thin axis is x, otherwise one row for each q.
-    const bool rows_of_one = thick == 0;
-    const word mask[4] = {rows_of_one ? bits & 1u : bits & 3u, rows_of_one ? bits >> 1 & 1u : 0u,
-                          rows_of_one ? bits >> 2 & 1u : bits >> 2, rows_of_one ? bits >> 3 : 0u};
-    sink.four(lo[0], lo[1], lo[2], mask, thick == 2);
+    if (!inside) {
+        const core::small_box box = r.part(call.extent);
+        if (box.empty()) return;
+        const int p0 = thick == 0 ? box.lo[1] : box.lo[0], p1 = thick == 0 ? box.hi[1] : box.hi[0];
+        const int q0 = thick == 2 ? box.lo[1] : box.lo[2], q1 = thick == 2 ? box.hi[1] : box.hi[2];
+        bits &= (p0 == 0 ? 15u : 10u) & (p1 == 1 ? 15u : 5u) & (q0 == 0 ? 15u : 12u) & (q1 == 1 ? 15u : 3u);
+    }
+    // Rows along x.
+    if (thick != 0) {
+        const word mask[2] = {bits & 3u, bits >> 2};
+        sink.two(r.lo[0], r.lo[1], r.lo[2], mask, thick == 2);
+    } else {
+        const word mask[4] = {bits & 1u, bits >> 1 & 1u, bits >> 2 & 1u, bits >> 3};
+        sink.four(r.lo[0], r.lo[1], r.lo[2], mask);
+    }
 }
 
 // What one warp keeps in shared memory.
 struct warp_queues {
-    triangle_queue cubes, smalls;       // bounding boxes of 2 x 2 x 2 voxels; other small ones
+    triangle_queue cubes, smalls;       // bounding boxes of up to 2 x 2 x 2 voxels; other small ones
     std::uint32_t larges[queue_places]; // numbers of triangles that are loaded again
 };
 
@@ -257,17 +299,19 @@ __device__ VOXELPIPE_INLINE void feed(Sink& sink, F&& f) {
 template <coverage Rule, class Source, class Sink>
 __device__ VOXELPIPE_INLINE void raster_medium(const raster_input<Source>& call, bool wanted, std::uint32_t triangle,
                                                Sink& sink) {
-    near_triangle near;
-    if (wanted) near = load_near<Rule>(call, call.source.triangle(triangle));
+    near_triangle r;
+    if (wanted) r = load_near(call, call.source.triangle(triangle));
     feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
         if (!wanted) return;
         sink.begin(triangle);
         if constexpr (Rule == coverage::thin) {
             const int lane = static_cast<int>(threadIdx.x) % medium_lanes;
-            const bool has_area = raster_thin(call, near.t, near.lo, near.box, lane, medium_lanes, sink);
+            const bool has_area =
+                raster_thin(call, r.relative(call.fraction), r.lo, r.part(call.extent), lane, medium_lanes, sink);
             if (!has_area && lane == 0) sink.drop(core::triangle_class::zero_area);
         } else {
-            raster_lanes(core::small_conservative(near.t, call.fraction), near.lo, near.box, sink);
+            raster_lanes(core::small_conservative(r.relative(call.fraction), call.fraction), r.lo, r.part(call.extent),
+                         sink);
         }
     });
 }
@@ -277,8 +321,8 @@ __device__ VOXELPIPE_INLINE void raster_medium(const raster_input<Source>& call,
 //   buffers           whether settle(), which all lanes call between triangles, is wanted (feed)
 //   mediums(wanted, triangle)   takes those that are much for a thread; all lanes call it
 //   check(index)      whether the indices may be used
-//   begin(triangle), row(x0, y, z, mask), four(x, y, z, masks, along_y): the fragments of one triangle, as rows of
-//                     bits along x (direct_target.cuh)
+//   begin(triangle), row(x0, y, z, mask), two(x, y, z, masks, along_y), four(x, y, z, masks), voxels(bits, position):
+//                     the fragments of one triangle, as rows of bits along x (blend_rows) or one by one
 //   big(triangle, index)   what this path does not take; says whether it is drawn
 //   drop(class)       counts a triangle that is not drawn
 template <coverage Rule, class Source, class Sink>
@@ -294,16 +338,17 @@ struct raster_warp {
 
     __device__ VOXELPIPE_INLINE static void put(triangle_queue& queue, int at, const near_triangle& r,
                                                 std::uint32_t triangle) {
-        for (int k = 0; k < 9; ++k) queue.p[k][at] = r.t.p[k / 3][k % 3];
-        for (int k = 0; k < 3; ++k) queue.origin[k][at] = r.lo[k];
-        queue.part[at] = pack_box(r.box);
+        for (int k = 0; k < 9; ++k) queue.q[k][at] = r.q[k / 3][k % 3];
         if constexpr (Sink::names_triangles) queue.triangle[at] = triangle;
     }
-    __device__ VOXELPIPE_INLINE static core::small_box get(const triangle_queue& queue, int at, core::small_triangle& t,
-                                                           std::int32_t (&lo)[3]) {
-        for (int k = 0; k < 9; ++k) t.p[k / 3][k % 3] = queue.p[k][at];
-        for (int k = 0; k < 3; ++k) lo[k] = queue.origin[k][at];
-        return unpack_box(queue.part[at]);
+    // Takes one that waits, and tells the sink.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle take(const triangle_queue& queue, int at) {
+        near_triangle r;
+        for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = queue.q[k][at];
+        r.is_near = true;
+        r.find_box(call.fraction);
+        if constexpr (Sink::names_triangles) sink.begin(queue.triangle[at]);
+        return r;
     }
 
     // The last 32 that wait, one a lane; all lanes take part.
@@ -314,31 +359,32 @@ struct raster_warp {
         __syncwarp();
         count -= 32;
     }
-    __device__ VOXELPIPE_INLINE void begin(const triangle_queue& queue, int at) {
-        if constexpr (Sink::names_triangles) sink.begin(queue.triangle[at]);
-    }
     [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_cube() {
         return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            core::small_triangle t;
-            std::int32_t lo[3];
-            const core::small_box box = get(from.cubes, at, t, lo);
-            word bits = core::cube_bits(core::small_conservative(t, call.fraction));
-            bits &= (box.lo[0] == 0 ? 0xffu : 0xaau) & (box.hi[0] == 1 ? 0xffu : 0x55u) &
-                    (box.lo[1] == 0 ? 0xffu : 0xccu) & (box.hi[1] == 1 ? 0xffu : 0x33u) &
-                    (box.lo[2] == 0 ? 0xffu : 0xf0u) & (box.hi[2] == 1 ? 0xffu : 0x0fu);
-            const word mask[4] = {bits & 3u, bits >> 2 & 3u, bits >> 4 & 3u, bits >> 6};
-            begin(from.cubes, at);
-            sink.four(lo[0], lo[1], lo[2], mask, false);
+            const near_triangle r = take(from.cubes, at);
+            if constexpr (thin) {
+                if (!raster_thin_cube(call, r, sink)) sink.drop(triangle_class::zero_area);
+            } else {
+                const core::small_box box = r.part(call.extent);
+                word bits = core::cube_bits(core::small_conservative(r.relative(call.fraction), call.fraction));
+                bits &= (box.lo[0] == 0 ? 0xffu : 0xaau) & (box.hi[0] == 1 ? 0xffu : 0x55u) &
+                        (box.lo[1] == 0 ? 0xffu : 0xccu) & (box.hi[1] == 1 ? 0xffu : 0x33u) &
+                        (box.lo[2] == 0 ? 0xffu : 0xf0u) & (box.hi[2] == 1 ? 0xffu : 0x0fu);
+                const word mask[4] = {bits & 3u, bits >> 2 & 3u, bits >> 4 & 3u, bits >> 6};
+                sink.four(r.lo[0], r.lo[1], r.lo[2], mask);
+            }
         };
     }
-    __device__ VOXELPIPE_INLINE void raster(const core::small_triangle& t, const std::int32_t (&lo)[3],
-                                            const core::small_box& box) {
+    __device__ VOXELPIPE_INLINE void raster(const near_triangle& r) {
+        const core::small_box box = r.part(call.extent);
         if constexpr (thin) {
-            if (!raster_thin(call, t, lo, box, 0, 1, sink)) sink.drop(triangle_class::zero_area);
+            if (!raster_thin(call, r.relative(call.fraction), r.lo, box, 0, 1, sink))
+                sink.drop(triangle_class::zero_area);
         } else {
-            const core::small_conservative s(t, call.fraction);
-            const auto emit = [&](int y, int z, word bits)
-                                  VOXELPIPE_INLINE_LAMBDA { sink.row(lo[0] + box.lo[0], lo[1] + y, lo[2] + z, bits); };
+            const core::small_conservative s(r.relative(call.fraction), call.fraction);
+            const auto emit = [&](int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
+                sink.row(r.lo[0] + box.lo[0], r.lo[1] + y, r.lo[2] + z, bits);
+            };
             const int most = core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) + 1;
             if (most <= most_side)
                 s.rows(box, emit);
@@ -347,76 +393,71 @@ struct raster_warp {
         }
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_small() {
-        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            core::small_triangle t;
-            std::int32_t lo[3];
-            const core::small_box box = get(from.smalls, at, t, lo);
-            begin(from.smalls, at);
-            raster(t, lo, box);
-        };
+        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA { raster(take(from.smalls, at)); };
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_large() {
         return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            const near_triangle r = load_near<Rule>(call, call.source.triangle(from.larges[at]));
+            const near_triangle r = load_near(call, call.source.triangle(from.larges[at]));
             sink.begin(from.larges[at]);
-            raster(r.t, r.lo, r.box);
+            raster(r);
         };
     }
-    // Columns of voxels that the triangle can touch, at most.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE static int columns(const near_triangle& r) {
-        return core::max3(r.cells[0] * r.cells[1], r.cells[1] * r.cells[2], r.cells[2] * r.cells[0]);
+    // What a triangle costs: voxels of its bounding box, or for thin coverage the columns that it can touch at most.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static int cost(const near_triangle& r) {
+        const int x = r.last[0] + 1, y = r.last[1] + 1, z = r.last[2] + 1;
+        return thin ? core::max3(x * y, y * z, z * x) : x * y * z;
     }
 
     // The lane's triangle i, where there is one.
     __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, const glm::uvec3& index) {
+        bool is_quad = false, is_inside = false, waits = false, is_big = false;
         int most = 0;
-        bool is_quad = false, to_cubes = false, to_smalls = false, to_larges = false, to_mediums = false,
-             is_big = false;
         near_triangle r;
         if (valid) {
-            r = load_near<Rule>(call, index);
-            most = core::max3(r.cells[0], r.cells[1], r.cells[2]);
-            is_big = !r.is_near || most > core::small_voxels(call.fraction) || most > most_medium_side;
-            if (!is_big && r.is_out) sink.drop(triangle_class::outside);
-            if (!is_big && !r.is_out) {
-                if constexpr (thin) {
-                    to_smalls = columns(r) <= small_columns;
-                    to_larges = !to_smalls && columns(r) <= most_columns;
-                } else {
-                    is_quad = most <= 2 && core::min3(r.cells[0], r.cells[1], r.cells[2]) == 1;
-                    to_cubes = !is_quad && most == 2;
-                    to_smalls = most > 2 && most <= most_side && r.cells[0] * r.cells[1] * r.cells[2] <= small_cells;
-                    to_larges = most > 2 && !to_smalls && r.cells[0] * r.cells[1] * r.cells[2] <= most_cells;
-                }
-                to_mediums = !(is_quad || to_cubes || to_smalls || to_larges);
-                if (thin && to_mediums) { // a small one finds out when it is drawn
-                    const core::triple<std::int64_t> normal = core::small_normal(r.t);
-                    if ((normal[0] | normal[1] | normal[2]) == 0) {
-                        sink.drop(triangle_class::zero_area);
-                        to_mediums = false;
-                    }
-                }
+            r = load_near(call, index);
+            most = r.most();
+            is_big = !r.is_near || most > most_medium_side;
+            is_inside = r.is_inside(call.extent);
+            if (!is_big && !is_inside && r.is_outside<Rule>(call.extent))
+                sink.drop(triangle_class::outside);
+            else
+                waits = !is_big;
+            if constexpr (!thin) {
+                is_quad = waits && most <= 2 && core::min3(r.last[0], r.last[1], r.last[2]) == 0;
+                waits = waits && !is_quad;
             }
         }
-        if constexpr (!thin) {
-            const int at = take_place(to_cubes, num_cubes);
-            if (to_cubes) put(queues.cubes, at, r, i);
-        }
-        const int small_at = take_place(to_smalls, num_smalls);
-        if (to_smalls) put(queues.smalls, small_at, r, i);
-        const int large_at = take_place(to_larges, num_larges);
-        if (to_larges) queues.larges[large_at] = i;
-        sink.mediums(to_mediums, i);
         if constexpr (!thin) {
             feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
                 if (!is_quad) return;
                 sink.begin(i);
-                raster_quad(call, r.t, r.lo, r.cells, r.box, sink);
+                raster_quad(call, r, is_inside, sink);
             });
         }
-        if (is_big) {
-            const triangle_class kind = sink.big(i, index);
-            if (kind != triangle_class::drawn) sink.drop(kind);
+        if (__any_sync(0xffffffffu, waits || is_big)) {
+            const bool to_cubes = waits && most <= 2;
+            const bool to_smalls =
+                waits && !to_cubes && (thin || most <= most_side) && cost(r) <= (thin ? small_columns : small_cells);
+            const bool to_larges = waits && !to_cubes && !to_smalls && cost(r) <= (thin ? most_columns : most_cells);
+            bool to_mediums = waits && !(to_cubes || to_smalls || to_larges);
+            if (thin && to_mediums) { // a small one finds out when it is drawn
+                const core::triple<std::int64_t> normal = core::small_normal(r.relative(call.fraction));
+                if ((normal[0] | normal[1] | normal[2]) == 0) {
+                    sink.drop(triangle_class::zero_area);
+                    to_mediums = false;
+                }
+            }
+            const int cube_at = take_place(to_cubes, num_cubes);
+            if (to_cubes) put(queues.cubes, cube_at, r, i);
+            const int small_at = take_place(to_smalls, num_smalls);
+            if (to_smalls) put(queues.smalls, small_at, r, i);
+            const int large_at = take_place(to_larges, num_larges);
+            if (to_larges) queues.larges[large_at] = i;
+            sink.mediums(to_mediums, i);
+            if (is_big) {
+                const triangle_class kind = sink.big(i, index);
+                if (kind != triangle_class::drawn) sink.drop(kind);
+            }
         }
         __syncwarp();
     }
@@ -438,8 +479,7 @@ struct raster_warp {
             const std::uint32_t i = first + static_cast<unsigned>(lane);
             batch(i, i < call.num_triangles && sink.check(index), index);
             index = next;
-            if constexpr (!thin)
-                if (num_cubes >= 32) drain(queues, num_cubes, raster_cube());
+            if (num_cubes >= 32) drain(queues, num_cubes, raster_cube());
             if (num_smalls >= 32) drain(queues, num_smalls, raster_small());
             if (num_larges >= 32) drain(queues, num_larges, raster_large());
         }
@@ -456,7 +496,7 @@ struct raster_warp {
                 if (w < Warps) raster_one(all[w], at);
             });
         };
-        if constexpr (!thin) rest(left[0], raster_cube());
+        rest(left[0], raster_cube());
         rest(left[1], raster_small());
         // A lane each, the larger ones would keep a few lanes busy long after all others.
         int num = 0;
