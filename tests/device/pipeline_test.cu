@@ -360,12 +360,12 @@ TEST(Pipeline, LaunchesFillTheDevice) {
         const std::uint64_t items = std::uint64_t{1} << bit;
         EXPECT_EQ(vp::device::fill_device(items), 8 * multiprocessors) << bit;
         EXPECT_EQ(vp::device::fill_device(items, 4), 4 * multiprocessors) << bit;
-        EXPECT_GE(vp::device::raster_blocks(items), multiprocessors) << bit;
-        EXPECT_LE(vp::device::raster_blocks(items), static_cast<unsigned>(properties.maxGridSize[0])) << bit;
+        EXPECT_GE(vp::device::raster_blocks(items, 8), multiprocessors) << bit;
+        EXPECT_LE(vp::device::raster_blocks(items, 8), static_cast<unsigned>(properties.maxGridSize[0])) << bit;
     }
     EXPECT_EQ(vp::device::fill_device(0), 1u);
     EXPECT_EQ(vp::device::num_blocks(0), 1u);
-    EXPECT_GE(vp::device::raster_blocks(1), 1u);
+    EXPECT_GE(vp::device::raster_blocks(1, 8), 1u);
 }
 
 // add_unordered is not the same bits: it stays within the rounding of its additions.

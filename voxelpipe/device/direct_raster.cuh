@@ -4,52 +4,18 @@
 
 // Direct raster: fragments go straight from their triangle into the render targets, without tiles, where the shader is
 // constant and every target takes a fragment by one atomic (direct_target.cuh). Coarse raster, sort and tile images
-// cost a small triangle more than the few voxels that it touches. Small triangles are small_raster.cuh's; what that
-// leaves goes to a list in global memory, which a second kernel shares out by bricks.
+// cost a small triangle more than the few voxels that it touches. A first kernel reads the mesh once, does at once what
+// costs next to nothing, and hands the rest on by what it costs (triangle_lists.cuh), so that the second kernel's warps
+// have 32 triangles of a kind each.
 
+#include <voxelpipe/device/block_raster.cuh>
 #include <voxelpipe/device/direct_target.cuh>
+#include <voxelpipe/device/large_raster.cuh>
 #include <voxelpipe/device/small_raster.cuh>
 #include <voxelpipe/device/tile_image.cuh>
-#include <voxelpipe/device/wide_path.cuh>
-#include <voxelpipe/device/work_share.cuh>
+#include <voxelpipe/device/triangle_lists.cuh>
 
 namespace voxelpipe::device {
-
-// Triangles that the small path cannot take, in order of arrival, each with the number of its first record of 32
-// chunks: a warp finds the triangle of a record by bisection. `next` packs how many triangles and records there are, so
-// that one atomic places both.
-struct large_list {
-    static constexpr int record_bits = 36;
-    std::uint32_t* triangles;
-    unsigned long long* first_records;
-    unsigned long long* next;
-    std::uint32_t* mediums; // small triangles that are much work for one thread
-    unsigned long long* num_mediums;
-
-    [[nodiscard]] static large_list take(arena& memory, std::size_t num_triangles) {
-        large_list l{};
-        l.triangles = memory.take<std::uint32_t>(num_triangles);
-        l.first_records = memory.take<unsigned long long>(num_triangles);
-        l.mediums = memory.take<std::uint32_t>(num_triangles);
-        return l;
-    }
-    // With its counters, which are zeroed.
-    [[nodiscard]] large_list with(pipeline_state* state) const {
-        large_list l = *this;
-        l.next = &state->next_large;
-        l.num_mediums = &state->num_mediums;
-        return l;
-    }
-    [[nodiscard]] static constexpr bool holds(std::uint64_t triangles, std::uint64_t records_each) {
-        return triangles < (std::uint64_t{1} << (64 - record_bits)) &&
-               triangles * records_each < (std::uint64_t{1} << record_bits);
-    }
-    __device__ void push(std::uint32_t triangle, unsigned long long records) const {
-        const unsigned long long at = atomicAdd(next, (1ull << record_bits) + records);
-        triangles[at >> record_bits] = triangle;
-        first_records[at >> record_bits] = at & ((1ull << record_bits) - 1);
-    }
-};
 
 // One draw. Output says where its fragments go, and has the sink that takes them there: framebuffer_output, or
 // list_output (list_raster.cuh).
@@ -57,103 +23,11 @@ template <coverage Rule, class Source, class Output>
 struct direct_call {
     static constexpr coverage rule = Rule;
     using source_type = Source;
+    using output = Output;
     using sink = typename Output::template sink<direct_call>;
     raster_input<Source> in;
     Output out;
-    large_list large;
-};
-
-inline constexpr int most_direct_extent = 1 << 16; // bricks are numbered with 16 bits, voxels with 32
-
-// ---- large triangles ------------------------------------------------------------------------------------------------
-
-// How a large triangle's box of voxels is cut into pieces, a lane each, 32 to a record. Conservative: columns of bricks
-// along the dominant axis. Thin: rows of 16 columns of voxels.
-template <coverage Rule>
-struct large_pieces {
-    static constexpr int across = Rule == coverage::thin ? 1 : core::brick_size; // voxels along v
-    int axis;
-    core::triple<std::int64_t> lo, hi; // uvw, the box
-    std::int64_t first_u, first_v, per_row, rows;
-
-    VOXELPIPE_HD large_pieces(const core::voxel_box& box, int axis_)
-        : axis(axis_), lo(core::to_uvw(axis_, box.lo[0], box.lo[1], box.lo[2])),
-          hi(core::to_uvw(axis_, box.hi[0], box.hi[1], box.hi[2])), first_u(lo[0] >> core::log2_brick),
-          first_v(lo[1] / across), per_row((hi[0] >> core::log2_brick) - first_u + 1),
-          rows(hi[1] / across - first_v + 1) {}
-    [[nodiscard]] VOXELPIPE_HD std::int64_t count() const { return per_row * rows; }
-    [[nodiscard]] VOXELPIPE_HD std::int64_t records() const {
-        return (count() + chunks_per_record - 1) / chunks_per_record;
-    }
-    // The lowest voxel of piece i along u and v, maybe outside the box.
-    [[nodiscard]] VOXELPIPE_HD std::int64_t u(std::int64_t i) const {
-        return (first_u + i % per_row) << core::log2_brick;
-    }
-    [[nodiscard]] VOXELPIPE_HD std::int64_t v(std::int64_t i) const { return (first_v + i / per_row) * across; }
-    // Piece i as a box of voxels.
-    [[nodiscard]] VOXELPIPE_HD core::voxel_box piece(std::int64_t i) const {
-        const std::int64_t u0 = u(i), v0 = v(i), u1 = u0 + core::brick_size - 1, v1 = v0 + across - 1;
-        const auto inside = [&](std::int64_t at, int k) { return at < lo[k] ? lo[k] : at > hi[k] ? hi[k] : at; };
-        return {core::to_xyz(axis, inside(u0, 0), inside(v0, 1), lo[2]),
-                core::to_xyz(axis, inside(u1, 0), inside(v1, 1), hi[2])};
-    }
-    // The most records that a triangle can have in a grid.
-    [[nodiscard]] static std::uint64_t most_records(glm::ivec3 extent) {
-        const auto of = [](std::int64_t along, std::int64_t rest) {
-            const std::int64_t pieces = (along / core::brick_size + 1) * (rest / across + 1);
-            return static_cast<std::uint64_t>((pieces + chunks_per_record - 1) / chunks_per_record);
-        };
-        return core::max3(of(extent.y, extent.z), of(extent.z, extent.x), of(extent.x, extent.y));
-    }
-};
-
-// Decides about a triangle in full width; one that is drawn goes to the list.
-template <class Call>
-__device__ __noinline__ core::triangle_class push_large(const Call& call, std::uint32_t triangle, glm::uvec3 index) {
-    const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
-                                 c = call.in.source.position(index.z);
-    const core::voxel_box whole{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
-    core::voxel_box reach{};
-    core::triangle_class kind = core::classify<Call::rule>(a, b, c, call.in.fraction, whole, reach);
-    if (kind != core::triangle_class::drawn) return kind;
-    if (Call::rule == coverage::thin && core::has_zero_area(a, b, c)) return core::triangle_class::zero_area;
-    const large_pieces<Call::rule> pieces(reach, core::dominant_axis(a, b, c, call.in.fraction));
-    call.large.push(triangle, static_cast<unsigned long long>(pieces.records()));
-    return kind;
-}
-
-// Rows of bits along x from spans of columns: columns next to each other with one voxel at the same depth become one.
-template <class Sink>
-struct span_writer {
-    Sink& sink;
-    int x = 0, y = 0, z = 0; // of the row that waits
-    word mask = 0;
-
-    __device__ VOXELPIPE_INLINE void flush() {
-        if (mask != 0) sink.row(x, y, z, mask);
-        mask = 0;
-    }
-    __device__ VOXELPIPE_INLINE void span(int axis, int u, int v, int w0, int w1) {
-        if (axis == 0) {
-            for (int at = w0; at <= w1; at += 32) {
-                const int n = w1 - at + 1;
-                sink.row(at, u, v, n >= 32 ? ~0u : (1u << n) - 1);
-            }
-            return;
-        }
-        for (int w = w0; w <= w1; ++w) {
-            const auto p = core::to_xyz(axis, u, v, w);
-            if (mask != 0 && p[1] == y && p[2] == z && p[0] - x < 32) {
-                mask |= 1u << (p[0] - x);
-            } else {
-                flush();
-                x = p[0];
-                y = p[1];
-                z = p[2];
-                mask = 1;
-            }
-        }
-    }
+    triangle_lists lists;
 };
 
 // ---- kernels --------------------------------------------------------------------------------------------------------
@@ -177,25 +51,12 @@ __global__ void check_indices_kernel(const Index* indices, std::uint64_t count, 
     if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, 1u);
 }
 
-// What every sink of a direct call does with triangles that have no fragments here.
+// What every sink of a direct call does with triangles that are not drawn.
 template <class Call>
 struct direct_sink {
     const Call& call;
-    unsigned* dropped; // by triangle_class, of the block; null where all triangles are drawn
+    unsigned* dropped; // by triangle_class, of the block
 
-    [[nodiscard]] __device__ VOXELPIPE_INLINE core::triangle_class big(std::uint32_t triangle,
-                                                                       const glm::uvec3& index) {
-        return push_large(call, triangle, index);
-    }
-    __device__ VOXELPIPE_INLINE void mediums(bool wanted, std::uint32_t triangle) {
-        const unsigned who = __ballot_sync(0xffffffffu, wanted);
-        if (who == 0) return;
-        const unsigned lane = threadIdx.x % 32;
-        unsigned long long first = 0;
-        if (lane == 0) first = atomicAdd(call.large.num_mediums, static_cast<unsigned long long>(__popc(who)));
-        first = __shfl_sync(0xffffffffu, first, 0);
-        if (wanted) call.large.mediums[first + static_cast<unsigned>(__popc(who & ((1u << lane) - 1)))] = triangle;
-    }
     __device__ VOXELPIPE_INLINE void drop(core::triangle_class kind) {
         atomicAdd(&dropped[static_cast<int>(kind)], 1u);
     }
@@ -204,10 +65,8 @@ struct direct_sink {
 // Fragments go into the targets.
 template <class Call>
 struct blending_sink : direct_sink<Call> {
-    static constexpr bool names_triangles = false;
     static constexpr bool buffers = false;
     static constexpr bool checks_indices = false; // check_indices has run
-    static constexpr int min_blocks = raster_min_blocks;
     struct memory {};
 
     // Fragments and first touches of one thread, which cannot write 2^32 before the largest list ends.
@@ -269,209 +128,288 @@ private:
     }
 };
 
+template <class Framebuffer>
+inline constexpr bool has_only_bits = false;
+template <class... Targets>
+inline constexpr bool has_only_bits<framebuffer_view<Targets...>> = (Targets::map::is_bit && ...);
+
 template <class Framebuffer, class Values>
 struct framebuffer_output {
     template <class Call>
     using sink = blending_sink<Call>;
+    static constexpr bool hands_on = has_only_bits<Framebuffer>; // otherwise block_raster.cuh
     Framebuffer fb;
     Values values;
     int counting_target; // which target tells first touches, for the voxel counter; -1: none is wanted
 };
 
-// Whether a triangle's fragments are found and written, or why it has none, is decided here for each of them.
+// ---- the first kernel: every triangle -------------------------------------------------------------------------------
+
+// Blocks per multiprocessor that registers are kept for.
+template <class Call>
+inline constexpr int first_min_blocks = Call::rule == coverage::thin || Call::sink::buffers ? 6 : 8;
+template <class Call>
+inline constexpr int rest_min_blocks = Call::sink::buffers ? 4 : 5;
+
+// Thin triangles of up to 2 x 2 x 2 voxels, each in a column of words: all triangles of a fine mesh are of this kind,
+// so they are not handed on.
+struct cube_queue {
+    std::int32_t q[9][queue_places];
+    std::uint32_t triangle[queue_places];
+};
+struct no_queue {};
+
+// What one warp of the first kernel keeps in shared memory.
+template <class Call>
+struct first_memory {
+    kind_queues kinds;
+    std::conditional_t<Call::rule == coverage::thin, cube_queue, no_queue> cubes;
+    typename Call::sink::memory sink;
+};
+
+// A warp of the first kernel. Every warp has its own queues: no thread waits for another warp.
+template <class Call>
+struct first_warp {
+    static constexpr bool thin = Call::rule == coverage::thin;
+    using triangle_class = core::triangle_class;
+    using sink_type = typename Call::sink;
+
+    const Call& call;
+    first_memory<Call>& memory;
+    sink_type& sink;
+    kind_writer& writer;
+    std::uint32_t* left; // for big triangles, of the block
+    unsigned& num_left;
+    int num_cubes = 0; // that wait, of thin ones
+
+    // The lane's triangle i, where there is one.
+    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, const glm::uvec3& index) {
+        bool is_quad = false, is_inside = false, waits = false, is_big = false;
+        int most = 0;
+        near_triangle r;
+        if (valid) {
+            r = load_near(call.in, index);
+            most = r.most();
+            is_big = !r.is_near || most > most_medium_side;
+            is_inside = r.is_inside(call.in.extent);
+            if (!is_big && !is_inside && r.template is_outside<Call::rule>(call.in.extent))
+                sink.drop(triangle_class::outside);
+            else
+                waits = !is_big;
+            if constexpr (!thin) {
+                is_quad = waits && most <= 2 && core::min3(r.last[0], r.last[1], r.last[2]) == 0;
+                waits = waits && !is_quad;
+            }
+        }
+        if constexpr (!thin) {
+            feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                if (!is_quad) return;
+                sink.begin(i);
+                raster_quad(call.in, r, is_inside, sink);
+            });
+        } else {
+            const bool is_cube = waits && most <= 2;
+            waits = waits && !is_cube;
+            const int at = take_place(is_cube, num_cubes);
+            if (is_cube) {
+                for (int k = 0; k < 9; ++k) memory.cubes.q[k][at] = r.q[k / 3][k % 3];
+                memory.cubes.triangle[at] = i;
+            }
+        }
+        if (__any_sync(0xffffffffu, waits || is_big)) {
+            writer.push(waits ? kind_of<Call::rule>(r, most) : -1, i);
+            if (is_big) left[atomicAdd(&num_left, 1u)] = i; // no call of a function here: its registers would spill
+        }
+        __syncwarp();
+        if constexpr (thin)
+            if (num_cubes >= 32) drain_cubes();
+    }
+
+    // The last 32 cubes that wait.
+    __device__ VOXELPIPE_INLINE void drain_cubes() {
+        num_cubes -= 32;
+        const int at = num_cubes + static_cast<int>(threadIdx.x) % 32;
+        near_triangle r;
+        for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = memory.cubes.q[k][at];
+        r.is_near = true;
+        r.find_box(call.in.fraction);
+        feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+            sink.begin(memory.cubes.triangle[at]);
+            raster_cube<Call::rule>(call.in, r, sink);
+        });
+        __syncwarp();
+    }
+
+    // The big triangles of the block, when all its warps have run. All threads take part.
+    __device__ void cut_left() {
+        for (unsigned first = 0; first < num_left; first += raster_threads) {
+            const unsigned at = first + threadIdx.x;
+            unsigned long long records = 0;
+            const std::uint32_t triangle = at < num_left ? left[at] : 0;
+            if (at < num_left) {
+                const triangle_class kind = find_records(call, triangle, records);
+                if (kind != triangle_class::drawn) sink.drop(kind);
+            }
+            __syncwarp();
+            call.lists.push_cut(triangle, records);
+        }
+    }
+
+    // All batches of this warp. Returns how many triangles it looked at.
+    __device__ VOXELPIPE_INLINE unsigned run() {
+        const unsigned lane = threadIdx.x % 32;
+        const std::uint32_t step = gridDim.x * raster_threads, num = call.in.num_triangles;
+        // The indices of a batch are loaded while the batch before it is worked on.
+        const auto load_index = [&](std::uint32_t i) { return i < num ? call.in.source.triangle(i) : glm::uvec3(0); };
+        const std::uint32_t begin = blockIdx.x * raster_threads + warp_in_block() * 32;
+        glm::uvec3 index = load_index(begin + lane);
+        for (std::uint32_t first = begin; first < num; first += step) {
+            const glm::uvec3 next = load_index(first + step + lane);
+            batch(first + lane, first + lane < num && sink.check(index), index);
+            index = next;
+        }
+        if constexpr (thin) { // the rest of the cubes is handed on
+            const int at = static_cast<int>(lane);
+            writer.push(at < num_cubes ? static_cast<int>(cube_triangles) : -1, memory.cubes.triangle[at]);
+        }
+        if (begin >= num) return 0;
+        const std::uint32_t batches = (num - begin - 1) / step + 1, of_last = num - (begin + (batches - 1) * step);
+        return (batches - 1) * 32 + (of_last < 32 ? of_last : 32);
+    }
+};
+
 template <class Call>
 __global__ __launch_bounds__(raster_threads,
-                             Call::sink::min_blocks) void direct_raster_kernel(const __grid_constant__ Call call,
+                             first_min_blocks<Call>) void direct_raster_kernel(const __grid_constant__ Call call,
                                                                                pipeline_state* state) {
-    using core::triangle_class;
     using sink_type = typename Call::sink;
-    constexpr int warps = raster_threads / 32;
-    __shared__ warp_queues queues[warps];
-    __shared__ typename sink_type::memory memories[warps];
-    __shared__ int left[3][warps];
-    __shared__ unsigned dropped[5]; // by triangle_class
+    __shared__ first_memory<Call> memories[raster_warps];
+    __shared__ int left[num_triangle_kinds][raster_warps];
+    __shared__ unsigned dropped[num_triangle_classes], num_left;
     if constexpr (!sink_type::checks_indices) {
         if (state->index_error != 0) return;
     }
-    if (threadIdx.x < 5) dropped[threadIdx.x] = 0;
+    if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
+    if (threadIdx.x == 0) num_left = 0;
     __syncthreads();
-    sink_type sink(call, dropped, memories[threadIdx.x / 32]);
-    raster_warp<Call::rule, typename Call::source_type, sink_type> warp{call.in, queues[threadIdx.x / 32], sink};
-    const unsigned looked_at = warp.run(queues, left);
+    first_memory<Call>& memory = memories[warp_in_block()];
+    sink_type sink(call, dropped, memory.sink);
+    kind_writer writer{call.lists, memory.kinds};
+    const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
+    first_warp<Call> warp{
+        call, memory, sink, writer, call.lists.left + std::size_t{blockIdx.x} * batches * raster_threads, num_left};
+    const unsigned looked_at = warp.run();
+    __syncthreads();
+    warp.cut_left();
+    writer.finish([&](int w) -> const kind_queues& { return memories[w].kinds; }, left);
     sink.finish(state);
-    const unsigned long long all = block_sum(threadIdx.x % 32 == 0 ? looked_at : 0);
-    if (threadIdx.x == 0) {
-        const auto number = [&](triangle_class kind, unsigned long long* total) {
-            const unsigned n = dropped[static_cast<int>(kind)];
-            if (n != 0) atomicAdd(total, static_cast<unsigned long long>(n));
-            return n;
-        };
-        const unsigned none =
-            number(triangle_class::nonfinite, &state->nonfinite) + number(triangle_class::too_far, &state->too_far) +
-            number(triangle_class::zero_area, &state->zero_area) + number(triangle_class::outside, &state->outside);
-        if (all != none) atomicAdd(&state->drawn, all - none);
+    count_looked_at(looked_at, dropped, state);
+}
+
+// ---- the second kernel: what the first left ------------------------------------------------------------------------
+
+// All records, in registers of their own: what they need is not kept for the other triangles.
+template <class Call>
+__device__ __noinline__ void raster_all_records(const Call& call, pipeline_state* state, unsigned* dropped,
+                                                brick_memory& bricks, typename Call::sink::memory& memory,
+                                                unsigned warp, unsigned warps) {
+    typename Call::sink sink(call, dropped, memory);
+    raster_records(call, sink, bricks, warp, warps);
+    __syncwarp();
+    sink.finish(state);
+}
+
+// What a warp of the second kernel knows of its place.
+struct warp_place {
+    unsigned warp, warps; // of the grid
+    unsigned lane;
+};
+
+// The triangles of a list from number `first` on, by medium_lanes lanes each.
+template <class Call, class Sink>
+__device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std::uint32_t first,
+                                                 const warp_place& place, Sink& sink) {
+    constexpr unsigned at_once = 32 / medium_lanes;
+    const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[kind]));
+    const unsigned chunks = (length - first + at_once - 1) / at_once;
+    for (unsigned chunk = place.warp; chunk < chunks; chunk += place.warps) {
+        const std::uint32_t i = first + chunk * at_once + place.lane / medium_lanes;
+        const bool wanted = i < length;
+        __syncwarp();
+        raster_medium<Call::rule>(call.in, wanted, wanted ? call.lists.at(kind, i) : 0, sink);
+        __syncwarp();
     }
 }
 
-inline constexpr int large_warps = 4; // of a block
-inline constexpr int most_bricks = 64;
-
-// What one warp keeps in shared memory for a large triangle.
-struct large_memory {
-    core::brick_triangle triangle;
-    std::int16_t bricks[3][most_bricks]; // that wait, in bricks of the grid
-};
-
-// What direct_raster_kernel left. medium_lanes take a triangle of the small path; a warp takes a record: 32 pieces of a
-// large triangle, a lane each. Conservative: the lanes find the bricks that the
-// triangle meets in their columns, and medium_lanes of them then take a brick each.
-template <class Call>
-__global__ __launch_bounds__(32 * large_warps, 4) void direct_large_kernel(const __grid_constant__ Call call,
-                                                                           pipeline_state* state) {
-    constexpr bool thin = Call::rule == coverage::thin;
-    constexpr auto rule = core::to_rule(Call::rule);
-    using sink_type = typename Call::sink;
-    __shared__ large_memory memories[thin ? 1 : large_warps];
-    __shared__ typename sink_type::memory sink_memories[large_warps];
-    if (state->index_error != 0) return;
-    const unsigned long long packed = *call.large.next;
-    const unsigned long long records = packed & ((1ull << large_list::record_bits) - 1);
-    const unsigned long long num = packed >> large_list::record_bits;
-    const unsigned long long warps = std::uint64_t{gridDim.x} * large_warps;
-    const unsigned lane = threadIdx.x % 32;
-    const core::voxel_box whole{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
-    sink_type sink(call, nullptr, sink_memories[threadIdx.x / 32]);
-    const unsigned long long num_mediums = *call.large.num_mediums;
-    const unsigned long long thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    constexpr unsigned at_once = 32 / medium_lanes; // triangles of a warp
-    for (unsigned long long first = thread / 32 * at_once; first < num_mediums; first += warps * at_once) {
-        const unsigned long long m = first + lane / medium_lanes;
-        raster_medium<Call::rule>(call.in, m < num_mediums, m < num_mediums ? call.large.mediums[m] : 0, sink);
+// The lists of large, small and cube triangles by a thread each, neighbours, which are alike, in neighbouring lanes;
+// but what does not fill a warp, and whole lists that would not fill the device, by medium_lanes lanes each. All lists
+// advance together, part by part: they are in the order of the mesh, nearly, so that voxels are in the cache while
+// triangles of all kinds meet them.
+template <class Call, class Sink>
+__device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place& place, Sink& sink) {
+    constexpr int kinds = medium_triangles; // what comes before
+    std::uint32_t chunks[kinds], all = 0;
+    for (int k = 0; k < kinds; ++k) {
+        const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[k]));
+        const bool few = k != cube_triangles && length / 64 * medium_lanes < place.warps;
+        chunks[k] = few ? 0 : length / 32;
+        all += chunks[k];
+        const unsigned from_last = place.warps - 1 - place.warp; // the first ones have whole chunks to do
+        raster_by_lanes(call, k, chunks[k] * 32, {few ? place.warp : from_last, place.warps, place.lane}, sink);
     }
-    __syncwarp();
-    for (unsigned long long r = thread / 32; r < records; r += warps) {
-        unsigned long long lo = 0, hi = num; // the last triangle whose records begin at or before r
-        while (hi - lo > 1) {
-            const unsigned long long middle = lo + (hi - lo) / 2;
-            if (call.large.first_records[middle] <= r)
-                lo = middle;
-            else
-                hi = middle;
-        }
-        const auto piece = static_cast<std::int64_t>((r - call.large.first_records[lo]) * chunks_per_record + lane);
-        sink.begin(call.large.triangles[lo]);
-        const glm::uvec3 index = call.in.source.triangle(call.large.triangles[lo]);
-        const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
-                                     c = call.in.source.position(index.z);
-        core::voxel_box reach{};
-        (void)core::classify<Call::rule>(a, b, c, call.in.fraction, whole, reach);
-        const int axis = core::dominant_axis(a, b, c, call.in.fraction);
-        const large_pieces<Call::rule> pieces(reach, axis);
-        const bool valid = piece < pieces.count();
-        if (!core::fits_narrow(a, b, c, call.in.fraction)) {
-            feed(sink, [&] {
-                if (!valid) return;
-                span_writer<sink_type> writer{sink};
-                for_each_wide_span<rule>(a, b, c, call.in.fraction, pieces.piece(piece),
-                                         [&](const wide_span& s) { writer.span(axis, s.u, s.v, s.w_first, s.w_last); });
-                writer.flush();
-            });
-            continue;
-        }
-        const core::voxel_box box = core::bounds(a, b, c, call.in.fraction);
-        if constexpr (thin) {
-            feed(sink, [&] {
-                if (!valid) return;
-                const core::brick_thin t(a, b, c, box, axis, call.in.fraction);
-                const auto origin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
-                const auto last = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
-                const std::int64_t u0 = pieces.u(piece), v = pieces.v(piece);
-                if (v < origin[1] || v > last[1]) return; // reach is a voxel wider
-                const auto u = static_cast<int>(u0 - origin[0]), at_v = static_cast<int>(v - origin[1]);
-                if (!t.meets_row(u, at_v)) return;
-                // Columns of the bounding box, within the grid.
-                const std::int64_t from = u0 > origin[0] ? u0 : origin[0], to = u0 + core::brick_size - 1;
-                const std::int64_t begin = from > pieces.lo[0] ? from : pieces.lo[0];
-                const std::int64_t end = core::min3(to, last[0], pieces.hi[0]);
-                span_writer<sink_type> writer{sink};
-                t.from(u, at_v).template row<true>(
-                    static_cast<int>(begin - u0), static_cast<int>(end - u0), 0, [&](int column, int depth) {
-                        const std::int64_t w = origin[2] + depth;
-                        if (w < pieces.lo[2] || w > pieces.hi[2]) return;
-                        writer.span(axis, static_cast<int>(u0) + column, static_cast<int>(v), static_cast<int>(w),
-                                    static_cast<int>(w));
-                    });
-                writer.flush();
-            });
-        } else {
-            large_memory& memory = memories[threadIdx.x / 32];
-            __syncwarp(); // the last triangle's bricks are done
-            {
-                const core::brick_triangle t(a, b, c, box, call.in.fraction);
-                if (lane == 0) memory.triangle = t;
-            }
-            __syncwarp();
-            const core::brick_triangle& t = memory.triangle;
-            const auto raster_bricks = [&](int n) {
-                __syncwarp();
-                for (int first = 0; first < n; first += 32 / medium_lanes) {
-                    const int at = first + static_cast<int>(lane) / medium_lanes;
-                    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
-                        if (at >= n) return;
-                        std::int32_t corner[3]; // in the grid
-                        int from[3];            // the same from the bounding box
-                        core::small_box part;
-                        for (int k = 0; k < 3; ++k) {
-                            corner[k] = memory.bricks[k][at] * core::brick_size;
-                            from[k] = corner[k] - static_cast<int>(box.lo[k]);
-                            part.lo[k] = reach.lo[k] > corner[k] ? static_cast<int>(reach.lo[k]) - corner[k] : 0;
-                            part.hi[k] = reach.hi[k] - corner[k] < core::brick_size - 1
-                                             ? static_cast<int>(reach.hi[k]) - corner[k]
-                                             : core::brick_size - 1;
-                        }
-                        raster_lanes(t.at(from[0], from[1], from[2]), corner, part, sink);
-                    });
-                }
-                __syncwarp();
+    const unsigned wanted = all / (4 * place.warps), parts = wanted < 1 ? 1 : wanted > 64 ? 64 : wanted;
+    // Chunks are numbered by part, then kind; this warp's are `at`, at + warps, ...
+    unsigned at = place.warp, first = 0;
+    for (unsigned part = 0; part < parts; ++part) {
+        for (int k = kinds - 1; k >= 0; --k) {
+            const auto bound = [&](unsigned p) {
+                return static_cast<unsigned>(static_cast<std::uint64_t>(chunks[k]) * p / parts);
             };
-            int w = 0, w_end = -1; // bricks
-            const std::int64_t u0 = pieces.u(piece), v0 = pieces.v(piece);
-            if (valid) {
-                const auto origin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
-                double first = 0, last = 0;
-                t.depths(axis, static_cast<int>(u0 - origin[0]), static_cast<int>(v0 - origin[1]), first, last);
-                const auto low = static_cast<double>(pieces.lo[2]), high = static_cast<double>(pieces.hi[2]);
-                first += static_cast<double>(origin[2]);
-                last += static_cast<double>(origin[2]);
-                if (first <= high && last >= low) {
-                    w = static_cast<int>(first > low ? first : low) >> core::log2_brick;
-                    w_end = static_cast<int>(last < high ? last : high) >> core::log2_brick;
-                }
+            const unsigned begin = bound(part), num = bound(part + 1) - begin;
+            for (; at < first + num; at += place.warps) {
+                const std::uint32_t triangle = call.lists.at(k, (begin + at - first) * 32 + place.lane);
+                const near_triangle r = load_near(call.in, call.in.source.triangle(triangle));
+                __syncwarp();
+                feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                    sink.begin(triangle);
+                    if (k == cube_triangles)
+                        raster_cube<Call::rule>(call.in, r, sink);
+                    else
+                        raster_small<Call::rule>(call.in, r, sink);
+                });
+                __syncwarp();
             }
-            int waiting = 0;
-            while (__any_sync(0xffffffffu, w <= w_end)) {
-                bool hit = false;
-                core::triple<int> brick{};
-                if (w <= w_end) {
-                    brick = core::to_xyz(axis, static_cast<int>(u0 >> core::log2_brick),
-                                         static_cast<int>(v0 >> core::log2_brick), w);
-                    hit = t.meets(brick[0] * core::brick_size - static_cast<int>(box.lo[0]),
-                                  brick[1] * core::brick_size - static_cast<int>(box.lo[1]),
-                                  brick[2] * core::brick_size - static_cast<int>(box.lo[2]));
-                }
-                ++w;
-                const int place = take_place(hit, waiting);
-                if (hit)
-                    for (int k = 0; k < 3; ++k) memory.bricks[k][place] = static_cast<std::int16_t>(brick[k]);
-                if (waiting > most_bricks - 32) {
-                    raster_bricks(waiting);
-                    waiting = 0;
-                }
-            }
-            raster_bricks(waiting);
+            first += num;
         }
     }
+}
+
+template <class Call>
+__global__ __launch_bounds__(raster_threads,
+                             rest_min_blocks<Call>) void direct_rest_kernel(const __grid_constant__ Call call,
+                                                                            pipeline_state* state) {
+    using sink_type = typename Call::sink;
+    constexpr bool thin = Call::rule == coverage::thin;
+    __shared__ brick_memory bricks[thin ? 1 : raster_warps];
+    __shared__ typename sink_type::memory memories[raster_warps];
+    __shared__ unsigned dropped[num_triangle_classes];
+    if (state->index_error != 0) return;
+    if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
+    __syncthreads();
+    const unsigned in_block = warp_in_block();
+    const warp_place place{blockIdx.x * raster_warps + in_block, gridDim.x * raster_warps, threadIdx.x % 32};
+    typename sink_type::memory& memory = memories[in_block];
+    if (uniform(*call.lists.next) != 0)
+        raster_all_records(call, state, dropped, bricks[thin ? 0 : in_block], memory, place.warp, place.warps);
+    sink_type sink(call, dropped, memory);
+    raster_by_lanes(call, medium_triangles, 0, place, sink);
+    raster_lists(call, place, sink);
     sink.finish(state);
+    __syncthreads();
+    if (threadIdx.x == 0) { // the first kernel took them for drawn
+        const unsigned none = count_dropped(dropped, state);
+        if (none != 0) atomicAdd(&state->drawn, 0ull - none);
+    }
 }
 
 inline void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangles, std::uint64_t num_vertices,
@@ -482,13 +420,25 @@ inline void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangl
     check(cudaGetLastError(), stage::coarse_raster);
 }
 
+// Blocks of the first kernel: what fits the device at once.
+[[nodiscard]] inline unsigned raster_blocks(std::uint64_t num_triangles, int per_multiprocessor) {
+    const std::uint64_t batches = (num_triangles + raster_threads - 1) / raster_threads;
+    const std::uint64_t most =
+        static_cast<std::uint64_t>(num_multiprocessors()) * static_cast<unsigned>(per_multiprocessor);
+    return static_cast<unsigned>(batches < most ? batches : most);
+}
+
 template <class Call>
 void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream) {
-    const unsigned blocks = raster_blocks(call.in.num_triangles, Call::sink::min_blocks);
-    direct_raster_kernel<Call><<<blocks, raster_threads, 0, stream>>>(call, state);
+    const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
+    if constexpr (Call::output::hands_on)
+        direct_raster_kernel<Call>
+            <<<raster_blocks(call.in.num_triangles, first_min_blocks<Call>), raster_threads, 0, stream>>>(call, state);
+    else
+        block_raster_kernel<Call>
+            <<<raster_blocks(call.in.num_triangles, block_min_blocks), raster_threads, 0, stream>>>(call, state);
     check(cudaGetLastError(), where);
-    direct_large_kernel<Call>
-        <<<static_cast<unsigned>(num_multiprocessors()) * 4, 32 * large_warps, 0, stream>>>(call, state);
+    direct_rest_kernel<Call><<<multiprocessors * rest_min_blocks<Call>, raster_threads, 0, stream>>>(call, state);
     check(cudaGetLastError(), where);
 }
 

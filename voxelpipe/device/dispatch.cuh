@@ -304,7 +304,7 @@ private:
     [[nodiscard]] bool is_direct_call() const {
         if (draws.size() > most_direct_draws || core::small_voxels(core::make_snap_transform(g).fraction) == 0)
             return false;
-        if (!large_list::holds(num_primitives, large_pieces<coverage::thin>::most_records(g.extent))) return false;
+        if (!triangle_lists::holds(num_primitives, large_pieces<coverage::thin>::most_records(g.extent))) return false;
         if (std::max({g.extent.x, g.extent.y, g.extent.z}) > most_direct_extent) return false;
         if (options.count_voxels && find_counting_target() < 0) return false;
         bool all = true;
@@ -326,7 +326,7 @@ private:
             most_triangles = std::max(most_triangles, d.mesh.triangles.size());
         }
         core::snapped_position* const positions = memory.take<core::snapped_position>(on_the_spot ? 0 : vertices);
-        const large_list large = large_list::take(memory, most_triangles);
+        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles);
         if constexpr (Run) {
             check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
             for (const draw_type& d : draws)
@@ -343,14 +343,14 @@ private:
                 const draw_type& d = draws[i];
                 const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
                 if (num_triangles == 0) continue;
-                if (i != 0) check(cudaMemsetAsync(&state->next_large, 0, 2 * sizeof(state->next_large), stream));
+                if (i != 0) check(cudaMemsetAsync(&state->handed_on, 0, sizeof(state->handed_on), stream));
                 const auto raster = [&](const auto& source) {
                     using source_type = std::remove_cvref_t<decltype(source)>;
                     using values_type = decltype(d.fragment_shader.values);
                     const direct_call<Rule, source_type, framebuffer_output<Framebuffer, values_type>> call{
                         {source, num_triangles, snap.fraction, g.extent},
                         {fb, d.fragment_shader.values, counting_target},
-                        large.with(state)};
+                        handed_on.with(state)};
                     direct_raster(call, state, stage::fine_raster, stream);
                     end_stage(clock, &stage_times::fine_raster);
                 };
@@ -532,7 +532,7 @@ private:
         const draw_type& d = draws[0];
         core::snapped_position* const positions =
             memory.take<core::snapped_position>(on_the_spot ? 0 : d.mesh.positions.size());
-        const large_list large = large_list::take(memory, num_primitives);
+        const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
         const order_lists order = order_lists::take(memory, limits.fragments);
         if constexpr (Run) {
             const core::snap_transform snap = core::make_snap_transform(g);
@@ -540,8 +540,8 @@ private:
             const auto raster = [&](const auto& source) {
                 const raster_input<std::remove_cvref_t<decltype(source)>> in{source, num_primitives, snap.fraction,
                                                                              g.extent};
-                list_raster<Rule>(in, num_vertices, large.with(state), lists.keys[0], lists.values[0], state, limits,
-                                  stream);
+                list_raster<Rule>(in, num_vertices, handed_on.with(state), lists.keys[0], lists.values[0], state,
+                                  limits, stream);
             };
             if constexpr (on_the_spot) {
                 raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, 0});

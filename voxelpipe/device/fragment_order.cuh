@@ -174,8 +174,8 @@ template <int List, class Buffers>
 __global__ __launch_bounds__(threads_per_block) void warp_sort_kernel(const __grid_constant__ Buffers b) {
     constexpr int items = static_cast<int>(order_lists::most_below(List + 1) / 32);
     constexpr std::uint32_t warps = threads_per_block / 32;
-    const std::uint32_t n = b.lists.counts[List], lane = threadIdx.x % 32;
-    for (std::uint32_t r = blockIdx.x * warps + threadIdx.x / 32; r < n; r += gridDim.x * warps) {
+    const std::uint32_t n = uniform(b.lists.counts[List]), lane = threadIdx.x % 32;
+    for (std::uint32_t r = blockIdx.x * warps + warp_in_block(); r < n; r += gridDim.x * warps) {
         const fragment_run run = b.lists.voxels[List][r];
         std::uint32_t w[items];
 #pragma unroll

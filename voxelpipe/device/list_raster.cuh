@@ -12,10 +12,8 @@ namespace voxelpipe::device {
 
 template <class Call>
 struct listing_sink : direct_sink<Call> {
-    static constexpr bool names_triangles = true;
     static constexpr bool buffers = true;
     static constexpr bool checks_indices = true;
-    static constexpr int min_blocks = list_min_blocks;
     static constexpr unsigned room = 448;    // with the queues, less than 48 KB for a block
     static constexpr unsigned flush_at = 64; // less may wait: a round of thin triangles brings up to 384
     struct memory {
@@ -147,6 +145,7 @@ private:
 struct list_output {
     template <class Call>
     using sink = listing_sink<Call>;
+    static constexpr bool hands_on = true;
 
     std::uint32_t* voxels; // by fragment
     std::uint32_t* triangles;
@@ -160,16 +159,16 @@ struct list_output {
                                       glm::ivec3 extent) {
     return num_draws == 1 && core::small_voxels(fraction) > 0 &&
            std::max({extent.x, extent.y, extent.z}) <= most_direct_extent &&
-           large_list::holds(num_triangles, large_pieces<coverage::thin>::most_records(extent));
+           triangle_lists::holds(num_triangles, large_pieces<coverage::thin>::most_records(extent));
 }
 
 // Appends the fragments of a draw to two arrays of limits.fragments elements each; counts them in the state.
 template <coverage Rule, class Source>
-void list_raster(const raster_input<Source>& in, std::uint32_t num_vertices, const large_list& large,
+void list_raster(const raster_input<Source>& in, std::uint32_t num_vertices, const triangle_lists& handed_on,
                  std::uint32_t* voxels, std::uint32_t* triangles, pipeline_state* state, const capacities& limits,
                  cudaStream_t stream) {
     const direct_call<Rule, Source, list_output> call{
-        in, {voxels, triangles, limits.fragments, num_vertices, state}, large};
+        in, {voxels, triangles, limits.fragments, num_vertices, state}, handed_on};
     direct_raster(call, state, stage::abuffer_emit, stream);
 }
 

@@ -26,7 +26,9 @@ struct pipeline_state {
     unsigned int index_error;
     unsigned int num_items, num_splits, num_images; // tile split
     unsigned int next_item;                         // fine raster
-    unsigned long long next_large, num_mediums;     // direct raster, of one draw: large_list
+    struct {
+        unsigned long long cut, lengths[4];
+    } handed_on; // direct raster, of one draw: triangle_lists
 };
 
 // How many elements the arrays of a call have. What does not fit is counted, not written.
@@ -121,6 +123,16 @@ struct scene {
 // ---- launches -------------------------------------------------------------------------------------------------------
 
 inline constexpr int threads_per_block = 256; // of kernels that have no tuning of their own
+
+// A value that all lanes of a warp have, in a way that the compiler knows it: what is read from memory, or follows from
+// threadIdx, may differ for all that it can see, and then it lets the lanes of a loop with such a bound run apart for
+// good (a __syncwarp within such a loop makes them meet, not stay together). All lanes take part.
+__device__ VOXELPIPE_INLINE std::uint32_t uniform(std::uint32_t value) { return __reduce_max_sync(0xffffffffu, value); }
+__device__ VOXELPIPE_INLINE unsigned long long uniform(unsigned long long value) {
+    return static_cast<unsigned long long>(uniform(static_cast<std::uint32_t>(value >> 32))) << 32 |
+           uniform(static_cast<std::uint32_t>(value));
+}
+__device__ VOXELPIPE_INLINE unsigned warp_in_block() { return uniform(threadIdx.x / 32); }
 
 // Of a kernel with a thread an item.
 [[nodiscard]] inline unsigned num_blocks(std::uint64_t items) {

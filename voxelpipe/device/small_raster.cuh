@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Raster of small triangles without tiles: one kernel reads the mesh once and sorts triangles by what they cost. Those
-// of up to 2 x 2 x 1 voxels are done at once; small ones wait in shared memory until there is a full warp of them, the
-// smallest a thread each, larger ones eight lanes each; the rest is handed on. What is done with the fragments is the
-// sink's: blending (direct_raster.cuh) or listing (list_raster.cuh).
+// Raster of one small triangle, by a thread or by eight lanes. What is done with the fragments is the sink's: blending
+// (direct_raster.cuh) or listing (list_raster.cuh). A sink has
+//   buffers           whether settle(), which all lanes call between triangles, is wanted (feed)
+//   begin(triangle), row(x0, y, z, mask), two(x, y, z, masks, along_y), four(x, y, z, masks), voxels(bits, position):
+//                     the fragments of one triangle, as rows of bits along x (blend_rows) or one by one
+//   drop(class)       counts a triangle that is not drawn
 
 #include <voxelpipe/core/brick_triangle.hpp>
 #include <voxelpipe/device/scene.cuh>
@@ -71,9 +73,8 @@ using word = std::uint32_t;
 
 // ---- small triangles ------------------------------------------------------------------------------------------------
 
-inline constexpr int raster_threads = 128;
-inline constexpr int raster_min_blocks = 5; // per multiprocessor: registers for that many
-inline constexpr int list_min_blocks = 4;   // the same where the sink buffers fragments in shared memory
+inline constexpr int raster_threads = 128; // of a block
+inline constexpr int raster_warps = raster_threads / 32;
 inline constexpr int most_side = 8;         // a bounding box of so many voxels a side has rows of a byte
 inline constexpr int most_cells = 512;      // one of so many voxels is one thread's work
 inline constexpr int small_cells = 27;      // one of so many voxels waits apart from the larger ones
@@ -82,24 +83,6 @@ inline constexpr int most_columns = 96;     // thin: one thread's work
 inline constexpr int medium_lanes = 8;      // of a warp, for one larger triangle
 inline constexpr int most_medium_side = 16; // of its bounding box, in voxels
 static_assert(most_medium_side <= core::small_voxels(16) && most_medium_side <= core::small_voxels(12));
-
-// Triangles that wait for a full warp of them. Every warp has its own queues: no thread waits for another warp, and the
-// number that wait is a register that all lanes agree on.
-inline constexpr int queue_places = 64; // up to 31 wait when a warp brings up to 32 more
-
-// Triangles by their vertices, each in a column of words.
-struct triangle_queue {
-    std::int32_t q[9][queue_places];
-    std::uint32_t triangle[queue_places]; // its number, where the sink wants it
-};
-
-// The place of a lane that wants one behind the `count` that wait; adds the newcomers. All lanes take part.
-__device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
-    const unsigned who = __ballot_sync(0xffffffffu, wanted);
-    const int place = count + __popc(who & ((1u << threadIdx.x % 32) - 1));
-    count += __popc(who);
-    return place;
-}
 
 // A triangle whose vertices are less than 2^30 units from the grid's origin, and its bounding box.
 struct near_triangle {
@@ -275,12 +258,6 @@ __device__ VOXELPIPE_INLINE void raster_quad(const raster_input<Source>& call, c
     }
 }
 
-// What one warp keeps in shared memory.
-struct warp_queues {
-    triangle_queue cubes, smalls;       // bounding boxes of up to 2 x 2 x 2 voxels; other small ones
-    std::uint32_t larges[queue_places]; // numbers of triangles that are loaded again
-};
-
 // Runs f, which gives a sink fragments, on all lanes of a warp. A sink that buffers them may find that there were too
 // many, and then wants them once more.
 template <class Sink, class F>
@@ -316,210 +293,39 @@ __device__ VOXELPIPE_INLINE void raster_medium(const raster_input<Source>& call,
     });
 }
 
-// The work of a warp, from the mesh to a sink:
-//   names_triangles   whether begin is wanted
-//   buffers           whether settle(), which all lanes call between triangles, is wanted (feed)
-//   mediums(wanted, triangle)   takes those that are much for a thread; all lanes call it
-//   check(index)      whether the indices may be used
-//   begin(triangle), row(x0, y, z, mask), two(x, y, z, masks, along_y), four(x, y, z, masks), voxels(bits, position):
-//                     the fragments of one triangle, as rows of bits along x (blend_rows) or one by one
-//   big(triangle, index)   what this path does not take; says whether it is drawn
-//   drop(class)       counts a triangle that is not drawn
+// A bounding box of at most two voxels a side, whatever covers it.
 template <coverage Rule, class Source, class Sink>
-struct raster_warp {
-    static constexpr bool thin = Rule == coverage::thin;
-    using triangle_class = core::triangle_class;
-
-    const raster_input<Source>& call;
-    warp_queues& queues;
-    Sink& sink;
-    int lane = static_cast<int>(threadIdx.x) % 32;
-    int num_cubes = 0, num_smalls = 0, num_larges = 0;
-
-    __device__ VOXELPIPE_INLINE static void put(triangle_queue& queue, int at, const near_triangle& r,
-                                                std::uint32_t triangle) {
-        for (int k = 0; k < 9; ++k) queue.q[k][at] = r.q[k / 3][k % 3];
-        if constexpr (Sink::names_triangles) queue.triangle[at] = triangle;
-    }
-    // Takes one that waits, and tells the sink.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle take(const triangle_queue& queue, int at) {
-        near_triangle r;
-        for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = queue.q[k][at];
-        r.is_near = true;
-        r.find_box(call.fraction);
-        if constexpr (Sink::names_triangles) sink.begin(queue.triangle[at]);
-        return r;
-    }
-
-    // The last 32 that wait, one a lane; all lanes take part.
-    template <class Raster>
-    __device__ VOXELPIPE_INLINE void drain(const warp_queues& from, int& count, Raster&& raster) {
-        __syncwarp();
-        feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA { raster(from, count - 32 + static_cast<int>(threadIdx.x % 32)); });
-        __syncwarp();
-        count -= 32;
-    }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_cube() {
-        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            const near_triangle r = take(from.cubes, at);
-            if constexpr (thin) {
-                if (!raster_thin_cube(call, r, sink)) sink.drop(triangle_class::zero_area);
-            } else {
-                const core::small_box box = r.part(call.extent);
-                word bits = core::cube_bits(core::small_conservative(r.relative(call.fraction), call.fraction));
-                bits &= (box.lo[0] == 0 ? 0xffu : 0xaau) & (box.hi[0] == 1 ? 0xffu : 0x55u) &
-                        (box.lo[1] == 0 ? 0xffu : 0xccu) & (box.hi[1] == 1 ? 0xffu : 0x33u) &
-                        (box.lo[2] == 0 ? 0xffu : 0xf0u) & (box.hi[2] == 1 ? 0xffu : 0x0fu);
-                const word mask[4] = {bits & 3u, bits >> 2 & 3u, bits >> 4 & 3u, bits >> 6};
-                sink.four(r.lo[0], r.lo[1], r.lo[2], mask);
-            }
-        };
-    }
-    __device__ VOXELPIPE_INLINE void raster(const near_triangle& r) {
+__device__ VOXELPIPE_INLINE void raster_cube(const raster_input<Source>& call, const near_triangle& r, Sink& sink) {
+    if constexpr (Rule == coverage::thin) {
+        if (!raster_thin_cube(call, r, sink)) sink.drop(core::triangle_class::zero_area);
+    } else {
         const core::small_box box = r.part(call.extent);
-        if constexpr (thin) {
-            if (!raster_thin(call, r.relative(call.fraction), r.lo, box, 0, 1, sink))
-                sink.drop(triangle_class::zero_area);
-        } else {
-            const core::small_conservative s(r.relative(call.fraction), call.fraction);
-            const auto emit = [&](int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
-                sink.row(r.lo[0] + box.lo[0], r.lo[1] + y, r.lo[2] + z, bits);
-            };
-            const int most = core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) + 1;
-            if (most <= most_side)
-                s.rows(box, emit);
-            else
-                s.long_rows(box, emit);
-        }
+        word bits = core::cube_bits(core::small_conservative(r.relative(call.fraction), call.fraction));
+        bits &= (box.lo[0] == 0 ? 0xffu : 0xaau) & (box.hi[0] == 1 ? 0xffu : 0x55u) & (box.lo[1] == 0 ? 0xffu : 0xccu) &
+                (box.hi[1] == 1 ? 0xffu : 0x33u) & (box.lo[2] == 0 ? 0xffu : 0xf0u) & (box.hi[2] == 1 ? 0xffu : 0x0fu);
+        const word mask[4] = {bits & 3u, bits >> 2 & 3u, bits >> 4 & 3u, bits >> 6};
+        sink.four(r.lo[0], r.lo[1], r.lo[2], mask);
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_small() {
-        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA { raster(take(from.smalls, at)); };
-    }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE auto raster_large() {
-        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            const near_triangle r = load_near(call, call.source.triangle(from.larges[at]));
-            sink.begin(from.larges[at]);
-            raster(r);
+}
+
+// Any small triangle, by one thread.
+template <coverage Rule, class Source, class Sink>
+__device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, const near_triangle& r, Sink& sink) {
+    const core::small_box box = r.part(call.extent);
+    if constexpr (Rule == coverage::thin) {
+        if (!raster_thin(call, r.relative(call.fraction), r.lo, box, 0, 1, sink))
+            sink.drop(core::triangle_class::zero_area);
+    } else {
+        const core::small_conservative s(r.relative(call.fraction), call.fraction);
+        const auto emit = [&](int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
+            sink.row(r.lo[0] + box.lo[0], r.lo[1] + y, r.lo[2] + z, bits);
         };
+        const int most = core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) + 1;
+        if (most <= most_side)
+            s.rows(box, emit);
+        else
+            s.long_rows(box, emit);
     }
-    // What a triangle costs: voxels of its bounding box, or for thin coverage the columns that it can touch at most.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE static int cost(const near_triangle& r) {
-        const int x = r.last[0] + 1, y = r.last[1] + 1, z = r.last[2] + 1;
-        return thin ? core::max3(x * y, y * z, z * x) : x * y * z;
-    }
-
-    // The lane's triangle i, where there is one.
-    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, const glm::uvec3& index) {
-        bool is_quad = false, is_inside = false, waits = false, is_big = false;
-        int most = 0;
-        near_triangle r;
-        if (valid) {
-            r = load_near(call, index);
-            most = r.most();
-            is_big = !r.is_near || most > most_medium_side;
-            is_inside = r.is_inside(call.extent);
-            if (!is_big && !is_inside && r.is_outside<Rule>(call.extent))
-                sink.drop(triangle_class::outside);
-            else
-                waits = !is_big;
-            if constexpr (!thin) {
-                is_quad = waits && most <= 2 && core::min3(r.last[0], r.last[1], r.last[2]) == 0;
-                waits = waits && !is_quad;
-            }
-        }
-        if constexpr (!thin) {
-            feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
-                if (!is_quad) return;
-                sink.begin(i);
-                raster_quad(call, r, is_inside, sink);
-            });
-        }
-        if (__any_sync(0xffffffffu, waits || is_big)) {
-            const bool to_cubes = waits && most <= 2;
-            const bool to_smalls =
-                waits && !to_cubes && (thin || most <= most_side) && cost(r) <= (thin ? small_columns : small_cells);
-            const bool to_larges = waits && !to_cubes && !to_smalls && cost(r) <= (thin ? most_columns : most_cells);
-            bool to_mediums = waits && !(to_cubes || to_smalls || to_larges);
-            if (thin && to_mediums) { // a small one finds out when it is drawn
-                const core::triple<std::int64_t> normal = core::small_normal(r.relative(call.fraction));
-                if ((normal[0] | normal[1] | normal[2]) == 0) {
-                    sink.drop(triangle_class::zero_area);
-                    to_mediums = false;
-                }
-            }
-            const int cube_at = take_place(to_cubes, num_cubes);
-            if (to_cubes) put(queues.cubes, cube_at, r, i);
-            const int small_at = take_place(to_smalls, num_smalls);
-            if (to_smalls) put(queues.smalls, small_at, r, i);
-            const int large_at = take_place(to_larges, num_larges);
-            if (to_larges) queues.larges[large_at] = i;
-            sink.mediums(to_mediums, i);
-            if (is_big) {
-                const triangle_class kind = sink.big(i, index);
-                if (kind != triangle_class::drawn) sink.drop(kind);
-            }
-        }
-        __syncwarp();
-    }
-
-    // All batches of this warp, then what is left in the queues of the block's warps, together. All threads of the
-    // block take part. Returns how many triangles the warp looked at.
-    template <int Warps>
-    __device__ VOXELPIPE_INLINE unsigned run(const warp_queues (&all)[Warps], int (&left)[3][Warps]) {
-        const std::uint32_t step = gridDim.x * Warps * 32;
-        // The indices of a batch are loaded while the batch before it is worked on.
-        const auto load_index = [&](std::uint32_t i) {
-            return i < call.num_triangles ? call.source.triangle(i) : glm::uvec3(0);
-        };
-        const std::uint32_t begin = blockIdx.x * Warps * 32 + threadIdx.x / 32 * 32;
-        std::uint32_t first = begin;
-        glm::uvec3 index = load_index(first + static_cast<unsigned>(lane));
-        for (; first < call.num_triangles; first += step) {
-            const glm::uvec3 next = load_index(first + step + static_cast<unsigned>(lane));
-            const std::uint32_t i = first + static_cast<unsigned>(lane);
-            batch(i, i < call.num_triangles && sink.check(index), index);
-            index = next;
-            if (num_cubes >= 32) drain(queues, num_cubes, raster_cube());
-            if (num_smalls >= 32) drain(queues, num_smalls, raster_small());
-            if (num_larges >= 32) drain(queues, num_larges, raster_large());
-        }
-        if (lane == 0) {
-            left[0][threadIdx.x / 32] = num_cubes;
-            left[1][threadIdx.x / 32] = num_smalls;
-            left[2][threadIdx.x / 32] = num_larges;
-        }
-        __syncthreads();
-        const auto rest = [&](const int(&counts)[Warps], auto&& raster_one) {
-            int at = static_cast<int>(threadIdx.x), w = 0; // fewer than 32 a warp are left
-            while (w < Warps && at >= counts[w]) at -= counts[w++];
-            feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
-                if (w < Warps) raster_one(all[w], at);
-            });
-        };
-        rest(left[0], raster_cube());
-        rest(left[1], raster_small());
-        // A lane each, the larger ones would keep a few lanes busy long after all others.
-        int num = 0;
-        for (const int n : left[2]) num += n;
-        for (int start = 0; start < num; start += Warps * 32 / medium_lanes) {
-            int at = start + static_cast<int>(threadIdx.x) / medium_lanes, w = 0;
-            while (w < Warps && at >= left[2][w]) at -= left[2][w++];
-            raster_medium<Rule>(call, w < Warps, w < Warps ? all[w].larges[at] : 0, sink);
-        }
-
-        if (begin >= call.num_triangles) return 0;
-        const std::uint32_t batches = (call.num_triangles - begin - 1) / step + 1;
-        const std::uint32_t of_last = call.num_triangles - (begin + (batches - 1) * step);
-        return (batches - 1) * 32 + (of_last < 32 ? of_last : 32);
-    }
-};
-
-// Blocks of a kernel that runs raster_warp: what fits the device at once.
-[[nodiscard]] inline unsigned raster_blocks(std::uint64_t num_triangles, int per_multiprocessor = raster_min_blocks) {
-    const std::uint64_t batches = (num_triangles + raster_threads - 1) / raster_threads;
-    const std::uint64_t most =
-        static_cast<std::uint64_t>(num_multiprocessors()) * static_cast<unsigned>(per_multiprocessor);
-    return static_cast<unsigned>(batches < most ? batches : most);
 }
 
 } // namespace voxelpipe::device

@@ -65,7 +65,7 @@ __device__ void merge_cells(const image_column<Image>& column, int offset, unsig
     constexpr unsigned ways = fit < resolve_warps ? fit : resolve_warps; // warps that read
     __shared__ unsigned founds[resolve_warps];
     cell* const cells = reinterpret_cast<cell*>(memory);
-    const unsigned warp = threadIdx.x / 32, lane = threadIdx.x % 32;
+    const unsigned warp = warp_in_block(), lane = threadIdx.x % 32;
     __syncthreads(); // the last use of the memory is over
     cell merged{};
     if (warp < ways) {

@@ -66,7 +66,7 @@ struct share_buffers {
 __device__ inline unsigned long long block_sum(unsigned long long value) {
     __shared__ unsigned long long partial[32];
     for (int step = 16; step > 0; step /= 2) value += __shfl_down_sync(0xffffffffu, value, step);
-    const unsigned warp = threadIdx.x / 32, lane = threadIdx.x % 32;
+    const unsigned warp = warp_in_block(), lane = threadIdx.x % 32;
     __syncthreads(); // the last use of `partial` is over
     if (lane == 0) partial[warp] = value;
     __syncthreads();

@@ -1,0 +1,192 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Direct raster for targets that hold values. Where bits are tested before they are written, and mostly are set
+// already, a value takes an atomic for every fragment: neighbouring triangles have to be drawn at about the same time,
+// while their voxels are in the cache. So one kernel does all small triangles, and those of a kind wait within the
+// block until there is a full warp of them; only what is more than one thread's work is handed on (triangle_lists.cuh).
+
+#include <voxelpipe/device/large_raster.cuh>
+#include <voxelpipe/device/small_raster.cuh>
+#include <voxelpipe/device/triangle_lists.cuh>
+
+namespace voxelpipe::device {
+
+inline constexpr int block_min_blocks = 5; // per multiprocessor: registers for that many
+
+// Triangles by their vertices, each in a column of words.
+struct triangle_queue {
+    std::int32_t q[9][queue_places];
+};
+
+// What one warp keeps in shared memory.
+struct warp_queues {
+    triangle_queue cubes, smalls;       // bounding boxes of up to 2 x 2 x 2 voxels; other small ones
+    std::uint32_t larges[queue_places]; // numbers of triangles that are loaded again
+};
+
+template <class Call>
+__device__ __noinline__ core::triangle_class cut_and_push(const Call& call, std::uint32_t triangle) {
+    unsigned long long records = 0;
+    const core::triangle_class kind = find_records(call, triangle, records);
+    if (kind == core::triangle_class::drawn) call.lists.push_cut_alone(triangle, records);
+    return kind;
+}
+
+// The work of a warp, from the mesh to a sink. Every warp has its own queues: no thread waits for another warp, and the
+// numbers that wait are registers that all lanes agree on.
+template <class Call>
+struct block_warp {
+    static constexpr bool thin = Call::rule == coverage::thin;
+    using triangle_class = core::triangle_class;
+    using sink_type = typename Call::sink;
+
+    const Call& call;
+    warp_queues& queues;
+    sink_type& sink;
+    int lane = static_cast<int>(threadIdx.x) % 32;
+    int num_cubes = 0, num_smalls = 0, num_larges = 0;
+
+    __device__ VOXELPIPE_INLINE static void put(triangle_queue& queue, int at, const near_triangle& r) {
+        for (int k = 0; k < 9; ++k) queue.q[k][at] = r.q[k / 3][k % 3];
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle take(const triangle_queue& queue, int at) const {
+        near_triangle r;
+        for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = queue.q[k][at];
+        r.is_near = true;
+        r.find_box(call.in.fraction);
+        return r;
+    }
+    // The last 32 that wait, one a lane; all lanes take part.
+    template <class Raster>
+    __device__ VOXELPIPE_INLINE void drain(const warp_queues& from, int& count, Raster&& raster) {
+        __syncwarp();
+        raster(from, count - 32 + static_cast<int>(threadIdx.x % 32));
+        __syncwarp();
+        count -= 32;
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE auto cube_of_queue() {
+        return [this](const warp_queues& from, int at)
+                   VOXELPIPE_INLINE_LAMBDA { raster_cube<Call::rule>(call.in, take(from.cubes, at), sink); };
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE auto small_of_queue() {
+        return [this](const warp_queues& from, int at)
+                   VOXELPIPE_INLINE_LAMBDA { raster_small<Call::rule>(call.in, take(from.smalls, at), sink); };
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE auto large_of_queue() {
+        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
+            raster_small<Call::rule>(call.in, load_near(call.in, call.in.source.triangle(from.larges[at])), sink);
+        };
+    }
+
+    // The lane's triangle i, where there is one.
+    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, const glm::uvec3& index) {
+        bool is_quad = false, is_inside = false, waits = false, is_big = false;
+        int most = 0;
+        near_triangle r;
+        if (valid) {
+            r = load_near(call.in, index);
+            most = r.most();
+            is_big = !r.is_near || most > most_medium_side;
+            is_inside = r.is_inside(call.in.extent);
+            if (!is_big && !is_inside && r.template is_outside<Call::rule>(call.in.extent))
+                sink.drop(triangle_class::outside);
+            else
+                waits = !is_big;
+            if constexpr (!thin) {
+                is_quad = waits && most <= 2 && core::min3(r.last[0], r.last[1], r.last[2]) == 0;
+                waits = waits && !is_quad;
+            }
+        }
+        if constexpr (!thin)
+            if (is_quad) raster_quad(call.in, r, is_inside, sink);
+        if (__any_sync(0xffffffffu, waits || is_big)) {
+            const int kind = waits ? kind_of<Call::rule>(r, most) : -1;
+            const int cube_at = take_place(kind == cube_triangles, num_cubes);
+            if (kind == cube_triangles) put(queues.cubes, cube_at, r);
+            const int small_at = take_place(kind == small_triangles, num_smalls);
+            if (kind == small_triangles) put(queues.smalls, small_at, r);
+            const int large_at = take_place(kind == large_triangles, num_larges);
+            if (kind == large_triangles) queues.larges[large_at] = i;
+            call.lists.push(medium_triangles, kind == medium_triangles, i);
+            if (is_big) {
+                const triangle_class none = cut_and_push(call, i);
+                if (none != triangle_class::drawn) sink.drop(none);
+            }
+        }
+        __syncwarp();
+    }
+
+    // All batches of this warp, then what is left in the queues of the block's warps, together. All threads of the
+    // block take part. Returns how many triangles the warp looked at.
+    template <int Warps>
+    __device__ VOXELPIPE_INLINE unsigned run(const warp_queues (&all)[Warps], int (&left)[3][Warps]) {
+        const std::uint32_t step = gridDim.x * Warps * 32;
+        // The indices of a batch are loaded while the batch before it is worked on.
+        const auto load_index = [&](std::uint32_t i) {
+            return i < call.in.num_triangles ? call.in.source.triangle(i) : glm::uvec3(0);
+        };
+        const std::uint32_t begin = blockIdx.x * Warps * 32 + threadIdx.x / 32 * 32;
+        std::uint32_t first = begin;
+        glm::uvec3 index = load_index(first + static_cast<unsigned>(lane));
+        for (; first < call.in.num_triangles; first += step) {
+            const glm::uvec3 next = load_index(first + step + static_cast<unsigned>(lane));
+            const std::uint32_t i = first + static_cast<unsigned>(lane);
+            batch(i, i < call.in.num_triangles && sink.check(index), index);
+            index = next;
+            if (num_cubes >= 32) drain(queues, num_cubes, cube_of_queue());
+            if (num_smalls >= 32) drain(queues, num_smalls, small_of_queue());
+            if (num_larges >= 32) drain(queues, num_larges, large_of_queue());
+        }
+        if (lane == 0) {
+            left[0][threadIdx.x / 32] = num_cubes;
+            left[1][threadIdx.x / 32] = num_smalls;
+            left[2][threadIdx.x / 32] = num_larges;
+        }
+        __syncthreads();
+        const auto rest = [&](const int(&counts)[Warps], auto&& raster_one) {
+            int at = static_cast<int>(threadIdx.x), w = 0; // fewer than 32 a warp are left
+            while (w < Warps && at >= counts[w]) at -= counts[w++];
+            feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                if (w < Warps) raster_one(all[w], at);
+            });
+        };
+        rest(left[0], cube_of_queue());
+        rest(left[1], small_of_queue());
+        // A lane each, the larger ones would keep a few lanes busy long after all others.
+        int num = 0;
+        for (const int n : left[2]) num += n;
+        for (int start = 0; start < num; start += Warps * 32 / medium_lanes) {
+            int at = start + static_cast<int>(threadIdx.x) / medium_lanes, w = 0;
+            while (w < Warps && at >= left[2][w]) at -= left[2][w++];
+            raster_medium<Call::rule>(call.in, w < Warps, w < Warps ? all[w].larges[at] : 0, sink);
+        }
+
+        if (begin >= call.in.num_triangles) return 0;
+        const std::uint32_t batches = (call.in.num_triangles - begin - 1) / step + 1;
+        const std::uint32_t of_last = call.in.num_triangles - (begin + (batches - 1) * step);
+        return (batches - 1) * 32 + (of_last < 32 ? of_last : 32);
+    }
+};
+
+template <class Call>
+__global__ __launch_bounds__(raster_threads,
+                             block_min_blocks) void block_raster_kernel(const __grid_constant__ Call call,
+                                                                        pipeline_state* state) {
+    using sink_type = typename Call::sink;
+    __shared__ warp_queues queues[raster_warps];
+    __shared__ typename sink_type::memory memories[raster_warps];
+    __shared__ int left[3][raster_warps];
+    __shared__ unsigned dropped[num_triangle_classes];
+    if (state->index_error != 0) return;
+    if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
+    __syncthreads();
+    sink_type sink(call, dropped, memories[threadIdx.x / 32]);
+    block_warp<Call> warp{call, queues[threadIdx.x / 32], sink};
+    const unsigned looked_at = warp.run(queues, left);
+    sink.finish(state);
+    count_looked_at(looked_at, dropped, state);
+}
+
+} // namespace voxelpipe::device

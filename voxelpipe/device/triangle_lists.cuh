@@ -1,0 +1,195 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Triangles that one kernel hands on to the next, by what they cost: lists in global memory, in order of arrival,
+// filled by warps that first gather 32 of a kind in shared memory, so that neither an atomic nor a store is for one
+// triangle.
+
+#include <voxelpipe/device/small_raster.cuh>
+#include <voxelpipe/device/work_share.cuh>
+
+#include <algorithm>
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+// Bounding boxes: at most 2 x 2 x 2 voxels; one thread's work; the same, but much; several lanes' work.
+enum triangle_kind : int { cube_triangles, small_triangles, large_triangles, medium_triangles, num_triangle_kinds };
+
+// What a triangle costs: voxels of its bounding box, or for thin coverage the columns that it can touch at most.
+// `most`: the box's longest side.
+template <coverage Rule>
+[[nodiscard]] __device__ VOXELPIPE_INLINE int kind_of(const near_triangle& r, int most) {
+    constexpr bool thin = Rule == coverage::thin;
+    if (most <= 2) return cube_triangles;
+    const int x = r.last[0] + 1, y = r.last[1] + 1, z = r.last[2] + 1;
+    const int cost = thin ? core::max3(x * y, y * z, z * x) : x * y * z;
+    if (cost <= (thin ? small_columns : small_cells) && (thin || most <= most_side)) return small_triangles;
+    return cost <= (thin ? most_columns : most_cells) ? large_triangles : medium_triangles;
+}
+
+inline constexpr int num_triangle_classes = 5;
+
+// Adds up what the sinks of a block dropped, by triangle_class, and says how many that were. By one thread.
+__device__ inline unsigned count_dropped(const unsigned (&dropped)[num_triangle_classes], pipeline_state* state) {
+    using core::triangle_class;
+    const auto number = [&](triangle_class kind, unsigned long long* total) {
+        const unsigned n = dropped[static_cast<int>(kind)];
+        if (n != 0) atomicAdd(total, static_cast<unsigned long long>(n));
+        return n;
+    };
+    return number(triangle_class::nonfinite, &state->nonfinite) + number(triangle_class::too_far, &state->too_far) +
+           number(triangle_class::zero_area, &state->zero_area) + number(triangle_class::outside, &state->outside);
+}
+// The same, and the triangles that are drawn, from what each warp looked at. All threads take part.
+__device__ inline void count_looked_at(unsigned looked_at, const unsigned (&dropped)[num_triangle_classes],
+                                       pipeline_state* state) {
+    const unsigned long long all = block_sum(threadIdx.x % 32 == 0 ? looked_at : 0);
+    if (threadIdx.x != 0) return;
+    const unsigned none = count_dropped(dropped, state);
+    if (all != none) atomicAdd(&state->drawn, all - none);
+}
+
+struct triangle_lists {
+    // Two lists share an array, from both ends: a triangle is in one list only.
+    std::uint32_t* arrays[num_triangle_kinds / 2];
+    unsigned long long* lengths; // [num_triangle_kinds]
+    std::uint32_t capacity;      // of an array
+
+    // Triangles that are cut into pieces, each with the number of its first record of 32 pieces: a warp finds the
+    // triangle of a record by bisection. `next` packs how many triangles and records there are, so that one atomic
+    // places both.
+    static constexpr int record_bits = 36;
+    std::uint32_t* cut;
+    unsigned long long* first_records;
+    unsigned long long* next;
+
+    // Those that a block of the first kernel leaves until its end; each has a part of its own.
+    std::uint32_t* left;
+
+    [[nodiscard]] static triangle_lists take(arena& memory, std::size_t num_triangles) {
+        triangle_lists l{};
+        // Parts are whole batches of all threads of a persistent kernel.
+        const auto threads = static_cast<std::size_t>(num_multiprocessors()) * 2048;
+        l.left = memory.take<std::uint32_t>(num_triangles + std::min(threads, num_triangles + 2048));
+        for (auto& array : l.arrays) array = memory.take<std::uint32_t>(num_triangles);
+        l.capacity = static_cast<std::uint32_t>(num_triangles);
+        l.cut = memory.take<std::uint32_t>(num_triangles);
+        l.first_records = memory.take<unsigned long long>(num_triangles);
+        return l;
+    }
+    // With its counters, which are zeroed.
+    [[nodiscard]] triangle_lists with(pipeline_state* state) const {
+        triangle_lists l = *this;
+        l.lengths = state->handed_on.lengths;
+        l.next = &state->handed_on.cut;
+        return l;
+    }
+    [[nodiscard]] static constexpr bool holds(std::uint64_t triangles, std::uint64_t records_each) {
+        return triangles < (std::uint64_t{1} << (64 - record_bits)) &&
+               triangles * records_each < (std::uint64_t{1} << record_bits);
+    }
+    __device__ std::uint32_t& at(int kind, unsigned long long i) const {
+        std::uint32_t* const array = arrays[kind / 2];
+        return kind % 2 == 0 ? array[i] : array[capacity - 1 - i];
+    }
+    // One triangle, by one lane.
+    __device__ void push_cut_alone(std::uint32_t triangle, unsigned long long records) const {
+        const unsigned long long place = atomicAdd(next, (1ull << record_bits) + records);
+        cut[place >> record_bits] = triangle;
+        first_records[place >> record_bits] = place & ((1ull << record_bits) - 1);
+    }
+    // A triangle of each lane that wants it in a list. All lanes take part.
+    __device__ VOXELPIPE_INLINE void push(int kind, bool wanted, std::uint32_t triangle) const {
+        const unsigned who = __ballot_sync(0xffffffffu, wanted);
+        if (who == 0) return;
+        const unsigned lane = threadIdx.x % 32;
+        unsigned long long first = 0;
+        if (lane == 0) first = atomicAdd(&lengths[kind], static_cast<unsigned long long>(__popc(who)));
+        first = __shfl_sync(0xffffffffu, first, 0);
+        if (wanted) at(kind, first + static_cast<unsigned>(__popc(who & ((1u << lane) - 1)))) = triangle;
+    }
+    // The triangle of each lane that has records for it. All lanes take part.
+    __device__ void push_cut(std::uint32_t triangle, unsigned long long records) const {
+        const unsigned lane = threadIdx.x % 32;
+        const unsigned long long mine = (records != 0 ? 1ull << record_bits : 0) + records;
+        unsigned long long sum = mine;
+        for (unsigned d = 1; d < 32; d *= 2) {
+            const unsigned long long other = __shfl_up_sync(0xffffffffu, sum, d);
+            if (lane >= d) sum += other;
+        }
+        unsigned long long first = 0;
+        if (lane == 31 && sum != 0) first = atomicAdd(next, sum);
+        const unsigned long long place = __shfl_sync(0xffffffffu, first, 31) + sum - mine;
+        if (records == 0) return;
+        cut[place >> record_bits] = triangle;
+        first_records[place >> record_bits] = place & ((1ull << record_bits) - 1);
+    }
+};
+
+inline constexpr int queue_places = 64; // up to 31 wait when a warp brings up to 32 more
+
+// The place of a lane that wants one behind the `count` that wait; adds the newcomers. All lanes take part.
+__device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
+    const unsigned who = __ballot_sync(0xffffffffu, wanted);
+    const int place = count + __popc(who & ((1u << threadIdx.x % 32) - 1));
+    count += __popc(who);
+    return place;
+}
+
+// What of each kind waits in a warp for its list; the numbers are registers that all lanes agree on.
+struct kind_queues {
+    std::uint32_t triangles[num_triangle_kinds][queue_places];
+};
+
+struct kind_writer {
+    const triangle_lists& lists;
+    kind_queues& queues;
+    int waiting[num_triangle_kinds] = {};
+
+    // Every lane with a kind from 0 on adds its triangle. All lanes take part.
+    __device__ VOXELPIPE_INLINE void push(int kind, std::uint32_t triangle) {
+        for (int k = 0; k < num_triangle_kinds; ++k) {
+            const int place = take_place(kind == k, waiting[k]);
+            if (kind == k) queues.triangles[k][place] = triangle;
+            if (waiting[k] < 32) continue;
+            __syncwarp();
+            waiting[k] -= 32;
+            const unsigned long long first = take(k, 32);
+            const unsigned lane = threadIdx.x % 32;
+            lists.at(k, first + lane) = queues.triangles[k][waiting[k] + static_cast<int>(lane)];
+            __syncwarp();
+        }
+    }
+    // What is left in the queues of all warps of a block. All threads take part; `left` is shared memory.
+    // queues_of(w): those of warp w.
+    template <int Warps, class QueuesOf>
+    __device__ VOXELPIPE_INLINE void finish(const QueuesOf& queues_of, int (&left)[num_triangle_kinds][Warps]) {
+        const int lane = static_cast<int>(threadIdx.x) % 32, warp = static_cast<int>(threadIdx.x) / 32;
+        if (lane == 0)
+            for (int k = 0; k < num_triangle_kinds; ++k) left[k][warp] = waiting[k];
+        __syncthreads();
+        for (int k = warp; k < num_triangle_kinds; k += Warps) {
+            unsigned n = 0;
+            for (int w = 0; w < Warps; ++w) n += static_cast<unsigned>(left[k][w]);
+            if (n == 0) continue;
+            unsigned long long first = take(k, n);
+            for (int w = 0; w < Warps; ++w) {
+                if (lane < left[k][w])
+                    lists.at(k, first + static_cast<unsigned>(lane)) = queues_of(w).triangles[k][lane];
+                first += static_cast<unsigned>(left[k][w]);
+            }
+        }
+    }
+
+private:
+    // Room for n of a kind.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long take(int kind, unsigned n) const {
+        unsigned long long first = 0;
+        if (threadIdx.x % 32 == 0) first = atomicAdd(&lists.lengths[kind], static_cast<unsigned long long>(n));
+        return __shfl_sync(0xffffffffu, first, 0);
+    }
+};
+
+} // namespace voxelpipe::device
