@@ -89,6 +89,9 @@ private:
     }
 };
 
+// For fragment lists, a payload.
+using any_double = any_values<vp::target<double, vp::blend::replace>>;
+
 // Every cell of the targets, both coverages, cleared and loaded.
 template <class... Targets>
 void compare_cells() {

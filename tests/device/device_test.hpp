@@ -89,6 +89,11 @@ inline mesh_data mixed_triangles(int count, float size, std::uint32_t seed) {
     return m;
 }
 
+inline mesh_data translated(mesh_data m, glm::vec3 by) {
+    for (glm::vec3& p : m.positions) p += by;
+    return m;
+}
+
 // A vertex shader that does not run on the spot: its positions are stored first.
 struct shift {
     float by;
