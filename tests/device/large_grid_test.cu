@@ -51,10 +51,7 @@ void compare_in_place(const mesh_data& m, const vp::grid& g, const Shader& shade
 // Triangles through the whole of a grid of 2048^3, the last layers and the last corner among them.
 mesh_data far_triangles() {
     mesh_data m = mixed_triangles(3000, 2048.0f, 80);
-    mesh_data corner = mixed_triangles(500, 40.0f, 81);
-    for (glm::vec3& p : corner.positions) p += glm::vec3(2010.0f);
-    for (std::size_t t = 0; t < corner.triangles.size(); ++t)
-        add_triangle(m, corner.positions[3 * t], corner.positions[3 * t + 1], corner.positions[3 * t + 2]);
+    append(m, translated(mixed_triangles(500, 40.0f, 81), glm::vec3(2010.0f)));
     add_triangle(m, {0.0f, 0.0f, 2047.5f}, {2048.0f, 0.0f, 2047.9f}, {0.0f, 2048.0f, 2047.1f});
     add_triangle(m, {-500.0f, -400.0f, -300.0f}, {5000.0f, 100.0f, 2500.0f}, {10.0f, 5000.0f, 2600.0f});
     return m;
