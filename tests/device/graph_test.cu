@@ -243,6 +243,21 @@ TEST(Graph, ListsOfSeveralDrawsAndLargeGridsOnStreamsAtOnce) {
     compare_list_calls<double>(any_double{}, 130);
 }
 
+TEST(Lists, AConstantPayloadTakesMemoryOnceTheListsAreDone) {
+    vp::cuda_backend be;
+    const mesh_data m = mixed_triangles(500, 20.0f, 108);
+    const vp::grid g = box_grid({20, 20, 20});
+    const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+    const vp::workspace_limits limits{0, 0, 1 << 16, 0};
+    const auto bytes = [&]<class Payload>(const vp::abuffer_view<Payload>& lists, const auto& fs) {
+        const vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_cvref_t<decltype(fs)>> d{mesh.view(), {}, fs};
+        return vp::workspace_bytes(std::span(&d, 1), g, lists, {}, limits);
+    };
+    const std::size_t without = bytes(vp::abuffer_view<void>{}, vp::constant(true));
+    ASSERT_GT(without, 0u);
+    EXPECT_EQ(bytes(vp::abuffer_view<double>{}, vp::constant(0.5)), without + limits.fragments * sizeof(double));
+}
+
 TEST(Lists, NoMemoryForTheCopyIsInTheStatus) {
     counting_resource resource;
     vp::cuda_backend be{nullptr, resource};

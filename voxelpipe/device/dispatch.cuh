@@ -90,11 +90,10 @@ private:
     }
 };
 
-// Fragment lists with payloads of one type.
+// Fragment lists with payloads of one type. Where all fragments have one payload, it takes no memory.
 template <class Key, class Payload>
 [[nodiscard]] list_buffers<Key, Payload> take_lists(arena& memory, std::uint64_t num_voxels,
-                                                    unsigned long long capacity) {
-    constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
+                                                    unsigned long long capacity, bool one_payload = false) {
     list_buffers<Key, Payload> b{};
     for (int i = 0; i < 2; ++i) {
         b.keys[i] = memory.take<Key>(capacity);
@@ -102,7 +101,7 @@ template <class Key, class Payload>
     }
     b.bits = key_bits(num_voxels);
     b.storage_bytes = std::max(select_bytes<Key>(capacity), sort_bytes<Key>(capacity, b.bits));
-    if constexpr (has_payload) {
+    if (!std::is_same_v<Payload, no_payload> && !one_payload) {
         b.primitives = memory.take<std::uint32_t>(capacity);
         b.payloads = memory.take<Payload>(capacity);
     }
@@ -339,11 +338,11 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
         state = memory.take<pipeline_state>(1);
         if constexpr (Run) check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
-        const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
         if constexpr (core::is_solid<FragmentShader> && sizeof(Key) == sizeof(std::uint32_t)) {
             if (is_listable(draws.size(), num_primitives, core::make_snap_transform(g).fraction, g.extent))
-                return go_direct<Rule, Run>(memory, lists, state, stream);
+                return go_direct<Rule, Run>(memory, state, stream);
         }
+        const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
         const scene_buffers buffers(memory, draws);
         const list_memory share(memory, num_primitives, limits.fragment_records);
         if constexpr (Run) {
@@ -357,11 +356,12 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
 
 private:
     // One draw of a constant shader.
-    template <coverage Rule, bool Run, class Key>
-    [[nodiscard]] fragment_lists<Key, Payload> go_direct(arena& memory, const list_buffers<Key, Payload>& lists,
-                                                         pipeline_state* state, cudaStream_t stream) const {
+    template <coverage Rule, bool Run>
+    [[nodiscard]] fragment_lists<std::uint32_t, Payload> go_direct(arena& memory, pipeline_state* state,
+                                                                   cudaStream_t stream) const {
         constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
         const draw_type& d = draws[0];
+        const auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
         core::snapped_position* const positions =
             memory.take<core::snapped_position>(on_the_spot ? 0 : d.mesh.positions.size());
         const large_list large = large_list::take(memory, num_primitives);
@@ -383,7 +383,7 @@ private:
                 raster(stored_source{{d.mesh.triangles.data(), positions, 0, num_vertices}});
             }
             end_stage(clock, &stage_times::fine_raster);
-            fragment_lists<Key, Payload> sorted = sort_unordered(lists, order, state, limits, stream, clock);
+            fragment_lists<std::uint32_t, Payload> sorted = sort_unordered(lists, order, state, limits, stream, clock);
             if constexpr (!std::is_same_v<Payload, no_payload>)
                 sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
             return sorted;
