@@ -262,14 +262,18 @@ TEST(Lists, NoMemoryForTheCopyIsInTheStatus) {
     counting_resource resource;
     vp::cuda_backend be{nullptr, resource};
     const mesh_data m = mixed_triangles(500, 20.0f, 107);
-    const vp::grid g = box_grid({20, 20, 20});
+    const vp::grid g = box_grid({20, 20, 20}), other = box_grid({19, 20, 20});
     const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
     vp::abuffer<vp::cuda_backend> first{be}, second{be};
     ASSERT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), first).ok());
+    const auto before = first.to_host(be);
     resource.most = resource.live; // the workspace is there already
-    const vp::status s = vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), second);
-    EXPECT_EQ(s.code, vp::status_code::out_of_memory);
-    EXPECT_EQ(s.where, vp::stage::abuffer_emit);
+    for (auto* lists : {&first, &second}) {
+        const vp::status s = vp::voxelize(be, mesh, other, vp::passthrough{}, vp::constant(true), *lists);
+        EXPECT_EQ(s.code, vp::status_code::out_of_memory);
+        EXPECT_EQ(s.where, vp::stage::abuffer_emit);
+    }
+    expect_same_on_host(before, first.to_host(be));
     EXPECT_EQ(second.num_voxels(), 0u);
     EXPECT_EQ(second.num_fragments(), 0u);
 }

@@ -174,21 +174,22 @@ public:
                              abuffer<cuda_backend, Payload>& lists, const voxelize_options& options,
                              std::uint64_t triangles_in) {
         using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
-        lists = abuffer<cuda_backend, Payload>(*this);
+        abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
         status s =
             attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
                     [&](const device::capacities& limits, device::pipeline_state& state, device::stage_clock* clock) {
                         const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
                         const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
                         if (options.rule == coverage::thin)
-                            small ? fill<coverage::thin, std::uint32_t>(call, lists, state)
-                                  : fill<coverage::thin, std::uint64_t>(call, lists, state);
+                            small ? fill<coverage::thin, std::uint32_t>(call, made, state)
+                                  : fill<coverage::thin, std::uint64_t>(call, made, state);
                         else
-                            small ? fill<coverage::conservative, std::uint32_t>(call, lists, state)
-                                  : fill<coverage::conservative, std::uint64_t>(call, lists, state);
+                            small ? fill<coverage::conservative, std::uint32_t>(call, made, state)
+                                  : fill<coverage::conservative, std::uint64_t>(call, made, state);
                     });
         if (s.ok()) {
-            lists.extent = g.extent;
+            made.extent = g.extent;
+            lists = std::move(made);
             s.counts.fragments = lists.num_fragments();
             s.counts.voxels = lists.num_voxels();
         }
