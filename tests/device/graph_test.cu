@@ -204,6 +204,7 @@ void compare_overflowing_lists(const FragmentShader& fs, std::uint32_t seed) {
             expect_lists<Payload>({m}, g, fs, {}, lists.to_host(be), s);
         } else {
             ASSERT_EQ(s.code, vp::status_code::capacity_exceeded);
+            EXPECT_EQ(s.where, vp::stage::abuffer_emit);
             EXPECT_GT(s.required.fragments, 10u);
             EXPECT_EQ(lists.to_host(be).voxels.size(), 0u);
             EXPECT_EQ(lists.to_host(be).primitives.size(), 0u);

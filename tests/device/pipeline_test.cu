@@ -317,6 +317,7 @@ void start_too_small(vp::workspace_limits limits) {
         done = s.ok();
         if (!done) {
             ASSERT_EQ(s.code, vp::status_code::capacity_exceeded);
+            EXPECT_EQ(s.where, vp::stage::coarse_raster);
             EXPECT_GT(s.required.tile_pairs, 10u);
             for (const float v : vp::get<0>(fb).to_host(be)) ASSERT_EQ(std::bit_cast<std::uint32_t>(v), 0x5a5a5a5au);
         }

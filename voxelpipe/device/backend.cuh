@@ -36,6 +36,22 @@ namespace device {
     return s;
 }
 
+// Where a call that has_failed for a capacity met it.
+[[nodiscard]] inline stage find_overflow(const pipeline_state& s, const capacities& c) {
+    return s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ? stage::coarse_raster : stage::abuffer_emit;
+}
+
+// Runs f, which launches stages. A failure that names none, of a query in between, is put down to the last of them:
+// errors of kernels come late.
+template <class F>
+auto launch_until(stage last, F&& f) {
+    try {
+        return f();
+    } catch (const cuda_failure& e) {
+        throw cuda_failure{e.error, e.where == stage::validate ? last : e.where};
+    }
+}
+
 } // namespace device
 
 // Memory that a cuda_backend keeps between calls, released in stream order. Moves with its backend, is never shared.
@@ -235,7 +251,7 @@ private:
                 }
                 // A pass that overflowed its records did not count all of its cells: the next try may need a third.
                 if (tries == 4 || needed[0] > core::most_numbered || needed[2] > core::most_numbered) {
-                    s = core::failure(status_code::out_of_memory, stage::coarse_raster);
+                    s = core::failure(status_code::out_of_memory, device::find_overflow(state, limits));
                     s.required = {state.tile_pairs, state.list_fragments, 0};
                     break;
                 }
@@ -260,10 +276,9 @@ private:
         return workspace_.data();
     }
 
-    // `where`: the last stage of the call, which a failure that shows only here is put down to.
-    void read_state(const device::pipeline_state* d_state, device::pipeline_state& state, stage where) const {
-        device::check(cudaMemcpyAsync(&state, d_state, sizeof(state), cudaMemcpyDeviceToHost, stream), where);
-        device::check(cudaStreamSynchronize(stream), where);
+    void read_state(const device::pipeline_state* d_state, device::pipeline_state& state) const {
+        device::check(cudaMemcpyAsync(&state, d_state, sizeof(state), cudaMemcpyDeviceToHost, stream));
+        device::check(cudaStreamSynchronize(stream));
     }
 
     template <coverage Rule, class Call>
@@ -272,9 +287,11 @@ private:
         device::arena plan;
         call.template go<Rule, false>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
-        if (call.clock != nullptr) call.clock->start();
-        call.template go<Rule, true>(memory, d_state, stream);
-        read_state(d_state, state, stage::tile_resolve);
+        device::launch_until(call.last_stage(), [&] {
+            if (call.clock != nullptr) call.clock->start();
+            call.template go<Rule, true>(memory, d_state, stream);
+            read_state(d_state, state);
+        });
     }
 
     template <coverage Rule, class Key, class Call, class Payload>
@@ -283,13 +300,16 @@ private:
         device::arena plan;
         (void)call.template go<Rule, false, Key>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
-        if (call.clock != nullptr) call.clock->start();
-        const auto sorted = call.template go<Rule, true, Key>(memory, d_state, stream);
-        read_state(d_state, state, stage::abuffer_emit);
-        if (device::has_failed(state, call.limits)) return;
         using payload = payload_storage<Payload>;
         constexpr bool has_payload = abuffer<cuda_backend, Payload>::has_payload;
         constexpr stage where = stage::abuffer_emit;
+        const auto sorted = device::launch_until(where, [&] {
+            if (call.clock != nullptr) call.clock->start();
+            const auto lists_in_workspace = call.template go<Rule, true, Key>(memory, d_state, stream);
+            read_state(d_state, state);
+            return lists_in_workspace;
+        });
+        if (device::has_failed(state, call.limits)) return;
         buffer<std::uint64_t> voxels(*this, state.list_voxels, where);
         buffer<std::uint64_t> offsets(*this, state.list_voxels == 0 ? 0 : state.list_voxels + 1, where);
         buffer<std::uint32_t> primitives(*this, state.list_fragments, where);

@@ -168,6 +168,14 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
             go_with<Rule, Run, std::uint64_t>(memory, state, stream);
     }
 
+    // Of this call: what a failure that shows only at its end is put down to.
+    [[nodiscard]] stage last_stage() const {
+        if constexpr (can_be_direct<FragmentShader, Framebuffer>) {
+            if (is_direct_call()) return stage::fine_raster;
+        }
+        return groups::has_ordered ? stage::fine_raster : stage::tile_resolve;
+    }
+
 private:
     // Which target can tell first touches; -1 where none can.
     [[nodiscard]] int find_counting_target() const {
