@@ -13,17 +13,11 @@ namespace blend = voxelpipe::blend;
 
 namespace {
 
-struct newest {
-    static constexpr bool order_free = false;
-    VOXELPIPE_HD std::uint32_t identity() const { return 0; }
-    VOXELPIPE_HD std::uint32_t combine(std::uint32_t a, std::uint32_t b) const { return a * 3 + b; }
-};
-
 // Drawn in tiles, and one that is folded in order.
 template <template <class...> class Pipeline, class... First>
 using with_every_kind = Pipeline<First..., vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>,
                                  vp::target<double, blend::max>, vp::target<std::uint32_t, blend::replace>,
-                                 vp::target<std::uint32_t, newest>>;
+                                 vp::target<std::uint32_t, chain>>;
 template <class... Targets>
 struct on_both {
     static void compare(const mesh_data& m, const vp::grid& g, vp::coverage rule) {
