@@ -43,16 +43,26 @@ TEST(Balance, OneTriangleOverTheWholeGrid) {
 }
 
 TEST(Balance, TwoMillionTrianglesInOneVoxel) {
-    std::mt19937 random(50);
-    std::uniform_real_distribution<float> inside(0.1f, 0.9f);
-    mesh_data m;
-    const auto point = [&] {
-        return glm::vec3(17.0f, 5.0f, 30.0f) + glm::vec3(inside(random), inside(random), inside(random));
-    };
-    for (int i = 0; i < 2000000; ++i) add_triangle(m, point(), point(), point());
+    const mesh_data m = triangles_in_voxel(2000000, {17.0f, 5.0f, 30.0f}, 50);
     compare(m, box_grid({64, 64, 64}));
     expect_same_lists<void>(m, box_grid({64, 64, 64}), vp::passthrough{}, vp::constant(true),
                             vp::coverage::conservative);
+}
+
+// Folds: a voxel of 200,000 fragments, a few and very many of some thousands beside each other, and short ones.
+TEST(Balance, LongVoxelsOfBlendsThatAreFolded) {
+    mesh_data m = triangles_in_voxel(200000, {17.0f, 5.0f, 30.0f}, 56);
+    append(m, mixed_triangles(60000, 64.0f, 57));
+    for (std::uint32_t x = 0; x < 60; ++x) // the first of the grid, so that they fall to one block
+        append(m, triangles_in_voxel(2200, {static_cast<float>(x), 0.0f, 0.0f}, 100 + x));
+    for (std::uint32_t x = 0; x < 5; ++x)
+        append(m, triangles_in_voxel(4000, {9.0f * static_cast<float>(x), 20.0f, 50.0f}, 200 + x));
+    std::mt19937 random(58);
+    std::shuffle(m.triangles.begin(), m.triangles.end(), random);
+    for (const vp::coverage rule : both_rules) {
+        expect_same<chained, joined>(m, box_grid({64, 64, 64}), vp::passthrough{}, listed_values{}, rule);
+        expect_same<chained, joined>(m, box_grid({64, 64, 64}), vp::passthrough{}, listed_values{}, rule, start::load);
+    }
 }
 
 TEST(Balance, GridLongSlivers) {

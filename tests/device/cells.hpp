@@ -112,6 +112,28 @@ struct chain {
     VOXELPIPE_HD std::uint32_t combine(std::uint32_t a, std::uint32_t b) const { return mix_bits(a * 3 + b); }
 };
 
+// Values for both.
+using chained = vp::target<std::uint32_t, chain>;
+using joined = vp::target<extent_of, join>;
+struct listed_values {
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& f) const {
+        const std::uint32_t h = mix_bits(f.primitive + static_cast<std::uint32_t>(f.voxel.x + 64 * f.voxel.y));
+        const auto low = static_cast<std::int32_t>(h >> 8), high = static_cast<std::int32_t>(f.primitive);
+        return vp::outputs(h, extent_of{{low, f.voxel.x, f.axis}, {high, f.voxel.y, -low}}).discard_if(h % 7 == 0);
+    }
+};
+
+// Triangles within one voxel.
+inline mesh_data triangles_in_voxel(int count, glm::vec3 corner, std::uint32_t seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> inside(0.1f, 0.9f);
+    mesh_data m;
+    const auto point = [&] { return corner + glm::vec3(inside(random), inside(random), inside(random)); };
+    for (int i = 0; i < count; ++i) add_triangle(m, point(), point(), point());
+    return m;
+}
+
 // For fragment lists, a payload.
 using any_double = any_values<vp::target<double, vp::blend::replace>>;
 

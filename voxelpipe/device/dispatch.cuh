@@ -288,7 +288,7 @@ private:
                                         {!groups::has_ordered, !groups::has_ordered && options.count_voxels}, state,
                                         limits, stream, clock);
             if constexpr (groups::has_ordered)
-                fold(lists, state, typename groups::template indices<groups::ordered>{}, stream);
+                fold_ordered(lists, fb, options.count_voxels, state, limits, stream, clock);
         }
     }
 
@@ -301,15 +301,6 @@ private:
             return build_lists<Rule, all_values>(s, lists, share.with(state), state, limits, !in_tiles, stream, clock);
         else
             return {};
-    }
-
-    template <class Key, std::size_t... I>
-    void fold(const fragment_lists<Key, values>& lists, pipeline_state* state, std::index_sequence<I...>,
-              cudaStream_t stream) const {
-        fold_kernel<Key, values, Framebuffer, I...><<<fill_device(limits.fragments), threads_per_block, 0, stream>>>(
-            lists, fb, state, limits, options.count_voxels);
-        check(cudaGetLastError(), stage::fine_raster);
-        end_stage(clock, &stage_times::fine_raster);
     }
 };
 
