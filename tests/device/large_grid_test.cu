@@ -77,6 +77,23 @@ TEST(LargeGrid, ValuesOf2048CubedAreTheCpus) {
                                                            vp::coverage::conservative);
 }
 
+struct byte_chain {
+    static constexpr bool order_free = false;
+    VOXELPIPE_HD std::uint8_t identity() const { return 1; }
+    VOXELPIPE_HD std::uint8_t combine(std::uint8_t a, std::uint8_t b) const {
+        return static_cast<std::uint8_t>(a * 3u + b);
+    }
+};
+
+// The lists behind a blend that depends on the order number voxels with 64 bits here.
+TEST(LargeGrid, FoldsBeyond32BitsAreTheCpus) {
+    if (!has_memory(8, 12)) GTEST_SKIP() << "needs 8 GiB of GPU memory and 12 GiB of the host's";
+    mesh_data m = translated(mixed_triangles(400, 60.0f, 83), {2000.0f, 2000.0f, 990.0f});
+    add_triangle(m, {0.0f, 0.0f, 0.0f}, {2048.0f, 10.0f, 1030.0f}, {10.0f, 2048.0f, 1039.9f});
+    for (const vp::coverage rule : both_rules)
+        compare_in_place<vp::target<std::uint8_t, byte_chain>>(m, box_grid({2048, 2048, 1040}), by_voxel{}, rule);
+}
+
 // 10^5 slivers from face to face, most of them along an axis.
 mesh_data slivers(float size) {
     std::mt19937 random(82);
