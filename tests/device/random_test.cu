@@ -44,7 +44,7 @@ constexpr std::array targets{
         shaded<vp::target<glm::u8vec4, blend::max, vp::layout::planar>, vp::target<std::int16_t, blend::min>,
                vp::target<vp::half, blend::add>, vp::target<uint16_t, blend::bit_xor, vp::layout::tiled>>},
     way{"large values", shaded<vp::target<glm::dvec4, blend::replace, vp::layout::tiled>,
-                               vp::target<glm::dvec3, blend::add>, vp::target<float, blend::max>>},
+                               vp::target<double, blend::add>, vp::target<float, blend::max>>},
     way{"folded in order, beside tiles", shaded<vp::target<uint32_t, chain>, vp::target<uint64_t, blend::add_saturate>,
                                                 vp::target<vp::bit, blend::bit_and, vp::layout::tiled>>},
     way{"without tiles",
