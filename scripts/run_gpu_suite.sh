@@ -30,7 +30,7 @@ record="$results/$(date -u +%Y-%m-%dT%H%M%SZ).txt"
 {
     printf 'device: %s\ndriver: %s\nCUDA: %s\nclocks (SM, memory): %s\ncommit: %s\n\n' \
         "$device" "$driver" "$toolkit" "$clocks" "$commit"
-    printf '%-15s %-28s %8s %8s %8s\n' part program passed failed seconds
+    printf '%-15s %-28s %8s %8s %8s %8s\n' part program passed failed 'not run' seconds
 } >"$record"
 
 # Scenes are decoded beside the build, never inside the project.
@@ -52,18 +52,23 @@ decode_scenes() {
 }
 
 failures=0
-# run_program PART LABEL COMMAND...: counts what the program's tests say, and a crash or no end in time as a failure.
+not_run=0
+# run_program PART LABEL COMMAND...: counts what the program's tests say, and a crash or no end in time as a failure. A test
+# that is skipped, for want of memory or scenes, was not run: it is neither passed nor failed.
 run_program() {
-    local part=$1 name=$2 start=$SECONDS log passed failed status=0
+    local part=$1 name=$2 start=$SECONDS log passed failed skipped status=0
     shift 2
     log="build/gpu-$part-${name//[ ,]/-}.log"
     timeout "${VOXELPIPE_PROGRAM_SECONDS:-900}" "$@" >"$log" 2>&1 || status=$?
     passed="$(grep -cE '^\[       OK \]' "$log" || true)"
     failed="$(grep -E '^\[  FAILED  \]' "$log" | grep -cE 'ms\)$' || true)"
+    skipped="$(grep -E '^\[  SKIPPED \]' "$log" | grep -cE 'ms\)$' || true)"
     [[ $status -eq 0 || $failed -gt 0 ]] || failed=1
-    [[ $passed -gt 0 || $failed -gt 0 ]] || failed=1
-    printf '%-15s %-28s %8d %8d %8d\n' "$part" "$name" "$passed" "$failed" $((SECONDS - start)) | tee -a "$record"
+    [[ $passed -gt 0 || $failed -gt 0 || $skipped -gt 0 ]] || failed=1
+    printf '%-15s %-28s %8d %8d %8d %8d\n' "$part" "$name" "$passed" "$failed" "$skipped" $((SECONDS - start)) |
+        tee -a "$record"
     failures=$((failures + failed))
+    not_run=$((not_run + skipped))
     if [[ $failed -gt 0 ]]; then grep -vE '^\[ (RUN|      OK)' "$log" | head -n 40; fi
 }
 
@@ -131,6 +136,6 @@ for part in "${parts[@]}"; do
     esac
 done
 
-printf '\nfailures: %d\n' "$failures" | tee -a "$record"
+printf '\nfailures: %d\nnot run: %d\n' "$failures" "$not_run" | tee -a "$record"
 printf 'record: %s\n' "$record"
 [[ $failures -eq 0 ]]

@@ -106,7 +106,7 @@ public:
 };
 
 // Owns its lists on `Backend`; voxelize makes them as long as they must be. Empty before the first voxelize; after one
-// that failed they are as they were, or empty where a GPU backend had made room for the new ones.
+// that failed they are as they were. So the new lists are made before the old ones go, and memory has to hold both.
 template <class Backend, class Payload = void>
 class abuffer {
     static_assert(std::is_void_v<Payload> || std::is_trivially_copyable_v<Payload>,

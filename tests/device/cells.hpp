@@ -89,6 +89,54 @@ private:
     }
 };
 
+// Blends of a user's: order-free, and too large for an atomic.
+struct extent_of {
+    std::int32_t lo[3], hi[3];
+};
+struct join {
+    static constexpr bool order_free = true;
+    VOXELPIPE_HD extent_of identity() const { return {{1 << 30, 1 << 30, 1 << 30}, {-1, -1, -1}}; }
+    VOXELPIPE_HD extent_of combine(extent_of a, extent_of b) const {
+        for (int i = 0; i < 3; ++i) {
+            a.lo[i] = b.lo[i] < a.lo[i] ? b.lo[i] : a.lo[i];
+            a.hi[i] = b.hi[i] > a.hi[i] ? b.hi[i] : a.hi[i];
+        }
+        return a;
+    }
+};
+
+// And one that depends on the order: the last of a chain of hashes.
+struct chain {
+    static constexpr bool order_free = false;
+    VOXELPIPE_HD std::uint32_t identity() const { return 1; }
+    VOXELPIPE_HD std::uint32_t combine(std::uint32_t a, std::uint32_t b) const { return mix_bits(a * 3 + b); }
+};
+
+// Values for both.
+using chained = vp::target<std::uint32_t, chain>;
+using joined = vp::target<extent_of, join>;
+struct listed_values {
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& f) const {
+        const std::uint32_t h = mix_bits(f.primitive + static_cast<std::uint32_t>(f.voxel.x + 64 * f.voxel.y));
+        const auto low = static_cast<std::int32_t>(h >> 8), high = static_cast<std::int32_t>(f.primitive);
+        return vp::outputs(h, extent_of{{low, f.voxel.x, f.axis}, {high, f.voxel.y, -low}}).discard_if(h % 7 == 0);
+    }
+};
+
+// Triangles within one voxel.
+inline mesh_data triangles_in_voxel(int count, glm::vec3 corner, std::uint32_t seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> inside(0.1f, 0.9f);
+    mesh_data m;
+    const auto point = [&] { return corner + glm::vec3(inside(random), inside(random), inside(random)); };
+    for (int i = 0; i < count; ++i) add_triangle(m, point(), point(), point());
+    return m;
+}
+
+// For fragment lists, a payload.
+using any_double = any_values<vp::target<double, vp::blend::replace>>;
+
 // Every cell of the targets, both coverages, cleared and loaded.
 template <class... Targets>
 void compare_cells() {

@@ -22,27 +22,6 @@ struct largest_key {
         return b.key > a.key || (b.key == a.key && b.value > a.value) ? b : a;
     }
 };
-// Too large for an atomic.
-struct extent_of {
-    std::int32_t lo[3], hi[3];
-};
-struct join {
-    static constexpr bool order_free = true;
-    VOXELPIPE_HD extent_of identity() const { return {{1 << 30, 1 << 30, 1 << 30}, {-1, -1, -1}}; }
-    VOXELPIPE_HD extent_of combine(extent_of a, extent_of b) const {
-        for (int i = 0; i < 3; ++i) {
-            a.lo[i] = b.lo[i] < a.lo[i] ? b.lo[i] : a.lo[i];
-            a.hi[i] = b.hi[i] > a.hi[i] ? b.hi[i] : a.hi[i];
-        }
-        return a;
-    }
-};
-// Depends on the order: the last voxel of a chain of hashes.
-struct chain {
-    static constexpr bool order_free = false;
-    VOXELPIPE_HD std::uint32_t identity() const { return 1; }
-    VOXELPIPE_HD std::uint32_t combine(std::uint32_t a, std::uint32_t b) const { return mix_bits(a * 3 + b); }
-};
 struct over {
     static constexpr bool order_free = false;
     VOXELPIPE_HD glm::vec3 identity() const { return glm::vec3(0.0f); }

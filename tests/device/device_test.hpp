@@ -89,6 +89,17 @@ inline mesh_data mixed_triangles(int count, float size, std::uint32_t seed) {
     return m;
 }
 
+inline mesh_data translated(mesh_data m, glm::vec3 by) {
+    for (glm::vec3& p : m.positions) p += by;
+    return m;
+}
+
+inline void append(mesh_data& m, const mesh_data& more) {
+    const auto first = static_cast<std::uint32_t>(m.positions.size());
+    m.positions.insert(m.positions.end(), more.positions.begin(), more.positions.end());
+    for (const glm::uvec3& t : more.triangles) m.triangles.push_back(t + glm::uvec3(first));
+}
+
 // A vertex shader that does not run on the spot: its positions are stored first.
 struct shift {
     float by;

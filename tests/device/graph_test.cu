@@ -5,12 +5,10 @@
 // fragment lists of constant and of shaded fragments, of several draws and in grids beyond 32 bits; capacities of the
 // lists that are too small. All against cpu_backend.
 
+#include "async_lists.hpp"
 #include "cells.hpp"
 
-#include <voxelpipe/device/abuffer_async.cuh>
-
 #include <functional>
-#include <memory>
 #include <span>
 #include <string>
 
@@ -146,38 +144,6 @@ TEST(Graph, TwoStreamsAtOnceWithoutTiles) {
 
 // ---- fragment lists -------------------------------------------------------------------------------------------------
 
-// `parts`: the mesh of each draw.
-template <class Payload, class FragmentShader>
-void expect_lists(const std::vector<mesh_data>& parts, const vp::grid& g, const FragmentShader& fs,
-                  const vp::voxelize_options& options, const vp::host_abuffer<Payload>& lists, const vp::status& s) {
-    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;
-    vp::cpu_backend cpu;
-    vp::abuffer<vp::cpu_backend, Payload> expected{cpu};
-    std::vector<draw_type> draws;
-    for (const mesh_data& m : parts) draws.push_back({{m.positions, m.triangles}, {}, fs});
-    const vp::status reference = vp::voxelize(cpu, std::span<const draw_type>(draws), g, expected, options);
-    ASSERT_TRUE(reference.ok()) << reference.message();
-    ASSERT_TRUE(s.ok()) << s.message();
-    EXPECT_GT(lists.voxels.size(), 0u);
-    expect_same_counts(reference.counts, s.counts);
-    expect_same_on_host(expected.to_host(cpu), lists);
-}
-
-// Memory with a pattern behind it that must stay.
-struct guarded_memory {
-    static constexpr std::size_t guard = 1 << 16;
-    std::size_t bytes;
-    vp::cuda_backend::buffer<unsigned char> memory;
-
-    guarded_memory(vp::cuda_backend& be, std::size_t bytes_) : bytes(bytes_), memory(be, bytes_ + guard) {
-        EXPECT_EQ(cudaMemsetAsync(memory.data(), 0x5a, bytes + guard, be.stream), cudaSuccess);
-    }
-    void expect_untouched_behind(vp::cuda_backend& be) const {
-        const std::vector<unsigned char> host = memory.to_host(be);
-        for (std::size_t i = bytes; i < host.size(); ++i) ASSERT_EQ(host[i], 0x5a) << i - bytes;
-    }
-};
-
 template <class Payload, class FragmentShader>
 void compare_replayed_lists(const FragmentShader& fs, std::uint32_t seed) {
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;
@@ -208,9 +174,7 @@ void compare_replayed_lists(const FragmentShader& fs, std::uint32_t seed) {
 TEST(Graph, ListsOfConstantFragmentsAreReplayedWithChangedVertices) {
     compare_replayed_lists<void>(vp::constant(true), 101);
 }
-TEST(Graph, ListsWithPayloadsAreReplayedWithChangedVertices) {
-    compare_replayed_lists<double>(any_values<vp::target<double, blend::replace>>{}, 103);
-}
+TEST(Graph, ListsWithPayloadsAreReplayedWithChangedVertices) { compare_replayed_lists<double>(any_double{}, 103); }
 
 template <class Payload, class FragmentShader>
 void compare_overflowing_lists(const FragmentShader& fs, std::uint32_t seed) {
@@ -240,6 +204,7 @@ void compare_overflowing_lists(const FragmentShader& fs, std::uint32_t seed) {
             expect_lists<Payload>({m}, g, fs, {}, lists.to_host(be), s);
         } else {
             ASSERT_EQ(s.code, vp::status_code::capacity_exceeded);
+            EXPECT_EQ(s.where, vp::stage::abuffer_emit);
             EXPECT_GT(s.required.fragments, 10u);
             EXPECT_EQ(lists.to_host(be).voxels.size(), 0u);
             EXPECT_EQ(lists.to_host(be).primitives.size(), 0u);
@@ -251,59 +216,15 @@ void compare_overflowing_lists(const FragmentShader& fs, std::uint32_t seed) {
 
 TEST(Graph, ListsThatDoNotFitSayWhatIsNeeded) {
     compare_overflowing_lists<void>(vp::constant(true), 105);
-    compare_overflowing_lists<double>(any_values<vp::target<double, blend::replace>>{}, 106);
+    compare_overflowing_lists<double>(any_double{}, 106);
 }
-
-// A call that waits for nothing, of several draws, on a stream of its own.
-template <class Payload, class FragmentShader>
-class list_call {
-    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;
-
-public:
-    list_call(std::vector<mesh_data> parts, const vp::grid& g, const FragmentShader& fs, vp::coverage rule)
-        : parts_(std::move(parts)), grid_(g), shader_(fs), options_(rule) {
-        for (const mesh_data& m : parts_) meshes_.emplace_back(backend_, m.positions, m.triangles);
-        for (const auto& m : meshes_) draws_.push_back({m.view(), {}, shader_});
-        const vp::workspace_limits limits{0, 0, 1 << 17, 1 << 16};
-        const std::size_t bytes = vp::workspace_bytes(draws(), grid_, lists_, options_, limits);
-        EXPECT_GT(bytes, 0u);
-        memory_ = std::make_unique<guarded_memory>(backend_, bytes);
-        workspace_ = {const_cast<unsigned char*>(memory_->memory.data()), bytes, limits};
-    }
-    void launch() {
-        const vp::status s = vp::voxelize_async(backend_, draws(), grid_, lists_, options_, workspace_);
-        ASSERT_TRUE(s.ok()) << s.message();
-    }
-    void expect_the_cpus() {
-        const vp::status s = vp::read_status(backend_, workspace_);
-        expect_lists<Payload>(parts_, grid_, shader_, options_, lists_.to_host(backend_), s);
-        memory_->expect_untouched_behind(backend_);
-    }
-
-private:
-    [[nodiscard]] std::span<const draw_type> draws() const { return draws_; }
-
-    stream_owner owner_;
-    vp::cuda_backend backend_{owner_.stream};
-    std::vector<mesh_data> parts_;
-    vp::grid grid_;
-    FragmentShader shader_;
-    vp::voxelize_options options_;
-    std::vector<vp::mesh<vp::cuda_backend>> meshes_;
-    std::vector<draw_type> draws_;
-    vp::abuffer_view<Payload> lists_;
-    std::unique_ptr<guarded_memory> memory_;
-    vp::workspace_view workspace_;
-};
-
-using any_double = any_values<vp::target<double, blend::replace>>;
 
 template <class Payload, class FragmentShader>
 void compare_list_calls(const FragmentShader& fs, std::uint32_t seed) {
     // The last voxel of the far corner is number 2^33 - 1.
-    std::vector<mesh_data> far{mixed_triangles(150, 100.0f, seed), mixed_triangles(200, 60.0f, seed + 1)};
-    for (mesh_data& m : far)
-        for (glm::vec3& p : m.positions) p += glm::vec3(1960.0f, 1970.0f, 1980.0f);
+    const glm::vec3 corner(1960.0f, 1970.0f, 1980.0f);
+    std::vector<mesh_data> far{translated(mixed_triangles(150, 100.0f, seed), corner),
+                               translated(mixed_triangles(200, 60.0f, seed + 1), corner)};
     add_triangle(far[1], {2047.2f, 2047.3f, 2047.9f}, {2047.8f, 2047.1f, 2047.2f}, {2047.4f, 2047.9f, 2047.5f});
     const std::vector<mesh_data> several{mixed_triangles(500, 40.0f, seed + 2), mixed_triangles(1, 40.0f, seed + 3),
                                          mixed_triangles(900, 40.0f, seed + 4)};
@@ -323,18 +244,37 @@ TEST(Graph, ListsOfSeveralDrawsAndLargeGridsOnStreamsAtOnce) {
     compare_list_calls<double>(any_double{}, 130);
 }
 
+TEST(Lists, AConstantPayloadTakesMemoryOnceTheListsAreDone) {
+    vp::cuda_backend be;
+    const mesh_data m = mixed_triangles(500, 20.0f, 108);
+    const vp::grid g = box_grid({20, 20, 20});
+    const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+    const vp::workspace_limits limits{0, 0, 1 << 16, 0};
+    const auto bytes = [&]<class Payload>(const vp::abuffer_view<Payload>& lists, const auto& fs) {
+        const vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_cvref_t<decltype(fs)>> d{mesh.view(), {}, fs};
+        return vp::workspace_bytes(std::span(&d, 1), g, lists, {}, limits);
+    };
+    const std::size_t without = bytes(vp::abuffer_view<void>{}, vp::constant(true));
+    ASSERT_GT(without, 0u);
+    EXPECT_EQ(bytes(vp::abuffer_view<double>{}, vp::constant(0.5)), without + limits.fragments * sizeof(double));
+}
+
 TEST(Lists, NoMemoryForTheCopyIsInTheStatus) {
     counting_resource resource;
     vp::cuda_backend be{nullptr, resource};
     const mesh_data m = mixed_triangles(500, 20.0f, 107);
-    const vp::grid g = box_grid({20, 20, 20});
+    const vp::grid g = box_grid({20, 20, 20}), other = box_grid({19, 20, 20});
     const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
     vp::abuffer<vp::cuda_backend> first{be}, second{be};
     ASSERT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), first).ok());
+    const auto before = first.to_host(be);
     resource.most = resource.live; // the workspace is there already
-    const vp::status s = vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), second);
-    EXPECT_EQ(s.code, vp::status_code::out_of_memory);
-    EXPECT_EQ(s.where, vp::stage::abuffer_emit);
+    for (auto* lists : {&first, &second}) {
+        const vp::status s = vp::voxelize(be, mesh, other, vp::passthrough{}, vp::constant(true), *lists);
+        EXPECT_EQ(s.code, vp::status_code::out_of_memory);
+        EXPECT_EQ(s.where, vp::stage::abuffer_emit);
+    }
+    expect_same_on_host(before, first.to_host(be));
     EXPECT_EQ(second.num_voxels(), 0u);
     EXPECT_EQ(second.num_fragments(), 0u);
 }

@@ -51,10 +51,7 @@ void compare_in_place(const mesh_data& m, const vp::grid& g, const Shader& shade
 // Triangles through the whole of a grid of 2048^3, the last layers and the last corner among them.
 mesh_data far_triangles() {
     mesh_data m = mixed_triangles(3000, 2048.0f, 80);
-    mesh_data corner = mixed_triangles(500, 40.0f, 81);
-    for (glm::vec3& p : corner.positions) p += glm::vec3(2010.0f);
-    for (std::size_t t = 0; t < corner.triangles.size(); ++t)
-        add_triangle(m, corner.positions[3 * t], corner.positions[3 * t + 1], corner.positions[3 * t + 2]);
+    append(m, translated(mixed_triangles(500, 40.0f, 81), glm::vec3(2010.0f)));
     add_triangle(m, {0.0f, 0.0f, 2047.5f}, {2048.0f, 0.0f, 2047.9f}, {0.0f, 2048.0f, 2047.1f});
     add_triangle(m, {-500.0f, -400.0f, -300.0f}, {5000.0f, 100.0f, 2500.0f}, {10.0f, 5000.0f, 2600.0f});
     return m;
@@ -78,6 +75,23 @@ TEST(LargeGrid, ValuesOf2048CubedAreTheCpus) {
     if (!has_memory(12, 24)) GTEST_SKIP() << "needs 12 GiB of GPU memory and 24 GiB of the host's";
     compare_in_place<vp::target<std::uint8_t, blend::max>>(far_triangles(), box_grid({2048, 2048, 2048}), by_voxel{},
                                                            vp::coverage::conservative);
+}
+
+struct byte_chain {
+    static constexpr bool order_free = false;
+    VOXELPIPE_HD std::uint8_t identity() const { return 1; }
+    VOXELPIPE_HD std::uint8_t combine(std::uint8_t a, std::uint8_t b) const {
+        return static_cast<std::uint8_t>(a * 3u + b);
+    }
+};
+
+// The lists behind a blend that depends on the order number voxels with 64 bits here.
+TEST(LargeGrid, FoldsBeyond32BitsAreTheCpus) {
+    if (!has_memory(8, 12)) GTEST_SKIP() << "needs 8 GiB of GPU memory and 12 GiB of the host's";
+    mesh_data m = translated(mixed_triangles(400, 60.0f, 83), {2000.0f, 2000.0f, 990.0f});
+    add_triangle(m, {0.0f, 0.0f, 0.0f}, {2048.0f, 10.0f, 1030.0f}, {10.0f, 2048.0f, 1039.9f});
+    for (const vp::coverage rule : both_rules)
+        compare_in_place<vp::target<std::uint8_t, byte_chain>>(m, box_grid({2048, 2048, 1040}), by_voxel{}, rule);
 }
 
 // 10^5 slivers from face to face, most of them along an axis.

@@ -165,7 +165,7 @@ TEST(Pipeline, ACallThatOverflowsIsRunAgain) {
 }
 
 TEST(Pipeline, ListsWithPayloads) {
-    const any_values<vp::target<double, blend::replace>> shader;
+    const any_double shader;
     for (const vp::coverage rule : both_rules) {
         expect_same_lists<double>(mixed_triangles(2000, 40.0f, 33), box_grid({40, 33, 47}), vp::passthrough{}, shader,
                                   rule);
@@ -176,8 +176,7 @@ TEST(Pipeline, ListsWithPayloads) {
 
 // A linear id beyond 32 bits.
 TEST(Pipeline, ListsOfAGridBeyond32Bits) {
-    mesh_data m = mixed_triangles(300, 100.0f, 35);
-    for (glm::vec3& p : m.positions) p += glm::vec3(1900.0f, 1950.0f, 1980.0f);
+    const mesh_data m = translated(mixed_triangles(300, 100.0f, 35), {1900.0f, 1950.0f, 1980.0f});
     for (const vp::coverage rule : both_rules)
         expect_same_lists<void>(m, box_grid({2048, 2048, 2048}), vp::passthrough{}, vp::constant(true), rule);
 }
@@ -318,6 +317,7 @@ void start_too_small(vp::workspace_limits limits) {
         done = s.ok();
         if (!done) {
             ASSERT_EQ(s.code, vp::status_code::capacity_exceeded);
+            EXPECT_EQ(s.where, vp::stage::coarse_raster);
             EXPECT_GT(s.required.tile_pairs, 10u);
             for (const float v : vp::get<0>(fb).to_host(be)) ASSERT_EQ(std::bit_cast<std::uint32_t>(v), 0x5a5a5a5au);
         }

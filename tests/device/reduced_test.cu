@@ -3,6 +3,7 @@
 
 // Every kernel on small loads, quick enough for compute-sanitizer.
 
+#include "async_lists.hpp"
 #include "cells.hpp"
 
 #include <span>
@@ -12,34 +13,92 @@ namespace blend = voxelpipe::blend;
 
 namespace {
 
-struct newest {
-    static constexpr bool order_free = false;
-    VOXELPIPE_HD std::uint32_t identity() const { return 0; }
-    VOXELPIPE_HD std::uint32_t combine(std::uint32_t a, std::uint32_t b) const { return a * 3 + b; }
+// Drawn in tiles, and one that is folded in order.
+template <template <class...> class Pipeline, class... First>
+using with_every_kind = Pipeline<First..., vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>,
+                                 vp::target<double, blend::max>, vp::target<std::uint32_t, blend::replace>,
+                                 vp::target<std::uint32_t, chain>>;
+template <class... Targets>
+struct on_both {
+    static void compare(const mesh_data& m, const vp::grid& g, vp::coverage rule) {
+        expect_same<Targets...>(m, g, vp::passthrough{}, any_values<Targets...>{}, rule);
+    }
 };
 
 TEST(Reduced, EveryKindOfTarget) {
-    const any_values<vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>, vp::target<double, blend::max>,
-                     vp::target<std::uint32_t, blend::replace>, vp::target<std::uint32_t, newest>>
-        shader;
-    for (const vp::coverage rule : both_rules)
-        expect_same<vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>, vp::target<double, blend::max>,
-                    vp::target<std::uint32_t, blend::replace>, vp::target<std::uint32_t, newest>>(
-            mixed_triangles(300, 30.0f, 60), box_grid({30, 21, 33}), vp::passthrough{}, shader, rule);
+    for (const vp::coverage rule : both_rules) {
+        with_every_kind<on_both>::compare(mixed_triangles(300, 30.0f, 60), box_grid({30, 21, 33}), rule);
+        // More triangles in a tile than a work item takes.
+        with_every_kind<on_both>::compare(mixed_triangles(1200, 4.0f, 66), box_grid({5, 4, 6}), rule);
+    }
 }
 
-TEST(Reduced, SplitTilesAndLargeTriangles) {
+TEST(Reduced, LargeTrianglesWithoutTiles) {
     mesh_data m = mixed_triangles(1500, 4.0f, 61);
     add_triangle(m, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
-    for (const vp::coverage rule : both_rules)
+    for (const vp::coverage rule : both_rules) {
         expect_same<vp::target<vp::bit, blend::bit_or>>(m, box_grid({150, 90, 70}), vp::passthrough{},
                                                         vp::constant(true), rule);
+        expect_same<vp::target<vp::bit, blend::bit_or>>(m, box_grid({150, 90, 70}), shift{0.5f}, vp::constant(true),
+                                                        rule);
+    }
+}
+
+// More fragments than a thread folds alone, by a block for one voxel after the other and by its threads side by side.
+TEST(Reduced, LongVoxelsOfBlendsThatAreFolded) {
+    const vp::grid g = box_grid({36, 5, 6});
+    mesh_data m = mixed_triangles(200, 36.0f, 74);
+    append(m, triangles_in_voxel(2000, {3.0f, 2.0f, 4.0f}, 75));
+    expect_same<chained, joined>(m, g, vp::passthrough{}, listed_values{}, vp::coverage::conservative);
+    for (std::uint32_t x = 0; x < 36; ++x)
+        append(m, triangles_in_voxel(1400, {static_cast<float>(x), 0.0f, 0.0f}, 76 + x));
+    expect_same<chained, joined>(m, g, vp::passthrough{}, listed_values{}, vp::coverage::conservative);
+}
+
+// The identity of these blends is a set bit: rows and bricks that end within a word.
+TEST(Reduced, BitsThatAreClearedToOne) {
+    expect_same<vp::target<vp::bit, blend::bit_and>, vp::target<vp::bit, blend::min, vp::layout::tiled>>(
+        mixed_triangles(200, 30.0f, 67), box_grid({37, 21, 6}), vp::passthrough{}, vp::constant(false, false),
+        vp::coverage::conservative);
 }
 
 TEST(Reduced, Lists) {
-    mesh_data m = mixed_triangles(300, 30.0f, 62);
-    for (const vp::coverage rule : both_rules)
-        expect_same_lists<void>(m, box_grid({30, 21, 33}), vp::passthrough{}, vp::constant(true), rule);
+    const mesh_data m = mixed_triangles(300, 30.0f, 62);
+    const vp::grid g = box_grid({30, 21, 33});
+    for (const vp::coverage rule : both_rules) {
+        expect_same_lists<void>(m, g, vp::passthrough{}, vp::constant(true), rule);
+        expect_same_lists<float>(m, g, shift{0.5f}, vp::constant(0.5f), rule);
+        expect_same_lists<double>(m, g, vp::passthrough{}, any_double{}, rule);
+    }
+}
+
+// The last voxel of this grid is number 2^33 - 1.
+const vp::grid large_grid = box_grid({2048, 2048, 2048});
+mesh_data far_triangles(std::uint32_t seed) { return translated(mixed_triangles(80, 25.0f, seed), glm::vec3(2020.0f)); }
+
+TEST(Reduced, ListsOfVoxelNumbersBeyond32Bits) {
+    for (const vp::coverage rule : both_rules) {
+        expect_same_lists<void>(far_triangles(68), large_grid, vp::passthrough{}, vp::constant(true), rule);
+        expect_same_lists<double>(far_triangles(69), large_grid, vp::passthrough{}, any_double{}, rule);
+    }
+}
+
+template <class Payload, class FragmentShader>
+void compare_without_a_wait(std::vector<mesh_data> parts, const vp::grid& g, const FragmentShader& fs,
+                            vp::coverage rule) {
+    list_call<Payload, FragmentShader> call(std::move(parts), g, fs, rule);
+    call.launch();
+    call.expect_the_cpus();
+}
+
+TEST(Reduced, ListsWithoutAWait) {
+    const vp::grid g = box_grid({30, 21, 33});
+    for (const vp::coverage rule : both_rules) {
+        compare_without_a_wait<void>({mixed_triangles(300, 30.0f, 70)}, g, vp::constant(true), rule);
+        compare_without_a_wait<double>({mixed_triangles(200, 30.0f, 71), mixed_triangles(100, 30.0f, 72)}, g,
+                                       any_double{}, rule);
+        compare_without_a_wait<double>({far_triangles(73)}, large_grid, any_double{}, rule);
+    }
 }
 
 // Stage times are asked for without a change to what a call gives: they are parts of the call, and a call that is not
@@ -71,12 +130,8 @@ vp::stage_times time_stages(vp::cuda_backend& be, const Call& call) {
 }
 
 TEST(Reduced, StageTimesOfTilesAndOrderedTargets) {
-    using fb_type = vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>,
-                                    vp::target<double, blend::max>, vp::target<std::uint32_t, blend::replace>,
-                                    vp::target<std::uint32_t, newest>>;
-    const any_values<vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>, vp::target<double, blend::max>,
-                     vp::target<std::uint32_t, blend::replace>, vp::target<std::uint32_t, newest>>
-        shader;
+    using fb_type = with_every_kind<vp::framebuffer, vp::cuda_backend>;
+    const with_every_kind<any_values> shader;
     const mesh_data m = mixed_triangles(300, 30.0f, 63);
     const vp::grid g = box_grid({30, 21, 33});
     vp::cuda_backend be;

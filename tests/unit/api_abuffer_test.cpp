@@ -159,6 +159,34 @@ TEST(Abuffer, IsEmptyWhereNothingIsCovered) {
     EXPECT_EQ(voxels, 0);
 }
 
+// Whatever it finds out on the way.
+TEST(Abuffer, ACallThatFailsLeavesEarlierListsAsTheyWere) {
+    const unit::small_mesh good = unit::make_mesh(5, 100, extent);
+    unit::small_mesh bad = unit::make_mesh(6, 100, extent);
+    bad.triangles[77].z = static_cast<std::uint32_t>(bad.positions.size());
+    vp::grid wrong = unit::unit_grid(extent);
+    wrong.voxel_size.y = 0;
+    backend_type backend = unit::make_backend();
+    vp::abuffer<backend_type, float> lists{backend};
+    vp::voxelize(backend, good.on(backend), unit::unit_grid(extent), vp::passthrough{}, sum_shader{}, lists).or_throw();
+    const auto before = lists.to_host(backend);
+    ASSERT_GT(before.primitives.size(), 0u);
+    // Of another extent, with a shader and with constant fragments, and refused before it starts.
+    const vp::grid other = unit::unit_grid({60, 30, 31});
+    EXPECT_EQ(vp::voxelize(backend, bad.on(backend), other, vp::passthrough{}, sum_shader{}, lists).code,
+              vp::status_code::index_out_of_range);
+    EXPECT_EQ(vp::voxelize(backend, bad.on(backend), other, vp::passthrough{}, vp::constant(1.0f), lists).code,
+              vp::status_code::index_out_of_range);
+    EXPECT_EQ(vp::voxelize(backend, good.on(backend), wrong, vp::passthrough{}, sum_shader{}, lists).code,
+              vp::status_code::bad_voxel_size);
+    const auto after = lists.to_host(backend);
+    EXPECT_EQ(after.extent, extent);
+    EXPECT_EQ(after.voxels, before.voxels);
+    EXPECT_EQ(after.offsets, before.offsets);
+    EXPECT_EQ(after.primitives, before.primitives);
+    EXPECT_TRUE(unit::same_bytes(after.payloads, before.payloads));
+}
+
 // A million fragments in one voxel: counts beyond 16 bits.
 TEST(Abuffer, HoldsManyFragmentsOfOneVoxel) {
     unit::small_mesh m;

@@ -1,18 +1,21 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Shaders that give every fragment the same values take a way of their own through cpu_backend
-// (cpu_ref/solid_tile.hpp): the same bytes and counters as a shader of the user's that returns these values, which is
+// Shaders that give every fragment the same values take ways of their own (cpu_ref/solid_tile.hpp,
+// device/direct_raster.cuh): the same bytes and counters as a shader of the user's that returns these values, which is
 // shaded fragment by fragment.
 
 #include "api_model.hpp"
 
 #include <gtest/gtest.h>
 
+#include <type_traits>
+
 namespace {
 
 namespace vp = voxelpipe;
 namespace blend = voxelpipe::blend;
+using unit::backend_type;
 
 const glm::ivec3 extent{45, 70, 37};
 
@@ -45,14 +48,15 @@ std::vector<Shader<Ts...>> shaders(std::size_t count, const vp::core::pack<Ts...
 
 // Two passes: onto cleared targets, and onto what these hold. The last target is off in the second.
 template <class Framebuffer, class Shader>
-std::vector<vp::counters> draw_twice(Framebuffer& fb, const std::vector<unit::small_mesh>& meshes,
-                                     const std::vector<Shader>& fragment_shaders, vp::voxelize_options options,
-                                     unsigned threads) {
+std::vector<vp::counters> draw_twice(backend_type& backend, Framebuffer& fb,
+                                     const std::vector<unit::small_mesh>& meshes,
+                                     const std::vector<Shader>& fragment_shaders, vp::voxelize_options options) {
     using draw = vp::draw<vp::mesh_view<>, vp::passthrough, Shader>;
-    vp::cpu_backend backend{threads};
+    std::vector<vp::mesh<backend_type>> on_backend;
+    for (const unit::small_mesh& m : meshes) on_backend.push_back(m.on(backend));
     std::vector<draw> draws;
     for (std::size_t i = 0; i < meshes.size(); ++i)
-        draws.push_back({meshes[i].view(), vp::passthrough{}, fragment_shaders[i]});
+        draws.push_back({on_backend[i].view(), vp::passthrough{}, fragment_shaders[i]});
     std::vector<vp::counters> counts;
     constexpr std::size_t num_targets = Framebuffer::view_type::num_targets;
     for (int pass = 0; pass < 2; ++pass) {
@@ -74,12 +78,12 @@ void expect_same(const vp::core::pack<typename Targets::value_type...>& clear, c
                                                unit::make_mesh(7, 60, extent)};
     for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
         for (const bool several_values : {false, true})
-            for (const unsigned threads : {1u, 3u}) {
+            for (const unsigned threads : unit::thread_numbers) {
                 SCOPED_TRACE(testing::Message()
                              << (rule == vp::coverage::thin ? "thin" : "conservative") << ", "
                              << (several_values ? "two values" : "one value") << ", " << threads << " threads");
-                vp::cpu_backend backend{1};
-                using framebuffer = vp::framebuffer<vp::cpu_backend, Targets...>;
+                backend_type backend = unit::make_backend(threads);
+                using framebuffer = vp::framebuffer<backend_type, Targets...>;
                 framebuffer solid(backend, extent), shaded(backend, extent);
                 vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
                     vp::get<I>(solid).clear(vp::get<I>(clear));
@@ -87,9 +91,9 @@ void expect_same(const vp::core::pack<typename Targets::value_type...>& clear, c
                 });
                 const vp::voxelize_options options(rule);
                 const auto one =
-                    draw_twice(solid, meshes, shaders<vp::solid>(3, a, several_values ? b : a), options, threads);
+                    draw_twice(backend, solid, meshes, shaders<vp::solid>(3, a, several_values ? b : a), options);
                 const auto two =
-                    draw_twice(shaded, meshes, shaders<opaque>(3, a, several_values ? b : a), options, threads);
+                    draw_twice(backend, shaded, meshes, shaders<opaque>(3, a, several_values ? b : a), options);
                 for (std::size_t pass = 0; pass < 2; ++pass) {
                     EXPECT_GT(one[pass].fragments, 1000u);
                     EXPECT_EQ(one[pass].fragments, two[pass].fragments);
@@ -129,28 +133,42 @@ TEST(ConstantShader, NumbersOfEveryBlendAreAsShaded) {
         vp::core::make_pack(u32{0xffffffff}, u8{1}, i16{2999}, u32{5}, i16{20}, u8{7}, u32{3}, glm::ivec3(0, 1, 2)));
 }
 
+// The first pass of these needs no tiles on a GPU.
+TEST(ConstantShader, NumbersThatOneAtomicBlendsAreAsShaded) {
+    using u32 = std::uint32_t;
+    using i64 = std::int64_t;
+    expect_same<vp::target<vp::bit, blend::bit_xor>, vp::target<u32, blend::count>,
+                vp::target<u32, blend::add, vp::layout::tiled>, vp::target<i64, blend::min>>(
+        vp::core::make_pack(true, u32{0}, u32{9}, i64{100}), vp::core::make_pack(true, u32{0}, u32{3}, i64{-4}),
+        vp::core::make_pack(false, u32{8}, u32{0xfffffff1}, i64{7}));
+}
+
 TEST(ConstantShader, FloatsAndStructsAreAsShaded) {
+    // A GPU adds unordered terms in any order: there, such that every sum is exact.
+    constexpr bool any_order = !std::is_same_v<backend_type, vp::cpu_backend>;
+    constexpr float small = any_order ? 0.125f : 1e-3f, large = any_order ? -7.0f : -7.1f;
     expect_same<vp::target<float, blend::add>, vp::target<vp::half, blend::add>, vp::target<double, blend::add>,
                 vp::target<float, blend::add_unordered>, vp::target<float, blend::min>,
                 vp::target<glm::vec3, blend::add, vp::layout::planar>, vp::target<float, blend::add_quantum<-10>>,
                 vp::target<record, chain>>(
         vp::core::make_pack(0.1f, vp::half(1.0f), -1e9, 3.5f, 7.0f, glm::vec3(1, 2, 3), -0.0f, record{1, 0, 0}),
-        vp::core::make_pack(0.3f, vp::half(0.1f), 0.7, 1e-3f, -0.0f, glm::vec3(0.1f, -0.2f, 1e20f), 0.3f,
+        vp::core::make_pack(0.3f, vp::half(0.1f), 0.7, small, -0.0f, glm::vec3(0.1f, -0.2f, 1e20f), 0.3f,
                             record{77, 1, 0}),
-        vp::core::make_pack(-0.7f, vp::half(3.0f), 1e300, -7.1f, 0.0f, glm::vec3(1e-20f, 4, -1e20f), -5.0f,
+        vp::core::make_pack(-0.7f, vp::half(3.0f), 1e300, large, 0.0f, glm::vec3(1e-20f, 4, -1e20f), -5.0f,
                             record{5, 1, 9}));
 }
 
 TEST(ConstantShader, AbufferIsAsShaded) {
     const unit::small_mesh mesh = unit::make_mesh(8, 200, extent);
-    vp::cpu_backend backend{2};
+    backend_type backend = unit::make_backend();
+    const auto on_backend = mesh.on(backend);
     for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin}) {
-        vp::abuffer<vp::cpu_backend, float> solid{backend}, shaded{backend};
+        vp::abuffer<backend_type, float> solid{backend}, shaded{backend};
         const opaque<float> shader{vp::core::make_pack(2.5f)};
-        const auto one = vp::voxelize(backend, mesh.view(), unit::unit_grid(extent), vp::passthrough{},
+        const auto one = vp::voxelize(backend, on_backend, unit::unit_grid(extent), vp::passthrough{},
                                       vp::constant(2.5f), solid, rule);
         const auto two =
-            vp::voxelize(backend, mesh.view(), unit::unit_grid(extent), vp::passthrough{}, shader, shaded, rule);
+            vp::voxelize(backend, on_backend, unit::unit_grid(extent), vp::passthrough{}, shader, shaded, rule);
         ASSERT_TRUE(one.ok() && two.ok());
         EXPECT_GT(one.counts.fragments, 1000u);
         EXPECT_EQ(one.counts.fragments, two.counts.fragments);

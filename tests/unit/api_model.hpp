@@ -24,10 +24,12 @@ namespace vp = voxelpipe;
 
 #if defined(__CUDACC__)
 using backend_type = vp::cuda_backend;
-[[nodiscard]] inline backend_type make_backend() { return backend_type{}; }
+inline constexpr unsigned thread_numbers[] = {0}; // not the caller's to choose
+[[nodiscard]] inline backend_type make_backend(unsigned = 0) { return backend_type{}; }
 #else
 using backend_type = vp::cpu_backend;
-[[nodiscard]] inline backend_type make_backend() { return backend_type{2}; }
+inline constexpr unsigned thread_numbers[] = {1, 3};
+[[nodiscard]] inline backend_type make_backend(unsigned threads = 2) { return backend_type{threads}; }
 #endif
 
 struct small_mesh {

@@ -134,8 +134,10 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                 s.required = {0, workspace.limits.fragments, need};
                 return s;
             }
-            device::arena memory(workspace.memory);
-            device::list_async<true>(call, options.rule, memory, lists, backend.stream);
+            device::launch_until(stage::abuffer_emit, [&] {
+                device::arena memory(workspace.memory);
+                device::list_async<true>(call, options.rule, memory, lists, backend.stream);
+            });
         } catch (const device::cuda_failure& e) {
             return device::to_status(e);
         }

@@ -106,8 +106,8 @@ struct list_buffers {
     Key* keys[2];
     std::uint32_t* values[2];
     int bits;
-    std::uint32_t* primitives;          // by place; null without payloads
-    Payload* payloads;                  // by place
+    std::uint32_t* primitives;          // by place; null without payloads of fragments
+    Payload* payloads;                  // by place; null likewise
     unsigned long long* first_of_voxel; // fragment numbers, ascending; list_voxels of them
     void* storage;
     std::size_t storage_bytes;
@@ -120,11 +120,7 @@ struct list_memory {
     std::size_t storage_bytes;
 
     list_memory(arena& memory, std::uint32_t num_primitives, unsigned long long record_capacity)
-        : share{}, storage_bytes(share_scan_bytes(num_primitives)) {
-        share.counts = memory.take<std::uint32_t>(num_primitives);
-        share.offsets = memory.take<unsigned long long>(num_primitives);
-        share.records = memory.take<chunk_record>(record_capacity);
-        share.record_capacity = record_capacity;
+        : share(take_share(memory, num_primitives, record_capacity)), storage_bytes(share_scan_bytes(num_primitives)) {
         storage = memory.take<std::byte>(storage_bytes);
     }
     [[nodiscard]] list_memory with(pipeline_state* state) const {

@@ -36,6 +36,22 @@ namespace device {
     return s;
 }
 
+// Where a call that has_failed for a capacity met it.
+[[nodiscard]] inline stage find_overflow(const pipeline_state& s, const capacities& c) {
+    return s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ? stage::coarse_raster : stage::abuffer_emit;
+}
+
+// Runs f, which launches stages. A failure that names none, of a query in between, is put down to the last of them:
+// errors of kernels come late.
+template <class F>
+auto launch_until(stage last, F&& f) {
+    try {
+        return f();
+    } catch (const cuda_failure& e) {
+        throw cuda_failure{e.error, e.where == stage::validate ? last : e.where};
+    }
+}
+
 } // namespace device
 
 // Memory that a cuda_backend keeps between calls, released in stream order. Moves with its backend, is never shared.
@@ -174,21 +190,22 @@ public:
                              abuffer<cuda_backend, Payload>& lists, const voxelize_options& options,
                              std::uint64_t triangles_in) {
         using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
-        lists = abuffer<cuda_backend, Payload>(*this);
+        abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
         status s =
             attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
                     [&](const device::capacities& limits, device::pipeline_state& state, device::stage_clock* clock) {
                         const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
                         const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
                         if (options.rule == coverage::thin)
-                            small ? fill<coverage::thin, std::uint32_t>(call, lists, state)
-                                  : fill<coverage::thin, std::uint64_t>(call, lists, state);
+                            small ? fill<coverage::thin, std::uint32_t>(call, made, state)
+                                  : fill<coverage::thin, std::uint64_t>(call, made, state);
                         else
-                            small ? fill<coverage::conservative, std::uint32_t>(call, lists, state)
-                                  : fill<coverage::conservative, std::uint64_t>(call, lists, state);
+                            small ? fill<coverage::conservative, std::uint32_t>(call, made, state)
+                                  : fill<coverage::conservative, std::uint64_t>(call, made, state);
                     });
         if (s.ok()) {
-            lists.extent = g.extent;
+            made.extent = g.extent;
+            lists = std::move(made);
             s.counts.fragments = lists.num_fragments();
             s.counts.voxels = lists.num_voxels();
         }
@@ -234,7 +251,7 @@ private:
                 }
                 // A pass that overflowed its records did not count all of its cells: the next try may need a third.
                 if (tries == 4 || needed[0] > core::most_numbered || needed[2] > core::most_numbered) {
-                    s = core::failure(status_code::out_of_memory, stage::coarse_raster);
+                    s = core::failure(status_code::out_of_memory, device::find_overflow(state, limits));
                     s.required = {state.tile_pairs, state.list_fragments, 0};
                     break;
                 }
@@ -259,10 +276,9 @@ private:
         return workspace_.data();
     }
 
-    // `where`: the last stage of the call, which a failure that shows only here is put down to.
-    void read_state(const device::pipeline_state* d_state, device::pipeline_state& state, stage where) const {
-        device::check(cudaMemcpyAsync(&state, d_state, sizeof(state), cudaMemcpyDeviceToHost, stream), where);
-        device::check(cudaStreamSynchronize(stream), where);
+    void read_state(const device::pipeline_state* d_state, device::pipeline_state& state) const {
+        device::check(cudaMemcpyAsync(&state, d_state, sizeof(state), cudaMemcpyDeviceToHost, stream));
+        device::check(cudaStreamSynchronize(stream));
     }
 
     template <coverage Rule, class Call>
@@ -271,9 +287,11 @@ private:
         device::arena plan;
         call.template go<Rule, false>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
-        if (call.clock != nullptr) call.clock->start();
-        call.template go<Rule, true>(memory, d_state, stream);
-        read_state(d_state, state, stage::tile_resolve);
+        device::launch_until(call.last_stage(), [&] {
+            if (call.clock != nullptr) call.clock->start();
+            call.template go<Rule, true>(memory, d_state, stream);
+            read_state(d_state, state);
+        });
     }
 
     template <coverage Rule, class Key, class Call, class Payload>
@@ -282,13 +300,16 @@ private:
         device::arena plan;
         (void)call.template go<Rule, false, Key>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
-        if (call.clock != nullptr) call.clock->start();
-        const auto sorted = call.template go<Rule, true, Key>(memory, d_state, stream);
-        read_state(d_state, state, stage::abuffer_emit);
-        if (device::has_failed(state, call.limits)) return;
         using payload = payload_storage<Payload>;
         constexpr bool has_payload = abuffer<cuda_backend, Payload>::has_payload;
         constexpr stage where = stage::abuffer_emit;
+        const auto sorted = device::launch_until(where, [&] {
+            if (call.clock != nullptr) call.clock->start();
+            const auto lists_in_workspace = call.template go<Rule, true, Key>(memory, d_state, stream);
+            read_state(d_state, state);
+            return lists_in_workspace;
+        });
+        if (device::has_failed(state, call.limits)) return;
         buffer<std::uint64_t> voxels(*this, state.list_voxels, where);
         buffer<std::uint64_t> offsets(*this, state.list_voxels == 0 ? 0 : state.list_voxels + 1, where);
         buffer<std::uint32_t> primitives(*this, state.list_fragments, where);

@@ -7,112 +7,18 @@
 // and voxelize_async, which leaves it on the device.
 
 #include <voxelpipe/device/clear_target.cuh>
-#include <voxelpipe/device/coarse_raster.cuh>
 #include <voxelpipe/device/direct_raster.cuh>
-#include <voxelpipe/device/fine_raster.cuh>
 #include <voxelpipe/device/ordered_blend.cuh>
 #include <voxelpipe/device/stage_clock.cuh>
-#include <voxelpipe/device/tile_resolve.cuh>
-#include <voxelpipe/device/tile_sort.cuh>
-#include <voxelpipe/device/tile_split.cuh>
+#include <voxelpipe/device/tile_passes.cuh>
 #include <voxelpipe/device/vertex_shade.cuh>
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <limits>
 #include <span>
 
 namespace voxelpipe::device {
-
-// ---- targets into groups --------------------------------------------------------------------------------------------
-
-// Which targets the tile passes draw together, by compile-time greed: a group is closed where one more target would not
-// fit into the shared memory of the smallest tile. Group `ordered` is not drawn in tiles.
-template <class Framebuffer>
-struct target_groups {
-    static constexpr std::size_t count = targets_of<Framebuffer>::count;
-    static constexpr int ordered = -1;
-
-    static constexpr std::array<int, count> assign() {
-        std::array<int, count> groups{};
-        int group = 0, bits = 1, members = 0; // 1: the touched bit
-        bool winner = false;
-        core::for_each_index<count>([&]<std::size_t K>() {
-            using t = typename targets_of<Framebuffer>::template at<K>;
-            constexpr blend_method method = method_of<t>();
-            if constexpr (method == blend_method::ordered) {
-                groups[K] = ordered;
-            } else {
-                static_assert(bits_per_voxel<t>() + 1 <= tuning::most_bits_per_voxel,
-                              "voxelpipe: a render target needs more shared memory than a tile of 8^3 voxels can have");
-                const int more = method == blend_method::winner ? (winner ? 0 : 32) : bits_per_voxel<t>();
-                if (members > 0 && bits + more > tuning::most_bits_per_voxel) {
-                    ++group;
-                    bits = 1;
-                    members = 0;
-                    winner = false;
-                }
-                bits += method == blend_method::winner ? (winner ? 0 : 32) : bits_per_voxel<t>();
-                winner = winner || method == blend_method::winner;
-                ++members;
-                groups[K] = group;
-            }
-        });
-        return groups;
-    }
-    static constexpr std::array<int, count> group_of = assign();
-    static constexpr int num_groups() {
-        int n = 0;
-        for (const int g : group_of) n = g + 1 > n ? g + 1 : n;
-        return n;
-    }
-    static constexpr std::size_t size_of(int group) {
-        std::size_t n = 0;
-        for (const int g : group_of) n += g == group;
-        return n;
-    }
-    static constexpr bool has_ordered = size_of(ordered) != 0;
-
-    template <int Group>
-    static constexpr auto members() {
-        constexpr std::size_t n = size_of(Group);
-        std::array<std::size_t, n> m{};
-        std::size_t at = 0;
-        for (std::size_t k = 0; k < count; ++k)
-            if (group_of[k] == Group) m[at++] = k;
-        return m;
-    }
-    // The members of a group as an index_sequence.
-    template <int Group, std::size_t... N>
-    static constexpr auto sequence(std::index_sequence<N...>) {
-        constexpr auto m = members<Group>();
-        return std::index_sequence<m[N]...>{};
-    }
-    template <int Group>
-    using indices = decltype(sequence<Group>(std::make_index_sequence<size_of(Group)>{}));
-
-    // Bits of a voxel in the largest group: what the tile size follows from, for all groups share one coarse pass.
-    static constexpr int most_bits() {
-        int most = 1;
-        for (int g = 0; g < num_groups(); ++g) {
-            int bits = 1;
-            bool winner = false;
-            core::for_each_index<count>([&]<std::size_t K>() {
-                using t = typename targets_of<Framebuffer>::template at<K>;
-                if (group_of[K] != g) return;
-                bits += bits_per_voxel<t>();
-                winner = winner || method_of<t>() == blend_method::winner;
-            });
-            bits += winner ? 32 : 0;
-            most = bits > most ? bits : most;
-        }
-        return most;
-    }
-};
-
-template <int Log2Size, class Framebuffer, std::size_t... I>
-tile_image<Log2Size, Framebuffer, I...> image_type(std::index_sequence<I...>);
 
 // ---- memory ---------------------------------------------------------------------------------------------------------
 
@@ -184,21 +90,10 @@ private:
     }
 };
 
-[[nodiscard]] inline share_buffers take_share(arena& memory, std::uint32_t num_primitives,
-                                              unsigned long long record_capacity) {
-    share_buffers b{};
-    b.counts = memory.take<std::uint32_t>(num_primitives);
-    b.offsets = memory.take<unsigned long long>(num_primitives);
-    b.records = memory.take<chunk_record>(record_capacity);
-    b.record_capacity = record_capacity;
-    return b;
-}
-
-// Fragment lists with payloads of one type.
+// Fragment lists with payloads of one type. Where all fragments have one payload, it takes no memory.
 template <class Key, class Payload>
 [[nodiscard]] list_buffers<Key, Payload> take_lists(arena& memory, std::uint64_t num_voxels,
-                                                    unsigned long long capacity) {
-    constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
+                                                    unsigned long long capacity, bool one_payload = false) {
     list_buffers<Key, Payload> b{};
     for (int i = 0; i < 2; ++i) {
         b.keys[i] = memory.take<Key>(capacity);
@@ -206,7 +101,7 @@ template <class Key, class Payload>
     }
     b.bits = key_bits(num_voxels);
     b.storage_bytes = std::max(select_bytes<Key>(capacity), sort_bytes<Key>(capacity, b.bits));
-    if constexpr (has_payload) {
+    if (!std::is_same_v<Payload, no_payload> && !one_payload) {
         b.primitives = memory.take<std::uint32_t>(capacity);
         b.payloads = memory.take<Payload>(capacity);
     }
@@ -246,8 +141,6 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     using groups = target_groups<Framebuffer>;
     using values = decltype(std::declval<typename scene_type::fragment_output>().values);
     static constexpr bool in_tiles = groups::num_groups() > 0;
-    template <int Group>
-    using image = decltype(image_type<Policy.log2_tile_size, Framebuffer>(typename groups::template indices<Group>{}));
 
     std::span<const draw_type> draws;
     grid g;
@@ -257,18 +150,6 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     capacities limits;
     core::tile_grid tiles{g.extent, Policy.log2_tile_size};
     stage_clock* clock = nullptr; // where the call is asked for its times
-
-    [[nodiscard]] static std::uint32_t pairs_per_item(std::uint64_t pair_capacity) {
-        return static_cast<std::uint32_t>(std::max<std::uint64_t>(512, pair_capacity / 1024));
-    }
-    static constexpr int most_image_words() {
-        int most = 0;
-        [&]<int... G>(std::integer_sequence<int, G...>) {
-            ((most = image<G>::words > most ? image<G>::words : most), ...);
-        }
-        (std::make_integer_sequence<int, groups::num_groups()>{});
-        return most;
-    }
 
     // Carves the memory and, with Run, launches every stage. Whatever can fail is known before the first voxel is
     // written.
@@ -285,6 +166,14 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
             go_with<Rule, Run, std::uint32_t>(memory, state, stream);
         else if constexpr (groups::has_ordered)
             go_with<Rule, Run, std::uint64_t>(memory, state, stream);
+    }
+
+    // Of this call: what a failure that shows only at its end is put down to.
+    [[nodiscard]] stage last_stage() const {
+        if constexpr (can_be_direct<FragmentShader, Framebuffer>) {
+            if (is_direct_call()) return stage::fine_raster;
+        }
+        return groups::has_ordered ? stage::fine_raster : stage::tile_resolve;
     }
 
 private:
@@ -368,11 +257,6 @@ private:
         }
     }
 
-    struct tile_work {
-        fine_raster_input in{nullptr, nullptr, nullptr, {glm::ivec3(1), 3}, false, false, false};
-        const split_tile* splits = nullptr;
-    };
-
     template <coverage Rule, bool Run, class Key>
     void go_with(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
         state = memory.take<pipeline_state>(1);
@@ -384,7 +268,12 @@ private:
             end_stage(clock, &stage_times::vertex_shade);
         }
         tile_work work;
-        if constexpr (in_tiles) work = sort_tiles<Rule, Run>(memory, s, state, stream);
+        if constexpr (in_tiles) {
+            const tile_memory m(memory, tiles, num_primitives, limits,
+                                most_image_words<Policy.log2_tile_size, Framebuffer>(),
+                                default_pairs_per_item(limits.tile_pairs));
+            if constexpr (Run) work = coarse_pass<Rule>(s.geo, m, state, limits, stream, clock);
+        }
         fragment_lists<Key, values> lists{};
         if constexpr (groups::has_ordered) lists = list_fragments<Rule, Run, Key>(memory, s, state, stream);
         if constexpr (Run) {
@@ -393,64 +282,14 @@ private:
                 if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
             });
             end_stage(clock, &stage_times::clear);
-            if constexpr (in_tiles) {
-                [&]<int... G>(std::integer_sequence<int, G...>) { (draw_group<Rule, G>(s, work, state, stream), ...); }
-                (std::make_integer_sequence<int, groups::num_groups()>{});
-            }
+            // Fragments and voxels are counted once: by the lists, where there are any.
+            if constexpr (in_tiles)
+                fine_pass<Rule, Policy>(s, fb, work,
+                                        {!groups::has_ordered, !groups::has_ordered && options.count_voxels}, state,
+                                        limits, stream, clock);
             if constexpr (groups::has_ordered)
-                fold(lists, state, typename groups::template indices<groups::ordered>{}, stream);
+                fold_ordered(lists, fb, options.count_voxels, state, limits, stream, clock);
         }
-    }
-
-    template <coverage Rule, bool Run>
-    [[nodiscard]] tile_work sort_tiles(arena& memory, const scene_type& s, pipeline_state* state,
-                                       cudaStream_t stream) const {
-        share_buffers share = take_share(memory, num_primitives, limits.tile_records);
-        std::uint32_t *keys[2], *primitives[2];
-        for (int i = 0; i < 2; ++i) {
-            keys[i] = memory.take<std::uint32_t>(limits.tile_pairs);
-            primitives[i] = memory.take<std::uint32_t>(limits.tile_pairs);
-        }
-        const std::uint32_t per_item = pairs_per_item(limits.tile_pairs);
-        split_buffers<> split{};
-        split.pairs_per_item = per_item;
-        split.items = memory.take<work_item>(most_items(limits.tile_pairs, tiles.count(), per_item));
-        split.splits = memory.take<split_tile>(most_images(limits.tile_pairs, per_item));
-        word* const images = memory.take<word>(most_images(limits.tile_pairs, per_item) * most_image_words());
-        const int bits = key_bits(tiles.count());
-        const std::size_t storage_bytes =
-            std::max(sort_bytes<std::uint32_t>(limits.tile_pairs, bits), share_scan_bytes(num_primitives));
-        void* const storage = memory.take<std::byte>(storage_bytes);
-        tile_work work;
-        if constexpr (Run) {
-            share.num_records = &state->tile_records;
-            share.num_cells = &state->tile_pairs;
-            const tile_cells<Rule> op{tiles, keys[0], primitives[0]};
-            share_count(s.geo, op, share, state, storage, storage_bytes, stage::coarse_raster, stream);
-            share_emit(s.geo, op, share, state, limits, stage::coarse_raster, stream);
-            end_stage(clock, &stage_times::coarse_raster);
-            fill_end(keys[0], primitives[0], share.num_cells, limits.tile_pairs, state, limits, stream);
-            cub::DoubleBuffer<std::uint32_t> k(keys[0], keys[1]), v(primitives[0], primitives[1]);
-            sort_by_cell(k, v, limits.tile_pairs, bits, storage, storage_bytes, stage::tile_sort, stream);
-            end_stage(clock, &stage_times::tile_sort);
-            tile_split(k.Current(), split, state, limits, stream);
-            end_stage(clock, &stage_times::tile_split);
-            work.in = {v.Current(), split.items, images, tiles, false, false, false};
-            work.splits = split.splits;
-        }
-        return work;
-    }
-
-    // Fragments and voxels are counted once: by the lists, where there are any, otherwise by the first group.
-    template <coverage Rule, int Group>
-    void draw_group(const scene_type& s, const tile_work& work, pipeline_state* state, cudaStream_t stream) const {
-        using image_words = image<Group>;
-        fine_raster_input in = work.in;
-        in.count_fragments = Group == 0 && !groups::has_ordered;
-        in.count_voxels = in.count_fragments && options.count_voxels;
-        in.track = in.count_voxels || image_words::has_atomic || image_words::has_winner;
-        draw_tiles<Rule, image_words, Policy.threads_per_block, Policy.min_blocks_per_sm>(
-            s, fb, in, work.splits, state, limits, Policy.blocks_per_sm, stream, clock);
     }
 
     template <coverage Rule, bool Run, class Key>
@@ -462,15 +301,6 @@ private:
             return build_lists<Rule, all_values>(s, lists, share.with(state), state, limits, !in_tiles, stream, clock);
         else
             return {};
-    }
-
-    template <class Key, std::size_t... I>
-    void fold(const fragment_lists<Key, values>& lists, pipeline_state* state, std::index_sequence<I...>,
-              cudaStream_t stream) const {
-        fold_kernel<Key, values, Framebuffer, I...><<<fill_device(limits.fragments), threads_per_block, 0, stream>>>(
-            lists, fb, state, limits, options.count_voxels);
-        check(cudaGetLastError(), stage::fine_raster);
-        end_stage(clock, &stage_times::fine_raster);
     }
 };
 
@@ -507,11 +337,11 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
         state = memory.take<pipeline_state>(1);
         if constexpr (Run) check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
-        const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
         if constexpr (core::is_solid<FragmentShader> && sizeof(Key) == sizeof(std::uint32_t)) {
             if (is_listable(draws.size(), num_primitives, core::make_snap_transform(g).fraction, g.extent))
-                return go_direct<Rule, Run>(memory, lists, state, stream);
+                return go_direct<Rule, Run>(memory, state, stream);
         }
+        const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
         const scene_buffers buffers(memory, draws);
         const list_memory share(memory, num_primitives, limits.fragment_records);
         if constexpr (Run) {
@@ -525,11 +355,12 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
 
 private:
     // One draw of a constant shader.
-    template <coverage Rule, bool Run, class Key>
-    [[nodiscard]] fragment_lists<Key, Payload> go_direct(arena& memory, const list_buffers<Key, Payload>& lists,
-                                                         pipeline_state* state, cudaStream_t stream) const {
+    template <coverage Rule, bool Run>
+    [[nodiscard]] fragment_lists<std::uint32_t, Payload> go_direct(arena& memory, pipeline_state* state,
+                                                                   cudaStream_t stream) const {
         constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
         const draw_type& d = draws[0];
+        const auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
         core::snapped_position* const positions =
             memory.take<core::snapped_position>(on_the_spot ? 0 : d.mesh.positions.size());
         const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
@@ -551,7 +382,7 @@ private:
                 raster(stored_source{{d.mesh.triangles.data(), positions, 0, num_vertices}});
             }
             end_stage(clock, &stage_times::fine_raster);
-            fragment_lists<Key, Payload> sorted = sort_unordered(lists, order, state, limits, stream, clock);
+            fragment_lists<std::uint32_t, Payload> sorted = sort_unordered(lists, order, state, limits, stream, clock);
             if constexpr (!std::is_same_v<Payload, no_payload>)
                 sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
             return sorted;

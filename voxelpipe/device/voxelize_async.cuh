@@ -98,12 +98,14 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
                     s.required = {workspace.limits.tile_pairs, workspace.limits.fragments, need};
                     return;
                 }
-                device::arena memory(workspace.memory);
-                device::pipeline_state* state = nullptr; // the first thing in the workspace
-                if (options.rule == coverage::thin)
-                    call.template go<coverage::thin, true>(memory, state, backend.stream);
-                else
-                    call.template go<coverage::conservative, true>(memory, state, backend.stream);
+                device::launch_until(call.last_stage(), [&] {
+                    device::arena memory(workspace.memory);
+                    device::pipeline_state* state = nullptr; // the first thing in the workspace
+                    if (options.rule == coverage::thin)
+                        call.template go<coverage::thin, true>(memory, state, backend.stream);
+                    else
+                        call.template go<coverage::conservative, true>(memory, state, backend.stream);
+                });
             };
             device::with_call(draws, g, fb, options, s.counts.triangles_in, workspace.limits, launch);
         } catch (const device::cuda_failure& e) {
@@ -117,7 +119,8 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
 
 // Waits for the stream and says how the last call in this workspace went. Where it was too small (capacity_exceeded),
 // `need`, if given, receives limits with which the same call succeeds, or comes closer: a pass that had no room for its
-// records has not seen all of its pairs.
+// records has not seen all of its pairs. A CUDA error that shows only here has no stage (validate): it may be of any
+// work that the stream had before.
 [[nodiscard]] inline status read_status(cuda_backend& backend, const workspace_view& workspace,
                                         workspace_limits* need = nullptr) {
     device::pipeline_state state{};
@@ -129,7 +132,8 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
     }
     if (state.index_error != 0) return core::failure(status_code::index_out_of_range, stage::coarse_raster);
     if (device::has_failed(state, device::to_capacities(workspace.limits))) {
-        status s = core::failure(status_code::capacity_exceeded, stage::coarse_raster);
+        const device::capacities limits = device::to_capacities(workspace.limits);
+        status s = core::failure(status_code::capacity_exceeded, device::find_overflow(state, limits));
         s.required = {state.tile_pairs, state.list_fragments, 0};
         if (need != nullptr) {
             const auto larger = [](std::uint64_t a, std::uint64_t b) { return a > b ? a : b; };

@@ -62,6 +62,17 @@ struct share_buffers {
     unsigned long long* num_cells;
 };
 
+// All but the counters.
+[[nodiscard]] inline share_buffers take_share(arena& memory, std::uint32_t num_primitives,
+                                              unsigned long long record_capacity) {
+    share_buffers b{};
+    b.counts = memory.take<std::uint32_t>(num_primitives);
+    b.offsets = memory.take<unsigned long long>(num_primitives);
+    b.records = memory.take<chunk_record>(record_capacity);
+    b.record_capacity = record_capacity;
+    return b;
+}
+
 // The sum of `value` over the block, in thread 0. All threads take part.
 __device__ inline unsigned long long block_sum(unsigned long long value) {
     __shared__ unsigned long long partial[32];
