@@ -13,7 +13,8 @@ function(voxelpipe_own_target)
                         # GLM 0.9.9: __host__ __device__ on defaulted functions, in headers that are not SYSTEM to nvcc
                         $<$<COMPILE_LANGUAGE:CUDA>:-diag-suppress=20012>
                         # nvcc 13.0 takes a reference to a [[nodiscard]] class, which or_throw() returns, for the class
-                        $<$<COMPILE_LANGUAGE:CUDA>:-diag-suppress=2810>)
+                        $<$<COMPILE_LANGUAGE:CUDA>:-diag-suppress=2810>
+                        $<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<STREQUAL:$<TARGET_PROPERTY:CUDA_ARCHITECTURES>,OFF>>:${VOXELPIPE_CUDA_CODE}>)
     if(VOXELPIPE_WERROR)
       target_compile_options(${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-Werror>
                                                $<$<COMPILE_LANGUAGE:CUDA>:-Werror=all-warnings>)
@@ -25,5 +26,8 @@ endfunction()
 function(voxelpipe_hot_target)
   foreach(target IN LISTS ARGN)
     target_compile_options(${target} PRIVATE ${VOXELPIPE_HOT_OPTIONS})
+    if(VOXELPIPE_HOT_OPTIONS)
+      set_target_properties(${target} PROPERTIES DISABLE_PRECOMPILE_HEADERS ON) # precompiled without these options
+    endif()
   endforeach()
 endfunction()

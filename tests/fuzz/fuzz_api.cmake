@@ -8,6 +8,7 @@ if(TARGET voxelpipe_oracle)
   target_link_libraries(replay_api PRIVATE voxelpipe::cpu_ref voxelpipe_oracle)
   target_compile_definitions(replay_api PRIVATE VOXELPIPE_FUZZ_REPLAY)
   voxelpipe_own_target(replay_api)
+  voxelpipe_light_test(replay_api)
   add_test(NAME fuzz_api.replay COMMAND replay_api "${CMAKE_CURRENT_LIST_DIR}/corpus/fuzz_api")
   add_test(NAME fuzz_api.random COMMAND replay_api)
   # A corpus that got lost is not one that passes.

@@ -48,7 +48,8 @@ if(WAY STREQUAL "find_package")
   set(build_type Release)
 endif()
 set(configure ${environment} "${CMAKE_COMMAND}" -G "${GENERATOR}" "-DCMAKE_CXX_COMPILER=${CXX_COMPILER}"
-              "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}" "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}" -DCMAKE_BUILD_TYPE=${build_type})
+              "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}" "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}" -DCMAKE_BUILD_TYPE=${build_type}
+              "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG") # forced inlining needs no more
 
 if(WAY STREQUAL "fetch_content")
   run(${configure} -S "${consumer}" -B "${build}" -DCONSUMER_USES=FetchContent

@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Exact voxel counts and hashes of the bit grids of large meshes, against golden.txt, and picks of them against the
-// oracle. Two programs are made of this file: the one with VOXELPIPE_ALL_SCENES has the benchmark scenes that are there
-// and large grids, the other small grids of generated meshes.
+// oracle. Two programs are made of this file: the one of all_scenes.cpp has the benchmark scenes that are there and
+// large grids, that of small_scenes.cpp small grids of generated meshes.
 
+#include "all_scenes.hpp"
 #include "bit_digest.hpp"
 #include "generated_meshes.hpp"
 #include "mesh_file.hpp"
@@ -69,7 +70,10 @@ std::vector<scene_case> make_cases() {
             for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
                 cases.push_back({name, e, rule});
     };
-#if defined(VOXELPIPE_ALL_SCENES)
+    if (!all_scenes) {
+        for (const generated_mesh& g : generated) add(g.name, {glm::ivec3(128), {77, 131, 5}, {1, 1, 1}});
+        return cases;
+    }
     for (const std::string_view scene : bench::scene_names) {
         std::string why;
         if (bench::has_scene(VOXELPIPE_SCENES_DIR, scene, why))
@@ -78,9 +82,6 @@ std::vector<scene_case> make_cases() {
             std::printf("note: scene %s is not tested: %s\n", std::string(scene).c_str(), why.c_str());
     }
     for (const generated_mesh& g : generated) add(g.name, {glm::ivec3(512), glm::ivec3(1024), {2001, 37, 999}});
-#else
-    for (const generated_mesh& g : generated) add(g.name, {glm::ivec3(128), {77, 131, 5}, {1, 1, 1}});
-#endif
     return cases;
 }
 
