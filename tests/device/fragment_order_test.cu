@@ -48,7 +48,10 @@ void expect_ordered(const std::vector<std::uint64_t>& lengths, std::uint32_t see
         gpu, vp::array_view<const unsigned long long>(first.data(), first.size()));
     vp::cuda_backend::buffer<std::uint32_t> from(
         gpu, vp::array_view<const std::uint32_t>(primitives.data(), primitives.size()));
-    vp::cuda_backend::buffer<std::uint32_t> to(gpu, capacity), spare(gpu, capacity);
+    // Set, what lies behind the fragments too: all of it is copied back.
+    vp::cuda_backend::buffer<std::uint32_t> to(
+        gpu, vp::array_view<const std::uint32_t>(primitives.data(), primitives.size()));
+    vp::cuda_backend::buffer<std::uint32_t> spare(gpu, capacity);
     device::order_fragments({d_first.data(), from.data(), to.data(), spare.data(), lists}, state.data(),
                             {0, 0, capacity, 0}, gpu.stream);
     std::vector<std::uint32_t> result = to.to_host(gpu);
