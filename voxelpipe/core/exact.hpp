@@ -164,8 +164,9 @@ namespace exact {
 #if defined(__CUDA_ARCH__)
     return __double2loint(__dadd_rn(a, shift));
 #else
-    const auto offset = static_cast<std::int64_t>(0x1.8p52 - shift);
-    return static_cast<std::int32_t>(static_cast<std::uint32_t>(round_to_int64(a) - offset));
+    const auto offset = static_cast<std::int64_t>(0x1.8p52 - shift); // unsigned below, for an `a` out of range
+    return static_cast<std::int32_t>(
+        static_cast<std::uint32_t>(static_cast<std::uint64_t>(round_to_int64(a)) - static_cast<std::uint64_t>(offset)));
 #endif
 }
 
