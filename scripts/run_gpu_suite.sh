@@ -123,13 +123,14 @@ for part in "${parts[@]}"; do
     sanitizer)
         command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"
         # Of this commit, whatever lies there.
-        target=device_reduced_test build_suite gpu
-        target=device_fragment_order_test build_suite gpu
+        for program in reduced reduced_lists fragment_order; do target=device_${program}_test build_suite gpu; done
         for tool in memcheck racecheck initcheck synccheck; do
-            run_program sanitizer "$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 \
-                build/gpu/tests/device/device_reduced_test
-            run_program sanitizer "$tool, fragment order" compute-sanitizer --tool "$tool" --error-exitcode 9 \
-                build/gpu/tests/device/device_fragment_order_test --gtest_filter='*AtTheLimits:*NothingWhereTheCallHasFailed'
+            for program in reduced reduced_lists fragment_order; do
+                filter='*'
+                [[ $program != fragment_order ]] || filter='*AtTheLimits:*NothingWhereTheCallHasFailed'
+                run_program sanitizer "$tool, $program" compute-sanitizer --tool "$tool" --error-exitcode 9 \
+                    "build/gpu/tests/device/device_${program}_test" --gtest_filter="$filter"
+            done
         done
         ;;
     *) die "no part is called $part" ;;

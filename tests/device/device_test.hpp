@@ -248,6 +248,34 @@ struct stream_owner {
     ~stream_owner() { cudaStreamDestroy(stream); }
 };
 
+// Stage times are asked for without a change to what a call gives: they are parts of the call, and a call that is not
+// asked for them leaves them alone.
+template <class Call>
+vp::stage_times time_stages(vp::cuda_backend& be, const Call& call) {
+    cudaEvent_t begin = nullptr, end = nullptr;
+    EXPECT_EQ(cudaEventCreate(&begin), cudaSuccess);
+    EXPECT_EQ(cudaEventCreate(&end), cudaSuccess);
+    vp::stage_times times;
+    be.times = &times;
+    EXPECT_EQ(cudaEventRecord(begin, be.stream), cudaSuccess);
+    const vp::status s = call();
+    EXPECT_EQ(cudaEventRecord(end, be.stream), cudaSuccess);
+    EXPECT_EQ(cudaEventSynchronize(end), cudaSuccess);
+    be.times = nullptr;
+    EXPECT_TRUE(s.ok()) << s.message();
+    float whole = 0;
+    EXPECT_EQ(cudaEventElapsedTime(&whole, begin, end), cudaSuccess);
+    for (const auto& [name, field] : vp::stage_time_fields) EXPECT_GE(times.*field, 0.0) << name;
+    EXPECT_GT(vp::sum_of(times), 0.0);
+    EXPECT_LE(vp::sum_of(times), whole + 0.01); // events are good to half a microsecond each
+    const vp::stage_times before = times;
+    EXPECT_TRUE(call().ok());
+    EXPECT_EQ(before, times);
+    cudaEventDestroy(begin);
+    cudaEventDestroy(end);
+    return times;
+}
+
 inline constexpr vp::coverage both_rules[] = {vp::coverage::thin, vp::coverage::conservative};
 
 } // namespace device_test

@@ -1,12 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Every kernel on small loads, quick enough for compute-sanitizer.
+// Every kernel on small loads, quick enough for compute-sanitizer: render targets. Lists: reduced_lists_test.cu.
 
-#include "async_lists.hpp"
 #include "cells.hpp"
-
-#include <span>
 
 using namespace device_test;
 namespace blend = voxelpipe::blend;
@@ -62,73 +59,6 @@ TEST(Reduced, BitsThatAreClearedToOne) {
         vp::coverage::conservative);
 }
 
-TEST(Reduced, Lists) {
-    const mesh_data m = mixed_triangles(300, 30.0f, 62);
-    const vp::grid g = box_grid({30, 21, 33});
-    for (const vp::coverage rule : both_rules) {
-        expect_same_lists<void>(m, g, vp::passthrough{}, vp::constant(true), rule);
-        expect_same_lists<float>(m, g, shift{0.5f}, vp::constant(0.5f), rule);
-        expect_same_lists<double>(m, g, vp::passthrough{}, any_double{}, rule);
-    }
-}
-
-// The last voxel of this grid is number 2^33 - 1.
-const vp::grid large_grid = box_grid({2048, 2048, 2048});
-mesh_data far_triangles(std::uint32_t seed) { return translated(mixed_triangles(80, 25.0f, seed), glm::vec3(2020.0f)); }
-
-TEST(Reduced, ListsOfVoxelNumbersBeyond32Bits) {
-    for (const vp::coverage rule : both_rules) {
-        expect_same_lists<void>(far_triangles(68), large_grid, vp::passthrough{}, vp::constant(true), rule);
-        expect_same_lists<double>(far_triangles(69), large_grid, vp::passthrough{}, any_double{}, rule);
-    }
-}
-
-template <class Payload, class FragmentShader>
-void compare_without_a_wait(std::vector<mesh_data> parts, const vp::grid& g, const FragmentShader& fs,
-                            vp::coverage rule) {
-    list_call<Payload, FragmentShader> call(std::move(parts), g, fs, rule);
-    call.launch();
-    call.expect_the_cpus();
-}
-
-TEST(Reduced, ListsWithoutAWait) {
-    const vp::grid g = box_grid({30, 21, 33});
-    for (const vp::coverage rule : both_rules) {
-        compare_without_a_wait<void>({mixed_triangles(300, 30.0f, 70)}, g, vp::constant(true), rule);
-        compare_without_a_wait<double>({mixed_triangles(200, 30.0f, 71), mixed_triangles(100, 30.0f, 72)}, g,
-                                       any_double{}, rule);
-        compare_without_a_wait<double>({far_triangles(73)}, large_grid, any_double{}, rule);
-    }
-}
-
-// Stage times are asked for without a change to what a call gives: they are parts of the call, and a call that is not
-// asked for them leaves them alone.
-template <class Call>
-vp::stage_times time_stages(vp::cuda_backend& be, const Call& call) {
-    cudaEvent_t begin = nullptr, end = nullptr;
-    EXPECT_EQ(cudaEventCreate(&begin), cudaSuccess);
-    EXPECT_EQ(cudaEventCreate(&end), cudaSuccess);
-    vp::stage_times times;
-    be.times = &times;
-    EXPECT_EQ(cudaEventRecord(begin, be.stream), cudaSuccess);
-    const vp::status s = call();
-    EXPECT_EQ(cudaEventRecord(end, be.stream), cudaSuccess);
-    EXPECT_EQ(cudaEventSynchronize(end), cudaSuccess);
-    be.times = nullptr;
-    EXPECT_TRUE(s.ok()) << s.message();
-    float whole = 0;
-    EXPECT_EQ(cudaEventElapsedTime(&whole, begin, end), cudaSuccess);
-    for (const auto& [name, field] : vp::stage_time_fields) EXPECT_GE(times.*field, 0.0) << name;
-    EXPECT_GT(vp::sum_of(times), 0.0);
-    EXPECT_LE(vp::sum_of(times), whole + 0.01); // events are good to half a microsecond each
-    const vp::stage_times before = times;
-    EXPECT_TRUE(call().ok());
-    EXPECT_EQ(before, times);
-    cudaEventDestroy(begin);
-    cudaEventDestroy(end);
-    return times;
-}
-
 TEST(Reduced, StageTimesOfTilesAndOrderedTargets) {
     using fb_type = with_every_kind<vp::framebuffer, vp::cuda_backend>;
     const with_every_kind<any_values> shader;
@@ -171,29 +101,6 @@ TEST(Reduced, StageTimesWithoutTiles) {
     for (const double none : {times.vertex_shade, times.tile_sort, times.tile_split, times.tile_resolve})
         EXPECT_EQ(none, 0.0);
     expect_same_bytes(vp::get<0>(plain).to_host(be), vp::get<0>(timed).to_host(be), "timed");
-}
-
-// One draw of a constant shader is listed on the spot; several have their vertices shaded first.
-TEST(Reduced, StageTimesOfLists) {
-    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<bool>>;
-    const mesh_data m = mixed_triangles(300, 30.0f, 65);
-    const vp::grid g = box_grid({30, 21, 33});
-    vp::cuda_backend be;
-    const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
-    for (const std::size_t num_draws : {std::size_t{1}, std::size_t{2}}) {
-        SCOPED_TRACE(std::to_string(num_draws) + " draws");
-        const std::vector<draw_type> draws(num_draws, draw_type{mesh.view(), {}, vp::constant(true)});
-        vp::abuffer<vp::cuda_backend, void> timed{be}, plain{be};
-        const auto draw = [&](vp::abuffer<vp::cuda_backend, void>& lists) {
-            return vp::voxelize(be, std::span<const draw_type>(draws), g, lists);
-        };
-        ASSERT_TRUE(draw(plain).ok());
-        const vp::stage_times times = time_stages(be, [&] { return draw(timed); });
-        for (const double some : {times.fine_raster, times.tile_sort, times.abuffer_emit}) EXPECT_GT(some, 0.0);
-        EXPECT_EQ(times.vertex_shade > 0.0, num_draws > 1);
-        EXPECT_EQ(times.coarse_raster, 0.0);
-        expect_same_on_host(plain.to_host(be), timed.to_host(be));
-    }
 }
 
 } // namespace

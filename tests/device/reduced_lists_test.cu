@@ -1,0 +1,77 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Every kernel on small loads, quick enough for compute-sanitizer: fragment lists.
+
+#include "async_lists.hpp"
+#include "cells.hpp"
+
+#include <span>
+
+using namespace device_test;
+
+namespace {
+
+TEST(ReducedLists, OfConstantAndComputedPayloads) {
+    const mesh_data m = mixed_triangles(300, 30.0f, 62);
+    const vp::grid g = box_grid({30, 21, 33});
+    for (const vp::coverage rule : both_rules) {
+        expect_same_lists<void>(m, g, vp::passthrough{}, vp::constant(true), rule);
+        expect_same_lists<float>(m, g, shift{0.5f}, vp::constant(0.5f), rule);
+        expect_same_lists<double>(m, g, vp::passthrough{}, any_double{}, rule);
+    }
+}
+
+// The last voxel of this grid is number 2^33 - 1.
+const vp::grid large_grid = box_grid({2048, 2048, 2048});
+mesh_data far_triangles(std::uint32_t seed) { return translated(mixed_triangles(80, 25.0f, seed), glm::vec3(2020.0f)); }
+
+TEST(ReducedLists, OfVoxelNumbersBeyond32Bits) {
+    for (const vp::coverage rule : both_rules) {
+        expect_same_lists<void>(far_triangles(68), large_grid, vp::passthrough{}, vp::constant(true), rule);
+        expect_same_lists<double>(far_triangles(69), large_grid, vp::passthrough{}, any_double{}, rule);
+    }
+}
+
+template <class Payload, class FragmentShader>
+void compare_without_a_wait(std::vector<mesh_data> parts, const vp::grid& g, const FragmentShader& fs,
+                            vp::coverage rule) {
+    list_call<Payload, FragmentShader> call(std::move(parts), g, fs, rule);
+    call.launch();
+    call.expect_the_cpus();
+}
+
+TEST(ReducedLists, WithoutAWait) {
+    const vp::grid g = box_grid({30, 21, 33});
+    for (const vp::coverage rule : both_rules) {
+        compare_without_a_wait<void>({mixed_triangles(300, 30.0f, 70)}, g, vp::constant(true), rule);
+        compare_without_a_wait<double>({mixed_triangles(200, 30.0f, 71), mixed_triangles(100, 30.0f, 72)}, g,
+                                       any_double{}, rule);
+        compare_without_a_wait<double>({far_triangles(73)}, large_grid, any_double{}, rule);
+    }
+}
+
+// One draw of a constant shader is listed on the spot; several have their vertices shaded first.
+TEST(ReducedLists, StageTimes) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<bool>>;
+    const mesh_data m = mixed_triangles(300, 30.0f, 65);
+    const vp::grid g = box_grid({30, 21, 33});
+    vp::cuda_backend be;
+    const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+    for (const std::size_t num_draws : {std::size_t{1}, std::size_t{2}}) {
+        SCOPED_TRACE(std::to_string(num_draws) + " draws");
+        const std::vector<draw_type> draws(num_draws, draw_type{mesh.view(), {}, vp::constant(true)});
+        vp::abuffer<vp::cuda_backend, void> timed{be}, plain{be};
+        const auto draw = [&](vp::abuffer<vp::cuda_backend, void>& lists) {
+            return vp::voxelize(be, std::span<const draw_type>(draws), g, lists);
+        };
+        ASSERT_TRUE(draw(plain).ok());
+        const vp::stage_times times = time_stages(be, [&] { return draw(timed); });
+        for (const double some : {times.fine_raster, times.tile_sort, times.abuffer_emit}) EXPECT_GT(some, 0.0);
+        EXPECT_EQ(times.vertex_shade > 0.0, num_draws > 1);
+        EXPECT_EQ(times.coarse_raster, 0.0);
+        expect_same_on_host(plain.to_host(be), timed.to_host(be));
+    }
+}
+
+} // namespace
