@@ -130,7 +130,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
             if (max3(all.hi[0], all.hi[1], all.hi[2]) < 8) {
                 ++tiny;
                 voxels again;
-                s.rows(all, [&](int y, int z, std::uint32_t bits) {
+                s.rows<8>(all, [&](int y, int z, std::uint32_t bits) {
                     for (int x = 0; x < 32; ++x)
                         if (((bits >> x) & 1u) != 0)
                             again.insert({static_cast<int>(box.lo[0]) + x, static_cast<int>(box.lo[1]) + y,
@@ -146,6 +146,20 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
                                        static_cast<int>(box.lo[2]) + z});
             });
             ASSERT_EQ(longer, expected) << "fraction " << fraction << ", triangle " << i;
+            voxels sixteen;
+            if (last < 16) {
+                s.rows<16>(all, [&](int y, int z, std::uint32_t bits) {
+                    for (int x = 0; x < 32; ++x)
+                        if (((bits >> x) & 1u) != 0)
+                            sixteen.insert({static_cast<int>(box.lo[0]) + x, static_cast<int>(box.lo[1]) + y,
+                                            static_cast<int>(box.lo[2]) + z});
+                });
+                ASSERT_EQ(sixteen, expected) << "fraction " << fraction << ", triangle " << i;
+            }
+            // Nothing of a box that the grid leaves nothing of.
+            const small_box none{{1, 0, 0}, {0, all.hi[1], all.hi[2]}};
+            s.rows<8>(none, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
+            s.rows<16>(none, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
             if (all.hi[0] == 1 && all.hi[1] == 1 && all.hi[2] == 1) {
                 ++cubes;
                 std::uint32_t wanted = 0;
@@ -228,6 +242,25 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
                     const auto p = to_xyz(s.axis, origin[0] + u, origin[1] + row, origin[2] + w);
                     rows.insert({static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])});
                 });
+            }
+            const auto width = static_cast<int>(last[0]) + 1, height = static_cast<int>(last[1]) + 1;
+            const auto by_columns = [&]<int Width>(int step) {
+                voxels again;
+                for (int first = 0; first < step; ++first)
+                    s.columns<Width>(0, width - 1, first, height - 1, step, [&](int u, int row, int w) {
+                        EXPECT_EQ(row % step, first);
+                        const auto p = to_xyz(s.axis, origin[0] + u, origin[1] + row, origin[2] + w);
+                        again.insert({static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])});
+                    });
+                s.columns<Width>(1, 0, 0, height - 1, step, [&](int, int, int) { ADD_FAILURE(); });
+                return again;
+            };
+            if (width <= 8) {
+                ASSERT_EQ(by_columns.template operator()<8>(1), rows) << "fraction " << fraction << ", triangle " << i;
+            }
+            if (width <= 16) {
+                ASSERT_EQ(by_columns.template operator()<16>(1), rows) << "fraction " << fraction << ", triangle " << i;
+                ASSERT_EQ(by_columns.template operator()<16>(8), rows) << "fraction " << fraction << ", triangle " << i;
             }
             if (max3(last[0], last[1], last[2]) < 2) { // all columns at once
                 ++cubes;

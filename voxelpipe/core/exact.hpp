@@ -224,6 +224,22 @@ template <class Int>
 #endif
 }
 
+// Place of the lowest bit that is set; a != 0.
+[[nodiscard]] VOXELPIPE_HD inline int lowest_one(std::uint32_t a) {
+#if defined(__CUDA_ARCH__)
+    return __ffs(static_cast<int>(a)) - 1;
+#else
+    return std::countr_zero(a);
+#endif
+}
+[[nodiscard]] VOXELPIPE_HD inline int lowest_one(std::uint64_t a) {
+#if defined(__CUDA_ARCH__)
+    return __ffsll(static_cast<long long>(a)) - 1;
+#else
+    return std::countr_zero(a);
+#endif
+}
+
 [[nodiscard]] VOXELPIPE_HD inline int bit_width(uint128 a) {
     const auto high = static_cast<std::uint64_t>(a >> 64);
     return high != 0 ? 64 + bit_width(high) : bit_width(static_cast<std::uint64_t>(a));

@@ -84,6 +84,27 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void small_projection(const small_triang
     return {{e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x}};
 }
 
+// Bit x where three linear functions of x are all >= 0, for x = 0 .. Length - 1; e: their values at x = Length - 1, s:
+// what a step adds. Without a branch, and from the last one down, so that each sign goes to its bit by one shift of two
+// words. What is more than the row is for the caller to mask; within 32 voxels of a box of at most 16 the values stay
+// below 2^28.
+template <int Length>
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::uint32_t
+small_line(std::int32_t e0, std::int32_t e1, std::int32_t e2, std::int32_t s0, std::int32_t s1, std::int32_t s2) {
+    std::uint32_t outside = 0;
+    for (int x = Length; x > 0; --x) {
+        outside = outside << 1 | static_cast<std::uint32_t>(e0 | e1 | e2) >> 31;
+        e0 -= s0;
+        e1 -= s1;
+        e2 -= s2;
+    }
+    return ~outside;
+}
+// a * b for 0 <= b < 2^32, modulo 2^64: two multiplications of 32 bits.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::int64_t times(std::int64_t a, int b) {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) * static_cast<std::uint32_t>(b));
+}
+
 // ---- conservative ---------------------------------------------------------------------------------------------------
 
 struct small_conservative {
@@ -145,36 +166,66 @@ struct small_conservative {
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets_row(int y, int z) const {
         return (yz[0].at(y, z) | yz[1].at(y, z) | yz[2].at(y, z)) >= 0;
     }
+    // `limit` is one run of bits, as what projections leave is, and so is what the plane leaves of it: its ends are
+    // tested, and mostly nothing else.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t plane_bits(int x0, int y, int z,
                                                                          std::uint32_t limit) const {
-        const std::int64_t depth = n[0] * x0 + n[1] * y + n[2] * z;
+        if (limit == 0) return 0;
+        int first = exact::lowest_one(limit), last = exact::bit_width(std::uint64_t{limit}) - 1;
+        const std::int64_t depth = times(n[0], x0 + first) + times(n[1], y) + times(n[2], z);
         std::int64_t lower = depth + below, upper = above - depth;
-        std::uint32_t bits = 0;
-        for (std::uint32_t at = 1; at != 0 && at <= limit; at <<= 1) {
-            bits |= static_cast<std::uint32_t>(~((lower | upper) >> 63)) & at;
+        const std::int64_t across = times(n[0], last - first);
+        for (std::int64_t a = lower + across, b = upper - across; (a | b) < 0 && last >= first; --last) {
+            a -= n[0];
+            b += n[0];
+        }
+        for (; (lower | upper) < 0 && first <= last; ++first) {
             lower += n[0];
             upper -= n[0];
         }
-        return bits & limit;
+        return first <= last ? ((2u << last) - 1) & ~((1u << first) - 1) : 0;
     }
 
-    // Calls emit(y, z, bits) for the rows of a box of at most 8 voxels a side; bit 0 is box.lo[0]. What one projection
-    // cuts off a row depends on y or on z alone, so that is found once and not once a voxel.
-    template <class Emit>
+    // Calls emit(y, z, bits) for the rows of a box of at most Width voxels along x (8 or 16) that two projections and
+    // the plane leave something of; bit 0 is box.lo[0]. What the xy and the zx projection leave depends on y or on z
+    // alone, so that is found once and not once a row, and the yz projection tells which rows are wanted at all:
+    // threads that have a triangle each then go through as many rows as they emit, not through their boxes. The rows
+    // lie in 64 bits: 8 along y, and as many along z as there is room for.
+    template <int Width, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void rows(const small_box& box, Emit&& emit) const {
-        const int x0 = box.lo[0], x1 = box.hi[0];
-        std::uint64_t by_y = 0; // 8 bits a row
-        for (int y = box.hi[1]; y >= box.lo[1]; --y) by_y = by_y << 8 | limit_at_y(x0, x1, y);
-        for (int z = box.lo[2]; z <= box.hi[2]; ++z) {
-            const std::uint32_t by_z = limit_at_z(x0, x1, z);
-            std::uint64_t left = by_y;
-            for (int y = box.lo[1]; y <= box.hi[1]; ++y, left >>= 8) {
-                const std::uint32_t limit = static_cast<std::uint32_t>(left) & by_z; // by_z has 8 bits
-                if (limit != 0 && meets_row(y, z)) emit(y, z, plane_bits(x0, y, z, limit));
+        constexpr int slices = 64 / Width;
+        static_assert(Width == 8 || Width == 16);
+        const int x0 = box.lo[0], far = x0 + Width - 1;
+        if (box.hi[0] < x0) return;
+        const std::uint32_t along = (2u << (box.hi[0] - x0)) - 1;
+        for (int y0 = box.lo[1]; y0 <= box.hi[1]; y0 += 8) {
+            const int y1 = box.hi[1] < y0 + 7 ? box.hi[1] : y0 + 7;
+            const std::uint32_t across = (2u << (y1 - y0)) - 1;
+            std::uint64_t by_y[Width / 8] = {};
+            for (int y = y1; y >= y0; --y) {
+                for (int k = Width / 8 - 1; k > 0; --k) by_y[k] = by_y[k] << Width | by_y[k - 1] >> (64 - Width);
+                by_y[0] = by_y[0] << Width | (along & small_line<Width>(xy[0].at(far, y), xy[1].at(far, y),
+                                                                        xy[2].at(far, y), xy[0].a, xy[1].a, xy[2].a));
+            }
+            for (int z0 = box.lo[2]; z0 <= box.hi[2]; z0 += slices) {
+                const int z1 = box.hi[2] < z0 + slices - 1 ? box.hi[2] : z0 + slices - 1;
+                std::uint64_t by_z = 0, met = 0; // rows, bit y + 8 z
+                for (int z = z1; z >= z0; --z) {
+                    by_z = by_z << Width | (along & small_line<Width>(zx[0].at(z, far), zx[1].at(z, far),
+                                                                      zx[2].at(z, far), zx[0].b, zx[1].b, zx[2].b));
+                    met = met << 8 | (across & small_line<8>(yz[0].at(y0 + 7, z), yz[1].at(y0 + 7, z),
+                                                             yz[2].at(y0 + 7, z), yz[0].a, yz[1].a, yz[2].a));
+                }
+                for (; met != 0; met &= met - 1) {
+                    const int at = exact::lowest_one(met), y = at & 7, z = at >> 3;
+                    const std::uint64_t word = Width == 8 || y < 64 / Width ? by_y[0] : by_y[Width / 8 - 1];
+                    const std::uint32_t limit = static_cast<std::uint32_t>(word >> y % (64 / Width) * Width) &
+                                                static_cast<std::uint32_t>(by_z >> z * Width) & along;
+                    if (limit != 0) emit(y0 + y, z0 + z, plane_bits(x0, y0 + y, z0 + z, limit));
+                }
             }
         }
     }
-
     // The same for boxes of up to 32 voxels a side.
     template <class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void long_rows(const small_box& box, Emit&& emit) const {
@@ -321,6 +372,37 @@ struct small_thin {
             } else if (remainder >= divisor) {
                 remainder -= divisor;
                 ++w;
+            }
+        }
+    }
+
+    // Calls emit(u, v, w) for the covered columns of the rows v0, v0 + step, ... up to v1, of at most Width columns
+    // each (8 or 16): row() for threads that have a triangle each, as small_conservative::rows.
+    template <int Width, class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void columns(int u0, int u1, int v0, int v1, int step, Emit&& emit) const {
+        constexpr int rows = 64 / Width;
+        static_assert(Width == 8 || Width == 16);
+        if (u1 < u0) return;
+        const std::int64_t divisor = 2 * nw;
+        const float inverse = 1.0f / static_cast<float>(divisor);
+        const std::uint32_t along = (2u << (u1 - u0)) - 1;
+        const int far = u0 + Width - 1;
+        for (; v0 <= v1; v0 += rows * step) {
+            std::uint64_t met = 0;
+            int v = v0 + (rows - 1) * step;
+            while (v > v1) v -= step;
+            for (; v >= v0; v -= step)
+                met = met << Width | (along & small_line<Width>(uv[0].at(far, v), uv[1].at(far, v), uv[2].at(far, v),
+                                                                uv[0].a, uv[1].a, uv[2].a));
+            for (; met != 0; met &= met - 1) {
+                const int at = exact::lowest_one(met), u = u0 + at % Width;
+                v = v0 + at / Width * step;
+                const std::int64_t numerator = depth - times(nu, 2 * u + 1) - times(nv, 2 * v + 1);
+                // A quotient below 2^8, so at most one off, which the remainder tells.
+                auto w = static_cast<std::int32_t>(static_cast<float>(numerator) * inverse);
+                const std::int64_t remainder = numerator - w * divisor;
+                w += static_cast<std::int32_t>(remainder >= divisor) - static_cast<std::int32_t>(remainder < 0);
+                emit(u, v, w);
             }
         }
     }

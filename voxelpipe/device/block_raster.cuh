@@ -26,14 +26,6 @@ struct warp_queues {
     std::uint32_t larges[queue_places]; // numbers of triangles that are loaded again
 };
 
-template <class Call>
-__device__ __noinline__ core::triangle_class cut_and_push(const Call& call, std::uint32_t triangle) {
-    unsigned long long records = 0;
-    const core::triangle_class kind = find_records(call, triangle, records);
-    if (kind == core::triangle_class::drawn) call.lists.push_cut_alone(triangle, records);
-    return kind;
-}
-
 // The work of a warp, from the mesh to a sink. Every warp has its own queues: no thread waits for another warp, and the
 // numbers that wait are registers that all lanes agree on.
 template <class Call>
@@ -45,6 +37,8 @@ struct block_warp {
     const Call& call;
     warp_queues& queues;
     sink_type& sink;
+    std::uint32_t* left_over; // for big triangles, of the block
+    unsigned& num_left_over;
     int lane = static_cast<int>(threadIdx.x) % 32;
     int num_cubes = 0, num_smalls = 0, num_larges = 0;
 
@@ -110,10 +104,8 @@ struct block_warp {
             const int large_at = take_place(kind == large_triangles, num_larges);
             if (kind == large_triangles) queues.larges[large_at] = i;
             call.lists.push(medium_triangles, kind == medium_triangles, i);
-            if (is_big) {
-                const triangle_class none = cut_and_push(call, i);
-                if (none != triangle_class::drawn) sink.drop(none);
-            }
+            if (is_big)
+                left_over[atomicAdd(&num_left_over, 1u)] = i; // no call of a function here: its registers would spill
         }
         __syncwarp();
     }
@@ -163,6 +155,7 @@ struct block_warp {
             raster_medium<Call::rule>(call.in, w < Warps, w < Warps ? all[w].larges[at] : 0, sink);
         }
 
+        cut_left(call, sink, left_over, num_left_over);
         if (begin >= call.in.num_triangles) return 0;
         const std::uint32_t batches = (call.in.num_triangles - begin - 1) / step + 1;
         const std::uint32_t of_last = call.in.num_triangles - (begin + (batches - 1) * step);
@@ -178,12 +171,15 @@ __global__ __launch_bounds__(raster_threads,
     __shared__ warp_queues queues[raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ int left[3][raster_warps];
-    __shared__ unsigned dropped[num_triangle_classes];
+    __shared__ unsigned dropped[num_triangle_classes], num_left;
     if (state->index_error != 0) return;
+    if (threadIdx.x == 0) num_left = 0;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();
     sink_type sink(call, dropped, memories[threadIdx.x / 32]);
-    block_warp<Call> warp{call, queues[threadIdx.x / 32], sink};
+    const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
+    block_warp<Call> warp{call, queues[threadIdx.x / 32], sink,
+                          call.lists.left + std::size_t{blockIdx.x} * batches * raster_threads, num_left};
     const unsigned looked_at = warp.run(queues, left);
     sink.finish(state);
     count_looked_at(looked_at, dropped, state);

@@ -96,10 +96,10 @@ struct blending_sink : direct_sink<Call> {
     // The voxels position(i) for the bits i of a mask.
     template <class Position>
     __device__ VOXELPIPE_INLINE void voxels(word bits, const Position& position) {
-        for (; bits != 0; bits &= bits - 1) {
-            const glm::ivec3 p = position(__ffs(static_cast<int>(bits)) - 1);
-            row(p.x, p.y, p.z, 1u);
-        }
+        fragments += static_cast<unsigned>(__popc(bits));
+        each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
+            touched += blend_voxels(t, bits, position, voxelpipe::get<K>(this->call.out.values), count_first);
+        });
     }
     // Adds up; all threads of the block take part.
     __device__ void finish(pipeline_state* state) const {
@@ -240,21 +240,6 @@ struct first_warp {
         __syncwarp();
     }
 
-    // The big triangles of the block, when all its warps have run. All threads take part.
-    __device__ void cut_left() {
-        for (unsigned first = 0; first < num_left; first += raster_threads) {
-            const unsigned at = first + threadIdx.x;
-            unsigned long long records = 0;
-            const std::uint32_t triangle = at < num_left ? left[at] : 0;
-            if (at < num_left) {
-                const triangle_class kind = find_records(call, triangle, records);
-                if (kind != triangle_class::drawn) sink.drop(kind);
-            }
-            __syncwarp();
-            call.lists.push_cut(triangle, records);
-        }
-    }
-
     // All batches of this warp. Returns how many triangles it looked at.
     __device__ VOXELPIPE_INLINE unsigned run() {
         const unsigned lane = threadIdx.x % 32;
@@ -300,7 +285,7 @@ __global__ __launch_bounds__(raster_threads,
         call, memory, sink, writer, call.lists.left + std::size_t{blockIdx.x} * batches * raster_threads, num_left};
     const unsigned looked_at = warp.run();
     __syncthreads();
-    warp.cut_left();
+    cut_left(call, sink, warp.left, num_left);
     writer.finish([&](int w) -> const kind_queues& { return memories[w].kinds; }, left);
     sink.finish(state);
     count_looked_at(looked_at, dropped, state);

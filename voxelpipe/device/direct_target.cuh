@@ -240,20 +240,20 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
             word* const w = t.elements + map::cell(t.extent, x, y, z);
             if constexpr (blend_type::sets) {
                 if (!v) return;
-                const word seen = __ldca(w); // maybe an old one: bits that are set stay set
-                if ((bits & ~seen) == 0) return;
-                if (count_first)
-                    first += static_cast<unsigned>(__popc(bits & ~atomicOr(w, bits)));
-                else
+                if (!count_first) {
                     reduce_or(w, bits);
+                    return;
+                }
+                const word seen = __ldca(w); // maybe an old one: bits that are set stay set
+                if ((bits & ~seen) != 0) first += static_cast<unsigned>(__popc(bits & ~atomicOr(w, bits)));
             } else if constexpr (blend_type::clears) {
                 if (v) return;
-                const word seen = __ldca(w);
-                if ((bits & seen) == 0) return;
-                if (count_first)
-                    first += static_cast<unsigned>(__popc(bits & atomicAnd(w, ~bits)));
-                else
+                if (!count_first) {
                     reduce_and(w, ~bits);
+                    return;
+                }
+                const word seen = __ldca(w);
+                if ((bits & seen) != 0) first += static_cast<unsigned>(__popc(bits & atomicAnd(w, ~bits)));
             } else {
                 if (v) atomicXor(w, bits);
             }
@@ -326,6 +326,39 @@ __device__ VOXELPIPE_INLINE unsigned blend_rows(const target_view<Target>& t, in
         if (mask[k] == 0) continue;
         const int dy = N == 2 ? (along_y ? k : 0) : k % 2;
         touched += blend_row(t, x, y + dy, z + (N == 2 ? k - dy : k / 2), mask[k], value, count_first);
+    }
+    return touched;
+}
+
+// Up to four voxels, position(i) for the bits i of `wanted`, whose loads go out together.
+template <class Target, class Value, class Position>
+__device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, word wanted, const Position& position,
+                                                  const Value& value, bool count_first) {
+    using map = typename Target::map;
+    unsigned touched = 0;
+    if constexpr (map::is_bit && bit_blend<typename Target::blend_type>::sets) {
+        if (!value) return 0;
+        word* at[4];
+        word missing[4];
+        for (int k = 0; k < 4; ++k) {
+            const glm::ivec3 p = position(k);
+            at[k] = t.elements + map::cell(t.extent, p.x, p.y, p.z);
+            missing[k] = (wanted >> k & 1u) << (p.x & 31);
+        }
+        for (int k = 0; k < 4; ++k)
+            if (missing[k] != 0) missing[k] &= ~__ldca(at[k]); // maybe an old word: bits that are set stay set
+        for (int k = 0; k < 4; ++k) {
+            if (missing[k] == 0) continue;
+            if (count_first)
+                touched += static_cast<unsigned>(__popc(missing[k] & ~atomicOr(at[k], missing[k])));
+            else
+                reduce_or(at[k], missing[k]);
+        }
+    } else {
+        for (; wanted != 0; wanted &= wanted - 1) {
+            const glm::ivec3 p = position(__ffs(static_cast<int>(wanted)) - 1);
+            touched += blend_row(t, p.x, p.y, p.z, 1u, value, count_first);
+        }
     }
     return touched;
 }

@@ -129,8 +129,10 @@ struct small_part {
             const auto emit = [&](int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
                 if (bits != 0) row(t.lo[0] + box.lo[0], t.lo[1] + y, t.lo[2] + z, bits);
             };
-            if (core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) < most_side)
-                s.rows(box, emit);
+            if (box.hi[0] - box.lo[0] < 8)
+                s.template rows<8>(box, emit);
+            else if (box.hi[0] - box.lo[0] < 16)
+                s.template rows<16>(box, emit);
             else
                 s.long_rows(box, emit);
         }

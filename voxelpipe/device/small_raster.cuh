@@ -158,12 +158,18 @@ __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, c
     const auto end = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
     const int depth = axis == 0 ? call.extent.x : axis == 1 ? call.extent.y : call.extent.z;
     const int lowest = axis == 0 ? lo[0] : axis == 1 ? lo[1] : lo[2];
-    for (int v = begin[1] + first; v <= end[1]; v += step)
-        s.row(begin[0], end[0], v, [&](int u, int w) {
-            if (lowest + w < 0 || lowest + w >= depth) return;
-            const auto at = core::to_xyz(axis, u, v, w);
-            sink.row(lo[0] + at[0], lo[1] + at[1], lo[2] + at[2], 1u);
-        });
+    const auto emit = [&](int u, int v, int w) VOXELPIPE_INLINE_LAMBDA {
+        if (lowest + w < 0 || lowest + w >= depth) return;
+        const auto at = core::to_xyz(axis, u, v, w);
+        sink.row(lo[0] + at[0], lo[1] + at[1], lo[2] + at[2], 1u);
+    };
+    if (end[0] - begin[0] < 8 && step == 1)
+        s.template columns<8>(begin[0], end[0], begin[1] + first, end[1], step, emit);
+    else if (end[0] - begin[0] < 16)
+        s.template columns<16>(begin[0], end[0], begin[1] + first, end[1], step, emit);
+    else
+        for (int v = begin[1] + first; v <= end[1]; v += step)
+            s.row(begin[0], end[0], v, [&](int u, int w) { emit(u, v, w); });
     return true;
 }
 
@@ -322,9 +328,9 @@ __device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, 
         };
         const int most = core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) + 1;
         if (most <= most_side)
-            s.rows(box, emit);
+            s.template rows<8>(box, emit);
         else
-            s.long_rows(box, emit);
+            s.template rows<16>(box, emit);
     }
 }
 

@@ -94,12 +94,6 @@ struct triangle_lists {
         std::uint32_t* const array = arrays[kind / 2];
         return kind % 2 == 0 ? array[i] : array[capacity - 1 - i];
     }
-    // One triangle, by one lane.
-    __device__ void push_cut_alone(std::uint32_t triangle, unsigned long long records) const {
-        const unsigned long long place = atomicAdd(next, (1ull << record_bits) + records);
-        cut[place >> record_bits] = triangle;
-        first_records[place >> record_bits] = place & ((1ull << record_bits) - 1);
-    }
     // A triangle of each lane that wants it in a list. All lanes take part.
     __device__ VOXELPIPE_INLINE void push(int kind, bool wanted, std::uint32_t triangle) const {
         const unsigned who = __ballot_sync(0xffffffffu, wanted);
