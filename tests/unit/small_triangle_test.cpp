@@ -262,6 +262,8 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
                 ASSERT_EQ(by_columns.template operator()<16>(1), rows) << "fraction " << fraction << ", triangle " << i;
                 ASSERT_EQ(by_columns.template operator()<16>(8), rows) << "fraction " << fraction << ", triangle " << i;
             }
+            ASSERT_EQ(by_columns.template operator()<32>(1), rows) << "fraction " << fraction << ", triangle " << i;
+            ASSERT_EQ(by_columns.template operator()<32>(8), rows) << "fraction " << fraction << ", triangle " << i;
             if (max3(last[0], last[1], last[2]) < 2) { // all columns at once
                 ++cubes;
                 voxels again;

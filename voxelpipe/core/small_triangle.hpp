@@ -381,7 +381,7 @@ struct small_thin {
     template <int Width, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void columns(int u0, int u1, int v0, int v1, int step, Emit&& emit) const {
         constexpr int rows = 64 / Width;
-        static_assert(Width == 8 || Width == 16);
+        static_assert(Width == 8 || Width == 16 || Width == 32);
         if (u1 < u0) return;
         const std::int64_t divisor = 2 * nw;
         const float inverse = 1.0f / static_cast<float>(divisor);

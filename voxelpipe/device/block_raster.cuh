@@ -82,7 +82,7 @@ struct block_warp {
         if (valid) {
             r = load_near(call.in, index);
             most = r.most();
-            is_big = !r.is_near || most > most_medium_side;
+            is_big = !r.is_near || most > most_medium_side(call.in.fraction);
             is_inside = r.is_inside(call.in.extent);
             if (!is_big && !is_inside && r.template is_outside<Call::rule>(call.in.extent))
                 sink.drop(triangle_class::outside);

@@ -75,14 +75,16 @@ using word = std::uint32_t;
 
 inline constexpr int raster_threads = 128; // of a block
 inline constexpr int raster_warps = raster_threads / 32;
-inline constexpr int most_side = 8;         // a bounding box of so many voxels a side has rows of a byte
-inline constexpr int most_cells = 512;      // one of so many voxels is one thread's work
-inline constexpr int small_cells = 27;      // one of so many voxels waits apart from the larger ones
-inline constexpr int small_columns = 12;    // the same for thin coverage, in columns of voxels
-inline constexpr int most_columns = 96;     // thin: one thread's work
-inline constexpr int medium_lanes = 8;      // of a warp, for one larger triangle
-inline constexpr int most_medium_side = 16; // of its bounding box, in voxels
-static_assert(most_medium_side <= core::small_voxels(16) && most_medium_side <= core::small_voxels(12));
+inline constexpr int most_side = 8;      // a bounding box of so many voxels a side has rows of a byte
+inline constexpr int most_long_side = 16;   // one has rows of 16 bits
+inline constexpr int most_cells = 512;   // one of so many voxels is one thread's work
+inline constexpr int small_cells = 27;   // one of so many voxels waits apart from the larger ones
+inline constexpr int small_columns = 12; // the same for thin coverage, in columns of voxels
+inline constexpr int most_columns = 96;  // thin: one thread's work
+inline constexpr int medium_lanes = 8;   // of a warp, for one larger triangle
+// The longest side of its bounding box, in voxels: what 32 bits hold.
+[[nodiscard]] __device__ VOXELPIPE_INLINE int most_medium_side(int fraction) { return fraction < 16 ? 32 : 16; }
+static_assert(core::small_voxels(16) == 16 && core::small_voxels(15) == 32 && core::small_voxels(12) == 32);
 
 // A triangle whose vertices are less than 2^30 units from the grid's origin, and its bounding box.
 struct near_triangle {
@@ -168,8 +170,7 @@ __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, c
     else if (end[0] - begin[0] < 16)
         s.template columns<16>(begin[0], end[0], begin[1] + first, end[1], step, emit);
     else
-        for (int v = begin[1] + first; v <= end[1]; v += step)
-            s.row(begin[0], end[0], v, [&](int u, int w) { emit(u, v, w); });
+        s.template columns<32>(begin[0], end[0], begin[1] + first, end[1], step, emit);
     return true;
 }
 
