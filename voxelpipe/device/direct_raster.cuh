@@ -66,7 +66,8 @@ struct direct_sink {
 template <class Call>
 struct blending_sink : direct_sink<Call> {
     static constexpr bool buffers = false;
-    static constexpr bool checks_indices = false; // check_indices has run
+    static constexpr bool shares = !Call::output::hands_on; // one() wants to be told apart
+    static constexpr bool checks_indices = false;           // check_indices has run
     struct memory {};
 
     // Fragments and first touches of one thread, which cannot write 2^32 before the largest list ends.
@@ -92,6 +93,17 @@ struct blending_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4]) {
         fragments += static_cast<unsigned>(__popc(mask[0] | mask[1] << 2 | mask[2] << 4 | mask[3] << 6));
         rows(x, y, z, mask, false);
+    }
+    // One voxel. Lanes that come here together may have the same.
+    __device__ VOXELPIPE_INLINE void one(int x, int y, int z) {
+        ++fragments;
+        each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
+            const auto& value = voxelpipe::get<K>(this->call.out.values);
+            if constexpr (std::remove_cvref_t<decltype(t)>::map::is_bit)
+                touched += blend_row(t, x, y, z, 1u, value, count_first);
+            else
+                touched += blend_shared(t, x, y, z, value, count_first);
+        });
     }
     // The voxels position(i) for the bits i of a mask.
     template <class Position>

@@ -16,9 +16,26 @@
 
 namespace voxelpipe::device {
 
+// An or, an and on a word of bits, a sum, whose old value nobody needs. Written out, so that no compiler merges it with
+// the one that returns something, nor provides for memory that is not global, as it does for sums of floating types:
+// a warp would wait for the answer.
+__device__ VOXELPIPE_INLINE void reduce_or(word* at, word bits) {
+    asm volatile("red.relaxed.gpu.global.or.b32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(bits) : "memory");
+}
+__device__ VOXELPIPE_INLINE void reduce_and(word* at, word bits) {
+    asm volatile("red.relaxed.gpu.global.and.b32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(bits) : "memory");
+}
+__device__ VOXELPIPE_INLINE void reduce_add(float* at, float v) {
+    asm volatile("red.relaxed.gpu.global.add.f32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "f"(v) : "memory");
+}
+__device__ VOXELPIPE_INLINE void reduce_add(double* at, double v) {
+    asm volatile("red.relaxed.gpu.global.add.f64 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "d"(v) : "memory");
+}
+
 // direct_value<Blend, T>: one fragment with value v into a stored T.
 //   available     allowed(value, target, most): whether up to `most` fragments of this value give the blend's bits
 //   apply(T*, v)  apply_first(T*, v): whether the voxel had no fragment yet; count has it, where tells_first holds
+//   apply_many(T*, v, n): n fragments at once, n > 0
 template <class Blend, class T>
 struct direct_value {
     static constexpr bool available = false;
@@ -49,6 +66,10 @@ struct direct_value<blend::count, T> {
     template <class V>
     __device__ static void apply(T* at, const V&) {
         atomicAdd(reinterpret_cast<unsigned_word<T>*>(at), unsigned_word<T>{1});
+    }
+    template <class V>
+    __device__ static void apply_many(T* at, const V&, unsigned n) {
+        atomicAdd(reinterpret_cast<unsigned_word<T>*>(at), unsigned_word<T>{n});
     }
     // Whether the voxel had no fragment yet. Written out, as reduce_or is.
     template <class V>
@@ -96,6 +117,12 @@ struct direct_integer {
             atomicOr(reinterpret_cast<unsigned_word<T>*>(at), static_cast<unsigned_word<T>>(v));
         else
             atomicXor(reinterpret_cast<unsigned_word<T>*>(at), static_cast<unsigned_word<T>>(v));
+    }
+    __device__ static void apply_many(T* at, T v, unsigned n) {
+        if constexpr (std::is_same_v<Blend, blend::add>)
+            apply(at, static_cast<T>(static_cast<unsigned_word<T>>(v) * n)); // wraps
+        else if (!std::is_same_v<Blend, blend::bit_xor> || n % 2 != 0)
+            apply(at, v);
     }
 };
 template <class T>
@@ -159,7 +186,8 @@ requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_va
     [[nodiscard]] static bool tells_first(const Target&, std::uint64_t) {
         return false;
     }
-    __device__ static void apply(T* at, T v) { atomicAdd(at, v); }
+    __device__ static void apply(T* at, T v) { reduce_add(at, v); }
+    __device__ static void apply_many(T* at, T v, unsigned n) { reduce_add(at, v * static_cast<T>(n)); } // exact
 };
 
 // Order is free by definition.
@@ -174,17 +202,9 @@ requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_va
     [[nodiscard]] static bool tells_first(const Target&, std::uint64_t) {
         return false;
     }
-    __device__ static void apply(T* at, T v) { atomicAdd(at, v); }
+    __device__ static void apply(T* at, T v) { reduce_add(at, v); }
+    __device__ static void apply_many(T* at, T v, unsigned n) { reduce_add(at, v * static_cast<T>(n)); }
 };
-
-// An or, an and on a word of bits whose old value nobody needs. Written out, so that no compiler merges it with the one
-// that returns something: then a warp would wait for the answer.
-__device__ VOXELPIPE_INLINE void reduce_or(word* at, word bits) {
-    asm volatile("red.relaxed.gpu.global.or.b32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(bits) : "memory");
-}
-__device__ VOXELPIPE_INLINE void reduce_and(word* at, word bits) {
-    asm volatile("red.relaxed.gpu.global.and.b32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(bits) : "memory");
-}
 
 // ---- whole targets --------------------------------------------------------------------------------------------------
 
@@ -328,6 +348,21 @@ __device__ VOXELPIPE_INLINE unsigned blend_rows(const target_view<Target>& t, in
         touched += blend_row(t, x, y + dy, z + (N == 2 ? k - dy : k / 2), mask[k], value, count_first);
     }
     return touched;
+}
+
+// One voxel of a target of values, for every lane that is here: those that have the same one, as neighbours in a fine
+// mesh often do, are counted and take one atomic together.
+template <class Target, class Value>
+__device__ VOXELPIPE_INLINE unsigned blend_shared(const target_view<Target>& t, int x, int y, int z, const Value& value,
+                                                  bool count_first) {
+    using map = typename Target::map;
+    using method = direct_value<typename Target::blend_type, typename Target::value_type>;
+    if (count_first) return blend_row(t, x, y, z, 1u, value, true);
+    auto* const at = t.elements + map::cell(t.extent, x, y, z);
+    const unsigned same = __match_any_sync(__activemask(), reinterpret_cast<unsigned long long>(at));
+    if ((same & ((1u << threadIdx.x % 32) - 1)) == 0)
+        method::apply_many(at, value, static_cast<unsigned>(__popc(same)));
+    return 0;
 }
 
 // Up to four voxels, position(i) for the bits i of `wanted`, whose loads go out together.

@@ -13,6 +13,7 @@ namespace voxelpipe::device {
 template <class Call>
 struct listing_sink : direct_sink<Call> {
     static constexpr bool buffers = true;
+    static constexpr bool shares = false;
     static constexpr bool checks_indices = true;
     static constexpr unsigned room = 448;    // with the queues, less than 48 KB for a block
     static constexpr unsigned flush_at = 64; // less may wait: a round of thin triangles brings up to 384

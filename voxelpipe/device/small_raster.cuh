@@ -7,6 +7,7 @@
 //   buffers           whether settle(), which all lanes call between triangles, is wanted (feed)
 //   begin(triangle), row(x0, y, z, mask), two(x, y, z, masks, along_y), four(x, y, z, masks), voxels(bits, position):
 //                     the fragments of one triangle, as rows of bits along x (blend_rows) or one by one
+//   shares            whether one(x, y, z), a fragment of a triangle that has no other, is more than a row of one
 //   drop(class)       counts a triangle that is not drawn
 
 #include <voxelpipe/core/brick_triangle.hpp>
@@ -75,13 +76,13 @@ using word = std::uint32_t;
 
 inline constexpr int raster_threads = 128; // of a block
 inline constexpr int raster_warps = raster_threads / 32;
-inline constexpr int most_side = 8;      // a bounding box of so many voxels a side has rows of a byte
-inline constexpr int most_long_side = 16;   // one has rows of 16 bits
-inline constexpr int most_cells = 512;   // one of so many voxels is one thread's work
-inline constexpr int small_cells = 27;   // one of so many voxels waits apart from the larger ones
-inline constexpr int small_columns = 12; // the same for thin coverage, in columns of voxels
-inline constexpr int most_columns = 96;  // thin: one thread's work
-inline constexpr int medium_lanes = 8;   // of a warp, for one larger triangle
+inline constexpr int most_side = 8;       // a bounding box of so many voxels a side has rows of a byte
+inline constexpr int most_long_side = 16; // one has rows of 16 bits
+inline constexpr int most_cells = 512;    // one of so many voxels is one thread's work
+inline constexpr int small_cells = 27;    // one of so many voxels waits apart from the larger ones
+inline constexpr int small_columns = 12;  // the same for thin coverage, in columns of voxels
+inline constexpr int most_columns = 96;   // thin: one thread's work
+inline constexpr int medium_lanes = 8;    // of a warp, for one larger triangle
 // The longest side of its bounding box, in voxels: what 32 bits hold.
 [[nodiscard]] __device__ VOXELPIPE_INLINE int most_medium_side(int fraction) { return fraction < 16 ? 32 : 16; }
 static_assert(core::small_voxels(16) == 16 && core::small_voxels(15) == 32 && core::small_voxels(12) == 32);
@@ -254,6 +255,12 @@ __device__ VOXELPIPE_INLINE void raster_quad(const raster_input<Source>& call, c
         const int p0 = thick == 0 ? box.lo[1] : box.lo[0], p1 = thick == 0 ? box.hi[1] : box.hi[0];
         const int q0 = thick == 2 ? box.lo[1] : box.lo[2], q1 = thick == 2 ? box.hi[1] : box.hi[2];
         bits &= (p0 == 0 ? 15u : 10u) & (p1 == 1 ? 15u : 5u) & (q0 == 0 ? 15u : 12u) & (q1 == 1 ? 15u : 3u);
+    }
+    if constexpr (Sink::shares) {
+        if (shape == 0) {
+            if (bits != 0) sink.one(r.lo[0], r.lo[1], r.lo[2]);
+            return;
+        }
     }
     // Rows along x.
     if (thick != 0) {

@@ -27,7 +27,7 @@ template <coverage Rule>
     const int cost = thin ? core::max3(x * y, y * z, z * x) : x * y * z;
     if (cost <= (thin ? small_columns : small_cells) && (thin || most <= most_side)) return small_triangles;
     return cost <= (thin ? most_columns : most_cells) && (thin || most <= most_long_side) ? large_triangles
-                                                                                           : medium_triangles;
+                                                                                          : medium_triangles;
 }
 
 inline constexpr int num_triangle_classes = 5;
