@@ -145,9 +145,10 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
     const unsigned long long records = packed & ((1ull << triangle_lists::record_bits) - 1);
     const unsigned long long num = packed >> triangle_lists::record_bits;
     for (unsigned long long r = uniform(warp); r < records; r += warps) {
-        unsigned long long lo = 0, hi = num; // the last triangle whose records begin at or before r
+        __syncwarp();                                     // lanes that the last pieces kept apart come together
+        unsigned lo = 0, hi = static_cast<unsigned>(num); // the last triangle whose records begin at or before r
         while (hi - lo > 1) {
-            const unsigned long long middle = lo + (hi - lo) / 2;
+            const unsigned middle = lo + (hi - lo) / 2;
             if (call.lists.first_records[middle] <= r)
                 lo = middle;
             else
