@@ -193,33 +193,34 @@ struct small_conservative {
     // lie in 64 bits: 8 along y, and as many along z as there is room for.
     template <int Width, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void rows(const small_box& box, Emit&& emit) const {
-        constexpr int slices = 64 / Width;
         static_assert(Width == 8 || Width == 16);
+        constexpr int slices = 64 / Width, words = Width / slices;
         const int x0 = box.lo[0], far = x0 + Width - 1;
         if (box.hi[0] < x0) return;
         const std::uint32_t along = (2u << (box.hi[0] - x0)) - 1;
-        for (int y0 = box.lo[1]; y0 <= box.hi[1]; y0 += 8) {
-            const int y1 = box.hi[1] < y0 + 7 ? box.hi[1] : y0 + 7;
+        for (int y0 = box.lo[1]; y0 <= box.hi[1]; y0 += Width) {
+            const int y1 = box.hi[1] < y0 + Width - 1 ? box.hi[1] : y0 + Width - 1, far_y = y0 + Width - 1;
             const std::uint32_t across = (2u << (y1 - y0)) - 1;
-            std::uint64_t by_y[Width / 8] = {};
+            std::uint64_t by_y[words] = {};
             for (int y = y1; y >= y0; --y) {
-                for (int k = Width / 8 - 1; k > 0; --k) by_y[k] = by_y[k] << Width | by_y[k - 1] >> (64 - Width);
+                for (int k = words - 1; k > 0; --k) by_y[k] = by_y[k] << Width | by_y[k - 1] >> (64 - Width);
                 by_y[0] = by_y[0] << Width | (along & small_line<Width>(xy[0].at(far, y), xy[1].at(far, y),
                                                                         xy[2].at(far, y), xy[0].a, xy[1].a, xy[2].a));
             }
             for (int z0 = box.lo[2]; z0 <= box.hi[2]; z0 += slices) {
                 const int z1 = box.hi[2] < z0 + slices - 1 ? box.hi[2] : z0 + slices - 1;
-                std::uint64_t by_z = 0, met = 0; // rows, bit y + 8 z
+                std::uint64_t by_z = 0, met = 0; // rows, bit y + Width z
                 for (int z = z1; z >= z0; --z) {
                     by_z = by_z << Width | (along & small_line<Width>(zx[0].at(z, far), zx[1].at(z, far),
                                                                       zx[2].at(z, far), zx[0].b, zx[1].b, zx[2].b));
-                    met = met << 8 | (across & small_line<8>(yz[0].at(y0 + 7, z), yz[1].at(y0 + 7, z),
-                                                             yz[2].at(y0 + 7, z), yz[0].a, yz[1].a, yz[2].a));
+                    met = met << Width | (across & small_line<Width>(yz[0].at(far_y, z), yz[1].at(far_y, z),
+                                                                     yz[2].at(far_y, z), yz[0].a, yz[1].a, yz[2].a));
                 }
                 for (; met != 0; met &= met - 1) {
-                    const int at = exact::lowest_one(met), y = at & 7, z = at >> 3;
-                    const std::uint64_t word = Width == 8 || y < 64 / Width ? by_y[0] : by_y[Width / 8 - 1];
-                    const std::uint32_t limit = static_cast<std::uint32_t>(word >> y % (64 / Width) * Width) &
+                    const int at = exact::lowest_one(met), y = at % Width, z = at / Width;
+                    std::uint64_t word = by_y[0];
+                    for (int k = 1; k < words; ++k) word = y / slices == k ? by_y[k] : word;
+                    const std::uint32_t limit = static_cast<std::uint32_t>(word >> y % slices * Width) &
                                                 static_cast<std::uint32_t>(by_z >> z * Width) & along;
                     if (limit != 0) emit(y0 + y, z0 + z, plane_bits(x0, y0 + y, z0 + z, limit));
                 }
@@ -380,29 +381,42 @@ struct small_thin {
     // each (8 or 16): row() for threads that have a triangle each, as small_conservative::rows.
     template <int Width, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void columns(int u0, int u1, int v0, int v1, int step, Emit&& emit) const {
-        constexpr int rows = 64 / Width;
         static_assert(Width == 8 || Width == 16 || Width == 32);
         if (u1 < u0) return;
+        constexpr int rows = 64 / Width, words = Width == 16 ? 4 : 1; // at once: rows of a word, words
         const std::int64_t divisor = 2 * nw;
         const float inverse = 1.0f / static_cast<float>(divisor);
         const std::uint32_t along = (2u << (u1 - u0)) - 1;
         const int far = u0 + Width - 1;
-        for (; v0 <= v1; v0 += rows * step) {
-            std::uint64_t met = 0;
-            int v = v0 + (rows - 1) * step;
-            while (v > v1) v -= step;
-            for (; v >= v0; v -= step)
-                met = met << Width | (along & small_line<Width>(uv[0].at(far, v), uv[1].at(far, v), uv[2].at(far, v),
-                                                                uv[0].a, uv[1].a, uv[2].a));
-            for (; met != 0; met &= met - 1) {
-                const int at = exact::lowest_one(met), u = u0 + at % Width;
-                v = v0 + at / Width * step;
-                const std::int64_t numerator = depth - times(nu, 2 * u + 1) - times(nv, 2 * v + 1);
-                // A quotient below 2^8, so at most one off, which the remainder tells.
-                auto w = static_cast<std::int32_t>(static_cast<float>(numerator) * inverse);
-                const std::int64_t remainder = numerator - w * divisor;
-                w += static_cast<std::int32_t>(remainder >= divisor) - static_cast<std::int32_t>(remainder < 0);
-                emit(u, v, w);
+        for (; v0 <= v1; v0 += words * rows * step) {
+            std::uint64_t met[words] = {}, left = 0;
+            const int most = (v1 - v0) / step, last = most < words * rows - 1 ? most : words * rows - 1;
+            for (int v = v0 + last * step; v >= v0; v -= step) {
+                for (int k = words - 1; k > 0; --k) met[k] = met[k] << Width | met[k - 1] >> (64 - Width);
+                met[0] = met[0] << Width | (along & small_line<Width>(uv[0].at(far, v), uv[1].at(far, v),
+                                                                      uv[2].at(far, v), uv[0].a, uv[1].a, uv[2].a));
+            }
+            int first = v0;
+            for (;;) {
+                if (met[0] == 0) {
+                    left = 0;
+                    for (int k = 1; k < words; ++k) {
+                        left |= met[k];
+                        met[k - 1] = met[k];
+                    }
+                    if (left == 0) break;
+                    met[words - 1] = 0;
+                    first += rows * step;
+                } else {
+                    const int at = exact::lowest_one(met[0]), u = u0 + at % Width, v = first + at / Width * step;
+                    met[0] &= met[0] - 1;
+                    const std::int64_t numerator = depth - times(nu, 2 * u + 1) - times(nv, 2 * v + 1);
+                    // A quotient below 2^8, so at most one off, which the remainder tells.
+                    auto w = static_cast<std::int32_t>(static_cast<float>(numerator) * inverse);
+                    const std::int64_t remainder = numerator - w * divisor;
+                    w += static_cast<std::int32_t>(remainder >= divisor) - static_cast<std::int32_t>(remainder < 0);
+                    emit(u, v, w);
+                }
             }
         }
     }

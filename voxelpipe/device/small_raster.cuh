@@ -166,9 +166,11 @@ __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, c
         const auto at = core::to_xyz(axis, u, v, w);
         sink.row(lo[0] + at[0], lo[1] + at[1], lo[2] + at[2], 1u);
     };
-    if (end[0] - begin[0] < 8 && step == 1)
+    // All lanes that are here in the same loop.
+    const int most = __reduce_max_sync(__activemask(), end[0] - begin[0]);
+    if (most < 8 && step == 1)
         s.template columns<8>(begin[0], end[0], begin[1] + first, end[1], step, emit);
-    else if (end[0] - begin[0] < 16)
+    else if (most < 16)
         s.template columns<16>(begin[0], end[0], begin[1] + first, end[1], step, emit);
     else
         s.template columns<32>(begin[0], end[0], begin[1] + first, end[1], step, emit);
