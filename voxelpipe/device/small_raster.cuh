@@ -78,10 +78,10 @@ inline constexpr int raster_threads = 128; // of a block
 inline constexpr int raster_warps = raster_threads / 32;
 inline constexpr int most_side = 8;       // a bounding box of so many voxels a side has rows of a byte
 inline constexpr int most_long_side = 16; // one has rows of 16 bits
-inline constexpr int most_cells = 512;    // one of so many voxels is one thread's work
+inline constexpr int most_cells = 1024;   // one of so many voxels is one thread's work
 inline constexpr int small_cells = 27;    // one of so many voxels waits apart from the larger ones
 inline constexpr int small_columns = 12;  // the same for thin coverage, in columns of voxels
-inline constexpr int most_columns = 96;   // thin: one thread's work
+inline constexpr int most_columns = 192;  // thin: one thread's work
 inline constexpr int medium_lanes = 8;    // of a warp, for one larger triangle
 // The longest side of its bounding box, in voxels: what 32 bits hold.
 [[nodiscard]] __device__ VOXELPIPE_INLINE int most_medium_side(int fraction) { return fraction < 16 ? 32 : 16; }
