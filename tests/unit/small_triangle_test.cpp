@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdint>
 #include <random>
 #include <set>
@@ -100,7 +101,7 @@ voxels by_the_general_path(const snapped_position (&v)[3], int fraction, const v
 
 TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
     generator g;
-    int compared = 0, tiny = 0, flat = 0, cubes = 0, quads = 0;
+    int compared = 0, tiny = 0, flat = 0, cubes = 0, quads = 0, sixteens = 0;
     std::uint64_t covered = 0;
     for (const int fraction : {12, 13, 14, 15, 16}) {
         g.fraction = fraction;
@@ -130,7 +131,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
             if (max3(all.hi[0], all.hi[1], all.hi[2]) < 8) {
                 ++tiny;
                 voxels again;
-                s.rows<8>(all, [&](int y, int z, std::uint32_t bits) {
+                s.rows(all, [&](int y, int z, std::uint32_t bits) {
                     for (int x = 0; x < 32; ++x)
                         if (((bits >> x) & 1u) != 0)
                             again.insert({static_cast<int>(box.lo[0]) + x, static_cast<int>(box.lo[1]) + y,
@@ -146,20 +147,49 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
                                        static_cast<int>(box.lo[2]) + z});
             });
             ASSERT_EQ(longer, expected) << "fraction " << fraction << ", triangle " << i;
-            voxels sixteen;
-            if (last < 16) {
-                s.rows<16>(all, [&](int y, int z, std::uint32_t bits) {
+            struct {
+                std::array<std::uint32_t, 16> words{};
+                void set(int at, std::uint32_t word) { words.at(static_cast<std::size_t>(at)) = word; }
+                std::uint32_t get(int at) const { return words.at(static_cast<std::size_t>(at)); }
+            } limits;
+            if (max3(all.hi[0], all.hi[1], all.hi[2]) < 16) {
+                ++sixteens;
+                voxels again;
+                s.rows_of_16(all, limits, [&](int y, int z, std::uint32_t bits) {
                     for (int x = 0; x < 32; ++x)
                         if (((bits >> x) & 1u) != 0)
-                            sixteen.insert({static_cast<int>(box.lo[0]) + x, static_cast<int>(box.lo[1]) + y,
-                                            static_cast<int>(box.lo[2]) + z});
+                            again.insert({static_cast<int>(box.lo[0]) + x, static_cast<int>(box.lo[1]) + y,
+                                          static_cast<int>(box.lo[2]) + z});
                 });
-                ASSERT_EQ(sixteen, expected) << "fraction " << fraction << ", triangle " << i;
+                ASSERT_EQ(again, expected) << "fraction " << fraction << ", triangle " << i;
+                // A part of the box is that part of the set.
+                const small_box part{{static_cast<int>(g.number(0, all.hi[0])),
+                                      static_cast<int>(g.number(0, all.hi[1])),
+                                      static_cast<int>(g.number(0, all.hi[2]))},
+                                     {all.hi[0], all.hi[1], all.hi[2]}};
+                voxels by_rows, by_sixteen, wanted;
+                const auto into = [&](voxels& to) {
+                    return [&](int y, int z, std::uint32_t bits) {
+                        for (int x = 0; x < 32; ++x)
+                            if (((bits >> x) & 1u) != 0)
+                                to.insert({static_cast<int>(box.lo[0]) + part.lo[0] + x,
+                                           static_cast<int>(box.lo[1]) + y, static_cast<int>(box.lo[2]) + z});
+                    };
+                };
+                for (const auto& [x, y, z] : expected)
+                    if (x >= box.lo[0] + part.lo[0] && y >= box.lo[1] + part.lo[1] && z >= box.lo[2] + part.lo[2])
+                        wanted.insert({x, y, z});
+                s.rows_of_16(part, limits, into(by_sixteen));
+                ASSERT_EQ(by_sixteen, wanted) << "fraction " << fraction << ", triangle " << i;
+                if (part.hi[0] - part.lo[0] < 8) {
+                    s.rows(part, into(by_rows));
+                    ASSERT_EQ(by_rows, wanted) << "fraction " << fraction << ", triangle " << i;
+                }
             }
             // Nothing of a box that the grid leaves nothing of.
             const small_box none{{1, 0, 0}, {0, all.hi[1], all.hi[2]}};
-            s.rows<8>(none, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
-            s.rows<16>(none, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
+            s.rows(none, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
+            s.rows_of_16(none, limits, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
             if (all.hi[0] == 1 && all.hi[1] == 1 && all.hi[2] == 1) {
                 ++cubes;
                 std::uint32_t wanted = 0;
@@ -207,6 +237,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
     EXPECT_GT(compared, unit::cases(100000));
     EXPECT_GT(covered, static_cast<std::uint64_t>(compared));
     EXPECT_GT(tiny, compared / 4);
+    EXPECT_GT(sixteens, tiny);
     EXPECT_GT(flat, compared / 8);
     EXPECT_GT(cubes, compared / 50);
     EXPECT_GT(quads, compared / 50);

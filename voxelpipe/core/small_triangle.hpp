@@ -186,47 +186,67 @@ struct small_conservative {
         return first <= last ? ((2u << last) - 1) & ~((1u << first) - 1) : 0;
     }
 
-    // Calls emit(y, z, bits) for the rows of a box of at most Width voxels along x (8 or 16) that two projections and
-    // the plane leave something of; bit 0 is box.lo[0]. What the xy and the zx projection leave depends on y or on z
-    // alone, so that is found once and not once a row, and the yz projection tells which rows are wanted at all:
-    // threads that have a triangle each then go through as many rows as they emit, not through their boxes. The rows
-    // lie in 64 bits: 8 along y, and as many along z as there is room for.
-    template <int Width, class Emit>
+    // Calls emit(y, z, bits) for the rows of a box of at most 8 voxels along x that two projections and the plane leave
+    // something of; bit 0 is box.lo[0]. What the xy and the zx projection leave depends on y or on z alone, so that is
+    // found once and not once a row, and the yz projection tells which rows are wanted at all: threads that have a
+    // triangle each then go through as many rows as they emit, not through their boxes. 8 x 8 rows of 8 bits at once.
+    template <class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void rows(const small_box& box, Emit&& emit) const {
-        static_assert(Width == 8 || Width == 16);
-        constexpr int slices = 64 / Width, words = Width / slices;
-        const int x0 = box.lo[0], far = x0 + Width - 1;
+        const int x0 = box.lo[0], x7 = x0 + 7;
         if (box.hi[0] < x0) return;
         const std::uint32_t along = (2u << (box.hi[0] - x0)) - 1;
-        for (int y0 = box.lo[1]; y0 <= box.hi[1]; y0 += Width) {
-            const int y1 = box.hi[1] < y0 + Width - 1 ? box.hi[1] : y0 + Width - 1, far_y = y0 + Width - 1;
+        for (int y0 = box.lo[1]; y0 <= box.hi[1]; y0 += 8) {
+            const int y1 = box.hi[1] < y0 + 7 ? box.hi[1] : y0 + 7;
             const std::uint32_t across = (2u << (y1 - y0)) - 1;
-            std::uint64_t by_y[words] = {};
-            for (int y = y1; y >= y0; --y) {
-                for (int k = words - 1; k > 0; --k) by_y[k] = by_y[k] << Width | by_y[k - 1] >> (64 - Width);
-                by_y[0] = by_y[0] << Width | (along & small_line<Width>(xy[0].at(far, y), xy[1].at(far, y),
-                                                                        xy[2].at(far, y), xy[0].a, xy[1].a, xy[2].a));
-            }
-            for (int z0 = box.lo[2]; z0 <= box.hi[2]; z0 += slices) {
-                const int z1 = box.hi[2] < z0 + slices - 1 ? box.hi[2] : z0 + slices - 1;
-                std::uint64_t by_z = 0, met = 0; // rows, bit y + Width z
+            std::uint64_t by_y = 0;
+            for (int y = y1; y >= y0; --y) by_y = by_y << 8 | (along & limits_at_y<8>(x7, y));
+            for (int z0 = box.lo[2]; z0 <= box.hi[2]; z0 += 8) {
+                const int z1 = box.hi[2] < z0 + 7 ? box.hi[2] : z0 + 7;
+                std::uint64_t by_z = 0, met = 0; // rows, bit y + 8 z
                 for (int z = z1; z >= z0; --z) {
-                    by_z = by_z << Width | (along & small_line<Width>(zx[0].at(z, far), zx[1].at(z, far),
-                                                                      zx[2].at(z, far), zx[0].b, zx[1].b, zx[2].b));
-                    met = met << Width | (across & small_line<Width>(yz[0].at(far_y, z), yz[1].at(far_y, z),
-                                                                     yz[2].at(far_y, z), yz[0].a, yz[1].a, yz[2].a));
+                    by_z = by_z << 8 | (along & limits_at_z<8>(x7, z));
+                    met = met << 8 | (across & rows_at_z<8>(y0 + 7, z));
                 }
                 for (; met != 0; met &= met - 1) {
-                    const int at = exact::lowest_one(met), y = at % Width, z = at / Width;
-                    std::uint64_t word = by_y[0];
-                    for (int k = 1; k < words; ++k) word = y / slices == k ? by_y[k] : word;
-                    const std::uint32_t limit = static_cast<std::uint32_t>(word >> y % slices * Width) &
-                                                static_cast<std::uint32_t>(by_z >> z * Width) & along;
+                    const int at = exact::lowest_one(met), y = at % 8, z = at / 8;
+                    const std::uint32_t limit =
+                        static_cast<std::uint32_t>(by_y >> 8 * y) & static_cast<std::uint32_t>(by_z >> 8 * z) & along;
                     if (limit != 0) emit(y0 + y, z0 + z, plane_bits(x0, y0 + y, z0 + z, limit));
                 }
             }
         }
     }
+
+    // The same for a box of at most 16 voxels a side, all of it at once. `limits` holds 16 words: get(i), set(i, word).
+    template <class Limits, class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void rows_of_16(const small_box& box, Limits&& limits, Emit&& emit) const {
+        if (box.empty()) return;
+        const int x0 = box.lo[0], y0 = box.lo[1], z0 = box.lo[2];
+        const std::uint32_t along = (2u << (box.hi[0] - x0)) - 1, across = (2u << (box.hi[1] - y0)) - 1;
+        const int last_y = box.hi[1] - y0, last_z = box.hi[2] - z0;
+        std::uint64_t met[4] = {}; // rows, bit y + 16 z
+        for (int i = last_y > last_z ? last_y : last_z; i >= 0; --i) {
+            limits.set(i, (along & limits_at_y<16>(x0 + 15, y0 + i)) | (along & limits_at_z<16>(x0 + 15, z0 + i))
+                                                                           << 16); // beyond its end: never asked for
+            if (i > last_z) continue;
+            for (int k = 3; k > 0; --k) met[k] = met[k] << 16 | met[k - 1] >> 48;
+            met[0] = met[0] << 16 | (across & rows_at_z<16>(y0 + 15, z0 + i));
+        }
+        for (int first_z = 0;;) {
+            if (met[0] == 0) {
+                if ((met[1] | met[2] | met[3]) == 0) break;
+                for (int k = 1; k < 4; ++k) met[k - 1] = met[k];
+                met[3] = 0;
+                first_z += 4;
+            } else {
+                const int at = exact::lowest_one(met[0]), y = at % 16, z = first_z + at / 16;
+                met[0] &= met[0] - 1;
+                const std::uint32_t limit = limits.get(y) & limits.get(z) >> 16;
+                if (limit != 0) emit(y0 + y, z0 + z, plane_bits(x0, y0 + y, z0 + z, limit));
+            }
+        }
+    }
+
     // The same for boxes of up to 32 voxels a side.
     template <class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void long_rows(const small_box& box, Emit&& emit) const {
@@ -243,6 +263,20 @@ struct small_conservative {
     }
 
 private:
+    // What the xy projection leaves of the voxels from x - Length + 1 to x at y, the zx projection of them at z, and
+    // the yz projection of the rows from y - Length + 1 to y at z.
+    template <int Length>
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t limits_at_y(int x, int y) const {
+        return small_line<Length>(xy[0].at(x, y), xy[1].at(x, y), xy[2].at(x, y), xy[0].a, xy[1].a, xy[2].a);
+    }
+    template <int Length>
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t limits_at_z(int x, int z) const {
+        return small_line<Length>(zx[0].at(z, x), zx[1].at(z, x), zx[2].at(z, x), zx[0].b, zx[1].b, zx[2].b);
+    }
+    template <int Length>
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t rows_at_z(int y, int z) const {
+        return small_line<Length>(yz[0].at(y, z), yz[1].at(y, z), yz[2].at(y, z), yz[0].a, yz[1].a, yz[2].a);
+    }
     // Bit x where three values, stepped x times, are all >= 0; x = 0 .. last.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE static std::uint32_t line(std::int32_t e0, std::int32_t e1,
                                                                           std::int32_t e2, std::int32_t s0,

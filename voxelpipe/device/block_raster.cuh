@@ -36,6 +36,7 @@ struct block_warp {
 
     const Call& call;
     warp_queues& queues;
+    row_limits& limits;
     sink_type& sink;
     std::uint32_t* left_over; // for big triangles, of the block
     unsigned& num_left_over;
@@ -66,11 +67,12 @@ struct block_warp {
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE auto small_of_queue() {
         return [this](const warp_queues& from, int at)
-                   VOXELPIPE_INLINE_LAMBDA { raster_small<Call::rule>(call.in, take(from.smalls, at), sink); };
+                   VOXELPIPE_INLINE_LAMBDA { raster_small<Call::rule>(call.in, take(from.smalls, at), limits, sink); };
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE auto large_of_queue() {
         return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            raster_small<Call::rule>(call.in, load_near(call.in, call.in.source.triangle(from.larges[at])), sink);
+            raster_small<Call::rule>(call.in, load_near(call.in, call.in.source.triangle(from.larges[at])), limits,
+                                     sink);
         };
     }
 
@@ -168,7 +170,9 @@ __global__ __launch_bounds__(raster_threads,
                              block_min_blocks) void block_raster_kernel(const __grid_constant__ Call call,
                                                                         pipeline_state* state) {
     using sink_type = typename Call::sink;
+    constexpr bool thin = Call::rule == coverage::thin;
     __shared__ warp_queues queues[raster_warps];
+    __shared__ row_limits limits[thin ? 1 : raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ int left[3][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_left;
@@ -178,8 +182,12 @@ __global__ __launch_bounds__(raster_threads,
     __syncthreads();
     sink_type sink(call, dropped, memories[threadIdx.x / 32]);
     const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
-    block_warp<Call> warp{call, queues[threadIdx.x / 32], sink,
-                          call.lists.left + std::size_t{blockIdx.x} * batches * raster_threads, num_left};
+    block_warp<Call> warp{call,
+                          queues[threadIdx.x / 32],
+                          limits[thin ? 0 : threadIdx.x / 32],
+                          sink,
+                          call.lists.left + std::size_t{blockIdx.x} * batches * raster_threads,
+                          num_left};
     const unsigned looked_at = warp.run(queues, left);
     sink.finish(state);
     count_looked_at(looked_at, dropped, state);

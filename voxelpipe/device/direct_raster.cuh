@@ -343,7 +343,8 @@ __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std
 // advance together, part by part: they are in the order of the mesh, nearly, so that voxels are in the cache while
 // triangles of all kinds meet them.
 template <class Call, class Sink>
-__device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place& place, Sink& sink) {
+__device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place& place, row_limits& limits,
+                                              Sink& sink) {
     constexpr int kinds = medium_triangles; // what comes before
     std::uint32_t chunks[kinds], all = 0;
     for (int k = 0; k < kinds; ++k) {
@@ -372,7 +373,7 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place
                     if (k == cube_triangles)
                         raster_cube<Call::rule>(call.in, r, sink);
                     else
-                        raster_small<Call::rule>(call.in, r, sink);
+                        raster_small<Call::rule>(call.in, r, limits, sink);
                 });
                 __syncwarp();
             }
@@ -388,6 +389,7 @@ __global__ __launch_bounds__(raster_threads,
     using sink_type = typename Call::sink;
     constexpr bool thin = Call::rule == coverage::thin;
     __shared__ brick_memory bricks[thin ? 1 : raster_warps];
+    __shared__ row_limits limits[thin ? 1 : raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ unsigned dropped[num_triangle_classes];
     if (state->index_error != 0) return;
@@ -400,7 +402,7 @@ __global__ __launch_bounds__(raster_threads,
         raster_all_records(call, state, dropped, bricks[thin ? 0 : in_block], memory, place.warp, place.warps);
     sink_type sink(call, dropped, memory);
     raster_by_lanes(call, medium_triangles, 0, place, sink);
-    raster_lists(call, place, sink);
+    raster_lists(call, place, limits[thin ? 0 : in_block], sink);
     sink.finish(state);
     __syncthreads();
     if (threadIdx.x == 0) { // the first kernel took them for drawn

@@ -130,9 +130,7 @@ struct small_part {
                 if (bits != 0) row(t.lo[0] + box.lo[0], t.lo[1] + y, t.lo[2] + z, bits);
             };
             if (box.hi[0] - box.lo[0] < 8)
-                s.template rows<8>(box, emit);
-            else if (box.hi[0] - box.lo[0] < 16)
-                s.template rows<16>(box, emit);
+                s.rows(box, emit);
             else
                 s.long_rows(box, emit);
         }

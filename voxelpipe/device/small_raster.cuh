@@ -324,9 +324,18 @@ __device__ VOXELPIPE_INLINE void raster_cube(const raster_input<Source>& call, c
     }
 }
 
-// Any small triangle, by one thread.
+// What the threads of one warp keep of a triangle each (small_conservative::rows_of_16), a column for each lane.
+struct row_limits {
+    word words[most_long_side][32];
+
+    __device__ VOXELPIPE_INLINE void set(int i, word w) { words[i][threadIdx.x % 32] = w; }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE word get(int i) const { return words[i][threadIdx.x % 32]; }
+};
+
+// Any small triangle, by one thread. limits: shared memory of the warp, not used where coverage is thin.
 template <coverage Rule, class Source, class Sink>
-__device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, const near_triangle& r, Sink& sink) {
+__device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, const near_triangle& r,
+                                              row_limits& limits, Sink& sink) {
     const core::small_box box = r.part(call.extent);
     if constexpr (Rule == coverage::thin) {
         if (!raster_thin(call, r.relative(call.fraction), r.lo, box, 0, 1, sink))
@@ -338,9 +347,9 @@ __device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, 
         };
         const int most = core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) + 1;
         if (most <= most_side)
-            s.template rows<8>(box, emit);
+            s.rows(box, emit);
         else
-            s.template rows<16>(box, emit);
+            s.rows_of_16(box, limits, emit);
     }
 }
 
