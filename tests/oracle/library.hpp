@@ -122,12 +122,6 @@ inline std::string describe(const grid& g, const world_triangle& t) {
     return text.str();
 }
 
-// VOXELPIPE_TEST_SCALE, which slow builds set below 1; 1 otherwise.
-inline double test_scale() {
-    const char* const scale = std::getenv("VOXELPIPE_TEST_SCALE");
-    return scale == nullptr ? 1.0 : std::strtod(scale, nullptr);
-}
-
 // `usual`, or another one for every VOXELPIPE_ORACLE_SEED, so that a longer run can look elsewhere.
 inline std::uint64_t seed(std::uint64_t usual) {
     const char* const offset = std::getenv("VOXELPIPE_ORACLE_SEED");

@@ -115,8 +115,9 @@ std::int64_t exact_snap(float p, double origin, double voxel_size, int fraction)
 
 TEST(OracleSnap, IsTheFormulaInExactRationalArithmetic) {
     splitmix64 random(11);
+    const int cases = repeats(6000);
     long compared = 0;
-    for (int n = 0; n < 6000; ++n) {
+    for (int n = 0; n < cases; ++n) {
         const auto& grids = test_grids();
         grid g = grids[random.below(grids.size())].g;
         if (random.one_in(2))
@@ -140,7 +141,7 @@ TEST(OracleSnap, IsTheFormulaInExactRationalArithmetic) {
                 ++compared;
             }
     }
-    EXPECT_GT(compared, 40000);
+    EXPECT_GT(compared, 20 * cases / 3);
 }
 
 // ---- Conservative, by hand ----
@@ -331,8 +332,9 @@ TEST(OracleBarycentrics, AreExactRationals) {
 TEST(OracleBarycentrics, SumToOneAndReproduceTheDepth) {
     splitmix64 random(5);
     const test_grid& where = test_grids()[2];
+    const int cases = repeats(4000);
     int seen = 0;
-    for (int n = 0; n < 4000; ++n) {
+    for (int n = 0; n < cases; ++n) {
         const world_triangle w =
             make_triangle(random, where, n % 2 == 0 ? triangle_class::medium : triangle_class::far_away);
         const snapped_triangle t = snap(where.g, w.v);
@@ -352,7 +354,7 @@ TEST(OracleBarycentrics, SumToOneAndReproduceTheDepth) {
             ++seen;
         }
     }
-    EXPECT_GT(seen, 10000);
+    EXPECT_GT(seen, 5 * cases / 2);
 }
 
 TEST(OracleNearestFloat, RoundsOnceTiesToEven) {
@@ -381,7 +383,7 @@ TEST(OracleNearestDouble, RoundsOnceTiesToEven) {
     EXPECT_EQ(nearest_double({wide(tie + 2), wide(-1)}), -(0x1p53 + 4));
     EXPECT_EQ(nearest_double({wide(tie).shifted_left(80) + wide(1), wide(1)}), 0x1p133 + 0x1p81);
     splitmix64 random(9);
-    for (int n = 0; n < 30000; ++n) {
+    for (int n = 0; n < repeats(30000); ++n) {
         const std::int64_t a = random.between(-(std::int64_t{1} << 53), std::int64_t{1} << 53);
         const std::int64_t b = random.between(1, std::int64_t{1} << 53);
         ASSERT_EQ(nearest_double({wide(a), wide(b)}), static_cast<double>(a) / static_cast<double>(b));

@@ -8,8 +8,10 @@
 
 #include "oracle.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <string_view>
 #include <vector>
 
@@ -110,5 +112,14 @@ world_triangle make_triangle(splitmix64& random, const test_grid& where, triangl
 
 // World position of a point given in fixed-point units; exact inside a grid that says so.
 std::array<float, 3> to_world(const grid& g, const std::array<double, 3>& units);
+
+// VOXELPIPE_TEST_SCALE, which slow builds set below 1; 1 otherwise.
+inline double test_scale() {
+    const char* const scale = std::getenv("VOXELPIPE_TEST_SCALE");
+    return scale == nullptr ? 1.0 : std::strtod(scale, nullptr);
+}
+
+// How often the oracle's own tests repeat what they do `usual` times: by the test scale, no less than a tenth.
+inline int repeats(int usual) { return static_cast<int>(usual * std::clamp(test_scale(), 0.1, 1.0)); }
 
 } // namespace oracle

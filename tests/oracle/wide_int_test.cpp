@@ -34,7 +34,7 @@ wide any_wide(splitmix64& random, int limbs) {
 
 TEST(WideInt, AgreesWith128BitsWhereThoseReach) {
     splitmix64 random(1);
-    for (int n = 0; n < 200000; ++n) {
+    for (int n = 0; n < oracle::repeats(200000); ++n) {
         const int128 a = any_int128(random, 125);
         const int128 b = any_int128(random, 125);
         ASSERT_TRUE(wide(a).to_int128() == a);
@@ -56,7 +56,7 @@ TEST(WideInt, AgreesWith128BitsWhereThoseReach) {
 
 TEST(WideInt, KeepsTheLawsOfArithmeticBeyond128Bits) {
     splitmix64 random(2);
-    for (int n = 0; n < 20000; ++n) {
+    for (int n = 0; n < oracle::repeats(20000); ++n) {
         const wide a = any_wide(random, 2), b = any_wide(random, 2);
         const wide c = any_wide(random, 1), d = any_wide(random, 1);
         ASSERT_TRUE((a + b) * c == a * c + b * c);

@@ -15,7 +15,7 @@
 namespace voxelize {
 namespace {
 
-std::string_view type_name(scalar type) {
+std::string_view nrrd_type(scalar type) {
     constexpr std::array<std::string_view, 10> names{"uint8", "uint8", "uint16", "uint32", "uint64",
                                                      "int32", "int64", "float",  "float",  "double"};
     return names[static_cast<std::size_t>(type)];
@@ -35,7 +35,7 @@ std::string header_of(const volume& v, const channel& c, bool compress) {
     std::string text = "NRRD0004\n";
     text += "# complete specification: teem.sourceforge.net/nrrd/format.html\n";
     text += "content: " + c.name + "\n";
-    text += "type: " + std::string(type_name(c.type)) + "\n";
+    text += "type: " + std::string(nrrd_type(c.type)) + "\n";
     text += std::string("dimension: ") + (vector ? "4" : "3") + "\n";
     text += "space dimension: 3\n";
     text += "sizes:";

@@ -17,7 +17,7 @@ namespace {
 // Uncompressed bytes of one zlib block; VTK decodes a block at a time.
 constexpr std::size_t block_bytes = std::size_t{1} << 20;
 
-std::string_view type_name(scalar type) {
+std::string_view vtk_type(scalar type) {
     constexpr std::array<std::string_view, 10> names{"UInt8", "UInt8", "UInt16",  "UInt32",  "UInt64",
                                                      "Int32", "Int64", "Float32", "Float32", "Float64"};
     return names[static_cast<std::size_t>(type)];
@@ -45,7 +45,7 @@ std::string header_of(const volume& v, std::span<const std::uint64_t> offsets, b
     text += ">\n";
     for (std::size_t i = 0; i < v.channels.size(); ++i) {
         const channel& c = v.channels[i];
-        text += "        <DataArray type=\"" + std::string(type_name(c.type)) + "\" Name=\"" + c.name +
+        text += "        <DataArray type=\"" + std::string(vtk_type(c.type)) + "\" Name=\"" + c.name +
                 "\" NumberOfComponents=\"" + std::to_string(c.components) + "\" format=\"appended\" offset=\"" +
                 padded(offsets[i]) + "\"/>\n";
     }
