@@ -258,6 +258,7 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
             const triple<std::int64_t> normal = small_normal(t),
                                        turned = to_uvw(setup.axis, normal[0], normal[1], normal[2]);
             for (int k = 0; k < 3; ++k) ASSERT_EQ(turned[k], setup.normal[k]);
+            ASSERT_EQ(small_axis(normal), setup.zero_area ? -1 : setup.axis);
             if (setup.zero_area) continue;
             ++compared;
             const small_thin s(t, normal, setup.axis, fraction);

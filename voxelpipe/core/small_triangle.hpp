@@ -84,6 +84,12 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void small_projection(const small_triang
     return {{e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x}};
 }
 
+// The dominant axis: of the largest component, the first of equals; -1 where the area is zero.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr int small_axis(const triple<std::int64_t>& normal) {
+    const std::int64_t x = magnitude(normal[0]), y = magnitude(normal[1]), z = magnitude(normal[2]);
+    return (x | y | z) == 0 ? -1 : x >= y && x >= z ? 0 : y >= z ? 1 : 2;
+}
+
 // Bit x where three linear functions of x are all >= 0, for x = 0 .. Length - 1; e: their values at x = Length - 1, s:
 // what a step adds. Without a branch, and from the last one down, so that each sign goes to its bit by one shift of two
 // words. What is more than the row is for the caller to mask; within 32 voxels of a box of at most 16 the values stay

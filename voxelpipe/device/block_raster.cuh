@@ -38,8 +38,8 @@ struct block_warp {
     warp_queues& queues;
     row_limits& limits;
     sink_type& sink;
-    std::uint32_t* left_over; // for big triangles, of the block
-    unsigned& num_left_over;
+    std::uint32_t* big; // for big triangles, of the block
+    unsigned& num_big;
     int lane = static_cast<int>(threadIdx.x) % 32;
     int num_cubes = 0, num_smalls = 0, num_larges = 0;
 
@@ -106,8 +106,7 @@ struct block_warp {
             const int large_at = take_place(kind == large_triangles, num_larges);
             if (kind == large_triangles) queues.larges[large_at] = i;
             call.lists.push(medium_triangles, kind == medium_triangles, i);
-            if (is_big)
-                left_over[atomicAdd(&num_left_over, 1u)] = i; // no call of a function here: its registers would spill
+            if (is_big) big[atomicAdd(&num_big, 1u)] = i; // no call of a function here: its registers would spill
         }
         __syncwarp();
     }
@@ -157,7 +156,7 @@ struct block_warp {
             raster_medium<Call::rule>(call.in, w < Warps, w < Warps ? all[w].larges[at] : 0, sink);
         }
 
-        cut_left(call, sink, left_over, num_left_over);
+        cut_big(call, sink, big, num_big);
         if (begin >= call.in.num_triangles) return 0;
         const std::uint32_t batches = (call.in.num_triangles - begin - 1) / step + 1;
         const std::uint32_t of_last = call.in.num_triangles - (begin + (batches - 1) * step);
@@ -175,9 +174,9 @@ __global__ __launch_bounds__(raster_threads,
     __shared__ row_limits limits[thin ? 1 : raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ int left[3][raster_warps];
-    __shared__ unsigned dropped[num_triangle_classes], num_left;
+    __shared__ unsigned dropped[num_triangle_classes], num_big;
     if (state->index_error != 0) return;
-    if (threadIdx.x == 0) num_left = 0;
+    if (threadIdx.x == 0) num_big = 0;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();
     sink_type sink(call, dropped, memories[threadIdx.x / 32]);
@@ -186,8 +185,8 @@ __global__ __launch_bounds__(raster_threads,
                           queues[threadIdx.x / 32],
                           limits[thin ? 0 : threadIdx.x / 32],
                           sink,
-                          call.lists.left + std::size_t{blockIdx.x} * batches * raster_threads,
-                          num_left};
+                          call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads,
+                          num_big};
     const unsigned looked_at = warp.run(queues, left);
     sink.finish(state);
     count_looked_at(looked_at, dropped, state);

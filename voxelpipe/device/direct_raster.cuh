@@ -190,8 +190,8 @@ struct first_warp {
     first_memory<Call>& memory;
     sink_type& sink;
     kind_writer& writer;
-    std::uint32_t* left; // for big triangles, of the block
-    unsigned& num_left;
+    std::uint32_t* big; // triangles, of the block
+    unsigned& num_big;
     int num_cubes = 0; // that wait, of thin ones
 
     // The lane's triangle i, where there is one.
@@ -230,7 +230,7 @@ struct first_warp {
         }
         if (__any_sync(0xffffffffu, waits || is_big)) {
             writer.push(waits ? kind_of<Call::rule>(r, most) : -1, i);
-            if (is_big) left[atomicAdd(&num_left, 1u)] = i; // no call of a function here: its registers would spill
+            if (is_big) big[atomicAdd(&num_big, 1u)] = i; // no call of a function here: its registers would spill
         }
         __syncwarp();
         if constexpr (thin)
@@ -282,22 +282,22 @@ __global__ __launch_bounds__(raster_threads,
     using sink_type = typename Call::sink;
     __shared__ first_memory<Call> memories[raster_warps];
     __shared__ int left[num_triangle_kinds][raster_warps];
-    __shared__ unsigned dropped[num_triangle_classes], num_left;
+    __shared__ unsigned dropped[num_triangle_classes], num_big;
     if constexpr (!sink_type::checks_indices) {
         if (state->index_error != 0) return;
     }
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
-    if (threadIdx.x == 0) num_left = 0;
+    if (threadIdx.x == 0) num_big = 0;
     __syncthreads();
     first_memory<Call>& memory = memories[warp_in_block()];
     sink_type sink(call, dropped, memory.sink);
     kind_writer writer{call.lists, memory.kinds};
     const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
     first_warp<Call> warp{
-        call, memory, sink, writer, call.lists.left + std::size_t{blockIdx.x} * batches * raster_threads, num_left};
+        call, memory, sink, writer, call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads, num_big};
     const unsigned looked_at = warp.run();
     __syncthreads();
-    cut_left(call, sink, warp.left, num_left);
+    cut_big(call, sink, warp.big, num_big);
     writer.finish([&](int w) -> const kind_queues& { return memories[w].kinds; }, left);
     sink.finish(state);
     count_looked_at(looked_at, dropped, state);

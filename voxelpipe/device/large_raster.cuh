@@ -74,12 +74,12 @@ __device__ inline core::triangle_class find_records(const Call& call, std::uint3
 
 // The big triangles that a block left until its end, by all its threads.
 template <class Call, class Sink>
-__device__ VOXELPIPE_INLINE void cut_left(const Call& call, Sink& sink, const std::uint32_t* left, unsigned num_left) {
-    for (unsigned first = 0; first < num_left; first += blockDim.x) {
+__device__ VOXELPIPE_INLINE void cut_big(const Call& call, Sink& sink, const std::uint32_t* big, unsigned num_big) {
+    for (unsigned first = 0; first < num_big; first += blockDim.x) {
         const unsigned at = first + threadIdx.x;
         unsigned long long records = 0;
-        const std::uint32_t triangle = at < num_left ? left[at] : 0;
-        if (at < num_left) {
+        const std::uint32_t triangle = at < num_big ? big[at] : 0;
+        if (at < num_big) {
             const core::triangle_class kind = find_records(call, triangle, records);
             if (kind != core::triangle_class::drawn) sink.drop(kind);
         }

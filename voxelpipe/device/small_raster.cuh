@@ -152,10 +152,8 @@ __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, c
                                              const std::int32_t (&lo)[3], const core::small_box& box, int first,
                                              int step, Sink& sink) {
     const core::triple<std::int64_t> normal = core::small_normal(t);
-    const std::int64_t mx = core::magnitude(normal[0]), my = core::magnitude(normal[1]),
-                       mz = core::magnitude(normal[2]);
-    if ((mx | my | mz) == 0) return false;
-    const int axis = mx >= my && mx >= mz ? 0 : my >= mz ? 1 : 2;
+    const int axis = core::small_axis(normal);
+    if (axis < 0) return false;
     const core::small_thin s(t, normal, axis, call.fraction);
     const auto begin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
     const auto end = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
@@ -184,10 +182,8 @@ __device__ VOXELPIPE_INLINE bool raster_thin_cube(const raster_input<Source>& ca
                                                   Sink& sink) {
     const core::small_triangle t = r.relative(call.fraction);
     const core::triple<std::int64_t> normal = core::small_normal(t);
-    const std::int64_t mx = core::magnitude(normal[0]), my = core::magnitude(normal[1]),
-                       mz = core::magnitude(normal[2]);
-    if ((mx | my | mz) == 0) return false;
-    const int axis = mx >= my && mx >= mz ? 0 : my >= mz ? 1 : 2;
+    const int axis = core::small_axis(normal);
+    if (axis < 0) return false;
     const core::small_thin s(t, normal, axis, call.fraction);
     const std::uint32_t depths = core::cube_depths(s);
     const auto last = core::to_uvw(axis, r.last[0], r.last[1], r.last[2]);

@@ -67,13 +67,13 @@ struct triangle_lists {
     unsigned long long* next;
 
     // Those that a block of the first kernel leaves until its end; each has a part of its own.
-    std::uint32_t* left;
+    std::uint32_t* big;
 
     [[nodiscard]] static triangle_lists take(arena& memory, std::size_t num_triangles) {
         triangle_lists l{};
         // Parts are whole batches of all threads of a persistent kernel.
         const auto threads = static_cast<std::size_t>(num_multiprocessors()) * 2048;
-        l.left = memory.take<std::uint32_t>(num_triangles + std::min(threads, num_triangles + 2048));
+        l.big = memory.take<std::uint32_t>(num_triangles + std::min(threads, num_triangles + 2048));
         for (auto& array : l.arrays) array = memory.take<std::uint32_t>(num_triangles);
         l.capacity = static_cast<std::uint32_t>(num_triangles);
         l.cut = memory.take<std::uint32_t>(num_triangles);
