@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <random>
 #include <span>
 #include <vector>
 
@@ -18,6 +19,36 @@ namespace {
 
 using namespace device_test;
 namespace blend = voxelpipe::blend;
+
+// Runs of 1 to 40 triangles within a voxel, one voxel after the other.
+mesh_data specks() {
+    mesh_data m;
+    for (int run = 1; run <= 40; ++run)
+        for (int i = 0; i < run; ++i) {
+            const glm::vec3 corner(static_cast<float>(run) - 0.9f, 1.1f + static_cast<float>(run % 3), 1.2f);
+            const float step = 0.01f * static_cast<float>(i);
+            add_triangle(m, corner + glm::vec3(step, 0.0f, 0.1f), corner + glm::vec3(0.3f, 0.5f, step),
+                         corner + glm::vec3(0.1f, 0.2f + step, 0.3f));
+        }
+    return m;
+}
+
+// Slivers and others with bounding boxes of 2 to 40 voxels, in all directions.
+mesh_data middling_triangles(glm::ivec3 extent, std::uint32_t seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> unit(0.0f, 1.0f);
+    mesh_data m;
+    for (int i = 0; i < 3000; ++i) {
+        const glm::vec3 a = glm::vec3(unit(random), unit(random), unit(random)) * glm::vec3(extent);
+        const float length = 2.0f + 38.0f * unit(random);
+        const auto side = [&](float scale) {
+            return scale * glm::vec3(unit(random) - 0.5f, unit(random) - 0.5f, unit(random) - 0.5f);
+        };
+        const glm::vec3 b = a + side(2.0f * length);
+        add_triangle(m, a, b, (i % 2 == 0 ? b : a) + side(i % 4 < 2 ? 2.0f : length));
+    }
+    return m;
+}
 
 // Cleared and loaded, with and without the voxel counter, a grid that cuts triangles off at every side.
 template <class... Targets, class... Values>
@@ -29,6 +60,9 @@ void compare_constants(Values... values) {
                                 vp::voxelize_options{rule, false}, start::load);
         expect_same<Targets...>(mixed_triangles(200, 1.0f, 82), box_grid({1, 1, 1}), vp::passthrough{},
                                 vp::constant(values...), rule);
+        // Neighbours of one voxel each that share it, odd and even numbers of them.
+        expect_same<Targets...>(specks(), box_grid({40, 5, 3}), vp::passthrough{}, vp::constant(values...),
+                                vp::voxelize_options{rule, false});
     }
 }
 
@@ -53,6 +87,19 @@ TEST(Direct, Bits) {
         compare_constants<vp::target<vp::bit, blend::bit_or, tiled>, vp::target<vp::bit, blend::min, tiled>,
                           vp::target<std::uint32_t, blend::count, tiled>>(value, value, value);
     }
+}
+
+// The classes of work between one thread's and a large triangle's, whose limits follow the fraction bits of the grid.
+TEST(Direct, MiddlingTriangles) {
+    for (const glm::ivec3 extent : {glm::ivec3(120, 90, 100), glm::ivec3(300, 60, 50), glm::ivec3(40, 60, 1100)})
+        for (const vp::coverage rule : both_rules) {
+            expect_same<vp::target<vp::bit, blend::bit_or>>(middling_triangles(extent, 84), box_grid(extent),
+                                                            vp::passthrough{}, vp::constant(true),
+                                                            vp::voxelize_options{rule, false});
+            expect_same<vp::target<std::uint32_t, blend::add>>(middling_triangles(extent, 85), box_grid(extent),
+                                                               vp::passthrough{}, vp::constant(1u),
+                                                               vp::voxelize_options{rule, false});
+        }
 }
 
 // Exact partial sums, and values that have none and take the tiles.
