@@ -92,8 +92,8 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void small_projection(const small_triang
 
 // Bit x where three linear functions of x are all >= 0, for x = 0 .. Length - 1; e: their values at x = Length - 1, s:
 // what a step adds. Without a branch, and from the last one down, so that each sign goes to its bit by one shift of two
-// words. What is more than the row is for the caller to mask; within 32 voxels of a box of at most 16 the values stay
-// below 2^28.
+// words. What is more than the row is for the caller to mask; up to 63 voxels from the corner of a box of at most 32
+// the values stay below 2^28.
 template <int Length>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::uint32_t
 small_line(std::int32_t e0, std::int32_t e1, std::int32_t e2, std::int32_t s0, std::int32_t s1, std::int32_t s2) {
@@ -232,8 +232,9 @@ struct small_conservative {
         const int last_y = box.hi[1] - y0, last_z = box.hi[2] - z0;
         std::uint64_t met[4] = {}; // rows, bit y + 16 z
         for (int i = last_y > last_z ? last_y : last_z; i >= 0; --i) {
-            limits.set(i, (along & limits_at_y<16>(x0 + 15, y0 + i)) | (along & limits_at_z<16>(x0 + 15, z0 + i))
-                                                                           << 16); // beyond its end: never asked for
+            const std::uint32_t at_y = along & limits_at_y<16>(x0 + 15, y0 + i),
+                                at_z = along & limits_at_z<16>(x0 + 15, z0 + i);
+            limits.set(i, at_y | at_z << 16); // of what lies beyond the box nobody asks
             if (i > last_z) continue;
             for (int k = 3; k > 0; --k) met[k] = met[k] << 16 | met[k - 1] >> 48;
             met[0] = met[0] << 16 | (across & rows_at_z<16>(y0 + 15, z0 + i));
