@@ -88,8 +88,7 @@ std::vector<sample> pick_samples(const std::vector<std::uint32_t>& words, const 
 }
 
 // Whether the triangle gives a thin fragment in the voxel: the column's square meets the projection, and the floor of
-// the plane's depth at the column's centre is this voxel. `lo` and `hi` are the voxels that the triangle's bounds
-// touch.
+// the plane's depth at the column's centre is this voxel. `lo` and `hi`: the voxels that its bounds touch.
 bool covers_thin(const oracle::grid& g, int fraction, const oracle::snapped_triangle& t, const std::array<int, 3>& v,
                  const std::array<int, 3>& lo, const std::array<int, 3>& hi) {
     const int axis = oracle::dominant_axis(t);
@@ -122,9 +121,11 @@ sample_result check_with_oracle(const bench::mesh_data& mesh, const voxelpipe::g
     }
     const int fraction = oracle::fraction_bits(g);
 
-    // Samples by cells of 32^3 voxels, so that a triangle meets only those near it.
-    constexpr int log2_cell = 5;
-    const glm::ivec3 cells = (grid.extent + ((1 << log2_cell) - 1)) >> log2_cell;
+    // Samples by cells of 4^3 voxels, larger ones in large grids, so that a triangle meets only those near it.
+    const auto cells_of = [&](int log2) { return (grid.extent + ((1 << log2) - 1)) >> log2; };
+    int log2_cell = 2;
+    for (glm::ivec3 n = cells_of(log2_cell); n.x * n.y > (1 << 18) / n.z; n = cells_of(log2_cell)) ++log2_cell;
+    const glm::ivec3 cells = cells_of(log2_cell);
     std::vector<std::vector<std::uint32_t>> cell(static_cast<std::size_t>(cells.x * cells.y * cells.z));
     const auto cell_index = [&](int x, int y, int z) {
         return static_cast<std::size_t>((z * cells.y + y) * cells.x + x);
