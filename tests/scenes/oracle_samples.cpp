@@ -88,7 +88,7 @@ std::vector<sample> pick_samples(const std::vector<std::uint32_t>& words, const 
 }
 
 // Whether the triangle gives a thin fragment in the voxel: the column's square meets the projection, and the floor of
-// the plane's depth at the column's centre is this voxel.
+// the plane's depth at the column's centre is this voxel. `lo` and `hi`: the voxels that its bounds touch.
 bool covers_thin(const oracle::grid& g, int fraction, const oracle::snapped_triangle& t, const std::array<int, 3>& v,
                  const std::array<int, 3>& lo, const std::array<int, 3>& hi) {
     const int axis = oracle::dominant_axis(t);
@@ -96,7 +96,7 @@ bool covers_thin(const oracle::grid& g, int fraction, const oracle::snapped_tria
     const auto w = static_cast<std::size_t>(axis);
     // Beyond the triangle only along that axis: across it a voxel apart from the bounds need not be asked exactly.
     for (std::size_t a = 0; a < 3; ++a)
-        if (a != w && (v[a] == lo[a] || v[a] == hi[a])) return false;
+        if (a != w && (v[a] < lo[a] || v[a] > hi[a])) return false;
     std::array<int, 3> from = v, to = {v[0] + 1, v[1] + 1, v[2] + 1};
     from[w] = lo[w]; // all of the triangle along the dominant axis
     to[w] = hi[w] + 1;
@@ -121,9 +121,11 @@ sample_result check_with_oracle(const bench::mesh_data& mesh, const voxelpipe::g
     }
     const int fraction = oracle::fraction_bits(g);
 
-    // Samples by cells of 32^3 voxels, so that a triangle meets only those near it.
-    constexpr int log2_cell = 5;
-    const glm::ivec3 cells = (grid.extent + ((1 << log2_cell) - 1)) >> log2_cell;
+    // Samples by cells of 4^3 voxels, larger ones in large grids, so that a triangle meets only those near it.
+    const auto cells_of = [&](int log2) { return (grid.extent + ((1 << log2) - 1)) >> log2; };
+    int log2_cell = 2;
+    for (glm::ivec3 n = cells_of(log2_cell); n.x * n.y > (1 << 18) / n.z; n = cells_of(log2_cell)) ++log2_cell;
+    const glm::ivec3 cells = cells_of(log2_cell);
     std::vector<std::vector<std::uint32_t>> cell(static_cast<std::size_t>(cells.x * cells.y * cells.z));
     const auto cell_index = [&](int x, int y, int z) {
         return static_cast<std::size_t>((z * cells.y + y) * cells.x + x);
@@ -139,28 +141,30 @@ sample_result check_with_oracle(const bench::mesh_data& mesh, const voxelpipe::g
             for (int a = 0; a < 3; ++a) p[k][a] = mesh.positions[triangle[k]][a];
         const oracle::snapped_triangle t = oracle::snap(g, p);
         if (t.dropped) continue;
-        // Voxels that the triangle may touch, and for a thin fragment, which may lie beyond it, one more on every side.
-        const int margin = rule == voxelpipe::coverage::thin ? 2 : 1;
+        // The voxels whose closed boxes touch the triangle's closed bounds: any other is apart from it. Where a mesh
+        // has hundreds of triangles in a voxel, a voxel's neighbours have many times as many, none of which need be
+        // asked exactly. A thin fragment may lie beyond the bounds, by a voxel at most: two are looked at.
+        const int margin = rule == voxelpipe::coverage::thin ? 2 : 0;
         std::array<int, 3> lo{}, hi{};
         bool outside = false;
         for (std::size_t a = 0; a < 3; ++a) {
-            const std::int64_t low = std::min({t.v[0][a], t.v[1][a], t.v[2][a]}) >> fraction;
+            const std::int64_t low = (std::min({t.v[0][a], t.v[1][a], t.v[2][a]}) - 1) >> fraction; // ceil - 1
             const std::int64_t high = std::max({t.v[0][a], t.v[1][a], t.v[2][a]}) >> fraction;
             outside = outside || high < -1 || low > g.extent[a];
-            lo[a] = static_cast<int>(std::clamp<std::int64_t>(low - margin, -(1 << 29), 1 << 29));
-            hi[a] = static_cast<int>(std::clamp<std::int64_t>(high + margin, -(1 << 29), 1 << 29));
+            lo[a] = static_cast<int>(std::clamp<std::int64_t>(low, -(1 << 29), 1 << 29));
+            hi[a] = static_cast<int>(std::clamp<std::int64_t>(high, -(1 << 29), 1 << 29));
         }
         if (outside) continue;
-        const auto low = [&](std::size_t a) { return std::max(lo[a], 0) >> log2_cell; };
-        const auto high = [&](std::size_t a) { return std::min(hi[a], g.extent[a] - 1) >> log2_cell; };
+        const auto low = [&](std::size_t a) { return std::max(lo[a] - margin, 0) >> log2_cell; };
+        const auto high = [&](std::size_t a) { return std::min(hi[a] + margin, g.extent[a] - 1) >> log2_cell; };
         for (int z = low(2); z <= high(2); ++z)
             for (int y = low(1); y <= high(1); ++y)
                 for (int x = low(0); x <= high(0); ++x)
                     for (const std::uint32_t i : cell[cell_index(x, y, z)]) {
                         sample& s = samples[i];
                         const auto& v = s.at;
-                        if (s.covered || v[0] < lo[0] || v[1] < lo[1] || v[2] < lo[2] || v[0] > hi[0] || v[1] > hi[1] ||
-                            v[2] > hi[2])
+                        if (s.covered || v[0] < lo[0] - margin || v[1] < lo[1] - margin || v[2] < lo[2] - margin ||
+                            v[0] > hi[0] + margin || v[1] > hi[1] + margin || v[2] > hi[2] + margin)
                             continue;
                         s.covered = rule == voxelpipe::coverage::thin
                                         ? covers_thin(g, fraction, t, v, lo, hi)
