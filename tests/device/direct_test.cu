@@ -102,6 +102,23 @@ TEST(Direct, MiddlingTriangles) {
         }
 }
 
+// From one triangle, whose pieces are spread over the device, to more than it takes at once.
+TEST(Direct, FewAndManyLargeTriangles) {
+    const glm::ivec3 extent(150, 130, 140);
+    std::mt19937 random(86);
+    std::uniform_real_distribution<float> unit(-0.3f, 1.3f);
+    for (const int count : {1, 2, 7, 33, 300, 2000}) {
+        mesh_data m;
+        for (int i = 0; i < count; ++i) {
+            const auto point = [&] { return glm::vec3(unit(random), unit(random), unit(random)) * glm::vec3(extent); };
+            add_triangle(m, point(), point(), point());
+        }
+        for (const vp::coverage rule : both_rules)
+            expect_same<vp::target<vp::bit, blend::bit_or>, vp::target<std::uint32_t, blend::count>>(
+                m, box_grid(extent), vp::passthrough{}, vp::constant(true, true), rule);
+    }
+}
+
 // Exact partial sums, and values that have none and take the tiles.
 TEST(Direct, Sums) {
     for (const float value : {1.0f, -0.75f, 0.1f, 3e9f, 1e-20f, std::numeric_limits<float>::infinity()})

@@ -42,8 +42,7 @@ void expect_ordered(const std::vector<std::uint64_t>& lengths, std::uint32_t see
     vp::cuda_backend::buffer<std::byte> memory(gpu, plan.used());
     device::arena arena(memory.data());
     const device::order_lists lists = device::order_lists::take(arena, capacity);
-    const vp::cuda_backend::buffer<device::pipeline_state> state(
-        gpu, vp::array_view<const device::pipeline_state>(&host, 1));
+    vp::cuda_backend::buffer<device::pipeline_state> state(gpu, vp::array_view<const device::pipeline_state>(&host, 1));
     const vp::cuda_backend::buffer<unsigned long long> d_first(
         gpu, vp::array_view<const unsigned long long>(first.data(), first.size()));
     vp::cuda_backend::buffer<std::uint32_t> from(
@@ -52,8 +51,8 @@ void expect_ordered(const std::vector<std::uint64_t>& lengths, std::uint32_t see
     vp::cuda_backend::buffer<std::uint32_t> to(
         gpu, vp::array_view<const std::uint32_t>(primitives.data(), primitives.size()));
     vp::cuda_backend::buffer<std::uint32_t> spare(gpu, capacity);
-    device::order_fragments({d_first.data(), from.data(), to.data(), spare.data(), lists}, state.data(),
-                            {0, 0, capacity, 0}, gpu.stream);
+    device::order_fragments({d_first.data(), from.data(), to.data(), spare.data(), lists.with(state.data())},
+                            state.data(), {0, 0, capacity, 0}, gpu.stream);
     std::vector<std::uint32_t> result = to.to_host(gpu);
     result.resize(sorted.size());
     EXPECT_TRUE(result == sorted);
@@ -99,13 +98,12 @@ TEST(FragmentOrder, NothingWhereTheCallHasFailed) {
     vp::cuda_backend::buffer<std::byte> memory(gpu, plan.used());
     device::arena arena(memory.data());
     const device::order_lists lists = device::order_lists::take(arena, 500);
-    const vp::cuda_backend::buffer<device::pipeline_state> state(
-        gpu, vp::array_view<const device::pipeline_state>(&host, 1));
+    vp::cuda_backend::buffer<device::pipeline_state> state(gpu, vp::array_view<const device::pipeline_state>(&host, 1));
     const std::vector<std::uint32_t> fill(500, 42);
     vp::cuda_backend::buffer<std::uint32_t> to(gpu, vp::array_view<const std::uint32_t>(fill.data(), fill.size()));
     vp::cuda_backend::buffer<std::uint32_t> from(gpu, 500), spare(gpu, 500);
-    device::order_fragments({nullptr, from.data(), to.data(), spare.data(), lists}, state.data(), {0, 0, 500, 0},
-                            gpu.stream);
+    device::order_fragments({nullptr, from.data(), to.data(), spare.data(), lists.with(state.data())}, state.data(),
+                            {0, 0, 500, 0}, gpu.stream);
     EXPECT_TRUE(to.to_host(gpu) == fill);
 }
 

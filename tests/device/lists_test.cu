@@ -51,6 +51,40 @@ TEST(Lists, VoxelsOfManyFragments) {
         expect_same_lists<float>(m, box_grid({24, 20, 16}), vp::passthrough{}, vp::constant(2.0f), rule);
 }
 
+struct triangle_times_three {
+    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const { return vp::outputs(f.triangle * 3); }
+};
+
+// A call like the one before knows how much to expect: the same again, then other meshes of as many triangles, with
+// more voxels, fewer fragments, none, and more of both.
+template <class Payload, class FragmentShader>
+void compare_repeated(const FragmentShader& shader) {
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    vp::abuffer<vp::cuda_backend, Payload> gpu_lists{gpu};
+    vp::abuffer<vp::cpu_backend, Payload> cpu_lists{cpu};
+    const vp::grid g = box_grid({64, 48, 40});
+    mesh_data m = mixed_triangles(3000, 40.0f, 123);
+    const std::vector<glm::vec3> positions = m.positions;
+    for (const float scale : {1.0f, 1.0f, 0.3f, 0.3f, 1.0f, 1.1f, 0.01f, -1.0f, 1.2f, 1.2f, 2.0f}) {
+        for (std::size_t i = 0; i < positions.size(); ++i) m.positions[i] = scale * positions[i];
+        const vp::mesh<vp::cuda_backend> gpu_mesh{gpu, m.positions, m.triangles};
+        const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+        const vp::status gpu_status =
+            vp::voxelize(gpu, gpu_mesh, g, vp::passthrough{}, shader, gpu_lists, vp::coverage::conservative);
+        const vp::status cpu_status =
+            vp::voxelize(cpu, cpu_mesh, g, vp::passthrough{}, shader, cpu_lists, vp::coverage::conservative);
+        ASSERT_TRUE(gpu_status.ok() && cpu_status.ok()) << gpu_status.message() << scale;
+        SCOPED_TRACE(scale);
+        expect_same_counts(cpu_status.counts, gpu_status.counts);
+        expect_same_on_host(cpu_lists.to_host(cpu), gpu_lists.to_host(gpu));
+    }
+}
+
+TEST(Lists, RepeatedWithoutPayload) { compare_repeated<void>(vp::constant(true)); }
+TEST(Lists, RepeatedWithAConstantPayload) { compare_repeated<float>(vp::constant(0.5f)); }
+TEST(Lists, RepeatedWithAComputedPayload) { compare_repeated<std::uint32_t>(triangle_times_three{}); }
+
 // Slivers across the grid and triangles without area, alone.
 TEST(Lists, SliversAndZeroArea) {
     mesh_data m;

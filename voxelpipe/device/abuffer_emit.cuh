@@ -175,18 +175,18 @@ template <class Key, class Payload>
     return lists;
 }
 
-// The same for primitives that were listed in any order.
+// The same for primitives that were listed in any order. They come to lie in `to`, where there is such an array.
 template <class Payload>
 [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_lists& lists, pipeline_state* state,
-               const capacities& limits, cudaStream_t stream, stage_clock* clock) {
+sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_lists& lists, std::uint32_t* to,
+               pipeline_state* state, const capacities& limits, cudaStream_t stream, stage_clock* clock) {
     fragment_lists<std::uint32_t, Payload> sorted = sort_lists(b, state, limits, stream, clock);
     const bool second = sorted.values == b.values[1], second_key = sorted.keys == b.keys[1];
-    order_fragments(
-        {b.first_of_voxel, b.values[second ? 1 : 0], b.values[second ? 0 : 1], b.keys[second_key ? 0 : 1], lists},
-        state, limits, stream);
+    if (to == nullptr) to = b.values[second ? 0 : 1];
+    order_fragments({b.first_of_voxel, b.values[second ? 1 : 0], to, b.keys[second_key ? 0 : 1], lists.with(state)},
+                    state, limits, stream);
     end_stage(clock, &stage_times::abuffer_emit);
-    sorted.values = b.values[second ? 0 : 1];
+    sorted.values = to;
     sorted.primitives = nullptr; // a value is a primitive
     sorted.payloads = nullptr;
     return sorted;
@@ -224,6 +224,7 @@ __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint6
         offsets[i] = first;
     }
     if (thread == 0 && num_voxels != 0) offsets[num_voxels] = num_fragments;
+    if (std::is_same_v<Payload, no_payload> && lists.values == primitives) return; // they are there
     for (std::uint64_t i = thread; i < num_fragments; i += threads) {
         if constexpr (std::is_same_v<Payload, no_payload>) {
             primitives[i] = lists.values[i];
@@ -241,7 +242,19 @@ __global__ void copy_lists_kernel(fragment_lists<Key, Payload> lists, std::uint6
     copy_lists(lists, num_voxels, num_fragments, voxels, offsets, primitives, payloads);
 }
 
-// The same with the numbers that the state holds, where the host does not wait for them. Leaves them in the counters.
+// The same with the numbers that the state holds, where the host does not wait for them, and where there is room for so
+// many voxels.
+template <class Key, class Payload>
+__global__ void fit_lists_kernel(const __grid_constant__ fragment_lists<Key, Payload> lists,
+                                 const pipeline_state* state, capacities limits, std::uint64_t room,
+                                 std::uint64_t* voxels, std::uint64_t* offsets, std::uint32_t* primitives,
+                                 Payload* payloads) {
+    await_stream();
+    if (has_failed(*state, limits) || state->list_voxels > room) return;
+    copy_lists(lists, state->list_voxels, state->list_fragments, voxels, offsets, primitives, payloads);
+}
+
+// The same, for as many voxels as there are fragments. Leaves the numbers in the counters.
 template <class Key, class Payload>
 __global__ void publish_lists_kernel(fragment_lists<Key, Payload> lists, pipeline_state* state, capacities limits,
                                      list_counts* counts, std::uint64_t* voxels, std::uint64_t* offsets,

@@ -172,17 +172,18 @@ public:
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              const framebuffer_view<Targets...>& fb, const voxelize_options& options,
                              std::uint64_t triangles_in) {
-        return attempt(
-            framebuffer_room_, {triangles_in, g.extent, g.offset, options.rule},
-            [&](const device::capacities& limits, device::pipeline_state& state, device::stage_clock* clock) {
-                device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits, [&](auto call) {
-                    call.clock = clock;
-                    if (options.rule == coverage::thin)
-                        launch<coverage::thin>(call, state);
-                    else
-                        launch<coverage::conservative>(call, state);
-                });
-            });
+        return attempt(framebuffer_room_, {triangles_in, g.extent, g.offset, options.rule},
+                       [&](const device::capacities& limits, std::uint64_t, device::pipeline_state& state,
+                           device::stage_clock* clock) {
+                           device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits,
+                                                                   [&](auto call) {
+                                                                       call.clock = clock;
+                                                                       if (options.rule == coverage::thin)
+                                                                           launch<coverage::thin>(call, state);
+                                                                       else
+                                                                           launch<coverage::conservative>(call, state);
+                                                                   });
+                       });
     }
 
     template <class Mesh, class VertexShader, class FragmentShader, class Payload>
@@ -191,18 +192,18 @@ public:
                              std::uint64_t triangles_in) {
         using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
         abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
-        status s =
-            attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
-                    [&](const device::capacities& limits, device::pipeline_state& state, device::stage_clock* clock) {
-                        const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
-                        const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
-                        if (options.rule == coverage::thin)
-                            small ? fill<coverage::thin, std::uint32_t>(call, made, state)
-                                  : fill<coverage::thin, std::uint64_t>(call, made, state);
-                        else
-                            small ? fill<coverage::conservative, std::uint32_t>(call, made, state)
-                                  : fill<coverage::conservative, std::uint64_t>(call, made, state);
-                    });
+        status s = attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
+                           [&](const device::capacities& limits, std::uint64_t voxel_room,
+                               device::pipeline_state& state, device::stage_clock* clock) {
+                               const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
+                               const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
+                               if (options.rule == coverage::thin)
+                                   small ? fill<coverage::thin, std::uint32_t>(call, voxel_room, made, state)
+                                         : fill<coverage::thin, std::uint64_t>(call, voxel_room, made, state);
+                               else
+                                   small ? fill<coverage::conservative, std::uint32_t>(call, voxel_room, made, state)
+                                         : fill<coverage::conservative, std::uint64_t>(call, voxel_room, made, state);
+                           });
         if (s.ok()) {
             made.extent = g.extent;
             lists = std::move(made);
@@ -223,7 +224,8 @@ private:
         coverage rule;
         friend bool operator==(const call_key&, const call_key&) = default;
     };
-    using room = core::call_room<call_key, 4>; // of tile pairs, tile records, fragments, fragment records
+    using room =
+        core::call_room<call_key, 5>; // of tile pairs, tile records, fragments, fragment records, lists of voxels
 
     // Runs the stages with capacities that should do, waits, and once more where something did not fit.
     template <class Launch>
@@ -233,17 +235,19 @@ private:
             std::optional<device::stage_clock> clock;
             if (times != nullptr) clock.emplace(stream);
             const std::uint64_t n = key.triangles;
-            room::lengths there = memory.guess(key, {n + n / 4 + 16384, n / 16 + 4096, 4 * n + 65536, n / 16 + 4096});
+            // No room for the lists of voxels where nothing is known of the call: they are copied when all is.
+            room::lengths there =
+                memory.guess(key, {n + n / 4 + 16384, n / 16 + 4096, 4 * n + 65536, n / 16 + 4096, 0});
             for (int tries = 0;; ++tries) {
                 const device::capacities limits{there[0], there[1], there[2], there[3]};
                 device::pipeline_state state{};
-                launch_stages(limits, state, clock ? &*clock : nullptr);
+                launch_stages(limits, there[4], state, clock ? &*clock : nullptr);
                 if (state.index_error != 0) {
                     s = core::failure(status_code::index_out_of_range, stage::coarse_raster);
                     break;
                 }
                 const room::lengths needed{state.tile_pairs, state.tile_records, state.list_fragments,
-                                           state.fragment_records};
+                                           state.fragment_records, state.list_voxels};
                 if (!device::has_failed(state, limits)) {
                     s = device::to_status(state);
                     memory.fitted(key, needed);
@@ -294,42 +298,75 @@ private:
         });
     }
 
+    // Arrays of an A-buffer with room for so many voxels and fragments.
+    template <class Payload>
+    struct list_arrays {
+        static constexpr bool has_payload = abuffer<cuda_backend, Payload>::has_payload;
+        buffer<std::uint64_t> voxels, offsets;
+        buffer<std::uint32_t> primitives;
+        buffer<payload_storage<Payload>> payloads;
+
+        list_arrays(cuda_backend& b, std::uint64_t num_voxels, std::uint64_t num_fragments)
+            : voxels(b, num_voxels, stage::abuffer_emit),
+              offsets(b, num_voxels == 0 ? 0 : num_voxels + 1, stage::abuffer_emit),
+              primitives(b, num_fragments, stage::abuffer_emit),
+              payloads(b, has_payload ? num_fragments : 0, stage::abuffer_emit) {}
+        void give(abuffer<cuda_backend, Payload>& lists, std::uint64_t num_voxels, std::uint64_t num_fragments) {
+            voxels.count_ = num_voxels;
+            offsets.count_ = num_voxels == 0 ? 0 : num_voxels + 1;
+            primitives.count_ = num_fragments;
+            payloads.count_ = has_payload ? num_fragments : 0;
+            lists.voxels = std::move(voxels);
+            lists.offsets = std::move(offsets);
+            lists.primitives = std::move(primitives);
+            lists.payloads = std::move(payloads);
+        }
+    };
+
+    // voxel_room: how many voxels the lists are likely to have, 0 where nothing is known. Then nobody waits in between:
+    // the arrays are made beforehand, and hold a little more than is needed.
     template <coverage Rule, class Key, class Call, class Payload>
-    void fill(const Call& call, abuffer<cuda_backend, Payload>& lists, device::pipeline_state& state) {
+    void fill(const Call& call, std::uint64_t voxel_room, abuffer<cuda_backend, Payload>& lists,
+              device::pipeline_state& state) {
+        constexpr stage where = stage::abuffer_emit;
         device::pipeline_state* d_state = nullptr;
         device::arena plan;
         (void)call.template go<Rule, false, Key>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
-        using payload = payload_storage<Payload>;
-        constexpr bool has_payload = abuffer<cuda_backend, Payload>::has_payload;
-        constexpr stage where = stage::abuffer_emit;
+        list_arrays<Payload> arrays(*this, voxel_room, voxel_room == 0 ? 0 : call.limits.fragments);
         const auto sorted = device::launch_until(where, [&] {
             if (call.clock != nullptr) call.clock->start();
-            const auto lists_in_workspace = call.template go<Rule, true, Key>(memory, d_state, stream);
+            const auto made = call.template go<Rule, true, Key>(memory, d_state, stream, arrays.primitives.data());
+            if (voxel_room != 0) {
+                device::launch_behind(device::fit_lists_kernel<Key, payload_storage<Payload>>,
+                                      device::fill_device(call.limits.fragments), device::threads_per_block, stream,
+                                      where, made, d_state, call.limits, voxel_room, arrays.voxels.data(),
+                                      arrays.offsets.data(), arrays.primitives.data(), arrays.payloads.data());
+                device::end_stage(call.clock, &stage_times::abuffer_emit);
+            }
             read_state(d_state, state);
-            return lists_in_workspace;
+            return made;
         });
         if (device::has_failed(state, call.limits)) return;
-        buffer<std::uint64_t> voxels(*this, state.list_voxels, where);
-        buffer<std::uint64_t> offsets(*this, state.list_voxels == 0 ? 0 : state.list_voxels + 1, where);
-        buffer<std::uint32_t> primitives(*this, state.list_fragments, where);
-        buffer<payload> payloads(*this, has_payload ? state.list_fragments : 0, where);
-        if (state.list_fragments != 0) {
+        const std::uint64_t num_voxels = state.list_voxels, num_fragments = state.list_fragments;
+        const bool fits = num_voxels <= voxel_room && num_fragments >= call.limits.fragments / 4 * 3;
+        if (voxel_room != 0 && (fits || num_fragments == 0)) {
+            arrays.give(lists, num_voxels, num_fragments);
+            return;
+        }
+        list_arrays<Payload> exact(*this, num_voxels, num_fragments);
+        if (num_fragments != 0) {
             if (call.clock != nullptr) call.clock->start(); // leaves the wait and the allocations out
-            device::
-                copy_lists_kernel<<<device::fill_device(state.list_fragments), device::threads_per_block, 0, stream>>>(
-                    sorted, state.list_voxels, state.list_fragments, voxels.data(), offsets.data(), primitives.data(),
-                    payloads.data());
+            device::copy_lists_kernel<<<device::fill_device(num_fragments), device::threads_per_block, 0, stream>>>(
+                sorted, num_voxels, num_fragments, exact.voxels.data(), exact.offsets.data(), exact.primitives.data(),
+                exact.payloads.data());
             device::check(cudaGetLastError(), where);
             device::end_stage(call.clock, &stage_times::abuffer_emit);
         }
-        lists.voxels = std::move(voxels);
-        lists.offsets = std::move(offsets);
-        lists.primitives = std::move(primitives);
-        lists.payloads = std::move(payloads);
+        exact.give(lists, num_voxels, num_fragments);
     }
 
-    room framebuffer_room_{{true, false, true, false}}, list_room_{{true, false, true, false}};
+    room framebuffer_room_{{true, false, true, false, false}}, list_room_{{true, false, true, false, false}};
     device_block workspace_;
 };
 

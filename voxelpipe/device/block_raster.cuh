@@ -111,20 +111,15 @@ struct block_warp {
         __syncwarp();
     }
 
-    // All batches of this warp, then what is left in the queues of the block's warps, together. All threads of the
-    // block take part. Returns how many triangles the warp looked at.
+    // All batches of this warp, the lane's first with this index, then what is left in the queues of the block's warps,
+    // together. All threads of the block take part. Returns how many triangles the warp looked at.
     template <int Warps>
-    __device__ VOXELPIPE_INLINE unsigned run(const warp_queues (&all)[Warps], int (&left)[3][Warps]) {
+    __device__ VOXELPIPE_INLINE unsigned run(glm::uvec3 index, const warp_queues (&all)[Warps], int (&left)[3][Warps]) {
         const std::uint32_t step = gridDim.x * Warps * 32;
-        // The indices of a batch are loaded while the batch before it is worked on.
-        const auto load_index = [&](std::uint32_t i) {
-            return i < call.in.num_triangles ? call.in.source.triangle(i) : glm::uvec3(0);
-        };
         const std::uint32_t begin = blockIdx.x * Warps * 32 + threadIdx.x / 32 * 32;
-        std::uint32_t first = begin;
-        glm::uvec3 index = load_index(first + static_cast<unsigned>(lane));
-        for (; first < call.in.num_triangles; first += step) {
-            const glm::uvec3 next = load_index(first + step + static_cast<unsigned>(lane));
+        // The indices of a batch are loaded while the batch before it is worked on.
+        for (std::uint32_t first = begin; first < call.in.num_triangles; first += step) {
+            const glm::uvec3 next = load_index(call.in, first + step + static_cast<unsigned>(lane));
             const std::uint32_t i = first + static_cast<unsigned>(lane);
             batch(i, i < call.in.num_triangles && sink.check(index), index);
             index = next;
@@ -175,6 +170,8 @@ __global__ __launch_bounds__(raster_threads,
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ int left[3][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_big;
+    const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
+    await_stream();
     if (state->index_error != 0) return;
     if (threadIdx.x == 0) num_big = 0;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
@@ -187,7 +184,7 @@ __global__ __launch_bounds__(raster_threads,
                           sink,
                           call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads,
                           num_big};
-    const unsigned looked_at = warp.run(queues, left);
+    const unsigned looked_at = warp.run(index, queues, left);
     sink.finish(state);
     count_looked_at(looked_at, dropped, state);
 }

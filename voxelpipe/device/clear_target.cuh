@@ -19,6 +19,7 @@ struct fill_pattern {
 template <class Element>
 __global__ void fill_kernel(Element* to, std::uint64_t count, const __grid_constant__ fill_pattern<Element> pattern,
                             const pipeline_state* state, capacities limits) {
+    await_stream();
     if (has_failed(*state, limits)) return;
     const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
@@ -42,6 +43,7 @@ __global__ void fill_kernel(Element* to, std::uint64_t count, const __grid_const
 template <class Target>
 __global__ void fill_bits_kernel(const __grid_constant__ target_view<Target> t, const pipeline_state* state,
                                  capacities limits) {
+    await_stream();
     if (has_failed(*state, limits)) return;
     const auto words_x = static_cast<std::uint64_t>((t.extent.x + 31) / 32);
     const std::uint64_t count =
@@ -61,16 +63,14 @@ void clear_target(const target_view<Target>& t, const pipeline_state* state, con
     using map = typename Target::map;
     using element = typename Target::element_type;
     const auto fill = [&](element* to, std::size_t count, const element& value) {
-        fill_kernel<element><<<fill_device(count / (16 / sizeof(element) + 1) + 1, 16), threads_per_block, 0, stream>>>(
-            to, count, {value}, state, limits);
-        check(cudaGetLastError(), stage::fine_raster);
+        launch_behind(fill_kernel<element>, fill_device(count / (16 / sizeof(element) + 1) + 1, 16), threads_per_block,
+                      stream, stage::fine_raster, to, count, fill_pattern<element>{value}, state, limits);
     };
     if constexpr (map::is_bit) {
         fill(t.elements, map::elements(t.extent), 0u);
         if (t.clear_value) {
-            fill_bits_kernel<Target>
-                <<<fill_device(map::elements(t.extent), 16), threads_per_block, 0, stream>>>(t, state, limits);
-            check(cudaGetLastError(), stage::fine_raster);
+            launch_behind(fill_bits_kernel<Target>, fill_device(map::elements(t.extent), 16), threads_per_block, stream,
+                          stage::fine_raster, t, state, limits);
         }
     } else if constexpr (map::planes) {
         const std::size_t plane = map::cells(t.extent);

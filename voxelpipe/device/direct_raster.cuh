@@ -36,6 +36,7 @@ struct direct_call {
 template <class Index>
 __global__ void check_indices_kernel(const Index* indices, std::uint64_t count, Index num_vertices,
                                      pipeline_state* state) {
+    await_stream();
     bool bad = false;
     const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
@@ -71,7 +72,10 @@ struct blending_sink : direct_sink<Call> {
     struct memory {};
 
     // Fragments and first touches of one thread, which cannot write 2^32 before the largest list ends.
-    unsigned fragments = 0, touched = 0;
+    struct totals {
+        unsigned fragments = 0, touched = 0;
+    };
+    totals mine;
 
     __device__ VOXELPIPE_INLINE blending_sink(const Call& call, unsigned* dropped, memory&)
         : direct_sink<Call>{call, dropped} {}
@@ -80,54 +84,61 @@ struct blending_sink : direct_sink<Call> {
     // In the voxels x0 + i of a row, for the bits i of the mask.
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
-        fragments += static_cast<unsigned>(__popc(mask));
+        mine.fragments += static_cast<unsigned>(__popc(mask));
         each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
-            touched += blend_row(t, x0, y, z, mask, voxelpipe::get<K>(this->call.out.values), count_first);
+            mine.touched += blend_row(t, x0, y, z, mask, voxelpipe::get<K>(this->call.out.values), count_first);
         });
     }
     // Rows as in blend_rows.
     __device__ VOXELPIPE_INLINE void two(int x, int y, int z, const word (&mask)[2], bool along_y) {
-        fragments += static_cast<unsigned>(__popc(mask[0] | mask[1] << 2));
+        mine.fragments += static_cast<unsigned>(__popc(mask[0] | mask[1] << 2));
         rows(x, y, z, mask, along_y);
     }
     __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4]) {
-        fragments += static_cast<unsigned>(__popc(mask[0] | mask[1] << 2 | mask[2] << 4 | mask[3] << 6));
+        mine.fragments += static_cast<unsigned>(__popc(mask[0] | mask[1] << 2 | mask[2] << 4 | mask[3] << 6));
         rows(x, y, z, mask, false);
     }
     // One voxel. Lanes that come here together may have the same.
     __device__ VOXELPIPE_INLINE void one(int x, int y, int z) {
-        ++fragments;
+        ++mine.fragments;
         each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
             const auto& value = voxelpipe::get<K>(this->call.out.values);
             if constexpr (std::remove_cvref_t<decltype(t)>::map::is_bit)
-                touched += blend_row(t, x, y, z, 1u, value, count_first);
+                mine.touched += blend_row(t, x, y, z, 1u, value, count_first);
             else
-                touched += blend_shared(t, x, y, z, value, count_first);
+                mine.touched += blend_shared(t, x, y, z, value, count_first);
         });
     }
     // The voxels position(i) for the bits i of a mask.
     template <class Position>
     __device__ VOXELPIPE_INLINE void voxels(word bits, const Position& position) {
-        fragments += static_cast<unsigned>(__popc(bits));
+        mine.fragments += static_cast<unsigned>(__popc(bits));
         each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
-            touched += blend_voxels(t, bits, position, voxelpipe::get<K>(this->call.out.values), count_first);
+            mine.touched += blend_voxels(t, bits, position, voxelpipe::get<K>(this->call.out.values), count_first);
         });
+    }
+    // From one sink of a thread to another.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE totals end() const { return mine; }
+    __device__ VOXELPIPE_INLINE void take_over(const totals& other) {
+        mine.fragments += other.fragments;
+        mine.touched += other.touched;
     }
     // Adds up; all threads of the block take part.
     __device__ void finish(pipeline_state* state) const {
-        const auto add = [](unsigned mine, unsigned long long* total) {
-            const unsigned long long sum = block_sum(mine);
+        const auto add = [](unsigned one, unsigned long long* total) {
+            const unsigned long long sum = block_sum(one);
             if (threadIdx.x == 0 && sum != 0) atomicAdd(total, sum);
         };
-        add(fragments, &state->fragments);
-        if (this->call.out.counting_target >= 0) add(touched, &state->voxels);
+        add(mine.fragments, &state->fragments);
+        if (this->call.out.counting_target >= 0) add(mine.touched, &state->voxels);
     }
 
 private:
     template <int N>
     __device__ VOXELPIPE_INLINE void rows(int x, int y, int z, const word (&mask)[N], bool along_y) {
         each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
-            touched += blend_rows(t, x, y, z, mask, along_y, voxelpipe::get<K>(this->call.out.values), count_first);
+            mine.touched +=
+                blend_rows(t, x, y, z, mask, along_y, voxelpipe::get<K>(this->call.out.values), count_first);
         });
     }
     template <class F>
@@ -252,16 +263,14 @@ struct first_warp {
         __syncwarp();
     }
 
-    // All batches of this warp. Returns how many triangles it looked at.
-    __device__ VOXELPIPE_INLINE unsigned run() {
+    // All batches of this warp, the lane's first with this index. Returns how many triangles it looked at.
+    __device__ VOXELPIPE_INLINE unsigned run(glm::uvec3 index) {
         const unsigned lane = threadIdx.x % 32;
         const std::uint32_t step = gridDim.x * raster_threads, num = call.in.num_triangles;
-        // The indices of a batch are loaded while the batch before it is worked on.
-        const auto load_index = [&](std::uint32_t i) { return i < num ? call.in.source.triangle(i) : glm::uvec3(0); };
         const std::uint32_t begin = blockIdx.x * raster_threads + warp_in_block() * 32;
-        glm::uvec3 index = load_index(begin + lane);
+        // The indices of a batch are loaded while the batch before it is worked on.
         for (std::uint32_t first = begin; first < num; first += step) {
-            const glm::uvec3 next = load_index(first + step + lane);
+            const glm::uvec3 next = load_index(call.in, first + step + lane);
             batch(first + lane, first + lane < num && sink.check(index), index);
             index = next;
         }
@@ -283,6 +292,8 @@ __global__ __launch_bounds__(raster_threads,
     __shared__ first_memory<Call> memories[raster_warps];
     __shared__ int left[num_triangle_kinds][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_big;
+    const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
+    await_stream();
     if constexpr (!sink_type::checks_indices) {
         if (state->index_error != 0) return;
     }
@@ -295,7 +306,7 @@ __global__ __launch_bounds__(raster_threads,
     const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
     first_warp<Call> warp{
         call, memory, sink, writer, call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads, num_big};
-    const unsigned looked_at = warp.run();
+    const unsigned looked_at = warp.run(index);
     __syncthreads();
     cut_big(call, sink, warp.big, num_big);
     writer.finish([&](int w) -> const kind_queues& { return memories[w].kinds; }, left);
@@ -305,15 +316,16 @@ __global__ __launch_bounds__(raster_threads,
 
 // ---- the second kernel: what the first left ------------------------------------------------------------------------
 
-// All records, in registers of their own: what they need is not kept for the other triangles.
+// All records, in registers of their own: what they need is not kept for the other triangles. Nobody waits for the
+// block's other warps at its end.
 template <class Call>
-__device__ __noinline__ void raster_all_records(const Call& call, pipeline_state* state, unsigned* dropped,
-                                                brick_memory& bricks, typename Call::sink::memory& memory,
-                                                unsigned warp, unsigned warps) {
+__device__ __noinline__ typename Call::sink::totals
+raster_all_records(const Call& call, unsigned* dropped, brick_memory& bricks, typename Call::sink::memory& memory,
+                   unsigned warp, unsigned warps) {
     typename Call::sink sink(call, dropped, memory);
     raster_records(call, sink, bricks, warp, warps);
     __syncwarp();
-    sink.finish(state);
+    return sink.end();
 }
 
 // What a warp of the second kernel knows of its place.
@@ -392,15 +404,21 @@ __global__ __launch_bounds__(raster_threads,
     __shared__ row_limits limits[thin ? 1 : raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ unsigned dropped[num_triangle_classes];
+    await_stream();
     if (state->index_error != 0) return;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();
     const unsigned in_block = warp_in_block();
     const warp_place place{blockIdx.x * raster_warps + in_block, gridDim.x * raster_warps, threadIdx.x % 32};
     typename sink_type::memory& memory = memories[in_block];
-    if (uniform(*call.lists.next) != 0)
-        raster_all_records(call, state, dropped, bricks[thin ? 0 : in_block], memory, place.warp, place.warps);
+    typename sink_type::totals of_records{};
+    if (uniform(*call.lists.next) != 0) {
+        // Parts of few large triangles go to different multiprocessors.
+        const unsigned warp = thin ? place.warp : in_block * gridDim.x + blockIdx.x;
+        of_records = raster_all_records(call, dropped, bricks[thin ? 0 : in_block], memory, warp, place.warps);
+    }
     sink_type sink(call, dropped, memory);
+    sink.take_over(of_records);
     raster_by_lanes(call, medium_triangles, 0, place, sink);
     raster_lists(call, place, limits[thin ? 0 : in_block], sink);
     sink.finish(state);
@@ -413,10 +431,9 @@ __global__ __launch_bounds__(raster_threads,
 
 inline void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangles, std::uint64_t num_vertices,
                           pipeline_state* state, cudaStream_t stream) {
-    check_indices_kernel<std::uint32_t><<<fill_device(num_triangles), threads_per_block, 0, stream>>>(
-        reinterpret_cast<const std::uint32_t*>(triangles), 3 * num_triangles, static_cast<std::uint32_t>(num_vertices),
-        state);
-    check(cudaGetLastError(), stage::coarse_raster);
+    launch_behind(check_indices_kernel<std::uint32_t>, fill_device(num_triangles), threads_per_block, stream,
+                  stage::coarse_raster, reinterpret_cast<const std::uint32_t*>(triangles), 3 * num_triangles,
+                  static_cast<std::uint32_t>(num_vertices), state);
 }
 
 // Blocks of the first kernel: what fits the device at once.
@@ -431,14 +448,13 @@ template <class Call>
 void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream) {
     const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
     if constexpr (Call::output::hands_on)
-        direct_raster_kernel<Call>
-            <<<raster_blocks(call.in.num_triangles, first_min_blocks<Call>), raster_threads, 0, stream>>>(call, state);
+        launch_behind(direct_raster_kernel<Call>, raster_blocks(call.in.num_triangles, first_min_blocks<Call>),
+                      raster_threads, stream, where, call, state);
     else
-        block_raster_kernel<Call>
-            <<<raster_blocks(call.in.num_triangles, block_min_blocks), raster_threads, 0, stream>>>(call, state);
-    check(cudaGetLastError(), where);
-    direct_rest_kernel<Call><<<multiprocessors * rest_min_blocks<Call>, raster_threads, 0, stream>>>(call, state);
-    check(cudaGetLastError(), where);
+        launch_behind(block_raster_kernel<Call>, raster_blocks(call.in.num_triangles, block_min_blocks), raster_threads,
+                      stream, where, call, state);
+    launch_behind(direct_rest_kernel<Call>, multiprocessors * rest_min_blocks<Call>, raster_threads, stream, where,
+                  call, state);
 }
 
 } // namespace voxelpipe::device

@@ -332,14 +332,16 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     capacities limits;
     stage_clock* clock = nullptr;
 
-    // Carves the memory and, with `run`, launches the stages up to the sorted lists.
+    // Carves the memory and, with `run`, launches the stages up to the sorted lists. The primitives may come to lie in
+    // an array of limits.fragments elements, where one is given.
     template <coverage Rule, bool Run, class Key>
-    [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
+    [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, pipeline_state*& state, cudaStream_t stream,
+                                                  std::uint32_t* primitives = nullptr) const {
         state = memory.take<pipeline_state>(1);
         if constexpr (Run) check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
         if constexpr (core::is_solid<FragmentShader> && sizeof(Key) == sizeof(std::uint32_t)) {
             if (is_listable(draws.size(), num_primitives, core::make_snap_transform(g).fraction, g.extent))
-                return go_direct<Rule, Run>(memory, state, stream);
+                return go_direct<Rule, Run>(memory, state, stream, primitives);
         }
         const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
         const scene_buffers buffers(memory, draws);
@@ -356,8 +358,8 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
 private:
     // One draw of a constant shader.
     template <coverage Rule, bool Run>
-    [[nodiscard]] fragment_lists<std::uint32_t, Payload> go_direct(arena& memory, pipeline_state* state,
-                                                                   cudaStream_t stream) const {
+    [[nodiscard]] fragment_lists<std::uint32_t, Payload>
+    go_direct(arena& memory, pipeline_state* state, cudaStream_t stream, std::uint32_t* primitives) const {
         constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
         const draw_type& d = draws[0];
         const auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
@@ -382,7 +384,8 @@ private:
                 raster(stored_source{{d.mesh.triangles.data(), positions, 0, num_vertices}});
             }
             end_stage(clock, &stage_times::fine_raster);
-            fragment_lists<std::uint32_t, Payload> sorted = sort_unordered(lists, order, state, limits, stream, clock);
+            fragment_lists<std::uint32_t, Payload> sorted =
+                sort_unordered(lists, order, primitives, state, limits, stream, clock);
             if constexpr (!std::is_same_v<Payload, no_payload>)
                 sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
             return sorted;

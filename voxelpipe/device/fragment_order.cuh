@@ -35,13 +35,19 @@ struct order_lists {
     static constexpr int block_list = num_warp_sorts, run_list = num_warp_sorts + 1, num_lists = num_warp_sorts + 2;
     fragment_run* voxels[num_warp_sorts + 1]; // of a warp; of a block
     voxel_run* runs;
-    std::uint32_t* counts; // of all lists
+    unsigned int* counts; // of all lists; zeroed
 
     [[nodiscard]] static order_lists take(arena& memory, std::uint64_t capacity) {
         order_lists w{};
         for (int k = 0; k < num_lists - 1; ++k) w.voxels[k] = memory.take<fragment_run>(capacity / (most_below(k) + 1));
         w.runs = memory.take<voxel_run>(2 * (capacity / most_of_block)); // each voxel's last may be short
-        w.counts = memory.take<std::uint32_t>(num_lists);
+        return w;
+    }
+    // With its counters.
+    [[nodiscard]] order_lists with(pipeline_state* state) const {
+        static_assert(sizeof(state->num_ordered) == num_lists * sizeof(*counts));
+        order_lists w = *this;
+        w.counts = state->num_ordered;
         return w;
     }
     // The most fragments of a voxel that is too small for list k.
@@ -91,6 +97,7 @@ template <class Buffers>
 __global__ void order_voxels_kernel(const __grid_constant__ Buffers b, const pipeline_state* state, capacities limits) {
     using lists = order_lists;
     __shared__ std::uint32_t wanted[lists::num_lists], first[lists::num_lists];
+    await_stream();
     const std::uint64_t n = has_failed(*state, limits) ? 0 : state->list_voxels;
     for (std::uint64_t start = std::uint64_t{blockIdx.x} * blockDim.x; start < n;
          start += std::uint64_t{gridDim.x} * blockDim.x) {
@@ -174,6 +181,7 @@ template <int List, class Buffers>
 __global__ __launch_bounds__(threads_per_block) void warp_sort_kernel(const __grid_constant__ Buffers b) {
     constexpr int items = static_cast<int>(order_lists::most_below(List + 1) / 32);
     constexpr std::uint32_t warps = threads_per_block / 32;
+    await_stream();
     const std::uint32_t n = uniform(b.lists.counts[List]), lane = threadIdx.x % 32;
     for (std::uint32_t r = blockIdx.x * warps + warp_in_block(); r < n; r += gridDim.x * warps) {
         const fragment_run run = b.lists.voxels[List][r];
@@ -201,6 +209,7 @@ __global__ __launch_bounds__(block_sort_threads) void block_sort_kernel(const __
     using lists = order_lists;
     using sorter = cub::BlockMergeSort<std::uint32_t, block_sort_threads, static_cast<int>(items)>;
     __shared__ typename sorter::TempStorage storage;
+    await_stream();
     const std::uint32_t whole = b.lists.counts[lists::block_list], all = whole + b.lists.counts[lists::run_list];
     for (std::uint32_t r = blockIdx.x; r < all; r += gridDim.x) {
         const fragment_run run = r < whole ? b.lists.voxels[lists::block_list][r] : b.lists.runs[r - whole].run;
@@ -243,6 +252,7 @@ template <class Buffers>
 __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::uint32_t* from, std::uint32_t* to,
                                   std::uint64_t length, bool last) {
     constexpr std::uint32_t parts = most_of_block / threads_per_block;
+    await_stream();
     const std::uint64_t n = std::uint64_t{b.lists.counts[order_lists::run_list]} * parts;
     for (std::uint64_t r = blockIdx.x; r < n; r += gridDim.x) {
         const voxel_run entry = b.lists.runs[r / parts];
@@ -269,8 +279,8 @@ template <int List>
 void sort_by_warps(const order_buffers& b, std::uint64_t capacity, cudaStream_t stream) {
     constexpr std::uint64_t least = order_lists::most_below(List) + 1;
     if (capacity < least) return;
-    warp_sort_kernel<List><<<fill_device(capacity / least * 32), threads_per_block, 0, stream>>>(b);
-    check(cudaGetLastError(), stage::abuffer_emit);
+    launch_behind(warp_sort_kernel<List, order_buffers>, fill_device(capacity / least * 32), threads_per_block, stream,
+                  stage::abuffer_emit, b);
 }
 
 // Puts b.from in order, in b.to.
@@ -278,24 +288,20 @@ inline void order_fragments(const order_buffers& b, const pipeline_state* state,
                             cudaStream_t stream) {
     constexpr stage where = stage::abuffer_emit;
     const std::uint64_t capacity = limits.fragments;
-    check(cudaMemsetAsync(b.lists.counts, 0, order_lists::num_lists * sizeof(*b.lists.counts), stream), where);
-    order_voxels_kernel<<<fill_device(capacity), threads_per_block, 0, stream>>>(b, state, limits);
-    check(cudaGetLastError(), where);
+    launch_behind(order_voxels_kernel<order_buffers>, fill_device(capacity), threads_per_block, stream, where, b, state,
+                  limits);
     sort_by_warps<0>(b, capacity, stream);
     sort_by_warps<1>(b, capacity, stream);
     sort_by_warps<2>(b, capacity, stream);
     static_assert(num_warp_sorts == 3);
     if (capacity > most_of_warp)
-        block_sort_kernel<<<fill_device(capacity / (most_of_warp + 1) * threads_per_block), block_sort_threads, 0,
-                            stream>>>(b);
-    check(cudaGetLastError(), where);
+        launch_behind(block_sort_kernel<order_buffers>, fill_device(capacity / (most_of_warp + 1) * threads_per_block),
+                      block_sort_threads, stream, where, b);
     // Runs of 2^12, 2^18 and 2^24 fragments; the last merge takes all that there are.
     std::uint64_t length = most_of_block;
-    for (int level = 0; level < 3 && capacity > length; ++level, length *= merge_ways) {
-        merge_runs_kernel<<<fill_device(capacity), threads_per_block, 0, stream>>>(
-            b, level % 2 == 0 ? b.from : b.spare, level % 2 == 0 ? b.spare : b.from, length, level == 2);
-        check(cudaGetLastError(), where);
-    }
+    for (int level = 0; level < 3 && capacity > length; ++level, length *= merge_ways)
+        launch_behind(merge_runs_kernel<order_buffers>, fill_device(capacity), threads_per_block, stream, where, b,
+                      level % 2 == 0 ? b.from : b.spare, level % 2 == 0 ? b.spare : b.from, length, level == 2);
 }
 
 } // namespace voxelpipe::device

@@ -122,6 +122,22 @@ struct span_writer {
     }
 };
 
+// The last of n ascending numbers, n > 0, that is at most `number`; the first is. All lanes of a warp take part, with
+// the same arguments: each probes a place, so that few loads wait for one another.
+[[nodiscard]] __device__ VOXELPIPE_INLINE unsigned find_last(const unsigned long long* numbers, unsigned n,
+                                                             unsigned long long number) {
+    const unsigned lane = threadIdx.x % 32;
+    unsigned first = 0;
+    while (n > 1) {
+        const unsigned step = (n + 31) / 32, place = step * lane;
+        const bool below = place < n && numbers[first + place] <= number;
+        const unsigned skipped = (static_cast<unsigned>(__popc(__ballot_sync(0xffffffffu, below))) - 1) * step;
+        first += skipped;
+        n = n - skipped < step ? n - skipped : step;
+    }
+    return uniform(first);
+}
+
 inline constexpr int most_bricks = 64;
 
 // What one warp keeps in shared memory for a large triangle: nothing where coverage is thin.
@@ -130,9 +146,19 @@ struct brick_memory {
     std::int16_t bricks[3][most_bricks]; // that wait, in bricks of the grid
 };
 
-// The pieces of all triangles in call.lists.cut, 32 to a record, a lane each; records warp, warp + warps, ... are this
-// warp's. Conservative: the lanes find the bricks that the triangle meets in their columns, and medium_lanes of them
-// then take a brick each.
+// Into how many parts, a power of two, a record is cut. A warp goes through the bricks of its columns four at a time:
+// where there are few records, more warps with less each end sooner. Thin pieces are a lane's own.
+template <coverage Rule>
+[[nodiscard]] VOXELPIPE_HD inline unsigned parts_of_record(unsigned long long records, unsigned warps) {
+    unsigned parts = 1;
+    if (Rule == coverage::conservative)
+        while (parts < chunks_per_record && records * parts * 2 <= warps) parts *= 2;
+    return parts;
+}
+
+// The pieces of all triangles in call.lists.cut, 32 to a record, a lane each; parts warp, warp + warps, ... of the
+// records are this warp's. Conservative: the lanes find the bricks that the triangle meets in their columns, and
+// medium_lanes of them then take a brick each.
 template <class Call, class Sink>
 __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, brick_memory& memory, unsigned warp,
                                                 unsigned warps) {
@@ -144,16 +170,11 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
     const unsigned long long packed = uniform(*call.lists.next);
     const unsigned long long records = packed & ((1ull << triangle_lists::record_bits) - 1);
     const unsigned long long num = packed >> triangle_lists::record_bits;
-    for (unsigned long long r = uniform(warp); r < records; r += warps) {
-        __syncwarp();                                     // lanes that the last pieces kept apart come together
-        unsigned lo = 0, hi = static_cast<unsigned>(num); // the last triangle whose records begin at or before r
-        while (hi - lo > 1) {
-            const unsigned middle = lo + (hi - lo) / 2;
-            if (call.lists.first_records[middle] <= r)
-                lo = middle;
-            else
-                hi = middle;
-        }
+    const unsigned parts = parts_of_record<Call::rule>(records, warps);
+    for (unsigned long long i = uniform(warp); i < records * parts; i += warps) {
+        const unsigned long long r = i / parts;
+        __syncwarp(); // lanes that the last pieces kept apart come together
+        const unsigned lo = find_last(call.lists.first_records, static_cast<unsigned>(num), r);
         const auto piece = static_cast<std::int64_t>((r - call.lists.first_records[lo]) * chunks_per_record + lane);
         sink.begin(call.lists.cut[lo]);
         const glm::uvec3 index = call.in.source.triangle(call.lists.cut[lo]);
@@ -163,7 +184,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
         (void)core::classify<Call::rule>(a, b, c, call.in.fraction, whole, reach);
         const int axis = core::dominant_axis(a, b, c, call.in.fraction);
         const large_pieces<Call::rule> pieces(reach, axis);
-        const bool valid = piece < pieces.count();
+        const bool valid = piece < pieces.count() && lane * parts / chunks_per_record == i % parts;
         if (!core::fits_narrow(a, b, c, call.in.fraction)) {
             feed(sink, [&] {
                 if (!valid) return;

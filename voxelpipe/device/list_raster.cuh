@@ -88,10 +88,15 @@ struct listing_sink : direct_sink<Call> {
         }
         return false;
     }
-    __device__ void finish(pipeline_state*) {
+    struct totals {};
+    [[nodiscard]] __device__ VOXELPIPE_INLINE totals end() {
         __syncwarp();
         flush(kept_);
+        kept_ = 0;
+        return {};
     }
+    __device__ VOXELPIPE_INLINE void take_over(const totals&) {}
+    __device__ void finish(pipeline_state*) { (void)end(); }
 
 private:
     [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t voxel(int x, int y, int z) const { // modulo 2^32

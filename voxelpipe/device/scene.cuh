@@ -7,6 +7,7 @@
 
 #include <voxelpipe/core/launch_size.hpp>
 #include <voxelpipe/core/primitive.hpp>
+#include <voxelpipe/device/launch.cuh>
 #include <voxelpipe/device/memory.cuh>
 #include <voxelpipe/voxelize.hpp>
 
@@ -26,6 +27,7 @@ struct pipeline_state {
     unsigned int index_error;
     unsigned int num_items, num_splits, num_images; // tile split
     unsigned int next_item;                         // fine raster
+    unsigned int num_ordered[5];                    // fragment order: order_lists
     struct {
         unsigned long long cut, lengths[4];
     } handed_on; // direct raster, of one draw: triangle_lists

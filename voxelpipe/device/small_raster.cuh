@@ -69,6 +69,11 @@ struct raster_input {
     int fraction;
     glm::ivec3 extent;
 };
+// The vertices of triangle i; any where there is none.
+template <class Source>
+[[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 load_index(const raster_input<Source>& in, std::uint32_t i) {
+    return i < in.num_triangles ? in.source.triangle(i) : glm::uvec3(0);
+}
 
 using word = std::uint32_t;
 

@@ -30,6 +30,7 @@ template <class Key>
 template <class Key>
 __global__ void fill_end_kernel(Key* keys, std::uint32_t* values, const unsigned long long* num_pairs,
                                 std::uint64_t capacity, const pipeline_state* state, capacities limits) {
+    await_stream();
     const std::uint64_t first = has_failed(*state, limits) ? 0 : *num_pairs;
     for (std::uint64_t i = first + std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < capacity;
          i += std::uint64_t{gridDim.x} * blockDim.x) {
@@ -41,9 +42,8 @@ __global__ void fill_end_kernel(Key* keys, std::uint32_t* values, const unsigned
 template <class Key>
 void fill_end(Key* keys, std::uint32_t* values, const unsigned long long* num_pairs, std::uint64_t capacity,
               const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
-    fill_end_kernel<<<fill_device(capacity), threads_per_block, 0, stream>>>(keys, values, num_pairs, capacity, state,
-                                                                             limits);
-    check(cudaGetLastError(), stage::tile_sort);
+    launch_behind(fill_end_kernel<Key>, fill_device(capacity), threads_per_block, stream, stage::tile_sort, keys,
+                  values, num_pairs, capacity, state, limits);
 }
 
 template <class Key>
