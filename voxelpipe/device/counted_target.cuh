@@ -119,11 +119,11 @@ __global__ __launch_bounds__(threads_per_block) void end_counts_kernel(unsigned_
     constexpr int per_load = 16 / sizeof(T), batch = 4; // loads that go out together
     __shared__ number known[threads_per_block];         // what small numbers become
     if (has_failed(*state, limits)) return;
-    known[threadIdx.x] = __builtin_bit_cast(number, fold(threadIdx.x));
+    known[threadIdx.x] = core::bit_cast<number>(fold(threadIdx.x));
     __syncthreads();
     const auto value_of = [&](number n) {
         return n < threads_per_block ? known[n]
-                                     : __builtin_bit_cast(number, fold_many<Fold>(fold, static_cast<std::uint32_t>(n)));
+                                     : core::bit_cast<number>(fold_many<Fold>(fold, static_cast<std::uint32_t>(n)));
     };
     const number untouched = known[0];
     const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;

@@ -172,7 +172,9 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     // Of this call: what a failure that shows only at its end is put down to.
     [[nodiscard]] stage last_stage() const {
         if constexpr (can_be_direct<FragmentShader, Framebuffer>) {
-            if (is_direct_call()) return stage::fine_raster;
+            if (is_direct_call())
+                return plan_direct(draws, fb, num_primitives, options.count_voxels).any_counted() ? stage::tile_resolve
+                                                                                                  : stage::fine_raster;
         }
         return groups::has_ordered ? stage::fine_raster : stage::tile_resolve;
     }
