@@ -3,8 +3,8 @@
 #pragma once
 
 // What n fragments of one value make of a cleared voxel, without n folds: the bits of blend_traits folded n times, for
-// the blends that have such a form. add_unordered, whose additions come in any order, is closer to the exact sum than
-// any of them.
+// the blends that have such a form. add_unordered, whose additions come in any order, gives the exact sum but for
+// one rounding of a double and one to its type.
 
 #include <voxelpipe/blend.hpp>
 

@@ -34,10 +34,10 @@ struct direct_plan {
     }
 };
 
-// The last pass goes through the whole grid, the tiles only through what is touched: they take over where a counted
-// target has more bytes than this for each triangle, beyond what either way needs a few microseconds for. At 4 TB/s
-// these are 2 ns, about what a small triangle costs in the tiles.
-inline constexpr std::uint64_t counted_bytes_per_triangle = 8192, counted_bytes = 4 << 20;
+// The last pass goes through the whole grid, the tiles only through what is touched: they take over where the counted
+// targets have more bytes than this for each triangle, beyond what either way needs some microseconds for. At 4 TB/s
+// these are 4 ns; a triangle costs 0.6 to 3 ns in the tiles where it is small, 9 where it is large (bench/results).
+inline constexpr std::uint64_t counted_bytes_per_triangle = 16384, counted_bytes = std::uint64_t{4} << 20;
 
 template <std::size_t K, class Target, class Draw>
 [[nodiscard]] bool may_be_counted(std::span<const Draw> draws, const target_view<Target>& t) {
