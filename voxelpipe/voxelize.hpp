@@ -23,7 +23,7 @@ namespace voxelpipe {
 
 struct voxelize_options {
     coverage rule = coverage::conservative;
-    bool count_voxels = true; // fill counters::voxels; costs a bit per voxel of a tile
+    bool count_voxels = true; // fill counters::voxels; costs a bit per voxel of a tile, or reading a target once
 
     voxelize_options() = default;
     voxelize_options(coverage rule_, bool count_voxels_ = true) // NOLINT(*-explicit-*): a coverage is enough

@@ -25,6 +25,13 @@ struct load_values {
     }
 };
 
+struct weight {
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& f) const {
+        return vp::outputs(f.barycentric.x);
+    }
+};
+
 void compare(const mesh_data& m, const vp::grid& g) {
     for (const vp::coverage rule : both_rules) {
         expect_same<bits>(m, g, vp::passthrough{}, vp::constant(true), rule);
@@ -98,18 +105,19 @@ TEST(Balance, MixturesInAnyOrder) {
     mesh_data m = mixed_triangles(200000, 128.0f, 53);
     const vp::grid g = box_grid({128, 128, 128});
     compare(m, g);
-    const auto run = [&](const mesh_data& data) {
+    const auto run = [&](const mesh_data& data, const auto& shader) {
         vp::cuda_backend be;
         vp::mesh mesh{be, data.positions, data.triangles};
         vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
-        EXPECT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(0.3f), fb).ok());
+        EXPECT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, shader, fb).ok());
         return vp::get<0>(fb).to_host(be);
     };
-    const auto expected = run(m);
+    const auto shaded = run(m, weight{}), constant = run(m, vp::constant(0.3f));
     std::mt19937 random(54);
     for (int i = 0; i < 3; ++i) {
         std::shuffle(m.triangles.begin(), m.triangles.end(), random);
-        expect_same_bytes(expected, run(m), "permuted");
+        expect_same_bytes(shaded, run(m, weight{}), "permuted, in tiles");
+        expect_same_bytes(constant, run(m, vp::constant(0.3f)), "permuted, without");
     }
 }
 

@@ -181,6 +181,14 @@ TEST(Pipeline, ListsOfAGridBeyond32Bits) {
         expect_same_lists<void>(m, box_grid({2048, 2048, 2048}), vp::passthrough{}, vp::constant(true), rule);
 }
 
+// Is drawn in tiles, though it is constant.
+struct in_tiles {
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment&) const {
+        return vp::outputs(0.3f);
+    }
+};
+
 struct small_tiles {
     constexpr vp::tuning::fine_raster_policy operator()(int) const { return {64, 3, 4}; }
 };
@@ -193,8 +201,8 @@ std::vector<float> run_policy(const mesh_data& m, const vp::grid& g, vp::coverag
     vp::cuda_backend be;
     vp::mesh mesh{be, m.positions, m.triangles};
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
-    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<float>>;
-    const draw_type d{mesh.view(), {}, vp::constant(0.3f)};
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, in_tiles>;
+    const draw_type d{mesh.view(), {}, in_tiles{}};
     const vp::status s = be.run<Selector>(std::span<const draw_type>(&d, 1), g, fb.view(), vp::voxelize_options{rule},
                                           m.triangles.size());
     EXPECT_TRUE(s.ok()) << s.message();
@@ -215,7 +223,7 @@ TEST(Pipeline, ResultsDoNotDependOnThePolicy) {
     }
 }
 
-using one_draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<float>>;
+using one_draw = vp::draw<vp::mesh_view<>, vp::passthrough, in_tiles>;
 
 TEST(Pipeline, TwoStreamsAtOnce) {
     const mesh_data m = mixed_triangles(4000, 60.0f, 37);
@@ -233,7 +241,7 @@ TEST(Pipeline, TwoStreamsAtOnce) {
     for (vp::cuda_backend* be : backends) {
         meshes.emplace_back(*be, m.positions, m.triangles);
         fbs.emplace_back(*be, g.extent);
-        const one_draw d{meshes.back().view(), {}, vp::constant(0.3f)};
+        const one_draw d{meshes.back().view(), {}, in_tiles{}};
         const std::size_t bytes =
             vp::workspace_bytes(std::span<const one_draw>(&d, 1), g, fbs.back().view(), {}, limits);
         ASSERT_GT(bytes, 0u);
@@ -242,7 +250,7 @@ TEST(Pipeline, TwoStreamsAtOnce) {
     }
     for (int round = 0; round < 5; ++round)
         for (int k = 0; k < 2; ++k) {
-            const one_draw d{meshes[static_cast<std::size_t>(k)].view(), {}, vp::constant(0.3f)};
+            const one_draw d{meshes[static_cast<std::size_t>(k)].view(), {}, in_tiles{}};
             const vp::status s =
                 vp::voxelize_async(*backends[k], std::span<const one_draw>(&d, 1), g,
                                    fbs[static_cast<std::size_t>(k)].view(), {}, views[static_cast<std::size_t>(k)]);
@@ -264,7 +272,7 @@ TEST(Pipeline, AGraphIsReplayedWithChangedVertices) {
     vp::cuda_backend::buffer<glm::vec3> positions(be, vp::array_view<const glm::vec3>(m.positions));
     vp::cuda_backend::buffer<glm::uvec3> triangles(be, vp::array_view<const glm::uvec3>(m.triangles));
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
-    const one_draw d{{positions.view(), triangles.view(), {}}, {}, vp::constant(0.3f)};
+    const one_draw d{{positions.view(), triangles.view(), {}}, {}, in_tiles{}};
     const std::span<const one_draw> draws(&d, 1);
     const auto limits = vp::workspace_limits::for_triangles(4 * m.triangles.size());
     const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), {}, limits);
@@ -302,7 +310,7 @@ void start_too_small(vp::workspace_limits limits) {
     const vp::grid g = box_grid({200, 200, 200});
     vp::mesh mesh{be, m.positions, m.triangles};
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
-    const one_draw d{mesh.view(), {}, vp::constant(0.3f)};
+    const one_draw d{mesh.view(), {}, in_tiles{}};
     const std::span<const one_draw> draws(&d, 1);
     EXPECT_EQ(vp::voxelize_async(be, draws, g, fb.view(), {}, {nullptr, 0, limits}).code,
               vp::status_code::capacity_exceeded);
@@ -339,7 +347,7 @@ TEST(Pipeline, AWorkspaceBeyond32BitsIsRefused) {
     const vp::grid g = box_grid({20, 20, 20});
     vp::mesh mesh{be, m.positions, m.triangles};
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
-    const one_draw d{mesh.view(), {}, vp::constant(0.3f)};
+    const one_draw d{mesh.view(), {}, in_tiles{}};
     const std::span<const one_draw> draws(&d, 1);
     for (const vp::workspace_limits limits : {vp::workspace_limits{std::uint64_t{1} << 32, 1, 0, 0},
                                               vp::workspace_limits{1, 1, std::uint64_t{1} << 40, 1}}) {

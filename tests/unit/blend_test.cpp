@@ -7,6 +7,7 @@
 #include "test_support.hpp"
 
 #include <voxelpipe/blend.hpp>
+#include <voxelpipe/core/repeated_fold.hpp>
 
 #include <gtest/gtest.h>
 
@@ -312,6 +313,64 @@ TYPED_TEST(EveryBlend, TreatsVectorsComponentByComponent) {
         check(blend::bit_xor{});
         check(blend::count{});
     }
+}
+
+// The closed forms of one value many times; those of reproducible sums are in reproducible_sum_test.cpp.
+template <class T>
+class RepeatedFold : public ::testing::Test {};
+using Integers = ::testing::Types<std::uint8_t, std::int16_t, std::uint32_t, std::int32_t, std::uint64_t, std::int64_t>;
+TYPED_TEST_SUITE(RepeatedFold, Integers);
+
+TYPED_TEST(RepeatedFold, OfIntegersIsTheFold) {
+    splitmix64 random(12);
+    const auto check = [&]<class Blend>(Blend) {
+        for (std::int64_t i = 0; i < unit::cases(1000); ++i) {
+            const auto clear = random_value<TypeParam>(random), value = random_value<TypeParam>(random);
+            const auto n = static_cast<std::uint32_t>(random.below(random.one_in(20) ? 700 : 5));
+            const TypeParam got = vp::core::repeated_fold<Blend, TypeParam>(clear, value)(n);
+            ASSERT_EQ(got, fold<Blend>(std::vector<TypeParam>(n, value), clear));
+        }
+    };
+    check(blend::add{});
+    check(blend::count{});
+    check(blend::min{});
+    check(blend::max{});
+    check(blend::bit_and{});
+    check(blend::bit_or{});
+    check(blend::bit_xor{});
+}
+
+template <class T>
+void check_unordered() {
+    splitmix64 random(13);
+    constexpr T epsilon = std::numeric_limits<T>::epsilon();
+    const T infinity = std::numeric_limits<T>::infinity();
+    const auto repeat = [](T clear, T value, std::uint32_t n) {
+        return vp::core::repeated_fold<blend::add_unordered, T>(clear, value)(n);
+    };
+    for (std::int64_t i = 0; i < unit::cases(1000); ++i) {
+        // Within the bound of any order of additions; the same where all of them are exact.
+        const auto n = static_cast<std::uint32_t>(random.below(300));
+        const T clear = static_cast<T>(unit::spread_double(random, -9, 9));
+        const T value = static_cast<T>(unit::spread_double(random, -9, 9));
+        const T folded = fold<blend::add_unordered>(std::vector<T>(n, value), clear);
+        const T terms = std::abs(clear) + static_cast<T>(n) * std::abs(value);
+        ASSERT_LE(std::abs(repeat(clear, value, n) - folded), static_cast<T>(n) * epsilon * terms);
+        const T whole = static_cast<T>(random.below(1000)) - T(500), eighths = static_cast<T>(random.below(64)) / T(8);
+        const T exact = fold<blend::add_unordered>(std::vector<T>(n, eighths), whole);
+        ASSERT_TRUE(same_bytes(repeat(whole, eighths, n), exact));
+    }
+    ASSERT_TRUE(same_bytes(repeat(T(-0.0), T(-0.0), 3), T(-0.0)));
+    ASSERT_TRUE(same_bytes(repeat(T(0), T(-0.0), 3), T(0)));
+    ASSERT_TRUE(same_bytes(repeat(T(-0.0), T(1), 0), T(-0.0)));
+    ASSERT_TRUE(same_bytes(repeat(T(1), infinity, 2), infinity));
+    const T nan = fold<blend::add_unordered>(std::vector<T>{infinity}, -infinity);
+    ASSERT_TRUE(same_bytes(repeat(-infinity, infinity, 1), nan));
+}
+
+TEST(RepeatedFoldUnordered, StaysWithinTheBound) {
+    check_unordered<float>();
+    check_unordered<double>();
 }
 
 // Blends of a user's own.

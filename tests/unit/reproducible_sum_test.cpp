@@ -7,6 +7,7 @@
 #include "test_support.hpp"
 
 #include <voxelpipe/blend.hpp>
+#include <voxelpipe/core/repeated_fold.hpp>
 
 #include <gtest/gtest.h>
 
@@ -218,6 +219,49 @@ TYPED_TEST(ReproducibleSum, MarksNanAndInfinity) {
     EXPECT_EQ(library(std::vector<TypeParam>{make(-0.0)}), 0u); // an empty or cancelled sum is +0
 }
 
+template <class T, class Blend = vp::blend::add>
+std::uint64_t repeat(T clear, T value, std::uint32_t n) {
+    return std::bit_cast<typename vp::core::float_bits<T>::type>(vp::core::repeated_fold<Blend, T>(clear, value)(n));
+}
+
+// Up to the most fragments that a voxel can have; 1 to 3 are folded one by one as well.
+TYPED_TEST(ReproducibleSum, OfOneTermManyTimesIsAProduct) {
+    splitmix64 random(6);
+    const auto any_term = [&] {
+        switch (random.below(12)) {
+        case 0:
+            return narrow<TypeParam>(random.one_in(2) ? HUGE_VAL : -HUGE_VAL);
+        case 1:
+            return narrow<TypeParam>(std::nan(""));
+        case 2:
+            return narrow<TypeParam>(-0.0);
+        case 3: // the largest
+            if constexpr (std::is_same_v<TypeParam, vp::half>)
+                return vp::half(random.one_in(2) ? 65504.0f : -65504.0f);
+            else
+                return std::nextafter(static_cast<TypeParam>(format<TypeParam>::infinite_from), TypeParam{0}) *
+                       (random.one_in(2) ? TypeParam{1} : TypeParam{-1});
+        default:
+            return random_term<TypeParam>(random);
+        }
+    };
+    for (std::int64_t i = 0; i < unit::cases(5000); ++i) {
+        const TypeParam clear = any_term(), value = any_term();
+        const auto n = static_cast<std::uint32_t>(random.one_in(3) ? 1 + random.below(3)
+                                                                   : 1 + (random.next() >> (32 + random.below(32))));
+        if (n == 0) continue;
+        using term = repeated<TypeParam>;
+        ASSERT_EQ(repeat(clear, value, n), model(std::vector<term>{{clear, 1}, {value, n}})) << n;
+        if (n <= 3) {
+            std::vector<TypeParam> terms(n, value);
+            terms.push_back(clear);
+            ASSERT_EQ(repeat(clear, value, n), library(terms));
+        }
+        using bits = typename vp::core::float_bits<TypeParam>::type;
+        ASSERT_EQ(repeat(clear, value, 0), std::bit_cast<bits>(clear));
+    }
+}
+
 TEST(ReproducibleSumFloat, EndsOfTheRange) {
     using v = std::vector<float>;
     const float below = std::nextafterf(0x1p31f, 0.0f);
@@ -252,6 +296,11 @@ TEST(ReproducibleSumQuantum, MovesTheWindow) {
             for (float& t : terms)
                 t = static_cast<float>(unit::spread_double(random, std::max(Q - 20, -120), std::min(Q + 62, 120)));
             ASSERT_EQ((library<float, vp::blend::add_quantum<Q>>(terms)), model(terms, Q, std::ldexp(1.0, 63 + Q)))
+                << Q;
+            if (terms.size() < 2) continue;
+            const auto n = static_cast<std::uint32_t>(random.next() | 1u);
+            ASSERT_EQ((repeat<float, vp::blend::add_quantum<Q>>(terms[0], terms[1], n)),
+                      model(std::vector<repeated<float>>{{terms[0], 1}, {terms[1], n}}, Q, std::ldexp(1.0, 63 + Q)))
                 << Q;
         }
         const float limit = std::ldexp(1.0f, std::min(63 + Q, 127));

@@ -42,6 +42,36 @@ inline void add_term(wide_sum<2>& s, int128 term) {
     s.top += static_cast<std::int32_t>(sum < low) - static_cast<std::int32_t>(term < 0);
 }
 
+// n times a sum, marks included; exact where the product has the sum's width. Two's complement: a product of words,
+// modulo 2^(64 * Limbs + 32).
+template <int Limbs>
+[[nodiscard]] VOXELPIPE_HD inline wide_sum<Limbs> repeat_sum(const wide_sum<Limbs>& s, std::uint32_t n) {
+    wide_sum<Limbs> r{};
+    std::uint64_t carry = 0;
+    for (int k = 0; k < Limbs; ++k) {
+        const uint128 product = static_cast<uint128>(s.limb[k]) * n + carry;
+        r.limb[k] = static_cast<std::uint64_t>(product);
+        carry = static_cast<std::uint64_t>(product >> 64);
+    }
+    r.top = static_cast<std::int32_t>(static_cast<std::uint32_t>(s.top) * n + static_cast<std::uint32_t>(carry));
+    r.marks = n == 0 ? 0 : s.marks;
+    return r;
+}
+
+// Adds another sum, marks included.
+template <int Limbs>
+VOXELPIPE_HD inline void add_sum(wide_sum<Limbs>& s, const wide_sum<Limbs>& other) {
+    std::uint64_t carry = 0;
+    for (int k = 0; k < Limbs; ++k) {
+        const uint128 sum = static_cast<uint128>(s.limb[k]) + other.limb[k] + carry;
+        s.limb[k] = static_cast<std::uint64_t>(sum);
+        carry = static_cast<std::uint64_t>(sum >> 64);
+    }
+    s.top = static_cast<std::int32_t>(static_cast<std::uint32_t>(s.top) + static_cast<std::uint32_t>(other.top) +
+                                      static_cast<std::uint32_t>(carry));
+    s.marks |= other.marks;
+}
+
 // |sum| as magnitude * 2^exponent; bits that fall off the end of 128 are kept as a sticky last bit, which no rounding
 // to 53 bits or fewer can tell from the real ones.
 struct sum_magnitude {

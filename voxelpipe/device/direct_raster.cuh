@@ -85,8 +85,8 @@ struct blending_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
         mine.fragments += static_cast<unsigned>(__popc(mask));
-        each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
-            mine.touched += blend_row(t, x0, y, z, mask, voxelpipe::get<K>(this->call.out.values), count_first);
+        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
+            mine.touched += blend_row(t, x0, y, z, mask, voxelpipe::get<K>(this->call.out.values), mode);
         });
     }
     // Rows as in blend_rows.
@@ -101,20 +101,20 @@ struct blending_sink : direct_sink<Call> {
     // One voxel. Lanes that come here together may have the same.
     __device__ VOXELPIPE_INLINE void one(int x, int y, int z) {
         ++mine.fragments;
-        each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
+        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
             const auto& value = voxelpipe::get<K>(this->call.out.values);
             if constexpr (std::remove_cvref_t<decltype(t)>::map::is_bit)
-                mine.touched += blend_row(t, x, y, z, 1u, value, count_first);
+                mine.touched += blend_row(t, x, y, z, 1u, value, mode);
             else
-                mine.touched += blend_shared(t, x, y, z, value, count_first);
+                mine.touched += blend_shared(t, x, y, z, value, mode);
         });
     }
     // The voxels position(i) for the bits i of a mask.
     template <class Position>
     __device__ VOXELPIPE_INLINE void voxels(word bits, const Position& position) {
         mine.fragments += static_cast<unsigned>(__popc(bits));
-        each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
-            mine.touched += blend_voxels(t, bits, position, voxelpipe::get<K>(this->call.out.values), count_first);
+        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
+            mine.touched += blend_voxels(t, bits, position, voxelpipe::get<K>(this->call.out.values), mode);
         });
     }
     // From one sink of a thread to another.
@@ -130,23 +130,21 @@ struct blending_sink : direct_sink<Call> {
             if (threadIdx.x == 0 && sum != 0) atomicAdd(total, sum);
         };
         add(mine.fragments, &state->fragments);
-        if (this->call.out.counting_target >= 0) add(mine.touched, &state->voxels);
+        if (this->call.out.modes.counts_first) add(mine.touched, &state->voxels);
     }
 
 private:
     template <int N>
     __device__ VOXELPIPE_INLINE void rows(int x, int y, int z, const word (&mask)[N], bool along_y) {
-        each_target([&]<std::size_t K>(const auto& t, bool count_first) VOXELPIPE_INLINE_LAMBDA {
-            mine.touched +=
-                blend_rows(t, x, y, z, mask, along_y, voxelpipe::get<K>(this->call.out.values), count_first);
+        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
+            mine.touched += blend_rows(t, x, y, z, mask, along_y, voxelpipe::get<K>(this->call.out.values), mode);
         });
     }
     template <class F>
     __device__ VOXELPIPE_INLINE void each_target(F&& f) const {
         core::for_each_index<targets_of<decltype(this->call.out.fb)>::count>([&]<std::size_t K>() {
             const auto& t = voxelpipe::get<K>(this->call.out.fb.targets);
-            if (t.load != load_operation::off)
-                f.template operator()<K>(t, this->call.out.counting_target == static_cast<int>(K));
+            if (t.load != load_operation::off) f.template operator()<K>(t, this->call.out.modes.of[K]);
         });
     }
 };
@@ -163,7 +161,7 @@ struct framebuffer_output {
     static constexpr bool hands_on = has_only_bits<Framebuffer>; // otherwise block_raster.cuh
     Framebuffer fb;
     Values values;
-    int counting_target; // which target tells first touches, for the voxel counter; -1: none is wanted
+    direct_modes<targets_of<Framebuffer>::count> modes;
 };
 
 // ---- the first kernel: every triangle -------------------------------------------------------------------------------

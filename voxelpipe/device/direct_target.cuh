@@ -4,8 +4,11 @@
 
 // Render targets that fragments can be blended into where they lie, by one atomic on global memory: bits, and integers
 // whose stored value is what the blend accumulates. Sums of floats belong to them only where every partial sum is
-// exact, which a shader with constant values lets the host prove; then no order of additions can change a bit.
+// exact, which a shader with constant values lets the host prove; then no order of additions can change a bit. Other
+// sums, where all draws give one constant, are counted: a cleared target holds the number of fragments of each voxel
+// until the end of the call (counted_target.cuh).
 
+#include <voxelpipe/core/repeated_fold.hpp>
 #include <voxelpipe/device/atomics.cuh>
 #include <voxelpipe/framebuffer.hpp>
 
@@ -31,6 +34,24 @@ __device__ VOXELPIPE_INLINE void reduce_add(float* at, float v) {
 __device__ VOXELPIPE_INLINE void reduce_add(double* at, double v) {
     asm volatile("red.relaxed.gpu.global.add.f64 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "d"(v) : "memory");
 }
+__device__ VOXELPIPE_INLINE void reduce_add(unsigned* at, unsigned n) {
+    asm volatile("red.relaxed.gpu.global.add.u32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(n) : "memory");
+}
+__device__ VOXELPIPE_INLINE void reduce_add(unsigned long long* at, unsigned long long n) {
+    asm volatile("red.relaxed.gpu.global.add.u64 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "l"(n) : "memory");
+}
+
+// How the fragments of a call go into one of its targets.
+enum class direct_mode : std::uint32_t {
+    blend,       // where they lie
+    count_first, // the same, and voxels that had no fragment yet are counted, where tells_first holds
+    count        // the target holds a number of fragments for each voxel
+};
+template <std::size_t N>
+struct direct_modes {
+    direct_mode of[N] = {}; // by target
+    bool counts_first = false;
+};
 
 // direct_value<Blend, T>: one fragment with value v into a stored T.
 //   available     allowed(value, target, most): whether up to `most` fragments of this value give the blend's bits
@@ -168,19 +189,20 @@ template <class T>
     const int of_clear = clear == 0 ? of_value : lowest_bit(clear);
     const int unit = of_value < of_clear ? of_value : of_clear;
     if (unit < log2_quantum || unit < -100) return false;
+    // Terms count as infinite from here on.
+    const int log2_limit = log2_quantum + (sizeof(T) == sizeof(float) ? 63 : 127);
     // In units of 2^unit: |clear| + most * |value| <= 2^digits. The doubles are exact below 2^53 and only grow beyond.
     const double most_units = std::ldexp(std::abs(static_cast<double>(clear)), -unit) +
                               static_cast<double>(most) * std::ldexp(std::abs(static_cast<double>(value)), -unit);
-    return most_units < std::ldexp(1.0, digits) && std::ldexp(most_units, unit) < 0x1p31;
+    return most_units < std::ldexp(1.0, digits) && std::ldexp(most_units, unit) < std::ldexp(1.0, log2_limit);
 }
 
-template <class T>
-requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_value<blend::add, T> {
+template <class T, int Log2Quantum>
+struct direct_sum {
     static constexpr bool available = true;
     template <class Target>
     [[nodiscard]] static bool allowed(T v, const Target& t, std::uint64_t most) {
-        return t.load == load_operation::clear &&
-               sums_are_exact(v, t.clear_value, most, core::sum_format<T>::log2_quantum);
+        return t.load == load_operation::clear && sums_are_exact(v, t.clear_value, most, Log2Quantum);
     }
     template <class Target>
     [[nodiscard]] static bool tells_first(const Target&, std::uint64_t) {
@@ -189,6 +211,12 @@ requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_va
     __device__ static void apply(T* at, T v) { reduce_add(at, v); }
     __device__ static void apply_many(T* at, T v, unsigned n) { reduce_add(at, v * static_cast<T>(n)); } // exact
 };
+template <class T>
+requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_value<blend::add, T>
+    : direct_sum<T, core::sum_format<T>::log2_quantum> {
+};
+template <int Log2Quantum>
+struct direct_value<blend::add_quantum<Log2Quantum>, float> : direct_sum<float, Log2Quantum> {};
 
 // Order is free by definition.
 template <class T>
@@ -215,6 +243,16 @@ template <class Target>
     else
         return !Target::map::planes &&
                direct_value<typename Target::blend_type, typename Target::value_type>::available;
+}
+
+// Whether a number of fragments fits a voxel's place, and says what the voxel becomes.
+template <class Target>
+[[nodiscard]] constexpr bool is_countable() {
+    if constexpr (Target::map::is_bit)
+        return false;
+    else
+        return is_direct<Target>() &&
+               core::repeated_fold<typename Target::blend_type, typename Target::value_type>::available;
 }
 
 // Whether this target, with up to `most` fragments of this value, may be blended in place.
@@ -245,11 +283,29 @@ template <class Target, class Value>
     }
 }
 
+// n fragments of one value into the voxel at `at`, n > 0; with `One`, n is 1.
+template <class Target, bool One, class Value>
+__device__ VOXELPIPE_INLINE void blend_value(typename Target::element_type* at, const Value& value, unsigned n,
+                                             direct_mode mode) {
+    using method = direct_value<typename Target::blend_type, typename Target::value_type>;
+    using number = unsigned_word<typename Target::value_type>;
+    if constexpr (is_countable<Target>()) {
+        if (mode == direct_mode::count) {
+            reduce_add(reinterpret_cast<number*>(at), number{n});
+            return;
+        }
+    }
+    if constexpr (One)
+        method::apply(at, value);
+    else
+        method::apply_many(at, value, n);
+}
+
 // Fragments of one value in the voxels x0 + i of a row, for the bits i of `mask`; x0 + 31 may lie beyond the extent.
-// Returns how many voxels were touched for the first time, where tells_first holds and count_first asks.
+// Returns how many voxels were touched for the first time, where tells_first holds and the mode asks.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int x0, int y, int z, word mask,
-                                               const Value& value, bool count_first) {
+                                               const Value& value, direct_mode mode) {
     using map = typename Target::map;
     unsigned first = 0;
     if constexpr (map::is_bit) {
@@ -260,7 +316,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
             word* const w = t.elements + map::cell(t.extent, x, y, z);
             if constexpr (blend_type::sets) {
                 if (!v) return;
-                if (!count_first) {
+                if (mode != direct_mode::count_first) {
                     reduce_or(w, bits);
                     return;
                 }
@@ -268,7 +324,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
                 if ((bits & ~seen) != 0) first += static_cast<unsigned>(__popc(bits & ~atomicOr(w, bits)));
             } else if constexpr (blend_type::clears) {
                 if (v) return;
-                if (!count_first) {
+                if (mode != direct_mode::count_first) {
                     reduce_and(w, ~bits);
                     return;
                 }
@@ -286,14 +342,14 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
         for (; mask != 0; mask &= mask - 1) {
             const int x = x0 + __ffs(static_cast<int>(mask)) - 1;
             auto* const at = t.elements + map::cell(t.extent, x, y, z);
-            using method = direct_value<typename Target::blend_type, typename Target::value_type>;
             if constexpr (std::is_same_v<typename Target::blend_type, blend::count>) {
-                if (count_first) {
+                if (mode == direct_mode::count_first) {
+                    using method = direct_value<blend::count, typename Target::value_type>;
                     first += static_cast<unsigned>(method::apply_first(at, value));
                     continue;
                 }
             }
-            method::apply(at, value);
+            blend_value<Target, true>(at, value, 1, mode);
         }
     }
     return first;
@@ -305,7 +361,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
 template <int N, class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_rows(const target_view<Target>& t, int x, int y, int z,
                                                 const word (&mask)[N], bool along_y, const Value& value,
-                                                bool count_first) {
+                                                direct_mode mode) {
     static_assert(N == 2 || N == 4);
     using map = typename Target::map;
     const int shift = x & 31;
@@ -332,7 +388,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_rows(const target_view<Target>& t, in
             unsigned touched = 0;
             for (int k = 0; k < N; ++k) {
                 if (missing[k] == 0) continue;
-                if (count_first)
+                if (mode == direct_mode::count_first)
                     touched += static_cast<unsigned>(__popc(missing[k] & ~atomicOr(at[k], missing[k])));
                 else
                     reduce_or(at[k], missing[k]);
@@ -345,7 +401,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_rows(const target_view<Target>& t, in
     for (int k = 0; k < N; ++k) {
         if (mask[k] == 0) continue;
         const int dy = N == 2 ? (along_y ? k : 0) : k % 2;
-        touched += blend_row(t, x, y + dy, z + (N == 2 ? k - dy : k / 2), mask[k], value, count_first);
+        touched += blend_row(t, x, y + dy, z + (N == 2 ? k - dy : k / 2), mask[k], value, mode);
     }
     return touched;
 }
@@ -354,21 +410,20 @@ __device__ VOXELPIPE_INLINE unsigned blend_rows(const target_view<Target>& t, in
 // mesh often do, are counted and take one atomic together.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_shared(const target_view<Target>& t, int x, int y, int z, const Value& value,
-                                                  bool count_first) {
+                                                  direct_mode mode) {
     using map = typename Target::map;
-    using method = direct_value<typename Target::blend_type, typename Target::value_type>;
-    if (count_first) return blend_row(t, x, y, z, 1u, value, true);
+    if (mode == direct_mode::count_first) return blend_row(t, x, y, z, 1u, value, mode);
     auto* const at = t.elements + map::cell(t.extent, x, y, z);
     const unsigned same = __match_any_sync(__activemask(), reinterpret_cast<unsigned long long>(at));
     if ((same & ((1u << threadIdx.x % 32) - 1)) == 0)
-        method::apply_many(at, value, static_cast<unsigned>(__popc(same)));
+        blend_value<Target, false>(at, value, static_cast<unsigned>(__popc(same)), mode);
     return 0;
 }
 
 // Up to four voxels, position(i) for the bits i of `wanted`, whose loads go out together.
 template <class Target, class Value, class Position>
 __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, word wanted, const Position& position,
-                                                  const Value& value, bool count_first) {
+                                                  const Value& value, direct_mode mode) {
     using map = typename Target::map;
     unsigned touched = 0;
     if constexpr (map::is_bit && bit_blend<typename Target::blend_type>::sets) {
@@ -384,7 +439,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, 
             if (missing[k] != 0) missing[k] &= ~__ldca(at[k]); // maybe an old word: bits that are set stay set
         for (int k = 0; k < 4; ++k) {
             if (missing[k] == 0) continue;
-            if (count_first)
+            if (mode == direct_mode::count_first)
                 touched += static_cast<unsigned>(__popc(missing[k] & ~atomicOr(at[k], missing[k])));
             else
                 reduce_or(at[k], missing[k]);
@@ -392,7 +447,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, 
     } else {
         for (; wanted != 0; wanted &= wanted - 1) {
             const glm::ivec3 p = position(__ffs(static_cast<int>(wanted)) - 1);
-            touched += blend_row(t, p.x, p.y, p.z, 1u, value, count_first);
+            touched += blend_row(t, p.x, p.y, p.z, 1u, value, mode);
         }
     }
     return touched;

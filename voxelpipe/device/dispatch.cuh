@@ -7,6 +7,7 @@
 // and voxelize_async, which leaves it on the device.
 
 #include <voxelpipe/device/clear_target.cuh>
+#include <voxelpipe/device/counted_target.cuh>
 #include <voxelpipe/device/direct_raster.cuh>
 #include <voxelpipe/device/ordered_blend.cuh>
 #include <voxelpipe/device/stage_clock.cuh>
@@ -171,38 +172,20 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     // Of this call: what a failure that shows only at its end is put down to.
     [[nodiscard]] stage last_stage() const {
         if constexpr (can_be_direct<FragmentShader, Framebuffer>) {
-            if (is_direct_call()) return stage::fine_raster;
+            if (is_direct_call())
+                return plan_direct(draws, fb, num_primitives, options.count_voxels).any_counted() ? stage::tile_resolve
+                                                                                                  : stage::fine_raster;
         }
         return groups::has_ordered ? stage::fine_raster : stage::tile_resolve;
     }
 
 private:
-    // Which target can tell first touches; -1 where none can.
-    [[nodiscard]] int find_counting_target() const {
-        int found = -1;
-        core::for_each_index<groups::count>([&]<std::size_t K>() {
-            bool tells = true;
-            for (const draw_type& d : draws)
-                tells = tells && tells_first(voxelpipe::get<K>(fb.targets), voxelpipe::get<K>(d.fragment_shader.values),
-                                             num_primitives);
-            if (tells && found < 0) found = static_cast<int>(K);
-        });
-        return found;
-    }
-
     [[nodiscard]] bool is_direct_call() const {
         if (draws.size() > most_direct_draws || core::small_voxels(core::make_snap_transform(g).fraction) == 0)
             return false;
         if (!triangle_lists::holds(num_primitives, large_pieces<coverage::thin>::most_records(g.extent))) return false;
         if (std::max({g.extent.x, g.extent.y, g.extent.z}) > most_direct_extent) return false;
-        if (options.count_voxels && find_counting_target() < 0) return false;
-        bool all = true;
-        core::for_each_index<groups::count>([&]<std::size_t K>() {
-            for (const draw_type& d : draws)
-                all = all && may_be_direct(voxelpipe::get<K>(fb.targets), voxelpipe::get<K>(d.fragment_shader.values),
-                                           num_primitives);
-        });
-        return all;
+        return plan_direct(draws, fb, num_primitives, options.count_voxels).possible;
     }
 
     template <coverage Rule, bool Run>
@@ -217,17 +200,18 @@ private:
         core::snapped_position* const positions = memory.take<core::snapped_position>(on_the_spot ? 0 : vertices);
         const triangle_lists handed_on = triangle_lists::take(memory, most_triangles);
         if constexpr (Run) {
+            const auto plan = plan_direct(draws, fb, num_primitives, options.count_voxels);
             check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
             for (const draw_type& d : draws)
                 check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);
             end_stage(clock, &stage_times::coarse_raster);
             core::for_each_index<groups::count>([&]<std::size_t K>() {
-                const auto& t = voxelpipe::get<K>(fb.targets);
+                auto t = voxelpipe::get<K>(fb.targets);
+                if (plan.counts(K)) t.clear_value = {}; // no fragments
                 if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
             });
             end_stage(clock, &stage_times::clear);
             const core::snap_transform snap = core::make_snap_transform(g);
-            const int counting_target = options.count_voxels ? find_counting_target() : -1;
             for (std::size_t i = 0; i < draws.size(); ++i) {
                 const draw_type& d = draws[i];
                 const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
@@ -238,7 +222,7 @@ private:
                     using values_type = decltype(d.fragment_shader.values);
                     const direct_call<Rule, source_type, framebuffer_output<Framebuffer, values_type>> call{
                         {source, num_triangles, snap.fraction, g.extent},
-                        {fb, d.fragment_shader.values, counting_target},
+                        {fb, d.fragment_shader.values, plan.modes},
                         handed_on.with(state)};
                     direct_raster(call, state, stage::fine_raster, stream);
                     end_stage(clock, &stage_times::fine_raster);
@@ -253,6 +237,10 @@ private:
                     raster(stored_source{
                         {d.mesh.triangles.data(), positions, 0, static_cast<std::uint32_t>(d.mesh.positions.size())}});
                 }
+            }
+            if (plan.any_counted()) {
+                end_counts(plan, fb, draws[0].fragment_shader.values, state, limits, stream);
+                end_stage(clock, &stage_times::tile_resolve);
             }
         }
     }

@@ -1,0 +1,191 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Counted targets of a call without tiles: cleared ones whose fragments all have one value. During the raster the
+// target's own memory holds how many fragments each voxel has got; a last pass makes the values of these numbers. So a
+// sum of floats need not be exact in its type, and voxels are counted where no atomic tells first touches. Here: which
+// targets of a call are counted (plan_direct), and the last pass (end_counts).
+
+#include <voxelpipe/device/direct_target.cuh>
+#include <voxelpipe/device/work_share.cuh>
+
+#include <bit>
+#include <cstring>
+#include <span>
+
+namespace voxelpipe::device {
+
+// ---- which targets --------------------------------------------------------------------------------------------------
+
+template <std::size_t N>
+struct direct_plan {
+    bool possible = true;
+    direct_modes<N> modes;
+    int voxels_of = -1; // which counted target tells at the end how many voxels are touched
+
+    [[nodiscard]] bool counts(std::size_t k) const { return modes.of[k] == direct_mode::count; }
+    [[nodiscard]] bool any_counted() const { return first_counted() >= 0; }
+    [[nodiscard]] int first_counted() const {
+        for (std::size_t k = 0; k < N; ++k)
+            if (counts(k)) return static_cast<int>(k);
+        return -1;
+    }
+};
+
+// The last pass goes through the whole grid, the tiles only through what is touched: they take over where the counted
+// targets have more bytes than this for each triangle, beyond what either way needs some microseconds for. At 4 TB/s
+// these are 4 ns; a triangle costs 0.6 to 3 ns in the tiles where it is small, 9 where it is large (bench/results).
+inline constexpr std::uint64_t counted_bytes_per_triangle = 16384, counted_bytes = std::uint64_t{4} << 20;
+
+template <std::size_t K, class Target, class Draw>
+[[nodiscard]] bool may_be_counted(std::span<const Draw> draws, const target_view<Target>& t) {
+    if constexpr (is_countable<Target>()) {
+        if (t.load != load_operation::clear) return false;
+        if constexpr (!std::is_same_v<typename Target::blend_type, blend::count>) {
+            const auto& first = voxelpipe::get<K>(draws[0].fragment_shader.values);
+            for (const Draw& d : draws) // numbers, whose equal bytes are equal values
+                if (std::memcmp(&first, &voxelpipe::get<K>(d.fragment_shader.values), sizeof(first)) != 0) return false;
+        }
+        return true;
+    } else {
+        return false;
+    }
+}
+
+// How a call of constant shaders can do without tiles. A target is counted only where blending it in place would not
+// give its blend's bits, or where nothing else tells how many voxels are touched.
+template <class Draw, class... Targets>
+[[nodiscard]] direct_plan<sizeof...(Targets)> plan_direct(std::span<const Draw> draws,
+                                                          const framebuffer_view<Targets...>& fb,
+                                                          std::uint64_t num_primitives, bool count_voxels) {
+    direct_plan<sizeof...(Targets)> plan;
+    int telling = -1, countable = -1; // the first target that tells first touches, that may be counted
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
+        const auto& t = voxelpipe::get<K>(fb.targets);
+        bool in_place = true, tells = true;
+        for (const Draw& d : draws) {
+            const auto& value = voxelpipe::get<K>(d.fragment_shader.values);
+            in_place = in_place && may_be_direct(t, value, num_primitives);
+            tells = tells && tells_first(t, value, num_primitives);
+        }
+        const bool may_count = may_be_counted<K>(draws, t);
+        if (tells && telling < 0) telling = static_cast<int>(K);
+        if (may_count && countable < 0) countable = static_cast<int>(K);
+        if (in_place) return;
+        if (may_count)
+            plan.modes.of[K] = direct_mode::count;
+        else
+            plan.possible = false;
+    });
+    if (count_voxels && !plan.any_counted()) {
+        if (telling >= 0) {
+            plan.modes.of[telling] = direct_mode::count_first;
+            plan.modes.counts_first = true;
+        } else if (countable >= 0) {
+            plan.modes.of[countable] = direct_mode::count;
+        } else {
+            plan.possible = false;
+        }
+    }
+    if (count_voxels) plan.voxels_of = plan.first_counted();
+    std::uint64_t bytes = 0;
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
+        using target = typename core::pack_element<K, Targets...>::type;
+        if (plan.counts(K)) bytes += target::map::elements(fb.extent) * sizeof(typename target::element_type);
+    });
+    if (bytes > counted_bytes + num_primitives * counted_bytes_per_triangle) plan.possible = false;
+    return plan;
+}
+
+// ---- the last pass --------------------------------------------------------------------------------------------------
+
+// Rare numbers: out of line, for the registers.
+template <class Fold>
+__device__ __noinline__ auto fold_many(const Fold& fold, std::uint32_t n) {
+    return fold(n);
+}
+
+// Numbers of fragments become values, padding included. Nothing is written where the call has failed, nor where a
+// voxel without fragments has the bits that it should end with.
+template <class Fold, class T>
+__global__ __launch_bounds__(threads_per_block) void end_counts_kernel(unsigned_word<T>* at, std::uint64_t num_elements,
+                                                                       const __grid_constant__ Fold fold,
+                                                                       bool count_voxels, pipeline_state* state,
+                                                                       capacities limits) {
+    using number = unsigned_word<T>;
+    constexpr int per_load = 16 / sizeof(T), batch = 4; // loads that go out together
+    __shared__ number known[threads_per_block];         // what small numbers become
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    known[threadIdx.x] = core::bit_cast<number>(fold(threadIdx.x));
+    __syncthreads();
+    const auto value_of = [&](number n) {
+        return n < threads_per_block ? known[n]
+                                     : core::bit_cast<number>(fold_many<Fold>(fold, static_cast<std::uint32_t>(n)));
+    };
+    const number untouched = known[0];
+    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
+    unsigned long long touched = 0;
+    std::uint64_t done = 0;
+    if (reinterpret_cast<std::uintptr_t>(at) % 16 == 0) {
+        auto* const wide = reinterpret_cast<uint4*>(at);
+        const std::uint64_t loads = num_elements / per_load;
+        for (std::uint64_t first = thread; first < loads; first += batch * threads) {
+            uint4 loaded[batch];
+            for (int b = 0; b < batch; ++b) {
+                const std::uint64_t i = first + static_cast<unsigned>(b) * threads;
+                loaded[b] = i < loads ? wide[i] : uint4{0, 0, 0, 0};
+            }
+            for (int b = 0; b < batch; ++b) {
+                const std::uint64_t i = first + static_cast<unsigned>(b) * threads;
+                const uint4 v = loaded[b];
+                if (i >= loads || ((v.x | v.y | v.z | v.w) == 0 && untouched == 0)) continue;
+                number numbers[per_load];
+                memcpy(numbers, &v, 16);
+                for (int k = 0; k < per_load; ++k) {
+                    touched += static_cast<unsigned>(numbers[k] != 0);
+                    numbers[k] = value_of(numbers[k]);
+                }
+                uint4 made;
+                memcpy(&made, numbers, 16);
+                wide[i] = made;
+            }
+        }
+        done = loads * per_load;
+    }
+    for (std::uint64_t i = done + thread; i < num_elements; i += threads) {
+        const number n = at[i];
+        touched += static_cast<unsigned>(n != 0);
+        at[i] = value_of(n);
+    }
+    if (count_voxels) {
+        const unsigned long long sum = block_sum(touched);
+        if (threadIdx.x == 0 && sum != 0) atomicAdd(&state->voxels, sum);
+    }
+}
+
+// Ends the counted targets of a call, whose draws give these values.
+template <class... Targets, class Values>
+void end_counts(const direct_plan<sizeof...(Targets)>& plan, const framebuffer_view<Targets...>& fb,
+                const Values& values, pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
+        using target = typename core::pack_element<K, Targets...>::type;
+        if constexpr (is_countable<target>()) {
+            if (!plan.counts(K)) return;
+            using value_type = typename target::value_type;
+            using fold_type = core::repeated_fold<typename target::blend_type, value_type>;
+            const auto& t = voxelpipe::get<K>(fb.targets);
+            value_type value{}; // count has none
+            if constexpr (!std::is_same_v<typename target::blend_type, blend::count>) value = voxelpipe::get<K>(values);
+            const std::uint64_t count = target::map::elements(t.extent);
+            launch_behind(end_counts_kernel<fold_type, value_type>, fill_device(count / (16 / sizeof(value_type)) + 1),
+                          threads_per_block, stream, stage::tile_resolve,
+                          reinterpret_cast<unsigned_word<value_type>*>(t.elements), count,
+                          fold_type(t.clear_value, value), plan.voxels_of == static_cast<int>(K), state, limits);
+        }
+    });
+}
+
+} // namespace voxelpipe::device
