@@ -179,6 +179,36 @@ void compare_draws(const std::vector<VertexShader>& shaders) {
     expect_same_counts(a, b);
 }
 
+// Calls of one backend, whose counters come back by a copy first and through locked memory later, or never; while other
+// work keeps the device busy, as it may find the state of the call before.
+TEST(Direct, ManyCallsOfOneBackend) {
+    const vp::grid g = box_grid({60, 47, 71});
+    for (const bool locks : {true, false}) {
+        vp::cuda_backend gpu;
+        gpu.locks_memory = locks;
+        vp::cpu_backend cpu;
+        for (int call = 0; call < 8; ++call) {
+            const mesh_data m = mixed_triangles(call == 5 ? 1 : 500 * (call + 1), 40.0f, static_cast<unsigned>(call));
+            const vp::mesh<vp::cuda_backend> gpu_mesh{gpu, m.positions, m.triangles};
+            const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+            vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>> gpu_fb{gpu, g.extent};
+            vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, blend::bit_or>> cpu_fb{cpu, g.extent};
+            const vp::status a =
+                vp::voxelize(gpu, gpu_mesh, g, vp::passthrough{}, vp::constant(true), gpu_fb, vp::coverage::thin);
+            const vp::status b =
+                vp::voxelize(cpu, cpu_mesh, g, vp::passthrough{}, vp::constant(true), cpu_fb, vp::coverage::thin);
+            ASSERT_TRUE(a.ok() && b.ok()) << a.message() << " in call " << call;
+            expect_same_counts(b.counts, a.counts);
+            expect_same_bytes(vp::get<0>(cpu_fb).to_host(cpu), vp::get<0>(gpu_fb).to_host(gpu), "bits");
+            if (call == 3) gpu.release();
+            if (call == 6) {
+                vp::cuda_backend other = std::move(gpu);
+                gpu = std::move(other);
+            }
+        }
+    }
+}
+
 TEST(Direct, SeveralDraws) {
     glm::mat4 turned(1.0f);
     turned[0] = {0.0f, 1.0f, 0.0f, 0.0f};

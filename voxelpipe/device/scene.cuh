@@ -44,6 +44,15 @@ struct capacities {
            s.list_fragments > c.fragments || s.fragment_records > c.fragment_records;
 }
 
+// Copies the state to memory that the device can write. One warp.
+inline __global__ void write_state_kernel(const pipeline_state* state, pipeline_state* to) {
+    await_stream();
+    using word = std::uint64_t;
+    static_assert(sizeof(pipeline_state) % sizeof(word) == 0);
+    for (unsigned i = threadIdx.x; i < sizeof(pipeline_state) / sizeof(word); i += 32)
+        reinterpret_cast<word*>(to)[i] = reinterpret_cast<const word*>(state)[i];
+}
+
 struct draw_geometry {
     const glm::uvec3* triangles;
     const core::snapped_position* positions;
