@@ -13,6 +13,7 @@
 #include <limits>
 #include <random>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -179,8 +180,7 @@ void compare_draws(const std::vector<VertexShader>& shaders) {
     expect_same_counts(a, b);
 }
 
-// Calls of one backend, whose counters come back by a copy first and through locked memory later, or never; while other
-// work keeps the device busy, as it may find the state of the call before.
+// Calls of one backend, whose counters come back by a copy first and through locked memory later, or never.
 TEST(Direct, ManyCallsOfOneBackend) {
     const vp::grid g = box_grid({60, 47, 71});
     for (const bool locks : {true, false}) {

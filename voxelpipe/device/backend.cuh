@@ -67,7 +67,7 @@ public:
         if (on_device_ == nullptr)
             check(cudaMemcpyAsync(&copy, state, sizeof(copy), cudaMemcpyDeviceToHost, stream));
         else
-            launch_behind(write_state_kernel, 1, 32, stream, stage::validate, state,
+            launch_behind(write_state_kernel<pipeline_state>, 1, 32, stream, stage::validate, state,
                           static_cast<pipeline_state*>(on_device_));
         check(cudaStreamSynchronize(stream));
         if (on_device_ != nullptr) std::memcpy(&copy, page_, sizeof(copy));

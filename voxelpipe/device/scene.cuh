@@ -45,11 +45,12 @@ struct capacities {
 }
 
 // Copies the state to memory that the device can write. One warp.
-inline __global__ void write_state_kernel(const pipeline_state* state, pipeline_state* to) {
+template <class State>
+__global__ void write_state_kernel(const State* state, State* to) {
     await_stream();
     using word = std::uint64_t;
-    static_assert(sizeof(pipeline_state) % sizeof(word) == 0);
-    for (unsigned i = threadIdx.x; i < sizeof(pipeline_state) / sizeof(word); i += 32)
+    static_assert(sizeof(State) % sizeof(word) == 0);
+    for (unsigned i = threadIdx.x; i < sizeof(State) / sizeof(word); i += 32)
         reinterpret_cast<word*>(to)[i] = reinterpret_cast<const word*>(state)[i];
 }
 
