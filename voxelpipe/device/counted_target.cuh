@@ -40,7 +40,7 @@ inline constexpr std::uint64_t counted_bytes_per_triangle = 16384, counted_bytes
 
 template <std::size_t K, class Target, class Draw>
 [[nodiscard]] bool may_be_counted(std::span<const Draw> draws, const target_view<Target>& t) {
-    if constexpr (is_countable<Target>()) {
+    if constexpr (is_countable<Target>) {
         if (t.load != load_operation::clear) return false;
         if constexpr (!std::is_same_v<typename Target::blend_type, blend::count>) {
             const auto& first = voxelpipe::get<K>(draws[0].fragment_shader.values);
@@ -172,7 +172,7 @@ void end_counts(const direct_plan<sizeof...(Targets)>& plan, const framebuffer_v
                 const Values& values, pipeline_state* state, const capacities& limits, cudaStream_t stream) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         using target = typename core::pack_element<K, Targets...>::type;
-        if constexpr (is_countable<target>()) {
+        if constexpr (is_countable<target>) {
             if (!plan.counts(K)) return;
             using value_type = typename target::value_type;
             using fold_type = core::repeated_fold<typename target::blend_type, value_type>;

@@ -245,15 +245,13 @@ template <class Target>
                direct_value<typename Target::blend_type, typename Target::value_type>::available;
 }
 
-// Whether a number of fragments fits a voxel's place, and says what the voxel becomes.
+// Whether a number of fragments fits a voxel's place, and says what the voxel becomes. A constant, not a function:
+// device code asks for it.
 template <class Target>
-[[nodiscard]] constexpr bool is_countable() {
-    if constexpr (Target::map::is_bit)
-        return false;
-    else
-        return is_direct<Target>() &&
-               core::repeated_fold<typename Target::blend_type, typename Target::value_type>::available;
-}
+inline constexpr bool is_countable = false;
+template <class Target>
+requires(!Target::map::is_bit && is_direct<Target>()) inline constexpr bool is_countable<Target> =
+    core::repeated_fold<typename Target::blend_type, typename Target::value_type>::available;
 
 // Whether this target, with up to `most` fragments of this value, may be blended in place.
 template <class Target, class Value>
@@ -289,7 +287,7 @@ __device__ VOXELPIPE_INLINE void blend_value(typename Target::element_type* at, 
                                              direct_mode mode) {
     using method = direct_value<typename Target::blend_type, typename Target::value_type>;
     using number = unsigned_word<typename Target::value_type>;
-    if constexpr (is_countable<Target>()) {
+    if constexpr (is_countable<Target>) {
         if (mode == direct_mode::count) {
             reduce_add(reinterpret_cast<number*>(at), number{n});
             return;
