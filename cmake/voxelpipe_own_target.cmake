@@ -14,7 +14,7 @@ function(voxelpipe_own_target)
                         $<$<COMPILE_LANGUAGE:CUDA>:-diag-suppress=20012>
                         # nvcc 13.0 takes a reference to a [[nodiscard]] class, which or_throw() returns, for the class
                         $<$<COMPILE_LANGUAGE:CUDA>:-diag-suppress=2810>
-                        $<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<STREQUAL:$<TARGET_PROPERTY:CUDA_ARCHITECTURES>,OFF>>:${VOXELPIPE_CUDA_CODE}>)
+                        $<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<STREQUAL:$<TARGET_PROPERTY:CUDA_ARCHITECTURES>,OFF>>:${VOXELPIPE_CUDA_CODE};${VOXELPIPE_CUDA_HOST_OPTIONS}>)
     if(VOXELPIPE_WERROR)
       target_compile_options(${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-Werror>
                                                $<$<COMPILE_LANGUAGE:CUDA>:-Werror=all-warnings>)
