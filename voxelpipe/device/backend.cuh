@@ -219,7 +219,7 @@ public:
     cudaStream_t stream = nullptr; // not owned
     memory_resource resource;      // where all memory comes from
     // Where voxelize adds up the time of each stage, if anywhere: by events on the stream, which a call without it does
-    // not record. They are read after the call's wait, where fragment lists wait once more, for their copy.
+    // not record. They are read after the call's wait, where new fragment lists wait once more, for their copy.
     // voxelize_async has no times.
     stage_times* times = nullptr;
 
