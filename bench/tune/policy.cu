@@ -17,16 +17,24 @@ struct selector {
     }
 };
 
+// One value for all fragments, which the library cannot know: a constant shader would be drawn without tiles, and a
+// policy is about tiles.
+template <class Value>
+struct computed_value {
+    Value value;
+    VOXELPIPE_HD auto operator()(const vp::fragment<>&) const { return vp::outputs(value); }
+};
+
 // voxelize with another selector is the backend's run.
 template <class Target, class Value>
 class tuned_cell : public prepared_cell {
-    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<Value>>;
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, computed_value<Value>>;
 
 public:
     tuned_cell(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule, Value value,
                baseline_output baseline)
-        : session_(s), backend_(s.stream()), draw_{view(mesh), {}, vp::constant(value)}, grid_(grid),
-          options_(rule, false), framebuffer_(backend_, grid.extent), baseline_(baseline) {}
+        : session_(s), backend_(s.stream()), draw_{view(mesh), {}, {value}}, grid_(grid), options_(rule, false),
+          framebuffer_(backend_, grid.extent), baseline_(baseline) {}
 
     vp::counters call() override {
         const vp::status s = backend_.template run<selector>(
