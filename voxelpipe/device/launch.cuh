@@ -6,6 +6,7 @@
 // dependent launch, from compute capability 9.0 on). A kernel that launch_behind starts calls await_stream before it
 // touches what a kernel of the same call writes; everywhere else, both are an ordinary launch and nothing.
 
+#include <voxelpipe/config.hpp>
 #include <voxelpipe/device/memory.cuh>
 
 #include <utility>
