@@ -237,8 +237,7 @@ TEST(Counted, BadIndexWritesNothing) {
     expect_same_bytes(before, vp::get<0>(fb).to_host(be), "after a bad index");
 }
 
-// ---- when
-// ---------------------------------------------------------------------------------------------------------------
+// ---- when -----------------------------------------------------------------------------------------------------------
 
 template <class... Targets>
 vp::framebuffer_view<Targets...> view_of(glm::ivec3 extent) {
