@@ -95,6 +95,7 @@ struct block_warp {
                 waits = waits && !is_quad;
             }
         }
+        sink.mark_boxes(waits || is_quad, r);
         if constexpr (!thin)
             if (is_quad) raster_quad(call.in, r, is_inside, sink);
         if (__any_sync(0xffffffffu, waits || is_big)) {

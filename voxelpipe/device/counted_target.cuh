@@ -7,6 +7,7 @@
 // sum of floats need not be exact in its type, and voxels are counted where no atomic tells first touches. Here: which
 // targets of a call are counted (plan_direct), and the last pass (end_counts).
 
+#include <voxelpipe/device/chunk_marks.cuh>
 #include <voxelpipe/device/direct_target.cuh>
 #include <voxelpipe/device/work_share.cuh>
 
@@ -37,6 +38,9 @@ struct direct_plan {
 // targets have more bytes than this for each triangle, beyond what either way needs some microseconds for. At 4 TB/s
 // these are 4 ns; a triangle costs 0.6 to 3 ns in the tiles where it is small, 9 where it is large (bench/results).
 inline constexpr std::uint64_t counted_bytes_per_triangle = 16384, counted_bytes = std::uint64_t{4} << 20;
+
+// A target of so many bytes is worth marks: reading it takes longer than they do.
+inline constexpr std::uint64_t marked_bytes = std::uint64_t{32} << 20;
 
 template <std::size_t K, class Target, class Draw>
 [[nodiscard]] bool may_be_counted(std::span<const Draw> draws, const target_view<Target>& t) {
@@ -106,70 +110,106 @@ __device__ __noinline__ auto fold_many(const Fold& fold, std::uint32_t n) {
     return fold(n);
 }
 
-// Numbers of fragments become values, padding included. Nothing is written where the call has failed, nor where a
-// voxel without fragments has the bits that it should end with.
+// What numbers of fragments become.
+template <class Fold, class T>
+struct count_values {
+    using number = unsigned_word<T>;
+    static constexpr int per_load = 16 / sizeof(T);
+    const Fold& fold;
+    const number* known;            // for small numbers, of the block
+    unsigned long long touched = 0; // voxels so far that have fragments
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE number of(number n) {
+        touched += static_cast<unsigned>(n != 0);
+        return n < threads_per_block ? known[n]
+                                     : core::bit_cast<number>(fold_many<Fold>(fold, static_cast<std::uint32_t>(n)));
+    }
+    // Nothing is written where voxels without fragments have the bits that they should end with.
+    __device__ VOXELPIPE_INLINE void end(uint4* at, const uint4& v) {
+        if ((v.x | v.y | v.z | v.w) == 0 && known[0] == 0) return;
+        number numbers[per_load];
+        memcpy(numbers, &v, 16);
+        for (int k = 0; k < per_load; ++k) numbers[k] = of(numbers[k]);
+        uint4 made;
+        memcpy(&made, numbers, 16);
+        *at = made;
+    }
+};
+
+// Numbers of fragments become values, padding included; with marks, of what is marked. Not where the call has failed.
 template <class Fold, class T>
 __global__ __launch_bounds__(threads_per_block) void end_counts_kernel(unsigned_word<T>* at, std::uint64_t num_elements,
+                                                                       const __grid_constant__ chunk_marks marks,
                                                                        const __grid_constant__ Fold fold,
                                                                        bool count_voxels, pipeline_state* state,
                                                                        capacities limits) {
     using number = unsigned_word<T>;
     constexpr int per_load = 16 / sizeof(T), batch = 4; // loads that go out together
-    __shared__ number known[threads_per_block];         // what small numbers become
+    __shared__ number known[threads_per_block];
     await_stream();
     if (has_failed(*state, limits)) return;
     known[threadIdx.x] = core::bit_cast<number>(fold(threadIdx.x));
     __syncthreads();
-    const auto value_of = [&](number n) {
-        return n < threads_per_block ? known[n]
-                                     : core::bit_cast<number>(fold_many<Fold>(fold, static_cast<std::uint32_t>(n)));
-    };
-    const number untouched = known[0];
-    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
-    unsigned long long touched = 0;
-    std::uint64_t done = 0;
-    if (reinterpret_cast<std::uintptr_t>(at) % 16 == 0) {
-        auto* const wide = reinterpret_cast<uint4*>(at);
-        const std::uint64_t loads = num_elements / per_load;
-        for (std::uint64_t first = thread; first < loads; first += batch * threads) {
+    count_values<Fold, T> values{fold, known};
+    // place(i) for i = 0, 1, ... below `count`
+    const auto end_all = [&](std::uint64_t count, const auto& place) {
+        for (std::uint64_t first = 0; first < count; first += batch) {
             uint4 loaded[batch];
-            for (int b = 0; b < batch; ++b) {
-                const std::uint64_t i = first + static_cast<unsigned>(b) * threads;
-                loaded[b] = i < loads ? wide[i] : uint4{0, 0, 0, 0};
-            }
-            for (int b = 0; b < batch; ++b) {
-                const std::uint64_t i = first + static_cast<unsigned>(b) * threads;
-                const uint4 v = loaded[b];
-                if (i >= loads || ((v.x | v.y | v.z | v.w) == 0 && untouched == 0)) continue;
-                number numbers[per_load];
-                memcpy(numbers, &v, 16);
-                for (int k = 0; k < per_load; ++k) {
-                    touched += static_cast<unsigned>(numbers[k] != 0);
-                    numbers[k] = value_of(numbers[k]);
-                }
-                uint4 made;
-                memcpy(&made, numbers, 16);
-                wide[i] = made;
-            }
+            for (unsigned b = 0; b < batch; ++b) loaded[b] = first + b < count ? *place(first + b) : uint4{0, 0, 0, 0};
+            for (unsigned b = 0; b < batch; ++b)
+                if (first + b < count) values.end(place(first + b), loaded[b]);
         }
-        done = loads * per_load;
-    }
-    for (std::uint64_t i = done + thread; i < num_elements; i += threads) {
-        const number n = at[i];
-        touched += static_cast<unsigned>(n != 0);
-        at[i] = value_of(n);
+    };
+    if (marks.words == nullptr) {
+        const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+        const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
+        std::uint64_t done = 0;
+        if (reinterpret_cast<std::uintptr_t>(at) % 16 == 0) {
+            auto* const wide = reinterpret_cast<uint4*>(at);
+            const std::uint64_t loads = num_elements / per_load;
+            if (thread < loads)
+                end_all((loads - thread - 1) / threads + 1,
+                        [&](std::uint64_t i) { return wide + thread + i * threads; });
+            done = loads * per_load;
+        }
+        for (std::uint64_t i = done + thread; i < num_elements; i += threads) at[i] = values.of(at[i]);
+    } else if (has_wide_rows(at, marks)) {
+        for_each_marked<uint4>(at, marks, [&](const column_of_places<uint4>& c) {
+            end_all(static_cast<unsigned>(c.rows), [&](std::uint64_t i) { return c.first + c.step * i; });
+        });
+    } else {
+        for_each_marked<number>(at, marks, [&](const column_of_places<number>& c) {
+            for (int i = 0; i < c.rows; ++i) {
+                number& n = c.first[c.step * static_cast<unsigned>(i)];
+                if (n != 0) n = values.of(n);
+            }
+        });
     }
     if (count_voxels) {
-        const unsigned long long sum = block_sum(touched);
+        const unsigned long long sum = block_sum(values.touched);
         if (threadIdx.x == 0 && sum != 0) atomicAdd(&state->voxels, sum);
     }
 }
 
-// Ends the counted targets of a call, whose draws give these values.
+// Whether the last pass of a target goes by marks, which then are wanted: where it is large, and what is not touched
+// has the bits of a number of none already.
+template <class Target>
+[[nodiscard]] bool ends_by_marks(const target_view<Target>& t) {
+    using map = typename Target::map;
+    if constexpr (is_countable<Target> && !map::bricks) {
+        constexpr typename Target::value_type none{};
+        return map::elements(t.extent) * sizeof(none) >= marked_bytes &&
+               std::memcmp(&t.clear_value, &none, sizeof(none)) == 0;
+    } else {
+        return false;
+    }
+}
+
+// Ends the counted targets of a call, whose draws give these values, by marks where there are any.
 template <class... Targets, class Values>
 void end_counts(const direct_plan<sizeof...(Targets)>& plan, const framebuffer_view<Targets...>& fb,
-                const Values& values, pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+                const Values& values, const chunk_marks& marks, pipeline_state* state, const capacities& limits,
+                cudaStream_t stream) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         using target = typename core::pack_element<K, Targets...>::type;
         if constexpr (is_countable<target>) {
@@ -183,7 +223,8 @@ void end_counts(const direct_plan<sizeof...(Targets)>& plan, const framebuffer_v
             launch_behind(end_counts_kernel<fold_type, value_type>, fill_device(count / (16 / sizeof(value_type)) + 1),
                           threads_per_block, stream, stage::tile_resolve,
                           reinterpret_cast<unsigned_word<value_type>*>(t.elements), count,
-                          fold_type(t.clear_value, value), plan.voxels_of == static_cast<int>(K), state, limits);
+                          ends_by_marks(t) ? marks : chunk_marks{}, fold_type(t.clear_value, value),
+                          plan.voxels_of == static_cast<int>(K), state, limits);
         }
     });
 }

@@ -9,6 +9,7 @@
 // have 32 triangles of a kind each.
 
 #include <voxelpipe/device/block_raster.cuh>
+#include <voxelpipe/device/chunk_marks.cuh>
 #include <voxelpipe/device/direct_target.cuh>
 #include <voxelpipe/device/large_raster.cuh>
 #include <voxelpipe/device/small_raster.cuh>
@@ -61,6 +62,8 @@ struct direct_sink {
     __device__ VOXELPIPE_INLINE void drop(core::triangle_class kind) {
         atomicAdd(&dropped[static_cast<int>(kind)], 1u);
     }
+    __device__ VOXELPIPE_INLINE static void mark_row(int, int, int, int) {}
+    __device__ VOXELPIPE_INLINE static void mark_brick(const std::int32_t (&)[3], unsigned) {}
 };
 
 // Fragments go into the targets.
@@ -81,6 +84,18 @@ struct blending_sink : direct_sink<Call> {
         : direct_sink<Call>{call, dropped} {}
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool check(const glm::uvec3&) { return true; }
     __device__ VOXELPIPE_INLINE static void begin(std::uint32_t) {}
+    // Where there are marks: what a triangle may touch that is not large, what is touched of one that is.
+    __device__ VOXELPIPE_INLINE void mark_boxes(bool wanted, const near_triangle& r) const {
+        if (this->call.out.marks.words != nullptr) device::mark_boxes<Call::rule>(this->call.out.marks, wanted, r);
+    }
+    __device__ VOXELPIPE_INLINE void mark_row(int x0, int x1, int y, int z) const {
+        if constexpr (shares)
+            if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_row(x0, x1, y, z);
+    }
+    __device__ VOXELPIPE_INLINE void mark_brick(const std::int32_t (&corner)[3], unsigned lane) const {
+        if constexpr (shares)
+            if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_brick(corner, lane);
+    }
     // In the voxels x0 + i of a row, for the bits i of the mask.
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
@@ -162,6 +177,7 @@ struct framebuffer_output {
     Framebuffer fb;
     Values values;
     direct_modes<targets_of<Framebuffer>::count> modes;
+    chunk_marks marks; // of targets that hold values
 };
 
 // ---- the first kernel: every triangle -------------------------------------------------------------------------------

@@ -192,6 +192,13 @@ private:
     void go_direct(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
         constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
         state = memory.take<pipeline_state>(1);
+        const auto plan = plan_direct(draws, fb, num_primitives, options.count_voxels);
+        bool has_marks = false;
+        core::for_each_index<groups::count>([&]<std::size_t K>() {
+            has_marks = has_marks || (plan.counts(K) && ends_by_marks(voxelpipe::get<K>(fb.targets)));
+        });
+        chunk_marks marks;
+        if (has_marks) marks = chunk_marks::take(memory, g.extent);
         std::size_t vertices = 0, most_triangles = 0;
         for (const draw_type& d : draws) {
             vertices = std::max(vertices, d.mesh.positions.size());
@@ -200,8 +207,8 @@ private:
         core::snapped_position* const positions = memory.take<core::snapped_position>(on_the_spot ? 0 : vertices);
         const triangle_lists handed_on = triangle_lists::take(memory, most_triangles);
         if constexpr (Run) {
-            const auto plan = plan_direct(draws, fb, num_primitives, options.count_voxels);
             check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
+            if (has_marks) check(cudaMemsetAsync(marks.words, 0, marks.num_words() * sizeof(word), stream));
             for (const draw_type& d : draws)
                 check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);
             end_stage(clock, &stage_times::coarse_raster);
@@ -222,7 +229,7 @@ private:
                     using values_type = decltype(d.fragment_shader.values);
                     const direct_call<Rule, source_type, framebuffer_output<Framebuffer, values_type>> call{
                         {source, num_triangles, snap.fraction, g.extent},
-                        {fb, d.fragment_shader.values, plan.modes},
+                        {fb, d.fragment_shader.values, plan.modes, marks},
                         handed_on.with(state)};
                     direct_raster(call, state, stage::fine_raster, stream);
                     end_stage(clock, &stage_times::fine_raster);
@@ -239,7 +246,7 @@ private:
                 }
             }
             if (plan.any_counted()) {
-                end_counts(plan, fb, draws[0].fragment_shader.values, state, limits, stream);
+                end_counts(plan, fb, draws[0].fragment_shader.values, marks, state, limits, stream);
                 end_stage(clock, &stage_times::tile_resolve);
             }
         }

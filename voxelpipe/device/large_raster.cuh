@@ -96,13 +96,17 @@ struct span_writer {
     word mask = 0;
 
     __device__ VOXELPIPE_INLINE void flush() {
-        if (mask != 0) sink.row(x, y, z, mask);
+        if (mask != 0) {
+            sink.mark_row(x, x + 31 - __clz(static_cast<int>(mask)), y, z);
+            sink.row(x, y, z, mask);
+        }
         mask = 0;
     }
     __device__ VOXELPIPE_INLINE void span(int axis, int u, int v, int w0, int w1) {
         if (axis == 0) {
             for (int at = w0; at <= w1; at += 32) {
                 const int n = w1 - at + 1;
+                sink.mark_row(at, n >= 32 ? at + 31 : w1, u, v);
                 sink.row(at, u, v, n >= 32 ? ~0u : (1u << n) - 1);
             }
             return;
@@ -245,6 +249,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
                                              ? static_cast<int>(reach.hi[k]) - corner[k]
                                              : core::brick_size - 1;
                         }
+                        sink.mark_brick(corner, lane % medium_lanes);
                         raster_lanes(t.at(from[0], from[1], from[2]), corner, part, sink);
                     });
                 }

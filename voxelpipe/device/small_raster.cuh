@@ -8,6 +8,8 @@
 //   begin(triangle), row(x0, y, z, mask), two(x, y, z, masks, along_y), four(x, y, z, masks), voxels(bits, position):
 //                     the fragments of one triangle, as rows of bits along x (blend_rows) or one by one
 //   shares            whether one(x, y, z), a fragment of a triangle that has no other, is more than a row of one
+//   mark_row(x0, x1, y, z), mark_brick(corner, lane): told of voxels of a large triangle before they come, of a brick
+//                     by each of medium_lanes lanes
 //   drop(class)       counts a triangle that is not drawn
 
 #include <voxelpipe/core/brick_triangle.hpp>
