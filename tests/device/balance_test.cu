@@ -7,6 +7,7 @@
 #include "cells.hpp"
 
 #include <algorithm>
+#include <utility>
 
 using namespace device_test;
 namespace blend = voxelpipe::blend;
@@ -15,27 +16,11 @@ namespace {
 
 using bits = vp::target<vp::bit, blend::bit_or>;
 using sum = vp::target<float, blend::add>;
-using counts = vp::target<std::uint32_t, blend::count>;
-using last = vp::target<std::uint32_t, blend::replace>;
-
-struct load_values {
-    template <class Fragment>
-    VOXELPIPE_HD auto operator()(const Fragment& f) const {
-        return vp::outputs(true, f.barycentric.x, 0u, f.primitive);
-    }
-};
-
-struct weight {
-    template <class Fragment>
-    VOXELPIPE_HD auto operator()(const Fragment& f) const {
-        return vp::outputs(f.barycentric.x);
-    }
-};
 
 void compare(const mesh_data& m, const vp::grid& g) {
     for (const vp::coverage rule : both_rules) {
         expect_same<bits>(m, g, vp::passthrough{}, vp::constant(true), rule);
-        expect_same<bits, sum, counts, last>(m, g, vp::passthrough{}, load_values{}, rule);
+        expect_same(tile_targets{}, m, g, vp::passthrough{}, tile_values{}, rule);
     }
 }
 
@@ -67,8 +52,8 @@ TEST(Balance, LongVoxelsOfBlendsThatAreFolded) {
     std::mt19937 random(58);
     std::shuffle(m.triangles.begin(), m.triangles.end(), random);
     for (const vp::coverage rule : both_rules) {
-        expect_same<chained, joined>(m, box_grid({64, 64, 64}), vp::passthrough{}, listed_values{}, rule);
-        expect_same<chained, joined>(m, box_grid({64, 64, 64}), vp::passthrough{}, listed_values{}, rule, start::load);
+        expect_same(folded_targets{}, m, box_grid({64, 64, 64}), vp::passthrough{}, folded_values{}, rule);
+        expect_same(folded_targets{}, m, box_grid({64, 64, 64}), vp::passthrough{}, folded_values{}, rule, start::load);
     }
 }
 
@@ -105,19 +90,22 @@ TEST(Balance, MixturesInAnyOrder) {
     mesh_data m = mixed_triangles(200000, 128.0f, 53);
     const vp::grid g = box_grid({128, 128, 128});
     compare(m, g);
-    const auto run = [&](const mesh_data& data, const auto& shader) {
-        vp::cuda_backend be;
-        vp::mesh mesh{be, data.positions, data.triangles};
-        vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
-        EXPECT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, shader, fb).ok());
-        return vp::get<0>(fb).to_host(be);
+    vp::cuda_backend be;
+    tile_targets::framebuffer<vp::cuda_backend> shaded{be, g.extent};
+    vp::framebuffer<vp::cuda_backend, sum> constant{be, g.extent};
+    const auto draw = [&] {
+        const vp::mesh mesh{be, m.positions, m.triangles};
+        EXPECT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, tile_values{}, shaded).ok());
+        EXPECT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(0.3f), constant).ok());
+        return std::pair{vp::get<1>(shaded).to_host(be), vp::get<0>(constant).to_host(be)};
     };
-    const auto shaded = run(m, weight{}), constant = run(m, vp::constant(0.3f));
+    const auto expected = draw();
     std::mt19937 random(54);
     for (int i = 0; i < 3; ++i) {
         std::shuffle(m.triangles.begin(), m.triangles.end(), random);
-        expect_same_bytes(shaded, run(m, weight{}), "permuted, in tiles");
-        expect_same_bytes(constant, run(m, vp::constant(0.3f)), "permuted, without");
+        const auto actual = draw();
+        expect_same_bytes(expected.first, actual.first, "permuted, in tiles");
+        expect_same_bytes(expected.second, actual.second, "permuted, without");
     }
 }
 

@@ -112,17 +112,50 @@ struct chain {
     VOXELPIPE_HD std::uint32_t combine(std::uint32_t a, std::uint32_t b) const { return mix_bits(a * 3 + b); }
 };
 
-// Values for both.
-using chained = vp::target<std::uint32_t, chain>;
-using joined = vp::target<extent_of, join>;
-struct listed_values {
+// Both, beside two that are drawn in tiles, and values for them.
+using folded_targets = target_list<vp::target<std::uint32_t, chain>, vp::target<extent_of, join>,
+                                   vp::target<std::uint64_t, vp::blend::add_saturate>,
+                                   vp::target<vp::bit, vp::blend::bit_and, vp::layout::tiled>>;
+struct folded_values {
     template <class Fragment>
     VOXELPIPE_HD auto operator()(const Fragment& f) const {
         const std::uint32_t h = mix_bits(f.primitive + static_cast<std::uint32_t>(f.voxel.x + 64 * f.voxel.y));
         const auto low = static_cast<std::int32_t>(h >> 8), high = static_cast<std::int32_t>(f.primitive);
-        return vp::outputs(h, extent_of{{low, f.voxel.x, f.axis}, {high, f.voxel.y, -low}}).discard_if(h % 7 == 0);
+        const extent_of extent{{low, f.voxel.x, f.axis}, {high, f.voxel.y, -low}};
+        return vp::outputs(h, extent, std::uint64_t{h} << (h % 32), h % 3 != 0).discard_if(h % 7 == 0);
     }
 };
+
+// Bits, exact sums, counts and the last, in tiles. One fragment in so many is discarded; 0: none.
+using tile_targets =
+    target_list<vp::target<vp::bit, vp::blend::bit_xor>, vp::target<float, vp::blend::add>,
+                vp::target<std::uint32_t, vp::blend::count>, vp::target<std::uint32_t, vp::blend::replace>>;
+struct tile_values {
+    std::uint32_t discards = 0;
+
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& f) const {
+        const std::uint32_t h = f.primitive + static_cast<std::uint32_t>(f.voxel.x);
+        return vp::outputs(f.primitive % 3 == 0, f.barycentric.x, 0u, f.primitive)
+            .discard_if(discards != 0 && h % discards == 0);
+    }
+};
+
+// Bits in both layouts, for a constant shader: without tiles.
+using bit_targets = target_list<vp::target<vp::bit, vp::blend::bit_or, vp::layout::tiled>,
+                                vp::target<vp::bit, vp::blend::min, vp::layout::tiled>,
+                                vp::target<std::uint32_t, vp::blend::count, vp::layout::tiled>,
+                                vp::target<vp::bit, vp::blend::bit_or>, vp::target<vp::bit, vp::blend::bit_and>,
+                                vp::target<vp::bit, vp::blend::bit_xor>, vp::target<vp::bit, vp::blend::count>>;
+[[nodiscard]] inline auto same_bits(bool value) {
+    return vp::constant(value, value, value, value, value, value, value);
+}
+
+// Exact sums in both layouts, which are counted where the partial sums of a constant may not be exact.
+using sum_targets = target_list<vp::target<float, vp::blend::add>, vp::target<double, vp::blend::add>,
+                                vp::target<float, vp::blend::add, vp::layout::tiled>,
+                                vp::target<double, vp::blend::add, vp::layout::tiled>>;
+[[nodiscard]] inline auto same_sums(float value, double wide) { return vp::constant(value, wide, value, wide); }
 
 // Triangles within one voxel.
 inline mesh_data triangles_in_voxel(int count, glm::vec3 corner, std::uint32_t seed) {

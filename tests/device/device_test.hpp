@@ -197,6 +197,18 @@ void expect_same(const mesh_data& m, const vp::grid& g, const VertexShader& vs, 
     });
 }
 
+// Targets that several tests draw into, named once: each set of targets and shaders is kernels of its own to compile.
+template <class... Targets>
+struct target_list {
+    template <class Backend>
+    using framebuffer = vp::framebuffer<Backend, Targets...>;
+};
+
+template <class... Targets, class... Arguments>
+void expect_same(target_list<Targets...>, const Arguments&... arguments) {
+    expect_same<Targets...>(arguments...);
+}
+
 // Lists that were copied to the host.
 template <class Payload>
 void expect_same_on_host(const vp::host_abuffer<Payload>& a, const vp::host_abuffer<Payload>& b) {

@@ -4,7 +4,7 @@
 // Constant shaders, which are drawn without tiles where every target takes a fragment by one atomic: every such target
 // against cpu_backend, byte for byte, and the border between this way and the tiles.
 
-#include "device_test.hpp"
+#include "cells.hpp"
 
 #include <gtest/gtest.h>
 
@@ -52,26 +52,26 @@ mesh_data middling_triangles(glm::ivec3 extent, std::uint32_t seed) {
 }
 
 // Cleared and loaded, with and without the voxel counter, a grid that cuts triangles off at every side.
-template <class... Targets, class... Values>
-void compare_constants(Values... values) {
+template <class Targets, class... Values>
+void compare_constants(Targets targets, const vp::solid<Values...>& shader) {
     for (const vp::coverage rule : both_rules) {
         const mesh_data m = mixed_triangles(3000, 60.0f, 81);
-        expect_same<Targets...>(m, box_grid({60, 47, 71}), vp::passthrough{}, vp::constant(values...), rule);
-        expect_same<Targets...>(m, box_grid({97, 9, 31}), vp::passthrough{}, vp::constant(values...),
-                                vp::voxelize_options{rule, false}, start::load);
-        expect_same<Targets...>(mixed_triangles(200, 1.0f, 82), box_grid({1, 1, 1}), vp::passthrough{},
-                                vp::constant(values...), rule);
+        expect_same(targets, m, box_grid({60, 47, 71}), vp::passthrough{}, shader, rule);
+        expect_same(targets, m, box_grid({97, 9, 31}), vp::passthrough{}, shader, vp::voxelize_options{rule, false},
+                    start::load);
+        expect_same(targets, mixed_triangles(200, 1.0f, 82), box_grid({1, 1, 1}), vp::passthrough{}, shader, rule);
         // Neighbours of one voxel each that share it, odd and even numbers of them.
-        expect_same<Targets...>(specks(), box_grid({40, 5, 3}), vp::passthrough{}, vp::constant(values...),
-                                vp::voxelize_options{rule, false});
+        expect_same(targets, specks(), box_grid({40, 5, 3}), vp::passthrough{}, shader,
+                    vp::voxelize_options{rule, false});
     }
 }
 
 template <class T>
 void compare_integers(T value) {
-    compare_constants<vp::target<T, blend::add>, vp::target<T, blend::min>, vp::target<T, blend::max>,
-                      vp::target<T, blend::bit_and>, vp::target<T, blend::bit_or>, vp::target<T, blend::bit_xor>,
-                      vp::target<T, blend::count>>(value, value, value, value, value, value, value);
+    using targets = target_list<vp::target<T, blend::add>, vp::target<T, blend::min>, vp::target<T, blend::max>,
+                                vp::target<T, blend::bit_and>, vp::target<T, blend::bit_or>,
+                                vp::target<T, blend::bit_xor>, vp::target<T, blend::count>>;
+    compare_constants(targets{}, vp::constant(value, value, value, value, value, value, value));
 }
 
 TEST(Direct, Unsigned32) { compare_integers<std::uint32_t>(0x9234567u); }
@@ -80,14 +80,7 @@ TEST(Direct, Unsigned64) { compare_integers<std::uint64_t>(0x923456789abcdef1u);
 TEST(Direct, Signed64) { compare_integers<std::int64_t>(-765432123456789); }
 
 TEST(Direct, Bits) {
-    using vp::layout::tiled;
-    for (const bool value : {false, true}) {
-        compare_constants<vp::target<vp::bit, blend::bit_or>, vp::target<vp::bit, blend::bit_and>,
-                          vp::target<vp::bit, blend::bit_xor>, vp::target<vp::bit, blend::count>>(value, value, value,
-                                                                                                  value);
-        compare_constants<vp::target<vp::bit, blend::bit_or, tiled>, vp::target<vp::bit, blend::min, tiled>,
-                          vp::target<std::uint32_t, blend::count, tiled>>(value, value, value);
-    }
+    for (const bool value : {false, true}) compare_constants(bit_targets{}, same_bits(value));
 }
 
 // The classes of work between one thread's and a large triangle's, whose limits follow the fraction bits of the grid.
@@ -115,16 +108,14 @@ TEST(Direct, FewAndManyLargeTriangles) {
             add_triangle(m, point(), point(), point());
         }
         for (const vp::coverage rule : both_rules)
-            expect_same<vp::target<vp::bit, blend::bit_or>, vp::target<std::uint32_t, blend::count>>(
-                m, box_grid(extent), vp::passthrough{}, vp::constant(true, true), rule);
+            expect_same(bit_targets{}, m, box_grid(extent), vp::passthrough{}, same_bits(true), rule);
     }
 }
 
 // Exact partial sums, and values that have none and take the tiles.
 TEST(Direct, Sums) {
     for (const float value : {1.0f, -0.75f, 0.1f, 3e9f, 1e-20f, std::numeric_limits<float>::infinity()})
-        compare_constants<vp::target<float, blend::add>, vp::target<double, blend::add>>(value,
-                                                                                         static_cast<double>(value));
+        compare_constants(sum_targets{}, same_sums(value, value));
 }
 
 TEST(Direct, SumsAreExactOnlyWhereProven) {

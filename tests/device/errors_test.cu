@@ -5,7 +5,7 @@
 // stage and CUDA's number, no exception and no abort. Each in a process of its own, because such an error stays with
 // the context.
 
-#include "device_test.hpp"
+#include "cells.hpp"
 
 #include <voxelpipe/device/abuffer_async.cuh>
 
@@ -20,16 +20,7 @@ namespace blend = voxelpipe::blend;
 
 namespace {
 
-using bits = vp::target<vp::bit, blend::bit_or>;
-using last = vp::target<std::uint32_t, blend::replace>;
-
-// Is drawn in tiles, and listed with its payload.
-struct number {
-    template <class Fragment>
-    VOXELPIPE_HD auto operator()(const Fragment& f) const {
-        return vp::outputs(f.primitive);
-    }
-};
+using bits = target_list<vp::target<vp::bit, blend::bit_or>>;
 
 const vp::grid g = box_grid({40, 30, 50});
 
@@ -71,13 +62,14 @@ int count_wrong(const Call& call) {
     return first + is_wrong(call(), false);
 }
 
-template <class Target, class FragmentShader>
+template <class Targets, class FragmentShader>
 int draw_broken(broken what, const FragmentShader& fs) {
     broken_mesh m;
-    vp::framebuffer<vp::cuda_backend, Target> fb{m.be, g.extent};
-    auto target = fb.view();
-    if (what == broken::target) vp::get<0>(target.targets).elements = forbidden<typename Target::element_type>();
-    return count_wrong([&] { return vp::voxelize(m.be, m.view(what), g, vp::passthrough{}, fs, target); });
+    typename Targets::template framebuffer<vp::cuda_backend> fb{m.be, g.extent};
+    auto view = fb.view();
+    auto& target = vp::get<0>(view.targets);
+    if (what == broken::target) target.elements = forbidden<std::remove_cvref_t<decltype(*target.elements)>>();
+    return count_wrong([&] { return vp::voxelize(m.be, m.view(what), g, vp::passthrough{}, fs, view); });
 }
 
 template <class Payload, class FragmentShader>
@@ -88,11 +80,11 @@ int list_broken(broken what, const FragmentShader& fs) {
 }
 
 int draw_without_a_wait(broken what) {
-    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, number>;
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, tile_values>;
     broken_mesh m;
     const draw_type d{m.view(what), {}, {}};
     const std::span<const draw_type> draws(&d, 1);
-    vp::framebuffer<vp::cuda_backend, last> fb{m.be, g.extent};
+    tile_targets::framebuffer<vp::cuda_backend> fb{m.be, g.extent};
     const auto limits = vp::workspace_limits::for_triangles(m.data.triangles.size());
     const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), {}, limits);
     vp::cuda_backend::buffer<std::byte> memory(m.be, bytes);
@@ -115,7 +107,7 @@ void expect_none_wrong(const F& f, const char* message = "CUDA error 700") {
 
 TEST_F(BadAddressDeathTest, OfAMeshThatIsDrawnInTiles) {
     for (const broken what : {broken::positions, broken::triangles})
-        expect_none_wrong([&] { return draw_broken<last>(what, number{}); });
+        expect_none_wrong([&] { return draw_broken<tile_targets>(what, tile_values{}); });
 }
 // Where an error shows only at the end, the last stage is named; without tiles that is the raster.
 TEST_F(BadAddressDeathTest, OfAMeshThatIsDrawnWithoutTiles) {
@@ -124,11 +116,11 @@ TEST_F(BadAddressDeathTest, OfAMeshThatIsDrawnWithoutTiles) {
     expect_none_wrong([] { return draw_broken<bits>(broken::triangles, vp::constant(true)); });
 }
 TEST_F(BadAddressDeathTest, OfATarget) {
-    expect_none_wrong([] { return draw_broken<last>(broken::target, number{}); });
+    expect_none_wrong([] { return draw_broken<tile_targets>(broken::target, tile_values{}); });
     expect_none_wrong([] { return draw_broken<bits>(broken::target, vp::constant(true)); });
 }
 TEST_F(BadAddressDeathTest, OfAMeshThatIsListed) {
-    expect_none_wrong([] { return list_broken<std::uint32_t>(broken::positions, number{}); });
+    expect_none_wrong([] { return list_broken<double>(broken::positions, any_double{}); });
     expect_none_wrong([] { return list_broken<void>(broken::triangles, vp::constant(true)); });
 }
 TEST_F(BadAddressDeathTest, OfACallWithoutAWait) {

@@ -11,7 +11,6 @@
 #include <span>
 
 using namespace device_test;
-namespace blend = voxelpipe::blend;
 
 namespace {
 
@@ -120,7 +119,7 @@ void for_each_order(const F& f) {
 const vp::grid whole = box_grid({90, 81, 97});
 
 template <class... Targets, class FragmentShader>
-void compare(const FragmentShader& shader, vp::coverage rule) {
+void compare(target_list<Targets...>, const FragmentShader& shader, vp::coverage rule) {
     company others;
     stream_owner owner;
     vp::cuda_backend gpu{owner.stream};
@@ -152,24 +151,12 @@ void compare(const FragmentShader& shader, vp::coverage rule) {
     });
 }
 
-struct shaded {
-    template <class Fragment>
-    VOXELPIPE_HD auto operator()(const Fragment& f) const {
-        return vp::outputs(f.primitive % 3 == 0, f.barycentric.x, f.primitive)
-            .discard_if((f.primitive + static_cast<std::uint32_t>(f.voxel.x)) % 9 == 0);
-    }
-};
-
 TEST(LaunchOrder, OfTilesDoesNotShow) {
-    for (const vp::coverage rule : both_rules)
-        compare<vp::target<vp::bit, blend::bit_xor>, vp::target<float, blend::add>,
-                vp::target<std::uint32_t, blend::replace>>(shaded{}, rule);
+    for (const vp::coverage rule : both_rules) compare(tile_targets{}, tile_values{9}, rule);
 }
 
 TEST(LaunchOrder, WithoutTilesDoesNotShow) {
-    for (const vp::coverage rule : both_rules)
-        compare<vp::target<vp::bit, blend::bit_or>, vp::target<std::uint32_t, blend::count>>(vp::constant(true, 1u),
-                                                                                             rule);
+    for (const vp::coverage rule : both_rules) compare(bit_targets{}, same_bits(true), rule);
 }
 
 // Many draws take the shared count, one draw the lists' own raster.
