@@ -112,9 +112,7 @@ TEST_P(AbufferLists, WithoutPayloadHoldTheNumbersAlone) {
 INSTANTIATE_TEST_SUITE_P(Both, AbufferLists, ::testing::Values(vp::coverage::conservative, vp::coverage::thin),
                          [](const auto& p) { return p.param == vp::coverage::thin ? "thin" : "conservative"; });
 
-struct sum_shader {
-    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const { return vp::outputs(f.barycentric.y); }
-};
+using sum_shader = unit::float_shader;
 
 TEST(Abuffer, FoldedWithABlendIsTheFramebuffer) {
     const unit::small_mesh mesh = unit::make_mesh(4, 200, extent);

@@ -113,14 +113,14 @@ TEST(Crop, SlabsAddUp) {
     const unit::small_mesh mesh = unit::make_mesh(5, 100, extent);
     const vp::grid grid = unit::unit_grid(extent);
     backend_type backend = unit::make_backend();
-    vp::framebuffer<backend_type, vp::target<std::uint32_t, blend::count>> whole{backend, extent};
-    const auto all = vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, vp::constant(0u), whole);
+    vp::framebuffer<backend_type, vp::target<std::uint32_t, blend::add>> whole{backend, extent};
+    const auto all = vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, vp::constant(1u), whole);
     std::uint64_t fragments = 0, voxels = 0;
     for (int first = 0; first < extent.z; first += 5) {
         const glm::ivec3 size{extent.x, extent.y, std::min(5, extent.z - first)};
-        vp::framebuffer<backend_type, vp::target<std::uint32_t, blend::count>> slab{backend, size};
+        vp::framebuffer<backend_type, vp::target<std::uint32_t, blend::add>> slab{backend, size};
         const auto s = vp::voxelize(backend, mesh.on(backend), grid.crop({0, 0, first}, size), vp::passthrough{},
-                                    vp::constant(0u), slab);
+                                    vp::constant(1u), slab);
         ASSERT_TRUE(s.ok());
         fragments += s.counts.fragments;
         voxels += s.counts.voxels;

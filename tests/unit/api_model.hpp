@@ -103,6 +103,15 @@ VOXELPIPE_HD inline std::uint64_t mark(std::uint32_t primitive, glm::ivec3 voxel
     return z ^ (z >> 29);
 }
 
+// The place of each fragment on its triangle, or one number for all, of which the library cannot know.
+struct float_shader {
+    float constant = 0;
+    bool varies = true;
+    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+        return vp::outputs(varies ? f.barycentric.y : constant);
+    }
+};
+
 template <class T>
 [[nodiscard]] bool same_bytes(const std::vector<T>& a, const std::vector<T>& b) {
     static_assert(std::is_trivially_copyable_v<T>);
