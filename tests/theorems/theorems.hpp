@@ -83,7 +83,7 @@ inline bool make_exact(const grid& g, std::int64_t multiple, world_triangle& w) 
 
 // `count` by the test scale, but never so few that a test means nothing.
 inline int scaled(int count) {
-    return std::max(12, static_cast<int>(count * std::min(1.0, 4.0 * oracle::test_scale())));
+    return std::max(4, static_cast<int>(count * std::min(1.0, 4.0 * oracle::test_scale())));
 }
 
 // Random triangles of every class for a grid; on grids that are not dense without those that cover much.

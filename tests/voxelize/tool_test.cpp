@@ -220,7 +220,7 @@ TEST(Tool, ThreadsAndSlabsChangeNothing) {
     const scratch_folder folder;
     gltf_test::small_world().write_glb(folder / "m.glb");
     const auto voxelize = [&](const std::vector<std::string>& how) {
-        std::vector<std::string> arguments{folder / "m.glb", "-o",  folder / "o.npy", "-r", "70", "-t", all_targets,
+        std::vector<std::string> arguments{folder / "m.glb", "-o",  folder / "o.npy", "-r", "45", "-t", all_targets,
                                            "--stats",        "json"};
         arguments.insert(arguments.end(), how.begin(), how.end());
         const outcome result = run(folder, arguments);
@@ -238,7 +238,7 @@ TEST(Tool, ThreadsAndSlabsChangeNothing) {
     for (const std::vector<std::string>& how : {std::vector<std::string>{"--threads", "2"},
                                                 {"--threads", "7"},
                                                 {"--work-memory", "1"},
-                                                {"--work-memory", "9", "--threads", "3"}}) {
+                                                {"--work-memory", "2", "--threads", "3"}}) {
         const auto [other_bytes, other_stats, other_slabs] = voxelize(how);
         EXPECT_TRUE(bytes == other_bytes) << how[0] << ' ' << how[1];
         EXPECT_EQ(stats, other_stats);
