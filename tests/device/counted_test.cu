@@ -146,6 +146,27 @@ TEST(Counted, LayoutsAndExtents) {
         }
 }
 
+// Grids large enough for marks, whose last pass reads only what they mark: rows that go 16 bytes at a time and rows
+// that cannot, extents that end within a chunk, more chunks along x than a word has bits. Then a clear value for which
+// all has to be read.
+TEST(Counted, LargeGridsByMarks) {
+    for (const glm::ivec3 extent : {glm::ivec3(320, 200, 140), glm::ivec3(333, 191, 141), glm::ivec3(1100, 92, 91)}) {
+        ASSERT_GE(static_cast<std::size_t>(extent.x) * static_cast<std::size_t>(extent.y * extent.z) * sizeof(float),
+                  vp::device::marked_bytes);
+        const glm::vec3 size(extent);
+        mesh_data m = mixed_triangles(1500, size.x, 210); // many beyond the grid's faces, and some across them
+        append(m, crowded(36.0f, 211));
+        append(m, mixed_triangles(1500, size.z, 212));
+        for (const float x : {0.01f, 0.4f, 0.99f}) { // across the whole grid, and slivers
+            add_triangle(m, size * glm::vec3(x, 0.0f, 0.0f), size * glm::vec3(x, 1.0f, 0.1f), size);
+            add_triangle(m, size * glm::vec3(0.0f, x, 1.0f), size * glm::vec3(1.0f, x, 0.9f),
+                         size * glm::vec3(1.0f, x, 0.901f));
+        }
+        compare_sums(m, extent, 0.1f, 0.1, 0.0f, 0.0);
+        compare_sums(m, extent, 0.1f, 0.1, -0.0f, 0.3);
+    }
+}
+
 TEST(Counted, SeveralDraws) {
     const std::vector<mesh_data> meshes{crowded(36.0f, 203), mixed_triangles(300, 30.0f, 204), crowded(30.0f, 205)};
     const auto draw = [&](float a, float b, float c) {

@@ -81,6 +81,33 @@ TEST(Lists, RepeatedWithoutPayload) { compare_repeated<void>(vp::constant(true))
 TEST(Lists, RepeatedWithAConstantPayload) { compare_repeated<float>(vp::constant(0.5f)); }
 TEST(Lists, RepeatedWithAComputedPayload) { compare_repeated<double>(any_double{}); }
 
+// Arrays that are made beforehand are larger than the lists. Where only exact ones fit, a repeated call makes do with
+// these; where they do not, it says so and leaves the lists as they were.
+TEST(Lists, RepeatedWithRoomForTheListsOnly) {
+    counting_resource memory;
+    const stream_owner s;
+    vp::cuda_backend gpu{s.stream, memory};
+    const mesh_data m = mixed_triangles(3000, 40.0f, 124);
+    const vp::mesh<vp::cuda_backend> mesh{gpu, m.positions, m.triangles};
+    vp::abuffer<vp::cuda_backend> lists{gpu};
+    const auto draw = [&] {
+        return vp::voxelize(gpu, mesh, box_grid({64, 48, 40}), vp::passthrough{}, vp::constant(true), lists,
+                            vp::coverage::conservative);
+    };
+    ASSERT_TRUE(draw().ok());
+    ASSERT_TRUE(draw().ok());
+    const auto first = lists.to_host(gpu);
+    const std::size_t bytes =
+        (2 * lists.num_voxels() + 1) * sizeof(std::uint64_t) + lists.num_fragments() * sizeof(std::uint32_t);
+    memory.most = memory.live + bytes;
+    const vp::status exact = draw();
+    EXPECT_TRUE(exact.ok()) << exact.message();
+    expect_same_on_host(first, lists.to_host(gpu));
+    memory.most = memory.live + bytes - 1;
+    EXPECT_EQ(draw().code, vp::status_code::out_of_memory);
+    expect_same_on_host(first, lists.to_host(gpu));
+}
+
 // Slivers across the grid and triangles without area, alone.
 TEST(Lists, SliversAndZeroArea) {
     mesh_data m;

@@ -61,8 +61,8 @@ public:
 
     // Waits for the stream.
     [[nodiscard]] pipeline_state read(const pipeline_state* state, bool may_lock, cudaStream_t stream) {
-        if (may_lock && reads_ == 1) lock();
-        reads_ = reads_ < 2 ? reads_ + 1 : reads_;
+        if (may_lock && was_used_ && page_ == nullptr) lock();
+        was_used_ = true;
         pipeline_state copy{};
         if (on_device_ == nullptr)
             check(cudaMemcpyAsync(&copy, state, sizeof(copy), cudaMemcpyDeviceToHost, stream));
@@ -78,7 +78,7 @@ private:
     static constexpr std::align_val_t page_bytes{4096};
     static_assert(sizeof(pipeline_state) <= static_cast<std::size_t>(page_bytes));
 
-    // Where that cannot be had, copies do.
+    // Once: where that cannot be had, copies do.
     void lock() {
         constexpr auto bytes = static_cast<std::size_t>(page_bytes);
         page_ = ::operator new(bytes, page_bytes);
@@ -92,11 +92,11 @@ private:
     void swap(state_reader& other) noexcept {
         std::swap(page_, other.page_);
         std::swap(on_device_, other.on_device_);
-        std::swap(reads_, other.reads_);
+        std::swap(was_used_, other.was_used_);
     }
     void* page_ = nullptr;
     void* on_device_ = nullptr; // the page, where it is locked
-    int reads_ = 0;             // so far, up to 2
+    bool was_used_ = false;
 };
 
 // Runs f, which launches stages. A failure that names none, of a query in between, is put down to the last of them:
@@ -384,8 +384,21 @@ private:
         }
     };
 
-    // voxel_room: how many voxels the lists are likely to have, 0 where nothing is known. Then nobody waits in between:
-    // the arrays are made beforehand, and hold a little more than is needed.
+    // With a little more room than the lists are likely to need. None, and then no voxel_room, where memory is short:
+    // the exact lists may still fit.
+    template <class Payload>
+    [[nodiscard]] list_arrays<Payload> make_beforehand(std::uint64_t& voxel_room, std::uint64_t fragments) {
+        try {
+            return {*this, voxel_room, voxel_room == 0 ? 0 : fragments};
+        } catch (const device::cuda_failure& e) {
+            if (e.error != cudaErrorMemoryAllocation) throw;
+            voxel_room = 0;
+            return {*this, 0, 0};
+        }
+    }
+
+    // voxel_room: how many voxels the lists are likely to have, 0 where nothing is known. Otherwise nobody waits in
+    // between: the arrays are made beforehand.
     template <coverage Rule, class Key, class Call, class Payload>
     void fill(const Call& call, std::uint64_t voxel_room, abuffer<cuda_backend, Payload>& lists,
               device::pipeline_state& state) {
@@ -394,7 +407,7 @@ private:
         device::arena plan;
         (void)call.template go<Rule, false, Key>(plan, d_state, stream);
         device::arena memory(reserve(plan.used()));
-        list_arrays<Payload> arrays(*this, voxel_room, voxel_room == 0 ? 0 : call.limits.fragments);
+        list_arrays<Payload> arrays = make_beforehand<Payload>(voxel_room, call.limits.fragments);
         const auto sorted = device::launch_until(where, [&] {
             if (call.clock != nullptr) call.clock->start();
             const auto made = call.template go<Rule, true, Key>(memory, d_state, stream, arrays.primitives.data());
