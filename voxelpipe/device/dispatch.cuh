@@ -6,6 +6,7 @@
 // stage on one stream, without a wait (launch). The same plan serves voxelize, which reads the state once at the end,
 // and voxelize_async, which leaves it on the device.
 
+#include <voxelpipe/device/call_graph.cuh>
 #include <voxelpipe/device/clear_target.cuh>
 #include <voxelpipe/device/counted_target.cuh>
 #include <voxelpipe/device/direct_raster.cuh>
@@ -167,6 +168,29 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
             go_with<Rule, Run, std::uint32_t>(memory, state, stream);
         else if constexpr (groups::has_ordered)
             go_with<Rule, Run, std::uint64_t>(memory, state, stream);
+    }
+
+    // All that the launches of this call depend on, with the memory that they work in, where it is plain bytes.
+    static constexpr bool has_bytes =
+        std::is_trivially_copyable_v<draw_type> && std::is_trivially_copyable_v<Framebuffer>;
+    template <coverage Rule>
+    [[nodiscard]] call_bytes bytes(const void* workspace, const void* state_page) const {
+        static constexpr char type = 0; // its address: one for each type of call
+        int device = 0;
+        check(cudaGetDevice(&device));
+        call_bytes b;
+        b.add(&type);
+        b.add(Rule);
+        b.add(device);
+        b.add(workspace);
+        b.add(state_page);
+        for (const draw_type& d : draws) b.add(d);
+        b.add(g);
+        b.add(fb);
+        b.add(options);
+        b.add(num_primitives);
+        b.add(limits);
+        return b;
     }
 
     // Of this call: what a failure that shows only at its end is put down to.

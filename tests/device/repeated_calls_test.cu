@@ -1,0 +1,121 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Calls of one backend with the same arguments, which it keeps as a CUDA graph from the third on: what lies in the
+// meshes and targets may change in between, and so may the arguments.
+
+#include "cells.hpp"
+
+#include <gtest/gtest.h>
+
+#include <span>
+#include <vector>
+
+namespace {
+
+using namespace device_test;
+namespace blend = voxelpipe::blend;
+
+// A mesh whose arrays can be written between calls.
+struct open_mesh {
+    vp::cuda_backend::buffer<glm::vec3> positions;
+    vp::cuda_backend::buffer<glm::uvec3> triangles;
+
+    open_mesh(vp::cuda_backend& gpu, const mesh_data& m)
+        : positions(gpu, vp::array_view<const glm::vec3>(m.positions.data(), m.positions.size())),
+          triangles(gpu, vp::array_view<const glm::uvec3>(m.triangles.data(), m.triangles.size())) {}
+    void write(vp::cuda_backend& gpu, const mesh_data& m) {
+        ASSERT_EQ(cudaMemcpyAsync(positions.data(), m.positions.data(), m.positions.size() * sizeof(glm::vec3),
+                                  cudaMemcpyHostToDevice, gpu.stream),
+                  cudaSuccess);
+        ASSERT_EQ(cudaMemcpyAsync(triangles.data(), m.triangles.data(), m.triangles.size() * sizeof(glm::uvec3),
+                                  cudaMemcpyHostToDevice, gpu.stream),
+                  cudaSuccess);
+    }
+};
+
+template <class... Targets, class Shader>
+void repeat(vp::cuda_backend& gpu, const Shader& shader) {
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, Shader>;
+    vp::cpu_backend cpu;
+    mesh_data m = mixed_triangles(1200, 40.0f, 220);
+    const std::vector<glm::vec3> positions = m.positions;
+    open_mesh on_gpu(gpu, m);
+    const draw on_device{{on_gpu.positions.view(), on_gpu.triangles.view()}, {}, shader};
+    vp::grid g = box_grid({40, 33, 47});
+    vp::framebuffer<vp::cuda_backend, Targets...> gpu_fb{gpu, g.extent};
+    vp::framebuffer<vp::cpu_backend, Targets...> cpu_fb{cpu, g.extent};
+    for (int call = 0; call < 16; ++call) {
+        SCOPED_TRACE(call);
+        const bool is_bad = call == 5, is_other = call == 8 || call == 13;
+        for (std::size_t i = 0; i < positions.size(); ++i)
+            m.positions[i] = (call < 3 ? 1.0f : 1.0f + 0.1f * static_cast<float>(call % 4)) * positions[i];
+        const glm::uvec3 first = m.triangles[0];
+        if (is_bad) m.triangles[0].x = static_cast<std::uint32_t>(positions.size());
+        on_gpu.write(gpu, m);
+        const vp::voxelize_options options{is_other ? vp::coverage::thin : vp::coverage::conservative, call < 12};
+        if (call == 10) gpu.release();
+        if (call == 14) g.origin.x += 0.25f;
+        const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+        const draw on_host{cpu_mesh.view(), {}, shader};
+        const vp::status a = vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, gpu_fb, options);
+        const vp::status b = vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, cpu_fb, options);
+        m.triangles[0] = first;
+        ASSERT_EQ(a.code, b.code) << a.message();
+        ASSERT_EQ(a.ok(), !is_bad) << a.message();
+        if (a.ok()) expect_same_counts(b.counts, a.counts);
+        vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() { // a call that failed changed nothing
+            expect_same_bytes(vp::get<I>(cpu_fb).to_host(cpu), vp::get<I>(gpu_fb).to_host(gpu),
+                              ("target " + std::to_string(I)).c_str());
+        });
+    }
+}
+
+// On the legacy default stream, which cannot be captured, and on one of the caller's.
+template <class... Targets, class Shader>
+void repeat_everywhere(const Shader& shader) {
+    for (const bool keeps : {true, false}) {
+        SCOPED_TRACE(keeps);
+        vp::cuda_backend on_default;
+        on_default.keeps_graphs = keeps;
+        repeat<Targets...>(on_default, shader);
+        const stream_owner s;
+        vp::cuda_backend on_own{s.stream};
+        on_own.keeps_graphs = keeps;
+        repeat<Targets...>(on_own, shader);
+    }
+}
+
+TEST(RepeatedCalls, WithoutTiles) {
+    repeat_everywhere<vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>>(vp::constant(true, 0.1f));
+}
+
+// Through tiles, and lists for the blend that needs an order.
+TEST(RepeatedCalls, ThroughTilesAndLists) {
+    using first = vp::target<std::int32_t, blend::max>;
+    using second = vp::target<float, blend::replace>;
+    repeat_everywhere<first, second>(any_values<first, second>{});
+}
+
+// Two sets of arguments in turn never make a graph; each after itself does.
+TEST(RepeatedCalls, InTurn) {
+    const mesh_data m = mixed_triangles(800, 30.0f, 221);
+    const vp::grid g = box_grid({31, 30, 29});
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    const vp::mesh<vp::cuda_backend> gpu_mesh{gpu, m.positions, m.triangles};
+    const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+    using framebuffer_of_gpu = vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>>;
+    framebuffer_of_gpu a{gpu, g.extent}, b{gpu, g.extent};
+    vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, blend::bit_or>> expected{cpu, g.extent};
+    for (const char which : {'a', 'b', 'a', 'b', 'a', 'a', 'a', 'a', 'b', 'b', 'b', 'b', 'a', 'b'}) {
+        framebuffer_of_gpu& fb = which == 'a' ? a : b;
+        const vp::coverage rule = which == 'a' ? vp::coverage::thin : vp::coverage::conservative;
+        ASSERT_TRUE(vp::voxelize(gpu, gpu_mesh, g, vp::passthrough{}, vp::constant(true), fb, rule).ok());
+        ASSERT_TRUE(vp::voxelize(cpu, cpu_mesh, g, vp::passthrough{}, vp::constant(true), expected, rule).ok());
+        expect_same_bytes(vp::get<0>(expected).to_host(cpu), vp::get<0>(fb).to_host(gpu), "bits");
+        ASSERT_EQ(cudaMemset(vp::get<0>(fb.view().targets).elements, 0x5a, 64), cudaSuccess);
+    }
+}
+
+} // namespace
