@@ -14,6 +14,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <span>
+#include <type_traits>
 
 using namespace device_test;
 namespace blend = voxelpipe::blend;
