@@ -41,6 +41,33 @@ TEST(Reduced, LargeTrianglesWithoutTiles) {
     }
 }
 
+// Sums that are counted until a last pass, which reads all of a small grid, and what is marked of a large one.
+TEST(Reduced, CountedSums) {
+    mesh_data m = mixed_triangles(800, 40.0f, 68);
+    add_triangle(m, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
+    for (const vp::coverage rule : both_rules)
+        for (const glm::ivec3 extent : {glm::ivec3(37, 21, 31), glm::ivec3(320, 200, 141)})
+            expect_same<vp::target<float, blend::add>>(m, box_grid(extent), vp::passthrough{}, vp::constant(0.1f),
+                                                       rule);
+}
+
+// From the third call on a graph.
+TEST(Reduced, RepeatedCalls) {
+    const mesh_data m = mixed_triangles(300, 30.0f, 69);
+    const vp::grid g = box_grid({30, 21, 33});
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    const vp::mesh<vp::cuda_backend> gpu_mesh{gpu, m.positions, m.triangles};
+    const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+    vp::framebuffer<vp::cuda_backend, vp::target<float, blend::add>> gpu_fb{gpu, g.extent};
+    vp::framebuffer<vp::cpu_backend, vp::target<float, blend::add>> cpu_fb{cpu, g.extent};
+    ASSERT_TRUE(vp::voxelize(cpu, cpu_mesh, g, vp::passthrough{}, vp::constant(0.1f), cpu_fb).ok());
+    for (int call = 0; call < 5; ++call) {
+        ASSERT_TRUE(vp::voxelize(gpu, gpu_mesh, g, vp::passthrough{}, vp::constant(0.1f), gpu_fb).ok());
+        expect_same_bytes(vp::get<0>(cpu_fb).to_host(cpu), vp::get<0>(gpu_fb).to_host(gpu), "sums");
+    }
+}
+
 // More fragments than a thread folds alone, by a block for one voxel after the other and by its threads side by side.
 TEST(Reduced, LongVoxelsOfBlendsThatAreFolded) {
     const vp::grid g = box_grid({36, 5, 6});
