@@ -19,13 +19,13 @@ results="${VOXELPIPE_RESULTS:-tests/gpu_results}"
 mkdir -p "$results"
 
 command -v nvcc >/dev/null || die "no nvcc on PATH"
-device="$(nvidia-smi --query-gpu=name --format=csv,noheader 2>/dev/null | head -n 1)" || true
+device="$(nvidia-smi --query-gpu=name --format=csv,noheader 2>/dev/null | sed -n 1p)" || true
 [[ -n $device ]] || die "no CUDA device: the suite was not run"
-driver="$(nvidia-smi --query-gpu=driver_version --format=csv,noheader | head -n 1)"
-clocks="$(nvidia-smi --query-gpu=clocks.sm,clocks.mem --format=csv,noheader | head -n 1)"
+driver="$(nvidia-smi --query-gpu=driver_version --format=csv,noheader | sed -n 1p)"
+clocks="$(nvidia-smi --query-gpu=clocks.sm,clocks.mem --format=csv,noheader | sed -n 1p)"
 toolkit="$(nvcc --version | sed -n 's/.*release \([0-9.]*\).*/\1/p')"
 commit="${VOXELPIPE_COMMIT:-$(git rev-parse --short HEAD 2>/dev/null || echo unknown)}"
-architecture="$(nvidia-smi --query-gpu=compute_cap --format=csv,noheader | head -n 1 | tr -d .)"
+architecture="$(nvidia-smi --query-gpu=compute_cap --format=csv,noheader | sed -n 1p | tr -d .)"
 
 record="$results/$(date -u +%Y-%m-%dT%H%M%SZ).txt"
 {
