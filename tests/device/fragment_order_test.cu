@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The order of fragments within voxels, for voxels of every size: by a thread, a warp, a block and merged runs.
+// The order of fragments within voxels, and the list of those: voxels of every size, by a window, a warp, a block and
+// merged runs.
 
 #include "device_test.hpp"
 
@@ -15,13 +16,58 @@ namespace device = voxelpipe::device;
 
 namespace {
 
-// Lists of the given lengths, each of different primitives in any order; compares what comes back with std::sort.
-void expect_ordered(const std::vector<std::uint64_t>& lengths, std::uint32_t seed, std::uint32_t largest = ~0u) {
+template <class T>
+vp::cuda_backend::buffer<T> on_device(vp::cuda_backend& gpu, const std::vector<T>& values) {
+    return {gpu, vp::array_view<const T>(values.data(), values.size())};
+}
+
+// Fragments in device memory, sorted by voxel, and what order_fragments makes of them; all arrays are set, so that they
+// can be copied back whole. room: for voxels.
+struct ordered {
+    vp::cuda_backend gpu;
+    std::uint64_t capacity;
+    device::pipeline_state state{};
+    std::vector<std::uint32_t> primitives, narrow;
+    std::vector<std::uint64_t> first, wide;
+
+    ordered(std::vector<std::uint32_t> keys, std::vector<std::uint32_t> from, std::uint64_t num_fragments,
+            std::uint64_t num_primitives, bool is_wide, std::uint64_t room)
+        : capacity(keys.size()) {
+        state.list_fragments = num_fragments;
+        device::arena plan;
+        (void)device::order_memory::take(plan, capacity);
+        const std::vector<std::byte> zeros(plan.used());
+        auto memory = on_device(gpu, zeros);
+        device::arena arena(memory.data());
+        const device::order_memory order = device::order_memory::take(arena, capacity);
+        auto d_state = on_device(gpu, std::vector{state});
+        auto d_keys = on_device(gpu, keys), d_from = on_device(gpu, from), d_to = on_device(gpu, from);
+        auto d_narrow = on_device(gpu, std::vector<std::uint32_t>(room, 42));
+        auto d_wide = on_device(gpu, std::vector<std::uint64_t>(room, 42));
+        auto d_first = on_device(gpu, std::vector<std::uint64_t>(room + 1, 42));
+        const device::voxel_places places{is_wide ? d_wide.data() : nullptr, d_narrow.data(), d_first.data(), room};
+        device::order_fragments({d_keys.data(), d_from.data(), d_to.data(), d_keys.data(), order.tiles, places,
+                                 order.lists.with(d_state.data())},
+                                num_primitives, d_state.data(), {0, 0, capacity, 0}, gpu.stream);
+        primitives = d_to.to_host(gpu);
+        narrow = d_narrow.to_host(gpu);
+        wide = d_wide.to_host(gpu);
+        first = d_first.to_host(gpu);
+        state = d_state.to_host(gpu)[0];
+    }
+};
+
+// Voxels of the given lengths, each of different primitives in any order; compares what comes back with std::sort.
+void expect_ordered(const std::vector<std::uint64_t>& lengths, std::uint32_t seed, std::uint32_t largest = 0xfffffffe) {
     std::mt19937 random(seed);
-    std::vector<unsigned long long> first;
-    std::vector<std::uint32_t> primitives, sorted;
+    std::vector<std::uint64_t> first, voxels;
+    std::vector<std::uint32_t> keys, primitives, sorted;
+    std::uint32_t id = random() % 3;
     for (const std::uint64_t length : lengths) {
         first.push_back(primitives.size());
+        voxels.push_back(id);
+        keys.insert(keys.end(), length, id);
+        id += 1 + random() % 3;
         std::vector<std::uint32_t> voxel(length);
         const std::uint32_t step = std::max<std::uint32_t>(1, largest / static_cast<std::uint32_t>(length));
         for (std::uint64_t i = 0; i < length; ++i)
@@ -31,47 +77,52 @@ void expect_ordered(const std::vector<std::uint64_t>& lengths, std::uint32_t see
         std::sort(voxel.begin(), voxel.end());
         sorted.insert(sorted.end(), voxel.begin(), voxel.end());
     }
-    vp::cuda_backend gpu;
-    const std::uint64_t capacity = primitives.size() + 100; // more room than fragments
-    primitives.resize(capacity, 0);
-    device::pipeline_state host{};
-    host.list_fragments = sorted.size();
-    host.list_voxels = first.size();
-    device::arena plan;
-    (void)device::order_lists::take(plan, capacity);
-    vp::cuda_backend::buffer<std::byte> memory(gpu, plan.used());
-    device::arena arena(memory.data());
-    const device::order_lists lists = device::order_lists::take(arena, capacity);
-    vp::cuda_backend::buffer<device::pipeline_state> state(gpu, vp::array_view<const device::pipeline_state>(&host, 1));
-    const vp::cuda_backend::buffer<unsigned long long> d_first(
-        gpu, vp::array_view<const unsigned long long>(first.data(), first.size()));
-    vp::cuda_backend::buffer<std::uint32_t> from(
-        gpu, vp::array_view<const std::uint32_t>(primitives.data(), primitives.size()));
-    // Set, what lies behind the fragments too: all of it is copied back.
-    vp::cuda_backend::buffer<std::uint32_t> to(
-        gpu, vp::array_view<const std::uint32_t>(primitives.data(), primitives.size()));
-    vp::cuda_backend::buffer<std::uint32_t> spare(gpu, capacity);
-    device::order_fragments({d_first.data(), from.data(), to.data(), spare.data(), lists.with(state.data())},
-                            state.data(), {0, 0, capacity, 0}, gpu.stream);
-    std::vector<std::uint32_t> result = to.to_host(gpu);
-    result.resize(sorted.size());
-    EXPECT_TRUE(result == sorted);
+    first.push_back(primitives.size());
+    const std::uint64_t n = primitives.size(), num_voxels = voxels.size();
+    keys.resize(n + 100, ~0u); // more room than fragments
+    primitives.resize(n + 100, 0);
+    const bool is_wide = seed % 2 == 0;
+    const ordered result(keys, primitives, n, std::uint64_t{largest} + 1, is_wide, num_voxels);
+    EXPECT_EQ(result.state.list_voxels, num_voxels);
+    EXPECT_TRUE(std::equal(sorted.begin(), sorted.end(), result.primitives.begin()));
+    EXPECT_TRUE(std::all_of(result.primitives.begin() + static_cast<std::ptrdiff_t>(n), result.primitives.end(),
+                            [](std::uint32_t p) { return p == 0; }));
+    EXPECT_TRUE(result.first == first);
+    if (is_wide)
+        EXPECT_TRUE(result.wide == voxels);
+    else
+        EXPECT_TRUE(std::equal(voxels.begin(), voxels.end(), result.narrow.begin()));
 }
 
-TEST(FragmentOrder, EveryLengthOfAThreadAndAWarp) {
+constexpr std::uint32_t few_primitives = 1u << device::narrow_primitive_bits;
+
+TEST(FragmentOrder, EveryLengthOfAWindowAndAWarp) {
     std::vector<std::uint64_t> lengths(1100);
     std::iota(lengths.begin(), lengths.end(), 1);
-    expect_ordered(lengths, 1);
-    expect_ordered(lengths, 2, 1200); // neighbouring numbers
+    for (int turn = 0; turn < 2; ++turn) {
+        expect_ordered(lengths, 1 + 2 * turn);
+        expect_ordered(lengths, 2 + 2 * turn, 1200); // neighbouring numbers
+        expect_ordered(lengths, 11 + turn, few_primitives - 1);
+        expect_ordered(lengths, 13 + turn, few_primitives);
+        std::shuffle(lengths.begin(), lengths.end(), std::mt19937(14));
+    }
 }
 
 TEST(FragmentOrder, AtTheLimits) {
     std::vector<std::uint64_t> lengths;
-    for (const std::uint64_t limit : {std::uint64_t{device::most_of_thread}, std::uint64_t{128}, std::uint64_t{512},
-                                      std::uint64_t{device::most_of_warp}, std::uint64_t{device::most_of_block},
-                                      std::uint64_t{2 * device::most_of_block}})
-        for (const std::uint64_t length : {limit - 1, limit, limit + 1}) lengths.insert(lengths.end(), 3, length);
+    for (const std::uint32_t limit :
+         {device::window_length, device::most_of_window, 512u, device::most_of_warp, device::most_of_block,
+          device::tile_counts::length, 2 * device::most_of_block, 32 * 32 * 32u})
+        for (const std::uint32_t length : {limit - 1, limit, limit + 1}) lengths.insert(lengths.end(), 3, length);
     expect_ordered(lengths, 3);
+    expect_ordered(lengths, 4, few_primitives - 1);
+    // Voxels that begin and end where windows and tiles do, and last ones of every length.
+    expect_ordered(std::vector<std::uint64_t>(20, device::window_length), 15);
+    expect_ordered(std::vector<std::uint64_t>(3, device::tile_counts::length), 16);
+    for (std::uint32_t rest = 1; rest < 40; ++rest) {
+        expect_ordered({1, device::window_length - 2, rest}, 17 + rest, few_primitives - 1);
+        expect_ordered({rest}, 18 + rest);
+    }
 }
 
 TEST(FragmentOrder, FewAndMany) {
@@ -79,6 +130,34 @@ TEST(FragmentOrder, FewAndMany) {
     std::vector<std::uint64_t> lengths(20000);
     for (std::uint64_t& length : lengths) length = 1 + random() % (random() % 50 == 0 ? 3000 : 10);
     expect_ordered(lengths, 5);
+    // Windows that only just have room for what begins in them.
+    for (std::uint64_t& length : lengths) length = 1 + random() % (random() % 8 == 0 ? device::most_of_window : 60);
+    expect_ordered(lengths, 6);
+    expect_ordered(lengths, 7, few_primitives - 1);
+    // Many tiles.
+    lengths.assign(1'000'000, 1);
+    for (std::uint64_t& length : lengths) length += random() % 4;
+    expect_ordered(lengths, 8, few_primitives - 1);
+    expect_ordered(std::vector<std::uint64_t>(300'000, 1), 9);
+}
+
+// A list that has no room for all voxels counts them, and is not written beyond.
+TEST(FragmentOrder, NoRoomForAllVoxels) {
+    std::vector<std::uint32_t> keys(5000), primitives(5000);
+    for (std::uint32_t i = 0; i < 5000; ++i) {
+        keys[i] = i / 2;
+        primitives[i] = 5000 - i;
+    }
+    for (const bool is_wide : {false, true}) {
+        // All are there that have room, and nothing behind them is touched: the array of places is one longer.
+        const ordered result(keys, primitives, keys.size(), 5001, is_wide, 2000);
+        EXPECT_EQ(result.state.list_voxels, 2500u);
+        for (std::uint32_t i = 0; i < 2000; ++i) {
+            ASSERT_EQ(is_wide ? result.wide[i] : result.narrow[i], i);
+            ASSERT_EQ(result.first[i], 2 * i);
+        }
+        EXPECT_EQ(result.first[2000], 42u);
+    }
 }
 
 // One, two and three merges: runs of 2^12, 2^18 and 2^24 fragments.
@@ -89,22 +168,12 @@ TEST(FragmentOrder, MergedRuns) {
 }
 
 TEST(FragmentOrder, NothingWhereTheCallHasFailed) {
-    vp::cuda_backend gpu;
-    device::pipeline_state host{};
-    host.list_fragments = 1000;
-    host.list_voxels = 1;
-    device::arena plan;
-    (void)device::order_lists::take(plan, 500);
-    vp::cuda_backend::buffer<std::byte> memory(gpu, plan.used());
-    device::arena arena(memory.data());
-    const device::order_lists lists = device::order_lists::take(arena, 500);
-    vp::cuda_backend::buffer<device::pipeline_state> state(gpu, vp::array_view<const device::pipeline_state>(&host, 1));
-    const std::vector<std::uint32_t> fill(500, 42);
-    vp::cuda_backend::buffer<std::uint32_t> to(gpu, vp::array_view<const std::uint32_t>(fill.data(), fill.size()));
-    vp::cuda_backend::buffer<std::uint32_t> from(gpu, 500), spare(gpu, 500);
-    device::order_fragments({nullptr, from.data(), to.data(), spare.data(), lists.with(state.data())}, state.data(),
-                            {0, 0, 500, 0}, gpu.stream);
-    EXPECT_TRUE(to.to_host(gpu) == fill);
+    const std::vector<std::uint32_t> fill(500, 41);
+    const ordered result(fill, fill, 1000, 42, true, 500); // more fragments than room
+    EXPECT_TRUE(result.primitives == fill);
+    EXPECT_EQ(result.state.list_voxels, 0u);
+    EXPECT_TRUE(std::all_of(result.first.begin(), result.first.end(), [](std::uint64_t i) { return i == 42; }));
+    EXPECT_TRUE(std::all_of(result.wide.begin(), result.wide.end(), [](std::uint64_t i) { return i == 42; }));
 }
 
 } // namespace

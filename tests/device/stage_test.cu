@@ -328,7 +328,7 @@ void compare_lists(stages<marked>& s) {
     EXPECT_GT(end.discarded, 0u);
     std::vector<std::uint32_t> voxels, primitives;
     std::vector<float> payloads;
-    std::vector<unsigned long long> first_of_voxel;
+    std::vector<std::uint64_t> first_of_voxel;
     for (std::size_t i = 0; i < n; ++i) {
         voxels.push_back(static_cast<std::uint32_t>(fragments[i].voxel));
         primitives.push_back(fragments[i].primitive);

@@ -5,8 +5,8 @@
 // A-buffer: every fragment, ordered by (voxel, primitive). Fragments are counted, given their places by a
 // scan and written by ascending primitive; those of one draw with a constant shader are listed in one pass, in any
 // order (list_raster.cuh). A stable radix sort by voxel over just the bits in use follows, and the first fragment of
-// each voxel is selected; what was listed in any order is then put in order within each voxel (fragment_order.cuh).
-// Memory is in proportion to the fragments (paper section 3, A-buffer).
+// each voxel is selected; what was listed in any order is put in order within each voxel on the way
+// (fragment_order.cuh). Memory is in proportion to the fragments (paper section 3, A-buffer).
 
 #include <voxelpipe/device/fragment_order.cuh>
 #include <voxelpipe/device/fragment_shade.cuh>
@@ -94,7 +94,7 @@ template <class Key>
 [[nodiscard]] std::size_t select_bytes(std::uint64_t capacity) {
     std::size_t bytes = 0;
     check(cub::DeviceSelect::If(nullptr, bytes, thrust::counting_iterator<unsigned long long>(0),
-                                static_cast<unsigned long long*>(nullptr), static_cast<unsigned long long*>(nullptr),
+                                static_cast<std::uint64_t*>(nullptr), static_cast<unsigned long long*>(nullptr),
                                 capacity, is_first_of_voxel<Key>{}),
           stage::abuffer_emit);
     return bytes;
@@ -106,9 +106,9 @@ struct list_buffers {
     Key* keys[2];
     std::uint32_t* values[2];
     int bits;
-    std::uint32_t* primitives;          // by place; null without payloads of fragments
-    Payload* payloads;                  // by place; null likewise
-    unsigned long long* first_of_voxel; // fragment numbers, ascending; list_voxels of them
+    std::uint32_t* primitives;     // by place; null without payloads of fragments
+    Payload* payloads;             // by place; null likewise
+    std::uint64_t* first_of_voxel; // fragment numbers, ascending; list_voxels of them, and room for one more
     void* storage;
     std::size_t storage_bytes;
 };
@@ -131,16 +131,29 @@ struct list_memory {
     }
 };
 
+// Arrays of an A-buffer, or null: where they are.
+struct list_places {
+    std::uint64_t* voxels = nullptr;
+    std::uint64_t* offsets = nullptr; // one more
+    std::uint64_t room = 0;           // for voxels
+    std::uint32_t* primitives = nullptr;
+};
+
 // The sorted lists, where they came to lie.
 template <class Key, class Payload>
 struct fragment_lists {
     const Key* keys;
+    const std::uint32_t* voxels; // of each first_of_voxel; null: its key
     const std::uint32_t* values;
     const std::uint32_t* primitives; // null: a value is a primitive
     const Payload* payloads;         // null: all are `payload`
-    const unsigned long long* first_of_voxel;
+    const std::uint64_t* first_of_voxel;
     Payload payload;
+    bool are_placed; // all but the payloads are where they were asked for, and nowhere else
 
+    [[nodiscard]] __device__ std::uint64_t voxel(std::uint64_t i) const {
+        return voxels != nullptr ? voxels[i] : keys[first_of_voxel[i]];
+    }
     [[nodiscard]] __device__ std::uint32_t primitive(std::uint64_t i) const {
         const std::uint32_t value = values[i];
         return primitives == nullptr ? value : primitives[value];
@@ -150,19 +163,33 @@ struct fragment_lists {
     }
 };
 
+// Sorts what was listed by voxel, stably. Zeroes words on the way (fill_end).
+template <class Key>
+struct sorted_pairs {
+    Key *keys, *spare_keys;
+    std::uint32_t *values, *spare_values;
+};
+template <class Key, class Payload>
+[[nodiscard]] sorted_pairs<Key> sort_by_voxel(const list_buffers<Key, Payload>& b, pipeline_state* state,
+                                              const capacities& limits, cudaStream_t stream, stage_clock* clock,
+                                              unsigned long long* words = nullptr, std::uint64_t zeros = 0) {
+    fill_end(b.keys[0], b.values[0], &state->list_fragments, limits.fragments, state, limits, stream, words, zeros);
+    cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
+    cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
+    sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
+    end_stage(clock, &stage_times::tile_sort);
+    return {keys.Current(), keys.Alternate(), values.Current(), values.Alternate()};
+}
+
 // What was listed, sorted by voxel, and the first fragment of each.
 template <class Key, class Payload>
 [[nodiscard]] fragment_lists<Key, Payload> sort_lists(const list_buffers<Key, Payload>& b, pipeline_state* state,
                                                       const capacities& limits, cudaStream_t stream,
                                                       stage_clock* clock) {
-    fill_end(b.keys[0], b.values[0], &state->list_fragments, limits.fragments, state, limits, stream);
-    cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
-    cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
-    sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
-    end_stage(clock, &stage_times::tile_sort);
+    const sorted_pairs<Key> sorted = sort_by_voxel(b, state, limits, stream, clock);
     fragment_lists<Key, Payload> lists{};
-    lists.keys = keys.Current();
-    lists.values = values.Current();
+    lists.keys = sorted.keys;
+    lists.values = sorted.values;
     lists.primitives = b.primitives;
     lists.payloads = b.payloads;
     lists.first_of_voxel = b.first_of_voxel;
@@ -175,21 +202,28 @@ template <class Key, class Payload>
     return lists;
 }
 
-// The same for primitives that were listed in any order. They come to lie in `to`, where there is such an array.
+// The same for primitives that were listed in any order; the lists come to lie in `to`, where there are such arrays.
 template <class Payload>
 [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_lists& lists, std::uint32_t* to,
-               pipeline_state* state, const capacities& limits, cudaStream_t stream, stage_clock* clock) {
-    fragment_lists<std::uint32_t, Payload> sorted = sort_lists(b, state, limits, stream, clock);
-    const bool second = sorted.values == b.values[1], second_key = sorted.keys == b.keys[1];
-    if (to == nullptr) to = b.values[second ? 0 : 1];
-    order_fragments({b.first_of_voxel, b.values[second ? 1 : 0], to, b.keys[second_key ? 0 : 1], lists.with(state)},
-                    state, limits, stream);
+sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const list_places& to,
+               std::uint32_t num_primitives, pipeline_state* state, const capacities& limits, cudaStream_t stream,
+               stage_clock* clock) {
+    const sorted_pairs<std::uint32_t> sorted =
+        sort_by_voxel(b, state, limits, stream, clock, order.tiles.words, tile_counts::num(limits.fragments));
+    fragment_lists<std::uint32_t, Payload> lists{};
+    lists.are_placed = to.voxels != nullptr;
+    std::uint32_t* const primitives = to.primitives != nullptr ? to.primitives : sorted.spare_values;
+    const voxel_places voxels = lists.are_placed
+                                    ? voxel_places{to.voxels, nullptr, to.offsets, to.room}
+                                    : voxel_places{nullptr, sorted.spare_keys, b.first_of_voxel, limits.fragments};
+    order_fragments({sorted.keys, sorted.values, primitives, sorted.keys, order.tiles, voxels, order.lists.with(state)},
+                    num_primitives, state, limits, stream);
     end_stage(clock, &stage_times::abuffer_emit);
-    sorted.values = to;
-    sorted.primitives = nullptr; // a value is a primitive
-    sorted.payloads = nullptr;
-    return sorted;
+    lists.keys = sorted.keys;
+    lists.voxels = voxels.narrow;
+    lists.first_of_voxel = voxels.first;
+    lists.values = primitives; // a value is a primitive
+    return lists;
 }
 
 template <coverage Rule, class MakePayload, class Scene, class Key, class Payload>
@@ -218,20 +252,17 @@ __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint6
                            std::uint32_t* primitives, Payload* payloads) {
     const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
-    for (std::uint64_t i = thread; i < num_voxels; i += threads) {
-        const std::uint64_t first = lists.first_of_voxel[i];
-        voxels[i] = lists.keys[first];
-        offsets[i] = first;
+    if (!lists.are_placed) {
+        for (std::uint64_t i = thread; i < num_voxels; i += threads) {
+            voxels[i] = lists.voxel(i);
+            offsets[i] = lists.first_of_voxel[i];
+        }
+        if (thread == 0 && num_voxels != 0) offsets[num_voxels] = num_fragments;
     }
-    if (thread == 0 && num_voxels != 0) offsets[num_voxels] = num_fragments;
     if (std::is_same_v<Payload, no_payload> && lists.values == primitives) return; // they are there
     for (std::uint64_t i = thread; i < num_fragments; i += threads) {
-        if constexpr (std::is_same_v<Payload, no_payload>) {
-            primitives[i] = lists.values[i];
-        } else {
-            primitives[i] = lists.primitive(i);
-            payloads[i] = lists.payload_of(i);
-        }
+        if (lists.values != primitives) primitives[i] = lists.primitive(i);
+        if constexpr (!std::is_same_v<Payload, no_payload>) payloads[i] = lists.payload_of(i);
     }
 }
 

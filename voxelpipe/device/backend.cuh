@@ -401,6 +401,19 @@ private:
               offsets(b, num_voxels == 0 ? 0 : num_voxels + 1, stage::abuffer_emit),
               primitives(b, num_fragments, stage::abuffer_emit),
               payloads(b, has_payload ? num_fragments : 0, stage::abuffer_emit) {}
+        // As much as there is room for.
+        void copy(list_arrays& to, cudaStream_t stream) const {
+            const auto copy_one = [&](const auto& from, auto& array) {
+                if (array.size() != 0)
+                    device::check(cudaMemcpyAsync(array.data(), from.data(), array.size() * sizeof(*from.data()),
+                                                  cudaMemcpyDeviceToDevice, stream),
+                                  stage::abuffer_emit);
+            };
+            copy_one(voxels, to.voxels);
+            copy_one(offsets, to.offsets);
+            copy_one(primitives, to.primitives);
+            copy_one(payloads, to.payloads);
+        }
         void give(abuffer<cuda_backend, Payload>& lists, std::uint64_t num_voxels, std::uint64_t num_fragments) {
             voxels.count_ = num_voxels;
             offsets.count_ = num_voxels == 0 ? 0 : num_voxels + 1;
@@ -438,10 +451,13 @@ private:
         device::arena memory(reserve(plan.used()));
         state_reader_.prepare(locks_memory);
         list_arrays<Payload> arrays = make_beforehand<Payload>(voxel_room, call.limits.fragments);
+        device::list_places places;
+        if (voxel_room != 0)
+            places = {arrays.voxels.data(), arrays.offsets.data(), voxel_room, arrays.primitives.data()};
         const auto sorted = device::launch_until(where, [&] {
             if (call.clock != nullptr) call.clock->start();
-            const auto made = call.template go<Rule, true, Key>(memory, d_state, stream, arrays.primitives.data());
-            if (voxel_room != 0) {
+            const auto made = call.template go<Rule, true, Key>(memory, d_state, stream, places);
+            if (voxel_room != 0 && (!made.are_placed || list_arrays<Payload>::has_payload)) {
                 device::launch_behind(device::fit_lists_kernel<Key, payload_storage<Payload>>,
                                       device::fill_device(call.limits.fragments), device::threads_per_block, stream,
                                       where, made, d_state, call.limits, voxel_room, arrays.voxels.data(),
@@ -459,8 +475,14 @@ private:
             arrays.give(lists, num_voxels, num_fragments);
             return;
         }
+        if (sorted.are_placed && num_voxels > voxel_room) { // more than last time: once more
+            fill<Rule, Key>(call, 0, lists, state);
+            return;
+        }
         list_arrays<Payload> exact(*this, num_voxels, num_fragments);
-        if (num_fragments != 0) {
+        if (sorted.are_placed) {
+            arrays.copy(exact, stream);
+        } else if (num_fragments != 0) {
             if (call.clock != nullptr) call.clock->start(); // leaves the wait and the allocations out
             device::copy_lists_kernel<<<device::fill_device(num_fragments), device::threads_per_block, 0, stream>>>(
                 sorted, num_voxels, num_fragments, exact.voxels.data(), exact.offsets.data(), exact.primitives.data(),

@@ -107,7 +107,7 @@ template <class Key, class Payload>
         b.primitives = memory.take<std::uint32_t>(capacity);
         b.payloads = memory.take<Payload>(capacity);
     }
-    b.first_of_voxel = memory.take<unsigned long long>(capacity);
+    b.first_of_voxel = memory.take<std::uint64_t>(capacity + 1);
     b.storage = memory.take<std::byte>(b.storage_bytes);
     return b;
 }
@@ -351,16 +351,16 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     capacities limits;
     stage_clock* clock = nullptr;
 
-    // Carves the memory and, with `run`, launches the stages up to the sorted lists. The primitives may come to lie in
-    // an array of limits.fragments elements, where one is given.
+    // Carves the memory and, with `run`, launches the stages up to the sorted lists. They may come to lie in arrays
+    // that are given, with room for limits.fragments primitives.
     template <coverage Rule, bool Run, class Key>
     [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, pipeline_state*& state, cudaStream_t stream,
-                                                  std::uint32_t* primitives = nullptr) const {
+                                                  const list_places& to = {}) const {
         state = memory.take<pipeline_state>(1);
         if constexpr (Run) check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
         if constexpr (core::is_solid<FragmentShader> && sizeof(Key) == sizeof(std::uint32_t)) {
             if (is_listable(draws.size(), num_primitives, core::make_snap_transform(g).fraction, g.extent))
-                return go_direct<Rule, Run>(memory, state, stream, primitives);
+                return go_direct<Rule, Run>(memory, state, stream, to);
         }
         const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
         const scene_buffers buffers(memory, draws);
@@ -377,15 +377,15 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
 private:
     // One draw of a constant shader.
     template <coverage Rule, bool Run>
-    [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-    go_direct(arena& memory, pipeline_state* state, cudaStream_t stream, std::uint32_t* primitives) const {
+    [[nodiscard]] fragment_lists<std::uint32_t, Payload> go_direct(arena& memory, pipeline_state* state,
+                                                                   cudaStream_t stream, const list_places& to) const {
         constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
         const draw_type& d = draws[0];
         const auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
         core::snapped_position* const positions =
             memory.take<core::snapped_position>(on_the_spot ? 0 : d.mesh.positions.size());
         const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
-        const order_lists order = order_lists::take(memory, limits.fragments);
+        const order_memory order = order_memory::take(memory, limits.fragments);
         if constexpr (Run) {
             const core::snap_transform snap = core::make_snap_transform(g);
             const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
@@ -404,7 +404,7 @@ private:
             }
             end_stage(clock, &stage_times::fine_raster);
             fragment_lists<std::uint32_t, Payload> sorted =
-                sort_unordered(lists, order, primitives, state, limits, stream, clock);
+                sort_unordered(lists, order, to, num_primitives, state, limits, stream, clock);
             if constexpr (!std::is_same_v<Payload, no_payload>)
                 sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
             return sorted;
