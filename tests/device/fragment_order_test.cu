@@ -22,7 +22,8 @@ vp::cuda_backend::buffer<T> on_device(vp::cuda_backend& gpu, const std::vector<T
 }
 
 // Fragments in device memory, sorted by voxel, and what order_fragments makes of them; all arrays are set, so that they
-// can be copied back whole. room: for voxels.
+// can be copied back whole. Wide voxels go where they are asked for, narrow ones where they come to lie. room: for
+// voxels.
 struct ordered {
     vp::cuda_backend gpu;
     std::uint64_t capacity;
@@ -45,9 +46,15 @@ struct ordered {
         auto d_narrow = on_device(gpu, std::vector<std::uint32_t>(room, 42));
         auto d_wide = on_device(gpu, std::vector<std::uint64_t>(room, 42));
         auto d_first = on_device(gpu, std::vector<std::uint64_t>(room + 1, 42));
-        const device::voxel_places places{is_wide ? d_wide.data() : nullptr, d_narrow.data(), d_first.data(), room};
-        device::order_fragments({d_keys.data(), d_from.data(), d_to.data(), d_keys.data(), order.tiles, places,
-                                 order.lists.with(d_state.data())},
+        device::list_places places, none;
+        places.voxels = is_wide ? d_wide.data() : nullptr;
+        places.narrow_voxels = d_narrow.data();
+        places.offsets = d_first.data();
+        places.room = room;
+        places.primitives = d_to.data();
+        const auto asked = on_device(gpu, std::vector{is_wide ? places : none});
+        device::order_fragments({d_keys.data(), d_from.data(), d_keys.data(), asked.data(), is_wide ? none : places,
+                                 order.tiles, order.lists.with(d_state.data())},
                                 num_primitives, d_state.data(), {0, 0, capacity, 0}, gpu.stream);
         primitives = d_to.to_host(gpu);
         narrow = d_narrow.to_host(gpu);

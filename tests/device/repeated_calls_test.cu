@@ -71,6 +71,46 @@ void repeat(vp::cuda_backend& gpu, const Shader& shader) {
     }
 }
 
+// Lists, whose arrays are others each time: two sets of them take turns. Vertices that give as much as before, more,
+// less and nothing; an index that names no vertex, which leaves the lists as they were.
+template <class Payload, class Shader>
+void repeat_lists(vp::cuda_backend& gpu, const Shader& shader) {
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, Shader>;
+    vp::cpu_backend cpu;
+    mesh_data m = mixed_triangles(1200, 40.0f, 222);
+    const std::vector<glm::vec3> positions = m.positions;
+    open_mesh on_gpu(gpu, m);
+    const draw on_device{{on_gpu.positions.view(), on_gpu.triangles.view()}, {}, shader};
+    const vp::grid g = box_grid({40, 33, 47});
+    vp::abuffer<vp::cuda_backend, Payload> lists[2] = {vp::abuffer<vp::cuda_backend, Payload>{gpu},
+                                                       vp::abuffer<vp::cuda_backend, Payload>{gpu}};
+    vp::abuffer<vp::cpu_backend, Payload> expected[2] = {vp::abuffer<vp::cpu_backend, Payload>{cpu},
+                                                         vp::abuffer<vp::cpu_backend, Payload>{cpu}};
+    const float scales[] = {1.0f, 1.0f, 1.0f, 1.0f, 0.97f, 0.98f, 1.0f, 1.0f, 1.3f, 1.3f, 1.28f,
+                            1.3f, 0.3f, 1.3f, 1.3f, -9.f,  1.2f,  1.2f, 1.2f, 1.2f, 1.2f};
+    int call = 0;
+    for (const float scale : scales) {
+        SCOPED_TRACE(call);
+        const bool is_bad = call == 6 || call == 18;
+        const int which = call % 3 == 0 ? 0 : 1;
+        for (std::size_t i = 0; i < positions.size(); ++i) m.positions[i] = scale * positions[i];
+        const glm::uvec3 first = m.triangles[0];
+        if (is_bad) m.triangles[0].x = static_cast<std::uint32_t>(positions.size());
+        on_gpu.write(gpu, m);
+        const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+        const draw on_host{cpu_mesh.view(), {}, shader};
+        const vp::coverage rule = vp::coverage::conservative;
+        const vp::status a = vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, lists[which], rule);
+        const vp::status b = vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, expected[which], rule);
+        m.triangles[0] = first;
+        ASSERT_EQ(a.code, b.code) << a.message();
+        ASSERT_EQ(a.ok(), !is_bad) << a.message();
+        if (a.ok()) expect_same_counts(b.counts, a.counts);
+        for (int k = 0; k < 2; ++k) expect_same_on_host(expected[k].to_host(cpu), lists[k].to_host(gpu));
+        ++call;
+    }
+}
+
 // On the legacy default stream, which cannot be captured, and on one of the caller's.
 template <class... Targets, class Shader>
 void repeat_everywhere(const Shader& shader) {
@@ -95,6 +135,51 @@ TEST(RepeatedCalls, ThroughTilesAndLists) {
     using first = vp::target<std::int32_t, blend::max>;
     using second = vp::target<float, blend::replace>;
     repeat_everywhere<first, second>(any_values<first, second>{});
+}
+
+TEST(RepeatedCalls, OfLists) {
+    for (const bool keeps : {true, false}) {
+        SCOPED_TRACE(keeps);
+        vp::cuda_backend on_default;
+        on_default.keeps_graphs = keeps;
+        repeat_lists<void>(on_default, vp::constant(true));
+        repeat_lists<float>(on_default, vp::constant(0.5f));
+        const stream_owner s;
+        vp::cuda_backend on_own{s.stream};
+        on_own.keeps_graphs = keeps;
+        repeat_lists<float>(on_own, vp::constant(0.5f));
+        repeat_lists<double>(on_own, any_double{});
+    }
+}
+
+// Framebuffers and lists of one backend in turn, in the same memory.
+TEST(RepeatedCalls, OfListsAndFramebuffers) {
+    const mesh_data m = mixed_triangles(800, 30.0f, 223);
+    const vp::grid g = box_grid({31, 30, 29});
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    const vp::mesh<vp::cuda_backend> gpu_mesh{gpu, m.positions, m.triangles};
+    const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+    vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>> fb{gpu, g.extent};
+    vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, blend::bit_or>> expected_fb{cpu, g.extent};
+    vp::abuffer<vp::cuda_backend, void> lists{gpu};
+    vp::abuffer<vp::cpu_backend, void> expected{cpu};
+    const vp::coverage rule = vp::coverage::conservative;
+    ASSERT_TRUE(vp::voxelize(cpu, cpu_mesh, g, vp::passthrough{}, vp::constant(true), expected_fb, rule).ok());
+    ASSERT_TRUE(vp::voxelize(cpu, cpu_mesh, g, vp::passthrough{}, vp::constant(true), expected, rule).ok());
+    for (const char which :
+         {'f', 'l', 'f', 'l', 'l', 'l', 'l', 'f', 'f', 'f', 'f', 'l', 'l', 'r', 'l', 'l', 'l', 'f'}) {
+        if (which == 'f') {
+            ASSERT_TRUE(vp::voxelize(gpu, gpu_mesh, g, vp::passthrough{}, vp::constant(true), fb, rule).ok());
+            expect_same_bytes(vp::get<0>(expected_fb).to_host(cpu), vp::get<0>(fb).to_host(gpu), "bits");
+            ASSERT_EQ(cudaMemset(vp::get<0>(fb.view().targets).elements, 0x5a, 64), cudaSuccess);
+        } else if (which == 'l') {
+            ASSERT_TRUE(vp::voxelize(gpu, gpu_mesh, g, vp::passthrough{}, vp::constant(true), lists, rule).ok());
+            expect_same_on_host(expected.to_host(cpu), lists.to_host(gpu));
+        } else {
+            gpu.release();
+        }
+    }
 }
 
 // Two sets of arguments in turn never make a graph; each after itself does.

@@ -58,8 +58,9 @@ namespace device {
 // Carves the memory and, with Run, launches every stage and sets the view.
 template <coverage Rule, bool Run, class Key, class Payload, class Call>
 void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
-    pipeline_state* state = nullptr; // the first thing in the workspace: read_status looks there
-    const auto sorted = call.template go<Rule, Run, Key>(memory, state, stream);
+    [[maybe_unused]] pipeline_state* const state = arena(memory).template take<pipeline_state>(1); // what `go` takes first
+    if constexpr (Run) zero_state(state, stream);
+    const auto sorted = call.template go<Rule, Run, Key>(memory, stream);
     const std::size_t room = call.limits.fragments;
     auto* const counts = memory.take<list_counts>(1);
     auto* const voxels = memory.take<std::uint64_t>(room);

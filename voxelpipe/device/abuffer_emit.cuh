@@ -109,6 +109,7 @@ struct list_buffers {
     std::uint32_t* primitives;     // by place; null without payloads of fragments
     Payload* payloads;             // by place; null likewise
     std::uint64_t* first_of_voxel; // fragment numbers, ascending; list_voxels of them, and room for one more
+    list_places* places;           // where the lists are to go
     void* storage;
     std::size_t storage_bytes;
 };
@@ -131,12 +132,11 @@ struct list_memory {
     }
 };
 
-// Arrays of an A-buffer, or null: where they are.
-struct list_places {
-    std::uint64_t* voxels = nullptr;
-    std::uint64_t* offsets = nullptr; // one more
-    std::uint64_t room = 0;           // for voxels
-    std::uint32_t* primitives = nullptr;
+// Where the lists are to go: null where they come to lie. With a page, which the device can read, what it says when the
+// call runs, so that a call that is kept as a graph finds new arrays.
+struct asked_places {
+    list_places value;
+    const list_places* page = nullptr;
 };
 
 // The sorted lists, where they came to lie.
@@ -148,8 +148,9 @@ struct fragment_lists {
     const std::uint32_t* primitives; // null: a value is a primitive
     const Payload* payloads;         // null: all are `payload`
     const std::uint64_t* first_of_voxel;
+    const list_places* places; // where the lists are to go
     Payload payload;
-    bool are_placed; // all but the payloads are where they were asked for, and nowhere else
+    bool are_placed; // all but the payloads are there, and nowhere else
 
     [[nodiscard]] __device__ std::uint64_t voxel(std::uint64_t i) const {
         return voxels != nullptr ? voxels[i] : keys[first_of_voxel[i]];
@@ -163,17 +164,31 @@ struct fragment_lists {
     }
 };
 
-// Sorts what was listed by voxel, stably. Zeroes words on the way (fill_end).
+// Between what lists fragments and the sort: its fillers, where the lists are to go, and zeros for the tiles of the
+// order, if any.
+template <class Key>
+__global__ void prepare_sort_kernel(Key* keys, std::uint32_t* values, std::uint64_t capacity,
+                                    const __grid_constant__ asked_places asked, list_places* places, tile_counts tiles,
+                                    std::uint64_t num_tiles, const pipeline_state* state, capacities limits) {
+    await_stream();
+    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    if (thread == 0) *places = asked.page != nullptr ? *asked.page : asked.value;
+    for (std::uint64_t i = thread; i < num_tiles; i += std::uint64_t{gridDim.x} * blockDim.x) tiles.words[i] = 0;
+    fill_end_by_all(keys, values, state->list_fragments, capacity, *state, limits);
+}
+
 template <class Key>
 struct sorted_pairs {
     Key *keys, *spare_keys;
     std::uint32_t *values, *spare_values;
 };
+// Sorts what was listed by voxel, stably.
 template <class Key, class Payload>
-[[nodiscard]] sorted_pairs<Key> sort_by_voxel(const list_buffers<Key, Payload>& b, pipeline_state* state,
-                                              const capacities& limits, cudaStream_t stream, stage_clock* clock,
-                                              unsigned long long* words = nullptr, std::uint64_t zeros = 0) {
-    fill_end(b.keys[0], b.values[0], &state->list_fragments, limits.fragments, state, limits, stream, words, zeros);
+[[nodiscard]] sorted_pairs<Key> sort_by_voxel(const list_buffers<Key, Payload>& b, const asked_places& asked,
+                                              const tile_counts& tiles, std::uint64_t num_tiles, pipeline_state* state,
+                                              const capacities& limits, cudaStream_t stream, stage_clock* clock) {
+    launch_behind(prepare_sort_kernel<Key>, fill_device(limits.fragments), threads_per_block, stream, stage::tile_sort,
+                  b.keys[0], b.values[0], limits.fragments, asked, b.places, tiles, num_tiles, state, limits);
     cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
     cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
     sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
@@ -183,16 +198,17 @@ template <class Key, class Payload>
 
 // What was listed, sorted by voxel, and the first fragment of each.
 template <class Key, class Payload>
-[[nodiscard]] fragment_lists<Key, Payload> sort_lists(const list_buffers<Key, Payload>& b, pipeline_state* state,
-                                                      const capacities& limits, cudaStream_t stream,
-                                                      stage_clock* clock) {
-    const sorted_pairs<Key> sorted = sort_by_voxel(b, state, limits, stream, clock);
+[[nodiscard]] fragment_lists<Key, Payload> sort_lists(const list_buffers<Key, Payload>& b, const asked_places& asked,
+                                                      pipeline_state* state, const capacities& limits,
+                                                      cudaStream_t stream, stage_clock* clock) {
+    const sorted_pairs<Key> sorted = sort_by_voxel(b, asked, {}, 0, state, limits, stream, clock);
     fragment_lists<Key, Payload> lists{};
     lists.keys = sorted.keys;
     lists.values = sorted.values;
     lists.primitives = b.primitives;
     lists.payloads = b.payloads;
     lists.first_of_voxel = b.first_of_voxel;
+    lists.places = b.places;
     std::size_t bytes = b.storage_bytes;
     check(cub::DeviceSelect::If(b.storage, bytes, thrust::counting_iterator<unsigned long long>(0), b.first_of_voxel,
                                 &state->list_voxels, limits.fragments,
@@ -202,40 +218,43 @@ template <class Key, class Payload>
     return lists;
 }
 
-// The same for primitives that were listed in any order; the lists come to lie in `to`, where there are such arrays.
+// The same for primitives that were listed in any order; the lists are then where they are to go.
 template <class Payload>
 [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const list_places& to,
+sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const asked_places& asked,
                std::uint32_t num_primitives, pipeline_state* state, const capacities& limits, cudaStream_t stream,
                stage_clock* clock) {
     const sorted_pairs<std::uint32_t> sorted =
-        sort_by_voxel(b, state, limits, stream, clock, order.tiles.words, tile_counts::num(limits.fragments));
-    fragment_lists<std::uint32_t, Payload> lists{};
-    lists.are_placed = to.voxels != nullptr;
-    std::uint32_t* const primitives = to.primitives != nullptr ? to.primitives : sorted.spare_values;
-    const voxel_places voxels = lists.are_placed
-                                    ? voxel_places{to.voxels, nullptr, to.offsets, to.room}
-                                    : voxel_places{nullptr, sorted.spare_keys, b.first_of_voxel, limits.fragments};
-    order_fragments({sorted.keys, sorted.values, primitives, sorted.keys, order.tiles, voxels, order.lists.with(state)},
+        sort_by_voxel(b, asked, order.tiles, tile_counts::num(limits.fragments), state, limits, stream, clock);
+    list_places here;
+    here.narrow_voxels = sorted.spare_keys;
+    here.offsets = b.first_of_voxel;
+    here.room = limits.fragments;
+    here.primitives = sorted.spare_values;
+    order_fragments({sorted.keys, sorted.values, sorted.keys, b.places, here, order.tiles, order.lists.with(state)},
                     num_primitives, state, limits, stream);
     end_stage(clock, &stage_times::abuffer_emit);
+    fragment_lists<std::uint32_t, Payload> lists{};
     lists.keys = sorted.keys;
-    lists.voxels = voxels.narrow;
-    lists.first_of_voxel = voxels.first;
-    lists.values = primitives; // a value is a primitive
+    lists.voxels = here.narrow_voxels;
+    lists.first_of_voxel = here.offsets;
+    lists.values = here.primitives; // a value is a primitive
+    lists.places = b.places;
+    lists.are_placed = asked.value.voxels != nullptr;
     return lists;
 }
 
 template <coverage Rule, class MakePayload, class Scene, class Key, class Payload>
 [[nodiscard]] fragment_lists<Key, Payload>
 build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const list_memory& m, pipeline_state* state,
-            const capacities& limits, bool counts_triangles, cudaStream_t stream, stage_clock* clock) {
+            const capacities& limits, bool counts_triangles, cudaStream_t stream, stage_clock* clock,
+            const asked_places& asked = {}) {
     const fragment_cells<Rule, Scene, Key, Payload, MakePayload> op{
         s, b.keys[0], b.values[0], b.primitives, b.payloads, counts_triangles};
     share_count(s.geo, op, m.share, state, m.storage, m.storage_bytes, stage::abuffer_emit, stream);
     share_emit(s.geo, op, m.share, state, limits, stage::abuffer_emit, stream);
     end_stage(clock, &stage_times::fine_raster);
-    return sort_lists(b, state, limits, stream, clock);
+    return sort_lists(b, asked, state, limits, stream, clock);
 }
 
 // ---- into an A-buffer -----------------------------------------------------------------------------------------------
@@ -245,7 +264,7 @@ struct list_counts {
     std::uint64_t voxels, fragments;
 };
 
-// By all threads of a grid.
+// By all threads of a grid. What is where it is to go stays there.
 template <class Key, class Payload>
 __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint64_t num_voxels,
                            std::uint64_t num_fragments, std::uint64_t* voxels, std::uint64_t* offsets,
@@ -259,9 +278,8 @@ __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint6
         }
         if (thread == 0 && num_voxels != 0) offsets[num_voxels] = num_fragments;
     }
-    if (std::is_same_v<Payload, no_payload> && lists.values == primitives) return; // they are there
     for (std::uint64_t i = thread; i < num_fragments; i += threads) {
-        if (lists.values != primitives) primitives[i] = lists.primitive(i);
+        if (!lists.are_placed) primitives[i] = lists.primitive(i);
         if constexpr (!std::is_same_v<Payload, no_payload>) payloads[i] = lists.payload_of(i);
     }
 }
@@ -273,16 +291,23 @@ __global__ void copy_lists_kernel(fragment_lists<Key, Payload> lists, std::uint6
     copy_lists(lists, num_voxels, num_fragments, voxels, offsets, primitives, payloads);
 }
 
-// The same with the numbers that the state holds, where the host does not wait for them, and where there is room for so
-// many voxels.
+// The same with the numbers that the state holds, to where the lists are to go, if there is room for so many voxels.
 template <class Key, class Payload>
-__global__ void fit_lists_kernel(const __grid_constant__ fragment_lists<Key, Payload> lists,
-                                 const pipeline_state* state, capacities limits, std::uint64_t room,
-                                 std::uint64_t* voxels, std::uint64_t* offsets, std::uint32_t* primitives,
-                                 Payload* payloads) {
+__global__ void place_lists_kernel(const __grid_constant__ fragment_lists<Key, Payload> lists,
+                                   const pipeline_state* state, capacities limits) {
     await_stream();
-    if (has_failed(*state, limits) || state->list_voxels > room) return;
-    copy_lists(lists, state->list_voxels, state->list_fragments, voxels, offsets, primitives, payloads);
+    const list_places to = *lists.places;
+    if (has_failed(*state, limits) || state->list_voxels > to.room) return;
+    copy_lists(lists, state->list_voxels, state->list_fragments, to.voxels, to.offsets, to.primitives,
+               static_cast<Payload*>(to.payloads));
+}
+template <class Key, class Payload>
+void place_lists(const fragment_lists<Key, Payload>& lists, const pipeline_state* state, const capacities& limits,
+                 cudaStream_t stream, stage_clock* clock) {
+    if (lists.are_placed && std::is_same_v<Payload, no_payload>) return;
+    launch_behind(place_lists_kernel<Key, Payload>, fill_device(limits.fragments), threads_per_block, stream,
+                  stage::abuffer_emit, lists, state, limits);
+    end_stage(clock, &stage_times::abuffer_emit);
 }
 
 // The same, for as many voxels as there are fragments. Leaves the numbers in the counters.

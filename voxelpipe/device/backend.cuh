@@ -46,7 +46,7 @@ namespace device {
 
 // Brings the state of a call to the host. Into ordinary memory the driver copies it; from the second call on a page of
 // host memory is locked, which a kernel writes in less time: 10 us of a call that takes 60. Unlocking waits for the
-// whole device, so what is used once locks nothing.
+// whole device, so what is used once locks nothing. The page also says where the call's lists are to go.
 class state_reader {
 public:
     state_reader() = default;
@@ -65,34 +65,46 @@ public:
         if (may_lock && was_used_ && page_ == nullptr) lock();
         was_used_ = true;
     }
-    // Where the device writes the state, null where it does not.
+    // What the device knows the page by, null where there is none.
     [[nodiscard]] void* page() const { return on_device_; }
-    // The last that a call puts on its stream.
-    void send(const pipeline_state* state, cudaStream_t stream) const {
+    // Before the launches of a call: where its lists are to go.
+    [[nodiscard]] asked_places ask(const list_places& places) const {
+        if (on_device_ == nullptr) return {places, nullptr};
+        std::memcpy(&page_->places, &places, sizeof(places));
+        return {places, &on_device_->places};
+    }
+    // The last that a call puts on its stream. With a page, the state is zeroed then.
+    void send(pipeline_state* state, cudaStream_t stream) const {
         if (on_device_ == nullptr) return;
-        launch_behind(write_state_kernel<pipeline_state>, 1, 32, stream, stage::validate, state,
-                      static_cast<pipeline_state*>(on_device_));
+        launch_behind(move_state_kernel<pipeline_state>, 1, 32, stream, stage::validate, state, &on_device_->state);
     }
     // What was sent. Waits for the stream.
     [[nodiscard]] pipeline_state receive(const pipeline_state* state, cudaStream_t stream) const {
         pipeline_state copy{};
         if (on_device_ == nullptr) check(cudaMemcpyAsync(&copy, state, sizeof(copy), cudaMemcpyDeviceToHost, stream));
         check(cudaStreamSynchronize(stream));
-        if (on_device_ != nullptr) std::memcpy(&copy, page_, sizeof(copy));
+        if (on_device_ != nullptr) std::memcpy(&copy, &page_->state, sizeof(copy));
         return copy;
     }
 
 private:
     static constexpr std::align_val_t page_bytes{4096};
-    static_assert(sizeof(pipeline_state) <= static_cast<std::size_t>(page_bytes));
+    struct contents {
+        pipeline_state state;
+        list_places places;
+    };
+    static_assert(sizeof(contents) <= static_cast<std::size_t>(page_bytes));
 
     // Once: where that cannot be had, copies do.
     void lock() {
         constexpr auto bytes = static_cast<std::size_t>(page_bytes);
-        page_ = ::operator new(bytes, page_bytes);
+        page_ = new (::operator new(bytes, page_bytes)) contents{};
         if (cudaHostRegister(page_, bytes, cudaHostRegisterMapped | cudaHostRegisterPortable) == cudaSuccess) {
-            if (cudaHostGetDevicePointer(&on_device_, page_, 0) == cudaSuccess) return;
-            on_device_ = nullptr;
+            void* on_device = nullptr;
+            if (cudaHostGetDevicePointer(&on_device, page_, 0) == cudaSuccess) {
+                on_device_ = static_cast<contents*>(on_device);
+                return;
+            }
             cudaHostUnregister(page_);
         }
         cudaGetLastError();
@@ -102,8 +114,8 @@ private:
         std::swap(on_device_, other.on_device_);
         std::swap(was_used_, other.was_used_);
     }
-    void* page_ = nullptr;
-    void* on_device_ = nullptr; // the page, where it is locked
+    contents* page_ = nullptr;
+    contents* on_device_ = nullptr; // the page, where it is locked
     bool was_used_ = false;
 };
 
@@ -237,7 +249,8 @@ public:
     bool locks_memory = true;
 
     // Whether a call with the same arguments as those before it, the third on a row, is kept as a CUDA graph, which
-    // saves the host and the device some 10 us each time from then on. Framebuffers only, and where locks_memory holds.
+    // saves the host and the device some 10 us each time from then on. Where locks_memory holds; the arrays of an
+    // A-buffer may be others each time.
     // The driver has memory of its own for it, until a call with other arguments, release or the destructor.
     bool keeps_graphs = true;
 
@@ -292,6 +305,7 @@ public:
     // Gives back the memory that is kept between calls.
     void release() {
         call_graph_ = {};
+        has_zeroed_state_ = false;
         workspace_ = {};
         state_reader_ = {};
     }
@@ -354,37 +368,52 @@ private:
     // The workspace, at least so large.
     [[nodiscard]] void* reserve(std::size_t bytes) {
         if (workspace_.size() < bytes) {
+            has_zeroed_state_ = false;
             workspace_ = {}; // first, so that both need not fit
             workspace_ = device_block(bytes, resource, stream);
         }
         return workspace_.data();
     }
 
-    template <coverage Rule, class Call>
-    void launch(const Call& call, device::pipeline_state& state) {
-        device::pipeline_state* d_state = nullptr;
-        device::arena plan;
-        call.template go<Rule, false>(plan, d_state, stream);
-        void* const workspace = reserve(plan.used());
-        d_state = static_cast<device::pipeline_state*>(workspace); // the first thing in it
-        state_reader_.prepare(locks_memory);
-        const auto launch_all = [&](cudaStream_t on) {
-            device::arena memory(workspace);
-            call.template go<Rule, true>(memory, d_state, on);
+    [[nodiscard]] bool may_keep_graph(const device::stage_clock* clock) const {
+        return keeps_graphs && clock == nullptr && state_reader_.page() != nullptr;
+    }
+    // Puts launch_all(stream), which works in the workspace, on the stream, as a graph where `bytes`, if there are any,
+    // have come before; waits. The state comes first in the workspace; the call before has left it zeroed, mostly.
+    template <class F>
+    [[nodiscard]] device::pipeline_state
+    run_stages(device::stage_clock* clock, const std::optional<device::call_bytes>& bytes, const F& launch_all) {
+        auto* const d_state = static_cast<device::pipeline_state*>(workspace_.data());
+        if (clock != nullptr) clock->start();
+        if (!has_zeroed_state_) device::zero_state(d_state, stream);
+        has_zeroed_state_ = false;
+        const auto launch_and_send = [&](cudaStream_t on) {
+            launch_all(on);
             state_reader_.send(d_state, on);
         };
+        if (bytes)
+            call_graph_.launch(*bytes, stream, launch_and_send);
+        else
+            launch_and_send(stream);
+        const device::pipeline_state state = state_reader_.receive(d_state, stream);
+        has_zeroed_state_ = state_reader_.page() != nullptr;
+        return state;
+    }
+
+    template <coverage Rule, class Call>
+    void launch(const Call& call, device::pipeline_state& state) {
+        device::arena plan;
+        call.template go<Rule, false>(plan, stream);
+        void* const workspace = reserve(plan.used());
+        state_reader_.prepare(locks_memory);
         device::launch_until(call.last_stage(), [&] {
-            if (call.clock != nullptr) call.clock->start();
-            const bool may_keep = keeps_graphs && call.clock == nullptr && state_reader_.page() != nullptr;
-            if constexpr (Call::has_bytes) {
-                if (may_keep)
-                    call_graph_.launch(call.template bytes<Rule>(workspace, state_reader_.page()), stream, launch_all);
-                else
-                    launch_all(stream);
-            } else {
-                launch_all(stream);
-            }
-            state = state_reader_.receive(d_state, stream);
+            std::optional<device::call_bytes> bytes;
+            if constexpr (Call::has_bytes)
+                if (may_keep_graph(call.clock)) bytes = call.template bytes<Rule>(workspace, state_reader_.page());
+            state = run_stages(call.clock, bytes, [&](cudaStream_t on) {
+                device::arena memory(workspace);
+                call.template go<Rule, true>(memory, on);
+            });
         });
     }
 
@@ -401,6 +430,15 @@ private:
               offsets(b, num_voxels == 0 ? 0 : num_voxels + 1, stage::abuffer_emit),
               primitives(b, num_fragments, stage::abuffer_emit),
               payloads(b, has_payload ? num_fragments : 0, stage::abuffer_emit) {}
+        [[nodiscard]] device::list_places places(std::uint64_t room) {
+            device::list_places p;
+            p.voxels = voxels.data();
+            p.offsets = offsets.data();
+            p.room = room;
+            p.primitives = primitives.data();
+            p.payloads = payloads.data();
+            return p;
+        }
         // As much as there is room for.
         void copy(list_arrays& to, cudaStream_t stream) const {
             const auto copy_one = [&](const auto& from, auto& array) {
@@ -445,44 +483,56 @@ private:
     void fill(const Call& call, std::uint64_t voxel_room, abuffer<cuda_backend, Payload>& lists,
               device::pipeline_state& state) {
         constexpr stage where = stage::abuffer_emit;
-        device::pipeline_state* d_state = nullptr;
         device::arena plan;
-        (void)call.template go<Rule, false, Key>(plan, d_state, stream);
-        device::arena memory(reserve(plan.used()));
+        (void)call.template go<Rule, false, Key>(plan, stream);
+        void* const workspace = reserve(plan.used());
         state_reader_.prepare(locks_memory);
         list_arrays<Payload> arrays = make_beforehand<Payload>(voxel_room, call.limits.fragments);
-        device::list_places places;
-        if (voxel_room != 0)
-            places = {arrays.voxels.data(), arrays.offsets.data(), voxel_room, arrays.primitives.data()};
-        const auto sorted = device::launch_until(where, [&] {
-            if (call.clock != nullptr) call.clock->start();
-            const auto made = call.template go<Rule, true, Key>(memory, d_state, stream, places);
-            if (voxel_room != 0 && (!made.are_placed || list_arrays<Payload>::has_payload)) {
-                device::launch_behind(device::fit_lists_kernel<Key, payload_storage<Payload>>,
-                                      device::fill_device(call.limits.fragments), device::threads_per_block, stream,
-                                      where, made, d_state, call.limits, voxel_room, arrays.voxels.data(),
-                                      arrays.offsets.data(), arrays.primitives.data(), arrays.payloads.data());
-                device::end_stage(call.clock, &stage_times::abuffer_emit);
-            }
-            state_reader_.send(d_state, stream);
-            state = state_reader_.receive(d_state, stream);
-            return made;
+        if (voxel_room == 0) {
+            fill_exactly<Rule, Key>(call, workspace, lists, state);
+            return;
+        }
+        device::launch_until(where, [&] {
+            std::optional<device::call_bytes> bytes;
+            if constexpr (Call::has_bytes)
+                if (may_keep_graph(call.clock)) bytes = call.template bytes<Rule, Key>(workspace, state_reader_.page());
+            const device::asked_places asked = state_reader_.ask(arrays.places(voxel_room));
+            state = run_stages(call.clock, bytes, [&](cudaStream_t on) {
+                device::arena memory(workspace);
+                const auto sorted = call.template go<Rule, true, Key>(memory, on, asked);
+                const auto* const d_state = static_cast<const device::pipeline_state*>(workspace);
+                device::place_lists(sorted, d_state, call.limits, on, call.clock);
+            });
         });
         if (device::has_failed(state, call.limits)) return;
         const std::uint64_t num_voxels = state.list_voxels, num_fragments = state.list_fragments;
-        const bool fits = num_voxels <= voxel_room && num_fragments >= call.limits.fragments / 4 * 3;
-        if (voxel_room != 0 && (fits || num_fragments == 0)) {
-            arrays.give(lists, num_voxels, num_fragments);
-            return;
-        }
-        if (sorted.are_placed && num_voxels > voxel_room) { // more than last time: once more
+        if (num_voxels > voxel_room) { // more than the last time: once more
             fill<Rule, Key>(call, 0, lists, state);
-            return;
-        }
-        list_arrays<Payload> exact(*this, num_voxels, num_fragments);
-        if (sorted.are_placed) {
+        } else if (num_fragments >= call.limits.fragments / 4 * 3 || num_fragments == 0) {
+            arrays.give(lists, num_voxels, num_fragments);
+        } else {
+            list_arrays<Payload> exact(*this, num_voxels, num_fragments);
             arrays.copy(exact, stream);
-        } else if (num_fragments != 0) {
+            exact.give(lists, num_voxels, num_fragments);
+        }
+    }
+
+    // The same with arrays that are made when all is known.
+    template <coverage Rule, class Key, class Call, class Payload>
+    void fill_exactly(const Call& call, void* workspace, abuffer<cuda_backend, Payload>& lists,
+                      device::pipeline_state& state) {
+        constexpr stage where = stage::abuffer_emit;
+        device::fragment_lists<Key, payload_storage<Payload>> sorted{};
+        device::launch_until(where, [&] {
+            state = run_stages(call.clock, std::nullopt, [&](cudaStream_t on) {
+                device::arena memory(workspace);
+                sorted = call.template go<Rule, true, Key>(memory, on);
+            });
+        });
+        if (device::has_failed(state, call.limits)) return;
+        const std::uint64_t num_voxels = state.list_voxels, num_fragments = state.list_fragments;
+        list_arrays<Payload> exact(*this, num_voxels, num_fragments);
+        if (num_fragments != 0) {
             if (call.clock != nullptr) call.clock->start(); // leaves the wait and the allocations out
             device::copy_lists_kernel<<<device::fill_device(num_fragments), device::threads_per_block, 0, stream>>>(
                 sorted, num_voxels, num_fragments, exact.voxels.data(), exact.offsets.data(), exact.primitives.data(),
@@ -497,6 +547,7 @@ private:
     device_block workspace_;
     device::state_reader state_reader_;
     device::call_graph call_graph_;
+    bool has_zeroed_state_ = false; // in the workspace
 };
 
 } // namespace voxelpipe

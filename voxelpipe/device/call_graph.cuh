@@ -33,6 +33,20 @@ private:
     std::vector<std::byte> bytes_;
 };
 
+// A start for the bytes of a call: its type, the device, and the memory that it works in.
+template <class... Types>
+[[nodiscard]] call_bytes bytes_of_call(const void* workspace, const void* page) {
+    static constexpr char type = 0; // its address: one for each list of types
+    int device = 0;
+    check(cudaGetDevice(&device));
+    call_bytes b;
+    b.add(&type);
+    b.add(device);
+    b.add(workspace);
+    b.add(page);
+    return b;
+}
+
 // The last call, and its graph once it has come often enough. Belongs to one device; moves, is never shared.
 class call_graph {
 public:
@@ -48,12 +62,12 @@ public:
 
     // Puts on the stream what launch_all(stream) puts there, which depends on the arguments alone.
     template <class F>
-    void launch(call_bytes&& arguments, cudaStream_t stream, const F& launch_all) {
+    void launch(const call_bytes& arguments, cudaStream_t stream, const F& launch_all) {
         if (arguments == arguments_) {
             if (times_ < worth_a_graph && ++times_ == worth_a_graph) graph_ = record(launch_all);
         } else {
             *this = {};
-            arguments_ = std::move(arguments);
+            arguments_ = arguments;
             times_ = 1;
         }
         if (graph_ != nullptr)

@@ -108,6 +108,7 @@ template <class Key, class Payload>
         b.payloads = memory.take<Payload>(capacity);
     }
     b.first_of_voxel = memory.take<std::uint64_t>(capacity + 1);
+    b.places = memory.take<list_places>(1);
     b.storage = memory.take<std::byte>(b.storage_bytes);
     return b;
 }
@@ -154,9 +155,10 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     stage_clock* clock = nullptr; // where the call is asked for its times
 
     // Carves the memory and, with Run, launches every stage. Whatever can fail is known before the first voxel is
-    // written.
+    // written. The state comes first in the memory, and is zeroed before.
     template <coverage Rule, bool Run>
-    void go(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
+    void go(arena& memory, cudaStream_t stream) const {
+        pipeline_state* const state = memory.take<pipeline_state>(1);
         if constexpr (can_be_direct<FragmentShader, Framebuffer>) {
             if (is_direct_call()) {
                 go_direct<Rule, Run>(memory, state, stream);
@@ -170,20 +172,13 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
             go_with<Rule, Run, std::uint64_t>(memory, state, stream);
     }
 
-    // All that the launches of this call depend on, with the memory that they work in, where it is plain bytes.
+    // All that the launches of this call depend on, where it is plain bytes.
     static constexpr bool has_bytes =
         std::is_trivially_copyable_v<draw_type> && std::is_trivially_copyable_v<Framebuffer>;
     template <coverage Rule>
-    [[nodiscard]] call_bytes bytes(const void* workspace, const void* state_page) const {
-        static constexpr char type = 0; // its address: one for each type of call
-        int device = 0;
-        check(cudaGetDevice(&device));
-        call_bytes b;
-        b.add(&type);
+    [[nodiscard]] call_bytes bytes(const void* workspace, const void* page) const {
+        call_bytes b = bytes_of_call<framebuffer_call>(workspace, page);
         b.add(Rule);
-        b.add(device);
-        b.add(workspace);
-        b.add(state_page);
         for (const draw_type& d : draws) b.add(d);
         b.add(g);
         b.add(fb);
@@ -213,9 +208,8 @@ private:
     }
 
     template <coverage Rule, bool Run>
-    void go_direct(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
+    void go_direct(arena& memory, pipeline_state* state, cudaStream_t stream) const {
         constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
-        state = memory.take<pipeline_state>(1);
         const auto plan = plan_direct(draws, fb, num_primitives, options.count_voxels);
         bool has_marks = false;
         core::for_each_index<groups::count>([&]<std::size_t K>() {
@@ -231,7 +225,6 @@ private:
         core::snapped_position* const positions = memory.take<core::snapped_position>(on_the_spot ? 0 : vertices);
         const triangle_lists handed_on = triangle_lists::take(memory, most_triangles);
         if constexpr (Run) {
-            check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
             if (has_marks) check(cudaMemsetAsync(marks.words, 0, marks.num_words() * sizeof(word), stream));
             for (const draw_type& d : draws)
                 check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);
@@ -277,12 +270,10 @@ private:
     }
 
     template <coverage Rule, bool Run, class Key>
-    void go_with(arena& memory, pipeline_state*& state, cudaStream_t stream) const {
-        state = memory.take<pipeline_state>(1);
+    void go_with(arena& memory, pipeline_state* state, cudaStream_t stream) const {
         const scene_buffers buffers(memory, draws);
         scene_type s{};
         if constexpr (Run) {
-            check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
             s = buffers.shade(draws, g, stream);
             end_stage(clock, &stage_times::vertex_shade);
         }
@@ -351,16 +342,29 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     capacities limits;
     stage_clock* clock = nullptr;
 
-    // Carves the memory and, with `run`, launches the stages up to the sorted lists. They may come to lie in arrays
-    // that are given, with room for limits.fragments primitives.
+    // All that the launches of this call depend on, where it is plain bytes.
+    static constexpr bool has_bytes = std::is_trivially_copyable_v<draw_type>;
+    template <coverage Rule, class Key>
+    [[nodiscard]] call_bytes bytes(const void* workspace, const void* page) const {
+        call_bytes b = bytes_of_call<abuffer_call, Key>(workspace, page);
+        b.add(Rule);
+        for (const draw_type& d : draws) b.add(d);
+        b.add(g);
+        b.add(num_primitives);
+        b.add(limits);
+        return b;
+    }
+
+    // Carves the memory and, with Run, launches the stages up to the sorted lists, which may be where they are asked
+    // for already (are_placed): there is room for limits.fragments primitives. The state comes first in the memory, and
+    // is zeroed before.
     template <coverage Rule, bool Run, class Key>
-    [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, pipeline_state*& state, cudaStream_t stream,
-                                                  const list_places& to = {}) const {
-        state = memory.take<pipeline_state>(1);
-        if constexpr (Run) check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
+    [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, cudaStream_t stream,
+                                                  const asked_places& asked = {}) const {
+        pipeline_state* const state = memory.take<pipeline_state>(1);
         if constexpr (core::is_solid<FragmentShader> && sizeof(Key) == sizeof(std::uint32_t)) {
             if (is_listable(draws.size(), num_primitives, core::make_snap_transform(g).fraction, g.extent))
-                return go_direct<Rule, Run>(memory, state, stream, to);
+                return go_direct<Rule, Run>(memory, state, stream, asked);
         }
         const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
         const scene_buffers buffers(memory, draws);
@@ -368,7 +372,8 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
         if constexpr (Run) {
             const scene_type s = buffers.shade(draws, g, stream);
             end_stage(clock, &stage_times::vertex_shade);
-            return build_lists<Rule, first_value>(s, lists, share.with(state), state, limits, true, stream, clock);
+            return build_lists<Rule, first_value>(s, lists, share.with(state), state, limits, true, stream, clock,
+                                                  asked);
         } else {
             return {};
         }
@@ -377,8 +382,8 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
 private:
     // One draw of a constant shader.
     template <coverage Rule, bool Run>
-    [[nodiscard]] fragment_lists<std::uint32_t, Payload> go_direct(arena& memory, pipeline_state* state,
-                                                                   cudaStream_t stream, const list_places& to) const {
+    [[nodiscard]] fragment_lists<std::uint32_t, Payload>
+    go_direct(arena& memory, pipeline_state* state, cudaStream_t stream, const asked_places& asked) const {
         constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
         const draw_type& d = draws[0];
         const auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
@@ -404,7 +409,7 @@ private:
             }
             end_stage(clock, &stage_times::fine_raster);
             fragment_lists<std::uint32_t, Payload> sorted =
-                sort_unordered(lists, order, to, num_primitives, state, limits, stream, clock);
+                sort_unordered(lists, order, asked, num_primitives, state, limits, stream, clock);
             if constexpr (!std::is_same_v<Payload, no_payload>)
                 sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
             return sorted;

@@ -23,7 +23,7 @@ inline constexpr int num_warp_sorts = 2;             // with 16 or 32 fragments 
 inline constexpr std::uint32_t most_of_warp = 32 * 32;
 inline constexpr std::uint32_t most_of_block = 4096;
 inline constexpr int narrow_primitive_bits = 24; // beside the rank of a voxel in its window, in 32
-inline constexpr int order_warps = 8;            // of a block
+inline constexpr int order_warps = 4;            // of a block that takes windows
 inline constexpr int block_sort_threads = 256;
 inline constexpr std::uint32_t merge_ways = 64; // runs that one merge takes
 
@@ -80,13 +80,15 @@ struct order_lists {
     }
 };
 
-// Where the voxels of the lists go, ascending: their numbers, to one of two arrays, and where their fragments begin.
-// What is beyond the room is counted, not written.
-struct voxel_places {
-    std::uint64_t* wide; // or null:
-    std::uint32_t* narrow;
-    std::uint64_t* first;
-    std::uint64_t room;
+// Arrays for lists: the voxels, ascending, in one of two, where their fragments begin, and one place more that says how
+// many fragments there are; voxels beyond the room are counted, not written. The primitives by voxel, and payloads.
+struct list_places {
+    std::uint64_t* voxels = nullptr; // or
+    std::uint32_t* narrow_voxels = nullptr;
+    std::uint64_t* offsets = nullptr;
+    std::uint64_t room = 0;
+    std::uint32_t* primitives = nullptr;
+    void* payloads = nullptr;
 };
 
 // How many voxels begin in each tile of windows, passed on from tile to tile: one word each, zeroed before.
@@ -138,16 +140,21 @@ struct order_memory {
     }
 };
 
-// keys: the voxels of the fragments, ascending; from: their primitives, in any order within a voxel, overwritten; to:
-// where they come to lie in order; spare: room for as many, which may be where the keys are.
+// keys: the voxels of the fragments, ascending; from: their primitives, in any order within a voxel, overwritten;
+// spare: room for as many, which may be where the keys are. The lists go where `asked` says, in device memory, or
+// `here` where that has no voxels.
 struct order_buffers {
     const std::uint32_t* keys;
     std::uint32_t* from;
-    std::uint32_t* to;
     std::uint32_t* spare;
+    const list_places* asked;
+    list_places here;
     tile_counts tiles;
-    voxel_places voxels;
     order_lists lists;
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE const list_places& places() const {
+        return asked->voxels != nullptr ? *asked : here;
+    }
 };
 
 // ---- windows --------------------------------------------------------------------------------------------------------
@@ -211,8 +218,8 @@ struct order_window {
 // first `skipped` are of a voxel that begins before it. starts: by 32 places, where voxels begin. A fragment's number
 // in the sort is its voxel's rank within the window and then its primitive, in as many bits as Word leaves.
 template <class Word, int Items>
-__device__ VOXELPIPE_INLINE void order_places(const order_buffers& b, order_window& window, std::uint32_t begin,
-                                              std::uint32_t skipped, std::uint32_t end,
+__device__ VOXELPIPE_INLINE void order_places(const order_buffers& b, std::uint32_t* to, order_window& window,
+                                              std::uint32_t begin, std::uint32_t skipped, std::uint32_t end,
                                               const unsigned (&starts)[window_length / 32]) {
     constexpr int primitive_bits = sizeof(Word) == 4 ? narrow_primitive_bits : 32;
     constexpr int rows = window_length / 32;
@@ -239,7 +246,7 @@ __device__ VOXELPIPE_INLINE void order_places(const order_buffers& b, order_wind
 #pragma unroll
     for (int k = 0; k < Items; ++k) {
         const std::uint32_t at = lane + 32 * static_cast<std::uint32_t>(k);
-        if (at < end - skipped) b.to[begin + skipped + at] = window.primitives[at + static_cast<std::uint32_t>(k)];
+        if (at < end - skipped) to[begin + skipped + at] = window.primitives[at + static_cast<std::uint32_t>(k)];
     }
 }
 
@@ -264,8 +271,8 @@ __device__ VOXELPIPE_INLINE void order_places(const order_buffers& b, order_wind
 // Puts the voxels in order that begin in the window of n fragments from `begin` on, but for one that is too long, which
 // goes to its list; leaves all of them in `window`, and returns how many they are. By all lanes of a warp.
 template <class Word>
-[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t order_window_at(const order_buffers& b, order_window& window,
-                                                                        std::uint32_t begin, std::uint32_t n) {
+[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t
+order_window_at(const order_buffers& b, std::uint32_t* to, order_window& window, std::uint32_t begin, std::uint32_t n) {
     constexpr int rows = window_length / 32;
     const std::uint32_t lane = threadIdx.x % 32;
     const std::uint32_t* const voxels = b.keys + begin;
@@ -317,11 +324,11 @@ template <class Word>
     }
     const std::uint32_t skipped = window.first[0] - begin;
     if (end - skipped <= (is_long ? count - 1 : count)) { // a fragment each, or nothing
-        for (std::uint32_t i = skipped + lane; i < end; i += 32) b.to[begin + i] = b.from[begin + i];
+        for (std::uint32_t i = skipped + lane; i < end; i += 32) to[begin + i] = b.from[begin + i];
     } else if (end <= 32 * 8) {
-        order_places<Word, 8>(b, window, begin, skipped, end, starts);
+        order_places<Word, 8>(b, to, window, begin, skipped, end, starts);
     } else {
-        order_places<Word, 16>(b, window, begin, skipped, end, starts);
+        order_places<Word, 16>(b, to, window, begin, skipped, end, starts);
     }
     return count;
 }
@@ -336,6 +343,7 @@ __global__ __launch_bounds__(32 * order_warps) void order_windows_kernel(const _
     if (has_failed(*state, limits)) return;
     const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::most_numbered
     const std::uint32_t warp = warp_in_block(), lane = threadIdx.x % 32;
+    const list_places to = b.places();
     for (;;) {
         __syncthreads(); // all have read what the last tile left
         if (threadIdx.x == 0) tile = atomicAdd(&state->next_tile, 1u);
@@ -344,7 +352,7 @@ __global__ __launch_bounds__(32 * order_warps) void order_windows_kernel(const _
         if (first >= n) return;
         order_window& window = windows[warp];
         const std::uint32_t count =
-            begin < n ? order_window_at<Word>(b, window, static_cast<std::uint32_t>(begin), n) : 0;
+            begin < n ? order_window_at<Word>(b, to.primitives, window, static_cast<std::uint32_t>(begin), n) : 0;
         if (lane == 0) counts[warp] = count;
         __syncthreads();
         if (warp == 0) {
@@ -354,19 +362,19 @@ __global__ __launch_bounds__(32 * order_warps) void order_windows_kernel(const _
                 before = sum;
                 if (first + tile_counts::length >= n) { // the last tile
                     state->list_voxels = sum + all;
-                    if (sum + all <= b.voxels.room) b.voxels.first[sum + all] = n;
+                    if (sum + all <= to.room) to.offsets[sum + all] = n;
                 }
             }
         }
         __syncthreads();
         std::uint64_t at = before + lane;
         for (std::uint32_t w = 0; w < warp; ++w) at += counts[w];
-        for (std::uint32_t r = lane; r < count && at < b.voxels.room; r += 32, at += 32) {
-            if (b.voxels.wide != nullptr)
-                b.voxels.wide[at] = window.voxels[r];
+        for (std::uint32_t r = lane; r < count && at < to.room; r += 32, at += 32) {
+            if (to.voxels != nullptr)
+                to.voxels[at] = window.voxels[r];
             else
-                b.voxels.narrow[at] = window.voxels[r];
-            b.voxels.first[at] = window.first[r];
+                to.narrow_voxels[at] = window.voxels[r];
+            to.offsets[at] = window.first[r];
         }
     }
 }
@@ -376,7 +384,7 @@ __global__ __launch_bounds__(32 * order_warps) void order_windows_kernel(const _
 // The voxels of a list by a warp each. What is beyond the fragments of one is more than any primitive, or equal to the
 // last.
 template <int List>
-__device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b) {
+__device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uint32_t* to) {
     constexpr int items = static_cast<int>(order_lists::most_below(List + 1) / 32);
     const std::uint32_t n = uniform(b.lists.counts[List]), lane = threadIdx.x % 32;
     constexpr std::uint32_t warps = block_sort_threads / 32;
@@ -391,7 +399,7 @@ __device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b) {
         sort_warp(w);
 #pragma unroll
         for (std::uint32_t k = 0; k < items; ++k)
-            if (lane * items + k < run.length) b.to[run.begin + lane * items + k] = w[k];
+            if (lane * items + k < run.length) to[run.begin + lane * items + k] = w[k];
     }
 }
 
@@ -400,7 +408,7 @@ struct less_than {
 };
 
 // By a block each: voxels, and runs of one, which go back to where they were.
-__device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b) {
+__device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::uint32_t* primitives) {
     constexpr std::uint32_t items = most_of_block / block_sort_threads;
     using lists = order_lists;
     using sorter = cub::BlockMergeSort<std::uint32_t, block_sort_threads, static_cast<int>(items)>;
@@ -416,7 +424,7 @@ __device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b) {
         }
         sorter(storage).Sort(w, less_than{});
         __syncthreads(); // all have read the run, and the storage may be used again
-        std::uint32_t* const to = r < whole ? b.to : b.from;
+        std::uint32_t* const to = r < whole ? primitives : b.from;
 #pragma unroll
         for (std::uint32_t k = 0; k < items; ++k) {
             const std::uint32_t i = threadIdx.x * items + k;
@@ -428,10 +436,11 @@ __device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b) {
 template <class Buffers>
 __global__ __launch_bounds__(block_sort_threads) void order_long_kernel(const __grid_constant__ Buffers b) {
     await_stream();
-    order_by_warps<0>(b);
-    order_by_warps<1>(b);
+    std::uint32_t* const to = b.places().primitives;
+    order_by_warps<0>(b, to);
+    order_by_warps<1>(b, to);
     static_assert(num_warp_sorts == 2);
-    order_by_blocks(b);
+    order_by_blocks(b, to);
 }
 
 // How many of the sorted numbers are less than w.
@@ -473,13 +482,13 @@ __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::
         for (std::uint64_t start = group; start < end; start += length)
             if (start != own)
                 place += count_less(from + voxel.begin + start, end - start < length ? end - start : length, primitive);
-        (voxel.length <= group_length ? b.to : to)[place] = primitive;
+        (voxel.length <= group_length ? b.places().primitives : to)[place] = primitive;
     }
 }
 
 // ---- host -----------------------------------------------------------------------------------------------------------
 
-// Puts b.from in order, in b.to, and lists the voxels; counts them in the state.
+// Puts b.from in order and lists the voxels; counts them in the state.
 inline void order_fragments(const order_buffers& b, std::uint64_t num_primitives, pipeline_state* state,
                             const capacities& limits, cudaStream_t stream) {
     constexpr stage where = stage::abuffer_emit;

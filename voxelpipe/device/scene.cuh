@@ -44,14 +44,21 @@ struct capacities {
            s.list_fragments > c.fragments || s.fragment_records > c.fragment_records;
 }
 
-// Copies the state to memory that the device can write. One warp.
+// Where a call starts.
+inline void zero_state(void* state, cudaStream_t stream) {
+    check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
+}
+
+// Moves the state to memory that the device can write, and leaves zeros for the next call. One warp.
 template <class State>
-__global__ void write_state_kernel(const State* state, State* to) {
+__global__ void move_state_kernel(State* state, State* to) {
     await_stream();
     using word = std::uint64_t;
     static_assert(sizeof(State) % sizeof(word) == 0);
-    for (unsigned i = threadIdx.x; i < sizeof(State) / sizeof(word); i += 32)
+    for (unsigned i = threadIdx.x; i < sizeof(State) / sizeof(word); i += 32) {
         reinterpret_cast<word*>(to)[i] = reinterpret_cast<const word*>(state)[i];
+        reinterpret_cast<word*>(state)[i] = 0;
+    }
 }
 
 struct draw_geometry {

@@ -26,29 +26,32 @@ template <class Key>
     return bytes;
 }
 
-// Makes the pairs beyond *num_pairs, or all where the call has failed, fillers that sort to the end.
-// `zeros` words that the sort's reader wants zeroed are on the way.
+// Makes the pairs beyond num_pairs, or all where the call has failed, fillers that sort to the end. By all threads of a
+// grid.
 template <class Key>
-__global__ void fill_end_kernel(Key* keys, std::uint32_t* values, const unsigned long long* num_pairs,
-                                std::uint64_t capacity, const pipeline_state* state, capacities limits,
-                                unsigned long long* words, std::uint64_t zeros) {
-    await_stream();
-    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
-    for (std::uint64_t i = thread; i < zeros; i += threads) words[i] = 0;
-    const std::uint64_t first = has_failed(*state, limits) ? 0 : *num_pairs;
-    for (std::uint64_t i = first + thread; i < capacity; i += threads) {
+__device__ VOXELPIPE_INLINE void fill_end_by_all(Key* keys, std::uint32_t* values, std::uint64_t num_pairs,
+                                                 std::uint64_t capacity, const pipeline_state& state,
+                                                 const capacities& limits) {
+    const std::uint64_t first = has_failed(state, limits) ? 0 : num_pairs;
+    for (std::uint64_t i = first + std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < capacity;
+         i += std::uint64_t{gridDim.x} * blockDim.x) {
         keys[i] = static_cast<Key>(~Key{0});
         values[i] = 0;
     }
 }
 
 template <class Key>
+__global__ void fill_end_kernel(Key* keys, std::uint32_t* values, const unsigned long long* num_pairs,
+                                std::uint64_t capacity, const pipeline_state* state, capacities limits) {
+    await_stream();
+    fill_end_by_all(keys, values, *num_pairs, capacity, *state, limits);
+}
+
+template <class Key>
 void fill_end(Key* keys, std::uint32_t* values, const unsigned long long* num_pairs, std::uint64_t capacity,
-              const pipeline_state* state, const capacities& limits, cudaStream_t stream,
-              unsigned long long* words = nullptr, std::uint64_t zeros = 0) {
+              const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
     launch_behind(fill_end_kernel<Key>, fill_device(capacity), threads_per_block, stream, stage::tile_sort, keys,
-                  values, num_pairs, capacity, state, limits, words, zeros);
+                  values, num_pairs, capacity, state, limits);
 }
 
 template <class Key>

@@ -37,11 +37,10 @@ namespace device {
 template <class Call>
 [[nodiscard]] std::size_t bytes_of(const Call& call, coverage rule) {
     arena plan;
-    pipeline_state* state = nullptr;
     if (rule == coverage::thin)
-        call.template go<coverage::thin, false>(plan, state, nullptr);
+        call.template go<coverage::thin, false>(plan, nullptr);
     else
-        call.template go<coverage::conservative, false>(plan, state, nullptr);
+        call.template go<coverage::conservative, false>(plan, nullptr);
     return plan.used();
 }
 
@@ -100,11 +99,11 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
                 }
                 device::launch_until(call.last_stage(), [&] {
                     device::arena memory(workspace.memory);
-                    device::pipeline_state* state = nullptr; // the first thing in the workspace
+                    device::zero_state(workspace.memory, backend.stream);
                     if (options.rule == coverage::thin)
-                        call.template go<coverage::thin, true>(memory, state, backend.stream);
+                        call.template go<coverage::thin, true>(memory, backend.stream);
                     else
-                        call.template go<coverage::conservative, true>(memory, state, backend.stream);
+                        call.template go<coverage::conservative, true>(memory, backend.stream);
                 });
             };
             device::with_call(draws, g, fb, options, s.counts.triangles_in, workspace.limits, launch);
