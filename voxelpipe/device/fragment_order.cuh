@@ -381,14 +381,15 @@ __global__ __launch_bounds__(32 * order_warps) void order_windows_kernel(const _
 
 // ---- long voxels ----------------------------------------------------------------------------------------------------
 
-// The voxels of a list by a warp each. What is beyond the fragments of one is more than any primitive, or equal to the
-// last.
+// The voxels of a list by a warp each, the first one by the first warp of block `start`. What is beyond the fragments
+// of a voxel is more than any primitive, or equal to the last.
 template <int List>
-__device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uint32_t* to) {
+__device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uint32_t* to, unsigned start) {
     constexpr int items = static_cast<int>(order_lists::most_below(List + 1) / 32);
-    const std::uint32_t n = uniform(b.lists.counts[List]), lane = threadIdx.x % 32;
     constexpr std::uint32_t warps = block_sort_threads / 32;
-    for (std::uint32_t r = blockIdx.x * warps + warp_in_block(); r < n; r += gridDim.x * warps) {
+    const std::uint32_t n = uniform(b.lists.counts[List]), lane = threadIdx.x % 32;
+    const std::uint32_t block = blockIdx.x >= start ? blockIdx.x - start : blockIdx.x + gridDim.x - start;
+    for (std::uint32_t r = block * warps + warp_in_block(); r < n; r += gridDim.x * warps) {
         const fragment_run run = b.lists.voxels[List][r];
         std::uint32_t w[items];
 #pragma unroll
@@ -434,21 +435,22 @@ __device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::ui
 }
 
 template <class Buffers>
-__global__ __launch_bounds__(block_sort_threads) void order_long_kernel(const __grid_constant__ Buffers b) {
+__global__ __launch_bounds__(block_sort_threads, 4) void order_long_kernel(const __grid_constant__ Buffers b) {
     await_stream();
     std::uint32_t* const to = b.places().primitives;
-    order_by_warps<0>(b, to);
-    order_by_warps<1>(b, to);
+    // Where there are few, each list has blocks of its own.
+    order_by_warps<0>(b, to, gridDim.x / 3);
+    order_by_warps<1>(b, to, gridDim.x / 3 * 2);
     static_assert(num_warp_sorts == 2);
     order_by_blocks(b, to);
 }
 
-// How many of the sorted numbers are less than w.
-[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint64_t count_less(const std::uint32_t* numbers, std::uint64_t n,
+// How many of n sorted numbers are less than w.
+[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t count_less(const std::uint32_t* numbers, std::uint32_t n,
                                                                    std::uint32_t w) {
-    std::uint64_t lo = 0;
+    std::uint32_t lo = 0;
     while (n > 0) {
-        const std::uint64_t half = n / 2;
+        const std::uint32_t half = n / 2;
         if (numbers[lo + half] < w) {
             lo += half + 1;
             n -= half + 1;
@@ -460,29 +462,46 @@ __global__ __launch_bounds__(block_sort_threads) void order_long_kernel(const __
 }
 
 // Merges up to merge_ways sorted runs of `length` each: a primitive's place is the sum of how many are less in each. A
-// thread takes one fragment. Last: the rest of the voxel in one go, however many runs that is.
+// thread takes one fragment, a warp 32 neighbours of a run: each lane finds where those begin and end in another run,
+// and all search between. Last: the rest of the voxel in one go, however many runs that is.
 template <class Buffers>
 __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::uint32_t* from, std::uint32_t* to,
                                   std::uint64_t length, bool last) {
     constexpr std::uint32_t parts = most_of_block / threads_per_block;
     await_stream();
+    const std::uint32_t lane = threadIdx.x % 32;
     const std::uint64_t n = std::uint64_t{b.lists.counts[order_lists::run_list]} * parts;
     for (std::uint64_t r = blockIdx.x; r < n; r += gridDim.x) {
         const voxel_run entry = b.lists.runs[r / parts];
         const fragment_run voxel = entry.voxel;
         if (voxel.length <= length) continue; // was done by the merge before
         const std::uint64_t i = r % parts * threads_per_block + threadIdx.x;
-        if (i >= entry.run.length) continue;
+        if (i - lane >= entry.run.length) continue; // no lane has one
         const std::uint64_t group_length = last ? voxel.length : length * merge_ways;
-        const std::uint64_t at = entry.run.begin - voxel.begin + i; // within the voxel
+        // Within the voxel. Lanes beyond the last fragment take that.
+        const std::uint64_t at = entry.run.begin - voxel.begin + (i < entry.run.length ? i : entry.run.length - 1);
         const std::uint64_t group = at / group_length * group_length, own = at / length * length;
         const std::uint64_t end = group + group_length < voxel.length ? group + group_length : voxel.length;
-        const std::uint32_t primitive = from[voxel.begin + at];
+        const std::uint32_t* const numbers = from + voxel.begin;
+        const std::uint32_t primitive = numbers[at];
+        const std::uint32_t least = __shfl_sync(0xffffffffu, primitive, 0),
+                            most = __shfl_sync(0xffffffffu, primitive, 31);
         std::uint64_t place = voxel.begin + group + (at - own);
-        for (std::uint64_t start = group; start < end; start += length)
-            if (start != own)
-                place += count_less(from + voxel.begin + start, end - start < length ? end - start : length, primitive);
-        (voxel.length <= group_length ? b.places().primitives : to)[place] = primitive;
+        for (std::uint64_t start = group; start < end; start += 32 * length) {
+            const std::uint64_t mine = start + lane * length;
+            std::uint32_t low = 0, high = 0; // of the run's numbers, those before `least` and before `most`
+            if (mine < end && mine != own) {
+                const auto of_run = static_cast<std::uint32_t>(end - mine < length ? end - mine : length);
+                low = count_less(numbers + mine, of_run, least);
+                high = low + count_less(numbers + mine + low, of_run - low, most);
+            }
+            for (unsigned k = 0; k < 32 && start + k * length < end; ++k) {
+                const std::uint32_t first = __shfl_sync(0xffffffffu, low, k);
+                const std::uint32_t between = __shfl_sync(0xffffffffu, high, k) - first;
+                place += first + count_less(numbers + start + k * length + first, between, primitive);
+            }
+        }
+        if (i < entry.run.length) (voxel.length <= group_length ? b.places().primitives : to)[place] = primitive;
     }
 }
 
