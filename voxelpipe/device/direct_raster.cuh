@@ -71,7 +71,8 @@ template <class Call>
 struct blending_sink : direct_sink<Call> {
     static constexpr bool buffers = false;
     static constexpr bool shares = !Call::output::hands_on; // one() wants to be told apart
-    static constexpr bool checks_indices = false;           // check_indices has run
+    static constexpr bool spreads = shares;
+    static constexpr bool checks_indices = false; // check_indices has run
     struct memory {};
 
     // Fragments and first touches of one thread, which cannot write 2^32 before the largest list ends.
@@ -103,6 +104,9 @@ struct blending_sink : direct_sink<Call> {
         each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
             mine.touched += blend_row(t, x0, y, z, mask, voxelpipe::get<K>(this->call.out.values), mode);
         });
+    }
+    __device__ VOXELPIPE_INLINE void row_by_all(unsigned, int x0, int y, int z, word mask) {
+        row(x0, y, z, mask & bits_of_lane());
     }
     // Rows as in blend_rows.
     __device__ VOXELPIPE_INLINE void two(int x, int y, int z, const word (&mask)[2], bool along_y) {

@@ -14,6 +14,7 @@ template <class Call>
 struct listing_sink : direct_sink<Call> {
     static constexpr bool buffers = true;
     static constexpr bool shares = false;
+    static constexpr bool spreads = true;
     static constexpr bool checks_indices = true;
     static constexpr unsigned room = 448;    // with the queues, less than 48 KB for a block
     static constexpr unsigned flush_at = 64; // less may wait: a round of thin triangles brings up to 384
@@ -40,6 +41,16 @@ struct listing_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
         write_row(atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask))), voxel(x0, y, z), mask);
+    }
+    __device__ VOXELPIPE_INLINE void row_by_all(unsigned group, int x0, int y, int z, word mask) {
+        unsigned at = 0;
+        if (threadIdx.x % medium_lanes == 0) at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask)));
+        at = __shfl_sync(group, at, 0, medium_lanes);
+        const std::uint32_t first = voxel(x0, y, z);
+        for (word own = mask & bits_of_lane(); own != 0; own &= own - 1) {
+            const int i = __ffs(static_cast<int>(own)) - 1;
+            write(at + static_cast<unsigned>(__popc(mask & ((1u << i) - 1))), first + static_cast<unsigned>(i));
+        }
     }
     __device__ VOXELPIPE_INLINE void two(int x, int y, int z, const word (&mask)[2], bool along_y) {
         const unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask[0] | mask[1] << 2)));

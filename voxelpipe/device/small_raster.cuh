@@ -8,8 +8,10 @@
 //   begin(triangle), row(x0, y, z, mask), two(x, y, z, masks, along_y), four(x, y, z, masks), voxels(bits, position):
 //                     the fragments of one triangle, as rows of bits along x (blend_rows) or one by one
 //   shares            whether one(x, y, z), a fragment of a triangle that has no other, is more than a row of one
-//   mark_row(x0, x1, y, z), mark_brick(corner, lane): told of voxels of a large triangle before they come, of a brick
-//                     by each of medium_lanes lanes
+//   spreads           whether a row costs by its voxels, so that lanes had better share long ones:
+//   row_by_all(group, x0, y, z, mask): a row by medium_lanes neighbours, all with the same arguments
+//   mark_boxes(wanted, triangle), mark_row(x0, x1, y, z), mark_brick(corner, lane): told of what a triangle may touch
+//                     before it comes, of a brick by each of medium_lanes lanes
 //   drop(class)       counts a triangle that is not drawn
 
 #include <voxelpipe/core/brick_triangle.hpp>
@@ -90,6 +92,10 @@ inline constexpr int small_cells = 27;    // one of so many voxels waits apart f
 inline constexpr int small_columns = 12;  // the same for thin coverage, in columns of voxels
 inline constexpr int most_columns = 192;  // thin: one thread's work
 inline constexpr int medium_lanes = 8;    // of a warp, for one larger triangle
+// The bits of a row that are a lane's where medium_lanes share it: neighbours have neighbouring voxels.
+[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t bits_of_lane() {
+    return ~0u / ((1u << medium_lanes) - 1) << threadIdx.x % medium_lanes;
+}
 // The longest side of its bounding box, in voxels: what 32 bits hold.
 [[nodiscard]] __device__ VOXELPIPE_INLINE int most_medium_side(int fraction) { return fraction < 16 ? 32 : 16; }
 static_assert(core::small_voxels(16) == 16 && core::small_voxels(15) == 32 && core::small_voxels(12) == 32);
@@ -219,7 +225,8 @@ template <class Sink>
 __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s, const std::int32_t (&lo)[3],
                                               const core::small_box& box, Sink& sink) {
     const int lane = static_cast<int>(threadIdx.x) % medium_lanes;
-    const unsigned group = ((1u << medium_lanes) - 1) << (threadIdx.x % 32 / medium_lanes * medium_lanes);
+    const unsigned first_of_group = threadIdx.x % 32 / medium_lanes * medium_lanes;
+    const unsigned group = ((1u << medium_lanes) - 1) << first_of_group;
     const int x0 = box.lo[0], x1 = box.hi[0];
     for (int first_y = box.lo[1]; first_y <= box.hi[1]; first_y += medium_lanes) {
         const int y = first_y + lane;
@@ -229,8 +236,22 @@ __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s,
             const int end = box.hi[2] - first_z + 1 < medium_lanes ? box.hi[2] - first_z + 1 : medium_lanes;
             for (int k = 0; k < end; ++k) {
                 const word limit = __shfl_sync(group, mine, k, medium_lanes) & at_y;
-                if (limit == 0 || !s.meets_row(y, first_z + k)) continue;
-                sink.row(lo[0] + x0, lo[1] + y, lo[2] + first_z + k, s.plane_bits(x0, y, first_z + k, limit));
+                const int z = first_z + k;
+                const word bits = limit == 0 || !s.meets_row(y, z) ? 0 : s.plane_bits(x0, y, z, limit);
+                if constexpr (Sink::spreads) {
+                    // Few long rows, as of a floor, whose voxels are all in one lane's: each row by all lanes.
+                    word rows = __ballot_sync(group, bits != 0) >> first_of_group;
+                    const unsigned longest = __reduce_max_sync(group, static_cast<unsigned>(__popc(bits)));
+                    if (static_cast<unsigned>(__popc(rows)) * 5 <= longest * 3) {
+                        for (; rows != 0; rows &= rows - 1) {
+                            const int of = __ffs(static_cast<int>(rows)) - 1;
+                            const word mask = __shfl_sync(group, bits, of, medium_lanes);
+                            sink.row_by_all(group, lo[0] + x0, lo[1] + first_y + of, lo[2] + z, mask);
+                        }
+                        continue;
+                    }
+                }
+                sink.row(lo[0] + x0, lo[1] + y, lo[2] + z, bits);
             }
         }
     }
