@@ -58,7 +58,8 @@ namespace device {
 // Carves the memory and, with Run, launches every stage and sets the view.
 template <coverage Rule, bool Run, class Key, class Payload, class Call>
 void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
-    [[maybe_unused]] pipeline_state* const state = arena(memory).template take<pipeline_state>(1); // what `go` takes first
+    [[maybe_unused]] pipeline_state* const state =
+        arena(memory).template take<pipeline_state>(1); // what `go` takes first
     if constexpr (Run) zero_state(state, stream);
     const auto sorted = call.template go<Rule, Run, Key>(memory, stream);
     const std::size_t room = call.limits.fragments;

@@ -202,7 +202,7 @@ private:
     [[nodiscard]] bool is_direct_call() const {
         if (draws.size() > most_direct_draws || core::small_voxels(core::make_snap_transform(g).fraction) == 0)
             return false;
-        if (!triangle_lists::holds(num_primitives, large_pieces<coverage::thin>::most_records(g.extent))) return false;
+        if (!triangle_lists::holds(num_primitives, most_large_records(g.extent))) return false;
         if (std::max({g.extent.x, g.extent.y, g.extent.z}) > most_direct_extent) return false;
         return plan_direct(draws, fb, num_primitives, options.count_voxels).possible;
     }

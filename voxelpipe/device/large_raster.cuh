@@ -11,15 +11,19 @@
 #include <voxelpipe/device/wide_path.cuh>
 #include <voxelpipe/device/work_share.cuh>
 
+#include <algorithm>
+
 namespace voxelpipe::device {
 
 inline constexpr int most_direct_extent = 1 << 16; // bricks are numbered with 16 bits, voxels with 32
 
-// How a large triangle's box of voxels is cut into pieces, a lane each, 32 to a record. Conservative: columns of bricks
-// along the dominant axis. Thin: rows of 16 columns of voxels.
+// How a large triangle's box of voxels is cut into pieces, a lane each, some to a record, which is a warp's.
+// Conservative: columns of bricks along the dominant axis, few, for the bricks of a column keep eight lanes busy, and
+// the last warp to end is one with a floor or a wall. Thin: rows of 16 columns of voxels.
 template <coverage Rule>
 struct large_pieces {
     static constexpr int across = Rule == coverage::thin ? 1 : core::brick_size; // voxels along v
+    static constexpr int per_record = Rule == coverage::thin ? 32 : 8;
     int axis;
     core::triple<std::int64_t> lo, hi; // uvw, the box
     std::int64_t first_u, first_v, per_row, rows;
@@ -30,17 +34,21 @@ struct large_pieces {
           first_v(lo[1] / across), per_row((hi[0] >> core::log2_brick) - first_u + 1),
           rows(hi[1] / across - first_v + 1) {}
     [[nodiscard]] VOXELPIPE_HD std::int64_t count() const { return per_row * rows; }
-    [[nodiscard]] VOXELPIPE_HD std::int64_t records() const {
-        return (count() + chunks_per_record - 1) / chunks_per_record;
-    }
+    [[nodiscard]] VOXELPIPE_HD std::int64_t records() const { return (count() + per_record - 1) / per_record; }
     // The lowest voxel of piece i along u and v, maybe outside the box.
     [[nodiscard]] VOXELPIPE_HD std::int64_t u(std::int64_t i) const {
         return (first_u + i % per_row) << core::log2_brick;
     }
     [[nodiscard]] VOXELPIPE_HD std::int64_t v(std::int64_t i) const { return (first_v + i / per_row) * across; }
-    // Piece i as a box of voxels.
-    [[nodiscard]] VOXELPIPE_HD core::voxel_box piece(std::int64_t i) const {
-        const std::int64_t u0 = u(i), v0 = v(i), u1 = u0 + core::brick_size - 1, v1 = v0 + across - 1;
+    // A piece by several lanes: whether part `part` of lanes_each has rows within the box, and these as a box of
+    // voxels.
+    static constexpr int lanes_each = 32 / per_record;
+    [[nodiscard]] VOXELPIPE_HD bool has_rows(std::int64_t i, unsigned part) const {
+        return first_row(i, part) <= hi[1] && first_row(i, part + 1) > lo[1];
+    }
+    [[nodiscard]] VOXELPIPE_HD core::voxel_box piece(std::int64_t i, unsigned part) const {
+        const std::int64_t u0 = u(i), u1 = u0 + core::brick_size - 1;
+        const std::int64_t v0 = first_row(i, part), v1 = first_row(i, part + 1) - 1;
         const auto inside = [&](std::int64_t at, int k) { return at < lo[k] ? lo[k] : at > hi[k] ? hi[k] : at; };
         return {core::to_xyz(axis, inside(u0, 0), inside(v0, 1), lo[2]),
                 core::to_xyz(axis, inside(u1, 0), inside(v1, 1), hi[2])};
@@ -49,13 +57,23 @@ struct large_pieces {
     [[nodiscard]] static std::uint64_t most_records(glm::ivec3 extent) {
         const auto of = [](std::int64_t along, std::int64_t rest) {
             const std::int64_t pieces = (along / core::brick_size + 1) * (rest / across + 1);
-            return static_cast<std::uint64_t>((pieces + chunks_per_record - 1) / chunks_per_record);
+            return static_cast<std::uint64_t>((pieces + per_record - 1) / per_record);
         };
         return core::max3(of(extent.y, extent.z), of(extent.z, extent.x), of(extent.x, extent.y));
     }
-};
 
-// Decides about a triangle in full width; records: how many pieces of 32 it has, where it is drawn.
+private:
+    [[nodiscard]] VOXELPIPE_HD std::int64_t first_row(std::int64_t i, unsigned part) const {
+        return v(i) + part * (across / lanes_each);
+    }
+};
+// Whichever rule.
+[[nodiscard]] inline std::uint64_t most_large_records(glm::ivec3 extent) {
+    return std::max(large_pieces<coverage::thin>::most_records(extent),
+                    large_pieces<coverage::conservative>::most_records(extent));
+}
+
+// Decides about a triangle in full width; records: how many it has, where it is drawn.
 template <class Call>
 __device__ inline core::triangle_class find_records(const Call& call, std::uint32_t triangle,
                                                     unsigned long long& records) {
@@ -156,11 +174,11 @@ template <coverage Rule>
 [[nodiscard]] VOXELPIPE_HD inline unsigned parts_of_record(unsigned long long records, unsigned warps) {
     unsigned parts = 1;
     if (Rule == coverage::conservative)
-        while (parts < chunks_per_record && records * parts * 2 <= warps) parts *= 2;
+        while (parts < large_pieces<Rule>::per_record && records * parts * 2 <= warps) parts *= 2;
     return parts;
 }
 
-// The pieces of all triangles in call.lists.cut, 32 to a record, a lane each; parts warp, warp + warps, ... of the
+// The pieces of all triangles in call.lists.cut, a lane each; parts warp, warp + warps, ... of the
 // records are this warp's. Conservative: the lanes find the bricks that the triangle meets in their columns, and
 // medium_lanes of them then take a brick each.
 template <class Call, class Sink>
@@ -168,6 +186,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
                                                 unsigned warps) {
     constexpr bool thin = Call::rule == coverage::thin;
     constexpr auto rule = core::to_rule(Call::rule);
+    constexpr int per_record = large_pieces<Call::rule>::per_record;
     using sink_type = Sink;
     const unsigned lane = threadIdx.x % 32;
     const core::voxel_box whole{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
@@ -179,7 +198,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
         const unsigned long long r = i / parts;
         __syncwarp(); // lanes that the last pieces kept apart come together
         const unsigned lo = find_last(call.lists.first_records, static_cast<unsigned>(num), r);
-        const auto piece = static_cast<std::int64_t>((r - call.lists.first_records[lo]) * chunks_per_record + lane);
+        const auto piece = static_cast<std::int64_t>((r - call.lists.first_records[lo]) * per_record + lane);
         sink.begin(call.lists.cut[lo]);
         const glm::uvec3 index = call.in.source.triangle(call.lists.cut[lo]);
         const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
@@ -188,12 +207,17 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
         (void)core::classify<Call::rule>(a, b, c, call.in.fraction, whole, reach);
         const int axis = core::dominant_axis(a, b, c, call.in.fraction);
         const large_pieces<Call::rule> pieces(reach, axis);
-        const bool valid = piece < pieces.count() && lane * parts / chunks_per_record == i % parts;
+        // Lanes beyond the record's pieces have the number of no part.
+        const bool valid = piece < pieces.count() && lane * parts / per_record == i % parts;
         if (!core::fits_narrow(a, b, c, call.in.fraction)) {
+            // All lanes: those beyond the record's pieces take part of one.
+            const std::int64_t shared = piece - lane + lane % per_record;
+            const bool wanted = shared < pieces.count() && lane % per_record * parts / per_record == i % parts &&
+                                pieces.has_rows(shared, lane / per_record);
             feed(sink, [&] {
-                if (!valid) return;
+                if (!wanted) return;
                 span_writer<sink_type> writer{sink};
-                for_each_wide_span<rule>(a, b, c, call.in.fraction, pieces.piece(piece),
+                for_each_wide_span<rule>(a, b, c, call.in.fraction, pieces.piece(shared, lane / per_record),
                                          [&](const wide_span& s) { writer.span(axis, s.u, s.v, s.w_first, s.w_last); });
                 writer.flush();
             });

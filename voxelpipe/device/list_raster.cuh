@@ -176,7 +176,7 @@ struct list_output {
                                       glm::ivec3 extent) {
     return num_draws == 1 && core::small_voxels(fraction) > 0 &&
            std::max({extent.x, extent.y, extent.z}) <= most_direct_extent &&
-           triangle_lists::holds(num_triangles, large_pieces<coverage::thin>::most_records(extent));
+           triangle_lists::holds(num_triangles, most_large_records(extent));
 }
 
 // Appends the fragments of a draw to two arrays of limits.fragments elements each; counts them in the state.

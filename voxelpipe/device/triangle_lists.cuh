@@ -58,7 +58,7 @@ struct triangle_lists {
     unsigned long long* lengths; // [num_triangle_kinds]
     std::uint32_t capacity;      // of an array
 
-    // Triangles that are cut into pieces, each with the number of its first record of 32 pieces: a warp finds the
+    // Triangles that are cut into pieces, each with the number of its first record of them: a warp finds the
     // triangle of a record by bisection. `next` packs how many triangles and records there are, so that one atomic
     // places both.
     static constexpr int record_bits = 36;
