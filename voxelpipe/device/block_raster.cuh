@@ -104,9 +104,12 @@ struct block_warp {
             if (kind == cube_triangles) put(queues.cubes, cube_at, r);
             const int small_at = take_place(kind == small_triangles, num_smalls);
             if (kind == small_triangles) put(queues.smalls, small_at, r);
-            const int large_at = take_place(kind == large_triangles, num_larges);
-            if (kind == large_triangles) queues.larges[large_at] = i;
-            call.lists.push(medium_triangles, kind == medium_triangles, i);
+            // A mesh that leaves multiprocessors without a block: these are for the whole device.
+            const bool is_spread = kind == large_triangles && call.in.num_triangles <= gridDim.x * raster_threads;
+            const bool is_large = kind == large_triangles && !is_spread;
+            const int large_at = take_place(is_large, num_larges);
+            if (is_large) queues.larges[large_at] = i;
+            call.lists.push(medium_triangles, is_spread || kind == medium_triangles, i);
             if (is_big) big[atomicAdd(&num_big, 1u)] = i; // no call of a function here: its registers would spill
         }
         __syncwarp();
