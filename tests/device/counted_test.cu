@@ -167,6 +167,18 @@ TEST(Counted, LargeGridsByMarks) {
     }
 }
 
+// As few as the tiles took before there were marks.
+TEST(Counted, FewLargeTrianglesByMarks) {
+    const glm::ivec3 extent(260, 210, 170);
+    const glm::vec3 size(extent);
+    mesh_data m;
+    add_triangle(m, size * glm::vec3(0.1f, 0.0f, 0.2f), size * glm::vec3(0.9f, 0.8f, 0.3f), size * 1.2f);
+    add_triangle(m, {40.0f, 30.5f, 20.0f}, {90.0f, 30.5f, 25.0f}, {70.0f, 30.5f, 80.0f});
+    add_triangle(m, {40.0f, 30.5f, 20.0f}, {43.0f, 32.5f, 25.0f}, {41.0f, 31.5f, 22.0f});
+    for (const float value : {1.0f, 0.1f})
+        compare<float_sum>({m}, extent, std::vector{vp::constant(value)}, vp::core::make_pack(0.0f));
+}
+
 TEST(Counted, SeveralDraws) {
     const std::vector<mesh_data> meshes{crowded(36.0f, 203), mixed_triangles(300, 30.0f, 204), crowded(30.0f, 205)};
     const auto draw = [&](float a, float b, float c) {
@@ -311,10 +323,12 @@ TEST(CountedPlan, BesideATargetThatTellsFirstTouches) {
     EXPECT_EQ(beside(0.1f).modes.of[1], direct_mode::blend);
 }
 
-// A few triangles in a large grid are drawn sooner than the grid is read.
-TEST(CountedPlan, NotForAFewTrianglesInALargeGrid) {
+// A few triangles in a large grid are drawn sooner than the grid is read, where that is not spared by marks.
+TEST(CountedPlan, NotForAFewTrianglesWhereTheWholeGridIsRead) {
     const std::vector shaders{vp::constant(0.1f)};
-    const auto fb = view_of<float_sum>({1024, 1024, 1024});
+    auto fb = view_of<float_sum>({1024, 1024, 1024});
+    EXPECT_TRUE(plan(shaders, fb, 12, true).possible);
+    vp::get<0>(fb.targets).clear_value = 0.5f;
     EXPECT_FALSE(plan(shaders, fb, 12, true).possible);
     EXPECT_TRUE(plan(shaders, fb, 1000000, true).possible);
     EXPECT_TRUE(plan(shaders, view_of<float_sum>({64, 64, 64}), 12, true).possible);

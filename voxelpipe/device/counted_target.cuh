@@ -34,13 +34,13 @@ struct direct_plan {
     }
 };
 
-// The last pass goes through the whole grid, the tiles only through what is touched: they take over where the counted
-// targets have more bytes than this for each triangle, beyond what either way needs some microseconds for. At 4 TB/s
-// these are 4 ns; a triangle costs 0.6 to 3 ns in the tiles where it is small, 9 where it is large (bench/results).
-inline constexpr std::uint64_t counted_bytes_per_triangle = 16384, counted_bytes = std::uint64_t{4} << 20;
-
 // A target of so many bytes is worth marks: reading it takes longer than they do.
 inline constexpr std::uint64_t marked_bytes = std::uint64_t{32} << 20;
+
+// Without marks the last pass goes through the whole grid, the tiles only through what is touched: they take over where
+// the counted targets have more bytes than this for each triangle, beyond what takes some microseconds. At 4 TB/s these
+// are 4 ns, which a few fragments cost in the tiles.
+inline constexpr std::uint64_t counted_bytes_per_triangle = 16384, counted_bytes = marked_bytes;
 
 template <std::size_t K, class Target, class Draw>
 [[nodiscard]] bool may_be_counted(std::span<const Draw> draws, const target_view<Target>& t) {
@@ -52,6 +52,20 @@ template <std::size_t K, class Target, class Draw>
                 if (std::memcmp(&first, &voxelpipe::get<K>(d.fragment_shader.values), sizeof(first)) != 0) return false;
         }
         return true;
+    } else {
+        return false;
+    }
+}
+
+// Whether the last pass of a target goes by marks, which then are wanted: where it is large, and what is not touched
+// has the bits of a number of none already.
+template <class Target>
+[[nodiscard]] bool ends_by_marks(const target_view<Target>& t) {
+    using map = typename Target::map;
+    if constexpr (is_countable<Target> && !map::bricks) {
+        constexpr typename Target::value_type none{};
+        return map::elements(t.extent) * sizeof(none) >= marked_bytes &&
+               std::memcmp(&t.clear_value, &none, sizeof(none)) == 0;
     } else {
         return false;
     }
@@ -96,7 +110,8 @@ template <class Draw, class... Targets>
     std::uint64_t bytes = 0;
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         using target = typename core::pack_element<K, Targets...>::type;
-        if (plan.counts(K)) bytes += target::map::elements(fb.extent) * sizeof(typename target::element_type);
+        if (plan.counts(K) && !ends_by_marks(voxelpipe::get<K>(fb.targets)))
+            bytes += target::map::elements(fb.extent) * sizeof(typename target::element_type);
     });
     if (bytes > counted_bytes + num_primitives * counted_bytes_per_triangle) plan.possible = false;
     return plan;
@@ -188,20 +203,6 @@ __global__ __launch_bounds__(threads_per_block) void end_counts_kernel(unsigned_
     if (count_voxels) {
         const unsigned long long sum = block_sum(values.touched);
         if (threadIdx.x == 0 && sum != 0) atomicAdd(&state->voxels, sum);
-    }
-}
-
-// Whether the last pass of a target goes by marks, which then are wanted: where it is large, and what is not touched
-// has the bits of a number of none already.
-template <class Target>
-[[nodiscard]] bool ends_by_marks(const target_view<Target>& t) {
-    using map = typename Target::map;
-    if constexpr (is_countable<Target> && !map::bricks) {
-        constexpr typename Target::value_type none{};
-        return map::elements(t.extent) * sizeof(none) >= marked_bytes &&
-               std::memcmp(&t.clear_value, &none, sizeof(none)) == 0;
-    } else {
-        return false;
     }
 }
 
