@@ -231,6 +231,8 @@ __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s,
     for (int first_y = box.lo[1]; first_y <= box.hi[1]; first_y += medium_lanes) {
         const int y = first_y + lane;
         const word at_y = y <= box.hi[1] ? s.limit_at_y(x0, x1, y) : 0;
+        // A floor has all its voxels in the rows of few y, each a lane's: then all lanes look at each row.
+        const bool is_flat = Sink::spreads && __popc(__ballot_sync(group, at_y != 0)) <= medium_lanes / 4;
         for (int first_z = box.lo[2]; first_z <= box.hi[2]; first_z += medium_lanes) {
             const word mine = first_z + lane <= box.hi[2] ? s.limit_at_z(x0, x1, first_z + lane) : 0;
             const int end = box.hi[2] - first_z + 1 < medium_lanes ? box.hi[2] - first_z + 1 : medium_lanes;
@@ -238,8 +240,7 @@ __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s,
                 const word limit = __shfl_sync(group, mine, k, medium_lanes) & at_y;
                 const int z = first_z + k;
                 const word bits = limit == 0 || !s.meets_row(y, z) ? 0 : s.plane_bits(x0, y, z, limit);
-                if constexpr (Sink::spreads) {
-                    // Few long rows, as of a floor, whose voxels are all in one lane's: each row by all lanes.
+                if (is_flat) {
                     word rows = __ballot_sync(group, bits != 0) >> first_of_group;
                     const unsigned longest = __reduce_max_sync(group, static_cast<unsigned>(__popc(bits)));
                     if (static_cast<unsigned>(__popc(rows)) * 5 <= longest * 3) {
