@@ -14,6 +14,7 @@
 #include <cuda/atomic>
 
 #include <algorithm>
+#include <bit>
 
 namespace voxelpipe::device {
 
@@ -151,6 +152,7 @@ struct order_buffers {
     list_places here;
     tile_counts tiles;
     order_lists lists;
+    int primitive_bits = 32; // of the largest primitive
 
     [[nodiscard]] __device__ VOXELPIPE_INLINE const list_places& places() const {
         return asked->voxels != nullptr ? *asked : here;
@@ -216,12 +218,11 @@ struct order_window {
 
 // Writes the primitives of the fragments from `begin` on in order: places 0 .. end - 1 of the window, of which the
 // first `skipped` are of a voxel that begins before it. starts: by 32 places, where voxels begin. A fragment's number
-// in the sort is its voxel's rank within the window and then its primitive, in as many bits as Word leaves.
+// in the sort is its voxel's rank within the window and then its primitive, in primitive_bits.
 template <class Word, int Items>
 __device__ VOXELPIPE_INLINE void order_places(const order_buffers& b, std::uint32_t* to, order_window& window,
                                               std::uint32_t begin, std::uint32_t skipped, std::uint32_t end,
-                                              const unsigned (&starts)[window_length / 32]) {
-    constexpr int primitive_bits = sizeof(Word) == 4 ? narrow_primitive_bits : 32;
+                                              const unsigned (&starts)[window_length / 32], int primitive_bits) {
     constexpr int rows = window_length / 32;
     const std::uint32_t lane = threadIdx.x % 32;
     Word w[Items];
@@ -270,7 +271,7 @@ __device__ VOXELPIPE_INLINE void order_places(const order_buffers& b, std::uint3
 
 // Puts the voxels in order that begin in the window of n fragments from `begin` on, but for one that is too long, which
 // goes to its list; leaves all of them in `window`, and returns how many they are. By all lanes of a warp.
-template <class Word>
+template <bool Narrow>
 [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t
 order_window_at(const order_buffers& b, std::uint32_t* to, order_window& window, std::uint32_t begin, std::uint32_t n) {
     constexpr int rows = window_length / 32;
@@ -325,15 +326,26 @@ order_window_at(const order_buffers& b, std::uint32_t* to, order_window& window,
     const std::uint32_t skipped = window.first[0] - begin;
     if (end - skipped <= (is_long ? count - 1 : count)) { // a fragment each, or nothing
         for (std::uint32_t i = skipped + lane; i < end; i += 32) to[begin + i] = b.from[begin + i];
-    } else if (end <= 32 * 8) {
-        order_places<Word, 8>(b, to, window, begin, skipped, end, starts);
     } else {
-        order_places<Word, 16>(b, to, window, begin, skipped, end, starts);
+        const auto order = [&]<class Word>(int primitive_bits) VOXELPIPE_INLINE_LAMBDA {
+            if (end <= 32 * 8)
+                order_places<Word, 8>(b, to, window, begin, skipped, end, starts, primitive_bits);
+            else
+                order_places<Word, 16>(b, to, window, begin, skipped, end, starts, primitive_bits);
+        };
+        if constexpr (Narrow)
+            order.template operator()<std::uint32_t>(narrow_primitive_bits);
+        else if (b.primitive_bits < 32 &&
+                 count <= 1u << (32 - b.primitive_bits)) // few voxels, as where triangles are tiny
+            order.template operator()<std::uint32_t>(b.primitive_bits);
+        else
+            order.template operator()<std::uint64_t>(32);
     }
     return count;
 }
 
-template <class Word>
+// Narrow: primitives have narrow_primitive_bits.
+template <bool Narrow>
 __global__ __launch_bounds__(32 * order_warps) void order_windows_kernel(const __grid_constant__ order_buffers b,
                                                                          pipeline_state* state, capacities limits) {
     __shared__ order_window windows[order_warps];
@@ -352,7 +364,7 @@ __global__ __launch_bounds__(32 * order_warps) void order_windows_kernel(const _
         if (first >= n) return;
         order_window& window = windows[warp];
         const std::uint32_t count =
-            begin < n ? order_window_at<Word>(b, to.primitives, window, static_cast<std::uint32_t>(begin), n) : 0;
+            begin < n ? order_window_at<Narrow>(b, to.primitives, window, static_cast<std::uint32_t>(begin), n) : 0;
         if (lane == 0) counts[warp] = count;
         __syncthreads();
         if (warp == 0) {
@@ -508,13 +520,13 @@ __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::
 // ---- host -----------------------------------------------------------------------------------------------------------
 
 // Puts b.from in order and lists the voxels; counts them in the state.
-inline void order_fragments(const order_buffers& b, std::uint64_t num_primitives, pipeline_state* state,
+inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipeline_state* state,
                             const capacities& limits, cudaStream_t stream) {
     constexpr stage where = stage::abuffer_emit;
     const std::uint64_t capacity = limits.fragments;
-    const auto windows = num_primitives <= (std::uint64_t{1} << narrow_primitive_bits)
-                             ? order_windows_kernel<std::uint32_t>
-                             : order_windows_kernel<std::uint64_t>;
+    b.primitive_bits = num_primitives < 2 ? 1 : static_cast<int>(std::bit_width(num_primitives - 1));
+    const auto windows =
+        b.primitive_bits <= narrow_primitive_bits ? order_windows_kernel<true> : order_windows_kernel<false>;
     const std::uint64_t tiles = tile_counts::num(capacity);
     launch_behind(windows, fill_device(tiles * threads_per_block, 8), 32 * order_warps, stream, where, b, state,
                   limits);
