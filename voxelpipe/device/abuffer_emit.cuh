@@ -10,6 +10,7 @@
 
 #include <voxelpipe/device/fragment_order.cuh>
 #include <voxelpipe/device/fragment_shade.cuh>
+#include <voxelpipe/device/fragment_sort.cuh>
 #include <voxelpipe/device/list_raster.cuh>
 #include <voxelpipe/device/stage_clock.cuh>
 #include <voxelpipe/device/tile_sort.cuh>
@@ -105,7 +106,8 @@ template <class Key, class Payload>
 struct list_buffers {
     Key* keys[2];
     std::uint32_t* values[2];
-    int bits;
+    int bits;                      // of a voxel
+    sort_memory sort;              // where are_sorted_here
     std::uint32_t* primitives;     // by place; null without payloads of fragments
     Payload* payloads;             // by place; null likewise
     std::uint64_t* first_of_voxel; // fragment numbers, ascending; list_voxels of them, and room for one more
@@ -113,6 +115,12 @@ struct list_buffers {
     void* storage;
     std::size_t storage_bytes;
 };
+
+// Whether keys of this type, so many at most, are sorted by fragment_sort.cuh: what is longer goes to cub.
+template <class Key>
+[[nodiscard]] VOXELPIPE_HD constexpr bool are_sorted_here(std::uint64_t capacity) {
+    return sizeof(Key) == sizeof(std::uint32_t) && capacity < most_sorted;
+}
 
 // Arrays for counting and writing fragments.
 struct list_memory {
@@ -164,17 +172,22 @@ struct fragment_lists {
     }
 };
 
-// Between what lists fragments and the sort: its fillers, where the lists are to go, and zeros for the tiles of the
-// order, if any.
+// Between what lists fragments and the sort: what that wants of its memory, fillers or zeros, where the lists are to
+// go, and zeros for the tiles of the order, if any.
 template <class Key>
 __global__ void prepare_sort_kernel(Key* keys, std::uint32_t* values, std::uint64_t capacity,
+                                    const __grid_constant__ sort_memory sort,
                                     const __grid_constant__ asked_places asked, list_places* places, tile_counts tiles,
                                     std::uint64_t num_tiles, const pipeline_state* state, capacities limits) {
     await_stream();
     const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
     if (thread == 0) *places = asked.page != nullptr ? *asked.page : asked.value;
-    for (std::uint64_t i = thread; i < num_tiles; i += std::uint64_t{gridDim.x} * blockDim.x) tiles.words[i] = 0;
-    fill_end_by_all(keys, values, state->list_fragments, capacity, *state, limits);
+    for (std::uint64_t i = thread; i < num_tiles; i += threads) tiles.words[i] = 0;
+    if (are_sorted_here<Key>(capacity))
+        sort.zero(sort_count{state, limits}.get(), thread, threads);
+    else
+        fill_end_by_all(keys, values, state->list_fragments, capacity, *state, limits);
 }
 
 template <class Key>
@@ -188,12 +201,19 @@ template <class Key, class Payload>
                                               const tile_counts& tiles, std::uint64_t num_tiles, pipeline_state* state,
                                               const capacities& limits, cudaStream_t stream, stage_clock* clock) {
     launch_behind(prepare_sort_kernel<Key>, fill_device(limits.fragments), threads_per_block, stream, stage::tile_sort,
-                  b.keys[0], b.values[0], limits.fragments, asked, b.places, tiles, num_tiles, state, limits);
-    cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
-    cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
-    sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
+                  b.keys[0], b.values[0], limits.fragments, b.sort, asked, b.places, tiles, num_tiles, state, limits);
+    int at = 0;
+    if (!are_sorted_here<Key>(limits.fragments)) {
+        cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
+        cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
+        sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
+        at = keys.selector;
+        VOXELPIPE_ASSERT(values.selector == at);
+    } else if constexpr (sizeof(Key) == sizeof(std::uint32_t)) {
+        at = sort_fragments(b.keys, b.values, sort_count{state, limits}, limits.fragments, b.sort, stream);
+    }
     end_stage(clock, &stage_times::tile_sort);
-    return {keys.Current(), keys.Alternate(), values.Current(), values.Alternate()};
+    return {b.keys[at], b.keys[1 - at], b.values[at], b.values[1 - at]};
 }
 
 // What was listed, sorted by voxel, and the first fragment of each.

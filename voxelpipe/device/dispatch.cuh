@@ -16,6 +16,7 @@
 #include <voxelpipe/device/vertex_shade.cuh>
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -101,8 +102,14 @@ template <class Key, class Payload>
         b.keys[i] = memory.take<Key>(capacity);
         b.values[i] = memory.take<std::uint32_t>(capacity);
     }
-    b.bits = key_bits(num_voxels);
-    b.storage_bytes = std::max(select_bytes<Key>(capacity), sort_bytes<Key>(capacity, b.bits));
+    b.storage_bytes = select_bytes<Key>(capacity);
+    if (are_sorted_here<Key>(capacity)) {
+        b.bits = static_cast<int>(std::bit_width(num_voxels - 1));
+        b.sort = sort_memory::take(memory, capacity, b.bits);
+    } else {
+        b.bits = key_bits(num_voxels);
+        b.storage_bytes = std::max(b.storage_bytes, sort_bytes<Key>(capacity, b.bits));
+    }
     if (!std::is_same_v<Payload, no_payload> && !one_payload) {
         b.primitives = memory.take<std::uint32_t>(capacity);
         b.payloads = memory.take<Payload>(capacity);

@@ -9,6 +9,7 @@
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/device/memory.cuh>
 
+#include <cstddef>
 #include <utility>
 
 namespace voxelpipe::device {
@@ -37,20 +38,26 @@ __device__ VOXELPIPE_INLINE void await_stream() {
     return false;
 }
 
-// Starts a kernel that begins with await_stream.
+// Starts a kernel that begins with await_stream. shared_bytes: of dynamic shared memory.
 template <class... Parameters, class... Arguments>
-void launch_behind(void (*kernel)(Parameters...), unsigned blocks, unsigned threads, cudaStream_t stream, stage where,
-                   Arguments&&... arguments) {
+void launch_behind(void (*kernel)(Parameters...), unsigned blocks, unsigned threads, std::size_t shared_bytes,
+                   cudaStream_t stream, stage where, Arguments&&... arguments) {
     cudaLaunchAttribute early{};
     early.id = cudaLaunchAttributeProgrammaticStreamSerialization;
     early.val.programmaticStreamSerializationAllowed = 1;
     cudaLaunchConfig_t config{};
     config.gridDim = blocks;
     config.blockDim = threads;
+    config.dynamicSmemBytes = shared_bytes;
     config.stream = stream;
     config.attrs = &early;
     config.numAttrs = can_launch_early() ? 1 : 0;
     check(cudaLaunchKernelEx(&config, kernel, std::forward<Arguments>(arguments)...), where);
+}
+template <class... Parameters, class... Arguments>
+void launch_behind(void (*kernel)(Parameters...), unsigned blocks, unsigned threads, cudaStream_t stream, stage where,
+                   Arguments&&... arguments) {
+    launch_behind(kernel, blocks, threads, std::size_t{0}, stream, where, std::forward<Arguments>(arguments)...);
 }
 
 } // namespace voxelpipe::device

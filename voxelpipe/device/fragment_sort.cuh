@@ -1,0 +1,290 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Fragment sort: a stable radix sort of (voxel, value) pairs whose number is known on the device alone. One kernel
+// counts the digits of all passes, then each pass reads and writes every pair once: a tile learns where its digits go
+// from the tiles before it (decoupled look-back: Merrill and Garland 2016, Adinets and Merrill 2022). cub's sort has to
+// be told the number, so that the whole capacity would be sorted, fillers included, and takes 8 bits a pass: 27 bits of
+// a voxel are three passes of nine here and four there.
+
+#include <voxelpipe/device/scene.cuh>
+
+#include <cub/block/block_scan.cuh>
+#include <cuda/atomic>
+
+#include <algorithm>
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+inline constexpr int sort_threads = 512; // of a block, which takes a tile
+inline constexpr int sort_items = 16;    // pairs of a thread
+inline constexpr std::uint32_t sort_tile = sort_threads * sort_items;
+inline constexpr int digit_count_threads = 1024;
+inline constexpr int most_digit_bits = 9;
+inline constexpr int most_digit_passes = 4;
+inline constexpr std::uint64_t most_sorted = std::uint64_t{1} << 30; // pairs: two bits of a tile's words are flags
+
+// How keys of so many bits are cut into digits, lowest first: as few as can be, all of one size.
+struct digit_plan {
+    int passes, bits; // of a digit
+
+    VOXELPIPE_HD constexpr explicit digit_plan(int key_bits)
+        : passes(key_bits == 0 ? 1 : (key_bits + most_digit_bits - 1) / most_digit_bits),
+          bits(key_bits == 0 ? 1 : (key_bits + passes - 1) / passes) {}
+    [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t num_digits() const { return 1u << bits; }
+};
+// One digit of a key.
+struct digit_of {
+    int shift;
+    std::uint32_t mask;
+    VOXELPIPE_HD constexpr digit_of(const digit_plan& plan, int pass)
+        : shift(pass * plan.bits), mask(plan.num_digits() - 1) {}
+    [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t operator()(std::uint32_t key) const {
+        return key >> shift & mask;
+    }
+};
+
+// Memory of a sort.
+struct sort_memory {
+    // A tile's word for a digit: how many pairs have it, in the tile, or in all up to it.
+    static constexpr std::uint32_t own = 1u << 30, all = 2u << 30, value = own - 1;
+    struct totals {
+        std::uint32_t digits[most_digit_passes][1 << most_digit_bits]; // how many; then where the first one goes
+        std::uint32_t next_tile[most_digit_passes], blocks_done;
+        std::uint32_t num; // pairs
+    };
+    totals* all_tiles;
+    std::uint32_t* words[2]; // [tile][digit], of passes in turn: each zeroes those of the next
+    digit_plan plan{1};
+
+    [[nodiscard]] static sort_memory take(arena& memory, std::uint64_t capacity, int key_bits) {
+        sort_memory m{};
+        m.plan = digit_plan(key_bits);
+        m.all_tiles = memory.take<totals>(1);
+        for (auto& w : m.words) w = memory.take<std::uint32_t>(num_tiles(capacity) * m.plan.num_digits());
+        return m;
+    }
+    [[nodiscard]] VOXELPIPE_HD static std::uint64_t num_tiles(std::uint64_t num) {
+        return (num + sort_tile - 1) / sort_tile;
+    }
+    // What has to be zero when a sort of num pairs starts. By all threads of a grid.
+    __device__ void zero(std::uint64_t num, std::uint64_t thread, std::uint64_t threads) const {
+        const std::uint64_t tiles = num_tiles(num);
+        for (std::uint64_t i = thread; i < tiles * plan.num_digits(); i += threads) words[0][i] = 0;
+        for (std::uint64_t i = thread; i < sizeof(totals) / sizeof(std::uint32_t); i += threads)
+            reinterpret_cast<std::uint32_t*>(all_tiles)[i] = 0;
+    }
+};
+
+// How many pairs a call sorts: none where it has failed.
+struct sort_count {
+    const pipeline_state* state;
+    capacities limits;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint64_t get() const {
+        return has_failed(*state, limits) ? 0 : state->list_fragments;
+    }
+};
+
+// Counts the digits of all passes, and then says where the first pair of each goes.
+template <class Count>
+__global__ __launch_bounds__(digit_count_threads) void count_digits_kernel(const std::uint32_t* keys,
+                                                                           const __grid_constant__ Count count,
+                                                                           const __grid_constant__ sort_memory m) {
+    using scan = cub::BlockScan<std::uint32_t, digit_count_threads>;
+    static_assert(digit_count_threads >= 1 << most_digit_bits && sort_threads == 1 << most_digit_bits);
+    __shared__ std::uint32_t digits[most_digit_passes][1 << most_digit_bits];
+    __shared__ typename scan::TempStorage storage;
+    __shared__ bool is_last;
+    const std::uint32_t num_digits = m.plan.num_digits();
+    for (int p = 0; p < m.plan.passes; ++p)
+        if (threadIdx.x < num_digits) digits[p][threadIdx.x] = 0;
+    await_stream();
+    __syncthreads();
+    const std::uint64_t n = count.get(), threads = std::uint64_t{gridDim.x} * digit_count_threads,
+                        thread = std::uint64_t{blockIdx.x} * digit_count_threads + threadIdx.x;
+    for (std::uint64_t i = thread; i < n / 4; i += threads) {
+        const uint4 four = reinterpret_cast<const uint4*>(keys)[i];
+        for (int p = 0; p < m.plan.passes; ++p) {
+            const digit_of digit(m.plan, p);
+            atomicAdd(&digits[p][digit(four.x)], 1u);
+            atomicAdd(&digits[p][digit(four.y)], 1u);
+            atomicAdd(&digits[p][digit(four.z)], 1u);
+            atomicAdd(&digits[p][digit(four.w)], 1u);
+        }
+    }
+    if (thread < n % 4)
+        for (int p = 0; p < m.plan.passes; ++p) {
+            const digit_of digit(m.plan, p);
+            atomicAdd(&digits[p][digit(keys[n / 4 * 4 + thread])], 1u);
+        }
+    __syncthreads();
+    for (int p = 0; p < m.plan.passes; ++p)
+        if (threadIdx.x < num_digits && digits[p][threadIdx.x] != 0)
+            atomicAdd(&m.all_tiles->digits[p][threadIdx.x], digits[p][threadIdx.x]);
+    __threadfence();
+    __syncthreads();
+    if (threadIdx.x == 0) is_last = atomicAdd(&m.all_tiles->blocks_done, 1u) == gridDim.x - 1;
+    __syncthreads();
+    if (!is_last) return;
+    __threadfence();
+    if (threadIdx.x == 0) m.all_tiles->num = static_cast<std::uint32_t>(n);
+    for (int p = 0; p < m.plan.passes; ++p) {
+        std::uint32_t* const mine = &m.all_tiles->digits[p][threadIdx.x];
+        std::uint32_t sum = threadIdx.x < num_digits ? __ldcg(mine) : 0;
+        scan(storage).ExclusiveSum(sum, sum);
+        if (threadIdx.x < num_digits) *mine = sum;
+        __syncthreads(); // the storage may be used again
+    }
+}
+
+// How many pairs with this digit there are in the tiles before this one. Tiles are taken in order, so those before are
+// under way.
+[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t count_before(std::uint32_t* words, std::uint32_t tile,
+                                                                     std::uint32_t num_digits, std::uint32_t digit) {
+    using word = ::cuda::atomic_ref<std::uint32_t, ::cuda::thread_scope_device>;
+    constexpr int at_once = 4; // loads that do not wait for one another
+    std::uint32_t sum = 0;
+    for (std::int64_t last = std::int64_t{tile} - 1;;) {
+        std::uint32_t w[at_once];
+#pragma unroll
+        for (int k = 0; k < at_once; ++k)
+            w[k] = last < k ? sort_memory::all // before the first tile
+                            : word(words[static_cast<std::uint64_t>(last - k) * num_digits + digit])
+                                  .load(::cuda::memory_order_relaxed);
+        bool is_ready = true;
+#pragma unroll
+        for (int k = 0; k < at_once; ++k) {
+            is_ready = is_ready && (w[k] & ~sort_memory::value) != 0;
+            if (!is_ready) continue;
+            sum += w[k] & sort_memory::value;
+            --last;
+            if ((w[k] & sort_memory::all) != 0) return sum;
+        }
+    }
+}
+
+// What a block keeps in shared memory: first how many pairs of each digit its warps have, then the pairs of its tile.
+union sort_tile_memory {
+    std::uint16_t counts[sort_threads / 32][1 << most_digit_bits];
+    std::uint32_t pairs[2][sort_tile];
+};
+
+// Pass `pass` over the digits. A template, as all kernels in headers are.
+template <class Memory>
+__global__ __launch_bounds__(sort_threads, 2) void sort_pass_kernel(const std::uint32_t* __restrict__ keys,
+                                                                    const std::uint32_t* __restrict__ values,
+                                                                    std::uint32_t* __restrict__ to_keys,
+                                                                    std::uint32_t* __restrict__ to_values,
+                                                                    const __grid_constant__ Memory m, int pass) {
+    using scan = cub::BlockScan<std::uint32_t, sort_threads>;
+    using word = ::cuda::atomic_ref<std::uint32_t, ::cuda::thread_scope_device>;
+    constexpr int warps = sort_threads / 32;
+    extern __shared__ __align__(16) unsigned char dynamic_memory[];
+    auto& shared = *reinterpret_cast<sort_tile_memory*>(dynamic_memory);
+    __shared__ std::uint32_t places[sort_threads]; // of each digit, in the tile; then what takes it to its end
+    __shared__ typename scan::TempStorage storage;
+    __shared__ std::uint32_t next;
+    const digit_of digit(m.plan, pass);
+    const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32, num_digits = m.plan.num_digits();
+    for (int w = 0; w < warps; ++w) shared.counts[w][threadIdx.x] = 0;
+    await_stream();
+    if (threadIdx.x == 0) next = atomicAdd(&m.all_tiles->next_tile[pass], 1u);
+    __syncthreads();
+    const std::uint32_t tile = next;
+    const std::uint32_t n = m.all_tiles->num, begin = tile * sort_tile;
+    if (begin >= n) return;
+    const std::uint32_t length = n - begin < sort_tile ? n - begin : sort_tile;
+    // A lane has every 32nd pair of its warp's. What is beyond the last counts as one with the last digit.
+    const std::uint32_t first = warp * 32 * sort_items + lane;
+    std::uint32_t key[sort_items], place[sort_items];
+#pragma unroll
+    for (std::uint32_t i = 0; i < sort_items; ++i)
+        key[i] = first + 32 * i < length ? keys[begin + first + 32 * i] : ~0u;
+#pragma unroll
+    for (std::uint32_t i = 0; i < sort_items; ++i) {
+        const std::uint32_t d = digit(key[i]);
+        std::uint16_t& of_digit = shared.counts[warp][d];
+        const unsigned same = __match_any_sync(0xffffffffu, d);
+        const auto before = static_cast<std::uint32_t>(__popc(same & ((1u << lane) - 1)));
+        place[i] = of_digit + before;
+        __syncwarp();
+        if (before == 0) of_digit = static_cast<std::uint16_t>(place[i] + static_cast<std::uint32_t>(__popc(same)));
+        __syncwarp();
+    }
+    __syncthreads();
+    // A digit each: how many there are in the warps before each, and in all.
+    std::uint32_t* const words = m.words[pass % 2];
+    std::uint32_t* const mine = words + std::uint64_t{tile} * num_digits + threadIdx.x;
+    const bool has_digit = threadIdx.x < num_digits;
+    std::uint32_t total = 0, place_here = 0;
+#pragma unroll
+    for (int w = 0; w < warps; ++w) {
+        const std::uint32_t of_warp = shared.counts[w][threadIdx.x];
+        shared.counts[w][threadIdx.x] = static_cast<std::uint16_t>(total);
+        total += of_warp;
+    }
+    if (has_digit) {
+        word(*mine).store((tile == 0 ? sort_memory::all : sort_memory::own) | total, ::cuda::memory_order_relaxed);
+        if (pass + 1 < m.plan.passes) m.words[1 - pass % 2][std::uint64_t{tile} * num_digits + threadIdx.x] = 0;
+    }
+    scan(storage).ExclusiveSum(total, place_here);
+    places[threadIdx.x] = place_here;
+    __syncthreads();
+#pragma unroll
+    for (std::uint32_t i = 0; i < sort_items; ++i) {
+        const std::uint32_t d = digit(key[i]);
+        place[i] += places[d] + shared.counts[warp][d];
+    }
+    __syncthreads(); // the counts have been read
+#pragma unroll
+    for (std::uint32_t i = 0; i < sort_items; ++i) shared.pairs[0][place[i]] = key[i];
+    std::uint32_t value[sort_items];
+#pragma unroll
+    for (std::uint32_t i = 0; i < sort_items; ++i)
+        value[i] = first + 32 * i < length ? values[begin + first + 32 * i] : 0;
+    if (has_digit) {
+        std::uint32_t before = 0;
+        if (tile != 0) {
+            before = count_before(words, tile, num_digits, threadIdx.x);
+            word(*mine).store(sort_memory::all | (before + total), ::cuda::memory_order_relaxed);
+        }
+        places[threadIdx.x] = m.all_tiles->digits[pass][threadIdx.x] + before - place_here; // modulo 2^32
+    }
+#pragma unroll
+    for (std::uint32_t i = 0; i < sort_items; ++i) shared.pairs[1][place[i]] = value[i];
+    __syncthreads();
+#pragma unroll
+    for (std::uint32_t i = 0; i < sort_items; ++i) {
+        const std::uint32_t at = threadIdx.x + sort_threads * i;
+        if (at >= length) break;
+        const std::uint32_t k = shared.pairs[0][at], to = places[digit(k)] + at;
+        to_keys[to] = k;
+        to_values[to] = shared.pairs[1][at];
+    }
+}
+
+// Sorts the pairs in keys[0] and values[0], which lie in an arena; at most `capacity`, which is below most_sorted. The
+// memory's zeros are there (sort_memory::zero). Returns where the sorted pairs are: 0 or 1.
+template <class Count>
+[[nodiscard]] int sort_fragments(std::uint32_t* const (&keys)[2], std::uint32_t* const (&values)[2], const Count& count,
+                                 std::uint64_t capacity, const sort_memory& m, cudaStream_t stream) {
+    constexpr stage where = stage::abuffer_emit;
+    constexpr std::uint64_t pairs_of_block = 16 * digit_count_threads;
+    const std::uint64_t most_blocks = 2 * static_cast<std::uint64_t>(num_multiprocessors());
+    launch_behind(count_digits_kernel<Count>,
+                  static_cast<unsigned>(std::min(capacity / pairs_of_block + 1, most_blocks)), digit_count_threads,
+                  stream, where, keys[0], count, m);
+    const auto kernel = sort_pass_kernel<sort_memory>;
+    check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                               static_cast<int>(sizeof(sort_tile_memory))),
+          where);
+    const auto tiles = static_cast<unsigned>(sort_memory::num_tiles(capacity));
+    for (int p = 0; p < m.plan.passes && tiles != 0; ++p)
+        launch_behind(kernel, tiles, sort_threads, sizeof(sort_tile_memory), stream, where, keys[p % 2], values[p % 2],
+                      keys[1 - p % 2], values[1 - p % 2], m, p);
+    return tiles == 0 ? 0 : m.plan.passes % 2;
+}
+
+} // namespace voxelpipe::device
