@@ -11,34 +11,44 @@
 #   tool        the files that voxelize writes on the GPU against those that it writes on the CPU
 #   sanitizer   compute-sanitizer memcheck, racecheck, initcheck and synccheck over a reduced suite
 # VOXELPIPE_CUDA_FLAGS: further options for nvcc, which the record names; --Ofast-compile=mid halves the time to build.
+# VOXELPIPE_STEP: build, or run, for a machine that has no device but time, and one that has a device for a short time only.
+#   build compiles the parts for VOXELPIPE_ARCHITECTURE (90 where that is not set) and needs no device; run takes the programs
+#   that lie in build/ of the same folder, whichever there are, and the record says so.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 parts=("$@")
 [[ ${#parts[@]} -gt 0 ]] || parts=(default fast_math no_fmad plain_constexpr tool sanitizer)
-results="${VOXELPIPE_RESULTS:-tests/gpu_results}"
-mkdir -p "$results"
+step="${VOXELPIPE_STEP:-all}"
+[[ $step == all || $step == build || $step == run ]] || die "VOXELPIPE_STEP is build or run"
+[[ $step == run ]] || command -v nvcc >/dev/null || die "no nvcc on PATH"
 
-command -v nvcc >/dev/null || die "no nvcc on PATH"
-device="$(nvidia-smi --query-gpu=name --format=csv,noheader 2>/dev/null | sed -n 1p)" || true
-[[ -n $device ]] || die "no CUDA device: the suite was not run"
-driver="$(nvidia-smi --query-gpu=driver_version --format=csv,noheader | sed -n 1p)"
-clocks="$(nvidia-smi --query-gpu=clocks.sm,clocks.mem --format=csv,noheader | sed -n 1p)"
-toolkit="$(nvcc --version | sed -n 's/.*release \([0-9.]*\).*/\1/p')"
-commit="${VOXELPIPE_COMMIT:-$(git rev-parse --short HEAD 2>/dev/null || echo unknown)}"
-architecture="$(nvidia-smi --query-gpu=compute_cap --format=csv,noheader | sed -n 1p | tr -d .)"
-
-record="$results/$(date -u +%Y-%m-%dT%H%M%SZ).txt"
-{
-    printf 'device: %s\ndriver: %s\nCUDA: %s\nclocks (SM, memory): %s\ncommit: %s\n' \
-        "$device" "$driver" "$toolkit" "$clocks" "$commit"
-    [[ -z ${VOXELPIPE_CUDA_FLAGS:-} ]] || printf 'nvcc with: %s\n' "$VOXELPIPE_CUDA_FLAGS"
-    printf '\n'
-    printf '%-15s %-28s %8s %8s %8s %8s\n' part program passed failed 'not run' seconds
-} >"$record"
+record=/dev/null
+architecture="${VOXELPIPE_ARCHITECTURE:-90}"
+if [[ $step != build ]]; then
+    results="${VOXELPIPE_RESULTS:-tests/gpu_results}"
+    mkdir -p "$results"
+    device="$(nvidia-smi --query-gpu=name --format=csv,noheader 2>/dev/null | sed -n 1p)" || true
+    [[ -n $device ]] || die "no CUDA device: the suite was not run"
+    driver="$(nvidia-smi --query-gpu=driver_version --format=csv,noheader | sed -n 1p)"
+    clocks="$(nvidia-smi --query-gpu=clocks.sm,clocks.mem --format=csv,noheader | sed -n 1p)"
+    toolkit="$(nvcc --version 2>/dev/null | sed -n 's/.*release \([0-9.]*\).*/\1/p')" || true
+    commit="${VOXELPIPE_COMMIT:-$(git rev-parse --short HEAD 2>/dev/null || echo unknown)}"
+    architecture="$(nvidia-smi --query-gpu=compute_cap --format=csv,noheader | sed -n 1p | tr -d .)"
+    record="$results/$(date -u +%Y-%m-%dT%H%M%SZ).txt"
+    {
+        printf 'device: %s\ndriver: %s\nCUDA: %s\nclocks (SM, memory): %s\ncommit: %s\n' \
+            "$device" "$driver" "${toolkit:-unknown}" "$clocks" "$commit"
+        [[ $step != run ]] || printf 'built: before, by this script with VOXELPIPE_STEP=build\n'
+        [[ -z ${VOXELPIPE_CUDA_FLAGS:-} ]] || printf 'nvcc with: %s\n' "$VOXELPIPE_CUDA_FLAGS"
+        printf '\n'
+        printf '%-15s %-28s %8s %8s %8s %8s\n' part program passed failed 'not run' seconds
+    } >"$record"
+fi
 
 # Scenes are decoded beside the build, never inside the project.
 scenes="${VOXELPIPE_SCENES_DIR:-$root/../shared/scenes}"
 decode_scenes() {
+    [[ $step != build ]] || return 0
     [[ -e $scenes/vpmesh.py ]] || { printf 'note: no scenes at %s; generated meshes stand in\n' "$scenes" | tee -a "$record"; return 0; }
     export VOXELPIPE_VPM_DIR="${TMPDIR:-/tmp}/voxelpipe-scenes"
     mkdir -p "$VOXELPIPE_VPM_DIR"
@@ -57,10 +67,19 @@ decode_scenes() {
 failures=0
 not_run=0
 # run_program PART LABEL COMMAND...: counts what the program's tests say, and a crash or no end in time as a failure. A test
-# that is skipped, for want of memory or scenes, was not run: it is neither passed nor failed.
+# that is skipped, for want of memory or scenes, was not run: it is neither passed nor failed; nor is a program that was
+# not built where VOXELPIPE_STEP is run.
 run_program() {
-    local part=$1 name=$2 start=$SECONDS log passed failed skipped status=0
+    local part=$1 name=$2 start=$SECONDS log passed failed skipped status=0 program
     shift 2
+    [[ $step != build ]] || return 0
+    for program in "$@"; do
+        if [[ $step == run && $program == build/* && ! -x $program ]]; then
+            printf '%-15s %-28s not built\n' "$part" "$name" | tee -a "$record"
+            not_run=$((not_run + 1))
+            return 0
+        fi
+    done
     log="build/gpu-$part-${name//[ ,]/-}.log"
     timeout "${VOXELPIPE_PROGRAM_SECONDS:-900}" "$@" >"$log" 2>&1 || status=$?
     passed="$(grep -cE '^\[       OK \]' "$log" || true)"
@@ -79,6 +98,7 @@ run_program() {
 build_suite() {
     local folder=$1
     shift
+    [[ $step != run ]] || return 0
     cmake -S . -B "build/$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DVOXELPIPE_ENABLE_CUDA=ON \
         -DVOXELPIPE_BUILD_SAMPLES="${samples:-OFF}" -DVOXELPIPE_BUILD_BENCH=OFF -DCMAKE_CUDA_ARCHITECTURES="$architecture" \
         -DCMAKE_CUDA_FLAGS="$* ${VOXELPIPE_CUDA_FLAGS:-}" ${CMAKE_PREFIX_PATH:+-DCMAKE_PREFIX_PATH="$CMAKE_PREFIX_PATH"} \
@@ -92,8 +112,9 @@ build_suite() {
 }
 
 run_suite() {
-    local part=$1 folder=$2 program
-    for program in "build/$folder"/tests/device/device_*_test; do
+    local part=$1 folder=$2 source program
+    for source in tests/device/*_test.cu api_test.cu; do
+        program="build/$folder/tests/device/device_$(basename "$source" .cu)"
         [[ $part != default && $program == *scenes_test ]] && continue
         run_program "$part" "$(basename "$program")" "$program"
     done
@@ -124,13 +145,14 @@ for part in "${parts[@]}"; do
         run_program tool voxelize_gpu_files_test build/gpu-tool/tests/voxelize/voxelize_gpu_files_test
         ;;
     sanitizer)
-        command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"
+        [[ $step == build ]] || command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"
         # Of this commit, whatever lies there.
-        for program in reduced reduced_lists fragment_order; do target=device_${program}_test build_suite gpu; done
+        for program in reduced reduced_lists fragment_order fragment_sort; do target=device_${program}_test build_suite gpu; done
         for tool in memcheck racecheck initcheck synccheck; do
-            for program in reduced reduced_lists fragment_order; do
+            for program in reduced reduced_lists fragment_order fragment_sort; do
                 filter='*'
                 [[ $program != fragment_order ]] || filter='*AtTheLimits:*NothingWhereTheCallHasFailed'
+                [[ $program != fragment_sort ]] || filter='*LookAlike:*NothingWhereTheCallHasFailed'
                 run_program sanitizer "$tool, $program" compute-sanitizer --tool "$tool" --error-exitcode 9 \
                     "build/gpu/tests/device/device_${program}_test" --gtest_filter="$filter"
             done
@@ -140,6 +162,8 @@ for part in "${parts[@]}"; do
     esac
 done
 
-printf '\nfailures: %d\nnot run: %d\n' "$failures" "$not_run" | tee -a "$record"
-printf 'record: %s\n' "$record"
+if [[ $step != build ]]; then
+    printf '\nfailures: %d\nnot run: %d\n' "$failures" "$not_run" | tee -a "$record"
+    printf 'record: %s\n' "$record"
+fi
 [[ $failures -eq 0 ]]
