@@ -35,6 +35,20 @@ inline void add_triangle(mesh_data& m, glm::vec3 a, glm::vec3 b, glm::vec3 c) {
     m.triangles.emplace_back(n, n + 1, n + 2);
 }
 
+// Long thin triangles across a grid and somewhat beyond: bounding boxes of many columns of bricks, and few fragments. A
+// third have a short side of some 20 voxels.
+inline mesh_data long_triangles(glm::ivec3 extent, int count, std::uint32_t seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> unit(-0.1f, 1.1f);
+    mesh_data m;
+    for (int i = 0; i < count; ++i) {
+        const auto vector = [&] { return glm::vec3(unit(random), unit(random), unit(random)); };
+        const glm::vec3 a = vector() * glm::vec3(extent), b = vector() * glm::vec3(extent);
+        add_triangle(m, a, b, i % 3 == 0 ? a + 30.0f * vector() : b + 1.0f);
+    }
+    return m;
+}
+
 // Triangles of every size from a hundredth of a voxel to beyond the grid, in a grid of `size` voxels at the origin;
 // among them some on voxel faces, zero-area ones, NaN, infinite, far away and outside.
 inline mesh_data mixed_triangles(int count, float size, std::uint32_t seed) {

@@ -112,18 +112,10 @@ TEST(Direct, FewAndManyLargeTriangles) {
     }
 }
 
-// Bounding boxes of many columns of bricks, so that a warp takes several records at a time: of one triangle, and the
-// last of one with the first of the next.
+// Many records of each, more than the device has warps.
 TEST(Direct, ManyRecordsOfLargeTriangles) {
     const glm::ivec3 extent(420, 390, 400);
-    std::mt19937 random(87);
-    std::uniform_real_distribution<float> unit(-0.1f, 1.1f);
-    mesh_data m;
-    for (int i = 0; i < 1500; ++i) {
-        const auto point = [&] { return glm::vec3(unit(random), unit(random), unit(random)) * glm::vec3(extent); };
-        const glm::vec3 a = point(), b = point();
-        add_triangle(m, a, b, i % 3 == 0 ? a + 30.0f * glm::vec3(unit(random), unit(random), unit(random)) : b + 1.0f);
-    }
+    const mesh_data m = long_triangles(extent, 1500, 87);
     for (const vp::coverage rule : both_rules)
         expect_same(target_list<vp::target<vp::bit, blend::bit_or>, vp::target<std::uint32_t, blend::add>>{}, m,
                     box_grid(extent), vp::passthrough{}, vp::constant(true, 1u), vp::voxelize_options{rule, false});

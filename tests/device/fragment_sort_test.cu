@@ -8,7 +8,6 @@
 #include <voxelpipe/device/fragment_sort.cuh>
 
 #include <algorithm>
-#include <bit>
 #include <numeric>
 
 using namespace device_test;

@@ -104,7 +104,8 @@ struct block_warp {
             if (kind == cube_triangles) put(queues.cubes, cube_at, r);
             const int small_at = take_place(kind == small_triangles, num_smalls);
             if (kind == small_triangles) put(queues.smalls, small_at, r);
-            // A mesh that leaves multiprocessors without a block: these are for the whole device.
+            // Of a mesh with a round for each block at most, which may leave multiprocessors without one, these are
+            // for the whole device.
             const bool is_spread = kind == large_triangles && call.in.num_triangles <= gridDim.x * raster_threads;
             const bool is_large = kind == large_triangles && !is_spread;
             const int large_at = take_place(is_large, num_larges);

@@ -240,7 +240,7 @@ __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s,
                 const word limit = __shfl_sync(group, mine, k, medium_lanes) & at_y;
                 const int z = first_z + k;
                 const word bits = limit == 0 || !s.meets_row(y, z) ? 0 : s.plane_bits(x0, y, z, limit);
-                if (is_flat) {
+                if (is_flat) { // few long rows: each by all lanes
                     word rows = __ballot_sync(group, bits != 0) >> first_of_group;
                     const unsigned longest = __reduce_max_sync(group, static_cast<unsigned>(__popc(bits)));
                     if (static_cast<unsigned>(__popc(rows)) * 5 <= longest * 3) {
