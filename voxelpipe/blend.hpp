@@ -273,9 +273,12 @@ struct reproducible_blend {
     VOXELPIPE_HD
     static T end(const accumulator& a) {
         using bits = typename float_bits<T>::type;
-        constexpr int mantissa_bits = std::is_same_v<T, half> ? 10 : std::is_same_v<T, float> ? 23 : 52;
-        constexpr int exponent_bits = std::is_same_v<T, half> ? 5 : std::is_same_v<T, float> ? 8 : 11;
-        return core::bit_cast<T>(static_cast<bits>(round_sum(a, Log2Quantum, mantissa_bits, exponent_bits)));
+        if constexpr (std::is_same_v<T, float>)
+            return round_sum_to_float<Log2Quantum>(a);
+        else if constexpr (std::is_same_v<T, half>)
+            return core::bit_cast<T>(static_cast<bits>(round_sum(a, Log2Quantum, 10, 5)));
+        else
+            return core::bit_cast<T>(static_cast<bits>(round_sum(a, Log2Quantum, 52, 11)));
     }
 };
 template <class T>

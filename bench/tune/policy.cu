@@ -34,7 +34,9 @@ public:
     tuned_cell(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule, Value value,
                baseline_output baseline)
         : session_(s), backend_(s.stream()), draw_{view(mesh), {}, {value}}, grid_(grid), options_(rule, false),
-          framebuffer_(backend_, grid.extent), baseline_(baseline) {}
+          framebuffer_(backend_, grid.extent), baseline_(baseline) {
+        backend_.lists_fragments = false; // in tiles
+    }
 
     vp::counters call() override {
         const vp::status s = backend_.template run<selector>(

@@ -198,17 +198,22 @@ template <class... Targets, class VertexShader, class FragmentShader>
 void expect_same(const mesh_data& m, const vp::grid& g, const VertexShader& vs, const FragmentShader& fs,
                  vp::voxelize_options options, start how = start::clear) {
     vp::cpu_backend cpu;
-    vp::cuda_backend gpu;
     vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
-    vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
     const vp::status sa = draw_framebuffer(cpu, a, m, g, vs, fs, options, how);
-    const vp::status sb = draw_framebuffer(gpu, b, m, g, vs, fs, options, how);
-    ASSERT_EQ(sa.code, sb.code) << sb.message();
-    expect_same_counts(sa.counts, sb.counts);
-    vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-        const std::string what = "target " + std::to_string(I);
-        expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu), what.c_str());
-    });
+    for (const bool lists : {true, false}) {
+        SCOPED_TRACE(lists ? "fragments listed, where they can be" : "in tiles");
+        vp::cuda_backend gpu;
+        gpu.lists_fragments = lists;
+        vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
+        const vp::status sb = draw_framebuffer(gpu, b, m, g, vs, fs, options, how);
+        ASSERT_EQ(sa.code, sb.code) << sb.message();
+        expect_same_counts(sa.counts, sb.counts);
+        vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            const std::string what = "target " + std::to_string(I);
+            expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu), what.c_str());
+        });
+        if constexpr (vp::core::is_solid<FragmentShader>) break; // most are drawn without either
+    }
 }
 
 // Targets that several tests draw into, named once: each set of targets and shaders is kernels of its own to compile.

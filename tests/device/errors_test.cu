@@ -64,8 +64,9 @@ int count_wrong(const Call& call) {
 }
 
 template <class Targets, class FragmentShader>
-int draw_broken(broken what, const FragmentShader& fs) {
+int draw_broken(broken what, const FragmentShader& fs, bool lists = false) {
     broken_mesh m;
+    m.be.lists_fragments = lists;
     typename Targets::template framebuffer<vp::cuda_backend> fb{m.be, g.extent};
     auto view = fb.view();
     auto& target = vp::get<0>(view.targets);
@@ -110,6 +111,10 @@ TEST_F(BadAddressDeathTest, OfAMeshThatIsDrawnInTiles) {
     for (const broken what : {broken::positions, broken::triangles})
         expect_none_wrong([&] { return draw_broken<tile_targets>(what, tile_values{}); });
 }
+TEST_F(BadAddressDeathTest, OfAMeshWhoseFragmentsAreListed) {
+    for (const broken what : {broken::positions, broken::triangles, broken::target})
+        expect_none_wrong([&] { return draw_broken<tile_targets>(what, tile_values{}, true); });
+}
 // Where an error shows only at the end, the last stage is named; without tiles that is the raster.
 TEST_F(BadAddressDeathTest, OfAMeshThatIsDrawnWithoutTiles) {
     expect_none_wrong([] { return draw_broken<bits>(broken::positions, vp::constant(true)); },
@@ -129,7 +134,7 @@ TEST_F(BadAddressDeathTest, OfACallWithoutAWait) {
 }
 
 // 9,000 times half a slice of 1020^2 voxels are more than 2^32 fragments. They are counted, not written.
-TEST(Errors, MoreFragmentsThanNumbersAreOutOfMemory) {
+TEST(Errors, MoreFragmentsThanNumbersAreOutOfMemoryForLists) {
     mesh_data m;
     add_triangle(m, {1.0f, 1.0f, 512.5f}, {1021.0f, 1.0f, 512.5f}, {1.0f, 1021.0f, 512.5f});
     m.triangles.resize(9000, m.triangles[0]);
@@ -142,6 +147,25 @@ TEST(Errors, MoreFragmentsThanNumbersAreOutOfMemory) {
     EXPECT_EQ(s.where, vp::stage::abuffer_emit);
     EXPECT_GT(s.required.fragments, std::uint64_t{1} << 32);
     EXPECT_EQ(lists.num_fragments(), 0u);
+}
+
+// 600 times half a slice are more than 2^28: what need not be listed is drawn in tiles then, and at once the next time.
+TEST(Errors, TooManyFragmentsToListAreDrawnInTiles) {
+    mesh_data m;
+    add_triangle(m, {1.0f, 1.0f, 0.5f}, {1021.0f, 1.0f, 0.5f}, {1.0f, 1021.0f, 0.5f});
+    m.triangles.resize(600, m.triangles[0]);
+    const vp::grid slice = box_grid({1024, 1024, 1});
+    vp::cuda_backend be;
+    const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+    tile_targets::framebuffer<vp::cuda_backend> fb{be, slice.extent};
+    for (int call = 0; call < 2; ++call) {
+        const vp::status s = vp::voxelize(be, mesh, slice, vp::passthrough{}, tile_values{}, fb, vp::coverage::thin);
+        ASSERT_TRUE(s.ok()) << s.message();
+        EXPECT_GT(s.counts.fragments, std::uint64_t{1} << 28);
+        EXPECT_EQ(s.counts.fragments, s.counts.voxels * 600);
+        const auto counts = vp::get<2>(fb).to_host(be);
+        EXPECT_EQ(counts[1024 * 5 + 5], 600u);
+    }
 }
 
 } // namespace

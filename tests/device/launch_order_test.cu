@@ -119,10 +119,11 @@ void for_each_order(const F& f) {
 const vp::grid whole = box_grid({90, 81, 97});
 
 template <class... Targets, class FragmentShader>
-void compare(target_list<Targets...>, const FragmentShader& shader, vp::coverage rule) {
+void compare(target_list<Targets...>, const FragmentShader& shader, vp::coverage rule, bool lists = false) {
     company others;
     stream_owner owner;
     vp::cuda_backend gpu{owner.stream};
+    gpu.lists_fragments = lists;
     vp::cpu_backend cpu;
     const vp::voxelize_options options{rule};
     for_each_order([&](const std::vector<mesh_data>& parts) {
@@ -153,6 +154,10 @@ void compare(target_list<Targets...>, const FragmentShader& shader, vp::coverage
 
 TEST(LaunchOrder, OfTilesDoesNotShow) {
     for (const vp::coverage rule : both_rules) compare(tile_targets{}, tile_values{9}, rule);
+}
+
+TEST(LaunchOrder, OfListedFragmentsDoesNotShow) {
+    for (const vp::coverage rule : both_rules) compare(tile_targets{}, tile_values{9}, rule, true);
 }
 
 TEST(LaunchOrder, WithoutTilesDoesNotShow) {

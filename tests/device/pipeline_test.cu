@@ -150,6 +150,51 @@ TEST(Pipeline, MemoryComesFromTheResource) {
     EXPECT_EQ(resource.live, 0u);
 }
 
+// Constant, which the library cannot know.
+struct computed {
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment&) const {
+        return vp::outputs(0.3f);
+    }
+};
+
+// Where there is memory for tiles only, listed fragments give way to them; then nothing does.
+TEST(Pipeline, FragmentsAreDrawnInTilesWhereThereIsNoMemoryToListThem) {
+    const mesh_data m = mixed_triangles(20000, 60.0f, 35);
+    const vp::grid g = box_grid({60, 50, 70});
+    std::size_t bytes[2] = {}; // with lists, with tiles
+    std::vector<float> expected;
+    const auto draw = [&](vp::cuda_backend& be, vp::framebuffer<vp::cuda_backend, sum>& fb) {
+        const vp::mesh mesh{be, m.positions, m.triangles};
+        return vp::voxelize(be, mesh, g, vp::passthrough{}, computed{}, fb);
+    };
+    for (const bool lists : {true, false}) {
+        counting_resource resource;
+        vp::cuda_backend be{nullptr, resource};
+        be.lists_fragments = lists;
+        vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
+        const std::size_t before = resource.live;
+        ASSERT_TRUE(draw(be, fb).ok());
+        bytes[lists ? 0 : 1] = resource.live - before; // the workspace
+        const auto values = vp::get<0>(fb).to_host(be);
+        if (lists)
+            expected = values;
+        else
+            expect_same_bytes(expected, values, "in tiles");
+    }
+    ASSERT_GT(bytes[0], bytes[1]);
+    for (const std::size_t most : {bytes[0], bytes[1], bytes[1] - 1}) {
+        counting_resource resource;
+        vp::cuda_backend be{nullptr, resource};
+        vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
+        const std::size_t of_mesh = m.positions.size() * sizeof(glm::vec3) + m.triangles.size() * sizeof(glm::uvec3);
+        resource.most = resource.live + of_mesh + most;
+        const vp::status s = draw(be, fb);
+        EXPECT_EQ(s.code, most < bytes[1] ? vp::status_code::out_of_memory : vp::status_code::ok) << most;
+        if (s.ok()) expect_same_bytes(expected, vp::get<0>(fb).to_host(be), "with less memory");
+    }
+}
+
 // More pairs, records and fragments than the first guess has room for.
 TEST(Pipeline, ACallThatOverflowsIsRunAgain) {
     mesh_data m;
@@ -160,6 +205,7 @@ TEST(Pipeline, ACallThatOverflowsIsRunAgain) {
     const vp::grid g = box_grid({300, 300, 300});
     for (const vp::coverage rule : both_rules) {
         expect_same<bits>(m, g, vp::passthrough{}, vp::constant(true), rule);
+        expect_same<sum>(m, g, vp::passthrough{}, computed{}, rule);
         expect_same_lists<void>(m, g, vp::passthrough{}, vp::constant(true), rule);
     }
 }
@@ -181,14 +227,6 @@ TEST(Pipeline, ListsOfAGridBeyond32Bits) {
         expect_same_lists<void>(m, box_grid({2048, 2048, 2048}), vp::passthrough{}, vp::constant(true), rule);
 }
 
-// Is drawn in tiles, though it is constant.
-struct in_tiles {
-    template <class Fragment>
-    VOXELPIPE_HD auto operator()(const Fragment&) const {
-        return vp::outputs(0.3f);
-    }
-};
-
 struct small_tiles {
     constexpr vp::tuning::fine_raster_policy operator()(int) const { return {64, 3, 4}; }
 };
@@ -199,10 +237,11 @@ struct large_blocks {
 template <class Selector>
 std::vector<float> run_policy(const mesh_data& m, const vp::grid& g, vp::coverage rule, vp::counters& counts) {
     vp::cuda_backend be;
+    be.lists_fragments = false;
     vp::mesh mesh{be, m.positions, m.triangles};
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
-    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, in_tiles>;
-    const draw_type d{mesh.view(), {}, in_tiles{}};
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, computed>;
+    const draw_type d{mesh.view(), {}, computed{}};
     const vp::status s = be.run<Selector>(std::span<const draw_type>(&d, 1), g, fb.view(), vp::voxelize_options{rule},
                                           m.triangles.size());
     EXPECT_TRUE(s.ok()) << s.message();
@@ -223,7 +262,7 @@ TEST(Pipeline, ResultsDoNotDependOnThePolicy) {
     }
 }
 
-using one_draw = vp::draw<vp::mesh_view<>, vp::passthrough, in_tiles>;
+using one_draw = vp::draw<vp::mesh_view<>, vp::passthrough, computed>;
 
 TEST(Pipeline, TwoStreamsAtOnce) {
     const mesh_data m = mixed_triangles(4000, 60.0f, 37);
@@ -241,7 +280,7 @@ TEST(Pipeline, TwoStreamsAtOnce) {
     for (vp::cuda_backend* be : backends) {
         meshes.emplace_back(*be, m.positions, m.triangles);
         fbs.emplace_back(*be, g.extent);
-        const one_draw d{meshes.back().view(), {}, in_tiles{}};
+        const one_draw d{meshes.back().view(), {}, computed{}};
         const std::size_t bytes =
             vp::workspace_bytes(std::span<const one_draw>(&d, 1), g, fbs.back().view(), {}, limits);
         ASSERT_GT(bytes, 0u);
@@ -250,7 +289,7 @@ TEST(Pipeline, TwoStreamsAtOnce) {
     }
     for (int round = 0; round < 5; ++round)
         for (int k = 0; k < 2; ++k) {
-            const one_draw d{meshes[static_cast<std::size_t>(k)].view(), {}, in_tiles{}};
+            const one_draw d{meshes[static_cast<std::size_t>(k)].view(), {}, computed{}};
             const vp::status s =
                 vp::voxelize_async(*backends[k], std::span<const one_draw>(&d, 1), g,
                                    fbs[static_cast<std::size_t>(k)].view(), {}, views[static_cast<std::size_t>(k)]);
@@ -272,7 +311,7 @@ TEST(Pipeline, AGraphIsReplayedWithChangedVertices) {
     vp::cuda_backend::buffer<glm::vec3> positions(be, vp::array_view<const glm::vec3>(m.positions));
     vp::cuda_backend::buffer<glm::uvec3> triangles(be, vp::array_view<const glm::uvec3>(m.triangles));
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
-    const one_draw d{{positions.view(), triangles.view(), {}}, {}, in_tiles{}};
+    const one_draw d{{positions.view(), triangles.view(), {}}, {}, computed{}};
     const std::span<const one_draw> draws(&d, 1);
     const auto limits = vp::workspace_limits::for_triangles(4 * m.triangles.size());
     const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), {}, limits);
@@ -310,7 +349,7 @@ void start_too_small(vp::workspace_limits limits) {
     const vp::grid g = box_grid({200, 200, 200});
     vp::mesh mesh{be, m.positions, m.triangles};
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
-    const one_draw d{mesh.view(), {}, in_tiles{}};
+    const one_draw d{mesh.view(), {}, computed{}};
     const std::span<const one_draw> draws(&d, 1);
     EXPECT_EQ(vp::voxelize_async(be, draws, g, fb.view(), {}, {nullptr, 0, limits}).code,
               vp::status_code::capacity_exceeded);
@@ -347,7 +386,7 @@ TEST(Pipeline, AWorkspaceBeyond32BitsIsRefused) {
     const vp::grid g = box_grid({20, 20, 20});
     vp::mesh mesh{be, m.positions, m.triangles};
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
-    const one_draw d{mesh.view(), {}, in_tiles{}};
+    const one_draw d{mesh.view(), {}, computed{}};
     const std::span<const one_draw> draws(&d, 1);
     for (const vp::workspace_limits limits : {vp::workspace_limits{std::uint64_t{1} << 32, 1, 0, 0},
                                               vp::workspace_limits{1, 1, std::uint64_t{1} << 40, 1}}) {

@@ -86,6 +86,29 @@ TEST(Reduced, BitsThatAreClearedToOne) {
         vp::coverage::conservative);
 }
 
+// Shaded and blended by voxel: runs that a voxel goes through, voxels without a fragment that is kept, and draws.
+TEST(Reduced, ListedFragments) {
+    mesh_data m = mixed_triangles(700, 30.0f, 70);
+    append(m, triangles_in_voxel(3000, {3.0f, 2.0f, 4.0f}, 71));
+    for (std::uint32_t x = 0; x < 20; ++x)
+        append(m, triangles_in_voxel(70, {static_cast<float>(x), 9.0f, 9.0f}, 72 + x));
+    const vp::grid g = box_grid({30, 21, 33});
+    for (const vp::coverage rule : both_rules)
+        for (const std::uint32_t discards : {0u, 1u, 2u})
+            expect_same(tile_targets{}, m, g, vp::passthrough{}, tile_values{discards}, rule,
+                        discards == 2 ? start::load : start::clear);
+    vp::cuda_backend be;
+    tile_targets::framebuffer<vp::cuda_backend> timed{be, g.extent};
+    const vp::stage_times times = time_stages(
+        be, [&] { return draw_framebuffer(be, timed, m, g, vp::passthrough{}, tile_values{}, {}, start::clear); });
+    EXPECT_GT(times.vertex_shade, 0.0);
+    EXPECT_GT(times.fine_raster, 0.0);
+    EXPECT_GT(times.tile_sort, 0.0);
+    EXPECT_GT(times.clear, 0.0);
+    EXPECT_GT(times.tile_resolve, 0.0);
+    for (const double none : {times.coarse_raster, times.tile_split, times.abuffer_emit}) EXPECT_EQ(none, 0.0);
+}
+
 TEST(Reduced, StageTimesOfTilesAndOrderedTargets) {
     using fb_type = with_every_kind<vp::framebuffer, vp::cuda_backend>;
     const with_every_kind<any_values> shader;

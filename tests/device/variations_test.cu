@@ -158,6 +158,7 @@ several_results results_of(vp::cuda_backend& be, several& fb, const vp::status& 
 
 template <class Selector>
 several_results with(const mesh_data& m, const vp::grid& g, vp::coverage rule, vp::cuda_backend be = {}) {
+    be.lists_fragments = false;
     const vp::mesh mesh{be, m.positions, m.triangles};
     several fb{be, g.extent};
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, several_values>;

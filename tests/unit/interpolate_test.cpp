@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 
 namespace {
 
@@ -113,6 +114,39 @@ TEST(Barycentric, IsTheExactRatioRounded) {
         check_barycentrics<std::int64_t>(random, 24);
         check_barycentrics<int128>(random, i % 2 == 0 ? 24 : 40);
     }
+}
+
+// A small triangle's frame, in 32 bits, against the one in 64: weights, axis and normal, to the bit.
+TEST(Barycentric, OfASmallTriangleIsTheSame) {
+    splitmix64 random(5);
+    int zero_areas = 0;
+    for (std::int64_t i = 0; i < unit::cases(50'000); ++i) {
+        triangle t = random_triangle(random, random.one_in(3) ? 3 : 18);
+        if (random.one_in(7)) t.v[2] = t.v[random.below(2)];
+        const auto setup = vp::core::make_frame<std::int64_t>(t.v[0], t.v[1], t.v[2], fraction);
+        const vp::core::voxel_box box = vp::core::bounds(t.v[0], t.v[1], t.v[2], fraction);
+        vp::core::small_triangle small{};
+        for (int k = 0; k < 3; ++k)
+            for (int a = 0; a < 3; ++a) {
+                const std::int64_t q = a == 0 ? t.v[k].x : a == 1 ? t.v[k].y : t.v[k].z;
+                small.p[k][a] = static_cast<std::int32_t>(q - (box.lo[a] << fraction));
+            }
+        const vp::core::small_frame frame(small, fraction);
+        ASSERT_EQ(frame.axis, setup.axis);
+        ASSERT_EQ(frame.zero_area, setup.zero_area);
+        zero_areas += frame.zero_area;
+        const auto last =
+            vp::core::to_uvw(frame.axis, box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
+        ASSERT_LT(vp::core::max3(last[0], last[1], last[2]), vp::core::small_voxels(fraction));
+        const auto u = static_cast<int>(random.between(0, last[0])), v = static_cast<int>(random.between(0, last[1]));
+        const glm::vec3 a = vp::core::barycentric(setup, setup.origin[0] + u, setup.origin[1] + v),
+                        b = vp::core::barycentric(frame, u, v);
+        ASSERT_EQ(std::memcmp(&a, &b, sizeof(a)), 0);
+        const vp::core::triple<double> factors{{1.0, 0.5, 3.0}};
+        const glm::vec3 n = vp::core::unit_normal(setup, factors), m = vp::core::unit_normal(frame, factors);
+        ASSERT_EQ(std::memcmp(&n, &m, sizeof(n)), 0);
+    }
+    EXPECT_GT(zero_areas, 100);
 }
 
 TEST(Barycentric, ClampedLiesOnTheTriangle) {

@@ -381,6 +381,30 @@ TEST(WideSum, RoundsWhatNeedsMoreThan128Bits) {
             }
 }
 
+// A sum of 64 bits becomes a float by one conversion; every other one, and all of them, by round_sum.
+TEST(RoundSum, ToFloatByOneConversionIsTheSame) {
+    splitmix64 random(9);
+    const auto check = [&]<int Quantum>(std::integral_constant<int, Quantum>, const vp::core::wide_sum<1>& s) {
+        const auto bits = static_cast<std::uint32_t>(vp::core::round_sum(s, Quantum, 23, 8));
+        ASSERT_EQ(vp::core::bit_cast<std::uint32_t>(vp::core::round_sum_to_float<Quantum>(s)), bits)
+            << s.limb[0] << ' ' << s.top << ' ' << s.marks << ' ' << Quantum;
+    };
+    const auto check_all = [&](const vp::core::wide_sum<1>& s) {
+        check(std::integral_constant<int, -126>{}, s);
+        check(std::integral_constant<int, -32>{}, s);
+        check(std::integral_constant<int, 0>{}, s);
+        check(std::integral_constant<int, 64>{}, s);
+    };
+    for (const std::uint64_t low : {0ull, 1ull, (1ull << 63) - 1, 1ull << 63, (1ull << 63) + 1, ~0ull, (1ull << 24) + 1,
+                                    (1ull << 25) + 2, (1ull << 25) + 6, 0x7fffff4000000000ull, 0x7fffffc000000000ull})
+        for (const std::int32_t top : {0, -1, 1, -2})
+            for (const std::uint32_t marks : {0u, 1u, 2u, 3u, 4u}) check_all({{low}, top, marks});
+    for (std::int64_t i = 0; i < unit::cases(20'000); ++i) {
+        const auto units = static_cast<std::int64_t>(random.next()) >> random.below(64);
+        check_all({{static_cast<std::uint64_t>(units)}, static_cast<std::int32_t>(units >> 63), 0});
+    }
+}
+
 TEST(AddSaturate, SignedIsTheExactSumThenClamped) {
     splitmix64 random(7);
     const auto check = [&]<class T>(T) {

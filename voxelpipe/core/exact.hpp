@@ -287,6 +287,8 @@ template <class Int>
 }
 
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double to_double(std::int64_t a) { return static_cast<double>(a); }
+// Nearest float, ties to even, by one rounding.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float to_float(std::int64_t a) { return static_cast<float>(a); }
 
 } // namespace exact
 } // namespace voxelpipe

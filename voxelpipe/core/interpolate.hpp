@@ -8,6 +8,7 @@
 // from the triangle's first vertex); up to 12 members.
 
 #include <voxelpipe/core/pack.hpp>
+#include <voxelpipe/core/small_triangle.hpp>
 #include <voxelpipe/core/triangle_setup.hpp>
 
 #include <glm/vec2.hpp>
@@ -173,7 +174,7 @@ template <class V>
 // Barycentrics at the centre of column (u, v) (absolute voxel indices): quotients of exact integers, rounded to double
 // and then to float. Outside the triangle some are negative. A zero-area triangle has 1/3 everywhere.
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE glm::vec3 barycentric(const triangle_setup<Int>& t, std::int64_t u,
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE glm::vec3 barycentric(const triangle_frame<Int>& t, std::int64_t u,
                                                                   std::int64_t v) {
     if (t.zero_area) return glm::vec3(1.0f / 3.0f);
     const Int x = static_cast<Int>(2 * (u - t.origin[0]) + 1) << t.fraction; // doubled, so that the half stays whole
@@ -181,6 +182,19 @@ template <class Int>
     const double area = exact::to_double(2 * t.normal[2]);
     const auto weight = [&](const triple<Int>& p, const triple<Int>& q) VOXELPIPE_INLINE_LAMBDA {
         const Int n = (q[0] - p[0]) * (y - 2 * p[1]) - (q[1] - p[1]) * (x - 2 * p[0]);
+        return exact::to_float(exact::div(exact::to_double(n), area));
+    };
+    return {weight(t.p[1], t.p[2]), weight(t.p[2], t.p[0]), weight(t.p[0], t.p[1])};
+}
+
+// The same for a small triangle; (u, v) counts from the lowest voxel of its bounding box, and lies in that box.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE glm::vec3 barycentric(const small_frame& t, int u, int v) {
+    if (t.zero_area) return glm::vec3(1.0f / 3.0f);
+    const std::int32_t x = (2 * u + 1) << t.fraction, y = (2 * v + 1) << t.fraction;
+    const double area = exact::to_double(2 * t.normal[2]);
+    const auto weight = [&](const triple<std::int32_t>& p, const triple<std::int32_t>& q) VOXELPIPE_INLINE_LAMBDA {
+        const std::int64_t n = static_cast<std::int64_t>(q[0] - p[0]) * (y - 2 * p[1]) -
+                               static_cast<std::int64_t>(q[1] - p[1]) * (x - 2 * p[0]);
         return exact::to_float(exact::div(exact::to_double(n), area));
     };
     return {weight(t.p[1], t.p[2]), weight(t.p[2], t.p[0]), weight(t.p[0], t.p[1])};
@@ -194,12 +208,12 @@ template <class Int>
 }
 
 // Unit normal in world space, (p1 - p0) x (p2 - p0) direction; zero for a zero-area triangle. Exact integers, then
-// double: scale by the voxels' shape, length by three fused steps, quotients rounded to float.
-template <class Int>
-[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE glm::vec3 unit_normal(const triangle_setup<Int>& t,
-                                                                  const triple<double>& factors) {
+// double: scale by the voxels' shape, length by three fused steps, quotients rounded to float. Frame: triangle_frame or
+// small_frame.
+template <class Frame>
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE glm::vec3 unit_normal(const Frame& t, const triple<double>& factors) {
     if (t.zero_area) return glm::vec3(0.0f);
-    const triple<Int> n = to_xyz(t.axis, t.normal[0], t.normal[1], t.normal[2]);
+    const auto n = to_xyz(t.axis, t.normal[0], t.normal[1], t.normal[2]);
     const double x = exact::mul(exact::to_double(n[0]), factors[0]);
     const double y = exact::mul(exact::to_double(n[1]), factors[1]);
     const double z = exact::mul(exact::to_double(n[2]), factors[2]);

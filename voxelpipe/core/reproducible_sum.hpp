@@ -186,4 +186,17 @@ template <int Limbs>
            (m.negative ? sign : 0);
 }
 
+// The same to a float, mostly by one conversion: a sum that fits 64 bits, without marks. Its last place is a normal
+// float, so the product is exact.
+template <int Log2Quantum>
+[[nodiscard]] VOXELPIPE_HD inline float round_sum_to_float(const wide_sum<1>& s) {
+    static_assert(Log2Quantum >= -126 && Log2Quantum <= 64);
+    const auto units = static_cast<std::int64_t>(s.limb[0]);
+    if (s.marks == 0 && s.top == static_cast<std::int32_t>(units >> 63)) {
+        constexpr float quantum = core::bit_cast<float>(static_cast<std::uint32_t>(127 + Log2Quantum) << 23);
+        return exact::mul(exact::to_float(units), quantum);
+    }
+    return core::bit_cast<float>(static_cast<std::uint32_t>(round_sum(s, Log2Quantum, 23, 8)));
+}
+
 } // namespace voxelpipe::core

@@ -90,6 +90,29 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void small_projection(const small_triang
     return (x | y | z) == 0 ? -1 : x >= y && x >= z ? 0 : y >= z ? 1 : 2;
 }
 
+// What a fragment's position on a small triangle, and its normal, follow from: triangle_frame in fewer bits, relative
+// to the lowest voxel of the bounding box.
+struct small_frame {
+    int axis, fraction;
+    bool zero_area;
+    triple<std::int32_t> p[3];   // uvw order
+    triple<std::int64_t> normal; // (p1 - p0) x (p2 - p0), uvw order
+
+    VOXELPIPE_HD VOXELPIPE_INLINE constexpr small_frame(const small_triangle& t, int fraction_)
+        : axis(0), fraction(fraction_), zero_area(false), p{}, normal(small_normal(t)) {
+        axis = small_axis(normal);
+        zero_area = axis < 0;
+        if (zero_area) { // the longest side
+            triple<std::int32_t> sides{};
+            for (int k = 0; k < 3; ++k)
+                sides[k] = max3(t.p[0][k], t.p[1][k], t.p[2][k]) - min3(t.p[0][k], t.p[1][k], t.p[2][k]);
+            axis = sides[0] >= sides[1] && sides[0] >= sides[2] ? 0 : sides[1] >= sides[2] ? 1 : 2;
+        }
+        for (int i = 0; i < 3; ++i) p[i] = to_uvw(axis, t.p[i][0], t.p[i][1], t.p[i][2]);
+        normal = to_uvw(axis, normal[0], normal[1], normal[2]);
+    }
+};
+
 // Bit x where three linear functions of x are all >= 0, for x = 0 .. Length - 1; e: their values at x = Length - 1, s:
 // what a step adds. Without a branch, and from the last one down, so that each sign goes to its bit by one shift of two
 // words. What is more than the row is for the caller to mask; up to 63 voxels from the corner of a box of at most 32

@@ -123,15 +123,20 @@ struct half_plane {
     [[nodiscard]] VOXELPIPE_HD constexpr Int at(Int x, Int y) const { return a * x + b * y + c; }
 };
 
+// What a fragment's position on its triangle, and the triangle's normal, follow from.
 template <class Int>
-struct triangle_setup {
-    int axis;                     // w; of a zero-area triangle: its longest side
-    int fraction;                 // F
-    bool zero_area;               // after snapping
-    triple<std::int64_t> origin;  // voxel that holds the local origin, uvw order
+struct triangle_frame {
+    int axis;                    // w; of a zero-area triangle: its longest side
+    int fraction;                // F
+    bool zero_area;              // after snapping
+    triple<std::int64_t> origin; // voxel that holds the local origin, uvw order: the bounding box's first
+    triple<Int> p[3];            // vertices relative to origin, sub-voxel units, uvw order; each > 0
+    triple<Int> normal;          // (p1 - p0) x (p2 - p0), uvw order
+};
+
+template <class Int>
+struct triangle_setup : triangle_frame<Int> {
     triple<std::int64_t> last;    // last voxel of the bounding box, relative to origin; the first is 0
-    triple<Int> p[3];             // vertices relative to origin, sub-voxel units, uvw order; each > 0
-    triple<Int> normal;           // (p1 - p0) x (p2 - p0), uvw order
     half_plane<Int> uv[3];        // edge i runs from vertex i to vertex i + 1
     half_plane<Int> vw[3], wu[3]; // conservative only
     triple<Int> plane;            // normal, signed so that plane[2] > 0
@@ -174,13 +179,12 @@ template <class Int>
     return static_cast<int128>(n[0]) * p[0] + static_cast<int128>(n[1]) * p[1] + static_cast<int128>(n[2]) * p[2];
 }
 
-// Int = std::int64_t where fits_narrow, int128 otherwise. Vertices are drawable; fraction >= 1.
-template <span_rule Rule, class Int>
-[[nodiscard]] VOXELPIPE_HD constexpr triangle_setup<Int>
-setup_triangle(const snapped_position& a, const snapped_position& b, const snapped_position& c, int fraction) {
-    triangle_setup<Int> t; // every field that the rule uses is set below
+// Sets a frame up. Int = std::int64_t where fits_narrow, int128 otherwise. Vertices are drawable; fraction >= 1.
+// box: bounds(a, b, c, fraction).
+template <class Int>
+VOXELPIPE_HD constexpr void set_up_frame(triangle_frame<Int>& t, const voxel_box& box, const snapped_position& a,
+                                         const snapped_position& b, const snapped_position& c, int fraction) {
     t.fraction = fraction;
-    const voxel_box box = bounds(a, b, c, fraction);
     const std::int64_t ox = box.lo[0] << fraction, oy = box.lo[1] << fraction, oz = box.lo[2] << fraction;
 
     const Int e1x = b.x - a.x, e1y = b.y - a.y, e1z = b.z - a.z;
@@ -197,12 +201,27 @@ setup_triangle(const snapped_position& a, const snapped_position& b, const snapp
         t.axis = lx >= ly && lx >= lz ? 0 : ly >= lz ? 1 : 2;
     }
     t.origin = to_uvw(t.axis, box.lo[0], box.lo[1], box.lo[2]);
-    t.last = to_uvw(t.axis, box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
     t.p[0] = to_uvw<Int>(t.axis, a.x - ox, a.y - oy, a.z - oz);
     t.p[1] = to_uvw<Int>(t.axis, b.x - ox, b.y - oy, b.z - oz);
     t.p[2] = to_uvw<Int>(t.axis, c.x - ox, c.y - oy, c.z - oz);
     t.normal = to_uvw<Int>(t.axis, nx, ny, nz);
+}
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD constexpr triangle_frame<Int>
+make_frame(const snapped_position& a, const snapped_position& b, const snapped_position& c, int fraction) {
+    triangle_frame<Int> t{};
+    set_up_frame(t, bounds(a, b, c, fraction), a, b, c, fraction);
+    return t;
+}
 
+// Of a triangle as above.
+template <span_rule Rule, class Int>
+[[nodiscard]] VOXELPIPE_HD constexpr triangle_setup<Int>
+setup_triangle(const snapped_position& a, const snapped_position& b, const snapped_position& c, int fraction) {
+    triangle_setup<Int> t; // every field that the rule uses is set below
+    const voxel_box box = bounds(a, b, c, fraction);
+    set_up_frame(t, box, a, b, c, fraction);
+    t.last = to_uvw(t.axis, box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
     projection(t.p, 0, 1, t.normal[2], fraction, t.uv);
     if constexpr (Rule == span_rule::conservative) {
         projection(t.p, 1, 2, t.normal[0], fraction, t.vw);

@@ -35,7 +35,7 @@ template <class Cell>
 
 // scalar_blend<Blend, S>: available (an atomic exists), words per voxel, and with `n` voxels in the tile
 //   clear(plane, i, n)   accumulate(plane, i, n, value)   cell load(plane, i, n)   merge(cell&, cell)   finish(cell,
-//   stored)
+//   stored)   cell cell_of(value), of one fragment
 template <class Blend, class S>
 struct scalar_blend {
     static constexpr bool available = false;
@@ -91,6 +91,7 @@ struct extremum {
         else
             atomicMax(c, k);
     }
+    __device__ static cell cell_of(S v) { return map::to_key(v); }
     __device__ static void merge(cell& a, cell b) { a = is_min ? (b < a ? b : a) : (a < b ? b : a); }
     __device__ static S finish(cell c, S stored) {
         core::blend_traits<Blend, S>::apply(stored, map::from_key(c));
@@ -133,6 +134,7 @@ struct bitwise {
         else
             return plane[i];
     }
+    __device__ static cell cell_of(S v) { return static_cast<cell>(v); }
     __device__ static void merge(cell& a, cell b) { core::blend_traits<Blend, cell>::apply(a, b); }
     __device__ static S finish(cell c, S stored) {
         core::blend_traits<Blend, S>::apply(stored, static_cast<S>(c));
@@ -184,6 +186,7 @@ struct scalar_blend<blend::add, S> {
         else
             return plane[i];
     }
+    __device__ static cell cell_of(S v) { return static_cast<cell>(v); }
     __device__ static void merge(cell& a, cell b) { a += b; }
     __device__ static S finish(cell c, S stored) {
         core::blend_traits<blend::add, S>::apply(stored, static_cast<S>(c));
@@ -204,6 +207,10 @@ struct scalar_blend<blend::count, S> {
         atomicAdd(plane + i, 1u);
     }
     __device__ static cell load(const word* plane, int i, int) { return plane[i]; }
+    template <class Any>
+    __device__ static cell cell_of(const Any&) {
+        return 1;
+    }
     __device__ static void merge(cell& a, cell b) { a += b; }
     __device__ static S finish(cell c, S stored) {
         core::blend_traits<blend::add, S>::apply(stored, static_cast<S>(c));
@@ -249,6 +256,11 @@ struct wide_sum_blend {
         const word last = plane[2 * limbs * n + i];
         c.top = static_cast<std::int32_t>(last) >> mark_bits;
         c.marks = last & ((1u << mark_bits) - 1);
+        return c;
+    }
+    __device__ static cell cell_of(S v) {
+        cell c{};
+        Traits::apply(c, v);
         return c;
     }
     __device__ static void merge(cell& a, const cell& b) {
@@ -312,6 +324,7 @@ requires(core::is_integer<S>&& std::is_unsigned_v<S>) struct scalar_blend<blend:
         else
             return load_two_words(plane, i, n);
     }
+    __device__ static cell cell_of(S v) { return v; }
     __device__ static void merge(cell& a, cell b) { a = plus(a, b); }
     __device__ static S finish(cell c, S stored) {
         const cell sum = plus(c, stored);
@@ -332,6 +345,7 @@ struct scalar_blend<blend::add_unordered, S> {
     __device__ static void clear(word* plane, int i, int) { *at(plane, i) = 0; }
     __device__ static void accumulate(word* plane, int i, int, S v) { atomicAdd(at(plane, i), static_cast<cell>(v)); }
     __device__ static cell load(const word* plane, int i, int) { return *at(const_cast<word*>(plane), i); }
+    __device__ static cell cell_of(S v) { return static_cast<cell>(v); }
     __device__ static void merge(cell& a, cell b) { a += b; }
     __device__ static S finish(cell c, S stored) {
         return core::canonical(static_cast<S>(static_cast<cell>(stored) + c));
@@ -376,6 +390,11 @@ struct swap_blend {
         } while (old != seen);
     }
     __device__ static cell load(const word* plane, int i, int) { return from_raw(*at(const_cast<word*>(plane), i)); }
+    __device__ static cell cell_of(const T& v) {
+        T c = traits::identity();
+        traits::apply(c, v);
+        return c;
+    }
     __device__ static void merge(cell& a, const cell& b) { traits::apply(a, b); }
     __device__ static T finish(const cell& c, T stored) {
         traits::apply(stored, c);
@@ -425,6 +444,17 @@ requires(!core::user_blend<Blend, glm::vec<N, S, Q>> && !core::user_blend_templa
     __device__ static cell load(const word* plane, int i, int n) {
         cell r;
         for (int c = 0; c < N; ++c) r.c[c] = part::load(plane + c * part::words * n, i, n);
+        return r;
+    }
+    template <class Value>
+    __device__ static cell cell_of(const Value& v) {
+        cell r;
+        for (int c = 0; c < N; ++c) {
+            if constexpr (std::is_same_v<Blend, blend::count>)
+                r.c[c] = part::cell_of(v);
+            else
+                r.c[c] = part::cell_of(v[c]);
+        }
         return r;
     }
     __device__ static void merge(cell& a, const cell& b) {

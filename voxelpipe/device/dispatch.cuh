@@ -10,6 +10,7 @@
 #include <voxelpipe/device/clear_target.cuh>
 #include <voxelpipe/device/counted_target.cuh>
 #include <voxelpipe/device/direct_raster.cuh>
+#include <voxelpipe/device/fragment_resolve.cuh>
 #include <voxelpipe/device/ordered_blend.cuh>
 #include <voxelpipe/device/stage_clock.cuh>
 #include <voxelpipe/device/tile_passes.cuh>
@@ -32,7 +33,7 @@ struct scene_memory {
     using scene_type = scene<FragmentShader, varyings>;
     using draw_type = draw<Mesh, VertexShader, FragmentShader>;
 
-    core::snapped_position* positions;
+    vertex_positions positions;
     varyings* vertex_varyings;
     draw_geometry* geometries; // null where there is one draw
     typename scene_type::shading* shadings;
@@ -40,7 +41,7 @@ struct scene_memory {
     scene_memory(arena& memory, std::span<const draw_type> draws) {
         std::size_t vertices = 0;
         for (const auto& d : draws) vertices += d.mesh.positions.size();
-        positions = memory.take<core::snapped_position>(vertices);
+        positions = vertex_positions::take(memory, vertices);
         vertex_varyings = memory.take<varyings>(std::is_empty_v<varyings> ? 0 : vertices);
         geometries = memory.take<draw_geometry>(draws.size() > 1 ? draws.size() : 0);
         shadings = memory.take<typename scene_type::shading>(draws.size() > 1 ? draws.size() : 0);
@@ -59,9 +60,9 @@ struct scene_memory {
         std::uint32_t primitive = 0;
         for (std::size_t d = 0; d < draws.size(); ++d) {
             const Mesh& m = draws[d].mesh;
-            geometry_of[d] = {m.triangles.data(), positions + vertex, primitive,
-                              static_cast<std::uint32_t>(m.positions.size())};
-            vertex_shade(m, draws[d].vertex_shader, s.geo.snap, static_cast<std::uint32_t>(d), positions + vertex,
+            const vertex_positions of_draw = positions.from(vertex);
+            geometry_of[d] = {m.triangles.data(), of_draw, primitive, static_cast<std::uint32_t>(m.positions.size())};
+            vertex_shade(m, draws[d].vertex_shader, s.geo.snap, static_cast<std::uint32_t>(d), of_draw,
                          varyings_at(vertex), stream);
             vertex += m.positions.size();
             primitive += static_cast<std::uint32_t>(m.triangles.size());
@@ -158,6 +159,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     voxelize_options options;
     std::uint32_t num_primitives;
     capacities limits;
+    bool may_list = false; // fragments, where limits.fragments holds them
     core::tile_grid tiles{g.extent, Policy.log2_tile_size};
     stage_clock* clock = nullptr; // where the call is asked for its times
 
@@ -169,6 +171,12 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         if constexpr (can_be_direct<FragmentShader, Framebuffer>) {
             if (is_direct_call()) {
                 go_direct<Rule, Run>(memory, state, stream);
+                return;
+            }
+        }
+        if constexpr (is_resolvable<Framebuffer>) {
+            if (is_listed_call()) {
+                go_listed<Rule, Run>(memory, state, stream);
                 return;
             }
         }
@@ -192,7 +200,17 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         b.add(options);
         b.add(num_primitives);
         b.add(limits);
+        b.add(may_list);
         return b;
+    }
+    // Whether the call lists its fragments: its memory grows with them.
+    [[nodiscard]] bool is_listed_call() const {
+        if constexpr (can_be_direct<FragmentShader, Framebuffer>)
+            if (is_direct_call()) return false;
+        if (!is_resolvable<Framebuffer> || !may_list || draws.size() > most_direct_draws) return false;
+        if (num_voxels(g) >= std::numeric_limits<std::uint32_t>::max() || limits.fragments > most_resolved)
+            return false;
+        return is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
     }
 
     // Of this call: what a failure that shows only at its end is put down to.
@@ -229,7 +247,7 @@ private:
             vertices = std::max(vertices, d.mesh.positions.size());
             most_triangles = std::max(most_triangles, d.mesh.triangles.size());
         }
-        core::snapped_position* const positions = memory.take<core::snapped_position>(on_the_spot ? 0 : vertices);
+        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : vertices);
         const triangle_lists handed_on = triangle_lists::take(memory, most_triangles);
         if constexpr (Run) {
             if (has_marks) check(cudaMemsetAsync(marks.words, 0, marks.num_words() * sizeof(word), stream));
@@ -276,6 +294,56 @@ private:
         }
     }
 
+    template <coverage Rule, bool Run>
+    void go_listed(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+        using ends_type = run_ends<voxel_cells<Framebuffer>>;
+        const scene_buffers buffers(memory, draws);
+        std::uint32_t *voxels[2], *primitives[2];
+        for (int i = 0; i < 2; ++i) {
+            voxels[i] = memory.take<std::uint32_t>(limits.fragments);
+            primitives[i] = memory.take<std::uint32_t>(limits.fragments);
+        }
+        const sort_memory sort =
+            sort_memory::take(memory, limits.fragments, static_cast<int>(std::bit_width(num_voxels(g) - 1)));
+        std::size_t most_triangles = 0;
+        for (const draw_type& d : draws) most_triangles = std::max(most_triangles, d.mesh.triangles.size());
+        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles);
+        const ends_type ends = ends_type::take(memory, limits.fragments);
+        if constexpr (Run) {
+            const scene_type s = buffers.shade(draws, g, stream);
+            end_stage(clock, &stage_times::vertex_shade);
+            draw_geometry of_draw{draws[0].mesh.triangles.data(), buffers.positions, 0, 0};
+            for (const draw_type& d : draws) {
+                const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
+                of_draw.triangles = d.mesh.triangles.data();
+                of_draw.num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
+                if (num_triangles != 0) {
+                    if (of_draw.first_primitive != 0)
+                        check(cudaMemsetAsync(&state->handed_on, 0, sizeof(state->handed_on), stream));
+                    const raster_input<stored_source> in{{of_draw}, num_triangles, s.geo.snap.fraction, g.extent};
+                    list_raster<Rule>(in, of_draw.num_vertices, of_draw.first_primitive, handed_on.with(state),
+                                      voxels[0], primitives[0], state, limits, stream);
+                }
+                of_draw.positions = of_draw.positions.from(of_draw.num_vertices);
+                of_draw.first_primitive += num_triangles;
+            }
+            end_stage(clock, &stage_times::fine_raster);
+            const int at = sort_listed(voxels, primitives, sort, state, limits, stream);
+            end_stage(clock, &stage_times::tile_sort);
+            clear_targets(state, stream);
+            resolve_fragments(s, fb, {voxels[at], primitives[at]}, ends, options.count_voxels, state, limits, stream);
+            end_stage(clock, &stage_times::tile_resolve);
+        }
+    }
+
+    void clear_targets(const pipeline_state* state, cudaStream_t stream) const {
+        core::for_each_index<groups::count>([&]<std::size_t K>() {
+            const auto& t = voxelpipe::get<K>(fb.targets);
+            if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
+        });
+        end_stage(clock, &stage_times::clear);
+    }
+
     template <coverage Rule, bool Run, class Key>
     void go_with(arena& memory, pipeline_state* state, cudaStream_t stream) const {
         const scene_buffers buffers(memory, draws);
@@ -294,11 +362,7 @@ private:
         fragment_lists<Key, values> lists{};
         if constexpr (groups::has_ordered) lists = list_fragments<Rule, Run, Key>(memory, s, state, stream);
         if constexpr (Run) {
-            core::for_each_index<groups::count>([&]<std::size_t K>() {
-                const auto& t = voxelpipe::get<K>(fb.targets);
-                if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
-            });
-            end_stage(clock, &stage_times::clear);
+            clear_targets(state, stream);
             // Fragments and voxels are counted once: by the lists, where there are any.
             if constexpr (in_tiles)
                 fine_pass<Rule, Policy>(s, fb, work,
@@ -370,7 +434,7 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
                                                   const asked_places& asked = {}) const {
         pipeline_state* const state = memory.take<pipeline_state>(1);
         if constexpr (core::is_solid<FragmentShader> && sizeof(Key) == sizeof(std::uint32_t)) {
-            if (is_listable(draws.size(), num_primitives, core::make_snap_transform(g).fraction, g.extent))
+            if (draws.size() == 1 && is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent))
                 return go_direct<Rule, Run>(memory, state, stream, asked);
         }
         const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
@@ -394,8 +458,7 @@ private:
         constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
         const draw_type& d = draws[0];
         const auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
-        core::snapped_position* const positions =
-            memory.take<core::snapped_position>(on_the_spot ? 0 : d.mesh.positions.size());
+        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : d.mesh.positions.size());
         const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
         const order_memory order = order_memory::take(memory, limits.fragments);
         if constexpr (Run) {
@@ -404,7 +467,7 @@ private:
             const auto raster = [&](const auto& source) {
                 const raster_input<std::remove_cvref_t<decltype(source)>> in{source, num_primitives, snap.fraction,
                                                                              g.extent};
-                list_raster<Rule>(in, num_vertices, handed_on.with(state), lists.keys[0], lists.values[0], state,
+                list_raster<Rule>(in, num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0], state,
                                   limits, stream);
             };
             if constexpr (on_the_spot) {

@@ -195,7 +195,7 @@ __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, c
             const std::uint32_t triangle = m.ids[packed >> 15];
             const auto i = static_cast<int>(packed & 0x7fffu);
             visit(i, triangle,
-                  shade_fragment<false>(s, triangle, x0 + i % size, y0 + i / size % size, z0 + i / (size * size)));
+                  shade_small_fragment<true>(s, triangle, x0 + i % size, y0 + i / size % size, z0 + i / (size * size)));
         }
         const int all = m.sums[Threads - 1];
         for (int u = static_cast<int>(threadIdx.x); u < all; u += Threads) {

@@ -6,6 +6,7 @@
 // returns (paper section 3, fragment shader); and one fragment alone, for targets that need only the last one.
 
 #include <voxelpipe/device/scene.cuh>
+#include <voxelpipe/device/small_raster.cuh>
 #include <voxelpipe/device/wide_path.cuh>
 
 #include <type_traits>
@@ -34,8 +35,8 @@ struct fragment_source {
                 f.vertex_varyings[i] = d.varyings + t.index[i];
         }
     }
-    template <class Int>
-    __device__ VOXELPIPE_INLINE void begin_triangle(const core::triangle_setup<Int>& t) {
+    template <class Frame>
+    __device__ VOXELPIPE_INLINE void begin_triangle(const Frame& t) {
         f.axis = t.zero_area ? 0 : t.axis;
         f.front_facing = t.normal[2] >= 0;
         f.normal = core::unit_normal(t, s.normal_factors);
@@ -88,25 +89,47 @@ __device__ VOXELPIPE_INLINE void shade_fragments(const Scene& s, const loaded_tr
     }
 }
 
-// The output of the primitive's fragment in voxel (x, y, z), which it covers. MayBeWide: whether the triangle may need
-// more than 64 bits (core::fits_narrow).
-template <bool MayBeWide = true, class Scene>
+// The output of the primitive's fragment in voxel (x, y, z), which it covers.
+template <class Scene>
 __device__ auto shade_fragment(const Scene& s, std::uint32_t id, int x, int y, int z) {
     const loaded_triangle tri = s.geo.load(id);
     fragment_source<Scene> source(s, tri, id);
     const int fraction = s.geo.snap.fraction;
-    // Barycentrics and the normal do not depend on the coverage rule; thin needs the least set-up.
-    if (!MayBeWide || core::fits_narrow(tri.a, tri.b, tri.c, fraction)) {
-        const auto t = core::setup_triangle<core::span_rule::thin, std::int64_t>(tri.a, tri.b, tri.c, fraction);
+    if (core::fits_narrow(tri.a, tri.b, tri.c, fraction)) {
+        const auto t = core::make_frame<std::int64_t>(tri.a, tri.b, tri.c, fraction);
         const auto p = core::to_uvw(t.axis, x, y, z);
         source.begin_triangle(t);
         source.begin_column(core::barycentric(t, p[0], p[1]));
-    } else if constexpr (MayBeWide) {
+    } else {
         const wide_triangle t = set_up_wide(tri.a, tri.b, tri.c, fraction, s.normal_factors);
         const auto p = core::to_uvw(t.axis, x, y, z);
         source.begin_triangle(t);
         source.begin_column(wide_barycentric(tri.a, tri.b, tri.c, fraction, p[0], p[1]));
     }
+    return source.shade(x, y, z);
+}
+template <class Scene>
+__device__ __noinline__ auto shade_fragment_apart(const Scene& s, std::uint32_t id, int x, int y, int z) {
+    return shade_fragment(s, id, x, y, z);
+}
+
+// The same where most triangles are small: those in 32 bits. AllSmall: all are, and the others' code is left out.
+template <bool AllSmall, class Scene>
+__device__ VOXELPIPE_INLINE auto shade_small_fragment(const Scene& s, std::uint32_t id, int x, int y, int z) {
+    loaded_triangle tri; // but for its positions
+    tri.draw = s.geo.find_draw(id);
+    const draw_geometry& d = s.geo.draw(tri.draw);
+    tri.triangle = id - d.first_primitive;
+    tri.index = d.triangles[tri.triangle];
+    const int fraction = s.geo.snap.fraction;
+    const near_triangle r = load_near(raster_input<stored_source>{{d}, 0, fraction, s.geo.extent}, tri.index);
+    if (!AllSmall && (!r.is_near || r.most() > core::small_voxels(fraction)))
+        return shade_fragment_apart(s, id, x, y, z);
+    const core::small_frame frame(r.relative(fraction), fraction);
+    const auto p = core::to_uvw(frame.axis, x - r.lo[0], y - r.lo[1], z - r.lo[2]);
+    fragment_source<Scene> source(s, tri, id);
+    source.begin_triangle(frame);
+    source.begin_column(core::barycentric(frame, p[0], p[1]));
     return source.shade(x, y, z);
 }
 

@@ -287,4 +287,20 @@ template <class Count>
     return tiles == 0 ? 0 : m.plan.passes % 2;
 }
 
+// Zeros for the sort of what a call has listed, and that sort.
+template <class Memory>
+__global__ void zero_sort_kernel(const __grid_constant__ Memory m, const __grid_constant__ sort_count count) {
+    await_stream();
+    m.zero(count.get(), std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x, std::uint64_t{gridDim.x} * blockDim.x);
+}
+[[nodiscard]] inline int sort_listed(std::uint32_t* const (&keys)[2], std::uint32_t* const (&values)[2],
+                                     const sort_memory& m, pipeline_state* state, const capacities& limits,
+                                     cudaStream_t stream) {
+    const sort_count count{state, limits};
+    launch_behind(zero_sort_kernel<sort_memory>,
+                  fill_device(sort_memory::num_tiles(limits.fragments) * m.plan.num_digits()), threads_per_block,
+                  stream, stage::tile_sort, m, count);
+    return sort_fragments(keys, values, count, limits.fragments, m, stream);
+}
+
 } // namespace voxelpipe::device

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Fragment lists of a constant shader: direct_raster.cuh with a sink that appends what it finds to one list, in any
-// order. One pass: no fragment is counted before it is written, and none is shaded. A warp gathers fragments in shared
-// memory and takes room in the list for all of them at once.
+// Fragment lists: direct_raster.cuh with a sink that appends what it finds to one list, in any order. One pass: no
+// fragment is counted before it is written, and none is shaded. A warp gathers fragments in shared memory and takes
+// room in the list for all of them at once.
 
 #include <voxelpipe/device/direct_raster.cuh>
 
@@ -19,7 +19,7 @@ struct listing_sink : direct_sink<Call> {
     static constexpr unsigned room = 448;    // with the queues, less than 48 KB for a block
     static constexpr unsigned flush_at = 64; // less may wait: a round of thin triangles brings up to 384
     struct memory {
-        std::uint32_t voxels[room], triangles[room];
+        std::uint32_t voxels[room], primitives[room];
         unsigned n;
     };
 
@@ -34,7 +34,9 @@ struct listing_sink : direct_sink<Call> {
         if (!ok) atomicOr(&this->call.out.state->index_error, 1u);
         return ok;
     }
-    __device__ VOXELPIPE_INLINE void begin(std::uint32_t triangle) { triangle_ = triangle; }
+    __device__ VOXELPIPE_INLINE void begin(std::uint32_t triangle) {
+        primitive_ = this->call.out.first_primitive + triangle;
+    }
     __device__ VOXELPIPE_INLINE void drop(core::triangle_class kind) {
         if (!straight_) direct_sink<Call>::drop(kind); // once, where a triangle comes twice
     }
@@ -125,10 +127,10 @@ private:
         if (!straight_) {
             if (at >= room) return;
             m_.voxels[at] = voxel;
-            m_.triangles[at] = triangle_;
+            m_.primitives[at] = primitive_;
         } else if (base_ + at < this->call.out.capacity) {
             this->call.out.voxels[base_ + at] = voxel;
-            this->call.out.triangles[base_ + at] = triangle_;
+            this->call.out.primitives[base_ + at] = primitive_;
         }
     }
     // Room in the list for n fragments; what is beyond its capacity is counted only.
@@ -143,7 +145,7 @@ private:
         const unsigned long long first = take(n);
         for (unsigned i = threadIdx.x % 32; i < n && first + i < this->call.out.capacity; i += 32) {
             this->call.out.voxels[first + i] = m_.voxels[i];
-            this->call.out.triangles[first + i] = m_.triangles[i];
+            this->call.out.primitives[first + i] = m_.primitives[i];
         }
     }
     __device__ VOXELPIPE_INLINE void restart() {
@@ -156,7 +158,7 @@ private:
     unsigned kept_ = 0;           // of the memory; what lies behind belongs to this round
     bool straight_ = false;       // this round goes to the list at once,
     unsigned long long base_ = 0; // from here on
-    std::uint32_t triangle_ = 0;
+    std::uint32_t primitive_ = 0;
 };
 
 struct list_output {
@@ -165,27 +167,26 @@ struct list_output {
     static constexpr bool hands_on = true;
 
     std::uint32_t* voxels; // by fragment
-    std::uint32_t* triangles;
+    std::uint32_t* primitives;
     unsigned long long capacity;
-    std::uint32_t num_vertices;
+    std::uint32_t num_vertices, first_primitive;
     pipeline_state* state;
 };
 
-// Whether the fragments of one draw of a constant shader can be listed this way.
-[[nodiscard]] inline bool is_listable(std::size_t num_draws, std::uint64_t num_triangles, int fraction,
-                                      glm::ivec3 extent) {
-    return num_draws == 1 && core::small_voxels(fraction) > 0 &&
-           std::max({extent.x, extent.y, extent.z}) <= most_direct_extent &&
+// Whether the fragments of a draw can be listed this way.
+[[nodiscard]] inline bool is_listable(std::uint64_t num_triangles, int fraction, glm::ivec3 extent) {
+    return core::small_voxels(fraction) > 0 && std::max({extent.x, extent.y, extent.z}) <= most_direct_extent &&
            triangle_lists::holds(num_triangles, most_large_records(extent));
 }
 
 // Appends the fragments of a draw to two arrays of limits.fragments elements each; counts them in the state.
+// first_primitive: of the draw.
 template <coverage Rule, class Source>
-void list_raster(const raster_input<Source>& in, std::uint32_t num_vertices, const triangle_lists& handed_on,
-                 std::uint32_t* voxels, std::uint32_t* triangles, pipeline_state* state, const capacities& limits,
-                 cudaStream_t stream) {
+void list_raster(const raster_input<Source>& in, std::uint32_t num_vertices, std::uint32_t first_primitive,
+                 const triangle_lists& handed_on, std::uint32_t* voxels, std::uint32_t* primitives,
+                 pipeline_state* state, const capacities& limits, cudaStream_t stream) {
     const direct_call<Rule, Source, list_output> call{
-        in, {voxels, triangles, limits.fragments, num_vertices, state}, handed_on};
+        in, {voxels, primitives, limits.fragments, num_vertices, first_primitive, state}, handed_on};
     direct_raster(call, state, stage::abuffer_emit, stream);
 }
 

@@ -61,9 +61,37 @@ __global__ void move_state_kernel(State* state, State* to) {
     }
 }
 
+// A snapped position in 32 bits, where it is no further than 2^30 units from the first voxel of what is rasterised. One
+// load of 16 bytes, where the position has three of 8.
+struct __align__(16) near_position {
+    std::int32_t q[3];
+    std::uint32_t is_near; // or 0, and then q holds nothing
+
+    [[nodiscard]] VOXELPIPE_HD static near_position of(const core::snapped_position& p) {
+        constexpr std::int64_t limit = std::int64_t{1} << 30;
+        const bool near =
+            p.x <= limit && p.x >= -limit && p.y <= limit && p.y >= -limit && p.z <= limit && p.z >= -limit;
+        return {{static_cast<std::int32_t>(p.x), static_cast<std::int32_t>(p.y), static_cast<std::int32_t>(p.z)}, near};
+    }
+};
+// The positions that vertex_shade leaves, in both forms.
+struct vertex_positions {
+    core::snapped_position* exact;
+    near_position* near;
+
+    [[nodiscard]] static vertex_positions take(arena& memory, std::size_t num_vertices) {
+        core::snapped_position* const exact = memory.take<core::snapped_position>(num_vertices);
+        return {exact, memory.take<near_position>(num_vertices)};
+    }
+    // Those of a mesh whose first vertex is this one of all. With an arena that only adds up, nothing.
+    [[nodiscard]] vertex_positions from(std::size_t vertex) const {
+        return exact == nullptr ? *this : vertex_positions{exact + vertex, near + vertex};
+    }
+};
+
 struct draw_geometry {
     const glm::uvec3* triangles;
-    const core::snapped_position* positions;
+    vertex_positions positions;
     std::uint32_t first_primitive, num_vertices;
 };
 
@@ -106,9 +134,9 @@ struct geometry {
         t.index = d.triangles[t.triangle];
         t.index_ok = t.index.x < d.num_vertices && t.index.y < d.num_vertices && t.index.z < d.num_vertices;
         if (t.index_ok) {
-            t.a = d.positions[t.index.x];
-            t.b = d.positions[t.index.y];
-            t.c = d.positions[t.index.z];
+            t.a = d.positions.exact[t.index.x];
+            t.b = d.positions.exact[t.index.y];
+            t.c = d.positions.exact[t.index.z];
         }
         return t;
     }

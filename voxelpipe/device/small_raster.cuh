@@ -50,15 +50,12 @@ struct stored_source {
     draw_geometry geometry;
 
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(std::uint32_t vertex, std::int32_t (&q)[3]) const {
-        const core::snapped_position p = geometry.positions[vertex];
-        constexpr std::int64_t limit = std::int64_t{1} << 30;
-        q[0] = static_cast<std::int32_t>(p.x);
-        q[1] = static_cast<std::int32_t>(p.y);
-        q[2] = static_cast<std::int32_t>(p.z);
-        return p.x <= limit && p.x >= -limit && p.y <= limit && p.y >= -limit && p.z <= limit && p.z >= -limit;
+        const device::near_position p = geometry.positions.near[vertex];
+        for (int k = 0; k < 3; ++k) q[k] = p.q[k];
+        return p.is_near != 0;
     }
     [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
-        return geometry.positions[vertex];
+        return geometry.positions.exact[vertex];
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const {
         return geometry.triangles[i];

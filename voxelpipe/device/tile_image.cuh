@@ -159,30 +159,32 @@ __device__ void store_bit_row(const Framebuffer& fb, const core::voxel_box& box,
     stored = static_cast<bit_row<size>>(value);
 }
 
-// A touched voxel of atomic target K.
-template <class Image, std::size_t K, class Framebuffer, class Cell>
-__device__ void store_cell(const Framebuffer& fb, const voxel_place& at, const Cell& cell) {
-    using t = typename Image::template target<K>;
-    const auto& view = voxelpipe::get<K>(fb.targets);
+// A touched voxel of an atomic target.
+template <class Target, class Cell>
+__device__ void store_cell(const target_view<Target>& view, const voxel_place& at, const Cell& cell) {
     if (view.load == load_operation::off) return;
     const auto stored = view.load == load_operation::clear ? view.clear_value : view(at.x, at.y, at.z);
-    view.store(at.x, at.y, at.z, value_blend<typename t::blend_type, typename t::value_type>::finish(cell, stored));
+    view.store(at.x, at.y, at.z,
+               value_blend<typename Target::blend_type, typename Target::value_type>::finish(cell, stored));
 }
 
-// A touched voxel of the targets whose last fragment wins: shades that fragment. winner: its primitive + 1.
+// A touched voxel of a target whose last fragment wins: that fragment's value.
+template <class Target, class Value>
+__device__ void store_winner(const target_view<Target>& view, const voxel_place& at, const Value& value) {
+    if (view.load == load_operation::off) return;
+    if constexpr (Target::map::is_bit)
+        store_bit(view, at.x, at.y, at.z, value);
+    else
+        view.store(at.x, at.y, at.z, core::canonical(value));
+}
+
+// A touched voxel of all targets whose last fragment wins: shades that fragment. winner: its primitive + 1.
 template <class Image, class Scene, class Framebuffer>
 __device__ void store_winners(const Scene& s, const Framebuffer& fb, const voxel_place& at, word winner) {
     const auto out = shade_fragment(s, winner - 1, at.x, at.y, at.z);
     Image::for_each_target([&]<std::size_t K>() {
-        using t = typename Image::template target<K>;
-        if constexpr (method_of<t>() == blend_method::winner) {
-            const auto& view = voxelpipe::get<K>(fb.targets);
-            if (view.load == load_operation::off) return;
-            if constexpr (t::map::is_bit)
-                store_bit(view, at.x, at.y, at.z, voxelpipe::get<K>(out.values));
-            else
-                view.store(at.x, at.y, at.z, core::canonical(voxelpipe::get<K>(out.values)));
-        }
+        if constexpr (method_of<typename Image::template target<K>>() == blend_method::winner)
+            store_winner(voxelpipe::get<K>(fb.targets), at, voxelpipe::get<K>(out.values));
     });
 }
 
@@ -212,8 +214,8 @@ __device__ std::uint32_t store_tile(const Scene& s, const Framebuffer& fb, const
                 using t = typename Image::template target<K>;
                 if constexpr (method_of<t>() == blend_method::atomic) {
                     using blend_type = value_blend<typename t::blend_type, typename t::value_type>;
-                    store_cell<Image, K>(fb, at,
-                                         blend_type::load(tile + Image::template offset<K>(), i, Image::voxels));
+                    store_cell(voxelpipe::get<K>(fb.targets), at,
+                               blend_type::load(tile + Image::template offset<K>(), i, Image::voxels));
                 }
             });
             if constexpr (Image::has_winner) store_winners<Image>(s, fb, at, tile[Image::winner_at + i]);

@@ -143,8 +143,9 @@ __global__ __launch_bounds__(threads_per_block) void tile_resolve_kernel(const _
                 using t = typename Image::template target<K>;
                 if constexpr (method_of<t>() == blend_method::atomic) {
                     using blend_type = value_blend<typename t::blend_type, typename t::value_type>;
-                    merge_cells<blend_type>(column, Image::template offset<K>(), memory,
-                                            [&](const auto& cell) { store_cell<Image, K>(fb, at, cell); });
+                    merge_cells<blend_type>(column, Image::template offset<K>(), memory, [&](const auto& cell) {
+                        store_cell(voxelpipe::get<K>(fb.targets), at, cell);
+                    });
                 }
             });
         }

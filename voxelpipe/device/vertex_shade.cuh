@@ -14,24 +14,27 @@ namespace voxelpipe::device {
 template <class Mesh, class VertexShader, class Varyings>
 __global__ void vertex_shade_kernel(const __grid_constant__ Mesh mesh, const __grid_constant__ VertexShader shader,
                                     const __grid_constant__ core::snap_transform snap, std::uint32_t draw,
-                                    core::snapped_position* positions, Varyings* varyings) {
+                                    core::snapped_position* positions, near_position* near_positions,
+                                    Varyings* varyings) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i >= mesh.positions.size()) return;
     const auto v = core::fetch_vertex(mesh, static_cast<std::uint32_t>(i), draw);
     const auto result = shader(v);
     const auto& o = core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result);
-    positions[i] = core::snap(snap, o.position.x, o.position.y, o.position.z);
+    const core::snapped_position p = core::snap(snap, o.position.x, o.position.y, o.position.z);
+    positions[i] = p;
+    near_positions[i] = near_position::of(p);
     if constexpr (!std::is_empty_v<Varyings>) varyings[i] = o.varyings;
 }
 
 // positions and varyings have one element per vertex of the mesh; varyings may be null where the type is empty.
 template <class Mesh, class VertexShader, class Varyings>
 void vertex_shade(const Mesh& mesh, const VertexShader& shader, const core::snap_transform& snap, std::uint32_t draw,
-                  core::snapped_position* positions, Varyings* varyings, cudaStream_t stream) {
+                  const vertex_positions& positions, Varyings* varyings, cudaStream_t stream) {
     if (mesh.positions.size() == 0) return;
     vertex_shade_kernel<Mesh, VertexShader, Varyings>
-        <<<num_blocks(mesh.positions.size()), threads_per_block, 0, stream>>>(mesh, shader, snap, draw, positions,
-                                                                              varyings);
+        <<<num_blocks(mesh.positions.size()), threads_per_block, 0, stream>>>(mesh, shader, snap, draw, positions.exact,
+                                                                              positions.near, varyings);
     check(cudaGetLastError(), stage::vertex_shade);
 }
 

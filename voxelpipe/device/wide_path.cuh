@@ -41,14 +41,14 @@ __device__ __noinline__ int wide_spans(core::snapped_position a, core::snapped_p
 template <class Factors>
 __device__ __noinline__ wide_triangle set_up_wide(core::snapped_position a, core::snapped_position b,
                                                   core::snapped_position c, int fraction, Factors factors) {
-    const auto t = core::setup_triangle<core::span_rule::thin, int128>(a, b, c, fraction);
+    const auto t = core::make_frame<int128>(a, b, c, fraction);
     return {t.axis, t.zero_area, t.normal[2] >= 0, core::unit_normal(t, factors)};
 }
 
 template <class Position>
 __device__ __noinline__ glm::vec3 wide_barycentric(Position a, Position b, Position c, int fraction, std::int64_t u,
                                                    std::int64_t v) {
-    return core::barycentric(core::setup_triangle<core::span_rule::thin, int128>(a, b, c, fraction), u, v);
+    return core::barycentric(core::make_frame<int128>(a, b, c, fraction), u, v);
 }
 
 // Calls visit(axis, span) for every span of a triangle that fits_narrow refuses.
