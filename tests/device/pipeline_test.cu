@@ -160,7 +160,11 @@ struct computed {
 
 // Where there is memory for tiles only, listed fragments give way to them; then nothing does.
 TEST(Pipeline, FragmentsAreDrawnInTilesWhereThereIsNoMemoryToListThem) {
-    const mesh_data m = mixed_triangles(20000, 60.0f, 35);
+    mesh_data m = mixed_triangles(200, 60.0f, 35);
+    for (int i = 0; i < 300; ++i) { // more fragments than pairs with tiles, many times
+        const float h = 0.2f * static_cast<float>(i);
+        add_triangle(m, {-9.0f, -9.0f, h}, {130.0f, -9.0f, h + 3.0f}, {-9.0f, 130.0f, h + 9.0f});
+    }
     const vp::grid g = box_grid({60, 50, 70});
     std::size_t bytes[2] = {}; // with lists, with tiles
     std::vector<float> expected;
@@ -276,8 +280,9 @@ TEST(Pipeline, TwoStreamsAtOnce) {
     std::vector<vp::framebuffer<vp::cuda_backend, sum>> fbs;
     std::vector<vp::cuda_backend::buffer<std::byte>> memory;
     std::vector<vp::workspace_view> views;
-    const auto limits = vp::workspace_limits::for_triangles(4 * m.triangles.size());
+    auto limits = vp::workspace_limits::for_triangles(4 * m.triangles.size());
     for (vp::cuda_backend* be : backends) {
+        limits.lists_fragments = be == &second;
         meshes.emplace_back(*be, m.positions, m.triangles);
         fbs.emplace_back(*be, g.extent);
         const one_draw d{meshes.back().view(), {}, computed{}};
@@ -303,7 +308,7 @@ TEST(Pipeline, TwoStreamsAtOnce) {
     }
 }
 
-TEST(Pipeline, AGraphIsReplayedWithChangedVertices) {
+void replay(bool lists) {
     stream_owner owner;
     vp::cuda_backend be{owner.stream};
     const mesh_data m = mixed_triangles(3000, 60.0f, 38), other = mixed_triangles(3000, 60.0f, 39);
@@ -313,7 +318,9 @@ TEST(Pipeline, AGraphIsReplayedWithChangedVertices) {
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
     const one_draw d{{positions.view(), triangles.view(), {}}, {}, computed{}};
     const std::span<const one_draw> draws(&d, 1);
-    const auto limits = vp::workspace_limits::for_triangles(4 * m.triangles.size());
+    auto limits = vp::workspace_limits::for_triangles(4 * m.triangles.size());
+    limits.lists_fragments = lists;
+    limits.fragments *= 16; // large triangles among them
     const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), {}, limits);
     vp::cuda_backend::buffer<std::byte> memory(be, bytes);
     const vp::workspace_view workspace{memory.data(), bytes, limits};
@@ -343,6 +350,10 @@ TEST(Pipeline, AGraphIsReplayedWithChangedVertices) {
     cudaGraphDestroy(graph);
 }
 
+TEST(Pipeline, AGraphIsReplayedWithChangedVertices) {
+    for (const bool lists : {false, true}) replay(lists);
+}
+
 void start_too_small(vp::workspace_limits limits) {
     vp::cuda_backend be;
     mesh_data m = mixed_triangles(3000, 60.0f, 40);
@@ -364,8 +375,8 @@ void start_too_small(vp::workspace_limits limits) {
         done = s.ok();
         if (!done) {
             ASSERT_EQ(s.code, vp::status_code::capacity_exceeded);
-            EXPECT_EQ(s.where, vp::stage::coarse_raster);
-            EXPECT_GT(s.required.tile_pairs, 10u);
+            EXPECT_EQ(s.where, limits.lists_fragments ? vp::stage::abuffer_emit : vp::stage::coarse_raster);
+            EXPECT_GT(limits.lists_fragments ? s.required.fragments : s.required.tile_pairs, 10u);
             for (const float v : vp::get<0>(fb).to_host(be)) ASSERT_EQ(std::bit_cast<std::uint32_t>(v), 0x5a5a5a5au);
         }
     }
@@ -378,6 +389,8 @@ void start_too_small(vp::workspace_limits limits) {
 TEST(Pipeline, AWorkspaceThatIsTooSmallSaysWhatIsNeeded) {
     start_too_small({10, 1, 0, 0});
     start_too_small({}); // no room at all: nothing may be launched with no blocks
+    start_too_small({0, 0, 10, 0, true});
+    start_too_small({0, 0, 0, 0, true});
 }
 
 TEST(Pipeline, AWorkspaceBeyond32BitsIsRefused) {

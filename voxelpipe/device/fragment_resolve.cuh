@@ -199,24 +199,31 @@ __global__ __launch_bounds__(threads_per_block, 4) void resolve_runs_kernel(
     for (std::uint32_t run = blockIdx.x * (threads_per_block / 32) + warp_in_block(); run < runs; run += warps) {
         const std::uint32_t begin = run * resolve_run, end = n - begin < resolve_run ? n : begin + resolve_run;
         std::uint32_t before = begin == 0 ? ~0u : f.voxels[begin - 1]; // the voxel of the fragment before
-        some_cells<cells> carried{};                                   // of that voxel, in this run
+        const std::uint32_t behind = end < n ? f.voxels[end] : ~0u;    // that of the fragment behind the run
+        some_cells<cells> carried{};                                   // of the last voxel, in this run
         bool has_begun = false;                                        // whether any voxel has, in this run
         std::uint32_t flags = 0;
+        // What a lane has next is loaded while it works on what it has.
+        std::uint32_t next_voxel = begin + lane < end ? f.voxels[begin + lane] : ~0u; // which is no voxel
+        std::uint32_t next_primitive = begin + lane < end ? f.primitives[begin + lane] : 0;
         for (std::uint32_t first = begin; first < end; first += 32) {
             const std::uint32_t i = first + lane;
             const bool valid = i < end;
-            const std::uint32_t voxel = valid ? f.voxels[i] : ~0u; // which is no voxel
+            const std::uint32_t voxel = next_voxel, primitive = next_primitive;
+            next_voxel = i + 32 < end ? f.voxels[i + 32] : ~0u;
+            if (i + 32 < end) next_primitive = f.primitives[i + 32];
             std::uint32_t previous = __shfl_up_sync(whole_warp, voxel, 1),
                           next = __shfl_down_sync(whole_warp, voxel, 1);
             if (lane == 0) previous = before;
-            if (valid && (lane == 31 || i + 1 == end)) next = i + 1 < n ? f.voxels[i + 1] : ~0u;
+            const std::uint32_t ahead = __shfl_sync(whole_warp, next_voxel, 0);
+            if (lane == 31) next = ahead;
+            if (i + 1 == end) next = behind;
             before = __shfl_sync(whole_warp, voxel, 31);
             const unsigned starts = __ballot_sync(whole_warp, valid && voxel != previous);
             const unsigned upto = starts & ((2u << lane) - 1);
             some_cells<cells> mine{};
             const voxel_place at = place_of(voxel, fb.extent);
             if (valid) {
-                const std::uint32_t primitive = f.primitives[i];
                 const auto out = shade_small_fragment<false>(s, primitive, at.x, at.y, at.z);
                 mine.any = static_cast<word>(out.keep);
                 if (out.keep) mine.cells = cells::make(out.values, primitive);

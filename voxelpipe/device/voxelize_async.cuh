@@ -11,12 +11,16 @@
 namespace voxelpipe {
 
 // How much a call may hold. tile_pairs: (tile, triangle) pairs; fragments: only for targets with blends that need
-// triangle order; the records are pieces of large triangles, 512 columns of tiles (or voxels) each.
+// triangle order, or with lists_fragments; the records are pieces of large triangles, 512 columns of tiles (or voxels)
+// each.
 struct workspace_limits {
     std::uint64_t tile_pairs = 0;
     std::uint64_t tile_records = 0;
     std::uint64_t fragments = 0;
     std::uint64_t fragment_records = 0;
+    // Whether shaders that compute may have their fragments listed and sorted by voxel instead of being drawn in tiles
+    // (cuda_backend::lists_fragments): then `fragments` is what has to suffice, in place of tile_pairs. Up to 2^28.
+    bool lists_fragments = false;
 
     // A start for a mesh whose triangles are mostly smaller than a tile.
     [[nodiscard]] static workspace_limits for_triangles(std::uint64_t triangles) {
@@ -56,7 +60,10 @@ template <class Draw, class Framebuffer, class F>
 auto with_call(std::span<const Draw> draws, const grid& g, const Framebuffer& fb, const voxelize_options& options,
                std::uint64_t triangles, const workspace_limits& limits, const F& f) {
     return with_framebuffer_call<tuning::fine_raster_selector>(draws, g, fb, options, triangles, to_capacities(limits),
-                                                               f);
+                                                               [&](auto call) {
+                                                                   call.may_list = limits.lists_fragments;
+                                                                   return f(call);
+                                                               });
 }
 
 } // namespace device
@@ -139,7 +146,8 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
             *need = {larger(workspace.limits.tile_pairs, state.tile_pairs),
                      larger(workspace.limits.tile_records, state.tile_records),
                      larger(workspace.limits.fragments, state.list_fragments),
-                     larger(workspace.limits.fragment_records, state.fragment_records)};
+                     larger(workspace.limits.fragment_records, state.fragment_records),
+                     workspace.limits.lists_fragments};
         }
         return s;
     }
