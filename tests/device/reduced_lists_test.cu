@@ -22,6 +22,48 @@ TEST(ReducedLists, OfConstantAndComputedPayloads) {
     }
 }
 
+struct shaded_late {
+    std::uint32_t discards = 0; // one fragment in so many; 0: none
+
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& f) const {
+        const std::uint32_t h = mix_bits(f.primitive * 7u + static_cast<std::uint32_t>(f.voxel.x + f.voxel.z));
+        return vp::outputs(vp::exact::add(f.barycentric.y, f.normal.z)).discard_if(discards != 0 && h % discards == 0);
+    }
+};
+
+// Lists are shaded where they lie as long as nothing is discarded: one backend, calls that discard and calls that do
+// not, the first ones often enough to become a graph, with voxels of one fragment and of thousands.
+template <class Payload>
+void list_late(vp::coverage rule) {
+    mesh_data m = mixed_triangles(400, 30.0f, 63);
+    append(m, triangles_in_voxel(9000, {3.0f, 2.0f, 4.0f}, 64));
+    append(m, triangles_in_voxel(600, {9.0f, 2.0f, 4.0f}, 65));
+    const vp::grid g = box_grid({30, 21, 33});
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    const vp::mesh<vp::cpu_backend> on_cpu(cpu, m.positions, m.triangles);
+    const vp::mesh<vp::cuda_backend> on_gpu(gpu, m.positions, m.triangles);
+    vp::abuffer<vp::cpu_backend, Payload> expected{cpu};
+    vp::abuffer<vp::cuda_backend, Payload> lists{gpu};
+    for (const std::uint32_t discards : {0u, 0u, 0u, 0u, 0u, 3u, 3u, 0u, 1u}) {
+        SCOPED_TRACE(discards);
+        const vp::status a = vp::voxelize(cpu, on_cpu, g, vp::passthrough{}, shaded_late{discards}, expected, rule);
+        const vp::status b = vp::voxelize(gpu, on_gpu, g, vp::passthrough{}, shaded_late{discards}, lists, rule);
+        ASSERT_TRUE(a.ok() && b.ok()) << b.message();
+        EXPECT_EQ(b.counts.fragments_discarded != 0, discards != 0);
+        expect_same_counts(a.counts, b.counts);
+        expect_same_on_host(expected.to_host(cpu), lists.to_host(gpu));
+    }
+}
+
+TEST(ReducedLists, ShadedLate) {
+    for (const vp::coverage rule : both_rules) {
+        list_late<float>(rule);
+        list_late<void>(rule);
+    }
+}
+
 // The last voxel of this grid is number 2^33 - 1.
 const vp::grid large_grid = box_grid({2048, 2048, 2048});
 mesh_data far_triangles(std::uint32_t seed) { return translated(mixed_triangles(80, 25.0f, seed), glm::vec3(2020.0f)); }

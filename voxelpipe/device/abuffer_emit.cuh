@@ -3,10 +3,10 @@
 #pragma once
 
 // A-buffer: every fragment, ordered by (voxel, primitive). Fragments are counted, given their places by a
-// scan and written by ascending primitive; those of one draw with a constant shader are listed in one pass, in any
-// order (list_raster.cuh). A stable radix sort by voxel over just the bits in use follows, and the first fragment of
-// each voxel is selected; what was listed in any order is put in order within each voxel on the way
-// (fragment_order.cuh). Memory is in proportion to the fragments (paper section 3, A-buffer).
+// scan and written by ascending primitive; those of one draw are listed in one pass, in any order (list_raster.cuh),
+// where its shader is constant or discards nothing. A stable radix sort by voxel over just the bits in use follows, and
+// the first fragment of each voxel is selected; what was listed in any order is put in order within each voxel on the
+// way (fragment_order.cuh), and shaded then. Memory is in proportion to the fragments (paper section 3, A-buffer).
 
 #include <voxelpipe/device/fragment_order.cuh>
 #include <voxelpipe/device/fragment_shade.cuh>
@@ -158,7 +158,8 @@ struct fragment_lists {
     const std::uint64_t* first_of_voxel;
     const list_places* places; // where the lists are to go
     Payload payload;
-    bool are_placed; // all but the payloads are there, and nowhere else
+    bool are_placed;        // all but the payloads are there, and nowhere else
+    bool payloads_in_order; // payloads are by fragment, not by place
 
     [[nodiscard]] __device__ std::uint64_t voxel(std::uint64_t i) const {
         return voxels != nullptr ? voxels[i] : keys[first_of_voxel[i]];
@@ -168,7 +169,7 @@ struct fragment_lists {
         return primitives == nullptr ? value : primitives[value];
     }
     [[nodiscard]] __device__ const Payload& payload_of(std::uint64_t i) const {
-        return payloads == nullptr ? payload : payloads[values[i]];
+        return payloads == nullptr ? payload : payloads[payloads_in_order ? i : values[i]];
     }
 };
 
@@ -238,12 +239,13 @@ template <class Key, class Payload>
     return lists;
 }
 
-// The same for primitives that were listed in any order; the lists are then where they are to go.
+// The same for primitives that were listed in any order; the lists are then where they are to go. spare: room for
+// limits.fragments, where the sorted voxels are wanted afterwards; otherwise null.
 template <class Payload>
 [[nodiscard]] fragment_lists<std::uint32_t, Payload>
 sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const asked_places& asked,
-               std::uint32_t num_primitives, pipeline_state* state, const capacities& limits, cudaStream_t stream,
-               stage_clock* clock) {
+               std::uint32_t num_primitives, std::uint32_t* spare, pipeline_state* state, const capacities& limits,
+               cudaStream_t stream, stage_clock* clock) {
     const sorted_pairs<std::uint32_t> sorted =
         sort_by_voxel(b, asked, order.tiles, tile_counts::num(limits.fragments), state, limits, stream, clock);
     list_places here;
@@ -251,7 +253,8 @@ sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory
     here.offsets = b.first_of_voxel;
     here.room = limits.fragments;
     here.primitives = sorted.spare_values;
-    order_fragments({sorted.keys, sorted.values, sorted.keys, b.places, here, order.tiles, order.lists.with(state)},
+    order_fragments({sorted.keys, sorted.values, spare != nullptr ? spare : sorted.keys, b.places, here, order.tiles,
+                     order.lists.with(state)},
                     num_primitives, state, limits, stream);
     end_stage(clock, &stage_times::abuffer_emit);
     fragment_lists<std::uint32_t, Payload> lists{};
@@ -262,6 +265,27 @@ sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory
     lists.places = b.places;
     lists.are_placed = asked.value.voxels != nullptr;
     return lists;
+}
+
+// Shades fragments in their lists: payloads[i] is fragment i's, where there are payloads. Counts those that are
+// discarded, whose lists are not what the call is to give.
+template <class Scene, class Payload>
+__global__ __launch_bounds__(threads_per_block, 4) void shade_lists_kernel(
+    const __grid_constant__ Scene s, const __grid_constant__ fragment_lists<std::uint32_t, Payload> lists,
+    Payload* payloads, pipeline_state* state, capacities limits) {
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::most_numbered
+    const std::uint32_t* const primitives = lists.are_placed ? lists.places->primitives : lists.values;
+    std::uint32_t discarded = 0;
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * threads_per_block + threadIdx.x; i < n;
+         i += std::uint64_t{gridDim.x} * threads_per_block) {
+        const voxel_place at = place_of(lists.keys[i], s.geo.extent);
+        const auto out = shade_small_fragment<false>(s, primitives[i], at.x, at.y, at.z);
+        discarded += static_cast<std::uint32_t>(!out.keep);
+        if constexpr (!std::is_same_v<Payload, no_payload>) payloads[i] = first_value{}(out);
+    }
+    count_discarded(discarded, state);
 }
 
 template <coverage Rule, class MakePayload, class Scene, class Key, class Payload>

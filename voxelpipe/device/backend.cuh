@@ -289,14 +289,18 @@ public:
         status s = attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
                            [&](const device::capacities& limits, std::uint64_t voxel_room,
                                device::pipeline_state& state, device::stage_clock* clock) {
-                               const call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
-                               const bool small = device::num_voxels(g) < std::numeric_limits<std::uint32_t>::max();
-                               if (options.rule == coverage::thin)
-                                   small ? fill<coverage::thin, std::uint32_t>(call, voxel_room, made, state)
-                                         : fill<coverage::thin, std::uint64_t>(call, voxel_room, made, state);
-                               else
-                                   small ? fill<coverage::conservative, std::uint32_t>(call, voxel_room, made, state)
-                                         : fill<coverage::conservative, std::uint64_t>(call, voxel_room, made, state);
+                               call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
+                               if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
+                                   fill<std::uint64_t>(options.rule, call, voxel_room, made, state);
+                                   return false;
+                               }
+                               call.may_shade_late = discarding_call_ != device::tag_of_call<call_type>();
+                               fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
+                               if (state.discarded != 0 && call.template shades_late<std::uint32_t>()) {
+                                   discarding_call_ = device::tag_of_call<call_type>();
+                                   call.may_shade_late = false;
+                                   fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
+                               }
                                return false;
                            });
         if (s.ok()) {
@@ -512,6 +516,15 @@ private:
         }
     }
 
+    template <class Key, class Call, class Payload>
+    void fill(coverage rule, const Call& call, std::uint64_t voxel_room, abuffer<cuda_backend, Payload>& lists,
+              device::pipeline_state& state) {
+        if (rule == coverage::thin)
+            fill<coverage::thin, Key>(call, voxel_room, lists, state);
+        else
+            fill<coverage::conservative, Key>(call, voxel_room, lists, state);
+    }
+
     // voxel_room: how many voxels the lists are likely to have, 0 where nothing is known. Otherwise nobody waits in
     // between: the arrays are made beforehand.
     template <coverage Rule, class Key, class Call, class Payload>
@@ -582,7 +595,8 @@ private:
     device_block workspace_;
     device::state_reader state_reader_;
     device::call_graph call_graph_;
-    bool has_zeroed_state_ = false; // in the workspace
+    bool has_zeroed_state_ = false;         // in the workspace
+    const void* discarding_call_ = nullptr; // the last kind of lists' call that was shaded late and discarded fragments
 };
 
 } // namespace voxelpipe

@@ -33,14 +33,20 @@ private:
     std::vector<std::byte> bytes_;
 };
 
+// An address for each list of types.
+template <class... Types>
+[[nodiscard]] const void* tag_of_call() {
+    static constexpr char tag = 0;
+    return &tag;
+}
+
 // A start for the bytes of a call: its type, the device, and the memory that it works in.
 template <class... Types>
 [[nodiscard]] call_bytes bytes_of_call(const void* workspace, const void* page) {
-    static constexpr char type = 0; // its address: one for each list of types
     int device = 0;
     check(cudaGetDevice(&device));
     call_bytes b;
-    b.add(&type);
+    b.add(tag_of_call<Types...>());
     b.add(device);
     b.add(workspace);
     b.add(page);

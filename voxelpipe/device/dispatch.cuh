@@ -412,6 +412,7 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     std::uint32_t num_primitives;
     capacities limits;
     stage_clock* clock = nullptr;
+    bool may_shade_late = false; // in the lists; if any fragment is discarded then, these are not what is wanted
 
     // All that the launches of this call depend on, where it is plain bytes.
     static constexpr bool has_bytes = std::is_trivially_copyable_v<draw_type>;
@@ -423,7 +424,18 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
         b.add(g);
         b.add(num_primitives);
         b.add(limits);
+        b.add(may_shade_late);
         return b;
+    }
+    // Whether fragments are listed by the raster, and shaded afterwards where the shader is not constant.
+    template <class Key>
+    [[nodiscard]] bool is_listed_call() const {
+        return sizeof(Key) == sizeof(std::uint32_t) && (core::is_solid<FragmentShader> || may_shade_late) &&
+               draws.size() == 1 && is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
+    }
+    template <class Key>
+    [[nodiscard]] bool shades_late() const {
+        return !core::is_solid<FragmentShader> && is_listed_call<Key>();
     }
 
     // Carves the memory and, with Run, launches the stages up to the sorted lists, which may be where they are asked
@@ -433,9 +445,13 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, cudaStream_t stream,
                                                   const asked_places& asked = {}) const {
         pipeline_state* const state = memory.take<pipeline_state>(1);
-        if constexpr (core::is_solid<FragmentShader> && sizeof(Key) == sizeof(std::uint32_t)) {
-            if (draws.size() == 1 && is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent))
-                return go_direct<Rule, Run>(memory, state, stream, asked);
+        if constexpr (sizeof(Key) == sizeof(std::uint32_t)) {
+            if (is_listed_call<Key>()) {
+                if constexpr (core::is_solid<FragmentShader>)
+                    return go_direct<Rule, Run>(memory, state, stream, asked);
+                else
+                    return go_shaded<Rule, Run>(memory, state, stream, asked);
+            }
         }
         const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
         const scene_buffers buffers(memory, draws);
@@ -479,9 +495,40 @@ private:
             }
             end_stage(clock, &stage_times::fine_raster);
             fragment_lists<std::uint32_t, Payload> sorted =
-                sort_unordered(lists, order, asked, num_primitives, state, limits, stream, clock);
+                sort_unordered(lists, order, asked, num_primitives, nullptr, state, limits, stream, clock);
             if constexpr (!std::is_same_v<Payload, no_payload>)
                 sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
+            return sorted;
+        } else {
+            return {};
+        }
+    }
+
+    // One draw of any other shader.
+    template <coverage Rule, bool Run>
+    [[nodiscard]] fragment_lists<std::uint32_t, Payload>
+    go_shaded(arena& memory, pipeline_state* state, cudaStream_t stream, const asked_places& asked) const {
+        constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
+        const auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
+        const scene_buffers buffers(memory, draws);
+        const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
+        const order_memory order = order_memory::take(memory, limits.fragments);
+        auto* const spare = memory.take<std::uint32_t>(limits.fragments);
+        auto* const payloads = memory.take<Payload>(has_payload ? limits.fragments : 0);
+        if constexpr (Run) {
+            const scene_type s = buffers.shade(draws, g, stream);
+            end_stage(clock, &stage_times::vertex_shade);
+            const raster_input<stored_source> in{{s.geo.one}, num_primitives, s.geo.snap.fraction, g.extent};
+            list_raster<Rule>(in, s.geo.one.num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0],
+                              state, limits, stream);
+            end_stage(clock, &stage_times::fine_raster);
+            fragment_lists<std::uint32_t, Payload> sorted =
+                sort_unordered(lists, order, asked, num_primitives, spare, state, limits, stream, clock);
+            launch_behind(shade_lists_kernel<scene_type, Payload>, fill_device(limits.fragments), threads_per_block,
+                          stream, stage::abuffer_emit, s, sorted, payloads, state, limits);
+            end_stage(clock, &stage_times::abuffer_emit);
+            sorted.payloads = has_payload ? payloads : nullptr;
+            sorted.payloads_in_order = true;
             return sorted;
         } else {
             return {};

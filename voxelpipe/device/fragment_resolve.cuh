@@ -177,12 +177,6 @@ struct sorted_fragments {
     const std::uint32_t *voxels, *primitives;
 };
 
-[[nodiscard]] __device__ VOXELPIPE_INLINE voxel_place place_of(std::uint32_t voxel, const glm::ivec3& extent) {
-    const auto nx = static_cast<std::uint32_t>(extent.x), ny = static_cast<std::uint32_t>(extent.y);
-    const std::uint32_t row = voxel / nx, z = row / ny;
-    return {static_cast<int>(voxel - row * nx), static_cast<int>(row - z * ny), static_cast<int>(z)};
-}
-
 template <class Scene, class Framebuffer>
 __global__ __launch_bounds__(threads_per_block, 4) void resolve_runs_kernel(
     const __grid_constant__ Scene s, const __grid_constant__ Framebuffer fb, const __grid_constant__ sorted_fragments f,

@@ -167,6 +167,16 @@ struct scene {
     [[nodiscard]] VOXELPIPE_HD const shading& draw(std::uint32_t d) const { return many != nullptr ? many[d] : one; }
 };
 
+// A voxel of the computed part, and which one has a number: x first, then y, then z.
+struct voxel_place {
+    int x, y, z;
+};
+[[nodiscard]] VOXELPIPE_HD inline voxel_place place_of(std::uint32_t voxel, const glm::ivec3& extent) {
+    const auto nx = static_cast<std::uint32_t>(extent.x), ny = static_cast<std::uint32_t>(extent.y);
+    const std::uint32_t row = voxel / nx, z = row / ny;
+    return {static_cast<int>(voxel - row * nx), static_cast<int>(row - z * ny), static_cast<int>(z)};
+}
+
 // ---- launches -------------------------------------------------------------------------------------------------------
 
 inline constexpr int threads_per_block = 256; // of kernels that have no tuning of their own

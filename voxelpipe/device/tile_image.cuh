@@ -124,11 +124,6 @@ __device__ void store_bit(const target_view<Target>& t, int x, int y, int z, boo
         atomicAnd(w, ~mask);
 }
 
-// A voxel of a tile in the framebuffer.
-struct voxel_place {
-    int x, y, z;
-};
-
 template <class Image>
 [[nodiscard]] __device__ VOXELPIPE_INLINE voxel_place place_in_tile(const core::voxel_box& box, int i) {
     constexpr int size = Image::size;
