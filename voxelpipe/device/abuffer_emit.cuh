@@ -267,6 +267,64 @@ sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory
     return lists;
 }
 
+// Fragments as they were listed.
+struct listed_fragments {
+    std::uint32_t *voxels, *primitives;
+};
+
+// Shades fragments that are listed in any order, to leave out those that are discarded.
+template <class Scene>
+__global__ __launch_bounds__(threads_per_block, 4) void filter_lists_kernel(const __grid_constant__ Scene s,
+                                                                            listed_fragments from, listed_fragments to,
+                                                                            pipeline_state* state, capacities limits) {
+    constexpr int rounds = 4; // of a warp, for one atomic
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::most_numbered
+    const std::uint32_t lane = threadIdx.x % 32;
+    std::uint32_t discarded = 0;
+    for (std::uint64_t start = std::uint64_t{blockIdx.x} * threads_per_block * rounds + warp_in_block() * 32 * rounds;
+         start < n; start += std::uint64_t{gridDim.x} * threads_per_block * rounds) {
+        unsigned keeps[rounds];
+        unsigned num = 0;
+        for (int k = 0; k < rounds; ++k) {
+            const std::uint64_t i = start + 32 * static_cast<unsigned>(k) + lane;
+            bool keep = false;
+            if (i < n) {
+                const voxel_place at = place_of(from.voxels[i], s.geo.extent);
+                keep = shade_small_fragment<false>(s, from.primitives[i], at.x, at.y, at.z).keep;
+                discarded += static_cast<std::uint32_t>(!keep);
+            }
+            __syncwarp();
+            keeps[k] = __ballot_sync(0xffffffffu, keep);
+            num += static_cast<unsigned>(__popc(keeps[k]));
+        }
+        unsigned long long first = 0;
+        if (lane == 0 && num != 0) first = atomicAdd(&state->kept, static_cast<unsigned long long>(num));
+        first = __shfl_sync(0xffffffffu, first, 0);
+        for (int k = 0; k < rounds; ++k) {
+            const std::uint64_t i = start + 32 * static_cast<unsigned>(k) + lane;
+            if ((keeps[k] >> lane & 1u) != 0) {
+                const auto at = first + static_cast<unsigned>(__popc(keeps[k] & ((1u << lane) - 1)));
+                to.voxels[at] = from.voxels[i];
+                to.primitives[at] = from.primitives[i];
+            }
+            first += static_cast<unsigned>(__popc(keeps[k]));
+        }
+    }
+    const unsigned long long sum = block_sum(discarded);
+    if (threadIdx.x == 0 && sum != 0) {
+        atomicAdd(&state->filtered, sum);
+        atomicAdd(&state->discarded, sum);
+    }
+}
+// Behind it: the list is what was kept. One thread.
+template <class State>
+__global__ void end_filter_kernel(State* state, capacities limits) {
+    await_stream();
+    if (!has_failed(*state, limits)) state->list_fragments = state->kept;
+}
+
 // Shades fragments in their lists: payloads[i] is fragment i's, where there are payloads. Counts those that are
 // discarded, whose lists are not what the call is to give.
 template <class Scene, class Payload>

@@ -286,23 +286,25 @@ public:
                              std::uint64_t triangles_in) {
         using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
         abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
-        status s = attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
-                           [&](const device::capacities& limits, std::uint64_t voxel_room,
-                               device::pipeline_state& state, device::stage_clock* clock) {
-                               call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
-                               if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
-                                   fill<std::uint64_t>(options.rule, call, voxel_room, made, state);
-                                   return false;
-                               }
-                               call.may_shade_late = discarding_call_ != device::tag_of_call<call_type>();
-                               fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
-                               if (state.discarded != 0 && call.template shades_late<std::uint32_t>()) {
-                                   discarding_call_ = device::tag_of_call<call_type>();
-                                   call.may_shade_late = false;
-                                   fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
-                               }
-                               return false;
-                           });
+        status s =
+            attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
+                    [&](const device::capacities& limits, std::uint64_t voxel_room, device::pipeline_state& state,
+                        device::stage_clock* clock) {
+                        call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
+                        if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
+                            fill<std::uint64_t>(options.rule, call, voxel_room, made, state);
+                            return false;
+                        }
+                        call.may_shade_late = true;
+                        call.filters = discarding_call_ == device::tag_of_call<call_type>();
+                        fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
+                        if (state.discarded != 0 && call.template shades_late<std::uint32_t>() && !call.filters) {
+                            discarding_call_ = device::tag_of_call<call_type>();
+                            call.filters = true;
+                            fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
+                        }
+                        return false;
+                    });
         if (s.ok()) {
             made.extent = g.extent;
             lists = std::move(made);
@@ -351,7 +353,7 @@ private:
                     s = core::failure(status_code::index_out_of_range, stage::coarse_raster);
                     break;
                 }
-                const room::lengths needed{state.tile_pairs, state.tile_records, state.list_fragments,
+                const room::lengths needed{state.tile_pairs, state.tile_records, state.list_fragments + state.filtered,
                                            state.fragment_records, state.list_voxels};
                 if (!device::has_failed(state, limits)) {
                     s = device::to_status(state);

@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 
 namespace voxelpipe::device {
 
@@ -412,7 +413,9 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     std::uint32_t num_primitives;
     capacities limits;
     stage_clock* clock = nullptr;
-    bool may_shade_late = false; // in the lists; if any fragment is discarded then, these are not what is wanted
+    // Whether fragments may be shaded when they are listed: in the finished lists, and then these are not what is
+    // wanted if any was discarded; with `filters`, before that as well.
+    bool may_shade_late = false, filters = false;
 
     // All that the launches of this call depend on, where it is plain bytes.
     static constexpr bool has_bytes = std::is_trivially_copyable_v<draw_type>;
@@ -425,6 +428,7 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
         b.add(num_primitives);
         b.add(limits);
         b.add(may_shade_late);
+        b.add(filters);
         return b;
     }
     // Whether fragments are listed by the raster, and shaded afterwards where the shader is not constant.
@@ -509,7 +513,7 @@ private:
     [[nodiscard]] fragment_lists<std::uint32_t, Payload>
     go_shaded(arena& memory, pipeline_state* state, cudaStream_t stream, const asked_places& asked) const {
         constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
-        const auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
+        auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
         const scene_buffers buffers(memory, draws);
         const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
         const order_memory order = order_memory::take(memory, limits.fragments);
@@ -521,12 +525,22 @@ private:
             const raster_input<stored_source> in{{s.geo.one}, num_primitives, s.geo.snap.fraction, g.extent};
             list_raster<Rule>(in, s.geo.one.num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0],
                               state, limits, stream);
+            if (filters) {
+                const listed_fragments all{lists.keys[0], lists.values[0]}, kept{lists.keys[1], lists.values[1]};
+                launch_behind(filter_lists_kernel<scene_type>, fill_device(limits.fragments), threads_per_block, stream,
+                              stage::abuffer_emit, s, all, kept, state, limits);
+                launch_behind(end_filter_kernel<pipeline_state>, 1, 1, stream, stage::abuffer_emit, state, limits);
+                std::swap(lists.keys[0], lists.keys[1]);
+                std::swap(lists.values[0], lists.values[1]);
+            }
             end_stage(clock, &stage_times::fine_raster);
             fragment_lists<std::uint32_t, Payload> sorted =
                 sort_unordered(lists, order, asked, num_primitives, spare, state, limits, stream, clock);
-            launch_behind(shade_lists_kernel<scene_type, Payload>, fill_device(limits.fragments), threads_per_block,
-                          stream, stage::abuffer_emit, s, sorted, payloads, state, limits);
-            end_stage(clock, &stage_times::abuffer_emit);
+            if (!filters || has_payload) {
+                launch_behind(shade_lists_kernel<scene_type, Payload>, fill_device(limits.fragments), threads_per_block,
+                              stream, stage::abuffer_emit, s, sorted, payloads, state, limits);
+                end_stage(clock, &stage_times::abuffer_emit);
+            }
             sorted.payloads = has_payload ? payloads : nullptr;
             sorted.payloads_in_order = true;
             return sorted;

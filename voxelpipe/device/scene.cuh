@@ -24,6 +24,7 @@ struct pipeline_state {
     unsigned long long tile_pairs, tile_records;         // coarse raster
     unsigned long long list_fragments, fragment_records; // A-buffer
     unsigned long long list_voxels;
+    unsigned long long filtered, kept; // of listed fragments: those that the shader discards, and all others
     unsigned int index_error;
     unsigned int num_items, num_splits, num_images; // tile split
     unsigned int next_item;                         // fine raster
