@@ -19,6 +19,8 @@
 #include <cub/device/device_select.cuh>
 #include <thrust/iterator/counting_iterator.h>
 
+#include <utility>
+
 namespace voxelpipe::device {
 
 // Fragments as cells of work_share: the voxel is the key; the value is the primitive or, where there are payloads, the
@@ -325,9 +327,21 @@ __global__ void end_filter_kernel(State* state, capacities limits) {
     if (!has_failed(*state, limits)) state->list_fragments = state->kept;
 }
 
+// Leaves fragments out that are discarded. The buffers' first arrays hold what there is, before and after.
+template <class Scene, class Payload>
+void filter_lists(const Scene& s, list_buffers<std::uint32_t, Payload>& b, pipeline_state* state,
+                  const capacities& limits, cudaStream_t stream) {
+    const listed_fragments all{b.keys[0], b.values[0]}, kept{b.keys[1], b.values[1]};
+    launch_behind(filter_lists_kernel<Scene>, fill_device(limits.fragments), threads_per_block, stream,
+                  stage::abuffer_emit, s, all, kept, state, limits);
+    launch_behind(end_filter_kernel<pipeline_state>, 1, 1, stream, stage::abuffer_emit, state, limits);
+    std::swap(b.keys[0], b.keys[1]);
+    std::swap(b.values[0], b.values[1]);
+}
+
 // Shades fragments in their lists: payloads[i] is fragment i's, where there are payloads. Counts those that are
 // discarded, whose lists are not what the call is to give.
-template <class Scene, class Payload>
+template <class MakePayload, class Scene, class Payload>
 __global__ __launch_bounds__(threads_per_block, 4) void shade_lists_kernel(
     const __grid_constant__ Scene s, const __grid_constant__ fragment_lists<std::uint32_t, Payload> lists,
     Payload* payloads, pipeline_state* state, capacities limits) {
@@ -341,7 +355,7 @@ __global__ __launch_bounds__(threads_per_block, 4) void shade_lists_kernel(
         const voxel_place at = place_of(lists.keys[i], s.geo.extent);
         const auto out = shade_small_fragment<false>(s, primitives[i], at.x, at.y, at.z);
         discarded += static_cast<std::uint32_t>(!out.keep);
-        if constexpr (!std::is_same_v<Payload, no_payload>) payloads[i] = first_value{}(out);
+        if constexpr (!std::is_same_v<Payload, no_payload>) payloads[i] = MakePayload{}(out);
     }
     count_discarded(discarded, state);
 }

@@ -21,7 +21,6 @@
 #include <cstdint>
 #include <limits>
 #include <span>
-#include <utility>
 
 namespace voxelpipe::device {
 
@@ -153,6 +152,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     using groups = target_groups<Framebuffer>;
     using values = decltype(std::declval<typename scene_type::fragment_output>().values);
     static constexpr bool in_tiles = groups::num_groups() > 0;
+    static constexpr bool can_be_listed = is_resolvable<Framebuffer> || groups::has_ordered;
 
     std::span<const draw_type> draws;
     grid g;
@@ -175,9 +175,12 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
                 return;
             }
         }
-        if constexpr (is_resolvable<Framebuffer>) {
+        if constexpr (can_be_listed) {
             if (is_listed_call()) {
-                go_listed<Rule, Run>(memory, state, stream);
+                if constexpr (groups::has_ordered)
+                    go_folded<Rule, Run>(memory, state, stream);
+                else
+                    go_listed<Rule, Run>(memory, state, stream);
                 return;
             }
         }
@@ -208,7 +211,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     [[nodiscard]] bool is_listed_call() const {
         if constexpr (can_be_direct<FragmentShader, Framebuffer>)
             if (is_direct_call()) return false;
-        if (!is_resolvable<Framebuffer> || !may_list || draws.size() > most_direct_draws) return false;
+        if (!can_be_listed || !may_list || draws.size() > most_direct_draws) return false;
         if (num_voxels(g) >= std::numeric_limits<std::uint32_t>::max() || limits.fragments > most_resolved)
             return false;
         return is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
@@ -295,6 +298,33 @@ private:
         }
     }
 
+    // Appends the fragments of all draws to two arrays.
+    template <coverage Rule>
+    void list_draws(const scene_type& s, const vertex_positions& positions, const triangle_lists& handed_on,
+                    std::uint32_t* voxels, std::uint32_t* primitives, pipeline_state* state,
+                    cudaStream_t stream) const {
+        draw_geometry of_draw{draws[0].mesh.triangles.data(), positions, 0, 0};
+        for (const draw_type& d : draws) {
+            const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
+            of_draw.triangles = d.mesh.triangles.data();
+            of_draw.num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
+            if (num_triangles != 0) {
+                if (of_draw.first_primitive != 0)
+                    check(cudaMemsetAsync(&state->handed_on, 0, sizeof(state->handed_on), stream));
+                const raster_input<stored_source> in{{of_draw}, num_triangles, s.geo.snap.fraction, g.extent};
+                list_raster<Rule>(in, of_draw.num_vertices, of_draw.first_primitive, handed_on.with(state), voxels,
+                                  primitives, state, limits, stream);
+            }
+            of_draw.positions = of_draw.positions.from(of_draw.num_vertices);
+            of_draw.first_primitive += num_triangles;
+        }
+    }
+    [[nodiscard]] std::size_t most_triangles() const {
+        std::size_t most = 0;
+        for (const draw_type& d : draws) most = std::max(most, d.mesh.triangles.size());
+        return most;
+    }
+
     template <coverage Rule, bool Run>
     void go_listed(arena& memory, pipeline_state* state, cudaStream_t stream) const {
         using ends_type = run_ends<voxel_cells<Framebuffer>>;
@@ -306,34 +336,46 @@ private:
         }
         const sort_memory sort =
             sort_memory::take(memory, limits.fragments, static_cast<int>(std::bit_width(num_voxels(g) - 1)));
-        std::size_t most_triangles = 0;
-        for (const draw_type& d : draws) most_triangles = std::max(most_triangles, d.mesh.triangles.size());
-        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles);
+        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles());
         const ends_type ends = ends_type::take(memory, limits.fragments);
         if constexpr (Run) {
             const scene_type s = buffers.shade(draws, g, stream);
             end_stage(clock, &stage_times::vertex_shade);
-            draw_geometry of_draw{draws[0].mesh.triangles.data(), buffers.positions, 0, 0};
-            for (const draw_type& d : draws) {
-                const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
-                of_draw.triangles = d.mesh.triangles.data();
-                of_draw.num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
-                if (num_triangles != 0) {
-                    if (of_draw.first_primitive != 0)
-                        check(cudaMemsetAsync(&state->handed_on, 0, sizeof(state->handed_on), stream));
-                    const raster_input<stored_source> in{{of_draw}, num_triangles, s.geo.snap.fraction, g.extent};
-                    list_raster<Rule>(in, of_draw.num_vertices, of_draw.first_primitive, handed_on.with(state),
-                                      voxels[0], primitives[0], state, limits, stream);
-                }
-                of_draw.positions = of_draw.positions.from(of_draw.num_vertices);
-                of_draw.first_primitive += num_triangles;
-            }
+            list_draws<Rule>(s, buffers.positions, handed_on, voxels[0], primitives[0], state, stream);
             end_stage(clock, &stage_times::fine_raster);
             const int at = sort_listed(voxels, primitives, sort, state, limits, stream);
             end_stage(clock, &stage_times::tile_sort);
             clear_targets(state, stream);
             resolve_fragments(s, fb, {voxels[at], primitives[at]}, ends, options.count_voxels, state, limits, stream);
             end_stage(clock, &stage_times::tile_resolve);
+        }
+    }
+
+    // The same for blends that need an order: lists that are in it are folded.
+    template <coverage Rule, bool Run>
+    void go_folded(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+        auto lists = take_lists<std::uint32_t, values>(memory, num_voxels(g), limits.fragments, true);
+        const scene_buffers buffers(memory, draws);
+        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles());
+        const order_memory order = order_memory::take(memory, limits.fragments);
+        auto* const spare = memory.take<std::uint32_t>(limits.fragments);
+        auto* const payloads = memory.take<values>(limits.fragments);
+        if constexpr (Run) {
+            const scene_type s = buffers.shade(draws, g, stream);
+            end_stage(clock, &stage_times::vertex_shade);
+            list_draws<Rule>(s, buffers.positions, handed_on, lists.keys[0], lists.values[0], state, stream);
+            filter_lists(s, lists, state, limits, stream);
+            end_stage(clock, &stage_times::fine_raster);
+            fragment_lists<std::uint32_t, values> sorted =
+                sort_unordered(lists, order, {}, num_primitives, spare, state, limits, stream, clock);
+            launch_behind(shade_lists_kernel<all_values, scene_type, values>, fill_device(limits.fragments),
+                          threads_per_block, stream, stage::abuffer_emit, s, sorted, payloads, state, limits);
+            end_stage(clock, &stage_times::abuffer_emit);
+            sorted.payloads = payloads;
+            sorted.payloads_in_order = true;
+            clear_targets(state, stream);
+            fold_lists(sorted, fb, options.count_voxels, state, limits, std::make_index_sequence<groups::count>{},
+                       stream, clock);
         }
     }
 
@@ -525,20 +567,13 @@ private:
             const raster_input<stored_source> in{{s.geo.one}, num_primitives, s.geo.snap.fraction, g.extent};
             list_raster<Rule>(in, s.geo.one.num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0],
                               state, limits, stream);
-            if (filters) {
-                const listed_fragments all{lists.keys[0], lists.values[0]}, kept{lists.keys[1], lists.values[1]};
-                launch_behind(filter_lists_kernel<scene_type>, fill_device(limits.fragments), threads_per_block, stream,
-                              stage::abuffer_emit, s, all, kept, state, limits);
-                launch_behind(end_filter_kernel<pipeline_state>, 1, 1, stream, stage::abuffer_emit, state, limits);
-                std::swap(lists.keys[0], lists.keys[1]);
-                std::swap(lists.values[0], lists.values[1]);
-            }
+            if (filters) filter_lists(s, lists, state, limits, stream);
             end_stage(clock, &stage_times::fine_raster);
             fragment_lists<std::uint32_t, Payload> sorted =
                 sort_unordered(lists, order, asked, num_primitives, spare, state, limits, stream, clock);
             if (!filters || has_payload) {
-                launch_behind(shade_lists_kernel<scene_type, Payload>, fill_device(limits.fragments), threads_per_block,
-                              stream, stage::abuffer_emit, s, sorted, payloads, state, limits);
+                launch_behind(shade_lists_kernel<first_value, scene_type, Payload>, fill_device(limits.fragments),
+                              threads_per_block, stream, stage::abuffer_emit, s, sorted, payloads, state, limits);
                 end_stage(clock, &stage_times::abuffer_emit);
             }
             sorted.payloads = has_payload ? payloads : nullptr;

@@ -153,14 +153,22 @@ void launch_fold(const fragment_lists<Key, Values>& lists, const Framebuffer& fb
     check(cudaGetLastError(), stage::fine_raster);
 }
 
-// Folds lists with all shader outputs (all_values) into the targets of a framebuffer that are not drawn in tiles, and
-// sets the state's counters of fragments and, if wanted, voxels.
+// Folds lists with all shader outputs (all_values) into the targets I... of a framebuffer, and sets the state's
+// counters of fragments and, if wanted, voxels.
+template <class Key, class Values, class Framebuffer, std::size_t... I>
+void fold_lists(const fragment_lists<Key, Values>& lists, const Framebuffer& fb, bool count_voxels,
+                pipeline_state* state, const capacities& limits, std::index_sequence<I...> targets, cudaStream_t stream,
+                stage_clock* clock = nullptr) {
+    launch_fold(lists, fb, count_voxels, state, limits, targets, stream);
+    end_stage(clock, &stage_times::fine_raster);
+}
+// The same for the targets that are not drawn in tiles.
 template <class Key, class Values, class Framebuffer>
 void fold_ordered(const fragment_lists<Key, Values>& lists, const Framebuffer& fb, bool count_voxels,
                   pipeline_state* state, const capacities& limits, cudaStream_t stream, stage_clock* clock = nullptr) {
     using groups = target_groups<Framebuffer>;
-    launch_fold(lists, fb, count_voxels, state, limits, typename groups::template indices<groups::ordered>{}, stream);
-    end_stage(clock, &stage_times::fine_raster);
+    fold_lists(lists, fb, count_voxels, state, limits, typename groups::template indices<groups::ordered>{}, stream,
+               clock);
 }
 
 } // namespace voxelpipe::device
