@@ -76,11 +76,13 @@ TEST(ReducedLists, OfVoxelNumbersBeyond32Bits) {
 }
 
 template <class Payload, class FragmentShader>
-void compare_without_a_wait(std::vector<mesh_data> parts, const vp::grid& g, const FragmentShader& fs,
+void compare_without_a_wait(const std::vector<mesh_data>& parts, const vp::grid& g, const FragmentShader& fs,
                             vp::coverage rule) {
-    list_call<Payload, FragmentShader> call(std::move(parts), g, fs, rule);
-    call.launch();
-    call.expect_the_cpus();
+    for (const bool lists_fragments : {false, true}) {
+        list_call<Payload, FragmentShader> call(parts, g, fs, rule, lists_fragments);
+        call.launch();
+        call.expect_the_cpus();
+    }
 }
 
 TEST(ReducedLists, WithoutAWait) {
@@ -89,6 +91,7 @@ TEST(ReducedLists, WithoutAWait) {
         compare_without_a_wait<void>({mixed_triangles(300, 30.0f, 70)}, g, vp::constant(true), rule);
         compare_without_a_wait<double>({mixed_triangles(200, 30.0f, 71), mixed_triangles(100, 30.0f, 72)}, g,
                                        any_double{}, rule);
+        compare_without_a_wait<double>({mixed_triangles(300, 30.0f, 74)}, g, any_double{}, rule);
         compare_without_a_wait<double>({far_triangles(73)}, large_grid, any_double{}, rule);
     }
 }

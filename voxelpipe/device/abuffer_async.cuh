@@ -96,18 +96,29 @@ template <class Call, class Payload>
 
 } // namespace device
 
-// Bytes that voxelize_async needs for such a call; 0 where the arguments are refused. Of the limits, only `fragments`
-// and `fragment_records` count here.
+namespace device {
+
+// With lists_fragments, one draw of a shader that computes is listed by the raster; what it discards has to fit too.
+template <class Draw, class Payload>
+[[nodiscard]] abuffer_call<Draw, payload_storage<Payload>>
+make_list_call(std::span<const Draw> draws, const grid& g, std::uint64_t triangles, const workspace_limits& limits) {
+    return {draws, g, static_cast<std::uint32_t>(triangles), to_capacities(limits), nullptr, limits.lists_fragments,
+            true};
+}
+
+} // namespace device
+
+// Bytes that voxelize_async needs for such a call; 0 where the arguments are refused. Of the limits, only `fragments`,
+// `fragment_records` and `lists_fragments` count here.
 template <class Mesh, class VertexShader, class FragmentShader, class Payload>
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                           const grid& g, const abuffer_view<Payload>& lists,
                                           const voxelize_options& options, const workspace_limits& limits) {
-    using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
     const status s = core::validate_draws(draws);
     if (!s.ok() || !validate(g).ok() || limits.fragments > core::most_numbered) return 0;
     try {
-        const call_type call{draws, g, static_cast<std::uint32_t>(s.counts.triangles_in),
-                             device::to_capacities(limits)};
+        const auto call = device::make_list_call<draw<Mesh, VertexShader, FragmentShader>, Payload>(
+            draws, g, s.counts.triangles_in, limits);
         return device::list_bytes(call, options.rule, lists);
     } catch (const device::cuda_failure&) {
         return 0;
@@ -121,15 +132,14 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
 voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                abuffer_view<Payload>& lists, const voxelize_options& options, const workspace_view& workspace) {
     if constexpr (core::shaders_fit_payload<Mesh, VertexShader, FragmentShader, Payload>()) {
-        using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
         lists = {};
         if (const status s = validate(g); !s.ok()) return s;
         status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (workspace.limits.fragments > core::most_numbered) return core::failure(status_code::size_overflow);
         try {
-            const call_type call{draws, g, static_cast<std::uint32_t>(s.counts.triangles_in),
-                                 device::to_capacities(workspace.limits)};
+            const auto call = device::make_list_call<draw<Mesh, VertexShader, FragmentShader>, Payload>(
+                draws, g, s.counts.triangles_in, workspace.limits);
             const std::size_t need = device::list_bytes(call, options.rule, lists);
             if (workspace.memory == nullptr || workspace.bytes < need) {
                 s.code = status_code::capacity_exceeded;

@@ -18,7 +18,7 @@ struct workspace_limits {
     std::uint64_t tile_records = 0;
     std::uint64_t fragments = 0;
     std::uint64_t fragment_records = 0;
-    // Whether shaders that compute may have their fragments listed and sorted by voxel instead of being drawn in tiles
+    // Whether shaders that compute may have their fragments listed and sorted by voxel, instead of being drawn in tiles
     // (cuda_backend::lists_fragments): then `fragments` is what has to suffice, in place of tile_pairs. Up to 2^28.
     bool lists_fragments = false;
 
