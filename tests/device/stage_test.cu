@@ -10,6 +10,7 @@
 #include <cpu_ref/stages.hpp>
 
 #include <algorithm>
+#include <cstdlib>
 #include <span>
 
 using namespace device_test;
@@ -74,12 +75,27 @@ TEST(Stages, VertexShade) {
     const auto snap = vp::core::make_snap_transform(s.g);
     const auto expected = vp::cpu::vertex_shade(s.how, s.on_host(), snap);
     vp::cuda_backend::buffer<vp::core::snapped_position> positions(s.gpu, s.data.positions.size());
-    device::vertex_shade<vp::mesh_view<>, vp::passthrough, vp::no_varyings>(s.d_draw.mesh, {}, snap, 0,
-                                                                            positions.data(), nullptr, s.gpu.stream);
+    vp::cuda_backend::buffer<device::near_position> near(s.gpu, s.data.positions.size());
+    device::vertex_shade<vp::mesh_view<>, vp::passthrough, vp::no_varyings>(
+        s.d_draw.mesh, {}, snap, 0, device::vertex_positions{positions.data(), near.data()}, nullptr, s.gpu.stream);
     const auto actual = positions.to_host(s.gpu);
     const std::vector<vp::core::snapped_position> reference(expected[0].positions.get(),
                                                             expected[0].positions.get() + actual.size());
     expect_same_bytes(reference, actual, "snapped positions");
+    std::size_t num_far = 0;
+    const auto in_32_bits = near.to_host(s.gpu);
+    for (std::size_t i = 0; i < actual.size(); ++i) {
+        const vp::core::snapped_position& p = actual[i];
+        bool is_near = true;
+        for (const std::int64_t q : {p.x, p.y, p.z}) is_near = is_near && std::abs(q) <= std::int64_t{1} << 30;
+        ASSERT_EQ(in_32_bits[i].is_near != 0, is_near) << i;
+        num_far += !is_near;
+        if (!is_near) continue;
+        EXPECT_EQ(in_32_bits[i].q[0], p.x);
+        EXPECT_EQ(in_32_bits[i].q[1], p.y);
+        EXPECT_EQ(in_32_bits[i].q[2], p.z);
+    }
+    EXPECT_GT(num_far, 0u);
 }
 
 template <vp::coverage Rule>
