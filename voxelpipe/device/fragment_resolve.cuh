@@ -9,7 +9,9 @@
 // second kernel, so that a voxel of a million fragments is many warps'.
 
 #include <voxelpipe/device/tile_image.cuh>
+#include <voxelpipe/device/work_share.cuh>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 
