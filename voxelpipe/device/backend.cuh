@@ -343,8 +343,10 @@ private:
             if (times != nullptr) clock.emplace(stream);
             const std::uint64_t n = key.triangles;
             // No room for the lists of voxels where nothing is known of the call: they are copied when all is.
+            // Tiny triangles have few fragments: those of a framebuffer are not taken for too many beforehand.
+            const std::uint64_t most = &memory == &framebuffer_room_ ? device::most_resolved : core::most_numbered;
             room::lengths there =
-                memory.guess(key, {n + n / 4 + 16384, n / 16 + 4096, 4 * n + 65536, n / 16 + 4096, 0});
+                memory.guess(key, {n + n / 4 + 16384, n / 16 + 4096, std::min(4 * n + 65536, most), n / 16 + 4096, 0});
             for (int tries = 0;; ++tries) {
                 const device::capacities limits{there[0], there[1], there[2], there[3]};
                 device::pipeline_state state{};
