@@ -254,10 +254,10 @@ public:
     // The driver has memory of its own for it, until a call with other arguments, release or the destructor.
     bool keeps_graphs = true;
 
-    // Whether voxelize may list the fragments of shaders that compute, sort them by voxel and blend them then, where
-    // the blends are order-free: 2 to 4 times as fast as in tiles, for 17 bytes of device memory a fragment. Without
-    // it, where there is no such memory, and beyond 2^28 fragments, tiles of the grid are drawn, for 10 bytes or so a
-    // pair of triangle and tile that meet. Results are the same.
+    // Whether voxelize may list the fragments of a framebuffer's shaders that compute, sort them by voxel and blend
+    // them then: mostly 2 to 4 times as fast as in tiles, for 17 bytes of device memory a fragment, and more where a
+    // blend needs an order. Without it, where there is no such memory, and beyond 2^28 fragments, tiles of the grid are
+    // drawn, for 10 bytes or so a pair of triangle and tile that meet. Results are the same.
     bool lists_fragments = true;
 
     // What voxelize calls; arguments are validated. `Selector` picks tile and block size (tuning/); results do not
