@@ -296,10 +296,11 @@ public:
                             return false;
                         }
                         call.may_shade_late = true;
-                        call.filters = discarding_call_ == device::tag_of_call<call_type>();
+                        const void* const kind = device::tag_of_call<call_type>();
+                        call.filters = std::find(discarding_.begin(), discarding_.end(), kind) != discarding_.end();
                         fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
                         if (state.discarded != 0 && call.template shades_late<std::uint32_t>() && !call.filters) {
-                            discarding_call_ = device::tag_of_call<call_type>();
+                            discarding_.push_back(kind);
                             call.filters = true;
                             fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
                         }
@@ -599,8 +600,8 @@ private:
     device_block workspace_;
     device::state_reader state_reader_;
     device::call_graph call_graph_;
-    bool has_zeroed_state_ = false;         // in the workspace
-    const void* discarding_call_ = nullptr; // the last kind of lists' call that was shaded late and discarded fragments
+    bool has_zeroed_state_ = false;       // in the workspace
+    std::vector<const void*> discarding_; // kinds of lists' calls that were shaded late and discarded fragments
 };
 
 } // namespace voxelpipe
