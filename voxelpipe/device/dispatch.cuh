@@ -246,13 +246,10 @@ private:
         });
         chunk_marks marks;
         if (has_marks) marks = chunk_marks::take(memory, g.extent);
-        std::size_t vertices = 0, most_triangles = 0;
-        for (const draw_type& d : draws) {
-            vertices = std::max(vertices, d.mesh.positions.size());
-            most_triangles = std::max(most_triangles, d.mesh.triangles.size());
-        }
+        std::size_t vertices = 0;
+        for (const draw_type& d : draws) vertices = std::max(vertices, d.mesh.positions.size());
         const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : vertices);
-        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles);
+        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles());
         if constexpr (Run) {
             if (has_marks) check(cudaMemsetAsync(marks.words, 0, marks.num_words() * sizeof(word), stream));
             for (const draw_type& d : draws)
