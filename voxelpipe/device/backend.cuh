@@ -243,7 +243,7 @@ public:
     // Gives back the memory that is kept between calls.
     void release() {
         call_graph_ = {};
-        has_zeroed_state_ = false;
+        zeroed_bytes_ = 0;
         workspace_ = {};
         state_reader_ = {};
     }
@@ -310,7 +310,7 @@ private:
     // The workspace, at least so large.
     [[nodiscard]] void* reserve(std::size_t bytes) {
         if (workspace_.size() < bytes) {
-            has_zeroed_state_ = false;
+            zeroed_bytes_ = 0;
             workspace_ = {}; // first, so that both need not fit
             workspace_ = device_block(bytes, resource, stream);
         }
@@ -321,14 +321,16 @@ private:
         return keeps_graphs && clock == nullptr && state_reader_.page() != nullptr;
     }
     // Puts launch_all(stream), which works in the workspace, on the stream, as a graph where `bytes`, if there are any,
-    // have come before; waits. The state comes first in the workspace; the call before has left it zeroed, mostly.
+    // have come before; waits. The state comes first in the workspace, of which so many bytes are to be zero before,
+    // and are after, the state by way of the page; the call before has left them so, mostly.
     template <class F>
-    [[nodiscard]] device::pipeline_state
-    run_stages(device::stage_clock* clock, const std::optional<device::call_bytes>& bytes, const F& launch_all) {
+    [[nodiscard]] device::pipeline_state run_stages(device::stage_clock* clock,
+                                                    const std::optional<device::call_bytes>& bytes,
+                                                    std::size_t zeroed_bytes, const F& launch_all) {
         auto* const d_state = static_cast<device::pipeline_state*>(workspace_.data());
         if (clock != nullptr) clock->start();
-        if (!has_zeroed_state_) device::zero_state(d_state, stream);
-        has_zeroed_state_ = false;
+        if (zeroed_bytes_ < zeroed_bytes) device::check(cudaMemsetAsync(d_state, 0, zeroed_bytes, stream));
+        zeroed_bytes_ = 0;
         const auto launch_and_send = [&](cudaStream_t on) {
             launch_all(on);
             state_reader_.send(d_state, on);
@@ -338,7 +340,7 @@ private:
         else
             launch_and_send(stream);
         const device::pipeline_state state = state_reader_.receive(d_state, stream);
-        has_zeroed_state_ = state_reader_.page() != nullptr;
+        if (state_reader_.page() != nullptr) zeroed_bytes_ = zeroed_bytes;
         return state;
     }
 
@@ -379,7 +381,7 @@ private:
             std::optional<device::call_bytes> bytes;
             if constexpr (Call::has_bytes)
                 if (may_keep_graph(call.clock)) bytes = call.template bytes<Rule>(workspace, state_reader_.page());
-            state = run_stages(call.clock, bytes, [&](cudaStream_t on) {
+            state = run_stages(call.clock, bytes, call.zeroed_bytes(), [&](cudaStream_t on) {
                 device::arena memory(workspace);
                 call.template go<Rule, true>(memory, on);
             });
@@ -475,7 +477,7 @@ private:
             if constexpr (Call::has_bytes)
                 if (may_keep_graph(call.clock)) bytes = call.template bytes<Rule, Key>(workspace, state_reader_.page());
             const device::asked_places asked = state_reader_.ask(arrays.places(voxel_room));
-            state = run_stages(call.clock, bytes, [&](cudaStream_t on) {
+            state = run_stages(call.clock, bytes, sizeof(device::pipeline_state), [&](cudaStream_t on) {
                 device::arena memory(workspace);
                 const auto sorted = call.template go<Rule, true, Key>(memory, on, asked);
                 const auto* const d_state = static_cast<const device::pipeline_state*>(workspace);
@@ -502,7 +504,7 @@ private:
         constexpr stage where = stage::abuffer_emit;
         device::fragment_lists<Key, payload_storage<Payload>> sorted{};
         device::launch_until(where, [&] {
-            state = run_stages(call.clock, std::nullopt, [&](cudaStream_t on) {
+            state = run_stages(call.clock, std::nullopt, sizeof(device::pipeline_state), [&](cudaStream_t on) {
                 device::arena memory(workspace);
                 sorted = call.template go<Rule, true, Key>(memory, on);
             });
@@ -525,7 +527,7 @@ private:
     device_block workspace_;
     device::state_reader state_reader_;
     device::call_graph call_graph_;
-    bool has_zeroed_state_ = false;       // in the workspace
+    std::size_t zeroed_bytes_ = 0;        // of the workspace, from its start
     std::vector<const void*> discarding_; // kinds of lists' calls that were shaded late and discarded fragments
 };
 

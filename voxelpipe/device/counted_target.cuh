@@ -24,9 +24,11 @@ struct direct_plan {
     bool possible = true;
     direct_modes<N> modes;
     int voxels_of = -1; // which counted target tells at the end how many voxels are touched
+    int bits_of = -1;   // which target of bits does
 
     [[nodiscard]] bool counts(std::size_t k) const { return modes.of[k] == direct_mode::count; }
     [[nodiscard]] bool any_counted() const { return first_counted() >= 0; }
+    [[nodiscard]] bool has_last_pass() const { return any_counted() || bits_of >= 0; }
     [[nodiscard]] int first_counted() const {
         for (std::size_t k = 0; k < N; ++k)
             if (counts(k)) return static_cast<int>(k);
@@ -41,6 +43,10 @@ inline constexpr std::uint64_t marked_bytes = std::uint64_t{32} << 20;
 // the counted targets have more bytes than this for each triangle, beyond what takes some microseconds. At 4 TB/s these
 // are 4 ns, which a few fragments cost in the tiles.
 inline constexpr std::uint64_t counted_bytes_per_triangle = 16384, counted_bytes = marked_bytes;
+
+// Bits are counted when all is drawn, which takes as long as the clear did: the atomics that tell first touches make
+// every warp wait for them. Beyond so many bytes they tell it in less time.
+inline constexpr std::uint64_t most_counted_bits = std::uint64_t{256} << 20;
 
 template <std::size_t K, class Target, class Draw>
 [[nodiscard]] bool may_be_counted(std::span<const Draw> draws, const target_view<Target>& t) {
@@ -79,6 +85,7 @@ template <class Draw, class... Targets>
                                                           std::uint64_t num_primitives, bool count_voxels) {
     direct_plan<sizeof...(Targets)> plan;
     int telling = -1, countable = -1; // the first target that tells first touches, that may be counted
+    int telling_bits = -1;            // that tells them by its bits when all is drawn
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         const auto& t = voxelpipe::get<K>(fb.targets);
         bool in_place = true, tells = true;
@@ -89,6 +96,9 @@ template <class Draw, class... Targets>
         }
         const bool may_count = may_be_counted<K>(draws, t);
         if (tells && telling < 0) telling = static_cast<int>(K);
+        using map = typename core::pack_element<K, Targets...>::type::map;
+        if (tells && telling_bits < 0 && map::is_bit && map::elements(fb.extent) * sizeof(word) <= most_counted_bits)
+            telling_bits = static_cast<int>(K);
         if (may_count && countable < 0) countable = static_cast<int>(K);
         if (in_place) return;
         if (may_count)
@@ -97,7 +107,9 @@ template <class Draw, class... Targets>
             plan.possible = false;
     });
     if (count_voxels && !plan.any_counted()) {
-        if (telling >= 0) {
+        if (telling_bits >= 0) {
+            plan.bits_of = telling_bits;
+        } else if (telling >= 0) {
             plan.modes.of[telling] = direct_mode::count_first;
             plan.modes.counts_first = true;
         } else if (countable >= 0) {
@@ -206,14 +218,47 @@ __global__ __launch_bounds__(threads_per_block) void end_counts_kernel(unsigned_
     }
 }
 
-// Ends the counted targets of a call, whose draws give these values, by marks where there are any.
+// Counts the voxels of a target whose bits are no longer its clear value. Padding is zero.
+template <class Target>
+__global__ __launch_bounds__(threads_per_block) void count_bits_kernel(const __grid_constant__ target_view<Target> t,
+                                                                       pipeline_state* state, capacities limits) {
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const std::uint64_t num = Target::map::elements(t.extent);
+    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
+    std::uint64_t done = 0, set = 0;
+    if (reinterpret_cast<std::uintptr_t>(t.elements) % 16 == 0) {
+        const auto* const wide = reinterpret_cast<const uint4*>(t.elements);
+#pragma unroll 4
+        for (std::uint64_t i = thread; i < num / 4; i += threads) {
+            const uint4 v = wide[i];
+            set += static_cast<unsigned>(__popc(v.x) + __popc(v.y) + __popc(v.z) + __popc(v.w));
+        }
+        done = num / 4 * 4;
+    }
+    for (std::uint64_t i = done + thread; i < num; i += threads) set += static_cast<unsigned>(__popc(t.elements[i]));
+    const unsigned long long sum = block_sum(set);
+    if (threadIdx.x != 0) return;
+    const auto of_grid = static_cast<unsigned long long>(t.extent.x) * static_cast<unsigned>(t.extent.y) *
+                         static_cast<unsigned>(t.extent.z);
+    const unsigned long long all = t.clear_value && blockIdx.x == 0 ? of_grid : 0;
+    atomicAdd(&state->voxels, t.clear_value ? all - sum : sum);
+}
+
+// Ends the counted targets of a call, whose draws give these values, by marks where there are any, and counts voxels.
 template <class... Targets, class Values>
 void end_counts(const direct_plan<sizeof...(Targets)>& plan, const framebuffer_view<Targets...>& fb,
                 const Values& values, const chunk_marks& marks, pipeline_state* state, const capacities& limits,
                 cudaStream_t stream) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         using target = typename core::pack_element<K, Targets...>::type;
-        if constexpr (is_countable<target>) {
+        if constexpr (target::map::is_bit) {
+            if (plan.bits_of != static_cast<int>(K)) return;
+            const auto& t = voxelpipe::get<K>(fb.targets);
+            launch_behind(count_bits_kernel<target>, fill_device(target::map::elements(t.extent) / 16 + 1),
+                          threads_per_block, stream, stage::tile_resolve, t, state, limits);
+        } else if constexpr (is_countable<target>) {
             if (!plan.counts(K)) return;
             using value_type = typename target::value_type;
             using fold_type = core::repeated_fold<typename target::blend_type, value_type>;

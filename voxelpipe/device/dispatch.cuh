@@ -14,6 +14,7 @@
 #include <voxelpipe/device/ordered_blend.cuh>
 #include <voxelpipe/device/stage_clock.cuh>
 #include <voxelpipe/device/tile_passes.cuh>
+#include <voxelpipe/device/touched_grid.cuh>
 #include <voxelpipe/device/vertex_shade.cuh>
 
 #include <algorithm>
@@ -165,10 +166,16 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     stage_clock* clock = nullptr; // where the call is asked for its times
 
     // Carves the memory and, with Run, launches every stage. Whatever can fail is known before the first voxel is
-    // written. The state comes first in the memory, and is zeroed before.
+    // written. The state comes first in the memory, whose first zeroed_bytes() are zeroed before.
     template <coverage Rule, bool Run>
     void go(arena& memory, cudaStream_t stream) const {
         pipeline_state* const state = memory.take<pipeline_state>(1);
+        if constexpr (can_be_touched) {
+            if (is_touched_call()) {
+                go_touched<Rule, Run>(memory, state, stream);
+                return;
+            }
+        }
         if constexpr (can_be_direct<FragmentShader, Framebuffer>) {
             if (is_direct_call()) {
                 go_direct<Rule, Run>(memory, state, stream);
@@ -207,8 +214,16 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         b.add(may_list);
         return b;
     }
+    // Of the memory, from its start: zeroed before, and, but for the state, by a call that has run.
+    [[nodiscard]] std::size_t zeroed_bytes() const {
+        arena memory;
+        (void)memory.take<pipeline_state>(1);
+        if (is_touched_call()) (void)memory.take<word>(touched_target::map::elements(g.extent));
+        return memory.used();
+    }
     // Whether the call lists its fragments: its memory grows with them.
     [[nodiscard]] bool is_listed_call() const {
+        if (is_touched_call()) return false;
         if constexpr (can_be_direct<FragmentShader, Framebuffer>)
             if (is_direct_call()) return false;
         if (!can_be_listed || !may_list || draws.size() > most_direct_draws) return false;
@@ -219,6 +234,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
 
     // Of this call: what a failure that shows only at its end is put down to.
     [[nodiscard]] stage last_stage() const {
+        if (is_touched_call()) return stage::fine_raster;
         if constexpr (can_be_direct<FragmentShader, Framebuffer>) {
             if (is_direct_call())
                 return plan_direct(draws, fb, num_primitives, options.count_voxels).any_counted() ? stage::tile_resolve
@@ -228,17 +244,63 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     }
 
 private:
-    [[nodiscard]] bool is_direct_call() const {
-        if (draws.size() > most_direct_draws || core::small_voxels(core::make_snap_transform(g).fraction) == 0)
+    // What needs no memory but lists of triangles.
+    static constexpr bool can_be_touched = core::is_solid<FragmentShader> && depends_on_touched<Framebuffer>;
+    [[nodiscard]] bool is_touched_call() const {
+        if (!can_be_touched || draws.size() != 1 ||
+            !is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent))
             return false;
-        if (!triangle_lists::holds(num_primitives, most_large_records(g.extent))) return false;
-        if (std::max({g.extent.x, g.extent.y, g.extent.z}) > most_direct_extent) return false;
+        const std::uint64_t bytes = touched_target::map::elements(g.extent) * sizeof(word);
+        bool may_be_direct = false;
+        if constexpr (can_be_direct<FragmentShader, Framebuffer>)
+            may_be_direct = plan_direct(draws, fb, num_primitives, options.count_voxels).possible;
+        if (!may_be_direct) return bytes <= most_touched_bytes;
+        return bytes <= most_touched_bytes_of_direct &&
+               (options.count_voxels || clears_values(fb) ||
+                bytes <= least_touched_bytes + num_primitives * touched_bytes_per_triangle);
+    }
+    [[nodiscard]] bool is_direct_call() const {
+        if (draws.size() > most_direct_draws ||
+            !is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent))
+            return false;
         return plan_direct(draws, fb, num_primitives, options.count_voxels).possible;
+    }
+
+    // Vertices are shaded by the raster itself where that costs nothing.
+    static constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
+
+    template <coverage Rule, bool Run>
+    void go_touched(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+        const draw_type& d = draws[0];
+        const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
+        word* const touched = memory.take<word>(touched_target::map::elements(g.extent));
+        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : num_vertices);
+        const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
+        if constexpr (Run) {
+            const core::snap_transform snap = core::make_snap_transform(g);
+            const auto raster = [&](const auto& source) {
+                using source_type = std::remove_cvref_t<decltype(source)>;
+                const direct_call<Rule, source_type, touched_output> call{
+                    {source, num_primitives, snap.fraction, g.extent},
+                    {touched, g.extent, num_vertices, state},
+                    handed_on.with(state)};
+                if (num_primitives != 0) direct_raster(call, state, stage::fine_raster, stream);
+            };
+            if constexpr (on_the_spot) {
+                raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, 0});
+            } else {
+                vertex_shade(d.mesh, d.vertex_shader, snap, 0, positions, static_cast<no_varyings*>(nullptr), stream);
+                end_stage(clock, &stage_times::vertex_shade);
+                raster(stored_source{{d.mesh.triangles.data(), positions, 0, num_vertices}});
+            }
+            end_stage(clock, &stage_times::fine_raster);
+            end_touched(touched, fb, d.fragment_shader.values, options.count_voxels, state, limits, stream);
+            end_stage(clock, &stage_times::tile_resolve);
+        }
     }
 
     template <coverage Rule, bool Run>
     void go_direct(arena& memory, pipeline_state* state, cudaStream_t stream) const {
-        constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
         const auto plan = plan_direct(draws, fb, num_primitives, options.count_voxels);
         bool has_marks = false;
         core::for_each_index<groups::count>([&]<std::size_t K>() {
@@ -288,7 +350,7 @@ private:
                         {d.mesh.triangles.data(), positions, 0, static_cast<std::uint32_t>(d.mesh.positions.size())}});
                 }
             }
-            if (plan.any_counted()) {
+            if (plan.has_last_pass()) {
                 end_counts(plan, fb, draws[0].fragment_shader.values, marks, state, limits, stream);
                 end_stage(clock, &stage_times::tile_resolve);
             }

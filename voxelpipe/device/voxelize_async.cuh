@@ -106,7 +106,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
                 }
                 device::launch_until(call.last_stage(), [&] {
                     device::arena memory(workspace.memory);
-                    device::zero_state(workspace.memory, backend.stream);
+                    device::check(cudaMemsetAsync(workspace.memory, 0, call.zeroed_bytes(), backend.stream));
                     if (options.rule == coverage::thin)
                         call.template go<coverage::thin, true>(memory, backend.stream);
                     else
