@@ -142,13 +142,6 @@ struct list_memory {
     }
 };
 
-// Where the lists are to go: null where they come to lie. With a page, which the device can read, what it says when the
-// call runs, so that a call that is kept as a graph finds new arrays.
-struct asked_places {
-    list_places value;
-    const list_places* page = nullptr;
-};
-
 // The sorted lists, where they came to lie.
 template <class Key, class Payload>
 struct fragment_lists {
@@ -175,22 +168,30 @@ struct fragment_lists {
     }
 };
 
-// Between what lists fragments and the sort: what that wants of its memory, fillers or zeros, where the lists are to
-// go, and zeros for the tiles of the order, if any.
+// Between what lists fragments and the sort, where the raster has not done it: what the sort and the order want of
+// their memory, and fillers where cub sorts.
 template <class Key>
 __global__ void prepare_sort_kernel(Key* keys, std::uint32_t* values, std::uint64_t capacity,
-                                    const __grid_constant__ sort_memory sort,
-                                    const __grid_constant__ asked_places asked, list_places* places, tile_counts tiles,
-                                    std::uint64_t num_tiles, const pipeline_state* state, capacities limits) {
+                                    const __grid_constant__ sort_preparation preparation, const pipeline_state* state,
+                                    capacities limits) {
     await_stream();
-    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
-    if (thread == 0) *places = asked.page != nullptr ? *asked.page : asked.value;
-    for (std::uint64_t i = thread; i < num_tiles; i += threads) tiles.words[i] = 0;
-    if (are_sorted_here<Key>(capacity))
-        sort.zero(sort_count{state, limits}.get(), thread, threads);
-    else
-        fill_end_by_all(keys, values, state->list_fragments, capacity, *state, limits);
+    preparation.run(std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x, std::uint64_t{gridDim.x} * blockDim.x);
+    if (!are_sorted_here<Key>(capacity)) fill_end_by_all(keys, values, state->list_fragments, capacity, *state, limits);
+}
+
+// What has to be done for the lists of a call before they are sorted.
+template <class Key, class Payload>
+[[nodiscard]] sort_preparation prepare_lists(const list_buffers<Key, Payload>& b, const asked_places& asked,
+                                             const tile_counts& tiles, const capacities& limits) {
+    sort_preparation p;
+    p.is_wanted = true;
+    p.sorts = are_sorted_here<Key>(limits.fragments);
+    p.sort = b.sort;
+    p.capacity = limits.fragments;
+    p.tiles = tiles;
+    p.asked = asked;
+    p.places = b.places;
+    return p;
 }
 
 template <class Key>
@@ -198,13 +199,14 @@ struct sorted_pairs {
     Key *keys, *spare_keys;
     std::uint32_t *values, *spare_values;
 };
-// Sorts what was listed by voxel, stably.
+// Sorts what was listed by voxel, stably, for which `preparation` is to be done, if that is wanted.
 template <class Key, class Payload>
-[[nodiscard]] sorted_pairs<Key> sort_by_voxel(const list_buffers<Key, Payload>& b, const asked_places& asked,
-                                              const tile_counts& tiles, std::uint64_t num_tiles, pipeline_state* state,
-                                              const capacities& limits, cudaStream_t stream, stage_clock* clock) {
-    launch_behind(prepare_sort_kernel<Key>, fill_device(limits.fragments), threads_per_block, stream, stage::tile_sort,
-                  b.keys[0], b.values[0], limits.fragments, b.sort, asked, b.places, tiles, num_tiles, state, limits);
+[[nodiscard]] sorted_pairs<Key> sort_by_voxel(const list_buffers<Key, Payload>& b, const sort_preparation& preparation,
+                                              pipeline_state* state, const capacities& limits, cudaStream_t stream,
+                                              stage_clock* clock) {
+    if (preparation.is_wanted)
+        launch_behind(prepare_sort_kernel<Key>, fill_device(limits.fragments), threads_per_block, stream,
+                      stage::tile_sort, b.keys[0], b.values[0], limits.fragments, preparation, state, limits);
     int at = 0;
     if (!are_sorted_here<Key>(limits.fragments)) {
         cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
@@ -224,7 +226,8 @@ template <class Key, class Payload>
 [[nodiscard]] fragment_lists<Key, Payload> sort_lists(const list_buffers<Key, Payload>& b, const asked_places& asked,
                                                       pipeline_state* state, const capacities& limits,
                                                       cudaStream_t stream, stage_clock* clock) {
-    const sorted_pairs<Key> sorted = sort_by_voxel(b, asked, {}, 0, state, limits, stream, clock);
+    const sorted_pairs<Key> sorted =
+        sort_by_voxel(b, prepare_lists(b, asked, {}, limits), state, limits, stream, clock);
     fragment_lists<Key, Payload> lists{};
     lists.keys = sorted.keys;
     lists.values = sorted.values;
@@ -241,15 +244,17 @@ template <class Key, class Payload>
     return lists;
 }
 
-// The same for primitives that were listed in any order; the lists are then where they are to go. spare: room for
-// limits.fragments, where the sorted voxels are wanted afterwards; otherwise null.
+// The same for primitives that were listed in any order; the lists are then where they are to go. The raster has done
+// what sort_preparation says, but for fillers. spare: room for limits.fragments, where the sorted voxels are wanted
+// afterwards; otherwise null.
 template <class Payload>
 [[nodiscard]] fragment_lists<std::uint32_t, Payload>
 sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const asked_places& asked,
                std::uint32_t num_primitives, std::uint32_t* spare, pipeline_state* state, const capacities& limits,
                cudaStream_t stream, stage_clock* clock) {
-    const sorted_pairs<std::uint32_t> sorted =
-        sort_by_voxel(b, asked, order.tiles, tile_counts::num(limits.fragments), state, limits, stream, clock);
+    sort_preparation preparation = prepare_lists(b, asked, order.tiles, limits);
+    preparation.is_wanted = !preparation.sorts; // for the fillers
+    const sorted_pairs<std::uint32_t> sorted = sort_by_voxel(b, preparation, state, limits, stream, clock);
     list_places here;
     here.narrow_voxels = sorted.spare_keys;
     here.offsets = b.first_of_voxel;

@@ -182,6 +182,8 @@ struct framebuffer_output {
     Values values;
     direct_modes<targets_of<Framebuffer>::count> modes;
     chunk_marks marks; // of targets that hold values
+
+    __device__ VOXELPIPE_INLINE static void prepare(std::uint64_t, std::uint64_t) {} // for what comes afterwards
 };
 
 // ---- the first kernel: every triangle -------------------------------------------------------------------------------
@@ -423,6 +425,8 @@ __global__ __launch_bounds__(raster_threads,
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ unsigned dropped[num_triangle_classes];
     await_stream();
+    call.out.prepare(std::uint64_t{blockIdx.x} * raster_threads + threadIdx.x,
+                     std::uint64_t{gridDim.x} * raster_threads);
     if (state->index_error != 0) return;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();

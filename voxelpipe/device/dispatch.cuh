@@ -360,8 +360,8 @@ private:
     // Appends the fragments of all draws to two arrays.
     template <coverage Rule>
     void list_draws(const scene_type& s, const vertex_positions& positions, const triangle_lists& handed_on,
-                    std::uint32_t* voxels, std::uint32_t* primitives, pipeline_state* state,
-                    cudaStream_t stream) const {
+                    std::uint32_t* voxels, std::uint32_t* primitives, sort_preparation preparation,
+                    pipeline_state* state, cudaStream_t stream) const {
         draw_geometry of_draw{draws[0].mesh.triangles.data(), positions, 0, 0};
         for (const draw_type& d : draws) {
             const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
@@ -372,7 +372,8 @@ private:
                     check(cudaMemsetAsync(&state->handed_on, 0, sizeof(state->handed_on), stream));
                 const raster_input<stored_source> in{{of_draw}, num_triangles, s.geo.snap.fraction, g.extent};
                 list_raster<Rule>(in, of_draw.num_vertices, of_draw.first_primitive, handed_on.with(state), voxels,
-                                  primitives, state, limits, stream);
+                                  primitives, preparation, state, limits, stream);
+                preparation.is_wanted = false;
             }
             of_draw.positions = of_draw.positions.from(of_draw.num_vertices);
             of_draw.first_primitive += num_triangles;
@@ -400,9 +401,14 @@ private:
         if constexpr (Run) {
             const scene_type s = buffers.shade(draws, g, stream);
             end_stage(clock, &stage_times::vertex_shade);
-            list_draws<Rule>(s, buffers.positions, handed_on, voxels[0], primitives[0], state, stream);
+            sort_preparation preparation;
+            preparation.is_wanted = preparation.sorts = true;
+            preparation.sort = sort;
+            preparation.capacity = limits.fragments;
+            list_draws<Rule>(s, buffers.positions, handed_on, voxels[0], primitives[0], preparation, state, stream);
             end_stage(clock, &stage_times::fine_raster);
-            const int at = sort_listed(voxels, primitives, sort, state, limits, stream);
+            const int at =
+                sort_fragments(voxels, primitives, sort_count{state, limits}, limits.fragments, sort, stream);
             end_stage(clock, &stage_times::tile_sort);
             clear_targets(state, stream);
             resolve_fragments(s, fb, {voxels[at], primitives[at]}, ends, options.count_voxels, state, limits, stream);
@@ -422,7 +428,8 @@ private:
         if constexpr (Run) {
             const scene_type s = buffers.shade(draws, g, stream);
             end_stage(clock, &stage_times::vertex_shade);
-            list_draws<Rule>(s, buffers.positions, handed_on, lists.keys[0], lists.values[0], state, stream);
+            list_draws<Rule>(s, buffers.positions, handed_on, lists.keys[0], lists.values[0],
+                             prepare_lists(lists, {}, order.tiles, limits), state, stream);
             filter_lists(s, lists, state, limits, stream);
             end_stage(clock, &stage_times::fine_raster);
             fragment_lists<std::uint32_t, values> sorted =
@@ -588,8 +595,8 @@ private:
             const auto raster = [&](const auto& source) {
                 const raster_input<std::remove_cvref_t<decltype(source)>> in{source, num_primitives, snap.fraction,
                                                                              g.extent};
-                list_raster<Rule>(in, num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0], state,
-                                  limits, stream);
+                list_raster<Rule>(in, num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0],
+                                  prepare_lists(lists, asked, order.tiles, limits), state, limits, stream);
             };
             if constexpr (on_the_spot) {
                 raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, 0});
@@ -625,7 +632,7 @@ private:
             end_stage(clock, &stage_times::vertex_shade);
             const raster_input<stored_source> in{{s.geo.one}, num_primitives, s.geo.snap.fraction, g.extent};
             list_raster<Rule>(in, s.geo.one.num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0],
-                              state, limits, stream);
+                              prepare_lists(lists, asked, order.tiles, limits), state, limits, stream);
             if (filters) filter_lists(s, lists, state, limits, stream);
             end_stage(clock, &stage_times::fine_raster);
             fragment_lists<std::uint32_t, Payload> sorted =

@@ -8,6 +8,7 @@
 // more than that is cut into runs that are sorted and merged. How many fragments there are is known on the device
 // alone.
 
+#include <voxelpipe/device/fragment_sort.cuh>
 #include <voxelpipe/device/scene.cuh>
 
 #include <cub/block/block_merge_sort.cuh>
@@ -92,13 +93,22 @@ struct list_places {
     void* payloads = nullptr;
 };
 
+// Where the lists are to go: null where they come to lie. With a page, which the device can read, what it says when the
+// call runs, so that a call that is kept as a graph finds new arrays.
+struct asked_places {
+    list_places value;
+    const list_places* page = nullptr;
+};
+
 // How many voxels begin in each tile of windows, passed on from tile to tile: one word each, zeroed before.
 struct tile_counts {
     static constexpr std::uint32_t length = order_warps * window_length; // fragments of a tile
     static constexpr unsigned long long own = 1ull << 62, all = 2ull << 62, value = own - 1;
     unsigned long long* words;
 
-    [[nodiscard]] static std::uint64_t num(std::uint64_t capacity) { return (capacity + length - 1) / length; }
+    [[nodiscard]] VOXELPIPE_HD static std::uint64_t num(std::uint64_t capacity) {
+        return (capacity + length - 1) / length;
+    }
 
     // How many voxels begin in the tiles before this one, in which `count` do. By all lanes of one warp. Tiles are
     // taken in order, so those before are under way.
@@ -125,6 +135,26 @@ struct tile_counts {
         }
         if (lane == 0) word(words[tile]).store(all | (sum + count), ::cuda::memory_order_relaxed);
         return sum;
+    }
+};
+
+// What the sort and the order of a call's fragments want before they begin, which the raster that lists them does on
+// its way: zeros, and the page's word of where the lists are to go.
+struct sort_preparation {
+    bool is_wanted = false;
+    bool sorts = false; // by sort_fragments
+    sort_memory sort{};
+    std::uint64_t capacity = 0;    // fragments
+    tile_counts tiles{};           // or none
+    list_places* places = nullptr; // or none
+    asked_places asked;
+
+    // By all threads of a grid.
+    __device__ VOXELPIPE_INLINE void run(std::uint64_t thread, std::uint64_t threads) const {
+        if (places != nullptr && thread == 0) *places = asked.page != nullptr ? *asked.page : asked.value;
+        if (tiles.words != nullptr)
+            for (std::uint64_t i = thread; i < tile_counts::num(capacity); i += threads) tiles.words[i] = 0;
+        if (sorts) sort.zero(capacity, thread, threads);
     }
 };
 
@@ -531,7 +561,7 @@ inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipel
     launch_behind(windows, fill_device(tiles * threads_per_block, 8), 32 * order_warps, stream, where, b, state,
                   limits);
     if (capacity > most_of_window)
-        launch_behind(order_long_kernel<order_buffers>, fill_device(capacity / (most_of_window + 1) * 32),
+        launch_behind(order_long_kernel<order_buffers>, fill_device(capacity / (most_of_window + 1) * 32, 4),
                       block_sort_threads, stream, where, b);
     // Runs of 2^12, 2^18 and 2^24 fragments; the last merge takes all that there are.
     std::uint64_t length = most_of_block;

@@ -55,8 +55,8 @@ struct sort_memory {
         std::uint32_t next_tile[most_digit_passes], blocks_done;
         std::uint32_t num; // pairs
     };
-    totals* all_tiles;
-    std::uint32_t* words[2]; // [tile][digit], of passes in turn: each zeroes those of the next
+    totals* all_tiles = nullptr;
+    std::uint32_t* words[2]{}; // [tile][digit], of passes in turn: each zeroes those of the next
     digit_plan plan{1};
 
     [[nodiscard]] static sort_memory take(arena& memory, std::uint64_t capacity, int key_bits) {
@@ -285,22 +285,6 @@ template <class Count>
         launch_behind(kernel, tiles, sort_threads, sizeof(sort_tile_memory), stream, where, keys[p % 2], values[p % 2],
                       keys[1 - p % 2], values[1 - p % 2], m, p);
     return tiles == 0 ? 0 : m.plan.passes % 2;
-}
-
-// Zeros for the sort of what a call has listed, and that sort.
-template <class Memory>
-__global__ void zero_sort_kernel(const __grid_constant__ Memory m, const __grid_constant__ sort_count count) {
-    await_stream();
-    m.zero(count.get(), std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x, std::uint64_t{gridDim.x} * blockDim.x);
-}
-[[nodiscard]] inline int sort_listed(std::uint32_t* const (&keys)[2], std::uint32_t* const (&values)[2],
-                                     const sort_memory& m, pipeline_state* state, const capacities& limits,
-                                     cudaStream_t stream) {
-    const sort_count count{state, limits};
-    launch_behind(zero_sort_kernel<sort_memory>,
-                  fill_device(sort_memory::num_tiles(limits.fragments) * m.plan.num_digits()), threads_per_block,
-                  stream, stage::tile_sort, m, count);
-    return sort_fragments(keys, values, count, limits.fragments, m, stream);
 }
 
 } // namespace voxelpipe::device

@@ -7,6 +7,7 @@
 // room in the list for all of them at once.
 
 #include <voxelpipe/device/direct_raster.cuh>
+#include <voxelpipe/device/fragment_order.cuh>
 
 namespace voxelpipe::device {
 
@@ -171,6 +172,11 @@ struct list_output {
     unsigned long long capacity;
     std::uint32_t num_vertices, first_primitive;
     pipeline_state* state;
+    sort_preparation preparation;
+
+    __device__ VOXELPIPE_INLINE void prepare(std::uint64_t thread, std::uint64_t threads) const {
+        if (preparation.is_wanted) preparation.run(thread, threads);
+    }
 };
 
 // Whether the fragments of a draw can be listed this way.
@@ -180,13 +186,14 @@ struct list_output {
 }
 
 // Appends the fragments of a draw to two arrays of limits.fragments elements each; counts them in the state.
-// first_primitive: of the draw.
+// first_primitive: of the draw. Does what `preparation` says, if that is wanted.
 template <coverage Rule, class Source>
 void list_raster(const raster_input<Source>& in, std::uint32_t num_vertices, std::uint32_t first_primitive,
                  const triangle_lists& handed_on, std::uint32_t* voxels, std::uint32_t* primitives,
-                 pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+                 const sort_preparation& preparation, pipeline_state* state, const capacities& limits,
+                 cudaStream_t stream) {
     const direct_call<Rule, Source, list_output> call{
-        in, {voxels, primitives, limits.fragments, num_vertices, first_primitive, state}, handed_on};
+        in, {voxels, primitives, limits.fragments, num_vertices, first_primitive, state, preparation}, handed_on};
     direct_raster(call, state, stage::abuffer_emit, stream);
 }
 
