@@ -22,6 +22,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: 
 CELL_NAMES = {
     "bit_conservative": "bit, conservative",
     "bit_thin": "bit, thin",
+    "bit_counted_conservative": "bit, conservative, voxels counted",
+    "float_replace_conservative": "float replace by a constant, conservative",
     "float_add_conservative": "float add, reproducible, conservative",
     "float_add_unordered_conservative": "float add, unordered, conservative",
     "float_add_varying_conservative": "float add of a varying, conservative",

@@ -14,6 +14,8 @@ namespace {
 constexpr std::array<std::string_view, gpu_cells.size()> names{
     "bit_conservative",
     "bit_thin",
+    "bit_counted_conservative",
+    "float_replace_conservative",
     "float_add_conservative",
     "float_add_unordered_conservative",
     "float_add_varying_conservative",
@@ -41,7 +43,10 @@ bool parse(std::string_view name, gpu_cell& cell) {
 
 bool is_thin(gpu_cell cell) { return cell == gpu_cell::bit_thin || cell == gpu_cell::abuffer_thin; }
 bool is_abuffer(gpu_cell cell) { return cell == gpu_cell::abuffer_thin || cell == gpu_cell::abuffer_conservative; }
-bool is_bit(gpu_cell cell) { return cell == gpu_cell::bit_conservative || cell == gpu_cell::bit_thin; }
+bool is_bit(gpu_cell cell) {
+    return cell == gpu_cell::bit_conservative || cell == gpu_cell::bit_thin ||
+           cell == gpu_cell::bit_counted_conservative;
+}
 
 double gpu_anchor::fastest() const {
     if (original > 0 && peer > 0) return std::min(original, peer);
@@ -69,6 +74,8 @@ gpu_anchor published_anchor(std::string_view scene, int resolution, gpu_cell cel
     case gpu_cell::abuffer_thin:
         a = {p->original_abuffer, 0, {}, p->floor_abuffer, p->target_abuffer, p->paper_abuffer};
         break;
+    case gpu_cell::bit_counted_conservative:
+    case gpu_cell::float_replace_conservative:
     case gpu_cell::abuffer_conservative:
         return {};
     }

@@ -21,15 +21,19 @@ namespace bench {
 enum class gpu_cell : std::uint8_t {
     bit_conservative,
     bit_thin,
+    bit_counted_conservative,         // with count_voxels, the default, which no published figure includes
+    float_replace_conservative,       // by a constant
     float_add_conservative,           // reproducible sum of a constant
     float_add_unordered_conservative, // plain additions of a constant
     float_add_varying_conservative,   // reproducible sum of an interpolated value: no short cut for constants
     abuffer_thin,
     abuffer_conservative,
 };
-inline constexpr std::array<gpu_cell, 7> gpu_cells{
+inline constexpr std::array<gpu_cell, 9> gpu_cells{
     gpu_cell::bit_conservative,
     gpu_cell::bit_thin,
+    gpu_cell::bit_counted_conservative,
+    gpu_cell::float_replace_conservative,
     gpu_cell::float_add_conservative,
     gpu_cell::float_add_unordered_conservative,
     gpu_cell::float_add_varying_conservative,

@@ -12,7 +12,9 @@ namespace bench::gpu {
 
 using cell_pointer = std::unique_ptr<prepared_cell>;
 
-cell_pointer make_bits(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule);
+cell_pointer make_bits(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule,
+                       bool count_voxels);
+cell_pointer make_float_replace(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule);
 cell_pointer make_float_add(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule);
 cell_pointer make_float_add_unordered(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule);
 cell_pointer make_float_add_varying(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule);

@@ -13,7 +13,11 @@ std::unique_ptr<prepared_cell> prepare(session& s, const resident_mesh& mesh, co
     switch (cell) {
     case gpu_cell::bit_conservative:
     case gpu_cell::bit_thin:
-        return make_bits(s, mesh, grid, rule);
+        return make_bits(s, mesh, grid, rule, false);
+    case gpu_cell::bit_counted_conservative:
+        return make_bits(s, mesh, grid, rule, true);
+    case gpu_cell::float_replace_conservative:
+        return make_float_replace(s, mesh, grid, rule);
     case gpu_cell::float_add_conservative:
         return make_float_add(s, mesh, grid, rule);
     case gpu_cell::float_add_unordered_conservative:

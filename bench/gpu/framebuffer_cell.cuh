@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A prepared cell that draws into one render target. Voxels are not counted (voxelize_options::count_voxels), as no
-// other program's figure includes that; fragments are.
+// A prepared cell that draws into one render target. Mostly voxels are not counted (voxelize_options::count_voxels), as
+// no other program's figure includes that; fragments are.
 
 #include "cells.hpp"
 #include "one_thread_a_triangle.hpp"
@@ -31,8 +31,8 @@ class framebuffer_cell : public prepared_cell {
 
 public:
     framebuffer_cell(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule,
-                     const FragmentShader& shader, std::optional<baseline_output> baseline)
-        : session_(s), backend_(s.stream()), draw_{view(mesh), {}, shader}, grid_(grid), options_(rule, false),
+                     const FragmentShader& shader, std::optional<baseline_output> baseline, bool count_voxels = false)
+        : session_(s), backend_(s.stream()), draw_{view(mesh), {}, shader}, grid_(grid), options_(rule, count_voxels),
           framebuffer_(backend_, grid.extent), baseline_(baseline) {}
 
     vp::counters call() override {

@@ -108,7 +108,9 @@ TEST(PublishedGpuFigures, NoTargetUnderOnePointThreeTimesTheFloor) {
         for (const gpu_cell cell : gpu_cells) {
             const gpu_anchor a = published_anchor(s.scene, s.resolution, cell);
             EXPECT_GE(a.target, 1.3 * a.floor);
-            EXPECT_EQ(a.fastest() > 0, cell != gpu_cell::abuffer_conservative);
+            EXPECT_EQ(a.fastest() > 0, cell != gpu_cell::abuffer_conservative &&
+                                           cell != gpu_cell::bit_counted_conservative &&
+                                           cell != gpu_cell::float_replace_conservative);
         }
     const gpu_anchor dragon = published_anchor("dragon", 128, gpu_cell::bit_conservative);
     EXPECT_EQ(dragon.fastest(), 0.058);

@@ -1,0 +1,14 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "cell_factories.hpp"
+#include "framebuffer_cell.cuh"
+
+namespace bench::gpu {
+
+cell_pointer make_float_replace(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule) {
+    using cell = framebuffer_cell<vp::target<float, vp::blend::replace>, vp::passthrough, vp::solid<float>>;
+    return std::make_unique<cell>(s, mesh, grid, rule, vp::constant(0.5f), std::nullopt);
+}
+
+} // namespace bench::gpu
