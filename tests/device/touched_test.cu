@@ -169,38 +169,58 @@ TEST(Touched, CallsOfOneBackendInTurn) {
     }
 }
 
-// Two draws, whose values may differ, are drawn into the targets as they lie; so are grids of more than 32 MB of bits,
-// and of more than 1 MB where there are few triangles and nothing is counted.
-TEST(Touched, TwoDraws) {
-    using draw_list = std::vector<std::pair<mesh_data, bool>>;
-    const draw_list parts{{mixed_triangles(600, 40.0f, 440), true}, {mixed_triangles(600, 40.0f, 441), false}};
+template <class Backend, class... Targets, class Values>
+vp::counters draw_parts(Backend& be, vp::framebuffer<Backend, Targets...>& fb, const std::vector<mesh_data>& parts,
+                        const std::vector<Values>& values, const vp::grid& g, bool count) {
+    std::vector<vp::mesh<Backend>> meshes;
+    std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, Values>> draws;
+    for (const mesh_data& m : parts) meshes.emplace_back(be, m.positions, m.triangles);
+    for (std::size_t i = 0; i < parts.size(); ++i) draws.push_back({meshes[i].view(), {}, values[i]});
+    const vp::status s = vp::voxelize(be, std::span<const typename decltype(draws)::value_type>(draws), g, fb,
+                                      vp::voxelize_options{vp::coverage::conservative, count});
+    EXPECT_TRUE(s.ok()) << s.message();
+    return s.counts;
+}
+template <class... Targets, class Values>
+void compare_parts(target_list<Targets...>, const std::vector<mesh_data>& parts, const std::vector<Values>& values) {
     const vp::grid g = box_grid({60, 47, 31});
-    const auto draw_parts = [&]<class Backend>(Backend& be, vp::counters& counts) {
-        std::vector<vp::mesh<Backend>> meshes;
-        std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<bool>>> draws;
-        for (const auto& [m, value] : parts) meshes.emplace_back(be, m.positions, m.triangles);
-        for (std::size_t i = 0; i < parts.size(); ++i)
-            draws.push_back({meshes[i].view(), {}, vp::constant(parts[i].second)});
-        vp::framebuffer<Backend, bits<blend::bit_or>> fb{be, g.extent};
-        const vp::status s = vp::voxelize(be, std::span<const typename decltype(draws)::value_type>(draws), g, fb,
-                                          vp::voxelize_options{vp::coverage::conservative, false});
-        EXPECT_TRUE(s.ok()) << s.message();
-        counts = s.counts;
-        return vp::get<0>(fb).to_host(be);
-    };
-    vp::cpu_backend cpu;
-    vp::cuda_backend gpu;
-    vp::counters a{}, b{};
-    expect_same_bytes(draw_parts(cpu, a), draw_parts(gpu, b), "bits");
-    expect_same_counts(a, b);
+    for (const bool count : {true, false}) {
+        vp::cpu_backend cpu;
+        vp::cuda_backend gpu;
+        vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
+        vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
+        expect_same_counts(draw_parts(cpu, a, parts, values, g, count), draw_parts(gpu, b, parts, values, g, count));
+        vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu),
+                              ("target " + std::to_string(I)).c_str());
+        });
+    }
 }
 
+// Three draws that give one value, and others, which are drawn into the targets as they lie.
+TEST(Touched, SeveralDraws) {
+    mesh_data large = mixed_triangles(200, 40.0f, 440);
+    add_triangle(large, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 50.0f}, {-300.0f, 500.0f, 20.0f});
+    const std::vector<mesh_data> parts{large, mixed_triangles(600, 40.0f, 441), mixed_triangles(300, 40.0f, 442)};
+    using values = decltype(vp::constant(true, 0.5f));
+    const auto list = [](float third) {
+        return std::vector<values>{vp::constant(true, 0.5f), vp::constant(true, 0.5f), vp::constant(true, third)};
+    };
+    compare_parts(target_list<bits<blend::bit_or>, vp::target<float, blend::replace>>{}, parts, list(0.5f));
+    compare_parts(target_list<bits<blend::bit_or>, vp::target<float, blend::replace>>{}, parts, list(-1.5f));
+    using bit_value = vp::solid<bool>;
+    compare_parts(target_list<bits<blend::bit_or>>{}, parts,
+                  std::vector<bit_value>{vp::constant(true), vp::constant(false), vp::constant(true)});
+}
+
+// Grids of more than 32 MB of bits are drawn into directly, and of more than 1 MB where there are few triangles and
+// nothing is counted.
 TEST(Touched, LargeGridsOfBits) {
     const mesh_data m = mixed_triangles(60, 40.0f, 450);
     for (const bool count : {false, true})
         expect_same<bits<blend::bit_or>>(m, box_grid({416, 200, 200}), vp::passthrough{}, vp::constant(true),
                                          vp::voxelize_options{vp::coverage::conservative, count});
-    expect_same<bits<blend::bit_or>>(m, box_grid({1056, 600, 512}), vp::passthrough{}, vp::constant(true));
+    expect_same<bits<blend::bit_or>>(m, box_grid({1056, 600, 512}), vp::passthrough{}, vp::constant(true), {});
     // Voxels of a target that starts with all bits set.
     const glm::ivec3 extent(1056, 600, 512);
     vp::cpu_backend cpu;

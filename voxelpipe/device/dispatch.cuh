@@ -20,6 +20,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <span>
 
@@ -244,10 +245,9 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     }
 
 private:
-    // What needs no memory but lists of triangles.
     static constexpr bool can_be_touched = core::is_solid<FragmentShader> && depends_on_touched<Framebuffer>;
     [[nodiscard]] bool is_touched_call() const {
-        if (!can_be_touched || draws.size() != 1 ||
+        if (!can_be_touched || draws.size() > most_direct_draws || !have_one_value() ||
             !is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent))
             return false;
         const std::uint64_t bytes = touched_target::map::elements(g.extent) * sizeof(word);
@@ -258,6 +258,15 @@ private:
         return bytes <= most_touched_bytes_of_direct &&
                (options.count_voxels || clears_values(fb) ||
                 bytes <= least_touched_bytes + num_primitives * touched_bytes_per_triangle);
+    }
+    // Whether all draws give the same bytes.
+    [[nodiscard]] bool have_one_value() const {
+        if constexpr (core::is_solid<FragmentShader>) {
+            const auto& first = draws[0].fragment_shader.values;
+            for (const draw_type& d : draws)
+                if (std::memcmp(&first, &d.fragment_shader.values, sizeof(first)) != 0) return false;
+        }
+        return true;
     }
     [[nodiscard]] bool is_direct_call() const {
         if (draws.size() > most_direct_draws ||
@@ -271,31 +280,45 @@ private:
 
     template <coverage Rule, bool Run>
     void go_touched(arena& memory, pipeline_state* state, cudaStream_t stream) const {
-        const draw_type& d = draws[0];
-        const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
         word* const touched = memory.take<word>(touched_target::map::elements(g.extent));
-        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : num_vertices);
-        const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
+        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : most_vertices());
+        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles());
         if constexpr (Run) {
             const core::snap_transform snap = core::make_snap_transform(g);
-            const auto raster = [&](const auto& source) {
-                using source_type = std::remove_cvref_t<decltype(source)>;
-                const direct_call<Rule, source_type, touched_output> call{
-                    {source, num_primitives, snap.fraction, g.extent},
-                    {touched, g.extent, num_vertices, state},
-                    handed_on.with(state)};
-                if (num_primitives != 0) direct_raster(call, state, stage::fine_raster, stream);
-            };
-            if constexpr (on_the_spot) {
-                raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, 0});
-            } else {
-                vertex_shade(d.mesh, d.vertex_shader, snap, 0, positions, static_cast<no_varyings*>(nullptr), stream);
-                end_stage(clock, &stage_times::vertex_shade);
-                raster(stored_source{{d.mesh.triangles.data(), positions, 0, num_vertices}});
+            for (std::size_t i = 0; i < draws.size(); ++i) {
+                const draw_type& d = draws[i];
+                const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
+                const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
+                if (num_triangles == 0) continue;
+                if (i != 0) check(cudaMemsetAsync(&state->handed_on, 0, sizeof(state->handed_on), stream));
+                const auto raster = [&](const auto& source) {
+                    using source_type = std::remove_cvref_t<decltype(source)>;
+                    const direct_call<Rule, source_type, touched_output> call{
+                        {source, num_triangles, snap.fraction, g.extent},
+                        {touched, g.extent, num_vertices, state},
+                        handed_on.with(state)};
+                    direct_raster(call, state, stage::fine_raster, stream);
+                    end_stage(clock, &stage_times::fine_raster);
+                };
+                raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);
             }
-            end_stage(clock, &stage_times::fine_raster);
-            end_touched(touched, fb, d.fragment_shader.values, options.count_voxels, state, limits, stream);
+            end_touched(touched, fb, draws[0].fragment_shader.values, options.count_voxels, state, limits, stream);
             end_stage(clock, &stage_times::tile_resolve);
+        }
+    }
+
+    // raster(source), with vertices that are shaded there, or before.
+    template <class Raster>
+    void raster_draw(const draw_type& d, std::uint32_t number, const core::snap_transform& snap,
+                     const vertex_positions& positions, cudaStream_t stream, const Raster& raster) const {
+        if constexpr (on_the_spot) {
+            raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, number});
+        } else {
+            vertex_shade(d.mesh, d.vertex_shader, snap, number, positions, static_cast<no_varyings*>(nullptr),
+                         stream); // nobody reads them
+            end_stage(clock, &stage_times::vertex_shade);
+            raster(stored_source{
+                {d.mesh.triangles.data(), positions, 0, static_cast<std::uint32_t>(d.mesh.positions.size())}});
         }
     }
 
@@ -308,9 +331,7 @@ private:
         });
         chunk_marks marks;
         if (has_marks) marks = chunk_marks::take(memory, g.extent);
-        std::size_t vertices = 0;
-        for (const draw_type& d : draws) vertices = std::max(vertices, d.mesh.positions.size());
-        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : vertices);
+        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : most_vertices());
         const triangle_lists handed_on = triangle_lists::take(memory, most_triangles());
         if constexpr (Run) {
             if (has_marks) check(cudaMemsetAsync(marks.words, 0, marks.num_words() * sizeof(word), stream));
@@ -339,16 +360,7 @@ private:
                     direct_raster(call, state, stage::fine_raster, stream);
                     end_stage(clock, &stage_times::fine_raster);
                 };
-                if constexpr (on_the_spot) {
-                    raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap,
-                                                              static_cast<std::uint32_t>(i)});
-                } else {
-                    vertex_shade(d.mesh, d.vertex_shader, snap, static_cast<std::uint32_t>(i), positions,
-                                 static_cast<no_varyings*>(nullptr), stream); // nobody reads them
-                    end_stage(clock, &stage_times::vertex_shade);
-                    raster(stored_source{
-                        {d.mesh.triangles.data(), positions, 0, static_cast<std::uint32_t>(d.mesh.positions.size())}});
-                }
+                raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);
             }
             if (plan.has_last_pass()) {
                 end_counts(plan, fb, draws[0].fragment_shader.values, marks, state, limits, stream);
@@ -379,9 +391,15 @@ private:
             of_draw.first_primitive += num_triangles;
         }
     }
+    // Of a draw.
     [[nodiscard]] std::size_t most_triangles() const {
         std::size_t most = 0;
         for (const draw_type& d : draws) most = std::max(most, d.mesh.triangles.size());
+        return most;
+    }
+    [[nodiscard]] std::size_t most_vertices() const {
+        std::size_t most = 0;
+        for (const draw_type& d : draws) most = std::max(most, d.mesh.positions.size());
         return most;
     }
 

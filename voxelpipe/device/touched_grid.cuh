@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Framebuffers that depend only on which voxels are touched: a draw of a constant, and blends for which its second
+// Framebuffers that depend only on which voxels are touched: one constant in all draws, and blends for which its second
 // fragment in a voxel changes nothing, as bits, replace, min and max. The touched voxels are set in bits of the call's
 // own memory, whatever the targets are, and last passes give every target its values, each element once, count the
 // voxels and leave zeros for the next call. Nothing of a target is written before all triangles have been seen, so that
@@ -60,7 +60,8 @@ struct touched_output : framebuffer_output<framebuffer_view<touched_target>, cor
     }
 };
 
-// ---- the last pass --------------------------------------------------------------------------------------------------
+// ---- the last passes
+// --------------------------------------------------------------------------------------------------
 
 // Whether the second fragment of one value changes nothing.
 template <class Target>
@@ -266,7 +267,7 @@ __global__ __launch_bounds__(threads_per_block) void end_touched_kernel(uint4* t
     if (threadIdx.x == 0 && sum != 0) atomicAdd(&state->voxels, sum);
 }
 
-// Ends a call of one draw: touched voxels become bits of the targets, and zeros.
+// Ends a call: touched voxels become values of the targets, and zeros.
 template <class... Targets, class Values>
 void end_touched(word* touched, const framebuffer_view<Targets...>& fb, const Values& values, bool count_voxels,
                  pipeline_state* state, const capacities& limits, cudaStream_t stream) {
