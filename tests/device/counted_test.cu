@@ -306,11 +306,25 @@ TEST(CountedPlan, OnlyWhereItIsNeeded) {
 TEST(CountedPlan, BesideATargetThatTellsFirstTouches) {
     auto fb = view_of<bits, float_sum>({32, 32, 32});
     const auto beside = [&](float value) { return plan(std::vector{vp::constant(true, value)}, fb, 1000, true); };
+    // Bits tell the voxels when all is drawn,
+    EXPECT_TRUE(beside(1.0f).possible);
+    EXPECT_EQ(beside(1.0f).modes.of[0], direct_mode::blend);
+    EXPECT_EQ(beside(1.0f).modes.of[1], direct_mode::blend);
+    EXPECT_FALSE(beside(1.0f).modes.counts_first);
+    EXPECT_EQ(beside(1.0f).bits_of, 0);
+    EXPECT_EQ(beside(1.0f).voxels_of, -1);
+    // many of them while it is.
+    fb = view_of<bits, float_sum>({2048, 2048, 1024});
     EXPECT_TRUE(beside(1.0f).possible);
     EXPECT_EQ(beside(1.0f).modes.of[0], direct_mode::count_first);
     EXPECT_EQ(beside(1.0f).modes.of[1], direct_mode::blend);
     EXPECT_TRUE(beside(1.0f).modes.counts_first);
+    EXPECT_EQ(beside(1.0f).bits_of, -1);
     EXPECT_EQ(beside(1.0f).voxels_of, -1);
+    // Words beyond 2^32 want wider numbers.
+    fb = view_of<bits, float_sum>({32, 1 << 16, 1 << 16});
+    EXPECT_EQ(plan(std::vector{vp::constant(true, 1.0f)}, fb, 1000, false).modes.of[0], direct_mode::blend_far);
+    fb = view_of<bits, float_sum>({32, 32, 32});
     // What is counted anyway tells the voxels too.
     EXPECT_EQ(beside(0.1f).modes.of[0], direct_mode::blend);
     EXPECT_EQ(beside(0.1f).modes.of[1], direct_mode::count);

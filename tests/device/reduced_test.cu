@@ -138,20 +138,31 @@ TEST(Reduced, StageTimesOfTilesAndOrderedTargets) {
 TEST(Reduced, StageTimesWithoutTiles) {
     using fb_type = vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>>;
     const mesh_data m = mixed_triangles(300, 30.0f, 64);
-    const vp::grid g = box_grid({30, 21, 33});
-    vp::cuda_backend be;
-    fb_type timed{be, g.extent}, plain{be, g.extent};
-    const auto draw = [&](fb_type& fb) {
-        return draw_framebuffer(be, fb, m, g, vp::passthrough{}, vp::constant(true), {}, start::clear);
+    const auto times_of = [&](const vp::grid& g, bool count_voxels) {
+        vp::cuda_backend be;
+        fb_type timed{be, g.extent}, plain{be, g.extent};
+        const auto draw = [&](fb_type& fb) {
+            return draw_framebuffer(be, fb, m, g, vp::passthrough{}, vp::constant(true),
+                                    {vp::coverage::conservative, count_voxels}, start::clear);
+        };
+        EXPECT_TRUE(draw(plain).ok());
+        const vp::stage_times times = time_stages(be, [&] { return draw(timed); });
+        expect_same_bytes(vp::get<0>(plain).to_host(be), vp::get<0>(timed).to_host(be), "timed");
+        EXPECT_GT(times.fine_raster, 0.0);
+        for (const double none : {times.vertex_shade, times.tile_sort, times.tile_split, times.abuffer_emit})
+            EXPECT_EQ(none, 0.0);
+        return times;
     };
-    ASSERT_TRUE(draw(plain).ok());
-    const vp::stage_times times = time_stages(be, [&] { return draw(timed); });
-    EXPECT_GT(times.coarse_raster, 0.0);
-    EXPECT_GT(times.clear, 0.0);
-    EXPECT_GT(times.fine_raster, 0.0);
-    for (const double none : {times.vertex_shade, times.tile_sort, times.tile_split, times.tile_resolve})
-        EXPECT_EQ(none, 0.0);
-    expect_same_bytes(vp::get<0>(plain).to_host(be), vp::get<0>(timed).to_host(be), "timed");
+    // Into the target: its indices are checked first, and it is cleared.
+    const vp::stage_times direct = times_of(box_grid({256, 200, 256}), false);
+    EXPECT_GT(direct.coarse_raster, 0.0);
+    EXPECT_GT(direct.clear, 0.0);
+    EXPECT_EQ(direct.tile_resolve, 0.0);
+    // By touched voxels, which become the target at the end.
+    const vp::stage_times touched = times_of(box_grid({30, 21, 33}), true);
+    EXPECT_EQ(touched.coarse_raster, 0.0);
+    EXPECT_EQ(touched.clear, 0.0);
+    EXPECT_GT(touched.tile_resolve, 0.0);
 }
 
 } // namespace

@@ -101,7 +101,7 @@ voxels by_the_general_path(const snapped_position (&v)[3], int fraction, const v
 
 TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
     generator g;
-    int compared = 0, tiny = 0, flat = 0, cubes = 0, quads = 0, sixteens = 0;
+    int compared = 0, tiny = 0, sixteens = 0;
     std::uint64_t covered = 0;
     for (const int fraction : {12, 13, 14, 15, 16}) {
         g.fraction = fraction;
@@ -190,46 +190,11 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
             const small_box none{{1, 0, 0}, {0, all.hi[1], all.hi[2]}};
             s.rows(none, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
             s.rows_of_16(none, limits, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
-            if (all.hi[0] == 1 && all.hi[1] == 1 && all.hi[2] == 1) {
-                ++cubes;
-                std::uint32_t wanted = 0;
-                for (int k = 0; k < 8; ++k)
-                    wanted |= static_cast<std::uint32_t>(expected.count({static_cast<int>(box.lo[0]) + k % 2,
-                                                                         static_cast<int>(box.lo[1]) + k / 2 % 2,
-                                                                         static_cast<int>(box.lo[2]) + k / 4}))
-                              << k;
-                ASSERT_EQ(cube_bits(s), wanted) << "fraction " << fraction << ", triangle " << i;
-            }
             for (int y = 0; y <= all.hi[1]; ++y)
                 for (int z = 0; z <= all.hi[2]; ++z) {
                     const std::uint32_t limit = s.limit_at_y(from, last, y) & s.limit_at_z(from, last, z);
                     ASSERT_EQ(s.meets_row(y, z) ? s.plane_bits(from, y, z, limit) : 0u, s.row(from, last, y, z));
                 }
-            for (int thick = 0; thick < 3; ++thick) {
-                if (all.hi[thick] != 0) continue;
-                ++flat;
-                const int p = thick == 0 ? 1 : 0, q = thick == 2 ? 1 : 2;
-                const std::int32_t seen[3][2] = {
-                    {t.p[0][p], t.p[0][q]}, {t.p[1][p], t.p[1][q]}, {t.p[2][p], t.p[2][q]}};
-                const small_flat f(seen, fraction);
-                voxels again;
-                if (all.hi[p] == 1 && all.hi[q] == 1) {
-                    ++quads;
-                    ASSERT_EQ(quad_bits(f.e), f.row(0, 1, 0) | f.row(0, 1, 1) << 2);
-                }
-                for (int y = 0; y <= all.hi[q]; ++y) {
-                    const std::uint32_t bits = f.row(0, all.hi[p], y);
-                    for (int x = 0; x < 32; ++x) {
-                        if (((bits >> x) & 1u) == 0) continue;
-                        int at[3] = {0, 0, 0};
-                        at[p] = x;
-                        at[q] = y;
-                        again.insert({static_cast<int>(box.lo[0]) + at[0], static_cast<int>(box.lo[1]) + at[1],
-                                      static_cast<int>(box.lo[2]) + at[2]});
-                    }
-                }
-                ASSERT_EQ(again, expected) << "fraction " << fraction << ", triangle " << i;
-            }
             covered += expected.size();
             ASSERT_EQ(rows, expected) << "fraction " << fraction << ", triangle " << i;
         }
@@ -238,9 +203,6 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
     EXPECT_GT(covered, static_cast<std::uint64_t>(compared));
     EXPECT_GT(tiny, compared / 4);
     EXPECT_GT(sixteens, tiny);
-    EXPECT_GT(flat, compared / 8);
-    EXPECT_GT(cubes, compared / 50);
-    EXPECT_GT(quads, compared / 50);
 }
 
 TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {

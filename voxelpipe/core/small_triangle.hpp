@@ -136,6 +136,29 @@ small_line(std::int32_t e0, std::int32_t e1, std::int32_t e2, std::int32_t s0, s
 
 // ---- conservative ---------------------------------------------------------------------------------------------------
 
+// Exact for |a| < 2^22, by an addition of integers and one of floats.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float small_to_float(std::int32_t a) {
+    constexpr std::uint32_t shift = 0x4b400000u; // 1.5 * 2^23
+    return exact::sub(core::bit_cast<float>(shift + static_cast<std::uint32_t>(a)), 12582912.0f);
+}
+
+// The plane of a small triangle in floats: whether two voxels of a row surely meet it, and so all between them. With S
+// = |n.x| + |n.y| + |n.z| voxels that meet the plane are within S / 2 of `middle`, and up to 32 voxels from the corner
+// all that is added stays below 66 S: less than 2^-15.9 S is lost, and 2^-15 S left for it.
+struct near_plane {
+    float n[3], middle, reach;
+
+    VOXELPIPE_HD VOXELPIPE_INLINE near_plane(const std::int64_t (&normal)[3], std::int64_t below, std::int64_t above)
+        : n{static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2])},
+          middle(exact::mul(0.5f, static_cast<float>(above - below))),
+          reach(exact::mul(0.5f - 0x1p-15f, static_cast<float>(above + below))) {}
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets(int x0, int x1, int y, int z) const {
+        const float row = exact::fma(n[1], small_to_float(y), exact::fma(n[2], small_to_float(z), -middle));
+        const float a = exact::fma(n[0], small_to_float(x0), row), b = exact::fma(n[0], small_to_float(x1), row);
+        return a < reach && -a < reach && b < reach && -b < reach;
+    }
+};
+
 struct small_conservative {
     small_half_plane xy[3], yz[3], zx[3];
     std::int64_t n[3]; // normal
@@ -223,6 +246,7 @@ struct small_conservative {
     VOXELPIPE_HD VOXELPIPE_INLINE void rows(const small_box& box, Emit&& emit) const {
         const int x0 = box.lo[0], x7 = x0 + 7;
         if (box.hi[0] < x0) return;
+        const near_plane plane(n, below, above);
         const std::uint32_t along = (2u << (box.hi[0] - x0)) - 1;
         for (int y0 = box.lo[1]; y0 <= box.hi[1]; y0 += 8) {
             const int y1 = box.hi[1] < y0 + 7 ? box.hi[1] : y0 + 7;
@@ -240,7 +264,7 @@ struct small_conservative {
                     const int at = exact::lowest_one(met), y = at % 8, z = at / 8;
                     const std::uint32_t limit =
                         static_cast<std::uint32_t>(by_y >> 8 * y) & static_cast<std::uint32_t>(by_z >> 8 * z) & along;
-                    if (limit != 0) emit(y0 + y, z0 + z, plane_bits(x0, y0 + y, z0 + z, limit));
+                    if (limit != 0) emit(y0 + y, z0 + z, plane_bits(plane, x0, y0 + y, z0 + z, limit));
                 }
             }
         }
@@ -253,6 +277,7 @@ struct small_conservative {
         const int x0 = box.lo[0], y0 = box.lo[1], z0 = box.lo[2];
         const std::uint32_t along = (2u << (box.hi[0] - x0)) - 1, across = (2u << (box.hi[1] - y0)) - 1;
         const int last_y = box.hi[1] - y0, last_z = box.hi[2] - z0;
+        const near_plane plane(n, below, above);
         std::uint64_t met[4] = {}; // rows, bit y + 16 z
         for (int i = last_y > last_z ? last_y : last_z; i >= 0; --i) {
             const std::uint32_t at_y = along & limits_at_y<16>(x0 + 15, y0 + i),
@@ -272,7 +297,7 @@ struct small_conservative {
                 const int at = exact::lowest_one(met[0]), y = at % 16, z = first_z + at / 16;
                 met[0] &= met[0] - 1;
                 const std::uint32_t limit = limits.get(y) & limits.get(z) >> 16;
-                if (limit != 0) emit(y0 + y, z0 + z, plane_bits(x0, y0 + y, z0 + z, limit));
+                if (limit != 0) emit(y0 + y, z0 + z, plane_bits(plane, x0, y0 + y, z0 + z, limit));
             }
         }
     }
@@ -293,6 +318,12 @@ struct small_conservative {
     }
 
 private:
+    // The same, where the plane mostly cuts nothing off.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t plane_bits(const near_plane& plane, int x0, int y, int z,
+                                                                         std::uint32_t limit) const {
+        const int first = exact::lowest_one(limit), last = exact::bit_width(std::uint64_t{limit}) - 1;
+        return plane.meets(x0 + first, x0 + last, y, z) ? limit : plane_bits(x0, y, z, limit);
+    }
     // What the xy projection leaves of the voxels from x - Length + 1 to x at y, the zx projection of them at z, and
     // the yz projection of the rows from y - Length + 1 to y at z.
     template <int Length>
@@ -317,64 +348,6 @@ private:
             e0 += s0;
             e1 += s1;
             e2 += s2;
-        }
-        return bits;
-    }
-};
-
-// The covered voxels of a box of 2 x 2 x 2, bit x + 2 y + 4 z: rows() without loops.
-[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t cube_bits(const small_conservative& s) {
-    // Outside is negative; the sign is moved to the place of the voxels that it concerns.
-    const auto outside = [](const small_half_plane(&h)[3], int a, int b) VOXELPIPE_INLINE_LAMBDA {
-        std::int32_t e = 0;
-        for (int i = 0; i < 3; ++i) e |= h[i].c + (a != 0 ? h[i].a : 0) + (b != 0 ? h[i].b : 0);
-        return static_cast<std::uint32_t>(e >> 31);
-    };
-    std::uint32_t out = 0;
-    for (int a = 0; a < 2; ++a)
-        for (int b = 0; b < 2; ++b) {
-            out |= outside(s.xy, a, b) & (0x11u << (a + 2 * b)); // both z
-            out |= outside(s.yz, a, b) & (0x03u << (2 * a + 4 * b));
-            out |= outside(s.zx, a, b) & (0x05u << (4 * a + b));
-        }
-    for (int z = 0; z < 2; ++z)
-        for (int y = 0; y < 2; ++y) {
-            const std::int64_t depth = (y != 0 ? s.n[1] : 0) + (z != 0 ? s.n[2] : 0);
-            const std::int64_t lower = depth + s.below, upper = s.above - depth;
-            const auto sign = [](std::int64_t v)
-                                  VOXELPIPE_INLINE_LAMBDA { return static_cast<std::uint32_t>(v >> 63); };
-            out |= sign(lower | upper) & (1u << (2 * y + 4 * z));
-            out |= sign((lower + s.n[0]) | (upper - s.n[0])) & (2u << (2 * y + 4 * z));
-        }
-    return ~out & 0xffu;
-}
-
-// A triangle whose bounding box is one voxel thick: a voxel is covered exactly where its square, seen along that axis,
-// meets the projected triangle, since all of the triangle lies within the voxel's thickness.
-struct small_flat {
-    small_half_plane e[3];
-
-    // p: the vertices on the two other axes.
-    VOXELPIPE_HD VOXELPIPE_INLINE small_flat(const std::int32_t (&p)[3][2], int fraction) {
-        small_triangle t{};
-        for (int i = 0; i < 3; ++i) {
-            t.p[i][0] = p[i][0];
-            t.p[i][1] = p[i][1];
-        }
-        const std::int64_t area = static_cast<std::int64_t>(p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) -
-                                  static_cast<std::int64_t>(p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
-        small_projection<0, 1>(t, area < 0, fraction, e);
-    }
-
-    // The covered voxels (x0 .. x1, y) of the two axes, bit 0 for x0.
-    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t row(int x0, int x1, int y) const {
-        std::int32_t e0 = e[0].at(x0, y), e1 = e[1].at(x0, y), e2 = e[2].at(x0, y);
-        std::uint32_t bits = 0;
-        for (int x = 0; x <= x1 - x0; ++x) {
-            bits |= (static_cast<std::uint32_t>(~(e0 | e1 | e2)) >> 31) << x;
-            e0 += e[0].a;
-            e1 += e[1].a;
-            e2 += e[2].a;
         }
         return bits;
     }

@@ -66,10 +66,9 @@ struct storage_map {
             const int inside = is_bit ? (z & 7) * 8 + (y & 7) : ((z & 7) * 8 + (y & 7)) * 8 + (x & 7);
             return brick * (is_bit ? 64 : 512) + static_cast<std::size_t>(inside);
         } else {
-            const auto row = static_cast<std::size_t>(is_bit ? (extent.x + 31) / 32 : extent.x);
-            return (static_cast<std::size_t>(z) * static_cast<std::size_t>(extent.y) + static_cast<std::size_t>(y)) *
-                       row +
-                   static_cast<std::size_t>(column);
+            const auto wide = [](int a) { return std::size_t{static_cast<std::uint32_t>(a)}; }; // no sign to extend
+            const std::size_t row = wide(is_bit ? (extent.x + 31) / 32 : extent.x);
+            return (wide(z) * wide(extent.y) + wide(y)) * row + wide(column);
         }
     }
 

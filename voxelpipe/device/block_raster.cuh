@@ -22,7 +22,7 @@ struct triangle_queue {
 
 // What one warp keeps in shared memory.
 struct warp_queues {
-    triangle_queue cubes, smalls;       // bounding boxes of up to 2 x 2 x 2 voxels; other small ones
+    triangle_queue tinies, smalls;      // bounding boxes as for raster_tiny; other small ones
     std::uint32_t larges[queue_places]; // numbers of triangles that are loaded again
 };
 
@@ -41,7 +41,7 @@ struct block_warp {
     std::uint32_t* big; // for big triangles, of the block
     unsigned& num_big;
     int lane = static_cast<int>(threadIdx.x) % 32;
-    int num_cubes = 0, num_smalls = 0, num_larges = 0;
+    int num_tinies = 0, num_smalls = 0, num_larges = 0;
 
     __device__ VOXELPIPE_INLINE static void put(triangle_queue& queue, int at, const near_triangle& r) {
         for (int k = 0; k < 9; ++k) queue.q[k][at] = r.q[k / 3][k % 3];
@@ -61,9 +61,9 @@ struct block_warp {
         __syncwarp();
         count -= 32;
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE auto cube_of_queue() {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE auto tiny_of_queue() {
         return [this](const warp_queues& from, int at)
-                   VOXELPIPE_INLINE_LAMBDA { raster_cube<Call::rule>(call.in, take(from.cubes, at), sink); };
+                   VOXELPIPE_INLINE_LAMBDA { raster_tiny<Call::rule>(call.in, take(from.tinies, at), sink); };
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE auto small_of_queue() {
         return [this](const warp_queues& from, int at)
@@ -78,8 +78,10 @@ struct block_warp {
 
     // The lane's triangle i, where there is one.
     __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, const glm::uvec3& index) {
-        bool is_quad = false, is_inside = false, waits = false, is_big = false;
+        bool waits = false, is_big = false;
+        bool is_inside = false;
         int most = 0;
+        core::sure_bits cube{0, false};
         near_triangle r;
         if (valid) {
             r = load_near(call.in, index);
@@ -90,18 +92,18 @@ struct block_warp {
                 sink.drop(triangle_class::outside);
             else
                 waits = !is_big;
-            if constexpr (!thin) {
-                is_quad = waits && most <= 2 && core::min3(r.last[0], r.last[1], r.last[2]) == 0;
-                waits = waits && !is_quad;
-            }
         }
-        sink.mark_boxes(waits || is_quad, r);
+        if constexpr (!thin) {
+            cube = find_cube(call.in, waits && most <= 2, r, is_inside);
+            waits = waits && !cube.sure;
+        }
+        sink.mark_boxes(waits || cube.sure, r);
         if constexpr (!thin)
-            if (is_quad) raster_quad(call.in, r, is_inside, sink);
+            if (cube.sure) give_cube(r, cube.bits, sink);
         if (__any_sync(0xffffffffu, waits || is_big)) {
             const int kind = waits ? kind_of<Call::rule>(r, most) : -1;
-            const int cube_at = take_place(kind == cube_triangles, num_cubes);
-            if (kind == cube_triangles) put(queues.cubes, cube_at, r);
+            const int tiny_at = take_place(kind == tiny_triangles, num_tinies);
+            if (kind == tiny_triangles) put(queues.tinies, tiny_at, r);
             const int small_at = take_place(kind == small_triangles, num_smalls);
             if (kind == small_triangles) put(queues.smalls, small_at, r);
             // Of a mesh with a round for each block at most, which may leave multiprocessors without one, these are
@@ -128,12 +130,12 @@ struct block_warp {
             const std::uint32_t i = first + static_cast<unsigned>(lane);
             batch(i, i < call.in.num_triangles && sink.check(index), index);
             index = next;
-            if (num_cubes >= 32) drain(queues, num_cubes, cube_of_queue());
+            if (num_tinies >= 32) drain(queues, num_tinies, tiny_of_queue());
             if (num_smalls >= 32) drain(queues, num_smalls, small_of_queue());
             if (num_larges >= 32) drain(queues, num_larges, large_of_queue());
         }
         if (lane == 0) {
-            left[0][threadIdx.x / 32] = num_cubes;
+            left[0][threadIdx.x / 32] = num_tinies;
             left[1][threadIdx.x / 32] = num_smalls;
             left[2][threadIdx.x / 32] = num_larges;
         }
@@ -145,7 +147,7 @@ struct block_warp {
                 if (w < Warps) raster_one(all[w], at);
             });
         };
-        rest(left[0], cube_of_queue());
+        rest(left[0], tiny_of_queue());
         rest(left[1], small_of_queue());
         // A lane each, the larger ones would keep a few lanes busy long after all others.
         int num = 0;

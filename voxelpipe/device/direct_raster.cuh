@@ -72,7 +72,6 @@ struct blending_sink : direct_sink<Call> {
     static constexpr bool buffers = false;
     static constexpr bool shares = !Call::output::hands_on; // one() wants to be told apart
     static constexpr bool spreads = shares;
-    static constexpr bool checks_indices = false; // check_indices has run
     struct memory {};
 
     // Fragments and first touches of one thread, which cannot write 2^32 before the largest list ends.
@@ -101,27 +100,24 @@ struct blending_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
         mine.fragments += static_cast<unsigned>(__popc(mask));
-        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
-            mine.touched += blend_row(t, x0, y, z, mask, voxelpipe::get<K>(this->call.out.values), mode);
-        });
+        each_target([&]<std::size_t K>(const auto& t, direct_mode mode)
+                        VOXELPIPE_INLINE_LAMBDA { mine.touched += blend_row(t, x0, y, z, mask, value_of<K>(), mode); });
     }
     __device__ VOXELPIPE_INLINE void row_by_all(unsigned, int x0, int y, int z, word mask) {
         row(x0, y, z, mask & bits_of_lane());
     }
-    // Rows as in blend_rows.
-    __device__ VOXELPIPE_INLINE void two(int x, int y, int z, const word (&mask)[2], bool along_y) {
-        mine.fragments += static_cast<unsigned>(__popc(mask[0] | mask[1] << 2));
-        rows(x, y, z, mask, along_y);
-    }
-    __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4]) {
-        mine.fragments += static_cast<unsigned>(__popc(mask[0] | mask[1] << 2 | mask[2] << 4 | mask[3] << 6));
-        rows(x, y, z, mask, false);
+    // As in blend_cube.
+    __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word voxels) {
+        mine.fragments += static_cast<unsigned>(__popc(voxels));
+        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
+            mine.touched += blend_cube(t, x, y, z, voxels, value_of<K>(), mode);
+        });
     }
     // One voxel. Lanes that come here together may have the same.
     __device__ VOXELPIPE_INLINE void one(int x, int y, int z) {
         ++mine.fragments;
         each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
-            const auto& value = voxelpipe::get<K>(this->call.out.values);
+            const auto& value = value_of<K>();
             if constexpr (std::remove_cvref_t<decltype(t)>::map::is_bit)
                 mine.touched += blend_row(t, x, y, z, 1u, value, mode);
             else
@@ -133,7 +129,7 @@ struct blending_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE void voxels(word bits, const Position& position) {
         mine.fragments += static_cast<unsigned>(__popc(bits));
         each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
-            mine.touched += blend_voxels(t, bits, position, voxelpipe::get<K>(this->call.out.values), mode);
+            mine.touched += blend_voxels(t, bits, position, value_of<K>(), mode);
         });
     }
     // From one sink of a thread to another.
@@ -153,17 +149,21 @@ struct blending_sink : direct_sink<Call> {
     }
 
 private:
-    template <int N>
-    __device__ VOXELPIPE_INLINE void rows(int x, int y, int z, const word (&mask)[N], bool along_y) {
-        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
-            mine.touched += blend_rows(t, x, y, z, mask, along_y, voxelpipe::get<K>(this->call.out.values), mode);
-        });
+    template <std::size_t K>
+    [[nodiscard]] __device__ VOXELPIPE_INLINE decltype(auto) value_of() const {
+        if constexpr (Call::output::only_sets)
+            return true;
+        else
+            return (voxelpipe::get<K>(this->call.out.values));
     }
     template <class F>
     __device__ VOXELPIPE_INLINE void each_target(F&& f) const {
         core::for_each_index<targets_of<decltype(this->call.out.fb)>::count>([&]<std::size_t K>() {
             const auto& t = voxelpipe::get<K>(this->call.out.fb.targets);
-            if (t.load != load_operation::off) f.template operator()<K>(t, this->call.out.modes.of[K]);
+            if constexpr (Call::output::only_sets)
+                f.template operator()<K>(t, direct_mode::blend);
+            else if (t.load != load_operation::off)
+                f.template operator()<K>(t, this->call.out.modes.of[K]);
         });
     }
 };
@@ -178,12 +178,15 @@ struct framebuffer_output {
     template <class Call>
     using sink = blending_sink<Call>;
     static constexpr bool hands_on = has_only_bits<Framebuffer>; // otherwise block_raster.cuh
+    static constexpr bool only_sets = false; // all values are true, all targets in use: known to the compiler
     Framebuffer fb;
     Values values;
     direct_modes<targets_of<Framebuffer>::count> modes;
     chunk_marks marks; // of targets that hold values
 
     __device__ VOXELPIPE_INLINE static void prepare(std::uint64_t, std::uint64_t) {} // for what comes afterwards
+    // Whether check_indices has run; otherwise the sink looks at all indices.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return true; }
 };
 
 // ---- the first kernel: every triangle -------------------------------------------------------------------------------
@@ -227,8 +230,10 @@ struct first_warp {
 
     // The lane's triangle i, where there is one.
     __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, const glm::uvec3& index) {
-        bool is_quad = false, is_inside = false, waits = false, is_big = false;
+        bool waits = false, is_big = false;
+        bool is_inside = false;
         int most = 0;
+        core::sure_bits cube{0, false};
         near_triangle r;
         if (valid) {
             r = load_near(call.in, index);
@@ -239,16 +244,16 @@ struct first_warp {
                 sink.drop(triangle_class::outside);
             else
                 waits = !is_big;
-            if constexpr (!thin) {
-                is_quad = waits && most <= 2 && core::min3(r.last[0], r.last[1], r.last[2]) == 0;
-                waits = waits && !is_quad;
-            }
+        }
+        if constexpr (!thin) {
+            cube = find_cube(call.in, waits && most <= 2, r, is_inside);
+            waits = waits && !cube.sure;
         }
         if constexpr (!thin) {
             feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
-                if (!is_quad) return;
+                if (!cube.sure) return;
                 sink.begin(i);
-                raster_quad(call.in, r, is_inside, sink);
+                give_cube(r, cube.bits, sink);
             });
         } else {
             const bool is_cube = waits && most <= 2;
@@ -278,7 +283,7 @@ struct first_warp {
         r.find_box(call.in.fraction);
         feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
             sink.begin(memory.cubes.triangle[at]);
-            raster_cube<Call::rule>(call.in, r, sink);
+            raster_tiny<Call::rule>(call.in, r, sink);
         });
         __syncwarp();
     }
@@ -296,7 +301,7 @@ struct first_warp {
         }
         if constexpr (thin) { // the rest of the cubes is handed on
             const int at = static_cast<int>(lane);
-            writer.push(at < num_cubes ? static_cast<int>(cube_triangles) : -1, memory.cubes.triangle[at]);
+            writer.push(at < num_cubes ? static_cast<int>(tiny_triangles) : -1, memory.cubes.triangle[at]);
         }
         if (begin >= num) return 0;
         const std::uint32_t batches = (num - begin - 1) / step + 1, of_last = num - (begin + (batches - 1) * step);
@@ -314,9 +319,7 @@ __global__ __launch_bounds__(raster_threads,
     __shared__ unsigned dropped[num_triangle_classes], num_big;
     const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
     await_stream();
-    if constexpr (!sink_type::checks_indices) {
-        if (state->index_error != 0) return;
-    }
+    if (call.out.is_checked() && state->index_error != 0) return;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     if (threadIdx.x == 0) num_big = 0;
     __syncthreads();
@@ -381,7 +384,7 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place
     std::uint32_t chunks[kinds], all = 0;
     for (int k = 0; k < kinds; ++k) {
         const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[k]));
-        const bool few = k != cube_triangles && length / 64 * medium_lanes < place.warps;
+        const bool few = k != tiny_triangles && length / 64 * medium_lanes < place.warps;
         chunks[k] = few ? 0 : length / 32;
         all += chunks[k];
         const unsigned from_last = place.warps - 1 - place.warp; // the first ones have whole chunks to do
@@ -402,8 +405,8 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place
                 __syncwarp();
                 feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
                     sink.begin(triangle);
-                    if (k == cube_triangles)
-                        raster_cube<Call::rule>(call.in, r, sink);
+                    if (k == tiny_triangles)
+                        raster_tiny<Call::rule>(call.in, r, sink);
                     else
                         raster_small<Call::rule>(call.in, r, limits, sink);
                 });

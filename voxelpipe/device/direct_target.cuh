@@ -43,7 +43,8 @@ __device__ VOXELPIPE_INLINE void reduce_add(unsigned long long* at, unsigned lon
 
 // How the fragments of a call go into one of its targets.
 enum class direct_mode : std::uint32_t {
-    blend,       // where they lie
+    blend,       // where they lie; a target of bits in rows has fewer than 2^32 words then
+    blend_far,   // where they lie, in any number of words
     count_first, // the same, and voxels that had no fragment yet are counted, where tells_first holds
     count        // the target holds a number of fragments for each voxel
 };
@@ -299,6 +300,42 @@ __device__ VOXELPIPE_INLINE void blend_value(typename Target::element_type* at, 
         method::apply_many(at, value, n);
 }
 
+// Rows of bits of which fragments change words at once: by an or, or by an and.
+template <class Target>
+inline constexpr bool has_word_rows =
+    Target::map::is_bit && !Target::map::bricks &&
+    (bit_blend<typename Target::blend_type>::sets || bit_blend<typename Target::blend_type>::clears);
+// Whether fragments of this value change such rows at all.
+template <class Target, class Value>
+[[nodiscard]] __device__ VOXELPIPE_INLINE bool changes_bits(const Value& value) {
+    if constexpr (std::is_same_v<typename Target::blend_type, blend::count>)
+        return true;
+    else
+        return value == bit_blend<typename Target::blend_type>::sets;
+}
+// Changes the bits of a word, where there are any, without a branch.
+template <class Target>
+__device__ VOXELPIPE_INLINE void reduce_word(word* at, word bits) {
+    if constexpr (bit_blend<typename Target::blend_type>::sets)
+        asm volatile("{ .reg .pred any; setp.ne.u32 any, %1, 0; @any red.relaxed.gpu.global.or.b32 [%0], %1; }" ::"l"(
+                         __cvta_generic_to_global(at)),
+                     "r"(bits)
+                     : "memory");
+    else
+        asm volatile("{ .reg .pred any; setp.ne.u32 any, %1, 0; @any red.relaxed.gpu.global.and.b32 [%0], %2; }" ::"l"(
+                         __cvta_generic_to_global(at)),
+                     "r"(bits), "r"(~bits)
+                     : "memory");
+}
+// The number of a voxel's word, of fewer than 2^32 in rows, modulo 2^32: it may lie outside of the extent.
+template <class Target>
+[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t word_of(const target_view<Target>& t, int x, int y, int z) {
+    const auto words_x = static_cast<std::uint32_t>((t.extent.x + 31) / 32);
+    return (static_cast<std::uint32_t>(z) * static_cast<std::uint32_t>(t.extent.y) + static_cast<std::uint32_t>(y)) *
+               words_x +
+           static_cast<std::uint32_t>(x >> 5);
+}
+
 // Fragments of one value in the voxels x0 + i of a row, for the bits i of `mask`; x0 + 31 may lie beyond the extent.
 // Returns how many voxels were touched for the first time, where tells_first holds and the mode asks.
 template <class Target, class Value>
@@ -306,6 +343,16 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
                                                const Value& value, direct_mode mode) {
     using map = typename Target::map;
     unsigned first = 0;
+    if constexpr (has_word_rows<Target>) {
+        if (mode == direct_mode::blend) {
+            if (!changes_bits<Target>(value)) return 0;
+            word* const at = t.elements + word_of(t, x0, y, z);
+            const int shift = x0 & 31;
+            reduce_word<Target>(at, mask << shift);
+            reduce_word<Target>(at + 1, __funnelshift_l(mask, 0, shift));
+            return 0;
+        }
+    }
     if constexpr (map::is_bit) {
         using blend_type = bit_blend<typename Target::blend_type>;
         bool v = true;
@@ -353,53 +400,50 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
     return first;
 }
 
-// Two or four rows at once, of up to two voxels each, whose loads go out together: bits of row k in mask[k]. Two are at
-// (x, y, z) and (x, y + 1, z), where `along_y`, otherwise (x, y, z + 1). Four are at (x, y, z), (x, y + 1, z), (x, y, z
-// + 1) and (x, y + 1, z + 1).
-template <int N, class Target, class Value>
-__device__ VOXELPIPE_INLINE unsigned blend_rows(const target_view<Target>& t, int x, int y, int z,
-                                                const word (&mask)[N], bool along_y, const Value& value,
-                                                direct_mode mode) {
-    static_assert(N == 2 || N == 4);
-    using map = typename Target::map;
-    const int shift = x & 31;
-    word all = 0;
-    for (int k = 0; k < N; ++k) all |= mask[k];
-    if constexpr (map::is_bit && !map::bricks && bit_blend<typename Target::blend_type>::sets) {
-        if (shift != 31 || all < 2) { // within a word
-            if (!value) return 0;
-            const auto row = static_cast<std::ptrdiff_t>((t.extent.x + 31) / 32);
-            const std::ptrdiff_t slice = row * t.extent.y;
-            word* at[N];
-            at[0] = t.elements + map::cell(t.extent, x, y, z);
-            if constexpr (N == 2) {
-                at[1] = at[0] + (along_y ? row : slice);
-            } else {
-                at[1] = at[0] + row;
-                at[2] = at[0] + slice;
-                at[3] = at[1] + slice;
+// Fragments of one value in the voxels of 2 x 2 x 2 from (x, y, z) on, x + 2 y + 4 z for the bits of `voxels`, some of
+// which may lie outside of the extent. The rows' loads go out together.
+template <class Target, class Value>
+__device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, int x, int y, int z, word voxels,
+                                                const Value& value, direct_mode mode) {
+    if constexpr (has_word_rows<Target>) {
+        if (mode == direct_mode::blend) {
+            if (!changes_bits<Target>(value)) return 0;
+            constexpr bool sets = bit_blend<typename Target::blend_type>::sets;
+            const auto row = static_cast<std::uint32_t>((t.extent.x + 31) / 32);
+            const std::uint32_t slice = row * static_cast<std::uint32_t>(t.extent.y), first = word_of(t, x, y, z);
+            word* const at[4] = {t.elements + first, t.elements + (first + row), t.elements + (first + slice),
+                                 t.elements + (first + slice + row)};
+            const int shift = x & 31;
+            word missing[4];
+            for (int k = 0; k < 4; ++k) missing[k] = (voxels >> 2 * k & 3u) << shift;
+            for (int k = 0; k < 4; ++k)
+                if (missing[k] != 0) { // maybe an old word: what has changed stays so
+                    const word seen = __ldca(at[k]);
+                    missing[k] &= sets ? ~seen : seen;
+                }
+            for (int k = 0; k < 4; ++k) reduce_word<Target>(at[k], missing[k]);
+            if (shift == 31 && (voxels & 0xaau) != 0) { // the words after them
+                const std::uint32_t next = first + 1;
+                reduce_word<Target>(t.elements + next, voxels >> 1 & 1u);
+                reduce_word<Target>(t.elements + (next + row), voxels >> 3 & 1u);
+                reduce_word<Target>(t.elements + (next + slice), voxels >> 5 & 1u);
+                reduce_word<Target>(t.elements + (next + slice + row), voxels >> 7 & 1u);
             }
-            word missing[N];
-            for (int k = 0; k < N; ++k) missing[k] = mask[k] << shift;
-            for (int k = 0; k < N; ++k)
-                if (missing[k] != 0) missing[k] &= ~__ldca(at[k]); // maybe an old word: bits that are set stay set
-            unsigned touched = 0;
-            for (int k = 0; k < N; ++k) {
-                if (missing[k] == 0) continue;
-                if (mode == direct_mode::count_first)
-                    touched += static_cast<unsigned>(__popc(missing[k] & ~atomicOr(at[k], missing[k])));
-                else
-                    reduce_or(at[k], missing[k]);
-            }
-            return touched;
+            return 0;
         }
     }
     unsigned touched = 0;
+    if constexpr (Target::map::is_bit) {
 #pragma unroll 1
-    for (int k = 0; k < N; ++k) {
-        if (mask[k] == 0) continue;
-        const int dy = N == 2 ? (along_y ? k : 0) : k % 2;
-        touched += blend_row(t, x, y + dy, z + (N == 2 ? k - dy : k / 2), mask[k], value, mode);
+        for (int k = 0; k < 4; ++k)
+            if ((voxels >> 2 * k & 3u) != 0)
+                touched += blend_row(t, x, y + k % 2, z + k / 2, voxels >> 2 * k & 3u, value, mode);
+    } else {
+#pragma unroll 1
+        for (; voxels != 0; voxels &= voxels - 1) {
+            const int i = __ffs(static_cast<int>(voxels)) - 1;
+            touched += blend_row(t, x + i % 2, y + i / 2 % 2, z + i / 4, 1u, value, mode);
+        }
     }
     return touched;
 }
@@ -422,31 +466,31 @@ __device__ VOXELPIPE_INLINE unsigned blend_shared(const target_view<Target>& t, 
 template <class Target, class Value, class Position>
 __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, word wanted, const Position& position,
                                                   const Value& value, direct_mode mode) {
-    using map = typename Target::map;
+    if constexpr (has_word_rows<Target>) {
+        if (mode == direct_mode::blend) {
+            if (!changes_bits<Target>(value)) return 0;
+            constexpr bool sets = bit_blend<typename Target::blend_type>::sets;
+            word* at[4];
+            word missing[4];
+            for (int k = 0; k < 4; ++k) {
+                const glm::ivec3 p = position(k);
+                at[k] = t.elements + word_of(t, p.x, p.y, p.z);
+                missing[k] = (wanted >> k & 1u) << (p.x & 31);
+            }
+            for (int k = 0; k < 4; ++k)
+                if (missing[k] != 0) { // maybe an old word: what has changed stays so
+                    const word seen = __ldca(at[k]);
+                    missing[k] &= sets ? ~seen : seen;
+                }
+            for (int k = 0; k < 4; ++k) reduce_word<Target>(at[k], missing[k]);
+            return 0;
+        }
+    }
     unsigned touched = 0;
-    if constexpr (map::is_bit && bit_blend<typename Target::blend_type>::sets) {
-        if (!value) return 0;
-        word* at[4];
-        word missing[4];
-        for (int k = 0; k < 4; ++k) {
-            const glm::ivec3 p = position(k);
-            at[k] = t.elements + map::cell(t.extent, p.x, p.y, p.z);
-            missing[k] = (wanted >> k & 1u) << (p.x & 31);
-        }
-        for (int k = 0; k < 4; ++k)
-            if (missing[k] != 0) missing[k] &= ~__ldca(at[k]); // maybe an old word: bits that are set stay set
-        for (int k = 0; k < 4; ++k) {
-            if (missing[k] == 0) continue;
-            if (mode == direct_mode::count_first)
-                touched += static_cast<unsigned>(__popc(missing[k] & ~atomicOr(at[k], missing[k])));
-            else
-                reduce_or(at[k], missing[k]);
-        }
-    } else {
-        for (; wanted != 0; wanted &= wanted - 1) {
-            const glm::ivec3 p = position(__ffs(static_cast<int>(wanted)) - 1);
-            touched += blend_row(t, p.x, p.y, p.z, 1u, value, mode);
-        }
+#pragma unroll 1
+    for (; wanted != 0; wanted &= wanted - 1) {
+        const glm::ivec3 p = position(__ffs(static_cast<int>(wanted)) - 1);
+        touched += blend_row(t, p.x, p.y, p.z, 1u, value, mode);
     }
     return touched;
 }

@@ -295,7 +295,7 @@ private:
                     using source_type = std::remove_cvref_t<decltype(source)>;
                     const direct_call<Rule, source_type, touched_output> call{
                         {source, num_triangles, snap.fraction, g.extent},
-                        {touched, g.extent, num_vertices, state},
+                        {touched, g.extent, num_vertices, state, false},
                         handed_on.with(state)};
                     direct_raster(call, state, stage::fine_raster, stream);
                     end_stage(clock, &stage_times::fine_raster);
@@ -353,12 +353,24 @@ private:
                 const auto raster = [&](const auto& source) {
                     using source_type = std::remove_cvref_t<decltype(source)>;
                     using values_type = decltype(d.fragment_shader.values);
-                    const direct_call<Rule, source_type, framebuffer_output<Framebuffer, values_type>> call{
-                        {source, num_triangles, snap.fraction, g.extent},
-                        {fb, d.fragment_shader.values, plan.modes, marks},
-                        handed_on.with(state)};
-                    direct_raster(call, state, stage::fine_raster, stream);
-                    end_stage(clock, &stage_times::fine_raster);
+                    const auto draw_into = [&](const auto& output) {
+                        const direct_call<Rule, source_type, std::remove_cvref_t<decltype(output)>> call{
+                            {source, num_triangles, snap.fraction, g.extent}, output, handed_on.with(state)};
+                        direct_raster(call, state, stage::fine_raster, stream);
+                        end_stage(clock, &stage_times::fine_raster);
+                    };
+                    // The kernels that know that they only set bits.
+                    if constexpr (is_touched_itself<Framebuffer>) {
+                        const auto& t = voxelpipe::get<0>(fb.targets);
+                        if (plan.modes.of[0] == direct_mode::blend && t.load != load_operation::off &&
+                            voxelpipe::get<0>(d.fragment_shader.values)) {
+                            draw_into(touched_output{t.elements, g.extent,
+                                                     static_cast<std::uint32_t>(d.mesh.positions.size()), state, true});
+                            return;
+                        }
+                    }
+                    draw_into(
+                        framebuffer_output<Framebuffer, values_type>{fb, d.fragment_shader.values, plan.modes, marks});
                 };
                 raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);
             }

@@ -16,7 +16,6 @@ struct listing_sink : direct_sink<Call> {
     static constexpr bool buffers = true;
     static constexpr bool shares = false;
     static constexpr bool spreads = true;
-    static constexpr bool checks_indices = true;
     static constexpr unsigned room = 448;    // with the queues, less than 48 KB for a block
     static constexpr unsigned flush_at = 64; // less may wait: a round of thin triangles brings up to 384
     struct memory {
@@ -55,10 +54,6 @@ struct listing_sink : direct_sink<Call> {
             write(at + static_cast<unsigned>(__popc(mask & ((1u << i) - 1))), first + static_cast<unsigned>(i));
         }
     }
-    __device__ VOXELPIPE_INLINE void two(int x, int y, int z, const word (&mask)[2], bool along_y) {
-        const unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask[0] | mask[1] << 2)));
-        write_row(write_row(at, voxel(x, y, z), mask[0]), along_y ? voxel(x, y + 1, z) : voxel(x, y, z + 1), mask[1]);
-    }
     template <class Position>
     __device__ VOXELPIPE_INLINE void voxels(word bits, const Position& position) {
         if (bits == 0) return;
@@ -67,14 +62,13 @@ struct listing_sink : direct_sink<Call> {
             write(at++, voxel(p.x, p.y, p.z));
         }
     }
-    __device__ VOXELPIPE_INLINE void four(int x, int y, int z, const word (&mask)[4]) {
-        unsigned at =
-            atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask[0] | mask[1] << 2 | mask[2] << 4 | mask[3] << 6)));
+    __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word bits) {
+        if (bits == 0) return;
         const std::uint32_t first = voxel(x, y, z), row = voxel(0, 1, 0), slice = voxel(0, 0, 1);
-        at = write_row(at, first, mask[0]);
-        at = write_row(at, first + row, mask[1]);
-        at = write_row(at, first + slice, mask[2]);
-        write_row(at, first + row + slice, mask[3]);
+        for (unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(bits))); bits != 0; bits &= bits - 1) {
+            const unsigned i = static_cast<unsigned>(__ffs(static_cast<int>(bits)) - 1);
+            write(at++, first + (i & 1u) + ((i & 2u) != 0 ? row : 0) + ((i & 4u) != 0 ? slice : 0));
+        }
     }
     // Between triangles, by all lanes. True: the shared memory was too small for what came since the last time; it has
     // been counted and has to come once more, to be written to the list at once.
@@ -166,6 +160,7 @@ struct list_output {
     template <class Call>
     using sink = listing_sink<Call>;
     static constexpr bool hands_on = true;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return false; }
 
     std::uint32_t* voxels; // by fragment
     std::uint32_t* primitives;

@@ -5,8 +5,8 @@
 // Raster of one small triangle, by a thread or by eight lanes. What is done with the fragments is the sink's: blending
 // (direct_raster.cuh) or listing (list_raster.cuh). A sink has
 //   buffers           whether settle(), which all lanes call between triangles, is wanted (feed)
-//   begin(triangle), row(x0, y, z, mask), two(x, y, z, masks, along_y), four(x, y, z, masks), voxels(bits, position):
-//                     the fragments of one triangle, as rows of bits along x (blend_rows) or one by one
+//   begin(triangle), row(x0, y, z, mask), cube(x, y, z, bits), voxels(bits, position):
+//                     the fragments of one triangle, as a row of bits along x, as 2 x 2 x 2 (blend_cube) or one by one
 //   shares            whether one(x, y, z), a fragment of a triangle that has no other, is more than a row of one
 //   spreads           whether a row costs by its voxels, so that lanes had better share long ones:
 //   row_by_all(group, x0, y, z, mask): a row by medium_lanes neighbours, all with the same arguments
@@ -15,6 +15,7 @@
 //   drop(class)       counts a triangle that is not drawn
 
 #include <voxelpipe/core/brick_triangle.hpp>
+#include <voxelpipe/core/corner_signs.hpp>
 #include <voxelpipe/device/scene.cuh>
 #include <voxelpipe/device/vertex_shade.cuh>
 
@@ -82,6 +83,9 @@ using word = std::uint32_t;
 
 inline constexpr int raster_threads = 128; // of a block
 inline constexpr int raster_warps = raster_threads / 32;
+// A bounding box of so many voxels a side is done without a loop over it (raster_tiny).
+template <coverage Rule>
+inline constexpr int most_tiny_side = Rule == coverage::thin ? 2 : 3;
 inline constexpr int most_side = 8;       // a bounding box of so many voxels a side has rows of a byte
 inline constexpr int most_long_side = 16; // one has rows of 16 bits
 inline constexpr int most_cells = 1024;   // one of so many voxels is one thread's work
@@ -255,45 +259,39 @@ __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s,
     }
 }
 
-// A bounding box of at most two voxels along two axes and one along the third: written at once. Most triangles of a
-// fine mesh are of this kind.
-template <class Source, class Sink>
-__device__ VOXELPIPE_INLINE void raster_quad(const raster_input<Source>& call, const near_triangle& r, bool inside,
-                                             Sink& sink) {
-    const int shape = r.last[0] + 2 * r.last[1] + 4 * r.last[2];
-    const int thick = shape < 4 ? 2 : shape < 6 ? 1 : 0; // along which axis it is one voxel
-    word bits = shape == 0 ? 1u : shape == 1 ? 3u : 5u;  // p + 2 q, along the other two; a line is covered whole
-    if ((shape & (shape - 1)) != 0) {
-        std::int32_t p[3][2];
-        const std::int32_t lo_p = (thick == 0 ? r.lo[1] : r.lo[0]) << call.fraction,
-                           lo_q = (thick == 2 ? r.lo[1] : r.lo[2]) << call.fraction;
-        for (int v = 0; v < 3; ++v) {
-            p[v][0] = (thick == 0 ? r.q[v][1] : r.q[v][0]) - lo_p;
-            p[v][1] = (thick == 2 ? r.q[v][1] : r.q[v][2]) - lo_q;
-        }
-        bits = core::quad_bits(core::small_flat(p, call.fraction).e);
+// Of the voxels of 2 x 2 x 2, bit x + 2 y + 4 z, those that a box has.
+[[nodiscard]] __device__ VOXELPIPE_INLINE word cube_part(const core::small_box& box) {
+    return (box.lo[0] == 0 ? 0xffu : 0xaau) & (box.hi[0] == 1 ? 0xffu : 0x55u) & (box.lo[1] == 0 ? 0xffu : 0xccu) &
+           (box.hi[1] == 1 ? 0xffu : 0x33u) & (box.lo[2] == 0 ? 0xffu : 0xf0u) & (box.hi[2] == 1 ? 0xffu : 0x0fu);
+}
+// Conservative fragments within a bounding box of at most two voxels a side, most triangles of a fine mesh, of each
+// lane that wants them; not sure where that takes more bits than a float has: then raster_tiny. All lanes take part.
+template <class Source>
+[[nodiscard]] __device__ VOXELPIPE_INLINE core::sure_bits find_cube(const raster_input<Source>& call, bool wanted,
+                                                                    const near_triangle& r, bool inside) {
+    core::sure_bits cube{0, wanted};
+    const int wide = wanted ? r.last[0] + r.last[1] + r.last[2] : 0; // along how many axes
+    const bool all_ways = __any_sync(0xffffffffu, wide == 3);
+    if (wanted) {
+        if (wide < 2) // a line is covered whole
+            cube.bits = core::cube_of(r.last);
+        else if (all_ways)
+            cube = core::cube_bits_by_signs(r.q, r.lo, r.last, call.fraction);
+        else
+            cube = core::quad_bits_by_signs(r.q, r.lo, r.last, call.fraction);
+        if (!inside) cube.bits &= cube_part(r.part(call.extent));
     }
-    if (!inside) {
-        const core::small_box box = r.part(call.extent);
-        if (box.empty()) return;
-        const int p0 = thick == 0 ? box.lo[1] : box.lo[0], p1 = thick == 0 ? box.hi[1] : box.hi[0];
-        const int q0 = thick == 2 ? box.lo[1] : box.lo[2], q1 = thick == 2 ? box.hi[1] : box.hi[2];
-        bits &= (p0 == 0 ? 15u : 10u) & (p1 == 1 ? 15u : 5u) & (q0 == 0 ? 15u : 12u) & (q1 == 1 ? 15u : 3u);
-    }
+    return cube;
+}
+template <class Sink>
+__device__ VOXELPIPE_INLINE void give_cube(const near_triangle& r, word bits, Sink& sink) {
     if constexpr (Sink::shares) {
-        if (shape == 0) {
+        if ((r.last[0] | r.last[1] | r.last[2]) == 0) {
             if (bits != 0) sink.one(r.lo[0], r.lo[1], r.lo[2]);
             return;
         }
     }
-    // Rows along x.
-    if (thick != 0) {
-        const word mask[2] = {bits & 3u, bits >> 2};
-        sink.two(r.lo[0], r.lo[1], r.lo[2], mask, thick == 2);
-    } else {
-        const word mask[4] = {bits & 1u, bits >> 1 & 1u, bits >> 2 & 1u, bits >> 3};
-        sink.four(r.lo[0], r.lo[1], r.lo[2], mask);
-    }
+    sink.cube(r.lo[0], r.lo[1], r.lo[2], bits);
 }
 
 // Runs f, which gives a sink fragments, on all lanes of a warp. A sink that buffers them may find that there were too
@@ -331,18 +329,22 @@ __device__ VOXELPIPE_INLINE void raster_medium(const raster_input<Source>& call,
     });
 }
 
-// A bounding box of at most two voxels a side, whatever covers it.
+// A bounding box of at most two voxels a side, or three for conservative coverage, by one thread.
 template <coverage Rule, class Source, class Sink>
-__device__ VOXELPIPE_INLINE void raster_cube(const raster_input<Source>& call, const near_triangle& r, Sink& sink) {
+__device__ VOXELPIPE_INLINE void raster_tiny(const raster_input<Source>& call, const near_triangle& r, Sink& sink) {
     if constexpr (Rule == coverage::thin) {
         if (!raster_thin_cube(call, r, sink)) sink.drop(core::triangle_class::zero_area);
     } else {
         const core::small_box box = r.part(call.extent);
-        word bits = core::cube_bits(core::small_conservative(r.relative(call.fraction), call.fraction));
-        bits &= (box.lo[0] == 0 ? 0xffu : 0xaau) & (box.hi[0] == 1 ? 0xffu : 0x55u) & (box.lo[1] == 0 ? 0xffu : 0xccu) &
-                (box.hi[1] == 1 ? 0xffu : 0x33u) & (box.lo[2] == 0 ? 0xffu : 0xf0u) & (box.hi[2] == 1 ? 0xffu : 0x0fu);
-        const word mask[4] = {bits & 3u, bits >> 2 & 3u, bits >> 4 & 3u, bits >> 6};
-        sink.four(r.lo[0], r.lo[1], r.lo[2], mask);
+        if (box.empty()) return;
+        const auto emit = [&](int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
+            sink.row(r.lo[0] + box.lo[0], r.lo[1] + y, r.lo[2] + z, bits);
+        };
+        const core::ruled_out out = core::rule_out_by_signs(r.q, r.lo, r.last, call.fraction);
+        if (out.sure)
+            core::rows_of_three(out, box, emit);
+        else
+            core::small_conservative(r.relative(call.fraction), call.fraction).long_rows(box, emit);
     }
 }
 

@@ -27,11 +27,17 @@ inline constexpr std::uint64_t least_touched_bytes = std::uint64_t{1} << 20, tou
 
 using touched_target = target<bit, blend::bit_or>;
 
+// A framebuffer of one target that is laid out as they are, and takes true as they do.
+template <class Framebuffer>
+inline constexpr bool is_touched_itself = false;
+template <class Target>
+inline constexpr bool is_touched_itself<framebuffer_view<Target>> =
+    std::is_same_v<typename Target::blend_type, blend::bit_or> && !Target::map::bricks && Target::map::is_bit;
+
 // ---- raster ---------------------------------------------------------------------------------------------------------
 
 template <class Call>
 struct touching_sink : blending_sink<Call> {
-    static constexpr bool checks_indices = true;
     using blending_sink<Call>::blending_sink;
 
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(const glm::uvec3& index) const {
@@ -42,16 +48,21 @@ struct touching_sink : blending_sink<Call> {
 struct touched_output : framebuffer_output<framebuffer_view<touched_target>, core::pack<bool>> {
     template <class Call>
     using sink = touching_sink<Call>;
+    static constexpr bool only_sets = true;
 
     std::uint32_t num_vertices;
     pipeline_state* state;
+    bool checked; // whether check_indices has run
 
-    touched_output(word* words, const glm::ivec3& extent, std::uint32_t num_vertices_, pipeline_state* state_)
-        : framebuffer_output{{extent, {}}, core::make_pack(true), {}, {}}, num_vertices(num_vertices_), state(state_) {
+    touched_output(word* words, const glm::ivec3& extent, std::uint32_t num_vertices_, pipeline_state* state_,
+                   bool checked_)
+        : framebuffer_output{{extent, {}}, core::make_pack(true), {}, {}}, num_vertices(num_vertices_), state(state_),
+          checked(checked_) {
         auto& t = voxelpipe::get<0>(fb.targets);
         t.elements = words;
         t.extent = extent;
     }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_checked() const { return checked; }
     // Whether all three are vertices; says so where they are not.
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(const glm::uvec3& index) const {
         const bool ok = index.x < num_vertices && index.y < num_vertices && index.z < num_vertices;

@@ -14,15 +14,15 @@
 
 namespace voxelpipe::device {
 
-// Bounding boxes: at most 2 x 2 x 2 voxels; one thread's work; the same, but much; several lanes' work.
-enum triangle_kind : int { cube_triangles, small_triangles, large_triangles, medium_triangles, num_triangle_kinds };
+// By what bounding boxes hold: what raster_tiny takes; one thread's work; the same, but much; several lanes' work.
+enum triangle_kind : int { tiny_triangles, small_triangles, large_triangles, medium_triangles, num_triangle_kinds };
 
 // What a triangle costs: voxels of its bounding box, or for thin coverage the columns that it can touch at most.
 // `most`: the box's longest side.
 template <coverage Rule>
 [[nodiscard]] __device__ VOXELPIPE_INLINE int kind_of(const near_triangle& r, int most) {
     constexpr bool thin = Rule == coverage::thin;
-    if (most <= 2) return cube_triangles;
+    if (most <= most_tiny_side<Rule>) return tiny_triangles;
     const int x = r.last[0] + 1, y = r.last[1] + 1, z = r.last[2] + 1;
     const int cost = thin ? core::max3(x * y, y * z, z * x) : x * y * z;
     if (cost <= (thin ? small_columns : small_cells) && (thin || most <= most_side)) return small_triangles;
@@ -145,7 +145,9 @@ struct kind_writer {
 
     // Every lane with a kind from 0 on adds its triangle. All lanes take part.
     __device__ VOXELPIPE_INLINE void push(int kind, std::uint32_t triangle) {
+        const unsigned kinds = __reduce_or_sync(0xffffffffu, kind < 0 ? 0 : 1u << kind); // one or two, mostly
         for (int k = 0; k < num_triangle_kinds; ++k) {
+            if ((kinds >> k & 1u) == 0) continue;
             const int place = take_place(kind == k, waiting[k]);
             if (kind == k) queues.triangles[k][place] = triangle;
             if (waiting[k] < 32) continue;
