@@ -373,7 +373,7 @@ __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std
     }
 }
 
-// The lists of large, small and cube triangles by a thread each, neighbours, which are alike, in neighbouring lanes;
+// The lists of large, small and tiny triangles by a thread each, neighbours, which are alike, in neighbouring lanes;
 // but what does not fill a warp, and whole lists that would not fill the device, by medium_lanes lanes each. All lists
 // advance together, part by part: they are in the order of the mesh, nearly, so that voxels are in the cache while
 // triangles of all kinds meet them.
