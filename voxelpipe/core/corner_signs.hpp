@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Conservative coverage of a bounding box of at most 2 x 2 x 2 voxels by the signs of a few single-precision numbers,
-// and a word on whether rounding can have changed one of them: then small_triangle.hpp decides.
+// Conservative coverage of a bounding box of at most two or three voxels a side by the signs of a few single-precision
+// numbers, and a word on whether rounding can have changed one of them: then small_triangle.hpp decides.
 //
 // Of the axes that separate a voxel from a triangle (coverage.hpp) the edges and the plane rule a voxel out by the
 // value at one of its corners, the one furthest inside. In a bounding box that the triangle touches on all sides, only

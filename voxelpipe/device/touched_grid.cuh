@@ -71,8 +71,7 @@ struct touched_output : framebuffer_output<framebuffer_view<touched_target>, cor
     }
 };
 
-// ---- the last passes
-// --------------------------------------------------------------------------------------------------
+// ---- the last passes ------------------------------------------------------------------------------------------------
 
 // Whether the second fragment of one value changes nothing.
 template <class Target>
