@@ -71,7 +71,7 @@ struct generator {
 
 rows by_integers(const boxed_triangle& t, int fraction, const small_box& box) {
     rows out;
-    t.exact(fraction).rows(box, [&](int y, int z, std::uint32_t bits) {
+    t.exact(fraction).rows<false>(box, [&](int y, int z, std::uint32_t bits) {
         if (bits != 0) out[{y, z}] = bits;
     });
     return out;

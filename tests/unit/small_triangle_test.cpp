@@ -23,6 +23,12 @@ namespace {
 using namespace voxelpipe::core;
 using voxels = std::set<std::tuple<int, int, int>>;
 
+struct kept_rows { // small_thin::columns
+    std::uint32_t words[32] = {};
+    void set(int i, std::uint32_t row) { words[i] = row; }
+    std::uint32_t get(int i) const { return words[i]; }
+};
+
 struct generator {
     std::mt19937_64 random{20261121};
     int fraction = 14;
@@ -101,6 +107,7 @@ voxels by_the_general_path(const snapped_position (&v)[3], int fraction, const v
 
 TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
     generator g;
+    std::uint64_t limits_clipped = 0, sure_limits = 0, whole_limits = 0;
     int compared = 0, tiny = 0, sixteens = 0;
     std::uint64_t covered = 0;
     for (const int fraction : {12, 13, 14, 15, 16}) {
@@ -131,12 +138,16 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
             if (max3(all.hi[0], all.hi[1], all.hi[2]) < 8) {
                 ++tiny;
                 voxels again;
-                s.rows(all, [&](int y, int z, std::uint32_t bits) {
+                const auto into_again = [&](int y, int z, std::uint32_t bits) {
                     for (int x = 0; x < 32; ++x)
                         if (((bits >> x) & 1u) != 0)
                             again.insert({static_cast<int>(box.lo[0]) + x, static_cast<int>(box.lo[1]) + y,
                                           static_cast<int>(box.lo[2]) + z});
-                });
+                };
+                s.rows<false>(all, into_again);
+                ASSERT_EQ(again, expected) << "fraction " << fraction << ", triangle " << i;
+                again.clear();
+                s.rows<true>(all, into_again);
                 ASSERT_EQ(again, expected) << "fraction " << fraction << ", triangle " << i;
             }
             voxels longer;
@@ -155,7 +166,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
             if (max3(all.hi[0], all.hi[1], all.hi[2]) < 16) {
                 ++sixteens;
                 voxels again;
-                s.rows_of_16(all, limits, [&](int y, int z, std::uint32_t bits) {
+                s.rows_of_16<false>(all, limits, [&](int y, int z, std::uint32_t bits) {
                     for (int x = 0; x < 32; ++x)
                         if (((bits >> x) & 1u) != 0)
                             again.insert({static_cast<int>(box.lo[0]) + x, static_cast<int>(box.lo[1]) + y,
@@ -179,21 +190,37 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
                 for (const auto& [x, y, z] : expected)
                     if (x >= box.lo[0] + part.lo[0] && y >= box.lo[1] + part.lo[1] && z >= box.lo[2] + part.lo[2])
                         wanted.insert({x, y, z});
-                s.rows_of_16(part, limits, into(by_sixteen));
+                s.rows_of_16<true>(part, limits, into(by_sixteen));
                 ASSERT_EQ(by_sixteen, wanted) << "fraction " << fraction << ", triangle " << i;
                 if (part.hi[0] - part.lo[0] < 8) {
-                    s.rows(part, into(by_rows));
+                    s.rows<true>(part, into(by_rows));
                     ASSERT_EQ(by_rows, wanted) << "fraction " << fraction << ", triangle " << i;
                 }
             }
             // Nothing of a box that the grid leaves nothing of.
             const small_box none{{1, 0, 0}, {0, all.hi[1], all.hi[2]}};
-            s.rows(none, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
-            s.rows_of_16(none, limits, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
+            s.rows<true>(none, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
+            s.rows_of_16<true>(none, limits, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
+            const near_plane plane(s.n, s.below, s.above, from);
             for (int y = 0; y <= all.hi[1]; ++y)
                 for (int z = 0; z <= all.hi[2]; ++z) {
                     const std::uint32_t limit = s.limit_at_y(from, last, y) & s.limit_at_z(from, last, z);
                     ASSERT_EQ(s.meets_row(y, z) ? s.plane_bits(from, y, z, limit) : 0u, s.row(from, last, y, z));
+                    if (limit == 0) continue;
+                    // What floats are sure of is so, and they mostly are.
+                    const std::uint32_t left = s.plane_bits(from, y, z, limit);
+                    const int begin = voxelpipe::exact::lowest_one(limit), end = voxelpipe::exact::highest_one(limit);
+                    bool sure = false;
+                    const std::uint32_t clipped = plane.clip(begin, end, y, z, sure);
+                    ++limits_clipped;
+                    if (sure) {
+                        ++sure_limits;
+                        ASSERT_EQ(clipped, left) << "fraction " << fraction << ", triangle " << i;
+                    }
+                    if (plane.meets(begin, end, y, z)) {
+                        ++whole_limits;
+                        ASSERT_EQ(left, limit) << "fraction " << fraction << ", triangle " << i;
+                    }
                 }
             covered += expected.size();
             ASSERT_EQ(rows, expected) << "fraction " << fraction << ", triangle " << i;
@@ -203,6 +230,9 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
     EXPECT_GT(covered, static_cast<std::uint64_t>(compared));
     EXPECT_GT(tiny, compared / 4);
     EXPECT_GT(sixteens, tiny);
+    EXPECT_GT(whole_limits, limits_clipped / 10);
+    EXPECT_GT(sure_limits, whole_limits);
+    EXPECT_GT(sure_limits, limits_clipped * 7 / 10);
 }
 
 TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
@@ -238,26 +268,37 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
                 });
             }
             const auto width = static_cast<int>(last[0]) + 1, height = static_cast<int>(last[1]) + 1;
-            const auto by_columns = [&]<int Width>(int step) {
+            const auto by_columns = [&](bool swapped, int begin, int step) {
                 voxels again;
-                for (int first = 0; first < step; ++first)
-                    s.columns<Width>(0, width - 1, first, height - 1, step, [&](int u, int row, int w) {
-                        EXPECT_EQ(row % step, first);
-                        const auto p = to_xyz(s.axis, origin[0] + u, origin[1] + row, origin[2] + w);
-                        again.insert({static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])});
-                    });
-                s.columns<Width>(1, 0, 0, height - 1, step, [&](int, int, int) { ADD_FAILURE(); });
+                small_thin turned_round = s;
+                if (swapped) turned_round.swap_uv();
+                kept_rows kept;
+                for (int first = 0; first < step; ++first) {
+                    int v = 0;
+                    turned_round.columns(
+                        begin, (swapped ? height : width) - 1, first, (swapped ? width : height) - 1, step, kept,
+                        [&](int row) {
+                            EXPECT_EQ(row % step, first);
+                            v = row;
+                        },
+                        [&](int u, int w) {
+                            const auto p = to_xyz(s.axis, origin[0] + (swapped ? v : u), origin[1] + (swapped ? u : v),
+                                                  origin[2] + w);
+                            again.insert({static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])});
+                        });
+                }
                 return again;
             };
-            if (width <= 8) {
-                ASSERT_EQ(by_columns.template operator()<8>(1), rows) << "fraction " << fraction << ", triangle " << i;
-            }
-            if (width <= 16) {
-                ASSERT_EQ(by_columns.template operator()<16>(1), rows) << "fraction " << fraction << ", triangle " << i;
-                ASSERT_EQ(by_columns.template operator()<16>(8), rows) << "fraction " << fraction << ", triangle " << i;
-            }
-            ASSERT_EQ(by_columns.template operator()<32>(1), rows) << "fraction " << fraction << ", triangle " << i;
-            ASSERT_EQ(by_columns.template operator()<32>(8), rows) << "fraction " << fraction << ", triangle " << i;
+            for (const bool swapped : {false, true})
+                for (const int step : {1, 8})
+                    ASSERT_EQ(by_columns(swapped, 0, step), rows) << "fraction " << fraction << ", triangle " << i;
+            ASSERT_TRUE(by_columns(false, width, 1).empty()); // a part of the box that has no columns
+            voxels part = rows;
+            std::erase_if(part, [&](const auto& p) {
+                return to_uvw<std::int64_t>(s.axis, std::get<0>(p), std::get<1>(p), std::get<2>(p))[0] <
+                       origin[0] + from;
+            });
+            ASSERT_EQ(by_columns(false, from, 1), part) << "fraction " << fraction << ", triangle " << i;
             if (max3(last[0], last[1], last[2]) < 2) { // all columns at once
                 ++cubes;
                 voxels again;

@@ -156,6 +156,83 @@ namespace exact {
 #endif
 }
 
+// About 1 / a, to 2^-22 of itself; infinity for zero. Not the same everywhere: for what is proved to be near enough.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float near_inverse(float a) {
+#if defined(__CUDA_ARCH__)
+    float r;
+    asm("rcp.approx.f32 %0, %1;" : "=f"(r) : "f"(a));
+    return r;
+#else
+    return 1.0f / a;
+#endif
+}
+
+// fma, kept from 0 to 1; 0 for what is no number.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float fma_saturated(float a, float b, float c) {
+#if defined(__CUDA_ARCH__)
+    float r;
+    asm("fma.rn.sat.f32 %0, %1, %2, %3;" : "=f"(r) : "f"(a), "f"(b), "f"(c));
+    return r;
+#else
+    const float r = __builtin_fmaf(a, b, c);
+    return r > 0.0f ? r < 1.0f ? r : 1.0f : 0.0f;
+#endif
+}
+
+// a * b + c rounded once, to an integer above and below it; c must be one, and the sum at most 2^21.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float fma_up(float a, float b, float c) {
+#if defined(__CUDA_ARCH__)
+    float sum;
+    asm("fma.rp.f32 %0, %1, %2, %3;" : "=f"(sum) : "f"(a), "f"(b), "f"(c + 12582912.0f)); // 1.5 * 2^23
+    return sub(sum, 12582912.0f);
+#else
+    return static_cast<float>(std::ceil(static_cast<double>(a) * b + c));
+#endif
+}
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float fma_down(float a, float b, float c) {
+#if defined(__CUDA_ARCH__)
+    float sum;
+    asm("fma.rm.f32 %0, %1, %2, %3;" : "=f"(sum) : "f"(a), "f"(b), "f"(c + 12582912.0f));
+    return sub(sum, 12582912.0f);
+#else
+    return static_cast<float>(std::floor(static_cast<double>(a) * b + c));
+#endif
+}
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float least(float a, float b) {
+#if defined(__CUDA_ARCH__)
+    return fminf(a, b);
+#else
+    return b < a ? b : a;
+#endif
+}
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float greatest(float a, float b) {
+#if defined(__CUDA_ARCH__)
+    return fmaxf(a, b);
+#else
+    return a < b ? b : a;
+#endif
+}
+// An integer as what it is; |a| <= 2^21.
+inline constexpr std::int32_t integer_shift = 0x4b400000;
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t to_integer(float a) {
+    return core::bit_cast<std::int32_t>(add(a, 12582912.0f)) - integer_shift;
+}
+
+// The greatest integer that is not above a, for |a| <= 2^21, and by how much a is above it. By a sum with 1.5 * 2^23,
+// whose last mantissa bits are the integer: conversions run at a fraction of that rate.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t integer_below(float a, float& over) {
+#if defined(__CUDA_ARCH__)
+    float sum;
+    asm("add.rm.f32 %0, %1, 0f4B400000;" : "=f"(sum) : "f"(a));
+    over = sub(a, sub(sum, 12582912.0f));
+    return core::bit_cast<std::int32_t>(sum) - integer_shift;
+#else
+    const float whole = std::floor(a);
+    over = a - whole;
+    return static_cast<std::int32_t>(whole);
+#endif
+}
+
 // The same minus an even offset below 2^40, modulo 2^32, for |a| <= 2^30: by the sum with 1.5 * 2^52 - offset, whose
 // last mantissa bits are the integer. One addition, where a conversion runs at a fraction of that rate on a GPU; an odd
 // offset would turn ties to odd.
@@ -221,6 +298,15 @@ template <class Int>
     return 64 - __clzll(static_cast<long long>(a));
 #else
     return static_cast<int>(std::bit_width(a));
+#endif
+}
+
+// Place of the highest bit that is set; a != 0. One instruction less than the lowest on a GPU.
+[[nodiscard]] VOXELPIPE_HD inline int highest_one(std::uint32_t a) {
+#if defined(__CUDA_ARCH__)
+    return 31 - __clz(static_cast<int>(a));
+#else
+    return 31 - std::countl_zero(a);
 #endif
 }
 

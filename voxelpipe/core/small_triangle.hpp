@@ -129,6 +129,44 @@ small_line(std::int32_t e0, std::int32_t e1, std::int32_t e2, std::int32_t s0, s
     }
     return ~outside;
 }
+// Where rows of at most 32 columns enter and leave three half-planes, row after row. A half-plane e + a u ends at u =
+// -e / a, and wanted is the integer beyond that: the integer next to it in floats is tested by one product, which tells
+// it from its neighbour. |e| < 2^28, so a quotient from -16 to 48, which is all that is looked at, is off by less than
+// 2^-15.
+struct small_row_ends {
+    std::int32_t at[3], step[3], slope[3]; // of the next row's first column; to the row after it; to the next column
+    float inverse[3];                      // -1 / (64 slope); a slope of zero ends at infinity
+
+    // Rows v0, v0 + row_step, ... from the column u0 on, of half-planes on (u, v), or, turned, on (v, u).
+    VOXELPIPE_HD VOXELPIPE_INLINE small_row_ends(const small_half_plane (&e)[3], bool turned, int u0, int v0,
+                                                 int row_step) {
+        for (int i = 0; i < 3; ++i) {
+            slope[i] = turned ? e[i].b : e[i].a;
+            const std::int32_t across = turned ? e[i].a : e[i].b;
+            at[i] = slope[i] * u0 + across * v0 + e[i].c;
+            step[i] = across * row_step;
+            inverse[i] = -exact::near_inverse(exact::mul(64.0f, static_cast<float>(slope[i])));
+        }
+    }
+    // The columns 0 .. last that the row has, last < 32.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t next(int last) {
+        std::int32_t first = 0;
+        for (int i = 0; i < 3; ++i) {
+            const float quotient = exact::fma_saturated(static_cast<float>(at[i]), inverse[i], 0.25f);
+            const float sum = exact::fma(quotient, 64.0f, 12582912.0f - 16.0f);
+            const std::int32_t n = core::bit_cast<std::int32_t>(sum) - exact::integer_shift;
+            const std::int32_t outside = (at[i] + slope[i] * n) >> 31; // -1 or 0
+            const bool leaves = slope[i] < 0;
+            const std::int32_t end = n + (leaves ? outside : -outside), low = end - (leaves ? 1024 : 0),
+                               high = end + (leaves ? 0 : 1024);
+            first = first > low ? first : low;
+            last = last < high ? last : high;
+            at[i] += step[i];
+        }
+        return first > last ? 0 : ((2u << last) - 1) & (~0u << first);
+    }
+};
+
 // a * b for 0 <= b < 2^32, modulo 2^64: two multiplications of 32 bits.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::int64_t times(std::int64_t a, int b) {
     return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) * static_cast<std::uint32_t>(b));
@@ -142,20 +180,55 @@ small_line(std::int32_t e0, std::int32_t e1, std::int32_t e2, std::int32_t s0, s
     return exact::sub(core::bit_cast<float>(shift + static_cast<std::uint32_t>(a)), 12582912.0f);
 }
 
-// The plane of a small triangle in floats: whether two voxels of a row surely meet it, and so all between them. With S
-// = |n.x| + |n.y| + |n.z| voxels that meet the plane are within S / 2 of `middle`, and up to 32 voxels from the corner
-// all that is added stays below 66 S: less than 2^-15.9 S is lost, and 2^-15 S left for it.
+// What the plane of a small triangle leaves of a row of voxels, in floats. With S = |n.x| + |n.y| + |n.z| voxels that
+// meet the plane are within S / 2 of `middle`, and up to 32 voxels from the corner all that is added stays below 66 S:
+// less than 2^-15.9 S is lost, and 2^-15 S left for it on both sides.
 struct near_plane {
-    float n[3], middle, reach;
+    float n[3], middle;  // along x from x0 on, turned so that n[0] >= 0
+    float half, inverse; // S / 2; 1 / (64 n[0])
 
-    VOXELPIPE_HD VOXELPIPE_INLINE near_plane(const std::int64_t (&normal)[3], std::int64_t below, std::int64_t above)
+    VOXELPIPE_HD VOXELPIPE_INLINE near_plane(const std::int64_t (&normal)[3], std::int64_t below, std::int64_t above,
+                                             int x0)
         : n{static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2])},
-          middle(exact::mul(0.5f, static_cast<float>(above - below))),
-          reach(exact::mul(0.5f - 0x1p-15f, static_cast<float>(above + below))) {}
-    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets(int x0, int x1, int y, int z) const {
-        const float row = exact::fma(n[1], small_to_float(y), exact::fma(n[2], small_to_float(z), -middle));
-        const float a = exact::fma(n[0], small_to_float(x0), row), b = exact::fma(n[0], small_to_float(x1), row);
-        return a < reach && -a < reach && b < reach && -b < reach;
+          middle(exact::fma(-n[0], static_cast<float>(x0), exact::mul(0.5f, static_cast<float>(above - below)))),
+          half(exact::mul(0.5f, static_cast<float>(above + below))), inverse(0) {
+        if (normal[0] < 0) {
+            for (float& k : n) k = -k;
+            middle = -middle;
+        }
+        inverse = exact::near_inverse(exact::mul(64.0f, n[0]));
+    }
+    // Whether the voxels from and to of a row, from x0 on, surely meet the plane, and so all between them.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets(int from, int to, int y, int z) const {
+        const float row = row_at(y, z), in = exact::mul(half, 1.0f - 0x1p-14f);
+        const float a = exact::fma(n[0], small_to_float(from), row), b = exact::fma(n[0], small_to_float(to), row);
+        return -in < a && b < in; // a <= b
+    }
+    // Of the voxels from..to of a row, from x0 on, those that are left; `sure`: whether this is so. Along x the plane
+    // comes nearer and goes: it leaves what is between two numbers, which are rounded inwards and then looked at: the
+    // voxel that is in has to be so surely, and the one before it surely out.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t clip(int from_x, int to_x, int y, int z,
+                                                                   bool& sure) const {
+        const float row = row_at(y, z);
+        const auto from = static_cast<float>(from_x), to = static_cast<float>(to_x);
+        const float in = exact::mul(half, 1.0f - 0x1p-14f), out = exact::mul(half, 1.0f + 0x1p-14f);
+        const float enters = exact::fma_saturated(-exact::add(half, row), inverse, 0.25f),
+                    leaves = exact::fma_saturated(exact::sub(half, row), inverse, 0.25f); // (x + 16) / 64
+        const float k = exact::least(exact::greatest(exact::fma_up(enters, 64.0f, -16.0f), from), exact::add(to, 1.0f)),
+                    l = exact::greatest(exact::least(exact::fma_down(leaves, 64.0f, -16.0f), to),
+                                        exact::sub(from, 1.0f));
+        const float at_k = exact::fma(n[0], k, row), at_l = exact::fma(n[0], l, row);
+        const bool begins = (k == from) | (exact::sub(at_k, n[0]) < -out),
+                   ends = (l == to) | (exact::add(at_l, n[0]) > out);
+        const bool is_in = (k > to) | (at_k > -in), stays_in = (l < from) | (at_l < in);
+        sure = begins & ends & is_in & stays_in;
+        const std::uint32_t bits = ((2u << (exact::to_integer(l) & 31)) - 1) & (~0u << (exact::to_integer(k) & 31));
+        return k > l ? 0 : bits;
+    }
+
+private:
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float row_at(int y, int z) const {
+        return exact::fma(n[1], small_to_float(y), exact::fma(n[2], small_to_float(z), -middle));
     }
 };
 
@@ -242,11 +315,12 @@ struct small_conservative {
     // something of; bit 0 is box.lo[0]. What the xy and the zx projection leave depends on y or on z alone, so that is
     // found once and not once a row, and the yz projection tells which rows are wanted at all: threads that have a
     // triangle each then go through as many rows as they emit, not through their boxes. 8 x 8 rows of 8 bits at once.
-    template <class Emit>
+    // Clips: see plane_bits.
+    template <bool Clips, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void rows(const small_box& box, Emit&& emit) const {
         const int x0 = box.lo[0], x7 = x0 + 7;
         if (box.hi[0] < x0) return;
-        const near_plane plane(n, below, above);
+        const near_plane plane(n, below, above, x0);
         const std::uint32_t along = (2u << (box.hi[0] - x0)) - 1;
         for (int y0 = box.lo[1]; y0 <= box.hi[1]; y0 += 8) {
             const int y1 = box.hi[1] < y0 + 7 ? box.hi[1] : y0 + 7;
@@ -264,28 +338,35 @@ struct small_conservative {
                     const int at = exact::lowest_one(met), y = at % 8, z = at / 8;
                     const std::uint32_t limit =
                         static_cast<std::uint32_t>(by_y >> 8 * y) & static_cast<std::uint32_t>(by_z >> 8 * z) & along;
-                    if (limit != 0) emit(y0 + y, z0 + z, plane_bits(plane, x0, y0 + y, z0 + z, limit));
+                    if (limit != 0) emit(y0 + y, z0 + z, plane_bits<Clips>(plane, x0, y0 + y, z0 + z, limit));
                 }
             }
         }
     }
 
     // The same for a box of at most 16 voxels a side, all of it at once. `limits` holds 16 words: get(i), set(i, word).
-    template <class Limits, class Emit>
+    template <bool Clips, class Limits, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void rows_of_16(const small_box& box, Limits&& limits, Emit&& emit) const {
         if (box.empty()) return;
         const int x0 = box.lo[0], y0 = box.lo[1], z0 = box.lo[2];
-        const std::uint32_t along = (2u << (box.hi[0] - x0)) - 1, across = (2u << (box.hi[1] - y0)) - 1;
-        const int last_y = box.hi[1] - y0, last_z = box.hi[2] - z0;
-        const near_plane plane(n, below, above);
+        const int last_x = box.hi[0] - x0, last_y = box.hi[1] - y0, last_z = box.hi[2] - z0;
+        const near_plane plane(n, below, above, x0);
+        {
+            small_row_ends by_y(xy, false, x0, y0, 1);
+            for (int y = 0; y <= last_y; ++y) limits.set(y, by_y.next(last_x));
+        }
+        {
+            small_row_ends by_z(zx, true, x0, z0, 1);
+            for (int z = 0; z <= last_z; ++z)
+                limits.set(z, (z <= last_y ? limits.get(z) : 0) | by_z.next(last_x) << 16);
+        }
         std::uint64_t met[4] = {}; // rows, bit y + 16 z
-        for (int i = last_y > last_z ? last_y : last_z; i >= 0; --i) {
-            const std::uint32_t at_y = along & limits_at_y<16>(x0 + 15, y0 + i),
-                                at_z = along & limits_at_z<16>(x0 + 15, z0 + i);
-            limits.set(i, at_y | at_z << 16); // of what lies beyond the box nobody asks
-            if (i > last_z) continue;
-            for (int k = 3; k > 0; --k) met[k] = met[k] << 16 | met[k - 1] >> 48;
-            met[0] = met[0] << 16 | (across & rows_at_z<16>(y0 + 15, z0 + i));
+        {
+            small_row_ends by_z(yz, false, y0, z0 + last_z, -1);
+            for (int z = last_z; z >= 0; --z) {
+                for (int k = 3; k > 0; --k) met[k] = met[k] << 16 | met[k - 1] >> 48;
+                met[0] = met[0] << 16 | by_z.next(last_y);
+            }
         }
         for (int first_z = 0;;) {
             if (met[0] == 0) {
@@ -297,7 +378,7 @@ struct small_conservative {
                 const int at = exact::lowest_one(met[0]), y = at % 16, z = first_z + at / 16;
                 met[0] &= met[0] - 1;
                 const std::uint32_t limit = limits.get(y) & limits.get(z) >> 16;
-                if (limit != 0) emit(y0 + y, z0 + z, plane_bits(plane, x0, y0 + y, z0 + z, limit));
+                if (limit != 0) emit(y0 + y, z0 + z, plane_bits<Clips>(plane, x0, y0 + y, z0 + z, limit));
             }
         }
     }
@@ -318,11 +399,19 @@ struct small_conservative {
     }
 
 private:
-    // The same, where the plane mostly cuts nothing off.
+    // The same, from what floats say where they are sure: of whatever the plane leaves, or only whether that is all,
+    // which takes fewer registers.
+    template <bool Clips>
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t plane_bits(const near_plane& plane, int x0, int y, int z,
                                                                          std::uint32_t limit) const {
-        const int first = exact::lowest_one(limit), last = exact::bit_width(std::uint64_t{limit}) - 1;
-        return plane.meets(x0 + first, x0 + last, y, z) ? limit : plane_bits(x0, y, z, limit);
+        const int first = exact::lowest_one(limit), last = exact::highest_one(limit);
+        bool sure = false;
+        std::uint32_t bits = limit;
+        if constexpr (Clips)
+            bits = plane.clip(first, last, y, z, sure);
+        else
+            sure = plane.meets(first, last, y, z);
+        return sure ? bits : plane_bits(x0, y, z, limit);
     }
     // What the xy projection leaves of the voxels from x - Length + 1 to x at y, the zx projection of them at z, and
     // the yz projection of the rows from y - Length + 1 to y at z.
@@ -414,48 +503,64 @@ struct small_thin {
         }
     }
 
-    // Calls emit(u, v, w) for the covered columns of the rows v0, v0 + step, ... up to v1, of at most Width columns
-    // each (8 or 16): row() for threads that have a triangle each, as small_conservative::rows.
-    template <int Width, class Emit>
-    VOXELPIPE_HD VOXELPIPE_INLINE void columns(int u0, int u1, int v0, int v1, int step, Emit&& emit) const {
-        static_assert(Width == 8 || Width == 16 || Width == 32);
-        if (u1 < u0) return;
-        constexpr int rows = 64 / Width, words = Width == 16 ? 4 : 1; // at once: rows of a word, words
-        const std::int64_t divisor = 2 * nw;
-        const float inverse = 1.0f / static_cast<float>(divisor);
-        const std::uint32_t along = (2u << (u1 - u0)) - 1;
-        const int far = u0 + Width - 1;
-        for (; v0 <= v1; v0 += words * rows * step) {
-            std::uint64_t met[words] = {}, left = 0;
-            const int most = (v1 - v0) / step, last = most < words * rows - 1 ? most : words * rows - 1;
-            for (int v = v0 + last * step; v >= v0; v -= step) {
-                for (int k = words - 1; k > 0; --k) met[k] = met[k] << Width | met[k - 1] >> (64 - Width);
-                met[0] = met[0] << Width | (along & small_line<Width>(uv[0].at(far, v), uv[1].at(far, v),
-                                                                      uv[2].at(far, v), uv[0].a, uv[1].a, uv[2].a));
-            }
-            int first = v0;
-            for (;;) {
-                if (met[0] == 0) {
-                    left = 0;
-                    for (int k = 1; k < words; ++k) {
-                        left |= met[k];
-                        met[k - 1] = met[k];
-                    }
-                    if (left == 0) break;
-                    met[words - 1] = 0;
-                    first += rows * step;
-                } else {
-                    const int at = exact::lowest_one(met[0]), u = u0 + at % Width, v = first + at / Width * step;
-                    met[0] &= met[0] - 1;
-                    const std::int64_t numerator = depth - times(nu, 2 * u + 1) - times(nv, 2 * v + 1);
-                    // A quotient below 2^8, so at most one off, which the remainder tells.
-                    auto w = static_cast<std::int32_t>(static_cast<float>(numerator) * inverse);
-                    const std::int64_t remainder = numerator - w * divisor;
-                    w += static_cast<std::int32_t>(remainder >= divisor) - static_cast<std::int32_t>(remainder < 0);
-                    emit(u, v, w);
-                }
+    // u and v for each other: `row`, `columns` and uv then have them the other way round.
+    VOXELPIPE_HD VOXELPIPE_INLINE void swap_uv() {
+        for (small_half_plane& e : uv) e = {e.b, e.a, e.c};
+        const std::int64_t u = nu;
+        nu = nv;
+        nv = u;
+    }
+
+    // Calls begin_row(v) and emit(u, w) for the covered columns of the rows v0, v0 + step, ... up to v1, of at most 32
+    // columns each: row() for threads that have a triangle each, as small_conservative::rows. First all rows, then one
+    // loop over the columns that are left. `kept` holds a word for each of the rows, at most 32: get(i), set(i, word).
+    template <class Kept, class BeginRow, class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void columns(int u0, int u1, int v0, int v1, int step, Kept&& kept,
+                                               BeginRow&& begin_row, Emit&& emit) const {
+        std::uint32_t rows = 0;
+        {
+            small_row_ends ends(uv, false, u0, v0, step);
+            int i = 0;
+            for (int v = u1 < u0 ? v1 + 1 : v0; v <= v1; v += step, ++i) {
+                const std::uint32_t row = ends.next(u1 - u0);
+                kept.set(i, row);
+                rows |= static_cast<std::uint32_t>(row != 0) << i;
             }
         }
+        const float inverse = exact::near_inverse(static_cast<float>(nw));
+        const float by_u = exact::mul(-static_cast<float>(nu), inverse),
+                    by_v = exact::mul(-static_cast<float>(nv), inverse);
+        const float first =
+            exact::mul(static_cast<float>(depth - nu - nv), exact::mul(0.5f, inverse)); // at the centre of (0, 0)
+        float of_row = 0;
+        std::uint32_t row = 0;
+        for (int v = 0;;) {
+            if (row == 0) {
+                if (rows == 0) break;
+                const int i = exact::highest_one(rows);
+                rows ^= 1u << i;
+                row = kept.get(i);
+                v = v0 + i * step;
+                of_row = exact::fma(by_v, static_cast<float>(v), first);
+                begin_row(v);
+            }
+            const int i = exact::highest_one(row), u = u0 + i;
+            row ^= 1u << i;
+            // Slopes are at most one, and depths from -1 to 33, so that `first` is below 100, and what is lost on the
+            // way below 2^-14 voxel.
+            float over = 0;
+            std::int32_t w = exact::integer_below(exact::fma(by_u, static_cast<float>(u), of_row), over);
+            if (over < 0x1p-12f || over > 1.0f - 0x1p-12f) w = depth_of(u, v, w);
+            emit(u, w);
+        }
+    }
+
+private:
+    // The depth of a column at its centre, where `near` is at most one off.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t depth_of(int u, int v, std::int32_t near) const {
+        const std::int64_t divisor = 2 * nw;
+        const std::int64_t remainder = depth - times(nu, 2 * u + 1) - times(nv, 2 * v + 1) - near * divisor;
+        return near + static_cast<std::int32_t>(remainder >= divisor) - static_cast<std::int32_t>(remainder < 0);
     }
 };
 

@@ -36,7 +36,7 @@ struct block_warp {
 
     const Call& call;
     warp_queues& queues;
-    row_limits& limits;
+    kept_rows& kept; // of the warp
     sink_type& sink;
     std::uint32_t* big; // for big triangles, of the block
     unsigned& num_big;
@@ -66,13 +66,14 @@ struct block_warp {
                    VOXELPIPE_INLINE_LAMBDA { raster_tiny<Call::rule>(call.in, take(from.tinies, at), sink); };
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE auto small_of_queue() {
-        return [this](const warp_queues& from, int at)
-                   VOXELPIPE_INLINE_LAMBDA { raster_small<Call::rule>(call.in, take(from.smalls, at), limits, sink); };
+        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
+            raster_small<Call::rule, false>(call.in, take(from.smalls, at), lane_rows(kept), sink);
+        };
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE auto large_of_queue() {
         return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            raster_small<Call::rule>(call.in, load_near(call.in, call.in.source.triangle(from.larges[at])), limits,
-                                     sink);
+            raster_small<Call::rule, false>(call.in, load_near(call.in, call.in.source.triangle(from.larges[at])),
+                                            lane_rows(kept), sink);
         };
     }
 
@@ -155,7 +156,7 @@ struct block_warp {
         for (int start = 0; start < num; start += Warps * 32 / medium_lanes) {
             int at = start + static_cast<int>(threadIdx.x) / medium_lanes, w = 0;
             while (w < Warps && at >= left[2][w]) at -= left[2][w++];
-            raster_medium<Call::rule>(call.in, w < Warps, w < Warps ? all[w].larges[at] : 0, sink);
+            raster_medium<Call::rule>(call.in, w < Warps, w < Warps ? all[w].larges[at] : 0, lane_rows(kept), sink);
         }
 
         cut_big(call, sink, big, num_big);
@@ -173,7 +174,7 @@ __global__ __launch_bounds__(raster_threads,
     using sink_type = typename Call::sink;
     constexpr bool thin = Call::rule == coverage::thin;
     __shared__ warp_queues queues[raster_warps];
-    __shared__ row_limits limits[thin ? 1 : raster_warps];
+    __shared__ kept_rows rows_of_warps[raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ int left[3][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_big;
@@ -187,7 +188,7 @@ __global__ __launch_bounds__(raster_threads,
     const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
     block_warp<Call> warp{call,
                           queues[threadIdx.x / 32],
-                          limits[thin ? 0 : threadIdx.x / 32],
+                          rows_of_warps[threadIdx.x / 32],
                           sink,
                           call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads,
                           num_big};

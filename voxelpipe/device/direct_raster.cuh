@@ -106,6 +106,10 @@ struct blending_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE void row_by_all(unsigned, int x0, int y, int z, word mask) {
         row(x0, y, z, mask & bits_of_lane());
     }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static glm::ivec3 place(int x, int y, int z) { return {x, y, z}; }
+    __device__ VOXELPIPE_INLINE void put(const glm::ivec3& at, bool wanted) {
+        if (wanted) row(at.x, at.y, at.z, 1u);
+    }
     // As in blend_cube.
     __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word voxels) {
         mine.fragments += static_cast<unsigned>(__popc(voxels));
@@ -195,7 +199,9 @@ struct framebuffer_output {
 template <class Call>
 inline constexpr int first_min_blocks = Call::rule == coverage::thin || Call::sink::buffers ? 6 : 8;
 template <class Call>
-inline constexpr int rest_min_blocks = Call::sink::buffers ? 4 : 5;
+inline constexpr int rest_min_blocks = Call::sink::buffers            ? 4
+                                       : Call::rule == coverage::thin ? 6
+                                                                      : 5;
 
 // Thin triangles of up to 2 x 2 x 2 voxels, each in a column of words: all triangles of a fine mesh are of this kind,
 // so they are not handed on.
@@ -360,7 +366,7 @@ struct warp_place {
 // The triangles of a list from number `first` on, by medium_lanes lanes each.
 template <class Call, class Sink>
 __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std::uint32_t first,
-                                                 const warp_place& place, Sink& sink) {
+                                                 const warp_place& place, const lane_rows& kept, Sink& sink) {
     constexpr unsigned at_once = 32 / medium_lanes;
     const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[kind]));
     const unsigned chunks = (length - first + at_once - 1) / at_once;
@@ -368,7 +374,7 @@ __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std
         const std::uint32_t i = first + chunk * at_once + place.lane / medium_lanes;
         const bool wanted = i < length;
         __syncwarp();
-        raster_medium<Call::rule>(call.in, wanted, wanted ? call.lists.at(kind, i) : 0, sink);
+        raster_medium<Call::rule>(call.in, wanted, wanted ? call.lists.at(kind, i) : 0, kept, sink);
         __syncwarp();
     }
 }
@@ -378,7 +384,7 @@ __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std
 // advance together, part by part: they are in the order of the mesh, nearly, so that voxels are in the cache while
 // triangles of all kinds meet them.
 template <class Call, class Sink>
-__device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place& place, row_limits& limits,
+__device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place& place, const lane_rows& kept,
                                               Sink& sink) {
     constexpr int kinds = medium_triangles; // what comes before
     std::uint32_t chunks[kinds], all = 0;
@@ -388,7 +394,7 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place
         chunks[k] = few ? 0 : length / 32;
         all += chunks[k];
         const unsigned from_last = place.warps - 1 - place.warp; // the first ones have whole chunks to do
-        raster_by_lanes(call, k, chunks[k] * 32, {few ? place.warp : from_last, place.warps, place.lane}, sink);
+        raster_by_lanes(call, k, chunks[k] * 32, {few ? place.warp : from_last, place.warps, place.lane}, kept, sink);
     }
     const unsigned wanted = all / (4 * place.warps), parts = wanted < 1 ? 1 : wanted > 64 ? 64 : wanted;
     // Chunks are numbered by part, then kind; this warp's are `at`, at + warps, ...
@@ -408,7 +414,7 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place
                     if (k == tiny_triangles)
                         raster_tiny<Call::rule>(call.in, r, sink);
                     else
-                        raster_small<Call::rule>(call.in, r, limits, sink);
+                        raster_small<Call::rule, true>(call.in, r, kept, sink);
                 });
                 __syncwarp();
             }
@@ -424,7 +430,7 @@ __global__ __launch_bounds__(raster_threads,
     using sink_type = typename Call::sink;
     constexpr bool thin = Call::rule == coverage::thin;
     __shared__ brick_memory bricks[thin ? 1 : raster_warps];
-    __shared__ row_limits limits[thin ? 1 : raster_warps];
+    __shared__ kept_rows rows_of_warps[raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ unsigned dropped[num_triangle_classes];
     await_stream();
@@ -434,6 +440,7 @@ __global__ __launch_bounds__(raster_threads,
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();
     const unsigned in_block = warp_in_block();
+    const lane_rows kept(rows_of_warps[in_block]);
     const warp_place place{blockIdx.x * raster_warps + in_block, gridDim.x * raster_warps, threadIdx.x % 32};
     typename sink_type::memory& memory = memories[in_block];
     typename sink_type::totals of_records{};
@@ -444,8 +451,8 @@ __global__ __launch_bounds__(raster_threads,
     }
     sink_type sink(call, dropped, memory);
     sink.take_over(of_records);
-    raster_by_lanes(call, medium_triangles, 0, place, sink);
-    raster_lists(call, place, limits[thin ? 0 : in_block], sink);
+    raster_by_lanes(call, medium_triangles, 0, place, kept, sink);
+    raster_lists(call, place, kept, sink);
     sink.finish(state);
     __syncthreads();
     if (threadIdx.x == 0) { // the first kernel took them for drawn

@@ -121,8 +121,19 @@ struct small_part {
                         z <= tile.hi[2])
                         to(x, y, z, bits);
                 }
+                [[nodiscard]] __device__ VOXELPIPE_INLINE static glm::ivec3 place(int x, int y, int z) {
+                    return {x, y, z};
+                }
+                __device__ VOXELPIPE_INLINE void put(const glm::ivec3& at, bool wanted) {
+                    if (wanted) row(at.x, at.y, at.z, 1u);
+                }
             } within{tile, row};
-            (void)raster_thin(in, t.relative(in.fraction), t.lo, box, 0, 1, within); // a zero area is in no tile
+            struct kept_in_thread {
+                word words[core::small_most_voxels];
+                __device__ VOXELPIPE_INLINE void set(int i, word w) { words[i] = w; }
+                [[nodiscard]] __device__ VOXELPIPE_INLINE word get(int i) const { return words[i]; }
+            } kept;
+            (void)raster_thin(in, t.relative(in.fraction), t.lo, box, 0, 1, kept, within); // a zero area is in no tile
         } else {
             if (box.empty()) return;
             const core::small_conservative s(t.relative(in.fraction), in.fraction);
@@ -130,7 +141,7 @@ struct small_part {
                 if (bits != 0) row(t.lo[0] + box.lo[0], t.lo[1] + y, t.lo[2] + z, bits);
             };
             if (box.hi[0] - box.lo[0] < 8)
-                s.rows(box, emit);
+                s.template rows<false>(box, emit);
             else
                 s.long_rows(box, emit);
         }

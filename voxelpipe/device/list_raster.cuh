@@ -62,6 +62,10 @@ struct listing_sink : direct_sink<Call> {
             write(at++, voxel(p.x, p.y, p.z));
         }
     }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t place(int x, int y, int z) const { return voxel(x, y, z); }
+    __device__ VOXELPIPE_INLINE void put(std::uint32_t voxel, bool wanted) {
+        if (wanted) write(atomicAdd(&m_.n, 1u), voxel);
+    }
     __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word bits) {
         if (bits == 0) return;
         const std::uint32_t first = voxel(x, y, z), row = voxel(0, 1, 0), slice = voxel(0, 0, 1);
@@ -160,6 +164,7 @@ struct list_output {
     template <class Call>
     using sink = listing_sink<Call>;
     static constexpr bool hands_on = true;
+    static constexpr bool only_sets = false;
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return false; }
 
     std::uint32_t* voxels; // by fragment

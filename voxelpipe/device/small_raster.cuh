@@ -5,7 +5,8 @@
 // Raster of one small triangle, by a thread or by eight lanes. What is done with the fragments is the sink's: blending
 // (direct_raster.cuh) or listing (list_raster.cuh). A sink has
 //   buffers           whether settle(), which all lanes call between triangles, is wanted (feed)
-//   begin(triangle), row(x0, y, z, mask), cube(x, y, z, bits), voxels(bits, position):
+//   place(x, y, z)    where a voxel lies, as something linear: ivec3, or numbers modulo 2^32
+//   begin(triangle), row(x0, y, z, mask), cube(x, y, z, bits), voxels(bits, position), put(place, wanted):
 //                     the fragments of one triangle, as a row of bits along x, as 2 x 2 x 2 (blend_cube) or one by one
 //   shares            whether one(x, y, z), a fragment of a triangle that has no other, is more than a row of one
 //   spreads           whether a row costs by its voxels, so that lanes had better share long ones:
@@ -160,32 +161,65 @@ __device__ VOXELPIPE_INLINE near_triangle load_near(const raster_input<Source>& 
     return r;
 }
 
-// Thin fragments of the columns in rows first, first + step, ... of a small triangle; false where it has no area.
-template <class Source, class Sink>
+// What the threads of one warp keep of a triangle each (small_conservative::rows_of_16, small_thin::columns), a column
+// for each lane.
+struct kept_rows {
+    word words[most_long_side][32];
+};
+// The lane's, by an address that the compiler cannot see through: it would find it anew each time, in ten instructions.
+struct lane_rows {
+    std::uint32_t first;
+
+    __device__ VOXELPIPE_INLINE explicit lane_rows(kept_rows& of_warp) {
+        const auto at = static_cast<std::uint32_t>(__cvta_generic_to_shared(of_warp.words[0] + threadIdx.x % 32));
+        asm volatile("mov.u32 %0, %1;" : "=r"(first) : "r"(at));
+    }
+    __device__ VOXELPIPE_INLINE void set(int i, word w) const {
+        asm volatile("st.shared.u32 [%0], %1;" ::"r"(first + 128 * static_cast<unsigned>(i)), "r"(w) : "memory");
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE word get(int i) const {
+        word w = 0;
+        asm volatile("ld.shared.u32 %0, [%1];" : "=r"(w) : "r"(first + 128 * static_cast<unsigned>(i)) : "memory");
+        return w;
+    }
+};
+static_assert(sizeof(kept_rows::words[0]) == 128);
+// A part of at most 32 x 32 columns by medium_lanes lanes, or of most_columns by one, has so few rows along its shorter
+// side.
+static_assert(most_columns < most_long_side * most_long_side && 32 / medium_lanes <= most_long_side);
+
+// Thin fragments of the columns in rows first, first + step, ... of a small triangle, the rows along the longer side of
+// what is wanted of its box; false where it has no area.
+template <class Source, class Kept, class Sink>
 __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, const core::small_triangle& t,
                                              const std::int32_t (&lo)[3], const core::small_box& box, int first,
-                                             int step, Sink& sink) {
+                                             int step, Kept&& kept, Sink& sink) {
     const core::triple<std::int64_t> normal = core::small_normal(t);
     const int axis = core::small_axis(normal);
     if (axis < 0) return false;
-    const core::small_thin s(t, normal, axis, call.fraction);
-    const auto begin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
-    const auto end = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
+    core::small_thin s(t, normal, axis, call.fraction);
+    auto begin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
+    auto end = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
+    const bool swapped = end[0] - begin[0] < end[1] - begin[1];
+    if (swapped) {
+        s.swap_uv();
+        begin = {begin[1], begin[0], begin[2]};
+        end = {end[1], end[0], end[2]};
+    }
     const int depth = axis == 0 ? call.extent.x : axis == 1 ? call.extent.y : call.extent.z;
     const int lowest = axis == 0 ? lo[0] : axis == 1 ? lo[1] : lo[2];
-    const auto emit = [&](int u, int v, int w) VOXELPIPE_INLINE_LAMBDA {
-        if (lowest + w < 0 || lowest + w >= depth) return;
-        const auto at = core::to_xyz(axis, u, v, w);
-        sink.row(lo[0] + at[0], lo[1] + at[1], lo[2] + at[2], 1u);
-    };
-    // All lanes that are here in the same loop.
-    const int most = __reduce_max_sync(__activemask(), end[0] - begin[0]);
-    if (most < 8 && step == 1)
-        s.template columns<8>(begin[0], end[0], begin[1] + first, end[1], step, emit);
-    else if (most < 16)
-        s.template columns<16>(begin[0], end[0], begin[1] + first, end[1], step, emit);
-    else
-        s.template columns<32>(begin[0], end[0], begin[1] + first, end[1], step, emit);
+    // Where a voxel lies is linear in u, v and w.
+    const auto step_along = [&](int k) VOXELPIPE_INLINE_LAMBDA { return sink.place(k == 0, k == 1, k == 2); };
+    const int next = axis == 2 ? 0 : axis + 1, last = axis == 0 ? 2 : axis - 1; // along u and v
+    const auto origin = sink.place(lo[0], lo[1], lo[2]), by_u = step_along(swapped ? last : next),
+               by_v = step_along(swapped ? next : last), by_w = step_along(axis);
+    auto row = origin;
+    s.columns(
+        begin[0], end[0], begin[1] + first, end[1], step, kept,
+        [&](int v) VOXELPIPE_INLINE_LAMBDA { row = origin + by_v * v; },
+        [&](int u, int w) VOXELPIPE_INLINE_LAMBDA {
+            sink.put(row + by_u * u + by_w * w, static_cast<unsigned>(lowest + w) < static_cast<unsigned>(depth));
+        });
     return true;
 }
 
@@ -311,7 +345,7 @@ __device__ VOXELPIPE_INLINE void feed(Sink& sink, F&& f) {
 // A triangle by medium_lanes neighbouring lanes, where it is wanted. All lanes of the warp take part.
 template <coverage Rule, class Source, class Sink>
 __device__ VOXELPIPE_INLINE void raster_medium(const raster_input<Source>& call, bool wanted, std::uint32_t triangle,
-                                               Sink& sink) {
+                                               const lane_rows& kept, Sink& sink) {
     near_triangle r;
     if (wanted) r = load_near(call, call.source.triangle(triangle));
     feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
@@ -320,7 +354,7 @@ __device__ VOXELPIPE_INLINE void raster_medium(const raster_input<Source>& call,
         if constexpr (Rule == coverage::thin) {
             const int lane = static_cast<int>(threadIdx.x) % medium_lanes;
             const bool has_area =
-                raster_thin(call, r.relative(call.fraction), r.lo, r.part(call.extent), lane, medium_lanes, sink);
+                raster_thin(call, r.relative(call.fraction), r.lo, r.part(call.extent), lane, medium_lanes, kept, sink);
             if (!has_area && lane == 0) sink.drop(core::triangle_class::zero_area);
         } else {
             raster_lanes(core::small_conservative(r.relative(call.fraction), call.fraction), r.lo, r.part(call.extent),
@@ -348,21 +382,13 @@ __device__ VOXELPIPE_INLINE void raster_tiny(const raster_input<Source>& call, c
     }
 }
 
-// What the threads of one warp keep of a triangle each (small_conservative::rows_of_16), a column for each lane.
-struct row_limits {
-    word words[most_long_side][32];
-
-    __device__ VOXELPIPE_INLINE void set(int i, word w) { words[i][threadIdx.x % 32] = w; }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE word get(int i) const { return words[i][threadIdx.x % 32]; }
-};
-
-// Any small triangle, by one thread. limits: shared memory of the warp, not used where coverage is thin.
-template <coverage Rule, class Source, class Sink>
+// Any small triangle, by one thread. Apart: in a kernel that keeps nothing else in registers meanwhile.
+template <coverage Rule, bool Apart, class Source, class Sink>
 __device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, const near_triangle& r,
-                                              row_limits& limits, Sink& sink) {
+                                              const lane_rows& kept, Sink& sink) {
     const core::small_box box = r.part(call.extent);
     if constexpr (Rule == coverage::thin) {
-        if (!raster_thin(call, r.relative(call.fraction), r.lo, box, 0, 1, sink))
+        if (!raster_thin(call, r.relative(call.fraction), r.lo, box, 0, 1, kept, sink))
             sink.drop(core::triangle_class::zero_area);
     } else {
         const core::small_conservative s(r.relative(call.fraction), call.fraction);
@@ -371,9 +397,9 @@ __device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, 
         };
         const int most = core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) + 1;
         if (most <= most_side)
-            s.rows(box, emit);
+            s.template rows<Apart>(box, emit);
         else
-            s.rows_of_16(box, limits, emit);
+            s.template rows_of_16<Apart>(box, kept, emit);
     }
 }
 
