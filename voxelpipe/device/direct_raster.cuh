@@ -10,6 +10,7 @@
 
 #include <voxelpipe/device/block_raster.cuh>
 #include <voxelpipe/device/chunk_marks.cuh>
+#include <voxelpipe/device/combined_words.cuh>
 #include <voxelpipe/device/direct_target.cuh>
 #include <voxelpipe/device/large_raster.cuh>
 #include <voxelpipe/device/small_raster.cuh>
@@ -383,9 +384,9 @@ __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std
 // but what does not fill a warp, and whole lists that would not fill the device, by medium_lanes lanes each. All lists
 // advance together, part by part: they are in the order of the mesh, nearly, so that voxels are in the cache while
 // triangles of all kinds meet them.
-template <class Call, class Sink>
+template <class Call, class Rows, class Sink>
 __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place& place, const lane_rows& kept,
-                                              Sink& sink) {
+                                              Rows& rows, Sink& sink) {
     constexpr int kinds = medium_triangles; // what comes before
     std::uint32_t chunks[kinds], all = 0;
     for (int k = 0; k < kinds; ++k) {
@@ -414,9 +415,11 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place
                     if (k == tiny_triangles)
                         raster_tiny<Call::rule>(call.in, r, sink);
                     else
-                        raster_small<Call::rule, true>(call.in, r, kept, sink);
+                        raster_small<Call::rule, true>(call.in, r, kept, rows);
                 });
                 __syncwarp();
+                if constexpr (combines_words<Call>)
+                    if (k != tiny_triangles) rows.flush();
             }
             first += num;
         }
@@ -431,6 +434,7 @@ __global__ __launch_bounds__(raster_threads,
     constexpr bool thin = Call::rule == coverage::thin;
     __shared__ brick_memory bricks[thin ? 1 : raster_warps];
     __shared__ kept_rows rows_of_warps[raster_warps];
+    __shared__ warp_words<Call> words[raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ unsigned dropped[num_triangle_classes];
     await_stream();
@@ -452,7 +456,13 @@ __global__ __launch_bounds__(raster_threads,
     sink_type sink(call, dropped, memory);
     sink.take_over(of_records);
     raster_by_lanes(call, medium_triangles, 0, place, kept, sink);
-    raster_lists(call, place, kept, sink);
+    if constexpr (combines_words<Call>) {
+        combining_sink<Call> rows(sink, words[in_block]);
+        raster_lists(call, place, kept, rows, sink);
+        sink.take_over(rows.end());
+    } else {
+        raster_lists(call, place, kept, sink, sink);
+    }
     sink.finish(state);
     __syncthreads();
     if (threadIdx.x == 0) { // the first kernel took them for drawn
