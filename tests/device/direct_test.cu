@@ -34,14 +34,14 @@ mesh_data specks() {
     return m;
 }
 
-// Slivers and others with bounding boxes of 2 to 40 voxels, in all directions.
-mesh_data middling_triangles(glm::ivec3 extent, std::uint32_t seed) {
+// Slivers and others with bounding boxes of 2 to 40 voxels, or as many as `longest`, in all directions.
+mesh_data middling_triangles(glm::ivec3 extent, std::uint32_t seed, int count = 3000, float longest = 40.0f) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<float> unit(0.0f, 1.0f);
     mesh_data m;
-    for (int i = 0; i < 3000; ++i) {
+    for (int i = 0; i < count; ++i) {
         const glm::vec3 a = glm::vec3(unit(random), unit(random), unit(random)) * glm::vec3(extent);
-        const float length = 2.0f + 38.0f * unit(random);
+        const float length = 2.0f + (longest - 2.0f) * unit(random);
         const auto side = [&](float scale) {
             return scale * glm::vec3(unit(random) - 0.5f, unit(random) - 0.5f, unit(random) - 0.5f);
         };
@@ -109,6 +109,36 @@ TEST(Direct, FewAndManyLargeTriangles) {
         }
         for (const vp::coverage rule : both_rules)
             expect_same(bit_targets{}, m, box_grid(extent), vp::passthrough{}, same_bits(true), rule);
+    }
+}
+
+// So many of each kind that a thread has one, and in thin bits the warps gather words; also some beyond the grid.
+TEST(Direct, ManyMiddlingTriangles) {
+    const glm::ivec3 extent(190, 170, 180);
+    const mesh_data m = middling_triangles(extent, 89, 150000, 16.0f);
+    for (const vp::coverage rule : both_rules)
+        for (const bool count_voxels : {false, true})
+            expect_same<vp::target<vp::bit, blend::bit_or>>(m, box_grid(extent), vp::passthrough{}, vp::constant(true),
+                                                            vp::voxelize_options{rule, count_voxels});
+    expect_same_lists<void>(m, box_grid(extent), vp::passthrough{}, vp::constant(true),
+                            vp::voxelize_options{vp::coverage::thin, true});
+}
+
+// Few triangles in bits too large to be gathered apart: what an or and an and do to words where they lie, of targets
+// that were there before.
+TEST(Direct, FewTrianglesInManyBits) {
+    const glm::ivec3 extent(250, 200, 256);
+    mesh_data m = middling_triangles(extent, 88);
+    m.triangles.resize(300);
+    for (const vp::coverage rule : both_rules) {
+        const vp::voxelize_options options{rule, false};
+        const vp::grid g = box_grid(extent);
+        expect_same<vp::target<vp::bit, blend::bit_and>>(m, g, vp::passthrough{}, vp::constant(false), options,
+                                                         start::load);
+        expect_same<vp::target<vp::bit, blend::bit_or>>(m, g, vp::passthrough{}, vp::constant(true), options,
+                                                        start::load);
+        expect_same(target_list<vp::target<vp::bit, blend::bit_and>, vp::target<vp::bit, blend::bit_or>>{}, m, g,
+                    vp::passthrough{}, vp::constant(false, true), options, start::load);
     }
 }
 
