@@ -201,7 +201,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
             const small_box none{{1, 0, 0}, {0, all.hi[1], all.hi[2]}};
             s.rows<true>(none, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
             s.rows_of_16<true>(none, limits, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
-            const near_plane plane(s.n, s.below, s.above, from);
+            const near_plane plane(s.n, s.below, s.above, from, true), as_it_is(s.n, s.below, s.above, from, false);
             for (int y = 0; y <= all.hi[1]; ++y)
                 for (int z = 0; z <= all.hi[2]; ++z) {
                     const std::uint32_t limit = s.limit_at_y(from, last, y) & s.limit_at_z(from, last, z);
@@ -217,6 +217,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
                         ++sure_limits;
                         ASSERT_EQ(clipped, left) << "fraction " << fraction << ", triangle " << i;
                     }
+                    ASSERT_EQ(plane.meets(begin, end, y, z), as_it_is.meets(begin, end, y, z));
                     if (plane.meets(begin, end, y, z)) {
                         ++whole_limits;
                         ASSERT_EQ(left, limit) << "fraction " << fraction << ", triangle " << i;

@@ -184,15 +184,15 @@ struct small_row_ends {
 // meet the plane are within S / 2 of `middle`, and up to 32 voxels from the corner all that is added stays below 66 S:
 // less than 2^-15.9 S is lost, and 2^-15 S left for it on both sides.
 struct near_plane {
-    float n[3], middle;  // along x from x0 on, turned so that n[0] >= 0
+    float n[3], middle;  // along x from x0 on; where rows are to be clipped turned so that n[0] >= 0
     float half, inverse; // S / 2; 1 / (64 n[0])
 
     VOXELPIPE_HD VOXELPIPE_INLINE near_plane(const std::int64_t (&normal)[3], std::int64_t below, std::int64_t above,
-                                             int x0)
+                                             int x0, bool clips)
         : n{static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2])},
           middle(exact::fma(-n[0], static_cast<float>(x0), exact::mul(0.5f, static_cast<float>(above - below)))),
           half(exact::mul(0.5f, static_cast<float>(above + below))), inverse(0) {
-        if (normal[0] < 0) {
+        if (clips && normal[0] < 0) {
             for (float& k : n) k = -k;
             middle = -middle;
         }
@@ -202,7 +202,7 @@ struct near_plane {
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets(int from, int to, int y, int z) const {
         const float row = row_at(y, z), in = exact::mul(half, 1.0f - 0x1p-14f);
         const float a = exact::fma(n[0], small_to_float(from), row), b = exact::fma(n[0], small_to_float(to), row);
-        return -in < a && b < in; // a <= b
+        return a < in && -a < in && b < in && -b < in;
     }
     // Of the voxels from..to of a row, from x0 on, those that are left; `sure`: whether this is so. Along x the plane
     // comes nearer and goes: it leaves what is between two numbers, which are rounded inwards and then looked at: the
@@ -320,7 +320,7 @@ struct small_conservative {
     VOXELPIPE_HD VOXELPIPE_INLINE void rows(const small_box& box, Emit&& emit) const {
         const int x0 = box.lo[0], x7 = x0 + 7;
         if (box.hi[0] < x0) return;
-        const near_plane plane(n, below, above, x0);
+        const near_plane plane(n, below, above, x0, Clips);
         const std::uint32_t along = (2u << (box.hi[0] - x0)) - 1;
         for (int y0 = box.lo[1]; y0 <= box.hi[1]; y0 += 8) {
             const int y1 = box.hi[1] < y0 + 7 ? box.hi[1] : y0 + 7;
@@ -350,7 +350,7 @@ struct small_conservative {
         if (box.empty()) return;
         const int x0 = box.lo[0], y0 = box.lo[1], z0 = box.lo[2];
         const int last_x = box.hi[0] - x0, last_y = box.hi[1] - y0, last_z = box.hi[2] - z0;
-        const near_plane plane(n, below, above, x0);
+        const near_plane plane(n, below, above, x0, Clips);
         {
             small_row_ends by_y(xy, false, x0, y0, 1);
             for (int y = 0; y <= last_y; ++y) limits.set(y, by_y.next(last_x));
