@@ -181,8 +181,8 @@ struct small_row_ends {
 }
 
 // What the plane of a small triangle leaves of a row of voxels, in floats. With S = |n.x| + |n.y| + |n.z| voxels that
-// meet the plane are within S / 2 of `middle`, and up to 32 voxels from the corner all that is added, by five roundings,
-// stays below 66 S: less than 2^-15.3 S is lost, and 2^-15 S left for it on both sides.
+// meet the plane are within S / 2 of `middle`, and up to 32 voxels from the corner all that is added, by five
+// roundings, stays below 66 S: less than 2^-15.3 S is lost, and 2^-15 S left for it on both sides.
 struct near_plane {
     float n[3], middle;  // along x from x0 on; where rows are to be clipped turned so that n[0] >= 0
     float half, inverse; // S / 2; 1 / (64 n[0])
