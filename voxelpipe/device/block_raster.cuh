@@ -172,7 +172,6 @@ __global__ __launch_bounds__(raster_threads,
                              block_min_blocks) void block_raster_kernel(const __grid_constant__ Call call,
                                                                         pipeline_state* state) {
     using sink_type = typename Call::sink;
-    constexpr bool thin = Call::rule == coverage::thin;
     __shared__ warp_queues queues[raster_warps];
     __shared__ kept_rows rows_of_warps[raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
