@@ -8,6 +8,7 @@
 // reduction in L2. For thin coverage only: conservative rows have several bits, and gathering takes more instructions
 // than it saves.
 
+#include <voxelpipe/core/triangle_setup.hpp>
 #include <voxelpipe/device/direct_target.cuh>
 
 #include <cstdint>
