@@ -11,7 +11,6 @@
 #include <voxelpipe/device/fragment_sort.cuh>
 #include <voxelpipe/device/scene.cuh>
 
-#include <cub/block/block_merge_sort.cuh>
 #include <cuda/atomic>
 
 #include <algorithm>
@@ -26,6 +25,7 @@ inline constexpr std::uint32_t most_of_warp = 32 * 32;
 inline constexpr std::uint32_t most_of_block = 4096;
 inline constexpr int narrow_primitive_bits = 24; // beside the rank of a voxel in its window, in 32
 inline constexpr int order_warps = 4;            // of a block that takes windows
+inline constexpr int order_blocks = 8;           // on a multiprocessor
 inline constexpr int block_sort_threads = 256;
 inline constexpr std::uint32_t merge_ways = 64; // runs that one merge takes
 
@@ -110,14 +110,18 @@ struct tile_counts {
         return (capacity + length - 1) / length;
     }
 
-    // How many voxels begin in the tiles before this one, in which `count` do. By all lanes of one warp. Tiles are
-    // taken in order, so those before are under way.
+    using word = ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device>;
+
+    // Says how many voxels begin in this tile, for those behind. By one thread.
+    __device__ void publish(std::uint32_t tile, unsigned long long count) const {
+        if (tile != 0) word(words[tile]).store(own | count, ::cuda::memory_order_relaxed);
+    }
+    // How many voxels begin in the tiles before this one, in which `count` do, as has been published. By all lanes of
+    // one warp. Tiles are taken in order, so those before are under way.
     [[nodiscard]] __device__ unsigned long long before(std::uint32_t tile, unsigned long long count) const {
-        using word = ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device>;
         const auto lane = threadIdx.x % 32;
         unsigned long long sum = 0;
         if (tile != 0) {
-            if (lane == 0) word(words[tile]).store(own | count, ::cuda::memory_order_relaxed);
             for (std::int64_t last = std::int64_t{tile} - 1;; last -= 32) { // lane k looks at tile last - k
                 const std::int64_t mine = last - lane;
                 unsigned long long w = all; // before the first tile
@@ -191,23 +195,45 @@ struct order_buffers {
 
 // ---- windows --------------------------------------------------------------------------------------------------------
 
-// Sorts the numbers of a warp, of which a lane has Items neighbours, by a bitonic network that first compares each with
-// its mirror image, so that all comparisons go the same way. Neighbours up to Items apart are in one lane; beyond,
-// lanes exchange theirs.
+template <class Word>
+__device__ VOXELPIPE_INLINE void put_in_order(Word& low, Word& high) {
+    const Word a = low, b = high;
+    low = min(a, b);
+    high = max(a, b);
+}
+
+// The numbers of a warp, of which a lane has Items neighbours, by a bitonic network: those of runs of 2 * apart numbers
+// that are each less than all behind them, or more, once those apart have been compared.
+template <class Word, int Items>
+__device__ VOXELPIPE_INLINE void merge_warp(Word (&w)[Items], int apart) {
+    const int lane = static_cast<int>(threadIdx.x % 32);
+#pragma unroll
+    for (; apart > 0; apart /= 2) {
+        if (apart >= Items) {
+            const bool lower = (lane & apart / Items) == 0;
+#pragma unroll
+            for (int k = 0; k < Items; ++k) {
+                const Word other = __shfl_xor_sync(0xffffffffu, w[k], apart / Items);
+                w[k] = lower ? min(w[k], other) : max(w[k], other);
+            }
+        } else {
+#pragma unroll
+            for (int k = 0; k < Items; ++k)
+                if ((k & apart) == 0) put_in_order(w[k], w[k | apart]);
+        }
+    }
+}
+
+// Sorts them. Each run of numbers is compared with its mirror image first, so that all comparisons go the same way.
 template <class Word, int Items>
 __device__ VOXELPIPE_INLINE void sort_warp(Word (&w)[Items]) {
     const int lane = static_cast<int>(threadIdx.x % 32);
-    const auto put_in_order = [&](int low, int high) VOXELPIPE_INLINE_LAMBDA {
-        const Word a = w[low], b = w[high];
-        w[low] = min(a, b);
-        w[high] = max(a, b);
-    };
 #pragma unroll
     for (int size = 2; size <= 32 * Items; size *= 2) {
         if (size <= Items) {
 #pragma unroll
             for (int k = 0; k < Items; ++k)
-                if ((k & size / 2) == 0) put_in_order(k, k ^ (size - 1));
+                if ((k & size / 2) == 0) put_in_order(w[k], w[k ^ (size - 1)]);
         } else {
             const int lanes = size / Items;
             const bool lower = (lane & lanes / 2) == 0;
@@ -219,66 +245,155 @@ __device__ VOXELPIPE_INLINE void sort_warp(Word (&w)[Items]) {
                 w[Items - 1 - k] = lower ? min(w[Items - 1 - k], b) : max(w[Items - 1 - k], b);
             }
         }
-#pragma unroll
-        for (int apart = size / 4; apart > 0; apart /= 2) {
-            if (apart >= Items) {
-                const bool lower = (lane & apart / Items) == 0;
-#pragma unroll
-                for (int k = 0; k < Items; ++k) {
-                    const Word other = __shfl_xor_sync(0xffffffffu, w[k], apart / Items);
-                    w[k] = lower ? min(w[k], other) : max(w[k], other);
-                }
-            } else {
-#pragma unroll
-                for (int k = 0; k < Items; ++k)
-                    if ((k & apart) == 0) put_in_order(k, k | apart);
-            }
-        }
+        merge_warp(w, size / 4);
     }
 }
 
-// What a warp keeps of its window.
+// Sorts them where they are made of runs of at most `longest` numbers, each run less than the next: neighbours by
+// neighbours, even and odd ones in turn, which takes as many rounds as the longest run has numbers.
+template <class Word, int Items>
+__device__ VOXELPIPE_INLINE void sort_runs_of_warp(Word (&w)[Items], std::uint32_t longest) {
+    static_assert(Items % 2 == 0);
+    const bool is_first = threadIdx.x % 32 == 0, is_last = threadIdx.x % 32 == 31;
+    for (std::uint32_t round = 0; round < longest; round += 2) {
+#pragma unroll
+        for (int k = 0; k < Items; k += 2) put_in_order(w[k], w[k + 1]);
+#pragma unroll
+        for (int k = 1; k < Items - 1; k += 2) put_in_order(w[k], w[k + 1]);
+        const Word previous = __shfl_up_sync(0xffffffffu, w[Items - 1], 1);
+        const Word next = __shfl_down_sync(0xffffffffu, w[0], 1);
+        w[0] = max(w[0], is_first ? Word{0} : previous);
+        w[Items - 1] = min(w[Items - 1], is_last ? ~Word{0} : next);
+    }
+}
+
+// What a warp keeps of its window: the voxels that begin in it, and where.
 struct order_window {
-    static constexpr std::uint32_t most = window_length - 1 + most_of_window; // fragments of all voxels but a long one
-    static constexpr std::uint32_t places = 512;
-    static_assert(most <= places);
-    std::uint32_t voxels[window_length], first[window_length]; // of each voxel that begins here
-    std::uint32_t primitives[places + places / 32];            // a word more for 32, so that lanes meet no bank twice
+    std::uint32_t voxels[window_length], first[window_length];
 };
 
-// Writes the primitives of the fragments from `begin` on in order: places 0 .. end - 1 of the window, of which the
-// first `skipped` are of a voxel that begins before it. starts: by 32 places, where voxels begin. A fragment's number
-// in the sort is its voxel's rank within the window and then its primitive, in primitive_bits.
+// A lane's neighbours of n numbers, from number `first` on; ~0 beyond. numbers: aligned to 16 bytes.
+template <int Items>
+__device__ VOXELPIPE_INLINE void load_neighbours(const std::uint32_t* numbers, std::uint32_t first, std::uint32_t n,
+                                                 std::uint32_t (&to)[Items]) {
+    static_assert(Items % 4 == 0);
+    if (first + Items <= n) {
+#pragma unroll
+        for (int k = 0; k < Items; k += 4) {
+            const uint4 four = *reinterpret_cast<const uint4*>(numbers + first + k);
+            to[k] = four.x;
+            to[k + 1] = four.y;
+            to[k + 2] = four.z;
+            to[k + 3] = four.w;
+        }
+    } else {
+#pragma unroll
+        for (std::uint32_t k = 0; k < Items; ++k) to[k] = first + k < n ? numbers[first + k] : ~0u;
+    }
+}
+// Those of places begin .. end - 1 go where they belong.
+template <int Items>
+__device__ VOXELPIPE_INLINE void store_neighbours(std::uint32_t* numbers, std::uint32_t first, std::uint32_t begin,
+                                                  std::uint32_t end, const std::uint32_t (&from)[Items]) {
+    if (first >= begin && first + Items <= end && reinterpret_cast<std::uintptr_t>(numbers) % 16 == 0) {
+#pragma unroll
+        for (int k = 0; k < Items; k += 4)
+            *reinterpret_cast<uint4*>(numbers + first + k) = {from[k], from[k + 1], from[k + 2], from[k + 3]};
+    } else {
+#pragma unroll
+        for (std::uint32_t k = 0; k < Items; ++k)
+            if (first + k >= begin && first + k < end) numbers[first + k] = from[k];
+    }
+}
+
+// The voxels of a window of 32 * Items places, which count from its first; a lane has Items neighbours.
+template <int Items>
+struct window_voxels {
+    static constexpr std::uint32_t places = 32 * Items;
+    std::uint32_t voxel[Items];
+    unsigned starts;    // bit k: another voxel begins at the lane's place k than was before, or none
+    unsigned begins;    // the same of voxels that begin within window_length and before n
+    std::uint32_t rank; // of them, how many before this lane's places
+
+    // voxels: of n fragments, from the window's first; before: the voxel of the one before, or ~0.
+    __device__ VOXELPIPE_INLINE window_voxels(const std::uint32_t* voxels, std::uint32_t n, std::uint32_t before) {
+        const std::uint32_t lane = threadIdx.x % 32, first = lane * Items;
+        load_neighbours(voxels, first, n, voxel);
+        std::uint32_t previous = __shfl_up_sync(0xffffffffu, voxel[Items - 1], 1);
+        if (lane == 0) previous = before;
+        starts = 0;
+#pragma unroll
+        for (int k = 0; k < Items; ++k) {
+            starts |= voxel[k] != previous ? 1u << k : 0;
+            previous = voxel[k];
+        }
+        constexpr std::uint32_t length = window_length;
+        const std::uint32_t most = n < length ? n : length, own = first < most ? most - first : 0;
+        begins = starts & (own < Items ? (1u << own) - 1 : ~0u);
+        rank = static_cast<std::uint32_t>(__popc(begins));
+#pragma unroll
+        for (unsigned apart = 1; apart < 32; apart *= 2) {
+            const std::uint32_t other = __shfl_up_sync(0xffffffffu, rank, apart);
+            rank += lane >= apart ? other : 0;
+        }
+        rank -= static_cast<std::uint32_t>(__popc(begins));
+    }
+
+    // The first and the last of the places that are set in `bits` of any lane, of which there are some.
+    [[nodiscard]] static __device__ VOXELPIPE_INLINE std::uint32_t first_of(unsigned bits) {
+        const int lane = __ffs(static_cast<int>(__ballot_sync(0xffffffffu, bits != 0))) - 1;
+        return static_cast<std::uint32_t>(lane * Items + __ffs(static_cast<int>(__shfl_sync(0xffffffffu, bits, lane))) -
+                                          1);
+    }
+    [[nodiscard]] static __device__ VOXELPIPE_INLINE std::uint32_t last_of(unsigned bits) {
+        const int lane = 31 - __clz(static_cast<int>(__ballot_sync(0xffffffffu, bits != 0)));
+        return static_cast<std::uint32_t>(lane * Items + 31 -
+                                          __clz(static_cast<int>(__shfl_sync(0xffffffffu, bits, lane))));
+    }
+    // No voxel between two starts has more fragments.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t longest() const {
+        constexpr unsigned within = Items - 1; // of a lane
+        const unsigned next = __shfl_down_sync(0xffffffffu, starts, 1);
+        const unsigned across = starts != 0 && next != 0 && threadIdx.x % 32 != 31
+                                    ? static_cast<unsigned>(__ffs(static_cast<int>(next)) - 1 + Items - 31 +
+                                                            __clz(static_cast<int>(starts)))
+                                    : within;
+        unsigned most = __reduce_max_sync(0xffffffffu, across);
+        const unsigned lanes = __ballot_sync(0xffffffffu, starts != 0);
+        unsigned empty = ~lanes & (0u - (lanes & (0u - lanes))) & ~0u >> __clz(static_cast<int>(lanes));
+        if (empty != 0) { // lanes between others within which no voxel begins
+            for (most = 2 * Items - 1; empty != 0; empty &= empty << 1) most += Items;
+        }
+        return most < within ? within : most;
+    }
+};
+
+// Writes the primitives of the window's places begin .. end - 1 in order, within which whole voxels lie. A fragment's
+// number in the sort is its voxel's rank within the window and then its primitive, in primitive_bits.
 template <class Word, int Items>
-__device__ VOXELPIPE_INLINE void order_places(const order_buffers& b, std::uint32_t* to, order_window& window,
-                                              std::uint32_t begin, std::uint32_t skipped, std::uint32_t end,
-                                              const unsigned (&starts)[window_length / 32], int primitive_bits) {
-    constexpr int rows = window_length / 32;
-    const std::uint32_t lane = threadIdx.x % 32;
-    Word w[Items];
-    std::uint32_t before = 0; // voxels that begin before this row of places
+__device__ VOXELPIPE_INLINE void order_places(const std::uint32_t (&primitive)[Items], std::uint32_t* to,
+                                              const window_voxels<Items>& window, std::uint32_t begin,
+                                              std::uint32_t end, int primitive_bits) {
+    constexpr std::uint32_t few = Items <= 8 ? 6 * Items : 0; // beyond, the network for any order takes less
+    const std::uint32_t first = threadIdx.x % 32 * Items;
+    Word w[Items], rank = static_cast<Word>(window.rank) - 1;
 #pragma unroll
-    for (int k = 0; k < Items; ++k) {
-        const std::uint32_t place = lane + 32 * static_cast<std::uint32_t>(k);
-        const unsigned mine = k < rows ? starts[k < rows ? k : 0] : 0;
-        const std::uint32_t rank = before + static_cast<std::uint32_t>(__popc(mine & (2u << lane) - 1)) - 1;
-        before += static_cast<std::uint32_t>(__popc(mine));
-        w[k] = place >= skipped && place < end ? static_cast<Word>(rank) << primitive_bits | b.from[begin + place]
-                                               : ~Word{0};
+    for (std::uint32_t k = 0; k < Items; ++k) {
+        rank += window.begins >> k & 1u;
+        const Word own = rank << primitive_bits | primitive[k], but_before = first + k < begin ? Word{0} : own;
+        w[k] = first + k < end ? but_before : ~Word{0};
     }
-    sort_warp(w);
+    // A voxel that ends with the window has no start behind it.
+    const std::uint32_t longest = few != 0 && end < window.places ? window.longest() : few + 1;
+    if (longest <= few)
+        sort_runs_of_warp(w, longest);
+    else
+        sort_warp(w);
+    std::uint32_t sorted[Items];
 #pragma unroll
-    for (int k = 0; k < Items; ++k) {
-        const std::uint32_t at = lane * Items + static_cast<std::uint32_t>(k);
-        window.primitives[at + at / 32] =
-            static_cast<std::uint32_t>(w[k] & (static_cast<Word>(1) << primitive_bits) - 1);
-    }
-    __syncwarp();
-#pragma unroll
-    for (int k = 0; k < Items; ++k) {
-        const std::uint32_t at = lane + 32 * static_cast<std::uint32_t>(k);
-        if (at < end - skipped) to[begin + skipped + at] = window.primitives[at + static_cast<std::uint32_t>(k)];
-    }
+    for (int k = 0; k < Items; ++k)
+        sorted[k] = static_cast<std::uint32_t>(w[k] & (static_cast<Word>(1) << primitive_bits) - 1);
+    store_neighbours(to, first, begin, end, sorted);
 }
 
 // Of n voxels of fragments, ascending: the first from `at` on that is not this one, where all before are. By all lanes.
@@ -299,69 +414,62 @@ __device__ VOXELPIPE_INLINE void order_places(const order_buffers& b, std::uint3
     return static_cast<std::uint32_t>(end);
 }
 
-// Puts the voxels in order that begin in the window of n fragments from `begin` on, but for one that is too long, which
-// goes to its list; leaves all of them in `window`, and returns how many they are. By all lanes of a warp.
-template <bool Narrow>
-[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t
-order_window_at(const order_buffers& b, std::uint32_t* to, order_window& window, std::uint32_t begin, std::uint32_t n) {
-    constexpr int rows = window_length / 32;
-    const std::uint32_t lane = threadIdx.x % 32;
-    const std::uint32_t* const voxels = b.keys + begin;
-    n -= begin; // from here on places count from the window's first
-    std::uint32_t row[rows];
+// The window of n fragments from `begin` on, by all lanes of a warp.
+struct order_of_window {
+    static constexpr int items = 8, wide_items = 16;
+    using voxels_type = window_voxels<items>;
+    using wide_type = window_voxels<wide_items>;
+    static_assert(voxels_type::places >= window_length && wide_type::places >= window_length - 1 + most_of_window);
+
+    const order_buffers& b;
+    std::uint32_t begin, n, before; // n counts from the window's first, as all places do; the voxel before it
+    std::uint32_t primitive[items]{};
+    voxels_type voxels;
+    std::uint32_t count; // of voxels that begin in it
+
+    __device__ VOXELPIPE_INLINE order_of_window(const order_buffers& buffers, std::uint32_t begin_, std::uint32_t n_)
+        : b(buffers), begin(begin_), n(n_ - begin_), before(begin_ == 0 ? ~0u : b.keys[begin_ - 1]),
+          voxels(b.keys + begin, n, before) {
+        load_neighbours(b.from + begin, threadIdx.x % 32 * items, n, primitive);
+        count = __reduce_add_sync(0xffffffffu, static_cast<std::uint32_t>(__popc(voxels.begins)));
+    }
+
+    __device__ VOXELPIPE_INLINE void keep(order_window& kept) const {
+        const std::uint32_t first = begin + threadIdx.x % 32 * items;
+        std::uint32_t rank = voxels.rank;
 #pragma unroll
-    for (int k = 0; k < rows; ++k) {
-        const std::uint32_t place = lane + 32 * static_cast<std::uint32_t>(k);
-        row[k] = place < n ? voxels[place] : ~0u;
+        for (std::uint32_t k = 0; k < items; ++k)
+            if ((voxels.begins >> k & 1u) != 0) {
+                kept.voxels[rank] = voxels.voxel[k];
+                kept.first[rank++] = first + k;
+            }
     }
-    std::uint32_t before = begin == 0 ? ~0u : *(voxels - 1); // the voxel of the fragment before a row
-    unsigned starts[rows];
-    std::uint32_t count = 0;
-#pragma unroll
-    for (int k = 0; k < rows; ++k) {
-        const std::uint32_t place = lane + 32 * static_cast<std::uint32_t>(k);
-        std::uint32_t previous = __shfl_up_sync(0xffffffffu, row[k], 1);
-        if (lane == 0) previous = before;
-        before = __shfl_sync(0xffffffffu, row[k], 31);
-        const bool is_first = place < n && row[k] != previous;
-        starts[k] = __ballot_sync(0xffffffffu, is_first);
-        if (is_first) {
-            const std::uint32_t rank = count + static_cast<std::uint32_t>(__popc(starts[k] & ((1u << lane) - 1)));
-            window.voxels[rank] = row[k];
-            window.first[rank] = begin + place;
+
+    // Puts its voxels in order, but for one that is too long, which goes to its list.
+    template <bool Narrow>
+    __device__ VOXELPIPE_INLINE void order(std::uint32_t* to) const {
+        if (count == 0) return;
+        const std::uint32_t skipped = voxels_type::first_of(voxels.begins);
+        const unsigned behind = voxels.starts & ~voxels.begins;
+        std::uint32_t whole = count;
+        std::uint32_t end = voxels_type::places;
+        if (__any_sync(0xffffffffu, behind != 0))
+            end = voxels_type::first_of(behind);
+        else
+            whole -= find_last(end);
+        to += begin;
+        if (end - skipped <= whole) { // a fragment each, or nothing
+            store_neighbours(to, threadIdx.x % 32 * items, skipped, end, primitive);
+            return;
         }
-        count += static_cast<std::uint32_t>(__popc(starts[k]));
-    }
-    __syncwarp();
-    if (count == 0) return 0;
-    // The last one ends in another window.
-    const std::uint32_t last = window.first[count - 1] - begin, voxel = window.voxels[count - 1];
-    std::uint32_t end = window_length;
-    for (;;) {
-        const unsigned other = __ballot_sync(0xffffffffu, end + lane >= n || voxels[end + lane] != voxel);
-        if (other != 0) {
-            end += static_cast<std::uint32_t>(__ffs(static_cast<int>(other))) - 1;
-            break;
-        }
-        end += 32;
-        if (end - last > most_of_window) break;
-    }
-    end = end < n ? end : n;
-    const bool is_long = end - last > most_of_window;
-    if (is_long) {
-        end = find_end(voxels, n, voxel, end);
-        if (lane == 0) b.lists.push(begin + last, end - last);
-        end = last;
-    }
-    const std::uint32_t skipped = window.first[0] - begin;
-    if (end - skipped <= (is_long ? count - 1 : count)) { // a fragment each, or nothing
-        for (std::uint32_t i = skipped + lane; i < end; i += 32) to[begin + i] = b.from[begin + i];
-    } else {
         const auto order = [&]<class Word>(int primitive_bits) VOXELPIPE_INLINE_LAMBDA {
-            if (end <= 32 * 8)
-                order_places<Word, 8>(b, to, window, begin, skipped, end, starts, primitive_bits);
-            else
-                order_places<Word, 16>(b, to, window, begin, skipped, end, starts, primitive_bits);
+            if (end <= voxels_type::places) {
+                order_places<Word>(primitive, to, voxels, skipped, end, primitive_bits);
+            } else {
+                std::uint32_t all[wide_items];
+                load_neighbours(b.from + begin, threadIdx.x % 32 * wide_items, n, all);
+                order_places<Word>(all, to, wide_type(b.keys + begin, n, before), skipped, end, primitive_bits);
+            }
         };
         if constexpr (Narrow)
             order.template operator()<std::uint32_t>(narrow_primitive_bits);
@@ -371,13 +479,35 @@ order_window_at(const order_buffers& b, std::uint32_t* to, order_window& window,
         else
             order.template operator()<std::uint64_t>(32);
     }
-    return count;
-}
+
+private:
+    // Where the last voxel ends, which does so at `end` or beyond. Returns 1 where it is too long: then `end` is where
+    // it begins.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t find_last(std::uint32_t& end) const {
+        const std::uint32_t lane = threadIdx.x % 32, last = voxels_type::last_of(voxels.begins);
+        const std::uint32_t* const keys = b.keys + begin;
+        const std::uint32_t voxel = keys[last];
+        do {
+            const unsigned other = __ballot_sync(0xffffffffu, end + lane >= n || keys[end + lane] != voxel);
+            if (other != 0) {
+                end += static_cast<std::uint32_t>(__ffs(static_cast<int>(other))) - 1;
+                break;
+            }
+            end += 32;
+        } while (end - last <= most_of_window);
+        if (end - last <= most_of_window) return 0;
+        end = find_end(keys, n, voxel, end);
+        if (lane == 0) b.lists.push(begin + last, end - last);
+        end = last;
+        return 1;
+    }
+};
 
 // Narrow: primitives have narrow_primitive_bits.
 template <bool Narrow>
-__global__ __launch_bounds__(32 * order_warps) void order_windows_kernel(const __grid_constant__ order_buffers b,
-                                                                         pipeline_state* state, capacities limits) {
+__global__ __launch_bounds__(32 * order_warps,
+                             order_blocks) void order_windows_kernel(const __grid_constant__ order_buffers b,
+                                                                     pipeline_state* state, capacities limits) {
     __shared__ order_window windows[order_warps];
     __shared__ std::uint32_t tile, counts[order_warps];
     __shared__ unsigned long long before;
@@ -392,13 +522,19 @@ __global__ __launch_bounds__(32 * order_warps) void order_windows_kernel(const _
         __syncthreads();
         const std::uint64_t first = std::uint64_t{tile} * tile_counts::length, begin = first + warp * window_length;
         if (first >= n) return;
-        order_window& window = windows[warp];
-        const std::uint32_t count =
-            begin < n ? order_window_at<Narrow>(b, to.primitives, window, static_cast<std::uint32_t>(begin), n) : 0;
-        if (lane == 0) counts[warp] = count;
+        // Where the tile has no such window, one that begins with the last fragment, of no voxel.
+        const order_of_window window(b, static_cast<std::uint32_t>(begin < n ? begin : n), n);
+        if (lane == 0) counts[warp] = window.count;
         __syncthreads();
+        std::uint32_t earlier = 0, all = 0;
+        for (std::uint32_t w = 0; w < order_warps; ++w) {
+            earlier += w < warp ? counts[w] : 0;
+            all += counts[w];
+        }
+        if (threadIdx.x == 0) b.tiles.publish(tile, all); // before the sort, for the tiles behind
+        window.keep(windows[warp]);
+        window.template order<Narrow>(to.primitives);
         if (warp == 0) {
-            const std::uint32_t all = __reduce_add_sync(0xffffffffu, lane < order_warps ? counts[lane] : 0);
             const unsigned long long sum = b.tiles.before(tile, all);
             if (lane == 0) {
                 before = sum;
@@ -409,24 +545,47 @@ __global__ __launch_bounds__(32 * order_warps) void order_windows_kernel(const _
             }
         }
         __syncthreads();
-        std::uint64_t at = before + lane;
-        for (std::uint32_t w = 0; w < warp; ++w) at += counts[w];
-        for (std::uint32_t r = lane; r < count && at < to.room; r += 32, at += 32) {
+        std::uint64_t at = before + earlier + lane;
+        for (std::uint32_t r = lane; r < window.count && at < to.room; r += 32, at += 32) {
             if (to.voxels != nullptr)
-                to.voxels[at] = window.voxels[r];
+                to.voxels[at] = windows[warp].voxels[r];
             else
-                to.narrow_voxels[at] = window.voxels[r];
-            to.offsets[at] = window.first[r];
+                to.narrow_voxels[at] = windows[warp].voxels[r];
+            to.offsets[at] = windows[warp].first[r];
         }
     }
 }
 
 // ---- long voxels ----------------------------------------------------------------------------------------------------
 
+// Numbers of a block, on their way from one lane to another. Those of a warp lie apart; a word more for 32, so that
+// lanes meet no bank twice.
+struct sort_exchange {
+    static constexpr std::uint32_t of_warp = most_of_warp + most_of_warp / 32;
+    std::uint32_t numbers[block_sort_threads / 32 * of_warp];
+    static_assert(block_sort_threads / 32 * of_warp >= most_of_block);
+};
+
+// Writes the first n numbers of a warp, of which a lane has Items neighbours.
+template <int Items>
+__device__ VOXELPIPE_INLINE void store_warp(const std::uint32_t (&w)[Items], sort_exchange& exchange, std::uint32_t* to,
+                                            std::uint32_t n) {
+    std::uint32_t* const mine = exchange.numbers + warp_in_block() * sort_exchange::of_warp;
+    const std::uint32_t lane = threadIdx.x % 32;
+#pragma unroll
+    for (std::uint32_t k = 0; k < Items; ++k) mine[lane * Items + k + (lane * Items + k) / 32] = w[k];
+    __syncwarp();
+#pragma unroll
+    for (std::uint32_t k = 0; k < Items; ++k)
+        if (lane + 32 * k < n) to[lane + 32 * k] = mine[lane + 33 * k];
+    __syncwarp();
+}
+
 // The voxels of a list by a warp each, the first one by the first warp of block `start`. What is beyond the fragments
 // of a voxel is more than any primitive, or equal to the last.
 template <int List>
-__device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uint32_t* to, unsigned start) {
+__device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uint32_t* to, sort_exchange& exchange,
+                                                unsigned start) {
     constexpr int items = static_cast<int>(order_lists::most_below(List + 1) / 32);
     constexpr std::uint32_t warps = block_sort_threads / 32;
     const std::uint32_t n = uniform(b.lists.counts[List]), lane = threadIdx.x % 32;
@@ -440,51 +599,84 @@ __device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uin
             w[k] = i < run.length ? b.from[run.begin + i] : ~0u;
         }
         sort_warp(w);
-#pragma unroll
-        for (std::uint32_t k = 0; k < items; ++k)
-            if (lane * items + k < run.length) to[run.begin + lane * items + k] = w[k];
+        store_warp(w, exchange, to + run.begin, static_cast<std::uint32_t>(run.length));
     }
 }
 
-struct less_than {
-    [[nodiscard]] __device__ bool operator()(std::uint32_t a, std::uint32_t b) const { return a < b; }
-};
+// Sorts the numbers of a block, of which a thread has Items neighbours: the network of sort_warp, in which warps
+// exchange theirs through shared memory.
+template <int Items>
+__device__ VOXELPIPE_INLINE void sort_block(std::uint32_t (&w)[Items], sort_exchange& exchange) {
+    constexpr int of_warp = 32 * Items, all = block_sort_threads * Items;
+    sort_warp(w);
+    // Number k of this thread with that of another, whose number differs by the bits of `threads`.
+    const auto compare = [&](unsigned threads, unsigned lower_bit, bool mirrored) VOXELPIPE_INLINE_LAMBDA {
+        __syncthreads();
+#pragma unroll
+        for (int k = 0; k < Items; ++k) exchange.numbers[k * block_sort_threads + threadIdx.x] = w[k];
+        __syncthreads();
+        const bool lower = (threadIdx.x & lower_bit) == 0;
+#pragma unroll
+        for (int k = 0; k < Items; ++k) {
+            const std::uint32_t other =
+                exchange.numbers[(mirrored ? Items - 1 - k : k) * block_sort_threads + (threadIdx.x ^ threads)];
+            w[k] = lower ? min(w[k], other) : max(w[k], other);
+        }
+    };
+    for (int size = 2 * of_warp; size <= all; size *= 2) {
+        const auto threads = static_cast<unsigned>(size / Items);
+        compare(threads - 1, threads / 2, true);
+        for (unsigned apart = threads / 4; apart >= 32; apart /= 2) compare(apart, apart, false);
+        merge_warp(w, of_warp / 2);
+    }
+}
+
+// A run of at most Items * block_sort_threads primitives.
+template <int Items>
+__device__ VOXELPIPE_INLINE void order_run(const std::uint32_t* from, std::uint32_t* to, std::uint32_t length,
+                                           sort_exchange& exchange) {
+    std::uint32_t w[Items];
+#pragma unroll
+    for (std::uint32_t k = 0; k < Items; ++k) {
+        const std::uint32_t i = threadIdx.x + block_sort_threads * k;
+        w[k] = i < length ? from[i] : ~0u;
+    }
+    sort_block(w, exchange);
+    __syncthreads(); // nobody reads what others wrote into the exchange
+    const std::uint32_t first = warp_in_block() * 32 * Items;
+    if (first < length) store_warp(w, exchange, to + first, length - first);
+    __syncthreads();
+}
 
 // By a block each: voxels, and runs of one, which go back to where they were.
-__device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::uint32_t* primitives) {
-    constexpr std::uint32_t items = most_of_block / block_sort_threads;
+__device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::uint32_t* primitives,
+                                                 sort_exchange& exchange) {
+    constexpr int most_items = most_of_block / block_sort_threads;
     using lists = order_lists;
-    using sorter = cub::BlockMergeSort<std::uint32_t, block_sort_threads, static_cast<int>(items)>;
-    __shared__ typename sorter::TempStorage storage;
     const std::uint32_t whole = b.lists.counts[lists::block_list], all = whole + b.lists.counts[lists::run_list];
     for (std::uint32_t r = blockIdx.x; r < all; r += gridDim.x) {
         const fragment_run run = r < whole ? b.lists.voxels[lists::block_list][r] : b.lists.runs[r - whole].run;
-        std::uint32_t w[items];
-#pragma unroll
-        for (std::uint32_t k = 0; k < items; ++k) {
-            const std::uint32_t i = threadIdx.x + block_sort_threads * k;
-            w[k] = i < run.length ? b.from[run.begin + i] : ~0u;
-        }
-        sorter(storage).Sort(w, less_than{});
-        __syncthreads(); // all have read the run, and the storage may be used again
-        std::uint32_t* const to = r < whole ? primitives : b.from;
-#pragma unroll
-        for (std::uint32_t k = 0; k < items; ++k) {
-            const std::uint32_t i = threadIdx.x * items + k;
-            if (i < run.length) to[run.begin + i] = w[k];
-        }
+        const std::uint32_t* const from = b.from + run.begin;
+        std::uint32_t* const to = (r < whole ? primitives : b.from) + run.begin;
+        const auto length = static_cast<std::uint32_t>(run.length);
+        if (length <= most_of_block / 2)
+            order_run<most_items / 2>(from, to, length, exchange);
+        else
+            order_run<most_items>(from, to, length, exchange);
     }
 }
 
 template <class Buffers>
 __global__ __launch_bounds__(block_sort_threads, 4) void order_long_kernel(const __grid_constant__ Buffers b) {
+    __shared__ sort_exchange exchange;
     await_stream();
     std::uint32_t* const to = b.places().primitives;
     // Where there are few, each list has blocks of its own.
-    order_by_warps<0>(b, to, gridDim.x / 3);
-    order_by_warps<1>(b, to, gridDim.x / 3 * 2);
+    order_by_warps<0>(b, to, exchange, gridDim.x / 3);
+    order_by_warps<1>(b, to, exchange, gridDim.x / 3 * 2);
     static_assert(num_warp_sorts == 2);
-    order_by_blocks(b, to);
+    __syncthreads();
+    order_by_blocks(b, to, exchange);
 }
 
 // How many of n sorted numbers are less than w.
@@ -558,8 +750,8 @@ inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipel
     const auto windows =
         b.primitive_bits <= narrow_primitive_bits ? order_windows_kernel<true> : order_windows_kernel<false>;
     const std::uint64_t tiles = tile_counts::num(capacity);
-    launch_behind(windows, fill_device(tiles * threads_per_block, 8), 32 * order_warps, stream, where, b, state,
-                  limits);
+    launch_behind(windows, fill_device(tiles * threads_per_block, order_blocks), 32 * order_warps, stream, where, b,
+                  state, limits);
     if (capacity > most_of_window)
         launch_behind(order_long_kernel<order_buffers>, fill_device(capacity / (most_of_window + 1) * 32, 4),
                       block_sort_threads, stream, where, b);
