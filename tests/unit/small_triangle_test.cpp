@@ -293,6 +293,10 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
             for (const bool swapped : {false, true})
                 for (const int step : {1, 8})
                     ASSERT_EQ(by_columns(swapped, 0, step), rows) << "fraction " << fraction << ", triangle " << i;
+            std::uint32_t count = 0;
+            kept_rows kept;
+            (void)s.find_columns(0, width - 1, 0, height - 1, 1, kept, count);
+            ASSERT_EQ(count, rows.size()) << "fraction " << fraction << ", triangle " << i;
             ASSERT_TRUE(by_columns(false, width, 1).empty()); // a part of the box that has no columns
             voxels part = rows;
             std::erase_if(part, [&](const auto& p) {

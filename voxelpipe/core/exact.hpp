@@ -310,6 +310,14 @@ template <class Int>
 #endif
 }
 
+[[nodiscard]] VOXELPIPE_HD inline int count_ones(std::uint32_t a) {
+#if defined(__CUDA_ARCH__)
+    return __popc(a);
+#else
+    return std::popcount(a);
+#endif
+}
+
 // Place of the lowest bit that is set; a != 0.
 [[nodiscard]] VOXELPIPE_HD inline int lowest_one(std::uint32_t a) {
 #if defined(__CUDA_ARCH__)

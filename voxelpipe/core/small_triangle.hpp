@@ -511,48 +511,66 @@ struct small_thin {
         nv = u;
     }
 
-    // Calls begin_row(v) and emit(u, w) for the covered columns of the rows v0, v0 + step, ... up to v1, of at most 32
-    // columns each: row() for threads that have a triangle each, as small_conservative::rows. First all rows, then one
-    // loop over the columns that are left. `kept` holds a word for each of the rows, at most 32: get(i), set(i, word).
-    template <class Kept, class BeginRow, class Emit>
-    VOXELPIPE_HD VOXELPIPE_INLINE void columns(int u0, int u1, int v0, int v1, int step, Kept&& kept,
-                                               BeginRow&& begin_row, Emit&& emit) const {
-        std::uint32_t rows = 0;
+    // Covered columns, row by row, of which some may have been passed.
+    struct walk {
+        float by_u, by_v, first, of_row; // depths: steps, at the centre of (0, 0), and of this row's first column
+        std::uint32_t rows, row;         // what is left: rows, as bits, and columns of this one
+        int u0, v0, step, v;
+        [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_done() const { return (rows | row) == 0; }
+    };
+    // The covered columns of the rows v0, v0 + step, ... up to v1, of at most 32 columns each. `kept` holds a word for
+    // each of the rows, at most 32: get(i), set(i, word). Adds how many columns they are to `count`.
+    template <class Kept>
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE walk find_columns(int u0, int u1, int v0, int v1, int step, Kept&& kept,
+                                                                  std::uint32_t& count) const {
+        walk k{};
         {
             small_row_ends ends(uv, false, u0, v0, step);
             int i = 0;
             for (int v = u1 < u0 ? v1 + 1 : v0; v <= v1; v += step, ++i) {
                 const std::uint32_t row = ends.next(u1 - u0);
                 kept.set(i, row);
-                rows |= static_cast<std::uint32_t>(row != 0) << i;
+                k.rows |= static_cast<std::uint32_t>(row != 0) << i;
+                count += static_cast<std::uint32_t>(exact::count_ones(row));
             }
         }
         const float inverse = exact::near_inverse(static_cast<float>(nw));
-        const float by_u = exact::mul(-static_cast<float>(nu), inverse),
-                    by_v = exact::mul(-static_cast<float>(nv), inverse);
-        const float first =
-            exact::mul(static_cast<float>(depth - nu - nv), exact::mul(0.5f, inverse)); // at the centre of (0, 0)
-        float of_row = 0;
-        std::uint32_t row = 0;
-        for (int v = 0;;) {
-            if (row == 0) {
-                if (rows == 0) break;
-                const int i = exact::highest_one(rows);
-                rows ^= 1u << i;
-                row = kept.get(i);
-                v = v0 + i * step;
-                of_row = exact::fma(by_v, static_cast<float>(v), first);
-                begin_row(v);
-            }
-            const int i = exact::highest_one(row), u = u0 + i;
-            row ^= 1u << i;
-            // Slopes are at most one, and depths from -1 to 33, so that `first` is below 100, and what is lost on the
-            // way below 2^-14 voxel.
-            float over = 0;
-            std::int32_t w = exact::integer_below(exact::fma(by_u, static_cast<float>(u), of_row), over);
-            if (over < 0x1p-12f || over > 1.0f - 0x1p-12f) w = depth_of(u, v, w);
-            emit(u, w);
+        k.by_u = exact::mul(-static_cast<float>(nu), inverse);
+        k.by_v = exact::mul(-static_cast<float>(nv), inverse);
+        k.first = exact::mul(static_cast<float>(depth - nu - nv), exact::mul(0.5f, inverse));
+        k.u0 = u0;
+        k.v0 = v0;
+        k.step = step;
+        return k;
+    }
+    // The next column of a walk that is not done: emit(u, w), and begin_row(v) before the first of a row.
+    template <class Kept, class BeginRow, class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void next_column(walk& k, Kept&& kept, BeginRow&& begin_row, Emit&& emit) const {
+        if (k.row == 0) {
+            const int i = exact::highest_one(k.rows);
+            k.rows ^= 1u << i;
+            k.row = kept.get(i);
+            k.v = k.v0 + i * k.step;
+            k.of_row = exact::fma(k.by_v, static_cast<float>(k.v), k.first);
+            begin_row(k.v);
         }
+        const int i = exact::highest_one(k.row), u = k.u0 + i;
+        k.row ^= 1u << i;
+        // Slopes are at most one, and depths from -1 to 33, so that `first` is below 100, and what is lost on the way
+        // below 2^-14 voxel.
+        float over = 0;
+        std::int32_t w = exact::integer_below(exact::fma(k.by_u, static_cast<float>(u), k.of_row), over);
+        if (over < 0x1p-12f || over > 1.0f - 0x1p-12f) w = depth_of(u, k.v, w);
+        emit(u, w);
+    }
+    // All of them: row() for threads that have a triangle each, as small_conservative::rows. First all rows, then one
+    // loop over the columns that are left.
+    template <class Kept, class BeginRow, class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void columns(int u0, int u1, int v0, int v1, int step, Kept&& kept,
+                                               BeginRow&& begin_row, Emit&& emit) const {
+        std::uint32_t count = 0;
+        for (walk k = find_columns(u0, u1, v0, v1, step, kept, count); !k.is_done();)
+            next_column(k, kept, begin_row, emit);
     }
 
 private:

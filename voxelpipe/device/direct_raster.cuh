@@ -57,6 +57,7 @@ __global__ void check_indices_kernel(const Index* indices, std::uint64_t count, 
 // What every sink of a direct call does with triangles that are not drawn.
 template <class Call>
 struct direct_sink {
+    static constexpr bool has_rounds = false;
     const Call& call;
     unsigned* dropped; // by triangle_class, of the block
 
@@ -410,13 +411,19 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place
                 const std::uint32_t triangle = call.lists.at(k, (begin + at - first) * 32 + place.lane);
                 const near_triangle r = load_near(call.in, call.in.source.triangle(triangle));
                 __syncwarp();
-                feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                bool is_done = false;
+                if constexpr (Call::rule == coverage::thin && Sink::has_rounds) {
                     sink.begin(triangle);
-                    if (k == tiny_triangles)
-                        raster_tiny<Call::rule>(call.in, r, sink);
-                    else
-                        raster_small<Call::rule, true>(call.in, r, kept, rows);
-                });
+                    is_done = k != tiny_triangles && raster_thin_by_rounds(call.in, r, kept, sink);
+                }
+                if (!is_done)
+                    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                        sink.begin(triangle);
+                        if (k == tiny_triangles)
+                            raster_tiny<Call::rule>(call.in, r, sink);
+                        else
+                            raster_small<Call::rule, true>(call.in, r, kept, rows);
+                    });
                 __syncwarp();
                 if constexpr (combines_words<Call>)
                     if (k != tiny_triangles) rows.flush();

@@ -16,6 +16,7 @@ struct listing_sink : direct_sink<Call> {
     static constexpr bool buffers = true;
     static constexpr bool shares = false;
     static constexpr bool spreads = true;
+    static constexpr bool has_rounds = true;
     static constexpr unsigned room = 448;    // with the queues, less than 48 KB for a block
     static constexpr unsigned flush_at = 64; // less may wait: a round of thin triangles brings up to 384
     struct memory {
@@ -65,6 +66,28 @@ struct listing_sink : direct_sink<Call> {
     [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t place(int x, int y, int z) const { return voxel(x, y, z); }
     __device__ VOXELPIPE_INLINE void put(std::uint32_t voxel, bool wanted) {
         if (wanted) write(atomicAdd(&m_.n, 1u), voxel);
+    }
+    // They go to the list at once: neighbours, as the lanes that give one.
+    template <class IsDone, class Next>
+    __device__ VOXELPIPE_INLINE void rounds(std::uint32_t count, IsDone&& is_done, Next&& next) {
+        const unsigned all = __reduce_add_sync(0xffffffffu, count), before = (1u << threadIdx.x % 32) - 1;
+        if (all == 0) return;
+        const unsigned long long first = take(all), rest = room_from(first);
+        std::uint32_t *const voxels = this->call.out.voxels + first, *const primitives =
+                                                                         this->call.out.primitives + first;
+        unsigned given = 0;
+        for (unsigned lanes = 0; (lanes = __ballot_sync(0xffffffffu, !is_done())) != 0;) {
+            if ((lanes & (before + 1)) != 0) {
+                const std::uint32_t voxel = next();
+                const unsigned at = given + static_cast<unsigned>(__popc(lanes & before));
+                if (at < rest) {
+                    voxels[at] = voxel;
+                    primitives[at] = primitive_;
+                }
+            }
+            given += static_cast<unsigned>(__popc(lanes));
+            __syncwarp();
+        }
     }
     __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word bits) {
         if (bits == 0) return;
@@ -138,6 +161,11 @@ private:
         if (threadIdx.x % 32 == 0)
             first = atomicAdd(&this->call.out.state->list_fragments, static_cast<unsigned long long>(n));
         return __shfl_sync(0xffffffffu, first, 0);
+    }
+    // How many fragments there is room for from number `first` on.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long room_from(unsigned long long first) const {
+        const unsigned long long capacity = this->call.out.capacity;
+        return first < capacity ? capacity - first : 0;
     }
     __device__ VOXELPIPE_INLINE void flush(unsigned n) const {
         if (n == 0) return;

@@ -14,11 +14,16 @@
 //   mark_boxes(wanted, triangle), mark_row(x0, x1, y, z), mark_brick(corner, lane): told of what a triangle may touch
 //                     before it comes, of a brick by each of medium_lanes lanes
 //   drop(class)       counts a triangle that is not drawn
+//   has_rounds        whether a warp had better give it thin fragments by
+//   rounds(count, is_done, next): those of all lanes, one of each lane at a time: next() is the place of the next of
+//                     this lane's `count`
 
 #include <voxelpipe/core/brick_triangle.hpp>
 #include <voxelpipe/core/corner_signs.hpp>
 #include <voxelpipe/device/scene.cuh>
 #include <voxelpipe/device/vertex_shade.cuh>
+
+#include <utility>
 
 namespace voxelpipe::device {
 
@@ -188,37 +193,92 @@ static_assert(sizeof(kept_rows::words[0]) == 128);
 // side.
 static_assert(most_columns < most_long_side * most_long_side && 32 / medium_lanes <= most_long_side);
 
-// Thin fragments of the columns in rows first, first + step, ... of a small triangle, the rows along the longer side of
-// what is wanted of its box; false where it has no area.
+// The columns of a small triangle that thin coverage wants, rows along the longer side of what is wanted of its box,
+// and where their voxels lie, which is linear in u, v and w.
+template <class Place>
+struct thin_columns {
+    core::small_thin s;
+    core::triple<std::int32_t> begin, end; // along u, v, w
+    int lowest, depth;                     // along w: voxels of the grid before the box, and of the grid
+    Place origin, by_u, by_v, by_w;
+
+    // False where the triangle has no area.
+    template <class Source, class Sink>
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool find(const raster_input<Source>& call, const core::small_triangle& t,
+                                                        const std::int32_t (&lo)[3], const core::small_box& box,
+                                                        const Sink& sink) {
+        const core::triple<std::int64_t> normal = core::small_normal(t);
+        const int axis = core::small_axis(normal);
+        if (axis < 0) return false;
+        s = core::small_thin(t, normal, axis, call.fraction);
+        begin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
+        end = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
+        const bool swapped = end[0] - begin[0] < end[1] - begin[1];
+        if (swapped) {
+            s.swap_uv();
+            begin = {begin[1], begin[0], begin[2]};
+            end = {end[1], end[0], end[2]};
+        }
+        depth = axis == 0 ? call.extent.x : axis == 1 ? call.extent.y : call.extent.z;
+        lowest = axis == 0 ? lo[0] : axis == 1 ? lo[1] : lo[2];
+        const auto step_along = [&](int k) VOXELPIPE_INLINE_LAMBDA { return sink.place(k == 0, k == 1, k == 2); };
+        const int next = axis == 2 ? 0 : axis + 1, last = axis == 0 ? 2 : axis - 1; // along u and v
+        origin = sink.place(lo[0], lo[1], lo[2]);
+        by_u = step_along(swapped ? last : next);
+        by_v = step_along(swapped ? next : last);
+        by_w = step_along(axis);
+        return true;
+    }
+    // Whether every column's voxel lies in the grid: one may lie beyond the box on both sides of it.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_inside() const {
+        return lowest >= 1 && lowest + end[2] + 1 < depth;
+    }
+};
+
+template <class Sink>
+using place_of_sink = decltype(std::declval<const Sink&>().place(0, 0, 0));
+
+// Thin fragments of the columns in rows first, first + step, ... of a small triangle; false where it has no area.
 template <class Source, class Kept, class Sink>
 __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, const core::small_triangle& t,
                                              const std::int32_t (&lo)[3], const core::small_box& box, int first,
                                              int step, Kept&& kept, Sink& sink) {
-    const core::triple<std::int64_t> normal = core::small_normal(t);
-    const int axis = core::small_axis(normal);
-    if (axis < 0) return false;
-    core::small_thin s(t, normal, axis, call.fraction);
-    auto begin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
-    auto end = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
-    const bool swapped = end[0] - begin[0] < end[1] - begin[1];
-    if (swapped) {
-        s.swap_uv();
-        begin = {begin[1], begin[0], begin[2]};
-        end = {end[1], end[0], end[2]};
-    }
-    const int depth = axis == 0 ? call.extent.x : axis == 1 ? call.extent.y : call.extent.z;
-    const int lowest = axis == 0 ? lo[0] : axis == 1 ? lo[1] : lo[2];
-    // Where a voxel lies is linear in u, v and w.
-    const auto step_along = [&](int k) VOXELPIPE_INLINE_LAMBDA { return sink.place(k == 0, k == 1, k == 2); };
-    const int next = axis == 2 ? 0 : axis + 1, last = axis == 0 ? 2 : axis - 1; // along u and v
-    const auto origin = sink.place(lo[0], lo[1], lo[2]), by_u = step_along(swapped ? last : next),
-               by_v = step_along(swapped ? next : last), by_w = step_along(axis);
-    auto row = origin;
-    s.columns(
-        begin[0], end[0], begin[1] + first, end[1], step, kept,
-        [&](int v) VOXELPIPE_INLINE_LAMBDA { row = origin + by_v * v; },
+    thin_columns<place_of_sink<Sink>> c;
+    if (!c.find(call, t, lo, box, sink)) return false;
+    auto row = c.origin;
+    c.s.columns(
+        c.begin[0], c.end[0], c.begin[1] + first, c.end[1], step, kept,
+        [&](int v) VOXELPIPE_INLINE_LAMBDA { row = c.origin + c.by_v * v; },
         [&](int u, int w) VOXELPIPE_INLINE_LAMBDA {
-            sink.put(row + by_u * u + by_w * w, static_cast<unsigned>(lowest + w) < static_cast<unsigned>(depth));
+            sink.put(row + c.by_u * u + c.by_w * w,
+                     static_cast<unsigned>(c.lowest + w) < static_cast<unsigned>(c.depth));
+        });
+    return true;
+}
+
+// The same for a warp whose lanes have a triangle each and give their fragments one at a time, for a sink that wants
+// to know how many they are. All lanes take part; false where that cannot be known: nothing has been done then.
+template <class Source, class Kept, class Sink>
+[[nodiscard]] __device__ VOXELPIPE_INLINE bool raster_thin_by_rounds(const raster_input<Source>& call,
+                                                                     const near_triangle& r, Kept&& kept, Sink& sink) {
+    thin_columns<place_of_sink<Sink>> c;
+    const bool has_area = c.find(call, r.relative(call.fraction), r.lo, r.part(call.extent), sink);
+    if (!__all_sync(0xffffffffu, !has_area || c.is_inside())) return false;
+    core::small_thin::walk walk{};
+    std::uint32_t count = 0;
+    if (has_area)
+        walk = c.s.find_columns(c.begin[0], c.end[0], c.begin[1], c.end[1], 1, kept, count);
+    else
+        sink.drop(core::triangle_class::zero_area);
+    auto row = c.origin;
+    sink.rounds(
+        count, [&]() VOXELPIPE_INLINE_LAMBDA { return walk.is_done(); },
+        [&]() VOXELPIPE_INLINE_LAMBDA {
+            auto place = row;
+            c.s.next_column(
+                walk, kept, [&](int v) VOXELPIPE_INLINE_LAMBDA { row = c.origin + c.by_v * v; },
+                [&](int u, int w) VOXELPIPE_INLINE_LAMBDA { place = row + c.by_u * u + c.by_w * w; });
+            return place;
         });
     return true;
 }
