@@ -27,6 +27,7 @@ struct direct_call {
     using source_type = Source;
     using output = Output;
     using sink = typename Output::template sink<direct_call>;
+    using rest_sink = typename Output::template rest_sink<direct_call>; // of the second kernel
     raster_input<Source> in;
     Output out;
     triangle_lists lists;
@@ -183,6 +184,8 @@ template <class Framebuffer, class Values>
 struct framebuffer_output {
     template <class Call>
     using sink = blending_sink<Call>;
+    template <class Call>
+    using rest_sink = sink<Call>;
     static constexpr bool hands_on = has_only_bits<Framebuffer>; // otherwise block_raster.cuh
     static constexpr bool only_sets = false; // all values are true, all targets in use: known to the compiler
     Framebuffer fb;
@@ -350,10 +353,10 @@ __global__ __launch_bounds__(raster_threads,
 // All records, in registers of their own: what they need is not kept for the other triangles. Nobody waits for the
 // block's other warps at its end.
 template <class Call>
-__device__ __noinline__ typename Call::sink::totals
-raster_all_records(const Call& call, unsigned* dropped, brick_memory& bricks, typename Call::sink::memory& memory,
+__device__ __noinline__ typename Call::rest_sink::totals
+raster_all_records(const Call& call, unsigned* dropped, brick_memory& bricks, typename Call::rest_sink::memory& memory,
                    unsigned warp, unsigned warps) {
-    typename Call::sink sink(call, dropped, memory);
+    typename Call::rest_sink sink(call, dropped, memory);
     raster_records(call, sink, bricks, warp, warps);
     __syncwarp();
     return sink.end();
@@ -437,7 +440,7 @@ template <class Call>
 __global__ __launch_bounds__(raster_threads,
                              rest_min_blocks<Call>) void direct_rest_kernel(const __grid_constant__ Call call,
                                                                             pipeline_state* state) {
-    using sink_type = typename Call::sink;
+    using sink_type = typename Call::rest_sink;
     constexpr bool thin = Call::rule == coverage::thin;
     __shared__ brick_memory bricks[thin ? 1 : raster_warps];
     __shared__ kept_rows rows_of_warps[raster_warps];

@@ -11,13 +11,14 @@
 
 namespace voxelpipe::device {
 
-template <class Call>
+// Room: fragments that may wait in a warp's shared memory.
+template <class Call, unsigned Room>
 struct listing_sink : direct_sink<Call> {
     static constexpr bool buffers = true;
     static constexpr bool shares = false;
     static constexpr bool spreads = true;
     static constexpr bool has_rounds = true;
-    static constexpr unsigned room = 448;    // with the queues, less than 48 KB for a block
+    static constexpr unsigned room = Room;
     static constexpr unsigned flush_at = 64; // less may wait: a round of thin triangles brings up to 384
     struct memory {
         std::uint32_t voxels[room], primitives[room];
@@ -190,7 +191,9 @@ private:
 
 struct list_output {
     template <class Call>
-    using sink = listing_sink<Call>;
+    using sink = listing_sink<Call, 448>; // with the queues, less than 48 KB for a block
+    template <class Call>
+    using rest_sink = listing_sink<Call, 960>; // fewer blocks, and triangles of many rows
     static constexpr bool hands_on = true;
     static constexpr bool only_sets = false;
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return false; }

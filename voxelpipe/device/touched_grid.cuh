@@ -48,6 +48,8 @@ struct touching_sink : blending_sink<Call> {
 struct touched_output : framebuffer_output<framebuffer_view<touched_target>, core::pack<bool>> {
     template <class Call>
     using sink = touching_sink<Call>;
+    template <class Call>
+    using rest_sink = sink<Call>;
     static constexpr bool only_sets = true;
 
     std::uint32_t num_vertices;
