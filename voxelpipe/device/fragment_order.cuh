@@ -522,7 +522,7 @@ __global__ __launch_bounds__(32 * order_warps,
         __syncthreads();
         const std::uint64_t first = std::uint64_t{tile} * tile_counts::length, begin = first + warp * window_length;
         if (first >= n) return;
-        // Where the tile has no such window, one that begins with the last fragment, of no voxel.
+        // Where the tile has no such window, one behind the last fragment, in which nothing begins.
         const order_of_window window(b, static_cast<std::uint32_t>(begin < n ? begin : n), n);
         if (lane == 0) counts[warp] = window.count;
         __syncthreads();
