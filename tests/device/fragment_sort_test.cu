@@ -33,8 +33,16 @@ sorted sort_on_device(std::vector<std::uint32_t> keys, std::uint64_t num, int bi
     };
     std::vector<std::uint32_t> values(capacity);
     std::iota(values.begin(), values.end(), 0u);
-    auto k0 = upload(keys), k1 = upload(std::vector<std::uint32_t>(capacity, 0xcccccccc)), v0 = upload(values),
-         v1 = upload(std::vector<std::uint32_t>(capacity, 0xcccccccc));
+    device::arena pair_plan;
+    (void)device::sort_pairs::take(pair_plan, capacity);
+    auto pair_memory = upload(std::vector<std::byte>(pair_plan.used(), std::byte{0xcc}));
+    device::arena pair_arena(pair_memory.data());
+    const auto pairs = device::sort_pairs::take(pair_arena, capacity);
+    const auto copy = [&](std::uint32_t* to, const std::uint32_t* from) {
+        ASSERT_EQ(cudaMemcpyAsync(to, from, capacity * sizeof(*to), cudaMemcpyDefault, gpu.stream), cudaSuccess);
+    };
+    copy(pairs.keys[0], keys.data());
+    copy(pairs.values[0], values.data());
     device::pipeline_state state{};
     state.list_fragments = num;
     const auto d_state = upload(std::vector{state});
@@ -45,11 +53,13 @@ sorted sort_on_device(std::vector<std::uint32_t> keys, std::uint64_t num, int bi
     const auto m = device::sort_memory::take(arena, capacity, bits);
     zero_kernel<<<64, 256, 0, gpu.stream>>>(m, num);
     const int at =
-        device::sort_fragments({k0.data(), k1.data()}, {v0.data(), v1.data()},
-                               device::sort_count{d_state.data(), {0, 0, capacity, 0}}, capacity, m, gpu.stream);
+        device::sort_fragments(pairs, device::sort_count{d_state.data(), {0, 0, capacity, 0}}, capacity, m, gpu.stream);
     EXPECT_EQ(cudaStreamSynchronize(gpu.stream), cudaSuccess);
     EXPECT_EQ(at, m.plan.passes % 2);
-    return {(at == 0 ? k0 : k1).to_host(gpu), (at == 0 ? v0 : v1).to_host(gpu)};
+    copy(keys.data(), pairs.keys[at]);
+    copy(values.data(), pairs.values[at]);
+    EXPECT_EQ(cudaStreamSynchronize(gpu.stream), cudaSuccess);
+    return {std::move(keys), std::move(values)};
 }
 
 // Keys that the given function makes of their place, in a room for some more.

@@ -215,7 +215,8 @@ template <class Key, class Payload>
         at = keys.selector;
         VOXELPIPE_ASSERT(values.selector == at);
     } else if constexpr (sizeof(Key) == sizeof(std::uint32_t)) {
-        at = sort_fragments(b.keys, b.values, sort_count{state, limits}, limits.fragments, b.sort, stream);
+        at = sort_fragments({{b.keys[0], b.keys[1]}, {b.values[0], b.values[1]}}, sort_count{state, limits},
+                            limits.fragments, b.sort, stream);
     }
     end_stage(clock, &stage_times::tile_sort);
     return {b.keys[at], b.keys[1 - at], b.values[at], b.values[1 - at]};

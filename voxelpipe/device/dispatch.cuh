@@ -101,9 +101,15 @@ template <class Key, class Payload>
 [[nodiscard]] list_buffers<Key, Payload> take_lists(arena& memory, std::uint64_t num_voxels,
                                                     unsigned long long capacity, bool one_payload = false) {
     list_buffers<Key, Payload> b{};
-    for (int i = 0; i < 2; ++i) {
-        b.keys[i] = memory.take<Key>(capacity);
-        b.values[i] = memory.take<std::uint32_t>(capacity);
+    if constexpr (std::is_same_v<Key, std::uint32_t>) {
+        const sort_pairs pairs = sort_pairs::take(memory, capacity);
+        std::copy_n(pairs.keys, 2, b.keys);
+        std::copy_n(pairs.values, 2, b.values);
+    } else {
+        for (int i = 0; i < 2; ++i) {
+            b.keys[i] = memory.take<Key>(capacity);
+            b.values[i] = memory.take<std::uint32_t>(capacity);
+        }
     }
     b.storage_bytes = select_bytes<Key>(capacity);
     if (are_sorted_here<Key>(capacity)) {
@@ -419,11 +425,7 @@ private:
     void go_listed(arena& memory, pipeline_state* state, cudaStream_t stream) const {
         using ends_type = run_ends<voxel_cells<Framebuffer>>;
         const scene_buffers buffers(memory, draws);
-        std::uint32_t *voxels[2], *primitives[2];
-        for (int i = 0; i < 2; ++i) {
-            voxels[i] = memory.take<std::uint32_t>(limits.fragments);
-            primitives[i] = memory.take<std::uint32_t>(limits.fragments);
-        }
+        const sort_pairs pairs = sort_pairs::take(memory, limits.fragments);
         const sort_memory sort =
             sort_memory::take(memory, limits.fragments, static_cast<int>(std::bit_width(num_voxels(g) - 1)));
         const triangle_lists handed_on = triangle_lists::take(memory, most_triangles());
@@ -435,13 +437,14 @@ private:
             preparation.is_wanted = preparation.sorts = true;
             preparation.sort = sort;
             preparation.capacity = limits.fragments;
-            list_draws<Rule>(s, buffers.positions, handed_on, voxels[0], primitives[0], preparation, state, stream);
+            list_draws<Rule>(s, buffers.positions, handed_on, pairs.keys[0], pairs.values[0], preparation, state,
+                             stream);
             end_stage(clock, &stage_times::fine_raster);
-            const int at =
-                sort_fragments(voxels, primitives, sort_count{state, limits}, limits.fragments, sort, stream);
+            const int at = sort_fragments(pairs, sort_count{state, limits}, limits.fragments, sort, stream);
             end_stage(clock, &stage_times::tile_sort);
             clear_targets(state, stream);
-            resolve_fragments(s, fb, {voxels[at], primitives[at]}, ends, options.count_voxels, state, limits, stream);
+            resolve_fragments(s, fb, {pairs.keys[at], pairs.values[at]}, ends, options.count_voxels, state, limits,
+                              stream);
             end_stage(clock, &stage_times::tile_resolve);
         }
     }

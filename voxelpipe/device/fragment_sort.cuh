@@ -5,8 +5,9 @@
 // Fragment sort: a stable radix sort of (voxel, value) pairs whose number is known on the device alone. One kernel
 // counts the digits of all passes, then each pass reads and writes every pair once: a tile learns where its digits go
 // from the tiles before it (decoupled look-back: Merrill and Garland 2016, Adinets and Merrill 2022). cub's sort has to
-// be told the number, so that the whole capacity would be sorted, fillers included, and takes 8 bits a pass: 27 bits of
-// a voxel are three passes of nine here and four there.
+// be told the number, so that the whole capacity would be sorted, fillers included, and takes 8 bits a pass: the 30
+// bits of a voxel of 1024^3 are three passes of ten here and four there. Between passes a key lies next to its value: a
+// pass writes short runs, and 16 pairs in a row lie in fewer sectors of the cache than 16 keys and 16 values elsewhere.
 
 #include <voxelpipe/device/scene.cuh>
 
@@ -15,14 +16,16 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <type_traits>
 
 namespace voxelpipe::device {
 
 inline constexpr int sort_threads = 512; // of a block, which takes a tile
 inline constexpr int sort_items = 16;    // pairs of a thread
 inline constexpr std::uint32_t sort_tile = sort_threads * sort_items;
+inline constexpr int sort_blocks = 2; // of a multiprocessor, at once
 inline constexpr int digit_count_threads = 1024;
-inline constexpr int most_digit_bits = 9;
+inline constexpr int most_digit_bits = 10;
 inline constexpr int most_digit_passes = 4;
 inline constexpr std::uint64_t most_sorted = std::uint64_t{1} << 30; // pairs: two bits of a tile's words are flags
 
@@ -44,6 +47,55 @@ struct digit_of {
     [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t operator()(std::uint32_t key) const {
         return key >> shift & mask;
     }
+};
+
+// Pairs: keys and values apart or, where there are no values, joined from keys[0] on, in the same memory.
+struct pair_array {
+    std::uint32_t *keys, *values;
+
+    // Calls use(std::bool_constant<are they joined>): asked once, not for each pair, so that loads are not held up.
+    template <class Use>
+    __device__ VOXELPIPE_INLINE void ask_once(Use&& use) const {
+        if (values == nullptr)
+            use(std::true_type{});
+        else
+            use(std::false_type{});
+    }
+    template <bool Joined>
+    [[nodiscard]] __device__ VOXELPIPE_INLINE uint2 load(std::uint32_t i) const {
+        if constexpr (Joined)
+            return reinterpret_cast<const uint2*>(keys)[i];
+        else
+            return {keys[i], values[i]};
+    }
+    template <bool Joined>
+    __device__ VOXELPIPE_INLINE void store(std::uint32_t i, const uint2& pair) const {
+        if constexpr (Joined) {
+            reinterpret_cast<uint2*>(keys)[i] = pair;
+        } else {
+            keys[i] = pair.x;
+            values[i] = pair.y;
+        }
+    }
+};
+
+// The two places between which a sort moves its pairs, apart: values begin where the room for keys ends.
+struct sort_pairs {
+    std::uint32_t *keys[2]{}, *values[2]{};
+
+    [[nodiscard]] static sort_pairs take(arena& memory, std::uint64_t capacity) {
+        const std::uint64_t room = room_for(capacity);
+        sort_pairs p;
+        for (int i = 0; i < 2; ++i) {
+            p.keys[i] = memory.take<std::uint32_t>(2 * room);
+            p.values[i] = p.keys[i] == nullptr ? nullptr : p.keys[i] + room;
+        }
+        return p;
+    }
+    // For keys: values begin at a whole 256 bytes too.
+    [[nodiscard]] static constexpr std::uint64_t room_for(std::uint64_t capacity) { return (capacity + 63) / 64 * 64; }
+    [[nodiscard]] pair_array joined(int i) const { return {keys[i], nullptr}; }
+    [[nodiscard]] pair_array apart(int i) const { return {keys[i], values[i]}; }
 };
 
 // Memory of a sort.
@@ -93,7 +145,8 @@ __global__ __launch_bounds__(digit_count_threads) void count_digits_kernel(const
                                                                            const __grid_constant__ Count count,
                                                                            const __grid_constant__ sort_memory m) {
     using scan = cub::BlockScan<std::uint32_t, digit_count_threads>;
-    static_assert(digit_count_threads >= 1 << most_digit_bits && sort_threads == 1 << most_digit_bits);
+    constexpr int at_once = 4; // loads that do not wait for one another
+    static_assert(digit_count_threads >= 1 << most_digit_bits);
     __shared__ std::uint32_t digits[most_digit_passes][1 << most_digit_bits];
     __shared__ typename scan::TempStorage storage;
     __shared__ bool is_last;
@@ -104,14 +157,21 @@ __global__ __launch_bounds__(digit_count_threads) void count_digits_kernel(const
     __syncthreads();
     const std::uint64_t n = count.get(), threads = std::uint64_t{gridDim.x} * digit_count_threads,
                         thread = std::uint64_t{blockIdx.x} * digit_count_threads + threadIdx.x;
-    for (std::uint64_t i = thread; i < n / 4; i += threads) {
-        const uint4 four = reinterpret_cast<const uint4*>(keys)[i];
-        for (int p = 0; p < m.plan.passes; ++p) {
-            const digit_of digit(m.plan, p);
-            atomicAdd(&digits[p][digit(four.x)], 1u);
-            atomicAdd(&digits[p][digit(four.y)], 1u);
-            atomicAdd(&digits[p][digit(four.z)], 1u);
-            atomicAdd(&digits[p][digit(four.w)], 1u);
+    for (std::uint64_t i = thread; i < n / 4; i += threads * at_once) {
+        uint4 fours[at_once];
+#pragma unroll
+        for (unsigned k = 0; k < at_once; ++k)
+            if (i + k * threads < n / 4) fours[k] = reinterpret_cast<const uint4*>(keys)[i + k * threads];
+#pragma unroll
+        for (unsigned k = 0; k < at_once; ++k) {
+            if (i + k * threads >= n / 4) break;
+            for (int p = 0; p < m.plan.passes; ++p) {
+                const digit_of digit(m.plan, p);
+                atomicAdd(&digits[p][digit(fours[k].x)], 1u);
+                atomicAdd(&digits[p][digit(fours[k].y)], 1u);
+                atomicAdd(&digits[p][digit(fours[k].z)], 1u);
+                atomicAdd(&digits[p][digit(fours[k].w)], 1u);
+            }
         }
     }
     if (thread < n % 4)
@@ -166,29 +226,34 @@ __global__ __launch_bounds__(digit_count_threads) void count_digits_kernel(const
 }
 
 // What a block keeps in shared memory: first how many pairs of each digit its warps have, then the pairs of its tile.
+template <int DigitsEach>
 union sort_tile_memory {
-    std::uint16_t counts[sort_threads / 32][1 << most_digit_bits];
-    std::uint32_t pairs[2][sort_tile];
+    std::uint16_t counts[sort_threads / 32][DigitsEach * sort_threads];
+    uint2 pairs[sort_tile];
 };
 
-// Pass `pass` over the digits. A template, as all kernels in headers are.
-template <class Memory>
-__global__ __launch_bounds__(sort_threads, 2) void sort_pass_kernel(const std::uint32_t* __restrict__ keys,
-                                                                    const std::uint32_t* __restrict__ values,
-                                                                    std::uint32_t* __restrict__ to_keys,
-                                                                    std::uint32_t* __restrict__ to_values,
-                                                                    const __grid_constant__ Memory m, int pass) {
-    using scan = cub::BlockScan<std::uint32_t, sort_threads>;
+// Pass `pass` over the digits; a thread has DigitsEach digits to see to. A template, as all kernels in headers are.
+template <class Memory, int DigitsEach>
+__global__ __launch_bounds__(sort_threads, sort_blocks) void sort_pass_kernel(const __grid_constant__ pair_array from,
+                                                                              const __grid_constant__ pair_array to,
+                                                                              const __grid_constant__ Memory m,
+                                                                              int pass) {
+    using scan = cub::BlockScan<std::uint32_t, sort_threads, cub::BLOCK_SCAN_WARP_SCANS>; // in few registers
     using word = ::cuda::atomic_ref<std::uint32_t, ::cuda::thread_scope_device>;
-    constexpr int warps = sort_threads / 32;
+    using tile_memory = sort_tile_memory<DigitsEach>;
+    constexpr unsigned warps = sort_threads / 32;
+    constexpr unsigned items = sort_items;
+    static_assert(items % 2 == 0 && sort_tile <= 1 << 16 && (DigitsEach == 1 || DigitsEach == 2));
     extern __shared__ __align__(16) unsigned char dynamic_memory[];
-    auto& shared = *reinterpret_cast<sort_tile_memory*>(dynamic_memory);
-    __shared__ std::uint32_t places[sort_threads]; // of each digit, in the tile; then what takes it to its end
+    auto& shared = *reinterpret_cast<tile_memory*>(dynamic_memory);
+    // Of each digit, in the tile; then what takes it to its end.
+    __shared__ std::uint32_t places[DigitsEach * sort_threads];
     __shared__ typename scan::TempStorage storage;
     __shared__ std::uint32_t next;
     const digit_of digit(m.plan, pass);
     const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32, num_digits = m.plan.num_digits();
-    for (int w = 0; w < warps; ++w) shared.counts[w][threadIdx.x] = 0;
+    for (unsigned i = threadIdx.x; i < sizeof(shared.counts) / sizeof(std::uint32_t); i += sort_threads)
+        reinterpret_cast<std::uint32_t*>(shared.counts)[i] = 0; // wider stores made the pass 7 % slower
     await_stream();
     if (threadIdx.x == 0) next = atomicAdd(&m.all_tiles->next_tile[pass], 1u);
     __syncthreads();
@@ -197,93 +262,126 @@ __global__ __launch_bounds__(sort_threads, 2) void sort_pass_kernel(const std::u
     if (begin >= n) return;
     const std::uint32_t length = n - begin < sort_tile ? n - begin : sort_tile;
     // A lane has every 32nd pair of its warp's. What is beyond the last counts as one with the last digit.
-    const std::uint32_t first = warp * 32 * sort_items + lane;
-    std::uint32_t key[sort_items], place[sort_items];
+    const std::uint32_t first = warp * 32 * items + lane;
+    std::uint32_t key[items], value[items], place[items / 2]; // two places in each
+    from.ask_once([&]<class Joined>(Joined) VOXELPIPE_INLINE_LAMBDA {
 #pragma unroll
-    for (std::uint32_t i = 0; i < sort_items; ++i)
-        key[i] = first + 32 * i < length ? keys[begin + first + 32 * i] : ~0u;
+        for (std::uint32_t i = 0; i < items; ++i) {
+            const bool is_one = first + 32 * i < length;
+            const uint2 pair = is_one ? from.template load<Joined::value>(begin + first + 32 * i) : uint2{~0u, 0};
+            key[i] = pair.x;
+            value[i] = pair.y;
+        }
+    });
 #pragma unroll
-    for (std::uint32_t i = 0; i < sort_items; ++i) {
+    for (std::uint32_t i = 0; i < items; ++i) {
         const std::uint32_t d = digit(key[i]);
         std::uint16_t& of_digit = shared.counts[warp][d];
         const unsigned same = __match_any_sync(0xffffffffu, d);
         const auto before = static_cast<std::uint32_t>(__popc(same & ((1u << lane) - 1)));
-        place[i] = of_digit + before;
+        const std::uint32_t own = of_digit + before;
         __syncwarp();
-        if (before == 0) of_digit = static_cast<std::uint16_t>(place[i] + static_cast<std::uint32_t>(__popc(same)));
+        if (before == 0) of_digit = static_cast<std::uint16_t>(own + static_cast<std::uint32_t>(__popc(same)));
         __syncwarp();
+        place[i / 2] = i % 2 == 0 ? own : place[i / 2] | own << 16;
     }
-    __syncthreads();
-    // A digit each: how many there are in the warps before each, and in all.
-    std::uint32_t* const words = m.words[pass % 2];
-    std::uint32_t* const mine = words + std::uint64_t{tile} * num_digits + threadIdx.x;
-    const bool has_digit = threadIdx.x < num_digits;
-    std::uint32_t total = 0, place_here = 0;
+    // The counts' addresses are found again below: kept until then, they would not fit the registers.
 #pragma unroll
-    for (int w = 0; w < warps; ++w) {
-        const std::uint32_t of_warp = shared.counts[w][threadIdx.x];
-        shared.counts[w][threadIdx.x] = static_cast<std::uint16_t>(total);
-        total += of_warp;
-    }
-    if (has_digit) {
-        word(*mine).store((tile == 0 ? sort_memory::all : sort_memory::own) | total, ::cuda::memory_order_relaxed);
-        if (pass + 1 < m.plan.passes) m.words[1 - pass % 2][std::uint64_t{tile} * num_digits + threadIdx.x] = 0;
+    for (std::uint32_t i = 0; i < items; ++i) asm volatile("" : "+r"(key[i]));
+    __syncthreads();
+    // Of the thread's digits: how many there are in the warps before each, and in all.
+    std::uint32_t* const words = m.words[pass % 2];
+    const std::uint32_t first_digit = DigitsEach * threadIdx.x;
+    const std::uint64_t mine = std::uint64_t{tile} * num_digits + first_digit;
+    const bool has_digits = first_digit < num_digits;
+    std::uint32_t total[DigitsEach]{}, place_here[DigitsEach]{};
+#pragma unroll(8 / DigitsEach)
+    for (unsigned w = 0; w < warps; ++w)
+#pragma unroll
+        for (std::uint32_t k = 0; k < DigitsEach; ++k) {
+            std::uint16_t& of_warp = shared.counts[w][first_digit + k];
+            const std::uint32_t count = of_warp;
+            of_warp = static_cast<std::uint16_t>(total[k]);
+            total[k] += count;
+        }
+    if (has_digits) {
+        const bool zeroes = pass + 1 < m.plan.passes;
+#pragma unroll
+        for (std::uint32_t k = 0; k < DigitsEach; ++k) {
+            word(words[mine + k])
+                .store((tile == 0 ? sort_memory::all : sort_memory::own) | total[k], ::cuda::memory_order_relaxed);
+            if (zeroes) m.words[1 - pass % 2][mine + k] = 0;
+        }
     }
     scan(storage).ExclusiveSum(total, place_here);
-    places[threadIdx.x] = place_here;
+#pragma unroll
+    for (std::uint32_t k = 0; k < DigitsEach; ++k) places[first_digit + k] = place_here[k];
     __syncthreads();
 #pragma unroll
-    for (std::uint32_t i = 0; i < sort_items; ++i) {
-        const std::uint32_t d = digit(key[i]);
-        place[i] += places[d] + shared.counts[warp][d];
+    for (std::uint32_t i = 0; i < items; i += 2) {
+        const std::uint32_t d = digit(key[i]), other = digit(key[i + 1]);
+        place[i / 2] += places[d] + shared.counts[warp][d] + ((places[other] + shared.counts[warp][other]) << 16);
     }
     __syncthreads(); // the counts have been read
 #pragma unroll
-    for (std::uint32_t i = 0; i < sort_items; ++i) shared.pairs[0][place[i]] = key[i];
-    std::uint32_t value[sort_items];
+    for (std::uint32_t i = 0; i < items; i += 2) {
+        shared.pairs[place[i / 2] & 0xffffu] = {key[i], value[i]};
+        shared.pairs[place[i / 2] >> 16] = {key[i + 1], value[i + 1]};
+    }
+    if (has_digits) {
 #pragma unroll
-    for (std::uint32_t i = 0; i < sort_items; ++i)
-        value[i] = first + 32 * i < length ? values[begin + first + 32 * i] : 0;
-    if (has_digit) {
-        std::uint32_t before = 0;
-        if (tile != 0) {
-            before = count_before(words, tile, num_digits, threadIdx.x);
-            word(*mine).store(sort_memory::all | (before + total), ::cuda::memory_order_relaxed);
+        for (std::uint32_t k = 0; k < DigitsEach; ++k) {
+            std::uint32_t before = 0;
+            if (tile != 0) {
+                before = count_before(words, tile, num_digits, first_digit + k);
+                word(words[mine + k]).store(sort_memory::all | (before + total[k]), ::cuda::memory_order_relaxed);
+            }
+            places[first_digit + k] =
+                m.all_tiles->digits[pass][first_digit + k] + before - place_here[k]; // modulo 2^32
         }
-        places[threadIdx.x] = m.all_tiles->digits[pass][threadIdx.x] + before - place_here; // modulo 2^32
     }
-#pragma unroll
-    for (std::uint32_t i = 0; i < sort_items; ++i) shared.pairs[1][place[i]] = value[i];
     __syncthreads();
+    to.ask_once([&]<class Joined>(Joined) VOXELPIPE_INLINE_LAMBDA {
 #pragma unroll
-    for (std::uint32_t i = 0; i < sort_items; ++i) {
-        const std::uint32_t at = threadIdx.x + sort_threads * i;
-        if (at >= length) break;
-        const std::uint32_t k = shared.pairs[0][at], to = places[digit(k)] + at;
-        to_keys[to] = k;
-        to_values[to] = shared.pairs[1][at];
-    }
+        for (std::uint32_t i = 0; i < items; ++i) {
+            const std::uint32_t at = threadIdx.x + sort_threads * i;
+            if (at >= length) break;
+            const uint2 pair = shared.pairs[at];
+            to.template store<Joined::value>(places[digit(pair.x)] + at, pair);
+        }
+    });
 }
 
-// Sorts the pairs in keys[0] and values[0], which lie in an arena; at most `capacity`, which is below most_sorted. The
-// memory's zeros are there (sort_memory::zero). Returns where the sorted pairs are: 0 or 1.
+template <int DigitsEach>
+void launch_sort_pass(const pair_array& from, const pair_array& to, unsigned tiles, const sort_memory& m, int pass,
+                      stage where, cudaStream_t stream) {
+    constexpr auto shared_bytes = sizeof(sort_tile_memory<DigitsEach>);
+    const auto kernel = sort_pass_kernel<sort_memory, DigitsEach>;
+    check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared_bytes)),
+          where);
+    launch_behind(kernel, tiles, sort_threads, shared_bytes, stream, where, from, to, m, pass);
+}
+
+// Sorts the pairs in keys[0] and values[0]; at most `capacity`, which is below most_sorted and for which both were
+// taken. The memory's zeros are there (sort_memory::zero). Returns where the sorted pairs are: 0 or 1.
 template <class Count>
-[[nodiscard]] int sort_fragments(std::uint32_t* const (&keys)[2], std::uint32_t* const (&values)[2], const Count& count,
-                                 std::uint64_t capacity, const sort_memory& m, cudaStream_t stream) {
+[[nodiscard]] int sort_fragments(const sort_pairs& pairs, const Count& count, std::uint64_t capacity,
+                                 const sort_memory& m, cudaStream_t stream) {
     constexpr stage where = stage::abuffer_emit;
-    constexpr std::uint64_t pairs_of_block = 16 * digit_count_threads;
-    const std::uint64_t most_blocks = 2 * static_cast<std::uint64_t>(num_multiprocessors());
+    constexpr std::uint64_t pairs_of_block = 8 * digit_count_threads;
+    const auto most_blocks = static_cast<std::uint64_t>(num_multiprocessors());
     launch_behind(count_digits_kernel<Count>,
                   static_cast<unsigned>(std::min(capacity / pairs_of_block + 1, most_blocks)), digit_count_threads,
-                  stream, where, keys[0], count, m);
-    const auto kernel = sort_pass_kernel<sort_memory>;
-    check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                               static_cast<int>(sizeof(sort_tile_memory))),
-          where);
+                  stream, where, pairs.keys[0], count, m);
     const auto tiles = static_cast<unsigned>(sort_memory::num_tiles(capacity));
-    for (int p = 0; p < m.plan.passes && tiles != 0; ++p)
-        launch_behind(kernel, tiles, sort_threads, sizeof(sort_tile_memory), stream, where, keys[p % 2], values[p % 2],
-                      keys[1 - p % 2], values[1 - p % 2], m, p);
+    for (int p = 0; p < m.plan.passes && tiles != 0; ++p) {
+        const pair_array from = p == 0 ? pairs.apart(0) : pairs.joined(p % 2);
+        const pair_array to = p + 1 == m.plan.passes ? pairs.apart(1 - p % 2) : pairs.joined(1 - p % 2);
+        if (m.plan.bits == most_digit_bits)
+            launch_sort_pass<2>(from, to, tiles, m, p, where, stream);
+        else
+            launch_sort_pass<1>(from, to, tiles, m, p, where, stream);
+    }
     return tiles == 0 ? 0 : m.plan.passes % 2;
 }
 
