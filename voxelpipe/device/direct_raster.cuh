@@ -8,6 +8,7 @@
 // costs next to nothing, and hands the rest on by what it costs (triangle_lists.cuh), so that the second kernel's warps
 // have 32 triangles of a kind each.
 
+#include <voxelpipe/core/list_walk.hpp>
 #include <voxelpipe/device/block_raster.cuh>
 #include <voxelpipe/device/chunk_marks.cuh>
 #include <voxelpipe/device/combined_words.cuh>
@@ -386,53 +387,61 @@ __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std
 
 // The lists of large, small and tiny triangles by a thread each, neighbours, which are alike, in neighbouring lanes;
 // but what does not fill a warp, and whole lists that would not fill the device, by medium_lanes lanes each. All lists
-// advance together, part by part: they are in the order of the mesh, nearly, so that voxels are in the cache while
-// triangles of all kinds meet them.
+// advance together, part by part (list_walk): they are in the order of the mesh, nearly, so that voxels are in the
+// cache while triangles of all kinds meet them.
 template <class Call, class Rows, class Sink>
 __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place& place, const lane_rows& kept,
                                               Rows& rows, Sink& sink) {
     constexpr int kinds = medium_triangles; // what comes before
-    std::uint32_t chunks[kinds], all = 0;
+    std::uint32_t chunks[kinds];
     for (int k = 0; k < kinds; ++k) {
         const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[k]));
         const bool few = k != tiny_triangles && length / 64 * medium_lanes < place.warps;
         chunks[k] = few ? 0 : length / 32;
-        all += chunks[k];
         const unsigned from_last = place.warps - 1 - place.warp; // the first ones have whole chunks to do
         raster_by_lanes(call, k, chunks[k] * 32, {few ? place.warp : from_last, place.warps, place.lane}, kept, sink);
     }
-    const unsigned wanted = all / (4 * place.warps), parts = wanted < 1 ? 1 : wanted > 64 ? 64 : wanted;
-    // Chunks are numbered by part, then kind; this warp's are `at`, at + warps, ...
-    unsigned at = place.warp, first = 0;
-    for (unsigned part = 0; part < parts; ++part) {
-        for (int k = kinds - 1; k >= 0; --k) {
-            const auto bound = [&](unsigned p) {
-                return static_cast<unsigned>(static_cast<std::uint64_t>(chunks[k]) * p / parts);
-            };
-            const unsigned begin = bound(part), num = bound(part + 1) - begin;
-            for (; at < first + num; at += place.warps) {
-                const std::uint32_t triangle = call.lists.at(k, (begin + at - first) * 32 + place.lane);
-                const near_triangle r = load_near(call.in, call.in.source.triangle(triangle));
-                __syncwarp();
-                bool is_done = false;
-                if constexpr (Call::rule == coverage::thin && Sink::has_rounds) {
-                    sink.begin(triangle);
-                    is_done = k != tiny_triangles && raster_thin_by_rounds(call.in, r, kept, sink);
-                }
-                if (!is_done)
-                    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
-                        sink.begin(triangle);
-                        if (k == tiny_triangles)
-                            raster_tiny<Call::rule>(call.in, r, sink);
-                        else
-                            raster_small<Call::rule, true>(call.in, r, kept, rows);
-                    });
-                __syncwarp();
-                if constexpr (combines_words<Call>)
-                    if (k != tiny_triangles) rows.flush();
-            }
-            first += num;
+    // Of a chunk that comes next, the triangles' numbers are loaded while the one before the last is worked on, and
+    // their vertices' while the last one is.
+    using walk_type = core::list_walk<kinds>;
+    using chunk = typename walk_type::chunk;
+    walk_type walk(chunks, place.warp, place.warps);
+    const auto number = [&](const chunk& c) VOXELPIPE_INLINE_LAMBDA {
+        return c.list < 0 ? 0 : call.lists.at(c.list, 32 * c.number + place.lane);
+    };
+    const auto vertices = [&](const chunk& c, std::uint32_t triangle) VOXELPIPE_INLINE_LAMBDA {
+        return c.list < 0 ? glm::uvec3(0) : call.in.source.triangle(triangle);
+    };
+    chunk here = walk.next(), next = walk.next();
+    std::uint32_t triangle = number(here), triangle_of_next = number(next);
+    glm::uvec3 index = vertices(here, triangle);
+    while (here.list >= 0) {
+        const near_triangle r = load_near(call.in, index);
+        const chunk after = walk.next();
+        const glm::uvec3 index_of_next = vertices(next, triangle_of_next);
+        const std::uint32_t triangle_of_after = number(after);
+        __syncwarp();
+        bool is_done = false;
+        if constexpr (Call::rule == coverage::thin && Sink::has_rounds) {
+            sink.begin(triangle);
+            is_done = here.list != tiny_triangles && raster_thin_by_rounds(call.in, r, kept, sink);
         }
+        if (!is_done)
+            feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                sink.begin(triangle);
+                if (here.list == tiny_triangles)
+                    raster_tiny<Call::rule>(call.in, r, sink);
+                else
+                    raster_small<Call::rule, true>(call.in, r, kept, rows);
+            });
+        __syncwarp();
+        if constexpr (combines_words<Call>)
+            if (here.list != tiny_triangles) rows.flush();
+        here = next;
+        next = after;
+        triangle = triangle_of_next;
+        triangle_of_next = triangle_of_after;
+        index = index_of_next;
     }
 }
 

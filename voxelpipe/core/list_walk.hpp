@@ -1,0 +1,66 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The way of one of many workers through several lists, chunk by chunk, as plain arithmetic. All lists advance
+// together, part by part, the last list first in each; every worker has every num_workers-th chunk.
+
+#include <voxelpipe/config.hpp>
+
+#include <cstdint>
+
+namespace voxelpipe::core {
+
+template <int Lists>
+class list_walk {
+public:
+    struct chunk {
+        int list; // below 0: there is none
+        std::uint32_t number;
+    };
+
+    // chunks: how many a list has. Fewer than 2^32 - num_workers in all; num_workers is below 2^29.
+    VOXELPIPE_HD VOXELPIPE_INLINE list_walk(const std::uint32_t (&chunks)[Lists], std::uint32_t worker,
+                                            std::uint32_t num_workers)
+        : at_(worker), step_(num_workers) {
+        std::uint32_t all = 0;
+        for (int k = 0; k < Lists; ++k) {
+            chunks_[k] = chunks[k];
+            all += chunks[k];
+        }
+        while (part_bits_ < most_part_bits && all >> part_bits_ >= 8 * num_workers) ++part_bits_;
+    }
+    // This worker's next one; none ever after where there is none.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE chunk next() {
+        while (at_ >= end_) {
+            if (list_ == 0) {
+                if (part_ + 1 == 1u << part_bits_) return {-1, 0};
+                ++part_;
+                list_ = Lists;
+            }
+            --list_;
+            std::uint32_t chunks = chunks_[0]; // without an index, for which it would have to lie in memory
+            for (int k = 1; k < Lists; ++k) chunks = list_ == k ? chunks_[k] : chunks;
+            const std::uint32_t begin = begin_of(part_, chunks);
+            shift_ = begin - end_;
+            end_ += begin_of(part_ + 1, chunks) - begin;
+        }
+        const std::uint32_t number = at_ + shift_;
+        at_ += step_;
+        return {list_, number};
+    }
+
+private:
+    static constexpr int most_part_bits = 6; // of how many parts there are, each of four chunks or more for a worker
+
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t begin_of(std::uint32_t part, std::uint32_t chunks) const {
+        return static_cast<std::uint32_t>(static_cast<std::uint64_t>(chunks) * part >> part_bits_);
+    }
+    std::uint32_t chunks_[Lists];
+    int part_bits_ = 0;
+    // Chunks are numbered as they come: those of part_ and list_ end at end_, and number n is the list's n + shift_.
+    std::uint32_t at_, step_, part_ = 0, end_ = 0, shift_ = 0;
+    int list_ = Lists;
+};
+
+} // namespace voxelpipe::core
