@@ -8,6 +8,7 @@
 #include "test_support.hpp"
 
 #include <voxelpipe/core/corner_signs.hpp>
+#include <voxelpipe/core/small_conservative.hpp>
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,8 @@
 
 #include <voxelpipe/core/brick_triangle.hpp>
 #include <voxelpipe/core/coverage.hpp>
-#include <voxelpipe/core/small_triangle.hpp>
+#include <voxelpipe/core/small_conservative.hpp>
+#include <voxelpipe/core/small_thin.hpp>
 
 #include <gtest/gtest.h>
 

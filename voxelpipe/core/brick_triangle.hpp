@@ -6,7 +6,8 @@
 // have voxels in, and for one of them the 32-bit coverage of small_triangle.hpp. Within a brick a half-plane's value
 // moves by less than 2^29, so that its constant may be cut to +-2^30 without changing a sign.
 
-#include <voxelpipe/core/small_triangle.hpp>
+#include <voxelpipe/core/small_conservative.hpp>
+#include <voxelpipe/core/small_thin.hpp>
 
 namespace voxelpipe::core {
 

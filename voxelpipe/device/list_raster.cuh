@@ -7,7 +7,7 @@
 // room in the list for all of them at once.
 
 #include <voxelpipe/device/direct_raster.cuh>
-#include <voxelpipe/device/fragment_order.cuh>
+#include <voxelpipe/device/order_memory.cuh>
 
 namespace voxelpipe::device {
 

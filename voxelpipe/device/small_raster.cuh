@@ -20,6 +20,8 @@
 
 #include <voxelpipe/core/brick_triangle.hpp>
 #include <voxelpipe/core/corner_signs.hpp>
+#include <voxelpipe/core/small_conservative.hpp>
+#include <voxelpipe/core/small_thin.hpp>
 #include <voxelpipe/device/scene.cuh>
 #include <voxelpipe/device/vertex_shade.cuh>
 

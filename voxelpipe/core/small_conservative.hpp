@@ -1,0 +1,275 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Conservative coverage of a small triangle (small_triangle.hpp), as rows of bits along x.
+
+#include <voxelpipe/core/small_triangle.hpp>
+
+#include <cstdint>
+
+namespace voxelpipe::core {
+
+// What the plane of a small triangle leaves of a row of voxels, in floats. With S = |n.x| + |n.y| + |n.z| voxels that
+// meet the plane are within S / 2 of `middle`, and up to 32 voxels from the corner all that is added, by five
+// roundings, stays below 66 S: less than 2^-15.3 S is lost, and 2^-15 S left for it on both sides.
+struct near_plane {
+    float n[3], middle;  // along x from x0 on; where rows are to be clipped turned so that n[0] >= 0
+    float half, inverse; // S / 2; 1 / (64 n[0])
+
+    VOXELPIPE_HD VOXELPIPE_INLINE near_plane(const std::int64_t (&normal)[3], std::int64_t below, std::int64_t above,
+                                             int x0, bool clips)
+        : n{static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2])},
+          middle(exact::fma(-n[0], static_cast<float>(x0), exact::mul(0.5f, static_cast<float>(above - below)))),
+          half(exact::mul(0.5f, static_cast<float>(above + below))), inverse(0) {
+        if (clips && normal[0] < 0) {
+            for (float& k : n) k = -k;
+            middle = -middle;
+        }
+        inverse = exact::near_inverse(exact::mul(64.0f, n[0]));
+    }
+    // Whether the voxels from and to of a row, from x0 on, surely meet the plane, and so all between them.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets(int from, int to, int y, int z) const {
+        const float row = row_at(y, z), in = exact::mul(half, 1.0f - 0x1p-14f);
+        const float a = exact::fma(n[0], small_to_float(from), row), b = exact::fma(n[0], small_to_float(to), row);
+        return a < in && -a < in && b < in && -b < in;
+    }
+    // Of the voxels from..to of a row, from x0 on, those that are left; `sure`: whether this is so. Along x the plane
+    // comes nearer and goes: it leaves what is between two numbers, which are rounded inwards and then looked at: the
+    // voxel that is in has to be so surely, and the one before it surely out.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t clip(int from_x, int to_x, int y, int z,
+                                                                   bool& sure) const {
+        const float row = row_at(y, z);
+        const auto from = static_cast<float>(from_x), to = static_cast<float>(to_x);
+        const float in = exact::mul(half, 1.0f - 0x1p-14f), out = exact::mul(half, 1.0f + 0x1p-14f);
+        const float enters = exact::fma_saturated(-exact::add(half, row), inverse, 0.25f),
+                    leaves = exact::fma_saturated(exact::sub(half, row), inverse, 0.25f); // (x + 16) / 64
+        const float k = exact::least(exact::greatest(exact::fma_up(enters, 64.0f, -16.0f), from), exact::add(to, 1.0f)),
+                    l = exact::greatest(exact::least(exact::fma_down(leaves, 64.0f, -16.0f), to),
+                                        exact::sub(from, 1.0f));
+        const float at_k = exact::fma(n[0], k, row), at_l = exact::fma(n[0], l, row);
+        const bool begins = (k == from) | (exact::sub(at_k, n[0]) < -out),
+                   ends = (l == to) | (exact::add(at_l, n[0]) > out);
+        const bool is_in = (k > to) | (at_k > -in), stays_in = (l < from) | (at_l < in);
+        sure = begins & ends & is_in & stays_in;
+        const std::uint32_t bits = ((2u << (exact::to_integer(l) & 31)) - 1) & (~0u << (exact::to_integer(k) & 31));
+        return k > l ? 0 : bits;
+    }
+
+private:
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float row_at(int y, int z) const {
+        return exact::fma(n[1], small_to_float(y), exact::fma(n[2], small_to_float(z), -middle));
+    }
+};
+
+struct small_conservative {
+    small_half_plane xy[3], yz[3], zx[3];
+    std::int64_t n[3]; // normal
+    // A voxel's lowest corner c meets the plane where n . c + below >= 0 and above - n . c >= 0.
+    std::int64_t below, above;
+
+    small_conservative() = default; // for brick_triangle to fill
+    VOXELPIPE_HD VOXELPIPE_INLINE small_conservative(const small_triangle& t, int fraction) {
+        const triple<std::int64_t> normal = small_normal(t);
+        small_projection<0, 1>(t, normal[2] < 0, fraction, xy);
+        small_projection<1, 2>(t, normal[0] < 0, fraction, yz);
+        small_projection<2, 0>(t, normal[1] < 0, fraction, zx);
+        std::int64_t at_plane = 0, positive = 0, negative = 0;
+        for (int i = 0; i < 3; ++i) {
+            n[i] = normal[i];
+            at_plane += n[i] * t.p[0][i];
+            positive += positive_part(n[i]);
+            negative += negative_part(n[i]);
+        }
+        below = positive - exact::ceil_shift(at_plane, fraction);
+        above = exact::floor_shift(at_plane, fraction) - negative;
+    }
+
+    // The covered voxels (x0 .. x1, y, z), bit 0 for x0; at most 32.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t row(int x0, int x1, int y, int z) const {
+        if ((yz[0].at(y, z) | yz[1].at(y, z) | yz[2].at(y, z)) < 0) return 0;
+        std::int32_t e[6];
+        for (int i = 0; i < 3; ++i) {
+            e[i] = xy[i].at(x0, y);
+            e[3 + i] = zx[i].at(z, x0);
+        }
+        const std::int64_t depth = n[0] * x0 + n[1] * y + n[2] * z;
+        std::int64_t lower = depth + below, upper = above - depth;
+        std::uint32_t bits = 0;
+        for (int x = 0; x <= x1 - x0; ++x) {
+            const std::int32_t outside =
+                e[0] | e[1] | e[2] | e[3] | e[4] | e[5] | static_cast<std::int32_t>((lower | upper) >> 32); // signs
+            bits |= (static_cast<std::uint32_t>(~outside) >> 31) << x;
+            for (int i = 0; i < 3; ++i) {
+                e[i] += xy[i].a;
+                e[3 + i] += zx[i].b;
+            }
+            lower += n[0];
+            upper -= n[0];
+        }
+        return bits;
+    }
+
+    // What the xy projection leaves of the voxels x0 .. x1 at y, what the zx projection leaves of them at z, whether
+    // the yz projection leaves the row (y, z), and what the plane leaves of `limit` in it: a row is the four together.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t limit_at_y(int x0, int x1, int y) const {
+        return line(xy[0].at(x0, y), xy[1].at(x0, y), xy[2].at(x0, y), xy[0].a, xy[1].a, xy[2].a, x1 - x0);
+    }
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t limit_at_z(int x0, int x1, int z) const {
+        return line(zx[0].at(z, x0), zx[1].at(z, x0), zx[2].at(z, x0), zx[0].b, zx[1].b, zx[2].b, x1 - x0);
+    }
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets_row(int y, int z) const {
+        return (yz[0].at(y, z) | yz[1].at(y, z) | yz[2].at(y, z)) >= 0;
+    }
+    // `limit` is one run of bits, as what projections leave is, and so is what the plane leaves of it: its ends are
+    // tested, and mostly nothing else.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t plane_bits(int x0, int y, int z,
+                                                                         std::uint32_t limit) const {
+        if (limit == 0) return 0;
+        int first = exact::lowest_one(limit), last = exact::bit_width(std::uint64_t{limit}) - 1;
+        const std::int64_t depth = times(n[0], x0 + first) + times(n[1], y) + times(n[2], z);
+        std::int64_t lower = depth + below, upper = above - depth;
+        const std::int64_t across = times(n[0], last - first);
+        for (std::int64_t a = lower + across, b = upper - across; (a | b) < 0 && last >= first; --last) {
+            a -= n[0];
+            b += n[0];
+        }
+        for (; (lower | upper) < 0 && first <= last; ++first) {
+            lower += n[0];
+            upper -= n[0];
+        }
+        return first <= last ? ((2u << last) - 1) & ~((1u << first) - 1) : 0;
+    }
+
+    // Calls emit(y, z, bits) for the rows of a box of at most 8 voxels along x that two projections and the plane leave
+    // something of; bit 0 is box.lo[0]. What the xy and the zx projection leave depends on y or on z alone, so that is
+    // found once and not once a row, and the yz projection tells which rows are wanted at all: threads that have a
+    // triangle each then go through as many rows as they emit, not through their boxes. 8 x 8 rows of 8 bits at once.
+    // Clips: see plane_bits.
+    template <bool Clips, class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void rows(const small_box& box, Emit&& emit) const {
+        const int x0 = box.lo[0], x7 = x0 + 7;
+        if (box.hi[0] < x0) return;
+        const near_plane plane(n, below, above, x0, Clips);
+        const std::uint32_t along = (2u << (box.hi[0] - x0)) - 1;
+        for (int y0 = box.lo[1]; y0 <= box.hi[1]; y0 += 8) {
+            const int y1 = box.hi[1] < y0 + 7 ? box.hi[1] : y0 + 7;
+            const std::uint32_t across = (2u << (y1 - y0)) - 1;
+            std::uint64_t by_y = 0;
+            for (int y = y1; y >= y0; --y) by_y = by_y << 8 | (along & limits_at_y<8>(x7, y));
+            for (int z0 = box.lo[2]; z0 <= box.hi[2]; z0 += 8) {
+                const int z1 = box.hi[2] < z0 + 7 ? box.hi[2] : z0 + 7;
+                std::uint64_t by_z = 0, met = 0; // rows, bit y + 8 z
+                for (int z = z1; z >= z0; --z) {
+                    by_z = by_z << 8 | (along & limits_at_z<8>(x7, z));
+                    met = met << 8 | (across & rows_at_z<8>(y0 + 7, z));
+                }
+                for (; met != 0; met &= met - 1) {
+                    const int at = exact::lowest_one(met), y = at % 8, z = at / 8;
+                    const std::uint32_t limit =
+                        static_cast<std::uint32_t>(by_y >> 8 * y) & static_cast<std::uint32_t>(by_z >> 8 * z) & along;
+                    if (limit != 0) emit(y0 + y, z0 + z, plane_bits<Clips>(plane, x0, y0 + y, z0 + z, limit));
+                }
+            }
+        }
+    }
+
+    // The same for a box of at most 16 voxels a side, all of it at once. `limits` holds 16 words: get(i), set(i, word).
+    template <bool Clips, class Limits, class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void rows_of_16(const small_box& box, Limits&& limits, Emit&& emit) const {
+        if (box.empty()) return;
+        const int x0 = box.lo[0], y0 = box.lo[1], z0 = box.lo[2];
+        const int last_x = box.hi[0] - x0, last_y = box.hi[1] - y0, last_z = box.hi[2] - z0;
+        const near_plane plane(n, below, above, x0, Clips);
+        {
+            small_row_ends by_y(xy, false, x0, y0, 1);
+            for (int y = 0; y <= last_y; ++y) limits.set(y, by_y.next(last_x));
+        }
+        {
+            small_row_ends by_z(zx, true, x0, z0, 1);
+            for (int z = 0; z <= last_z; ++z)
+                limits.set(z, (z <= last_y ? limits.get(z) : 0) | by_z.next(last_x) << 16);
+        }
+        std::uint64_t met[4] = {}; // rows, bit y + 16 z
+        {
+            small_row_ends by_z(yz, false, y0, z0 + last_z, -1);
+            for (int z = last_z; z >= 0; --z) {
+                for (int k = 3; k > 0; --k) met[k] = met[k] << 16 | met[k - 1] >> 48;
+                met[0] = met[0] << 16 | by_z.next(last_y);
+            }
+        }
+        for (int first_z = 0;;) {
+            if (met[0] == 0) {
+                if ((met[1] | met[2] | met[3]) == 0) break;
+                for (int k = 1; k < 4; ++k) met[k - 1] = met[k];
+                met[3] = 0;
+                first_z += 4;
+            } else {
+                const int at = exact::lowest_one(met[0]), y = at % 16, z = first_z + at / 16;
+                met[0] &= met[0] - 1;
+                const std::uint32_t limit = limits.get(y) & limits.get(z) >> 16;
+                if (limit != 0) emit(y0 + y, z0 + z, plane_bits<Clips>(plane, x0, y0 + y, z0 + z, limit));
+            }
+        }
+    }
+
+    // The same for boxes of up to 32 voxels a side.
+    template <class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void long_rows(const small_box& box, Emit&& emit) const {
+        const int x0 = box.lo[0], x1 = box.hi[0];
+        for (int y = box.lo[1]; y <= box.hi[1]; ++y) {
+            const std::uint32_t at_y = limit_at_y(x0, x1, y);
+            if (at_y == 0) continue;
+            for (int z = box.lo[2]; z <= box.hi[2]; ++z) {
+                if (!meets_row(y, z)) continue;
+                const std::uint32_t limit = at_y & limit_at_z(x0, x1, z);
+                if (limit != 0) emit(y, z, plane_bits(x0, y, z, limit));
+            }
+        }
+    }
+
+private:
+    // The same, from what floats say where they are sure: of whatever the plane leaves, or only whether that is all,
+    // which takes fewer registers.
+    template <bool Clips>
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t plane_bits(const near_plane& plane, int x0, int y, int z,
+                                                                         std::uint32_t limit) const {
+        const int first = exact::lowest_one(limit), last = exact::highest_one(limit);
+        bool sure = false;
+        std::uint32_t bits = limit;
+        if constexpr (Clips)
+            bits = plane.clip(first, last, y, z, sure);
+        else
+            sure = plane.meets(first, last, y, z);
+        return sure ? bits : plane_bits(x0, y, z, limit);
+    }
+    // What the xy projection leaves of the voxels from x - Length + 1 to x at y, the zx projection of them at z, and
+    // the yz projection of the rows from y - Length + 1 to y at z.
+    template <int Length>
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t limits_at_y(int x, int y) const {
+        return small_line<Length>(xy[0].at(x, y), xy[1].at(x, y), xy[2].at(x, y), xy[0].a, xy[1].a, xy[2].a);
+    }
+    template <int Length>
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t limits_at_z(int x, int z) const {
+        return small_line<Length>(zx[0].at(z, x), zx[1].at(z, x), zx[2].at(z, x), zx[0].b, zx[1].b, zx[2].b);
+    }
+    template <int Length>
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t rows_at_z(int y, int z) const {
+        return small_line<Length>(yz[0].at(y, z), yz[1].at(y, z), yz[2].at(y, z), yz[0].a, yz[1].a, yz[2].a);
+    }
+    // Bit x where three values, stepped x times, are all >= 0; x = 0 .. last.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE static std::uint32_t line(std::int32_t e0, std::int32_t e1,
+                                                                          std::int32_t e2, std::int32_t s0,
+                                                                          std::int32_t s1, std::int32_t s2, int last) {
+        std::uint32_t bits = 0;
+        for (int x = 0; x <= last; ++x) {
+            bits |= (static_cast<std::uint32_t>(~(e0 | e1 | e2)) >> 31) << x;
+            e0 += s0;
+            e1 += s1;
+            e2 += s2;
+        }
+        return bits;
+    }
+};
+
+} // namespace voxelpipe::core
