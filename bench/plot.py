@@ -145,8 +145,8 @@ def plot_ahead(rows, label, out):
                   color=colours[scenes.index(row["scene"]) % len(colours)], markersize=5, alpha=0.9)
     for goal, text in ((1, "as fast"), (1.5, "the least"), (3, "the goal")):
         axes.axvline(goal, color="#606060" if goal == 1 else "#c0c0c0", linewidth=1, zorder=0)
-        axes.annotate(f"{goal} × {text}", (goal, 1), xycoords=("data", "axes fraction"), rotation=90, fontsize=7,
-                      va="top", ha="right", color="#606060")
+        axes.annotate(f"{goal} × {text}", (goal, 1), xytext=(0, 3), xycoords=("data", "axes fraction"),
+                      textcoords="offset points", fontsize=7, va="bottom", ha="center", color="#606060")
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g} ×"))
@@ -161,7 +161,7 @@ def plot_ahead(rows, label, out):
     marks += [plt.Line2D([], [], marker=m, linestyle="", color="#606060", label=f"{n}³")
               for m, n in zip("osD", resolutions)]
     axes.legend(handles=marks, fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    axes.set_title("Ahead of the fastest published figure" + (f" — {label}" if label else ""), fontsize=11)
+    axes.set_title("Ahead of the fastest published figure" + (f" — {label}" if label else ""), fontsize=11, pad=16)
     figure.savefig(out / "ahead.png", dpi=110)
     plt.close(figure)
     return True
