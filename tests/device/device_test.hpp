@@ -103,6 +103,26 @@ inline mesh_data mixed_triangles(int count, float size, std::uint32_t seed) {
     return m;
 }
 
+// Triangles of some voxels in a grid, all at its lower or all at its upper faces.
+inline mesh_data triangles_at_faces(glm::ivec3 extent, int count, bool upper, std::uint32_t seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> unit(0.0f, 1.0f);
+    mesh_data m;
+    for (int i = 0; i < count; ++i) {
+        const int axis = i % 3;
+        glm::vec3 centre(unit(random), unit(random), unit(random));
+        centre *= glm::vec3(extent);
+        centre[axis] = upper ? static_cast<float>(extent[axis]) - 2.0f * unit(random) : 2.0f * unit(random);
+        const auto point = [&] {
+            glm::vec3 p = centre;
+            for (int a = 0; a < 3; ++a) p[a] += (unit(random) - 0.5f) * (a == axis ? 3.0f : 8.0f);
+            return glm::clamp(p, glm::vec3(0.01f), glm::vec3(extent) - 0.01f);
+        };
+        add_triangle(m, point(), point(), point());
+    }
+    return m;
+}
+
 inline mesh_data translated(mesh_data m, glm::vec3 by) {
     for (glm::vec3& p : m.positions) p += by;
     return m;

@@ -116,6 +116,16 @@ TEST(Lists, ManyRecordsOfLargeTriangles) {
                                 vp::constant(true), rule);
 }
 
+// A thin fragment may lie a voxel beyond its triangle's box: a warp with a triangle where the grid ends does not take
+// the way by rounds. So many that they fill a device by a thread each.
+TEST(Lists, TrianglesAtTheGridsFaces) {
+    const glm::ivec3 extent(80, 70, 60);
+    for (const bool upper : {false, true})
+        for (const vp::coverage rule : both_rules)
+            expect_same_lists<void>(triangles_at_faces(extent, 25000, upper, 126), box_grid(extent), vp::passthrough{},
+                                    vp::constant(true), rule);
+}
+
 // Slivers across the grid and triangles without area, alone.
 TEST(Lists, SliversAndZeroArea) {
     mesh_data m;

@@ -280,10 +280,13 @@ unsigned meet_block(bool predicate) { return the_block().meet_block(predicate); 
 
 unsigned char* dynamic_shared() { return shared_bytes_of_block; }
 std::uint32_t shared_address(const void* p) {
-    const std::ptrdiff_t d = static_cast<const unsigned char*>(p) - shared_bytes_of_block;
+    const std::intptr_t d = reinterpret_cast<std::intptr_t>(p) - reinterpret_cast<std::intptr_t>(shared_bytes_of_block);
     if (d != static_cast<std::int32_t>(d)) fail("an address that is not one of shared memory");
     return static_cast<std::uint32_t>(d);
 }
-void* shared_pointer(std::uint32_t address) { return shared_bytes_of_block + static_cast<std::int32_t>(address); }
+void* shared_pointer(std::uint32_t address) {
+    return reinterpret_cast<void*>(reinterpret_cast<std::intptr_t>(shared_bytes_of_block) + // another array's
+                                   static_cast<std::int32_t>(address));
+}
 
 } // namespace emulation
