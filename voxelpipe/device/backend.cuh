@@ -7,8 +7,9 @@
 // again.
 
 #include <voxelpipe/core/call_room.hpp>
+#include <voxelpipe/device/abuffer_call.cuh>
 #include <voxelpipe/device/call_graph.cuh>
-#include <voxelpipe/device/dispatch.cuh>
+#include <voxelpipe/device/framebuffer_call.cuh>
 #include <voxelpipe/device/state_reader.cuh>
 
 #include <algorithm>

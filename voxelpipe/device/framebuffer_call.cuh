@@ -2,11 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Host side of a call: which targets go through which path, what memory that takes (plan), and the launch of every
-// stage on one stream, without a wait (launch). The same plan serves voxelize, which reads the state once at the end,
-// and voxelize_async, which leaves it on the device.
+// Host side of a framebuffer call: which targets go through which path, what memory that takes (plan), and the launch
+// of every stage on one stream, without a wait (launch). The same plan serves voxelize, which reads the state once at
+// the end, and voxelize_async, which leaves it on the device.
 
 #include <voxelpipe/device/call_graph.cuh>
+#include <voxelpipe/device/call_memory.cuh>
 #include <voxelpipe/device/clear_target.cuh>
 #include <voxelpipe/device/counted_target.cuh>
 #include <voxelpipe/device/direct_raster.cuh>
@@ -15,131 +16,14 @@
 #include <voxelpipe/device/stage_clock.cuh>
 #include <voxelpipe/device/tile_passes.cuh>
 #include <voxelpipe/device/touched_grid.cuh>
-#include <voxelpipe/device/vertex_shade.cuh>
 
 #include <algorithm>
-#include <bit>
 #include <cstdint>
-#include <cstring>
-#include <limits>
 #include <span>
 
 namespace voxelpipe::device {
 
-// ---- memory ---------------------------------------------------------------------------------------------------------
-
-// Geometry and shading of the draws, and where they lie on the device.
-template <class Mesh, class VertexShader, class FragmentShader>
-struct scene_memory {
-    using varyings = typename core::shaded<Mesh, VertexShader>::varyings;
-    using scene_type = scene<FragmentShader, varyings>;
-    using draw_type = draw<Mesh, VertexShader, FragmentShader>;
-
-    vertex_positions positions;
-    varyings* vertex_varyings;
-    draw_geometry* geometries; // null where there is one draw
-    typename scene_type::shading* shadings;
-
-    scene_memory(arena& memory, std::span<const draw_type> draws) {
-        std::size_t vertices = 0;
-        for (const auto& d : draws) vertices += d.mesh.positions.size();
-        positions = vertex_positions::take(memory, vertices);
-        vertex_varyings = memory.take<varyings>(std::is_empty_v<varyings> ? 0 : vertices);
-        geometries = memory.take<draw_geometry>(draws.size() > 1 ? draws.size() : 0);
-        shadings = memory.take<typename scene_type::shading>(draws.size() > 1 ? draws.size() : 0);
-    }
-
-    // Runs the vertex shaders and gives the scene that the other stages read.
-    [[nodiscard]] scene_type shade(std::span<const draw_type> draws, const grid& g, cudaStream_t stream) const {
-        scene_type s{};
-        s.geo.num_draws = static_cast<std::uint32_t>(draws.size());
-        s.geo.snap = core::make_snap_transform(g);
-        s.geo.extent = g.extent;
-        s.normal_factors = core::normal_factors(g);
-        s.offset = g.offset;
-        std::vector<draw_geometry> geometry_of(draws.size());
-        std::size_t vertex = 0;
-        std::uint32_t primitive = 0;
-        for (std::size_t d = 0; d < draws.size(); ++d) {
-            const Mesh& m = draws[d].mesh;
-            const vertex_positions of_draw = positions.from(vertex);
-            geometry_of[d] = {m.triangles.data(), of_draw, primitive, static_cast<std::uint32_t>(m.positions.size())};
-            vertex_shade(m, draws[d].vertex_shader, s.geo.snap, static_cast<std::uint32_t>(d), of_draw,
-                         varyings_at(vertex), stream);
-            vertex += m.positions.size();
-            primitive += static_cast<std::uint32_t>(m.triangles.size());
-        }
-        s.geo.num_primitives = primitive;
-        s.geo.one = geometry_of[0];
-        s.one = {draws[0].fragment_shader, varyings_at(0)};
-        if (draws.size() > 1) {
-            upload(
-                geometries, draws.size(), [&](std::size_t d) { return geometry_of[d]; }, stream);
-            std::size_t first = 0;
-            upload(
-                shadings, draws.size(),
-                [&](std::size_t d) {
-                    const typename scene_type::shading one{draws[d].fragment_shader, varyings_at(first)};
-                    first += draws[d].mesh.positions.size();
-                    return one;
-                },
-                stream);
-            s.geo.many = geometries;
-            s.many = shadings;
-        }
-        return s;
-    }
-
-private:
-    [[nodiscard]] varyings* varyings_at(std::size_t vertex) const {
-        return std::is_empty_v<varyings> ? nullptr : vertex_varyings + vertex;
-    }
-};
-
-// Fragment lists with payloads of one type. Where all fragments have one payload, it takes no memory.
-template <class Key, class Payload>
-[[nodiscard]] list_buffers<Key, Payload> take_lists(arena& memory, std::uint64_t num_voxels,
-                                                    unsigned long long capacity, bool one_payload = false) {
-    list_buffers<Key, Payload> b{};
-    if constexpr (std::is_same_v<Key, std::uint32_t>) {
-        const sort_pairs pairs = sort_pairs::take(memory, capacity);
-        std::copy_n(pairs.keys, 2, b.keys);
-        std::copy_n(pairs.values, 2, b.values);
-    } else {
-        for (int i = 0; i < 2; ++i) {
-            b.keys[i] = memory.take<Key>(capacity);
-            b.values[i] = memory.take<std::uint32_t>(capacity);
-        }
-    }
-    b.storage_bytes = select_bytes<Key>(capacity);
-    if (are_sorted_here<Key>(capacity)) {
-        b.bits = static_cast<int>(std::bit_width(num_voxels - 1));
-        b.sort = sort_memory::take(memory, capacity, b.bits);
-    } else {
-        b.bits = key_bits(num_voxels);
-        b.storage_bytes = std::max(b.storage_bytes, sort_bytes<Key>(capacity, b.bits));
-    }
-    if (!std::is_same_v<Payload, no_payload> && !one_payload) {
-        b.primitives = memory.take<std::uint32_t>(capacity);
-        b.payloads = memory.take<Payload>(capacity);
-    }
-    b.first_of_voxel = memory.take<std::uint64_t>(capacity + 1);
-    b.places = memory.take<list_places>(1);
-    b.storage = memory.take<std::byte>(b.storage_bytes);
-    return b;
-}
-
-[[nodiscard]] inline std::uint64_t num_voxels(const grid& g) {
-    return static_cast<std::uint64_t>(g.extent.x) * static_cast<std::uint64_t>(g.extent.y) *
-           static_cast<std::uint64_t>(g.extent.z);
-}
-
-// ---- which calls need no tiles --------------------------------------------------------------------------------------
-
-// Vertex shaders that cost no more than reading what they made: they run once a corner instead of once a vertex.
-template <class VertexShader>
-inline constexpr bool is_cheap = std::is_same_v<VertexShader, passthrough> || std::is_same_v<VertexShader, transform>;
-
+// Whether a constant shader and its targets need no tiles.
 template <class FragmentShader, class Framebuffer>
 inline constexpr bool can_be_direct = false;
 template <class FragmentShader, class... Targets>
@@ -147,8 +31,6 @@ inline constexpr bool can_be_direct<FragmentShader, framebuffer_view<Targets...>
                                                                                     (is_direct<Targets>() && ...);
 
 inline constexpr std::size_t most_direct_draws = 16; // each has launches of its own
-
-// ---- a framebuffer call ---------------------------------------------------------------------------------------------
 
 template <class Draw, class Framebuffer, tuning::fine_raster_policy Policy>
 struct framebuffer_call;
@@ -538,150 +420,5 @@ auto with_framebuffer_call(std::span<const Draw> draws, const grid& g, const Fra
                                                                  static_cast<std::uint32_t>(triangles), limits});
         });
 }
-
-// ---- an A-buffer call -----------------------------------------------------------------------------------------------
-
-template <class Draw, class Payload>
-struct abuffer_call;
-template <class Mesh, class VertexShader, class FragmentShader, class Payload>
-struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
-    using draw_type = draw<Mesh, VertexShader, FragmentShader>;
-    using scene_buffers = scene_memory<Mesh, VertexShader, FragmentShader>;
-    using scene_type = typename scene_buffers::scene_type;
-
-    std::span<const draw_type> draws;
-    grid g;
-    std::uint32_t num_primitives;
-    capacities limits;
-    stage_clock* clock = nullptr;
-    // Whether fragments may be shaded when they are listed: in the finished lists, and then these are not what is
-    // wanted if any was discarded; with `filters`, before that as well.
-    bool may_shade_late = false, filters = false;
-
-    // All that the launches of this call depend on, where it is plain bytes.
-    static constexpr bool has_bytes = std::is_trivially_copyable_v<draw_type>;
-    template <coverage Rule, class Key>
-    [[nodiscard]] call_bytes bytes(const void* workspace, const void* page) const {
-        call_bytes b = bytes_of_call<abuffer_call, Key>(workspace, page);
-        b.add(Rule);
-        for (const draw_type& d : draws) b.add(d);
-        b.add(g);
-        b.add(num_primitives);
-        b.add(limits);
-        b.add(may_shade_late);
-        b.add(filters);
-        return b;
-    }
-    // Whether fragments are listed by the raster, and shaded afterwards where the shader is not constant.
-    template <class Key>
-    [[nodiscard]] bool is_listed_call() const {
-        return sizeof(Key) == sizeof(std::uint32_t) && (core::is_solid<FragmentShader> || may_shade_late) &&
-               draws.size() == 1 && is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
-    }
-    template <class Key>
-    [[nodiscard]] bool shades_late() const {
-        return !core::is_solid<FragmentShader> && is_listed_call<Key>();
-    }
-
-    // Carves the memory and, with Run, launches the stages up to the sorted lists, which may be where they are asked
-    // for already (are_placed): there is room for limits.fragments primitives. The state comes first in the memory, and
-    // is zeroed before.
-    template <coverage Rule, bool Run, class Key>
-    [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, cudaStream_t stream,
-                                                  const asked_places& asked = {}) const {
-        pipeline_state* const state = memory.take<pipeline_state>(1);
-        if constexpr (sizeof(Key) == sizeof(std::uint32_t)) {
-            if (is_listed_call<Key>()) {
-                if constexpr (core::is_solid<FragmentShader>)
-                    return go_direct<Rule, Run>(memory, state, stream, asked);
-                else
-                    return go_shaded<Rule, Run>(memory, state, stream, asked);
-            }
-        }
-        const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
-        const scene_buffers buffers(memory, draws);
-        const list_memory share(memory, num_primitives, limits.fragment_records);
-        if constexpr (Run) {
-            const scene_type s = buffers.shade(draws, g, stream);
-            end_stage(clock, &stage_times::vertex_shade);
-            return build_lists<Rule, first_value>(s, lists, share.with(state), state, limits, true, stream, clock,
-                                                  asked);
-        } else {
-            return {};
-        }
-    }
-
-private:
-    // One draw of a constant shader.
-    template <coverage Rule, bool Run>
-    [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-    go_direct(arena& memory, pipeline_state* state, cudaStream_t stream, const asked_places& asked) const {
-        constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
-        const draw_type& d = draws[0];
-        const auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
-        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : d.mesh.positions.size());
-        const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
-        const order_memory order = order_memory::take(memory, limits.fragments);
-        if constexpr (Run) {
-            const core::snap_transform snap = core::make_snap_transform(g);
-            const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
-            const auto raster = [&](const auto& source) {
-                const raster_input<std::remove_cvref_t<decltype(source)>> in{source, num_primitives, snap.fraction,
-                                                                             g.extent};
-                list_raster<Rule>(in, num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0],
-                                  prepare_lists(lists, asked, order.tiles, limits), state, limits, stream);
-            };
-            if constexpr (on_the_spot) {
-                raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, 0});
-            } else {
-                vertex_shade(d.mesh, d.vertex_shader, snap, 0, positions, static_cast<no_varyings*>(nullptr), stream);
-                end_stage(clock, &stage_times::vertex_shade);
-                raster(stored_source{{d.mesh.triangles.data(), positions, 0, num_vertices}});
-            }
-            end_stage(clock, &stage_times::fine_raster);
-            fragment_lists<std::uint32_t, Payload> sorted =
-                sort_unordered(lists, order, asked, num_primitives, nullptr, state, limits, stream, clock);
-            if constexpr (!std::is_same_v<Payload, no_payload>)
-                sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
-            return sorted;
-        } else {
-            return {};
-        }
-    }
-
-    // One draw of any other shader.
-    template <coverage Rule, bool Run>
-    [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-    go_shaded(arena& memory, pipeline_state* state, cudaStream_t stream, const asked_places& asked) const {
-        constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
-        auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
-        const scene_buffers buffers(memory, draws);
-        const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
-        const order_memory order = order_memory::take(memory, limits.fragments);
-        auto* const spare = memory.take<std::uint32_t>(limits.fragments);
-        auto* const payloads = memory.take<Payload>(has_payload ? limits.fragments : 0);
-        if constexpr (Run) {
-            const scene_type s = buffers.shade(draws, g, stream);
-            end_stage(clock, &stage_times::vertex_shade);
-            const raster_input<stored_source> in{{s.geo.one}, num_primitives, s.geo.snap.fraction, g.extent};
-            list_raster<Rule>(in, s.geo.one.num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0],
-                              prepare_lists(lists, asked, order.tiles, limits), state, limits, stream);
-            if (filters) filter_lists(s, lists, state, limits, stream);
-            end_stage(clock, &stage_times::fine_raster);
-            fragment_lists<std::uint32_t, Payload> sorted =
-                sort_unordered(lists, order, asked, num_primitives, spare, state, limits, stream, clock);
-            if (!filters || has_payload) {
-                launch_behind(shade_lists_kernel<first_value, scene_type, Payload>, fill_device(limits.fragments),
-                              threads_per_block, stream, stage::abuffer_emit, s, sorted, payloads, state, limits);
-                end_stage(clock, &stage_times::abuffer_emit);
-            }
-            sorted.payloads = has_payload ? payloads : nullptr;
-            sorted.payloads_in_order = true;
-            return sorted;
-        } else {
-            return {};
-        }
-    }
-};
 
 } // namespace voxelpipe::device
