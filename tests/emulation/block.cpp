@@ -3,7 +3,6 @@
 
 #include <emulation/block.hpp>
 
-#include <csetjmp>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -30,12 +29,17 @@ alignas(1024) unsigned char shared_bytes_of_block[most_shared_bytes];
     std::abort();
 }
 
+// For the compiler's own setjmp, which does not ask whether a jump leaves the stack that it is on. Functions that set
+// one are not inlined.
+using jump_buffer = void* [5];
+[[noreturn]] __attribute__((noinline)) void jump(jump_buffer& to) { __builtin_longjmp(to, 1); }
+
 enum class state { ready, waits, ended };
 
 struct fiber {
     state is = state::ended;
     bool exists = false; // stack and context, from its first block on
-    std::jmp_buf at;
+    jump_buffer at{};
     std::uint64_t value = 0, result = 0; // of a meeting
     unsigned from = 0;
 };
@@ -136,12 +140,12 @@ private:
         return text == nullptr ? 1u : static_cast<unsigned>(std::strtoul(text, nullptr, 10));
     }
 
-    void resume(unsigned i) {
+    __attribute__((noinline)) void resume(unsigned i) {
         running_ = i;
         fiber& f = fibers_[i];
         threadIdx = {i, 0, 0};
-        if (_setjmp(scheduler_) != 0) return;
-        if (f.exists) _longjmp(f.at, 1);
+        if (__builtin_setjmp(scheduler_) != 0) return;
+        if (f.exists) jump(f.at);
         f.exists = true;
         ucontext_t c;
         getcontext(&c);
@@ -153,8 +157,8 @@ private:
         setcontext(&c);
         fail("no context");
     }
-    void leave() {
-        if (_setjmp(fibers_[running_].at) == 0) _longjmp(scheduler_, 1);
+    __attribute__((noinline)) void leave() {
+        if (__builtin_setjmp(fibers_[running_].at) == 0) jump(scheduler_);
     }
     // A fiber's life: one thread of one block after another.
     static void begin() {
@@ -249,7 +253,7 @@ private:
     std::vector<unsigned> in_barrier_;
     std::minstd_rand random_;
     unsigned char* stacks_ = nullptr;
-    std::jmp_buf scheduler_;
+    jump_buffer scheduler_{};
     unsigned num_threads_ = 0, num_ended_ = 0, num_arrived_ = 0, num_true_ = 0, running_ = 0;
 };
 block* block::self = nullptr;
