@@ -4,8 +4,7 @@ include_guard(GLOBAL)
 
 # voxelpipe_join_sources(variable file source...): one source file, written to the build tree, that includes all of them,
 # each in a namespace of its own, behind the headers that they include. Half of the time of a file goes into those headers
-# and into the kernels that all files have. A file that does not end like the sources includes others that do, of the same
-# names.
+# and into the kernels that all files have. One that ends in .cpp includes .cpp of the same names in the place of .cu.
 function(voxelpipe_join_sources variable name)
   set(includes "")
   set(text "")
@@ -15,8 +14,11 @@ function(voxelpipe_join_sources variable name)
     file(STRINGS "${source}" lines REGEX "^#(include|define) ")
     list(APPEND includes ${lines})
     cmake_path(GET source STEM stem)
-    cmake_path(GET name EXTENSION LAST_ONLY extension)
-    string(APPEND text "\nnamespace joined_${stem} {\n#include \"${stem}${extension}\"\n}\n")
+    cmake_path(GET source FILENAME file)
+    if(name MATCHES "\\.cpp$")
+      string(REGEX REPLACE "\\.cu$" ".cpp" file "${file}")
+    endif()
+    string(APPEND text "\nnamespace joined_${stem} {\n#include \"${file}\"\n}\n")
   endforeach()
   list(REMOVE_DUPLICATES includes)
   list(JOIN includes "\n" includes)
