@@ -5,6 +5,7 @@
 // compares with the general path): boxes of up to 2 and up to 3 voxels a side, vertices on voxel faces and edges,
 // repeated vertices, triangles without area, and how often the signs are sure.
 
+#include "boxed_triangles.hpp"
 #include "test_support.hpp"
 
 #include <voxelpipe/core/corner_signs.hpp>
@@ -12,74 +13,27 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <map>
-#include <random>
 #include <utility>
 
 namespace {
 
 using namespace voxelpipe::core;
+using unit::boxed_triangle;
+using unit::boxed_triangles;
 using rows = std::map<std::pair<int, int>, std::uint32_t>; // by y and z
-
-struct boxed_triangle {
-    std::int32_t q[3][3], lo[3];
-    int last[3];
-
-    [[nodiscard]] int wide() const { return (last[0] != 0) + (last[1] != 0) + (last[2] != 0); }
-    [[nodiscard]] small_conservative exact(int fraction) const {
-        small_triangle t{};
-        for (int v = 0; v < 3; ++v)
-            for (int k = 0; k < 3; ++k) t.p[v][k] = q[v][k] - (lo[k] << fraction);
-        return {t, fraction};
-    }
-};
-
-struct generator {
-    std::mt19937_64 random{20261122};
-    int fraction = 14;
-
-    std::int32_t number(std::int64_t lo, std::int64_t hi) {
-        return static_cast<std::int32_t>(std::uniform_int_distribution(lo, hi)(random));
-    }
-    // A triangle of at most `most` voxels a side; false where this one is larger.
-    bool triangle(int most, boxed_triangle& t) {
-        const std::int64_t one = std::int64_t{1} << fraction;
-        const std::int64_t sizes[] = {most * one, (most - 1) * one, one / 2, one / 20 + 4, one / 500 + 4};
-        const std::int64_t size = sizes[number(0, 4)];
-        const bool on_faces = number(0, 2) == 0, around_a_corner = number(0, 3) == 0;
-        for (int k = 0; k < 3; ++k) {
-            const std::int64_t corner = (5 + number(0, 3)) * one,
-                               low = around_a_corner ? corner - number(0, size) : corner + number(0, most * one - size);
-            for (int v = 0; v < 3; ++v) {
-                std::int64_t q = low + number(0, size);
-                if (on_faces && number(0, 4) == 0) q = (q + one / 2) / one * one;
-                if (v > 0 && number(0, 20) == 0) q = t.q[v - 1][k];
-                t.q[v][k] = static_cast<std::int32_t>(q);
-            }
-        }
-        if (number(0, 15) == 0) std::copy(t.q[0], t.q[0] + 3, t.q[1]);
-        bool fits = true;
-        for (int k = 0; k < 3; ++k) {
-            t.lo[k] = (min3(t.q[0][k], t.q[1][k], t.q[2][k]) - 1) >> fraction;
-            t.last[k] = (max3(t.q[0][k], t.q[1][k], t.q[2][k]) >> fraction) - t.lo[k];
-            fits = fits && t.last[k] < most;
-        }
-        return fits;
-    }
-};
 
 rows by_integers(const boxed_triangle& t, int fraction, const small_box& box) {
     rows out;
-    t.exact(fraction).rows<false>(box, [&](int y, int z, std::uint32_t bits) {
+    small_conservative(t.relative(fraction), fraction).rows<false>(box, [&](int y, int z, std::uint32_t bits) {
         if (bits != 0) out[{y, z}] = bits;
     });
     return out;
 }
 
 TEST(CornerSigns, TwoVoxelsASide) {
-    generator g;
+    boxed_triangles g;
     int compared = 0, sure = 0, cubes = 0, sure_cubes = 0, quads = 0, partly = 0;
     for (const int fraction : {12, 13, 14, 15, 16}) {
         g.fraction = fraction;
@@ -122,7 +76,7 @@ TEST(CornerSigns, TwoVoxelsASide) {
 }
 
 TEST(CornerSigns, ThreeVoxelsASide) {
-    generator g;
+    boxed_triangles g;
     int compared = 0, sure = 0, full = 0;
     for (const int fraction : {12, 13, 14, 15, 16}) {
         g.fraction = fraction;

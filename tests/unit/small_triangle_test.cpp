@@ -10,6 +10,7 @@
 #include <voxelpipe/core/coverage.hpp>
 #include <voxelpipe/core/small_conservative.hpp>
 #include <voxelpipe/core/small_thin.hpp>
+#include <voxelpipe/core/thin_cube.hpp>
 
 #include <gtest/gtest.h>
 
@@ -308,13 +309,16 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
             if (max3(last[0], last[1], last[2]) < 2) { // all columns at once
                 ++cubes;
                 voxels again;
-                const std::uint32_t columns = quad_bits(s.uv), depths = cube_depths(s);
+                const int reach[3] = {static_cast<int>(box.hi[0] - box.lo[0]), static_cast<int>(box.hi[1] - box.lo[1]),
+                                      static_cast<int>(box.hi[2] - box.lo[2])};
+                const thin_cube cube = thin_cube_by_integers(t, reach, fraction);
+                ASSERT_EQ(cube.axis, s.axis);
                 for (int at = 0; at < 4; ++at) {
-                    const int u = at & 1, row = at >> 1, w = static_cast<int>(depths >> 2 * at & 3u) - 1;
-                    if ((columns >> at & 1u) == 0 || u > last[0] || row > last[1]) continue;
-                    beyond += static_cast<int>(w < 0 || w > last[2]);
-                    const auto p = to_xyz(s.axis, origin[0] + u, origin[1] + row, origin[2] + w);
-                    again.insert({static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])});
+                    if ((cube.columns >> at & 1u) == 0) continue;
+                    beyond += static_cast<int>(cube.depth(at) < 0 || cube.depth(at) > last[2]);
+                    const auto p = cube.voxel(at);
+                    again.insert({static_cast<int>(box.lo[0]) + p[0], static_cast<int>(box.lo[1]) + p[1],
+                                  static_cast<int>(box.lo[2]) + p[2]});
                 }
                 ASSERT_EQ(again, rows) << "fraction " << fraction << ", triangle " << i;
             }

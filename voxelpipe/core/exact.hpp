@@ -156,11 +156,12 @@ namespace exact {
 #endif
 }
 
-// About 1 / a, to 2^-22 of itself; infinity for zero. Not the same everywhere: for what is proved to be near enough.
+// About 1 / a, to 2^-22 of itself, for magnitudes from 2^-126 to 2^126; infinity for zero. Not the same everywhere: for
+// what is proved to be near enough.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float near_inverse(float a) {
 #if defined(__CUDA_ARCH__)
     float r;
-    asm("rcp.approx.f32 %0, %1;" : "=f"(r) : "f"(a));
+    asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(r) : "f"(a));
     return r;
 #else
     return 1.0f / a;
@@ -212,14 +213,21 @@ namespace exact {
     return a < b ? b : a;
 #endif
 }
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float absolute(float a) {
+#if defined(__CUDA_ARCH__)
+    return fabsf(a);
+#else
+    return a < 0 ? -a : a;
+#endif
+}
 // An integer as what it is; |a| <= 2^21.
 inline constexpr std::int32_t integer_shift = 0x4b400000;
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t to_integer(float a) {
     return core::bit_cast<std::int32_t>(add(a, 12582912.0f)) - integer_shift;
 }
 
-// The greatest integer that is not above a, for |a| <= 2^21, and by how much a is above it. By a sum with 1.5 * 2^23,
-// whose last mantissa bits are the integer: conversions run at a fraction of that rate.
+// The greatest integer that is not above a, for |a| <= 2^21, and by how much a is above it; anything for other numbers.
+// By a sum with 1.5 * 2^23, whose last mantissa bits are the integer: conversions run at a fraction of that rate.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t integer_below(float a, float& over) {
 #if defined(__CUDA_ARCH__)
     float sum;
@@ -229,7 +237,7 @@ inline constexpr std::int32_t integer_shift = 0x4b400000;
 #else
     const float whole = std::floor(a);
     over = a - whole;
-    return static_cast<std::int32_t>(whole);
+    return whole >= -0x1p21f && whole <= 0x1p21f ? static_cast<std::int32_t>(whole) : 0;
 #endif
 }
 

@@ -82,7 +82,7 @@ struct block_warp {
         bool waits = false, is_big = false;
         bool is_inside = false;
         int most = 0;
-        core::sure_bits cube{0, false};
+        bool is_done = false;
         near_triangle r;
         if (valid) {
             r = load_near(call.in, index);
@@ -94,13 +94,19 @@ struct block_warp {
             else
                 waits = !is_big;
         }
-        if constexpr (!thin) {
-            cube = find_cube(call.in, waits && most <= 2, r, is_inside);
-            waits = waits && !cube.sure;
+        sink.mark_boxes(waits, r);
+        if constexpr (thin) {
+            const bool is_cube = waits && most <= 2;
+            if (__popc(__ballot_sync(0xffffffffu, is_cube)) >= least_thin_cubes && is_cube) {
+                const core::thin_cube cube = core::thin_cube_by_signs(r.q, r.lo, r.last, call.in.fraction, is_done);
+                if (is_done) give_thin_cube(call.in, r, cube, sink);
+            }
+        } else {
+            const core::sure_bits cube = find_cube(call.in, waits && most <= 2, r, is_inside);
+            is_done = cube.sure;
+            if (is_done) give_cube(r, cube.bits, sink);
         }
-        sink.mark_boxes(waits || cube.sure, r);
-        if constexpr (!thin)
-            if (cube.sure) give_cube(r, cube.bits, sink);
+        waits = waits && !is_done;
         if (__any_sync(0xffffffffu, waits || is_big)) {
             const int kind = waits ? kind_of<Call::rule>(r, most) : -1;
             const int tiny_at = take_place(kind == tiny_triangles, num_tinies);

@@ -62,16 +62,6 @@ inline constexpr bool combines_words = Call::output::only_sets && (Call::rule ==
 template <class Call>
 using warp_words = std::conditional_t<combines_words<Call>, word_places, no_words>;
 
-// The number of a row's first word, and x; modulo 2^32.
-struct word_place {
-    std::uint32_t row, x;
-    [[nodiscard]] __device__ VOXELPIPE_INLINE word_place operator+(const word_place& other) const {
-        return {row + other.row, x + other.x};
-    }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE word_place operator*(int n) const {
-        return {row * static_cast<std::uint32_t>(n), x * static_cast<std::uint32_t>(n)};
-    }
-};
 // Takes the place of the sink that it is made from, for fragments one by one.
 template <class Call>
 struct combining_sink : Call::sink {
@@ -82,14 +72,10 @@ struct combining_sink : Call::sink {
         this->mine = {};
         words.start();
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE word_place place(int x, int y, int z) const {
-        const auto& t = voxelpipe::get<0>(this->call.out.fb.targets);
-        return {word_of(t, 0, y, z), static_cast<std::uint32_t>(x)};
-    }
     __device__ VOXELPIPE_INLINE void put(const word_place& at, bool wanted) {
         if (!wanted) return;
         ++this->mine.fragments;
-        words.set(voxelpipe::get<0>(this->call.out.fb.targets).elements, at.row + (at.x >> 5), 1u << (at.x & 31));
+        words.set(voxelpipe::get<0>(this->call.out.fb.targets).elements, at.number(), at.bit());
     }
     __device__ VOXELPIPE_INLINE void flush() { words.flush(voxelpipe::get<0>(this->call.out.fb.targets).elements); }
 };

@@ -110,9 +110,19 @@ struct blending_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE void row_by_all(unsigned, int x0, int y, int z, word mask) {
         row(x0, y, z, mask & bits_of_lane());
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE static glm::ivec3 place(int x, int y, int z) { return {x, y, z}; }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE auto place(int x, int y, int z) const {
+        if constexpr (Call::output::only_sets)
+            return place_of_word(voxelpipe::get<0>(this->call.out.fb.targets), glm::ivec3(x, y, z));
+        else
+            return glm::ivec3(x, y, z);
+    }
     __device__ VOXELPIPE_INLINE void put(const glm::ivec3& at, bool wanted) {
         if (wanted) row(at.x, at.y, at.z, 1u);
+    }
+    __device__ VOXELPIPE_INLINE void put(const word_place& at, bool wanted) {
+        if (!wanted) return;
+        ++mine.fragments;
+        reduce_or(voxelpipe::get<0>(this->call.out.fb.targets).elements + at.number(), at.bit());
     }
     // As in blend_cube.
     __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word voxels) {
@@ -132,12 +142,12 @@ struct blending_sink : direct_sink<Call> {
                 mine.touched += blend_shared(t, x, y, z, value, mode);
         });
     }
-    // The voxels position(i) for the bits i of a mask.
-    template <class Position>
-    __device__ VOXELPIPE_INLINE void voxels(word bits, const Position& position) {
+    // The voxels place_of(i) for the bits i of a mask, of four.
+    template <class Place>
+    __device__ VOXELPIPE_INLINE void voxels(word bits, const Place& place_of) {
         mine.fragments += static_cast<unsigned>(__popc(bits));
         each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
-            mine.touched += blend_voxels(t, bits, position, value_of<K>(), mode);
+            mine.touched += blend_voxels(t, bits, place_of, value_of<K>(), mode);
         });
     }
     // From one sink of a thread to another.
@@ -209,8 +219,8 @@ inline constexpr int rest_min_blocks = Call::sink::buffers            ? 4
                                        : Call::rule == coverage::thin ? 6
                                                                       : 5;
 
-// Thin triangles of up to 2 x 2 x 2 voxels, each in a column of words: all triangles of a fine mesh are of this kind,
-// so they are not handed on.
+// Thin triangles of up to 2 x 2 x 2 voxels that wait for integers, each in a column of words: those that floats are not
+// sure of, and those of warps that have few.
 struct cube_queue {
     std::int32_t q[9][queue_places];
     std::uint32_t triangle[queue_places];
@@ -245,7 +255,6 @@ struct first_warp {
         bool waits = false, is_big = false;
         bool is_inside = false;
         int most = 0;
-        core::sure_bits cube{0, false};
         near_triangle r;
         if (valid) {
             r = load_near(call.in, index);
@@ -257,23 +266,33 @@ struct first_warp {
             else
                 waits = !is_big;
         }
+        const bool is_cube = waits && most <= 2;
         if constexpr (!thin) {
-            cube = find_cube(call.in, waits && most <= 2, r, is_inside);
-            waits = waits && !cube.sure;
-        }
-        if constexpr (!thin) {
+            const core::sure_bits cube = find_cube(call.in, is_cube, r, is_inside);
             feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
                 if (!cube.sure) return;
                 sink.begin(i);
                 give_cube(r, cube.bits, sink);
             });
+            waits = waits && !cube.sure;
         } else {
-            const bool is_cube = waits && most <= 2;
             waits = waits && !is_cube;
-            const int at = take_place(is_cube, num_cubes);
-            if (is_cube) {
-                for (int k = 0; k < 9; ++k) memory.cubes.q[k][at] = r.q[k / 3][k % 3];
-                memory.cubes.triangle[at] = i;
+            bool sure = false;
+            if (__popc(__ballot_sync(0xffffffffu, is_cube)) >= least_thin_cubes) {
+                core::thin_cube cube{};
+                if (is_cube) cube = core::thin_cube_by_signs(r.q, r.lo, r.last, call.in.fraction, sure);
+                feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                    if (!sure) return;
+                    sink.begin(i);
+                    give_thin_cube(call.in, r, cube, sink);
+                });
+            }
+            if (__any_sync(0xffffffffu, is_cube && !sure)) {
+                const int at = take_place(is_cube && !sure, num_cubes);
+                if (is_cube && !sure) {
+                    for (int k = 0; k < 9; ++k) memory.cubes.q[k][at] = r.q[k / 3][k % 3];
+                    memory.cubes.triangle[at] = i;
+                }
             }
         }
         if (__any_sync(0xffffffffu, waits || is_big)) {

@@ -335,6 +335,26 @@ template <class Target>
                words_x +
            static_cast<std::uint32_t>(x >> 5);
 }
+// Where a voxel lies among them, as something linear: the number of its row's first word, and x; modulo 2^32.
+struct word_place {
+    std::uint32_t row, x;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE word_place operator+(const word_place& other) const {
+        return {row + other.row, x + other.x};
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE word_place operator*(int n) const {
+        return {row * static_cast<std::uint32_t>(n), x * static_cast<std::uint32_t>(n)};
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t number() const { return row + (x >> 5); }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE word bit() const { return 1u << (x & 31); }
+};
+template <class Target>
+[[nodiscard]] __device__ VOXELPIPE_INLINE word_place place_of_word(const target_view<Target>& t, const glm::ivec3& p) {
+    return {word_of(t, 0, p.y, p.z), static_cast<std::uint32_t>(p.x)};
+}
+template <class Target>
+[[nodiscard]] __device__ VOXELPIPE_INLINE word_place place_of_word(const target_view<Target>&, const word_place& p) {
+    return p;
+}
 
 // Fragments of one value in the voxels x0 + i of a row, for the bits i of `mask`; x0 + 31 may lie beyond the extent.
 // Returns how many voxels were touched for the first time, where tells_first holds and the mode asks.
@@ -462,7 +482,8 @@ __device__ VOXELPIPE_INLINE unsigned blend_shared(const target_view<Target>& t, 
     return 0;
 }
 
-// Up to four voxels, position(i) for the bits i of `wanted`, whose loads go out together.
+// Up to four voxels, position(i) for the bits i of `wanted`, whose loads go out together. Where the mode is to blend
+// rows of bits, positions may be places of words.
 template <class Target, class Value, class Position>
 __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, word wanted, const Position& position,
                                                   const Value& value, direct_mode mode) {
@@ -473,9 +494,9 @@ __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, 
             word* at[4];
             word missing[4];
             for (int k = 0; k < 4; ++k) {
-                const glm::ivec3 p = position(k);
-                at[k] = t.elements + word_of(t, p.x, p.y, p.z);
-                missing[k] = (wanted >> k & 1u) << (p.x & 31);
+                const word_place p = place_of_word(t, position(k));
+                at[k] = t.elements + p.number();
+                missing[k] = (wanted >> k & 1u) != 0 ? p.bit() : 0;
             }
             for (int k = 0; k < 4; ++k)
                 if (missing[k] != 0) { // maybe an old word: what has changed stays so
@@ -487,10 +508,12 @@ __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, 
         }
     }
     unsigned touched = 0;
+    if constexpr (!std::is_same_v<decltype(position(0)), word_place>) {
 #pragma unroll 1
-    for (; wanted != 0; wanted &= wanted - 1) {
-        const glm::ivec3 p = position(__ffs(static_cast<int>(wanted)) - 1);
-        touched += blend_row(t, p.x, p.y, p.z, 1u, value, mode);
+        for (; wanted != 0; wanted &= wanted - 1) {
+            const glm::ivec3 p = position(__ffs(static_cast<int>(wanted)) - 1);
+            touched += blend_row(t, p.x, p.y, p.z, 1u, value, mode);
+        }
     }
     return touched;
 }

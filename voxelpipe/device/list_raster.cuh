@@ -56,13 +56,11 @@ struct listing_sink : direct_sink<Call> {
             write(at + static_cast<unsigned>(__popc(mask & ((1u << i) - 1))), first + static_cast<unsigned>(i));
         }
     }
-    template <class Position>
-    __device__ VOXELPIPE_INLINE void voxels(word bits, const Position& position) {
+    template <class Place>
+    __device__ VOXELPIPE_INLINE void voxels(word bits, const Place& place_of) {
         if (bits == 0) return;
-        for (unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(bits))); bits != 0; bits &= bits - 1) {
-            const glm::ivec3 p = position(__ffs(static_cast<int>(bits)) - 1);
-            write(at++, voxel(p.x, p.y, p.z));
-        }
+        for (unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(bits))); bits != 0; bits &= bits - 1)
+            write(at++, place_of(__ffs(static_cast<int>(bits)) - 1));
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t place(int x, int y, int z) const { return voxel(x, y, z); }
     __device__ VOXELPIPE_INLINE void put(std::uint32_t voxel, bool wanted) {

@@ -6,7 +6,7 @@
 // (direct_raster.cuh) or listing (list_raster.cuh). A sink has
 //   buffers           whether settle(), which all lanes call between triangles, is wanted (feed)
 //   place(x, y, z)    where a voxel lies, as something linear: ivec3, or numbers modulo 2^32
-//   begin(triangle), row(x0, y, z, mask), cube(x, y, z, bits), voxels(bits, position), put(place, wanted):
+//   begin(triangle), row(x0, y, z, mask), cube(x, y, z, bits), voxels(bits, place), put(place, wanted):
 //                     the fragments of one triangle, as a row of bits along x, as 2 x 2 x 2 (blend_cube) or one by one
 //   shares            whether one(x, y, z), a fragment of a triangle that has no other, is more than a row of one
 //   spreads           whether a row costs by its voxels, so that lanes had better share long ones:
@@ -22,6 +22,7 @@
 #include <voxelpipe/core/corner_signs.hpp>
 #include <voxelpipe/core/small_conservative.hpp>
 #include <voxelpipe/core/small_thin.hpp>
+#include <voxelpipe/core/thin_cube.hpp>
 #include <voxelpipe/device/scene.cuh>
 #include <voxelpipe/device/vertex_shade.cuh>
 
@@ -285,34 +286,40 @@ template <class Source, class Kept, class Sink>
     return true;
 }
 
-// The same for a bounding box of at most two voxels a side, all columns at once. Most triangles of a fine mesh are of
-// this kind.
+// Of a warp's 32 triangles, so many thin boxes of two voxels a side at least are done where they are read; fewer are
+// gathered, so that all lanes have one.
+inline constexpr int least_thin_cubes = 16;
+
+// Thin fragments of a bounding box of at most two voxels a side, all columns at once. Most triangles of a fine mesh are
+// of this kind.
 template <class Source, class Sink>
-__device__ VOXELPIPE_INLINE bool raster_thin_cube(const raster_input<Source>& call, const near_triangle& r,
-                                                  Sink& sink) {
-    const core::small_triangle t = r.relative(call.fraction);
-    const core::triple<std::int64_t> normal = core::small_normal(t);
-    const int axis = core::small_axis(normal);
-    if (axis < 0) return false;
-    const core::small_thin s(t, normal, axis, call.fraction);
-    const std::uint32_t depths = core::cube_depths(s);
-    const auto last = core::to_uvw(axis, r.last[0], r.last[1], r.last[2]);
-    word columns = core::quad_bits(s.uv) & (last[0] == 0 ? 5u : 15u) & (last[1] == 0 ? 3u : 15u);
-    const auto position = [&](int column) VOXELPIPE_INLINE_LAMBDA {
-        const int w = static_cast<int>(depths >> 2 * column & 3u) - 1;
-        const auto at = core::to_xyz(axis, column & 1, column >> 1, w);
-        return glm::ivec3(r.lo[0] + at[0], r.lo[1] + at[1], r.lo[2] + at[2]);
-    };
+__device__ VOXELPIPE_INLINE void give_thin_cube(const raster_input<Source>& call, const near_triangle& r,
+                                                const core::thin_cube& cube, Sink& sink) {
+    const int axis = cube.axis;
     // A voxel beyond the box on both sides of it counts.
     const bool inside = (r.lo[0] - 1 | r.lo[1] - 1 | r.lo[2] - 1 | (call.extent.x - 3 - r.lo[0]) |
                          (call.extent.y - 3 - r.lo[1]) | (call.extent.z - 3 - r.lo[2])) >= 0;
+    word columns = cube.columns;
     if (!inside)
         for (int i = 0; i < 4; ++i) {
-            const glm::ivec3 p = position(i);
+            const auto at = cube.voxel(i);
+            const glm::ivec3 p(r.lo[0] + at[0], r.lo[1] + at[1], r.lo[2] + at[2]);
             if (p.x < 0 || p.y < 0 || p.z < 0 || p.x >= call.extent.x || p.y >= call.extent.y || p.z >= call.extent.z)
                 columns &= ~(1u << i);
         }
-    sink.voxels(columns, position);
+    const auto by_u = sink.place(axis != 0, axis == 0, 0), by_v = sink.place(0, axis == 2, axis != 2),
+               by_w = sink.place(axis == 0, axis == 1, axis == 2), below = sink.place(r.lo[0], r.lo[1], r.lo[2]);
+    sink.voxels(columns, [&](int column) VOXELPIPE_INLINE_LAMBDA {
+        return below + by_u * (column & 1) + by_v * (column >> 1) + by_w * cube.depth(column);
+    });
+}
+// False where the triangle has no area.
+template <class Source, class Sink>
+__device__ VOXELPIPE_INLINE bool raster_thin_cube(const raster_input<Source>& call, const near_triangle& r,
+                                                  Sink& sink) {
+    const core::thin_cube cube = core::thin_cube_by_integers(r.relative(call.fraction), r.last, call.fraction);
+    if (cube.axis < 0) return false;
+    give_thin_cube(call, r, cube, sink);
     return true;
 }
 

@@ -1,0 +1,68 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Random triangles whose bounding box is a few voxels a side: vertices on voxel faces and edges, repeated vertices,
+// triangles without area, slivers, and triangles far smaller than a voxel.
+
+#include <voxelpipe/core/small_triangle.hpp>
+
+#include <algorithm>
+#include <cstdint>
+#include <random>
+
+namespace unit {
+
+// q: vertices in units of 2^-fraction voxel, lo: the box's lowest voxel, last: its highest, counted from that.
+struct boxed_triangle {
+    std::int32_t q[3][3], lo[3];
+    int last[3];
+
+    [[nodiscard]] int wide() const { return (last[0] != 0) + (last[1] != 0) + (last[2] != 0); }
+    // Along one axis; false where it is more than `most` voxels.
+    bool find_box(int k, int fraction, int most = 2) {
+        lo[k] = (voxelpipe::core::min3(q[0][k], q[1][k], q[2][k]) - 1) >> fraction;
+        last[k] = (voxelpipe::core::max3(q[0][k], q[1][k], q[2][k]) >> fraction) - lo[k];
+        return last[k] < most;
+    }
+    [[nodiscard]] voxelpipe::core::small_triangle relative(int fraction) const {
+        voxelpipe::core::small_triangle t{};
+        for (int v = 0; v < 3; ++v)
+            for (int k = 0; k < 3; ++k) t.p[v][k] = q[v][k] - (lo[k] << fraction);
+        return t;
+    }
+};
+
+struct boxed_triangles {
+    std::mt19937_64 random{20261122};
+    int fraction = 14;
+
+    std::int32_t number(std::int64_t lo, std::int64_t hi) {
+        return static_cast<std::int32_t>(std::uniform_int_distribution(lo, hi)(random));
+    }
+    // A triangle of at most `most` voxels a side; false where this one is larger.
+    bool triangle(int most, boxed_triangle& t) {
+        const std::int64_t one = std::int64_t{1} << fraction;
+        const std::int64_t sizes[] = {most * one, (most - 1) * one, one / 2, one / 20 + 4, one / 500 + 4};
+        const std::int64_t size = sizes[number(0, 4)];
+        const bool on_faces = number(0, 2) == 0, around_a_corner = number(0, 3) == 0;
+        for (int k = 0; k < 3; ++k) {
+            const std::int64_t corner = (5 + number(0, 3)) * one,
+                               low = around_a_corner ? corner - number(0, size) : corner + number(0, most * one - size);
+            for (int v = 0; v < 3; ++v) {
+                std::int64_t q = low + number(0, size);
+                if (on_faces && number(0, 4) == 0) q = (q + one / 2) / one * one;
+                if (v > 0 && number(0, 20) == 0) q = t.q[v - 1][k];
+                t.q[v][k] = static_cast<std::int32_t>(q);
+            }
+        }
+        if (number(0, 15) == 0) std::copy(t.q[0], t.q[0] + 3, t.q[1]);
+        bool fits = true;
+        for (int k = 0; k < 3; ++k) {
+            fits = t.find_box(k, fraction, most) && fits;
+        }
+        return fits;
+    }
+};
+
+} // namespace unit
