@@ -65,6 +65,11 @@ public:
     stage_times* times = nullptr; // where to add up the time of each stage, if anywhere
     std::function<void(std::uint64_t done, std::uint64_t total)> progress; // called from any thread, one call at a time
 
+    // What check_indices calls.
+    [[nodiscard]] std::uint32_t most_index(array_view<const glm::uvec3> triangles) const {
+        return core::most_index(triangles);
+    }
+
     // What voxelize calls; arguments are validated. Exceptions of a user's shader or progress function pass through.
     template <class Draws, class Output>
     [[nodiscard]] status run(const Draws& draws, const grid& g, Output& out, const voxelize_options& options,

@@ -11,11 +11,21 @@
 
 #include <glm/vec3.hpp>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <type_traits>
 #include <utility>
 
 namespace voxelpipe {
+
+// What is known of the indices of some triangles, so that calls need not read them all once more. Holds as long as
+// nobody writes to them.
+struct checked_indices {
+    const glm::uvec3* triangles = nullptr; // the first `count` from here; null: nothing is known
+    std::size_t count = 0;
+    std::uint64_t bound = 0; // above every index
+};
 
 template <class... Attributes>
 struct mesh_view {
@@ -26,22 +36,54 @@ struct mesh_view {
     array_view<const glm::vec3> positions;                       // one per vertex
     array_view<const glm::uvec3> triangles;                      // vertex indices
     core::pack<array_view<const Attributes>...> attributes = {}; // each as long as positions
+    // By check_indices, or by mesh. What it says of other triangles than those above counts for nothing.
+    checked_indices checked = {};
+
+    // Whether all indices are known to name vertices. Otherwise calls look at each of them, and say where one does not.
+    [[nodiscard]] bool has_checked_indices() const {
+        return checked.triangles == triangles.data() && checked.count >= triangles.size() &&
+               checked.bound <= positions.size();
+    }
 };
 
+// Reads the indices of triangles on the backend, waiting for what its stream has before, for mesh_view::checked: worth
+// it for triangles that are drawn more than once, since a cuda_backend's calls read them all once more before they
+// write to anything. Throws std::bad_alloc, or the backend's error.
+template <class Backend>
+[[nodiscard]] checked_indices check_indices(Backend& backend, array_view<const glm::uvec3> triangles) {
+    return {triangles.data(), triangles.size(),
+            triangles.size() == 0 ? 0 : std::uint64_t{backend.most_index(triangles)} + 1};
+}
+
+namespace core {
+
+// Of triangles in host memory; 0 where there are none.
+[[nodiscard]] inline std::uint32_t most_index(array_view<const glm::uvec3> triangles) {
+    std::uint32_t most = 0;
+    for (const glm::uvec3& t : triangles) most = std::max({most, t.x, t.y, t.z});
+    return most;
+}
+
+} // namespace core
+
 // Backend::buffer<T> holds the arrays; they are copied in by the constructor, which throws std::bad_alloc (or the
-// backend's error) where there is no memory.
+// backend's error) where there is no memory. The constructor looks at the indices too, once for all calls, for nobody
+// can write to them afterwards; one that names no vertex is the calls' error all the same.
 template <class Backend, class... Attributes>
 class mesh {
 public:
     mesh(Backend& backend, array_view<const glm::vec3> positions, array_view<const glm::uvec3> triangles,
          array_view<const Attributes>... attributes)
         : positions_(backend, positions),
-          triangles_(backend, triangles), attributes_{core::make_pack(buffer<Attributes>(backend, attributes)...)} {}
+          triangles_(backend, triangles), attributes_{core::make_pack(buffer<Attributes>(backend, attributes)...)},
+          index_bound_(triangles.size() == 0 ? 0 : std::uint64_t{core::most_index(triangles)} + 1) {}
 
     [[nodiscard]] mesh_view<Attributes...> view() const {
         return [this]<std::size_t... I>(std::index_sequence<I...>) {
-            return mesh_view<Attributes...>{positions_.view(), triangles_.view(),
-                                            core::make_pack(voxelpipe::get<I>(attributes_).view()...)};
+            return mesh_view<Attributes...>{positions_.view(),
+                                            triangles_.view(),
+                                            core::make_pack(voxelpipe::get<I>(attributes_).view()...),
+                                            {triangles_.data(), triangles_.size(), index_bound_}};
         }
         (std::index_sequence_for<Attributes...>{});
     }
@@ -54,6 +96,7 @@ private:
     buffer<glm::vec3> positions_;
     buffer<glm::uvec3> triangles_;
     core::pack<buffer<Attributes>...> attributes_;
+    std::uint64_t index_bound_;
 };
 
 template <class Backend, class Positions, class Triangles>

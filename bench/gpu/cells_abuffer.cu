@@ -12,7 +12,7 @@ namespace {
 class abuffer_cell : public prepared_cell {
 public:
     abuffer_cell(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule)
-        : backend_(s.stream()), mesh_(view(mesh)), grid_(grid), rule_(rule), lists_(backend_) {}
+        : backend_(s.stream()), mesh_(view(mesh, backend_)), grid_(grid), rule_(rule), lists_(backend_) {}
 
     vp::counters call() override {
         const vp::status s = vp::voxelize(backend_, mesh_, grid_, vp::passthrough{}, vp::constant(true), lists_, rule_);

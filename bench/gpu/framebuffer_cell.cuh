@@ -20,8 +20,11 @@ inline void check(const vp::status& s) {
     s.or_throw();
 }
 
-[[nodiscard]] inline vp::mesh_view<> view(const resident_mesh& m) {
-    return {{m.positions.data(), m.positions.size()}, {m.triangles.data(), m.triangles.size()}};
+// With its indices looked at, as vp::mesh does where it is made.
+[[nodiscard]] inline vp::mesh_view<> view(const resident_mesh& m, vp::cuda_backend& backend) {
+    vp::mesh_view<> v{{m.positions.data(), m.positions.size()}, {m.triangles.data(), m.triangles.size()}};
+    v.checked = vp::check_indices(backend, v.triangles);
+    return v;
 }
 
 // Baseline: which of its outputs stands beside the target.
@@ -32,8 +35,8 @@ class framebuffer_cell : public prepared_cell {
 public:
     framebuffer_cell(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule,
                      const FragmentShader& shader, std::optional<baseline_output> baseline, bool count_voxels = false)
-        : session_(s), backend_(s.stream()), draw_{view(mesh), {}, shader}, grid_(grid), options_(rule, count_voxels),
-          framebuffer_(backend_, grid.extent), baseline_(baseline) {}
+        : session_(s), backend_(s.stream()), draw_{view(mesh, backend_), {}, shader}, grid_(grid),
+          options_(rule, count_voxels), framebuffer_(backend_, grid.extent), baseline_(baseline) {}
 
     vp::counters call() override {
         const vp::status s = vp::voxelize(backend_, draws(), grid_, framebuffer_, options_);

@@ -182,7 +182,8 @@ int scaling::run(const std::string& command) {
                        "\n" + describe_machine().markdown() + "- command: `" + command +
                        "`\n- times: milliseconds, medians of at most " + std::to_string(how_.choice.repeat.runs) +
                        " calls after " + std::to_string(how_.choice.repeat.warmups) +
-                       " warm-ups, CUDA events around the whole call, clear included, mesh on the device\n"
+                       " warm-ups, CUDA events around the whole call, clear included, mesh on the device, its "
+                       "indices looked at once before\n"
                        "- baseline: one thread a triangle, atomics in global memory, the same sets\n";
     for (const std::string& n : notes_) text += "- " + n + "\n";
     text += "\n" + table_.markdown();

@@ -106,8 +106,9 @@ int run(const options& how, const std::string& command) {
     std::string text = "# GPU table\n\n" + measured + "- times: milliseconds, medians of " +
                        std::to_string(how.choice.repeat.runs) + " calls after " +
                        std::to_string(how.choice.repeat.warmups) +
-                       " warm-ups, CUDA events around the whole call, clear included, mesh on the device; the caches "
-                       "are not flushed between calls\n"
+                       " warm-ups, CUDA events around the whole call, clear included, mesh on the device, its "
+                       "indices looked at once before (mesh_view::checked, as vp::mesh does where it is made); the "
+                       "caches are not flushed between calls\n"
                        "- async: voxelize_async in the caller's memory\n"
                        "- baseline: one thread a triangle, atomics in global memory, the library's exact sets; "
                        "compared word by word before it is timed, fewer runs where it is slow\n"

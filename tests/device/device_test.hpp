@@ -203,15 +203,26 @@ void expect_same_bytes(const std::vector<T>& cpu, const std::vector<T>& gpu, con
 // call.
 enum class start { clear, load };
 
+// Whether calls are told that a mesh's indices have been looked at.
+enum class indices { checked, unknown };
+
+template <class Backend>
+vp::mesh_view<> view_of(const vp::mesh<Backend>& mesh, indices known) {
+    vp::mesh_view<> v = mesh.view();
+    if (known == indices::unknown) v.checked = {};
+    return v;
+}
+
 template <class Backend, class... Targets, class VertexShader, class FragmentShader>
 vp::status draw_framebuffer(Backend& backend, vp::framebuffer<Backend, Targets...>& fb, const mesh_data& m,
                             const vp::grid& g, const VertexShader& vs, const FragmentShader& fs,
-                            const vp::voxelize_options& options, start how) {
-    vp::mesh<Backend> mesh(backend, m.positions, m.triangles);
-    vp::status s = vp::voxelize(backend, mesh, g, vs, fs, fb, options);
+                            const vp::voxelize_options& options, start how, indices known = indices::checked) {
+    const vp::mesh<Backend> mesh(backend, m.positions, m.triangles);
+    const vp::mesh_view<> view = view_of(mesh, known);
+    vp::status s = vp::voxelize(backend, view, g, vs, fs, fb, options);
     if (!s.ok() || how == start::clear) return s;
     vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() { vp::get<I>(fb).load(); });
-    return vp::voxelize(backend, mesh, g, vs, fs, fb, options);
+    return vp::voxelize(backend, view, g, vs, fs, fb, options);
 }
 
 template <class... Targets, class VertexShader, class FragmentShader>
@@ -220,19 +231,23 @@ void expect_same(const mesh_data& m, const vp::grid& g, const VertexShader& vs, 
     vp::cpu_backend cpu;
     vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
     const vp::status sa = draw_framebuffer(cpu, a, m, g, vs, fs, options, how);
-    for (const bool lists : {true, false}) {
-        SCOPED_TRACE(lists ? "fragments listed, where they can be" : "in tiles");
+    // Constants are drawn without lists and tiles, mostly, but by other ways where indices have to be looked at.
+    constexpr bool constant = vp::core::is_solid<FragmentShader>;
+    for (const bool first : {true, false}) {
+        SCOPED_TRACE(constant ? first ? "indices checked" : "indices unknown"
+                     : first  ? "fragments listed, where they can be"
+                              : "in tiles");
         vp::cuda_backend gpu;
-        gpu.lists_fragments = lists;
+        gpu.lists_fragments = constant || first;
         vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
-        const vp::status sb = draw_framebuffer(gpu, b, m, g, vs, fs, options, how);
+        const vp::status sb = draw_framebuffer(gpu, b, m, g, vs, fs, options, how,
+                                               constant && !first ? indices::unknown : indices::checked);
         ASSERT_EQ(sa.code, sb.code) << sb.message();
         expect_same_counts(sa.counts, sb.counts);
         vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
             const std::string what = "target " + std::to_string(I);
             expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu), what.c_str());
         });
-        if constexpr (vp::core::is_solid<FragmentShader>) break; // most are drawn without either
     }
 }
 

@@ -247,7 +247,7 @@ TEST(Direct, SeveralDraws) {
     compare_draws<shift>({shift{0.0f}, shift{2.5f}, shift{-9.0f}});
 }
 
-// A bad index leaves the targets as they were, cleared ones too.
+// A bad index leaves the targets as they were, cleared ones too, whatever is known of others.
 TEST(Direct, BadIndexWritesNothing) {
     vp::cuda_backend be;
     mesh_data m = mixed_triangles(500, 20.0f, 95);
@@ -257,11 +257,54 @@ TEST(Direct, BadIndexWritesNothing) {
     const vp::mesh<vp::cuda_backend> good(be, m.positions, m.triangles);
     ASSERT_TRUE(vp::voxelize(be, good, g, vp::passthrough{}, vp::constant(true), fb).ok());
     const auto before = vp::get<0>(fb).to_host(be);
+    const auto expect_refused = [&](const vp::mesh_view<>& view, const char* what) {
+        for (const bool count : {true, false})
+            EXPECT_EQ(vp::voxelize(be, view, g, vp::passthrough{}, vp::constant(true), fb,
+                                   {vp::coverage::conservative, count})
+                          .code,
+                      vp::status_code::index_out_of_range)
+                << what;
+        EXPECT_EQ(vp::get<0>(fb).to_host(be), before) << what;
+    };
     m.triangles[321].y = static_cast<std::uint32_t>(m.positions.size());
     const vp::mesh<vp::cuda_backend> bad(be, m.positions, m.triangles);
-    EXPECT_EQ(vp::voxelize(be, bad, g, vp::passthrough{}, vp::constant(true), fb).code,
-              vp::status_code::index_out_of_range);
-    EXPECT_EQ(vp::get<0>(fb).to_host(be), before);
+    expect_refused(bad.view(), "a mesh");
+    vp::mesh_view<> view = good.view();
+    view.triangles = bad.view().triangles;
+    expect_refused(view, "other triangles");
+    view.checked = vp::check_indices(be, view.triangles);
+    expect_refused(view, "triangles that were looked at");
+    view = good.view();
+    view.positions.count -= 1;
+    expect_refused(view, "a vertex that has gone");
+    vp::mesh_view<> part = bad.view();
+    part.triangles.count = 300;
+    part.checked = vp::check_indices(be, part.triangles);
+    EXPECT_TRUE(part.has_checked_indices());
+    part.triangles.count = bad.view().triangles.size();
+    expect_refused(part, "more than were looked at");
+}
+
+// The greatest index, wherever it is, of any number of triangles.
+TEST(Direct, ChecksIndices) {
+    vp::cuda_backend be;
+    std::mt19937 random(97);
+    for (const std::size_t count : {1, 31, 1000, 300000}) {
+        std::vector<glm::uvec3> triangles(count);
+        for (glm::uvec3& t : triangles) t = {random() % 1000, random() % 1000, random() % 1000};
+        for (int at = 0; at < 3; ++at) {
+            std::vector<glm::uvec3> changed = triangles;
+            changed[random() % count][at] = 3000000000u + static_cast<std::uint32_t>(at);
+            const vp::cuda_backend::buffer<glm::uvec3> on_device(be, vp::array_view<const glm::uvec3>(changed));
+            const vp::checked_indices found = vp::check_indices(be, on_device.view());
+            EXPECT_EQ(found.triangles, on_device.data());
+            EXPECT_EQ(found.count, count);
+            EXPECT_EQ(found.bound, 3000000001u + static_cast<unsigned>(at));
+        }
+    }
+    EXPECT_EQ(vp::check_indices(be, {}).bound, 0u);
+    const vp::cuda_backend::buffer<glm::uvec3> zeros(be, vp::array_view<const glm::uvec3>(std::vector<glm::uvec3>(7)));
+    EXPECT_EQ(vp::check_indices(be, zeros.view()).bound, 1u);
 }
 
 } // namespace

@@ -138,12 +138,12 @@ TEST(Reduced, StageTimesOfTilesAndOrderedTargets) {
 TEST(Reduced, StageTimesWithoutTiles) {
     using fb_type = vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>>;
     const mesh_data m = mixed_triangles(300, 30.0f, 64);
-    const auto times_of = [&](const vp::grid& g, bool count_voxels) {
+    const auto times_of = [&](const vp::grid& g, bool count_voxels, indices known = indices::unknown) {
         vp::cuda_backend be;
         fb_type timed{be, g.extent}, plain{be, g.extent};
         const auto draw = [&](fb_type& fb) {
             return draw_framebuffer(be, fb, m, g, vp::passthrough{}, vp::constant(true),
-                                    {vp::coverage::conservative, count_voxels}, start::clear);
+                                    {vp::coverage::conservative, count_voxels}, start::clear, known);
         };
         EXPECT_TRUE(draw(plain).ok());
         const vp::stage_times times = time_stages(be, [&] { return draw(timed); });
@@ -158,6 +158,11 @@ TEST(Reduced, StageTimesWithoutTiles) {
     EXPECT_GT(direct.coarse_raster, 0.0);
     EXPECT_GT(direct.clear, 0.0);
     EXPECT_EQ(direct.tile_resolve, 0.0);
+    // Of indices that are known nothing is read.
+    const vp::stage_times known = times_of(box_grid({30, 21, 33}), false, indices::checked);
+    EXPECT_EQ(known.coarse_raster, 0.0);
+    EXPECT_GT(known.clear, 0.0);
+    EXPECT_EQ(known.tile_resolve, 0.0);
     // By touched voxels, which become the target at the end.
     const vp::stage_times touched = times_of(box_grid({30, 21, 33}), true);
     EXPECT_EQ(touched.coarse_raster, 0.0);

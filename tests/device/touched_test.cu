@@ -24,7 +24,8 @@ using bits = vp::target<vp::bit, Blend, Layout>;
 // One call into targets that are cleared to these values, or that hold a pattern of bytes; some are off.
 template <class Backend, class... Targets, class Values, class... Clear>
 vp::status draw_constants(Backend& be, vp::framebuffer<Backend, Targets...>& fb, const mesh_data& m, const vp::grid& g,
-                          const Values& values, const vp::voxelize_options& options, start how, Clear... clear) {
+                          const Values& values, const vp::voxelize_options& options, start how, indices known,
+                          Clear... clear) {
     const vp::mesh<Backend> mesh{be, m.positions, m.triangles};
     const auto each = [&](auto&& f) {
         const auto clears = vp::core::make_pack(clear...);
@@ -38,7 +39,7 @@ vp::status draw_constants(Backend& be, vp::framebuffer<Backend, Targets...>& fb,
         if (!s.ok()) return s;
         each([](auto&& target, const auto&) { target.load(); });
     }
-    return vp::voxelize(be, mesh, g, vp::passthrough{}, values, fb, options);
+    return vp::voxelize(be, view_of(mesh, known), g, vp::passthrough{}, values, fb, options);
 }
 
 template <class... Targets, class Values, class... Clear>
@@ -53,17 +54,20 @@ void compare_constants(target_list<Targets...>, const Values& values, Clear... c
                                                 << (how == start::load ? ", loaded" : ""));
                 const vp::grid g = box_grid(extent);
                 vp::cpu_backend cpu;
-                vp::cuda_backend gpu;
                 vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, extent};
-                vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, extent};
-                const vp::status sa = draw_constants(cpu, a, m, g, values, options, how, clear...);
-                const vp::status sb = draw_constants(gpu, b, m, g, values, options, how, clear...);
-                ASSERT_TRUE(sa.ok() && sb.ok()) << sb.message();
-                expect_same_counts(sa.counts, sb.counts);
-                vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-                    expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu),
-                                      ("target " + std::to_string(I)).c_str());
-                });
+                const vp::status sa = draw_constants(cpu, a, m, g, values, options, how, indices::checked, clear...);
+                for (const indices known : {indices::checked, indices::unknown}) {
+                    SCOPED_TRACE(known == indices::checked ? "indices checked" : "indices unknown");
+                    vp::cuda_backend gpu;
+                    vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, extent};
+                    const vp::status sb = draw_constants(gpu, b, m, g, values, options, how, known, clear...);
+                    ASSERT_TRUE(sa.ok() && sb.ok()) << sb.message();
+                    expect_same_counts(sa.counts, sb.counts);
+                    vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+                        expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu),
+                                          ("target " + std::to_string(I)).c_str());
+                    });
+                }
             }
 }
 
@@ -121,10 +125,10 @@ TEST(Touched, CallsOfOneBackendInTurn) {
             single::framebuffer<vp::cuda_backend> on_gpu{gpu, extent};
             single::framebuffer<vp::cpu_backend> on_cpu{cpu, extent};
             const auto before = vp::get<0>(on_gpu).to_host(gpu);
-            const vp::status a =
-                draw_constants(gpu, on_gpu, m, box_grid(extent), vp::constant(true), options, start::clear, false);
-            const vp::status b =
-                draw_constants(cpu, on_cpu, m, box_grid(extent), vp::constant(true), options, start::clear, false);
+            const vp::status a = draw_constants(gpu, on_gpu, m, box_grid(extent), vp::constant(true), options,
+                                                start::clear, indices::unknown, false);
+            const vp::status b = draw_constants(cpu, on_cpu, m, box_grid(extent), vp::constant(true), options,
+                                                start::clear, indices::unknown, false);
             ASSERT_EQ(a.code, b.code) << a.message();
             if (b.ok()) expect_same_counts(b.counts, a.counts);
             expect_same_bytes(b.ok() ? vp::get<0>(on_cpu).to_host(cpu) : before, vp::get<0>(on_gpu).to_host(gpu),
@@ -161,8 +165,8 @@ TEST(Touched, CallsOfOneBackendInTurn) {
         ASSERT_TRUE(vp::voxelize_async(gpu, draws, box_grid(small), fb.view(), {}, workspace).ok());
         const vp::status s = vp::read_status(gpu, workspace);
         single::framebuffer<vp::cpu_backend> expected{cpu, small};
-        const vp::status reference =
-            draw_constants(cpu, expected, m, box_grid(small), vp::constant(true), {}, start::clear, false);
+        const vp::status reference = draw_constants(cpu, expected, m, box_grid(small), vp::constant(true), {},
+                                                    start::clear, indices::unknown, false);
         ASSERT_TRUE(s.ok()) << s.message();
         expect_same_counts(reference.counts, s.counts);
         expect_same_bytes(vp::get<0>(expected).to_host(cpu), vp::get<0>(fb).to_host(gpu), "bits of voxelize_async");
@@ -171,11 +175,11 @@ TEST(Touched, CallsOfOneBackendInTurn) {
 
 template <class Backend, class... Targets, class Values>
 vp::counters draw_parts(Backend& be, vp::framebuffer<Backend, Targets...>& fb, const std::vector<mesh_data>& parts,
-                        const std::vector<Values>& values, const vp::grid& g, bool count) {
+                        const std::vector<Values>& values, const vp::grid& g, bool count, indices known) {
     std::vector<vp::mesh<Backend>> meshes;
     std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, Values>> draws;
     for (const mesh_data& m : parts) meshes.emplace_back(be, m.positions, m.triangles);
-    for (std::size_t i = 0; i < parts.size(); ++i) draws.push_back({meshes[i].view(), {}, values[i]});
+    for (std::size_t i = 0; i < parts.size(); ++i) draws.push_back({view_of(meshes[i], known), {}, values[i]});
     const vp::status s = vp::voxelize(be, std::span<const typename decltype(draws)::value_type>(draws), g, fb,
                                       vp::voxelize_options{vp::coverage::conservative, count});
     EXPECT_TRUE(s.ok()) << s.message();
@@ -186,14 +190,18 @@ void compare_parts(target_list<Targets...>, const std::vector<mesh_data>& parts,
     const vp::grid g = box_grid({60, 47, 31});
     for (const bool count : {true, false}) {
         vp::cpu_backend cpu;
-        vp::cuda_backend gpu;
         vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
-        vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
-        expect_same_counts(draw_parts(cpu, a, parts, values, g, count), draw_parts(gpu, b, parts, values, g, count));
-        vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-            expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu),
-                              ("target " + std::to_string(I)).c_str());
-        });
+        const vp::counters expected = draw_parts(cpu, a, parts, values, g, count, indices::checked);
+        for (const indices known : {indices::checked, indices::unknown}) {
+            SCOPED_TRACE(known == indices::checked ? "indices checked" : "indices unknown");
+            vp::cuda_backend gpu;
+            vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
+            expect_same_counts(expected, draw_parts(gpu, b, parts, values, g, count, known));
+            vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+                expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu),
+                                  ("target " + std::to_string(I)).c_str());
+            });
+        }
     }
 }
 
@@ -213,8 +221,8 @@ TEST(Touched, SeveralDraws) {
                   std::vector<bit_value>{vp::constant(true), vp::constant(false), vp::constant(true)});
 }
 
-// Grids of more than 32 MB of bits are drawn into directly, and of more than 1 MB where there are few triangles and
-// nothing is counted.
+// Grids of more than 32 MB of bits are drawn into directly, and where nothing is counted also those of more than 1 MB
+// of few triangles, and those of indices that are known.
 TEST(Touched, LargeGridsOfBits) {
     const mesh_data m = mixed_triangles(60, 40.0f, 450);
     for (const bool count : {false, true})
@@ -227,8 +235,10 @@ TEST(Touched, LargeGridsOfBits) {
     vp::cuda_backend gpu;
     vp::framebuffer<vp::cpu_backend, bits<blend::bit_and, layout::tiled>> a{cpu, extent};
     vp::framebuffer<vp::cuda_backend, bits<blend::bit_and, layout::tiled>> b{gpu, extent};
-    const vp::status sa = draw_constants(cpu, a, m, box_grid(extent), vp::constant(false), {}, start::clear, true);
-    const vp::status sb = draw_constants(gpu, b, m, box_grid(extent), vp::constant(false), {}, start::clear, true);
+    const vp::status sa =
+        draw_constants(cpu, a, m, box_grid(extent), vp::constant(false), {}, start::clear, indices::unknown, true);
+    const vp::status sb =
+        draw_constants(gpu, b, m, box_grid(extent), vp::constant(false), {}, start::clear, indices::unknown, true);
     ASSERT_TRUE(sa.ok() && sb.ok()) << sb.message();
     EXPECT_GT(sa.counts.voxels, 0u);
     expect_same_counts(sa.counts, sb.counts);

@@ -186,6 +186,16 @@ public:
     // drawn, for 10 bytes or so a pair of triangle and tile that meet. Results are the same.
     bool lists_fragments = true;
 
+    // What check_indices calls.
+    [[nodiscard]] std::uint32_t most_index(array_view<const glm::uvec3> triangles) {
+        buffer<std::uint32_t> most(*this, std::size_t{1});
+        buffer<std::uint32_t>::translate([&] {
+            device::check(cudaMemsetAsync(most.data(), 0, sizeof(std::uint32_t), stream));
+            device::find_most_index(triangles, most.data(), stream);
+        });
+        return most.to_host(*this)[0];
+    }
+
     // What voxelize calls; arguments are validated. `Selector` picks tile and block size (tuning/); results do not
     // depend on it.
     template <class Selector = tuning::fine_raster_selector, class Mesh, class VertexShader, class FragmentShader,

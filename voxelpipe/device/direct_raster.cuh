@@ -56,6 +56,18 @@ __global__ void check_indices_kernel(const Index* indices, std::uint64_t count, 
     if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, 1u);
 }
 
+// The greatest index, where `most` was 0.
+template <class Index>
+__global__ void most_index_kernel(const Index* indices, std::uint64_t count, Index* most) {
+    await_stream();
+    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
+    Index mine = 0;
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < count; i += threads)
+        mine = indices[i] > mine ? indices[i] : mine;
+    mine = __reduce_max_sync(0xffffffffu, mine);
+    if (threadIdx.x % 32 == 0) atomicMax(most, mine);
+}
+
 // What every sink of a direct call does with triangles that are not drawn.
 template <class Call>
 struct direct_sink {
@@ -516,6 +528,14 @@ inline void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangl
                   static_cast<std::uint32_t>(num_vertices), state);
 }
 
+// Of some triangles, none of which there may be.
+inline void find_most_index(const array_view<const glm::uvec3>& triangles, std::uint32_t* most, cudaStream_t stream) {
+    if (triangles.size() == 0) return;
+    launch_behind(most_index_kernel<std::uint32_t>, fill_device(triangles.size()), threads_per_block, stream,
+                  stage::validate, reinterpret_cast<const std::uint32_t*>(triangles.data()),
+                  std::uint64_t{3} * triangles.size(), most);
+}
+
 // Blocks of the first kernel: what fits the device at once.
 [[nodiscard]] inline unsigned raster_blocks(std::uint64_t num_triangles, int per_multiprocessor) {
     const std::uint64_t batches = (num_triangles + raster_threads - 1) / raster_threads;
@@ -524,15 +544,18 @@ inline void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangl
     return static_cast<unsigned>(batches < most ? batches : most);
 }
 
+// is_first: whether these are a call's first kernels. They read indices before they await the stream, which the
+// caller's own kernel in front of them may still write.
 template <class Call>
-void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream) {
+void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false) {
     const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
     if constexpr (Call::output::hands_on)
-        launch_behind(direct_raster_kernel<Call>, raster_blocks(call.in.num_triangles, first_min_blocks<Call>),
-                      raster_threads, stream, where, call, state);
+        launch_kernel(!is_first, direct_raster_kernel<Call>,
+                      raster_blocks(call.in.num_triangles, first_min_blocks<Call>), raster_threads, 0, stream, where,
+                      call, state);
     else
-        launch_behind(block_raster_kernel<Call>, raster_blocks(call.in.num_triangles, block_min_blocks), raster_threads,
-                      stream, where, call, state);
+        launch_kernel(!is_first, block_raster_kernel<Call>, raster_blocks(call.in.num_triangles, block_min_blocks),
+                      raster_threads, 0, stream, where, call, state);
     launch_behind(direct_rest_kernel<Call>, multiprocessors * rest_min_blocks<Call>, raster_threads, stream, where,
                   call, state);
 }

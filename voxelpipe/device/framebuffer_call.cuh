@@ -143,9 +143,15 @@ private:
         if constexpr (can_be_direct<FragmentShader, Framebuffer>)
             may_be_direct = plan_direct(draws, fb, num_primitives, options.count_voxels).possible;
         if (!may_be_direct) return bytes <= most_touched_bytes;
-        return bytes <= most_touched_bytes_of_direct &&
-               (options.count_voxels || clears_values(fb) ||
-                bytes <= least_touched_bytes + num_primitives * touched_bytes_per_triangle);
+        if (bytes > most_touched_bytes_of_direct) return false;
+        return options.count_voxels || clears_values(fb) ||
+               (!have_checked_indices() && bytes <= least_touched_bytes + num_primitives * touched_bytes_per_triangle);
+    }
+    // Whether no call need look at any draw's indices.
+    [[nodiscard]] bool have_checked_indices() const {
+        for (const draw_type& d : draws)
+            if (!d.mesh.has_checked_indices()) return false;
+        return true;
     }
     // Whether all draws give the same bytes.
     [[nodiscard]] bool have_one_value() const {
@@ -185,7 +191,7 @@ private:
                         {source, num_triangles, snap.fraction, g.extent},
                         {touched, g.extent, num_vertices, state, false},
                         handed_on.with(state)};
-                    direct_raster(call, state, stage::fine_raster, stream);
+                    direct_raster(call, state, stage::fine_raster, stream, on_the_spot && i == 0);
                     end_stage(clock, &stage_times::fine_raster);
                 };
                 raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);
@@ -224,8 +230,10 @@ private:
         if constexpr (Run) {
             if (has_marks) check(cudaMemsetAsync(marks.words, 0, marks.num_words() * sizeof(word), stream));
             for (const draw_type& d : draws)
-                check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);
-            end_stage(clock, &stage_times::coarse_raster);
+                if (!d.mesh.has_checked_indices())
+                    check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state,
+                                  stream);
+            if (!have_checked_indices()) end_stage(clock, &stage_times::coarse_raster);
             core::for_each_index<groups::count>([&]<std::size_t K>() {
                 auto t = voxelpipe::get<K>(fb.targets);
                 if (plan.counts(K)) t.clear_value = {}; // no fragments
@@ -244,6 +252,8 @@ private:
                     const auto draw_into = [&](const auto& output) {
                         const direct_call<Rule, source_type, std::remove_cvref_t<decltype(output)>> call{
                             {source, num_triangles, snap.fraction, g.extent}, output, handed_on.with(state)};
+                        // Without a check and a clear these may be the first kernels, but then nobody writes to
+                        // the indices (mesh_view::checked).
                         direct_raster(call, state, stage::fine_raster, stream);
                         end_stage(clock, &stage_times::fine_raster);
                     };

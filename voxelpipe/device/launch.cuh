@@ -38,26 +38,32 @@ __device__ VOXELPIPE_INLINE void await_stream() {
     return false;
 }
 
-// Starts a kernel that begins with await_stream. shared_bytes: of dynamic shared memory.
+// Starts a kernel, early where the device can. shared_bytes: of dynamic shared memory.
 template <class... Parameters, class... Arguments>
-void launch_behind(void (*kernel)(Parameters...), unsigned blocks, unsigned threads, std::size_t shared_bytes,
-                   cudaStream_t stream, stage where, Arguments&&... arguments) {
-    cudaLaunchAttribute early{};
-    early.id = cudaLaunchAttributeProgrammaticStreamSerialization;
-    early.val.programmaticStreamSerializationAllowed = 1;
+void launch_kernel(bool early, void (*kernel)(Parameters...), unsigned blocks, unsigned threads,
+                   std::size_t shared_bytes, cudaStream_t stream, stage where, Arguments&&... arguments) {
+    cudaLaunchAttribute attribute{};
+    attribute.id = cudaLaunchAttributeProgrammaticStreamSerialization;
+    attribute.val.programmaticStreamSerializationAllowed = 1;
     cudaLaunchConfig_t config{};
     config.gridDim = blocks;
     config.blockDim = threads;
     config.dynamicSmemBytes = shared_bytes;
     config.stream = stream;
-    config.attrs = &early;
-    config.numAttrs = can_launch_early() ? 1 : 0;
+    config.attrs = &attribute;
+    config.numAttrs = early && can_launch_early() ? 1 : 0;
     check(cudaLaunchKernelEx(&config, kernel, std::forward<Arguments>(arguments)...), where);
+}
+// Starts a kernel that begins with await_stream.
+template <class... Parameters, class... Arguments>
+void launch_behind(void (*kernel)(Parameters...), unsigned blocks, unsigned threads, std::size_t shared_bytes,
+                   cudaStream_t stream, stage where, Arguments&&... arguments) {
+    launch_kernel(true, kernel, blocks, threads, shared_bytes, stream, where, std::forward<Arguments>(arguments)...);
 }
 template <class... Parameters, class... Arguments>
 void launch_behind(void (*kernel)(Parameters...), unsigned blocks, unsigned threads, cudaStream_t stream, stage where,
                    Arguments&&... arguments) {
-    launch_behind(kernel, blocks, threads, std::size_t{0}, stream, where, std::forward<Arguments>(arguments)...);
+    launch_kernel(true, kernel, blocks, threads, 0, stream, where, std::forward<Arguments>(arguments)...);
 }
 
 } // namespace voxelpipe::device
