@@ -44,8 +44,9 @@ struct shading_source {
         const auto result = shader(core::fetch_vertex(mesh, vertex, draw));
         return core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result).position;
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(std::uint32_t vertex, std::int32_t (&q)[3]) const {
-        const glm::vec3 p = shade(vertex);
+    using loaded = glm::vec3; // a vertex on its way from memory
+    [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(std::uint32_t vertex) const { return shade(vertex); }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(const loaded& p, std::int32_t (&q)[3]) const {
         return core::snap_near(snap, p.x, p.y, p.z, q);
     }
     [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
@@ -59,8 +60,11 @@ struct shading_source {
 struct stored_source {
     draw_geometry geometry;
 
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(std::uint32_t vertex, std::int32_t (&q)[3]) const {
-        const device::near_position p = geometry.positions.near[vertex];
+    using loaded = device::near_position;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(std::uint32_t vertex) const {
+        return geometry.positions.near[vertex];
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(const loaded& p, std::int32_t (&q)[3]) const {
         for (int k = 0; k < 3; ++k) q[k] = p.q[k];
         return p.is_near != 0;
     }
@@ -161,12 +165,27 @@ struct near_triangle {
 };
 
 template <class Source>
-__device__ VOXELPIPE_INLINE near_triangle load_near(const raster_input<Source>& call, const glm::uvec3& index) {
+struct loaded_corners {
+    typename Source::loaded of[3];
+};
+template <class Source>
+[[nodiscard]] __device__ VOXELPIPE_INLINE loaded_corners<Source> load_corners(const raster_input<Source>& call,
+                                                                              const glm::uvec3& index) {
+    return {{call.source.load(index.x), call.source.load(index.y), call.source.load(index.z)}};
+}
+template <class Source>
+[[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle make_near(const raster_input<Source>& call,
+                                                                  const loaded_corners<Source>& corners) {
     near_triangle r;
-    r.is_near = call.source.near_position(index.x, r.q[0]) & call.source.near_position(index.y, r.q[1]) &
-                call.source.near_position(index.z, r.q[2]);
+    r.is_near = call.source.near_position(corners.of[0], r.q[0]) & call.source.near_position(corners.of[1], r.q[1]) &
+                call.source.near_position(corners.of[2], r.q[2]);
     r.find_box(call.fraction);
     return r;
+}
+template <class Source>
+[[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle load_near(const raster_input<Source>& call,
+                                                                  const glm::uvec3& index) {
+    return make_near(call, load_corners(call, index));
 }
 
 // What the threads of one warp keep of a triangle each (small_conservative::rows_of_16, small_thin::columns), a column
