@@ -50,7 +50,7 @@ struct seen {
 TEST(ThinCube, FloatsThatAreSureSayWhatIntegersSay) {
     boxed_triangles g;
     seen s;
-    for (const int fraction : {12, 13, 14, 15, 16}) {
+    for (const int fraction : {12, 13, 14, 15, 16, 18, 19}) {
         g.fraction = fraction;
         for (int i = 0; i < unit::cases(100000); ++i) {
             boxed_triangle t{};
@@ -68,7 +68,7 @@ TEST(ThinCube, FloatsThatAreSureSayWhatIntegersSay) {
 // Sides of a voxel and of a tenth of one, anywhere: what is not sure takes the integers of a whole warp.
 TEST(ThinCube, FloatsAreSureOfAMeshsTriangles) {
     boxed_triangles g;
-    for (const int fraction : {14, 16})
+    for (const int fraction : {12, 14, 16, 19})
         for (const int parts : {1, 10}) {
             g.fraction = fraction;
             const std::int64_t one = std::int64_t{1} << fraction;
