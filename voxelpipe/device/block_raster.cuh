@@ -53,30 +53,6 @@ struct block_warp {
         r.find_box(call.in.fraction);
         return r;
     }
-    // The last 32 that wait, one a lane; all lanes take part.
-    template <class Raster>
-    __device__ VOXELPIPE_INLINE void drain(const warp_queues& from, int& count, Raster&& raster) {
-        __syncwarp();
-        raster(from, count - 32 + static_cast<int>(threadIdx.x % 32));
-        __syncwarp();
-        count -= 32;
-    }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE auto tiny_of_queue() {
-        return [this](const warp_queues& from, int at)
-                   VOXELPIPE_INLINE_LAMBDA { raster_tiny<Call::rule>(call.in, take(from.tinies, at), sink); };
-    }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE auto small_of_queue() {
-        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            raster_small<Call::rule, false>(call.in, take(from.smalls, at), lane_rows(kept), sink);
-        };
-    }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE auto large_of_queue() {
-        return [this](const warp_queues& from, int at) VOXELPIPE_INLINE_LAMBDA {
-            raster_small<Call::rule, false>(call.in, load_near(call.in, call.in.source.triangle(from.larges[at])),
-                                            lane_rows(kept), sink);
-        };
-    }
-
     // The lane's triangle i, where there is one.
     __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, const glm::uvec3& index) {
         bool waits = false, is_big = false;
@@ -131,31 +107,57 @@ struct block_warp {
     __device__ VOXELPIPE_INLINE unsigned run(glm::uvec3 index, const warp_queues (&all)[Warps], int (&left)[3][Warps]) {
         const std::uint32_t step = gridDim.x * Warps * 32;
         const std::uint32_t begin = blockIdx.x * Warps * 32 + threadIdx.x / 32 * 32;
-        // The indices of a batch are loaded while the batch before it is worked on.
-        for (std::uint32_t first = begin; first < call.in.num_triangles; first += step) {
-            const glm::uvec3 next = load_index(call.in, first + step + static_cast<unsigned>(lane));
-            const std::uint32_t i = first + static_cast<unsigned>(lane);
-            batch(i, i < call.in.num_triangles && sink.check(index), index);
-            index = next;
-            if (num_tinies >= 32) drain(queues, num_tinies, tiny_of_queue());
-            if (num_smalls >= 32) drain(queues, num_smalls, small_of_queue());
-            if (num_larges >= 32) drain(queues, num_larges, large_of_queue());
+        // One loop for what waits while the mesh is read and what is left then: twice the code, with that of the sink in
+        // every place, and warps wait for instructions.
+        const int own = static_cast<int>(warp_in_block());
+        int ended = 0; // kinds of which the rest is done
+        for (std::uint32_t first = begin;;) {
+            int w = own, at = 0;
+            bool is_tiny = false, is_large = false;
+            if (num_tinies >= 32) {
+                at = (num_tinies -= 32) + lane;
+                is_tiny = true;
+            } else if (num_smalls >= 32) {
+                at = (num_smalls -= 32) + lane;
+            } else if (num_larges >= 32) {
+                at = (num_larges -= 32) + lane;
+                is_large = true;
+            } else if (first < call.in.num_triangles) {
+                // The indices of a batch are loaded while the batch before it is worked on.
+                const glm::uvec3 next = load_index(call.in, first + step + static_cast<unsigned>(lane));
+                const std::uint32_t i = first + static_cast<unsigned>(lane);
+                batch(i, i < call.in.num_triangles && sink.check(index), index);
+                index = next;
+                first += step;
+                continue;
+            } else {
+                if (ended == 0) {
+                    if (lane == 0) {
+                        left[0][own] = num_tinies;
+                        left[1][own] = num_smalls;
+                        left[2][own] = num_larges;
+                    }
+                    __syncthreads();
+                }
+                if (ended == 2) break;
+                is_tiny = ended == 0;
+                at = static_cast<int>(threadIdx.x); // fewer than 32 a warp are left
+                for (w = 0; w < Warps && at >= left[ended][w];) at -= left[ended][w++];
+                ++ended;
+            }
+            __syncwarp();
+            if (w < Warps) {
+                if (is_tiny) {
+                    raster_tiny<Call::rule>(call.in, take(all[w].tinies, at), sink);
+                } else {
+                    const near_triangle r = is_large
+                                                ? load_near(call.in, call.in.source.triangle(all[w].larges[at]))
+                                                : take(all[w].smalls, at);
+                    raster_small<Call::rule, false>(call.in, r, lane_rows(kept), sink);
+                }
+            }
+            __syncwarp();
         }
-        if (lane == 0) {
-            left[0][threadIdx.x / 32] = num_tinies;
-            left[1][threadIdx.x / 32] = num_smalls;
-            left[2][threadIdx.x / 32] = num_larges;
-        }
-        __syncthreads();
-        const auto rest = [&](const int(&counts)[Warps], auto&& raster_one) {
-            int at = static_cast<int>(threadIdx.x), w = 0; // fewer than 32 a warp are left
-            while (w < Warps && at >= counts[w]) at -= counts[w++];
-            feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
-                if (w < Warps) raster_one(all[w], at);
-            });
-        };
-        rest(left[0], tiny_of_queue());
-        rest(left[1], small_of_queue());
         // A lane each, the larger ones would keep a few lanes busy long after all others.
         int num = 0;
         for (const int n : left[2]) num += n;

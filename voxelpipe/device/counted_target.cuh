@@ -29,6 +29,11 @@ struct direct_plan {
     [[nodiscard]] bool counts(std::size_t k) const { return modes.of[k] == direct_mode::count; }
     [[nodiscard]] bool any_counted() const { return first_counted() >= 0; }
     [[nodiscard]] bool has_last_pass() const { return any_counted() || bits_of >= 0; }
+    [[nodiscard]] bool only_blends() const {
+        for (const direct_mode mode : modes.of)
+            if (mode != direct_mode::blend) return false;
+        return true;
+    }
     [[nodiscard]] int first_counted() const {
         for (std::size_t k = 0; k < N; ++k)
             if (counts(k)) return static_cast<int>(k);
@@ -75,6 +80,14 @@ template <class Target>
     } else {
         return false;
     }
+}
+
+template <class... Targets>
+[[nodiscard]] bool all_in_use(const framebuffer_view<Targets...>& fb) {
+    bool all = true;
+    core::for_each_index<sizeof...(Targets)>(
+        [&]<std::size_t K>() { all = all && voxelpipe::get<K>(fb.targets).load != load_operation::off; });
+    return all;
 }
 
 // How a call of constant shaders can do without tiles. A target is counted only where blending it in place would not

@@ -102,25 +102,33 @@ struct blending_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE static void begin(std::uint32_t) {}
     // Where there are marks: what a triangle may touch that is not large, what is touched of one that is.
     __device__ VOXELPIPE_INLINE void mark_boxes(bool wanted, const near_triangle& r) const {
-        if (this->call.out.marks.words != nullptr) device::mark_boxes<Call::rule>(this->call.out.marks, wanted, r);
+        if constexpr (!Call::output::only_blends)
+            if (this->call.out.marks.words != nullptr) device::mark_boxes<Call::rule>(this->call.out.marks, wanted, r);
     }
     __device__ VOXELPIPE_INLINE void mark_row(int x0, int x1, int y, int z) const {
-        if constexpr (shares)
+        if constexpr (shares && !Call::output::only_blends)
             if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_row(x0, x1, y, z);
     }
     __device__ VOXELPIPE_INLINE void mark_brick(const std::int32_t (&corner)[3], unsigned lane) const {
-        if constexpr (shares)
+        if constexpr (shares && !Call::output::only_blends)
             if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_brick(corner, lane);
     }
     // In the voxels x0 + i of a row, for the bits i of the mask.
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
         mine.fragments += static_cast<unsigned>(__popc(mask));
-        each_target([&]<std::size_t K>(const auto& t, direct_mode mode)
-                        VOXELPIPE_INLINE_LAMBDA { mine.touched += blend_row(t, x0, y, z, mask, value_of<K>(), mode); });
+        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
+            if constexpr (Call::output::only_blends)
+                add_row(t, x0, y, z, mask, value_of<K>());
+            else
+                mine.touched += blend_row(t, x0, y, z, mask, value_of<K>(), mode);
+        });
     }
     __device__ VOXELPIPE_INLINE void row_by_all(unsigned, int x0, int y, int z, word mask) {
-        row(x0, y, z, mask & bits_of_lane());
+        const word own = mask & bits_of_lane();
+        mine.fragments += static_cast<unsigned>(__popc(own));
+        each_target([&]<std::size_t K>(const auto& t, direct_mode mode)
+                        VOXELPIPE_INLINE_LAMBDA { mine.touched += blend_row(t, x0, y, z, own, value_of<K>(), mode); });
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE auto place(int x, int y, int z) const {
         if constexpr (Call::output::only_sets)
@@ -140,7 +148,10 @@ struct blending_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word voxels) {
         mine.fragments += static_cast<unsigned>(__popc(voxels));
         each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
-            mine.touched += blend_cube(t, x, y, z, voxels, value_of<K>(), mode);
+            if constexpr (Call::output::only_blends)
+                add_cube(t, x, y, z, voxels, value_of<K>());
+            else
+                mine.touched += blend_cube(t, x, y, z, voxels, value_of<K>(), mode);
         });
     }
     // One voxel. Lanes that come here together may have the same.
@@ -190,7 +201,7 @@ private:
     __device__ VOXELPIPE_INLINE void each_target(F&& f) const {
         core::for_each_index<targets_of<decltype(this->call.out.fb)>::count>([&]<std::size_t K>() {
             const auto& t = voxelpipe::get<K>(this->call.out.fb.targets);
-            if constexpr (Call::output::only_sets)
+            if constexpr (Call::output::only_sets || Call::output::only_blends)
                 f.template operator()<K>(t, direct_mode::blend);
             else if (t.load != load_operation::off)
                 f.template operator()<K>(t, this->call.out.modes.of[K]);
@@ -210,7 +221,9 @@ struct framebuffer_output {
     template <class Call>
     using rest_sink = sink<Call>;
     static constexpr bool hands_on = has_only_bits<Framebuffer>; // otherwise block_raster.cuh
-    static constexpr bool only_sets = false; // all values are true, all targets in use: known to the compiler
+    // Known to the compiler: all targets are in use, and all values true, or the mode of all is to blend.
+    static constexpr bool only_sets = false;
+    static constexpr bool only_blends = false;
     Framebuffer fb;
     Values values;
     direct_modes<targets_of<Framebuffer>::count> modes;
@@ -219,6 +232,20 @@ struct framebuffer_output {
     __device__ VOXELPIPE_INLINE static void prepare(std::uint64_t, std::uint64_t) {} // for what comes afterwards
     // Whether check_indices has run; otherwise the sink looks at all indices.
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return true; }
+};
+
+// Of targets that have rows of values.
+template <class Framebuffer>
+inline constexpr bool has_only_values = false;
+template <class... Targets>
+inline constexpr bool has_only_values<framebuffer_view<Targets...>> = (has_value_rows<Targets> && ...);
+template <class Framebuffer, class Values>
+struct blended_output : framebuffer_output<Framebuffer, Values> {
+    template <class Call>
+    using sink = blending_sink<Call>;
+    template <class Call>
+    using rest_sink = sink<Call>;
+    static constexpr bool only_blends = true;
 };
 
 // ---- the first kernel: every triangle -------------------------------------------------------------------------------

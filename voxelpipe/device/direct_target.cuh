@@ -34,6 +34,19 @@ __device__ VOXELPIPE_INLINE void reduce_add(float* at, float v) {
 __device__ VOXELPIPE_INLINE void reduce_add(double* at, double v) {
     asm volatile("red.relaxed.gpu.global.add.f64 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "d"(v) : "memory");
 }
+// The same where it is wanted, without a branch.
+__device__ VOXELPIPE_INLINE void reduce_add_where(float* at, float v, bool wanted) {
+    asm volatile("{ .reg .pred p; setp.ne.u32 p, %2, 0; @p red.relaxed.gpu.global.add.f32 [%0], %1; }" ::"l"(
+                     __cvta_generic_to_global(at)),
+                 "f"(v), "r"(static_cast<unsigned>(wanted))
+                 : "memory");
+}
+__device__ VOXELPIPE_INLINE void reduce_add_where(double* at, double v, bool wanted) {
+    asm volatile("{ .reg .pred p; setp.ne.u32 p, %2, 0; @p red.relaxed.gpu.global.add.f64 [%0], %1; }" ::"l"(
+                     __cvta_generic_to_global(at)),
+                 "d"(v), "r"(static_cast<unsigned>(wanted))
+                 : "memory");
+}
 __device__ VOXELPIPE_INLINE void reduce_add(unsigned* at, unsigned n) {
     asm volatile("red.relaxed.gpu.global.add.u32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(n) : "memory");
 }
@@ -466,6 +479,43 @@ __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, in
         }
     }
     return touched;
+}
+
+// ---- targets of values whose mode is to blend, which the compiler knows -----------------------------------------------
+
+// Values that lie along x.
+template <class Target>
+inline constexpr bool has_value_rows = !Target::map::is_bit && !Target::map::bricks && is_direct<Target>();
+
+template <class Target, class Value>
+__device__ VOXELPIPE_INLINE void add_where(typename Target::element_type* at, const Value& value, bool wanted) {
+    using value_type = typename Target::value_type;
+    if constexpr (std::is_floating_point_v<value_type>) { // all that is direct are sums
+        reduce_add_where(at, value, wanted);
+    } else if (wanted) {
+        direct_value<typename Target::blend_type, value_type>::apply(at, value);
+    }
+}
+// As blend_row, for a mask whose bits are neighbours mostly.
+template <class Target, class Value>
+__device__ VOXELPIPE_INLINE void add_row(const target_view<Target>& t, int x0, int y, int z, word mask,
+                                         const Value& value) {
+    if (mask == 0) return;
+    const int skipped = __ffs(static_cast<int>(mask)) - 1;
+    auto* at = t.elements + Target::map::cell(t.extent, x0 + skipped, y, z);
+    for (mask >>= skipped; mask != 0; mask >>= 4, at += 4)
+        for (int k = 0; k < 4; ++k) add_where<Target>(at + k, value, (mask >> k & 1u) != 0);
+}
+// As blend_cube.
+template <class Target, class Value>
+__device__ VOXELPIPE_INLINE void add_cube(const target_view<Target>& t, int x, int y, int z, word voxels,
+                                          const Value& value) {
+    const auto row = static_cast<std::uint64_t>(t.extent.x), slice = row * static_cast<std::uint64_t>(t.extent.y);
+    const std::uint64_t first = Target::map::cell(t.extent, x, y, z); // modulo 2^64
+    for (unsigned k = 0; k < 4; ++k) {
+        auto* const at = t.elements + (first + (k % 2 != 0 ? row : 0) + (k / 2 != 0 ? slice : 0));
+        for (unsigned i = 0; i < 2; ++i) add_where<Target>(at + i, value, (voxels >> (2 * k + i) & 1u) != 0);
+    }
 }
 
 // One voxel of a target of values, for every lane that is here: those that have the same one, as neighbours in a fine

@@ -267,8 +267,15 @@ private:
                             return;
                         }
                     }
-                    draw_into(
-                        framebuffer_output<Framebuffer, values_type>{fb, d.fragment_shader.values, plan.modes, marks});
+                    const framebuffer_output<Framebuffer, values_type> output{fb, d.fragment_shader.values, plan.modes,
+                                                                              marks};
+                    if constexpr (has_only_values<Framebuffer>) {
+                        if (plan.only_blends() && all_in_use(fb)) {
+                            draw_into(blended_output<Framebuffer, values_type>{output});
+                            return;
+                        }
+                    }
+                    draw_into(output);
                 };
                 raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);
             }

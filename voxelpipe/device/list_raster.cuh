@@ -194,6 +194,7 @@ struct list_output {
     using rest_sink = listing_sink<Call, 960>; // fewer blocks, and triangles of many rows
     static constexpr bool hands_on = true;
     static constexpr bool only_sets = false;
+    static constexpr bool only_blends = false;
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return false; }
 
     std::uint32_t* voxels; // by fragment
