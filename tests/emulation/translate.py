@@ -27,6 +27,8 @@ PTX = {
     "atom.relaxed.gpu.global.add.u64 %0, [%1], 1;": "atom_increment_u64",
     "{ .reg .pred any; setp.ne.u32 any, %1, 0; @any red.relaxed.gpu.global.or.b32 [%0], %1; }": "red_or_b32_where",
     "{ .reg .pred any; setp.ne.u32 any, %1, 0; @any red.relaxed.gpu.global.and.b32 [%0], %2; }": "red_and_b32_where",
+    "{ .reg .pred p; setp.ne.u32 p, %2, 0; @p red.relaxed.gpu.global.add.f32 [%0], %1; }": "red_add_f32_where",
+    "{ .reg .pred p; setp.ne.u32 p, %2, 0; @p red.relaxed.gpu.global.add.f64 [%0], %1; }": "red_add_f64_where",
     "atom.relaxed.cta.shared.cas.b32 %0, [%1], %2, %3;": "atom_shared_cas_b32",
     "red.relaxed.cta.shared.or.b32 [%0 + 4], %1;": "red_shared_or_b32_second",
     "mov.u32 %0, %1;": "mov_u32",

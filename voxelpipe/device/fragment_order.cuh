@@ -228,50 +228,46 @@ __global__ __launch_bounds__(32 * order_warps,
                              order_blocks) void order_windows_kernel(const __grid_constant__ order_buffers b,
                                                                      pipeline_state* state, capacities limits) {
     __shared__ order_window windows[order_warps];
-    __shared__ std::uint32_t tile, counts[order_warps];
+    __shared__ std::uint32_t counts[order_warps];
     __shared__ unsigned long long before;
     await_stream();
     if (has_failed(*state, limits)) return;
     const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::most_numbered
     const std::uint32_t warp = warp_in_block(), lane = threadIdx.x % 32;
     const list_places to = b.places();
-    for (;;) {
-        __syncthreads(); // all have read what the last tile left
-        if (threadIdx.x == 0) tile = atomicAdd(&state->next_tile, 1u);
-        __syncthreads();
-        const std::uint64_t first = std::uint64_t{tile} * tile_counts::length, begin = first + warp * window_length;
-        if (first >= n) return;
-        // Where the tile has no such window, one behind the last fragment, in which nothing begins.
-        const order_of_window window(b, static_cast<std::uint32_t>(begin < n ? begin : n), n);
-        if (lane == 0) counts[warp] = window.count;
-        __syncthreads();
-        std::uint32_t earlier = 0, all = 0;
-        for (std::uint32_t w = 0; w < order_warps; ++w) {
-            earlier += w < warp ? counts[w] : 0;
-            all += counts[w];
-        }
-        if (threadIdx.x == 0) b.tiles.publish(tile, all); // before the sort, for the tiles behind
-        window.keep(windows[warp]);
-        window.template order<Narrow>(to.primitives);
-        if (warp == 0) {
-            const unsigned long long sum = b.tiles.before(tile, all);
-            if (lane == 0) {
-                before = sum;
-                if (first + tile_counts::length >= n) { // the last tile
-                    state->list_voxels = sum + all;
-                    if (sum + all <= to.room) to.offsets[sum + all] = n;
-                }
+    const std::uint32_t tile = blockIdx.x; // see count_before
+    const std::uint64_t first = std::uint64_t{tile} * tile_counts::length, begin = first + warp * window_length;
+    if (first >= n) return;
+    // Where the tile has no such window, one behind the last fragment, in which nothing begins.
+    const order_of_window window(b, static_cast<std::uint32_t>(begin < n ? begin : n), n);
+    if (lane == 0) counts[warp] = window.count;
+    __syncthreads();
+    std::uint32_t earlier = 0, all = 0;
+    for (std::uint32_t w = 0; w < order_warps; ++w) {
+        earlier += w < warp ? counts[w] : 0;
+        all += counts[w];
+    }
+    if (threadIdx.x == 0) b.tiles.publish(tile, all); // before the sort, for the tiles behind
+    window.keep(windows[warp]);
+    window.template order<Narrow>(to.primitives);
+    if (warp == 0) {
+        const unsigned long long sum = b.tiles.before(tile, all);
+        if (lane == 0) {
+            before = sum;
+            if (first + tile_counts::length >= n) { // the last tile
+                state->list_voxels = sum + all;
+                if (sum + all <= to.room) to.offsets[sum + all] = n;
             }
         }
-        __syncthreads();
-        std::uint64_t at = before + earlier + lane;
-        for (std::uint32_t r = lane; r < window.count && at < to.room; r += 32, at += 32) {
-            if (to.voxels != nullptr)
-                to.voxels[at] = windows[warp].voxels[r];
-            else
-                to.narrow_voxels[at] = windows[warp].voxels[r];
-            to.offsets[at] = windows[warp].first[r];
-        }
+    }
+    __syncthreads();
+    std::uint64_t at = before + earlier + lane;
+    for (std::uint32_t r = lane; r < window.count && at < to.room; r += 32, at += 32) {
+        if (to.voxels != nullptr)
+            to.voxels[at] = windows[warp].voxels[r];
+        else
+            to.narrow_voxels[at] = windows[warp].voxels[r];
+        to.offsets[at] = windows[warp].first[r];
     }
 }
 
@@ -288,7 +284,7 @@ inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipel
     const auto windows =
         b.primitive_bits <= narrow_primitive_bits ? order_windows_kernel<true> : order_windows_kernel<false>;
     const std::uint64_t tiles = tile_counts::num(capacity);
-    launch_behind(windows, fill_device(tiles * threads_per_block, order_blocks), 32 * order_warps, stream, where, b,
+    launch_behind(windows, static_cast<unsigned>(std::max<std::uint64_t>(tiles, 1)), 32 * order_warps, stream, where, b,
                   state, limits);
     if (capacity > most_of_window)
         launch_behind(order_long_kernel<order_buffers>, fill_device(capacity / (most_of_window + 1) * 32, 4),

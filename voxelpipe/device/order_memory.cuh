@@ -114,7 +114,7 @@ struct tile_counts {
         if (tile != 0) word(words[tile]).store(own | count, ::cuda::memory_order_relaxed);
     }
     // How many voxels begin in the tiles before this one, in which `count` do, as has been published. By all lanes of
-    // one warp. Tiles are taken in order, so those before are under way.
+    // one warp. Blocks begin in the order of their tiles, so those before are under way.
     [[nodiscard]] __device__ unsigned long long before(std::uint32_t tile, unsigned long long count) const {
         const auto lane = threadIdx.x % 32;
         unsigned long long sum = 0;

@@ -28,7 +28,7 @@ struct pipeline_state {
     unsigned int index_error;
     unsigned int num_items, num_splits, num_images; // tile split
     unsigned int next_item;                         // fine raster
-    unsigned int num_ordered[4], next_tile;         // fragment order: order_lists, tile_counts
+    unsigned int num_ordered[4];                    // fragment order: order_lists
     struct {
         unsigned long long cut, lengths[4];
     } handed_on; // direct raster, of one draw: triangle_lists

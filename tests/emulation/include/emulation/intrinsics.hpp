@@ -225,6 +225,12 @@ inline void red_and_b32_where(std::uint64_t p, std::uint32_t wanted, std::uint32
 }
 inline void red_add_f32(std::uint64_t p, float v) { *global<float>(p) += v; }
 inline void red_add_f64(std::uint64_t p, double v) { *global<double>(p) += v; }
+inline void red_add_f32_where(std::uint64_t p, float v, std::uint32_t wanted) {
+    if (wanted != 0) red_add_f32(p, v);
+}
+inline void red_add_f64_where(std::uint64_t p, double v, std::uint32_t wanted) {
+    if (wanted != 0) red_add_f64(p, v);
+}
 inline void red_add_u32(std::uint64_t p, std::uint32_t v) { *global<std::uint32_t>(p) += v; }
 inline void red_add_u64(std::uint64_t p, std::uint64_t v) { *global<std::uint64_t>(p) += v; }
 template <class T>
