@@ -33,6 +33,8 @@ PTX = {
     "red.relaxed.cta.shared.or.b32 [%0 + 4], %1;": "red_shared_or_b32_second",
     "mov.u32 %0, %1;": "mov_u32",
     "st.shared.u32 [%0], %1;": "st_shared_u32",
+    "cp.async.ca.shared.global [%0], [%1], 4;": "cp_async_4",
+    "cp.async.wait_all;": "cp_async_wait_all",
     "ld.shared.u32 %0, [%1];": "ld_shared_u32",
     "griddepcontrol.wait;": None,
     "griddepcontrol.launch_dependents;": None,

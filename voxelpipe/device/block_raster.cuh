@@ -37,6 +37,7 @@ struct block_warp {
     const Call& call;
     warp_queues& queues;
     kept_rows& kept; // of the warp
+    coming_corners<typename Call::source_type>& corners;
     sink_type& sink;
     std::uint32_t* big; // for big triangles, of the block
     unsigned& num_big;
@@ -53,15 +54,17 @@ struct block_warp {
         r.find_box(call.in.fraction);
         return r;
     }
-    // The lane's triangle i, where there is one.
-    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, const glm::uvec3& index) {
+    // The lane's triangle i, where there is one, whose corners have been fetched. Then those of the next are, which has
+    // these vertices.
+    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, bool has_next, const glm::uvec3& next) {
         bool waits = false, is_big = false;
         bool is_inside = false;
         int most = 0;
         bool is_done = false;
         near_triangle r;
+        r = corners.take(call.in);
+        if (has_next) corners.fetch(call.in.source, next);
         if (valid) {
-            r = load_near(call.in, index);
             most = r.most();
             is_big = !r.is_near || most > most_medium_side(call.in.fraction);
             is_inside = r.is_inside(call.in.extent);
@@ -111,6 +114,10 @@ struct block_warp {
         // every place, and warps wait for instructions.
         const int own = static_cast<int>(warp_in_block());
         int ended = 0; // kinds of which the rest is done
+        const auto triangle = [&](std::uint32_t first) VOXELPIPE_INLINE_LAMBDA { return first + static_cast<unsigned>(lane); };
+        const std::uint32_t num_triangles = call.in.num_triangles;
+        if (triangle(begin) < num_triangles) corners.fetch(call.in.source, index);
+        index = load_index(call.in, triangle(begin + step));
         for (std::uint32_t first = begin;;) {
             int w = own, at = 0;
             bool is_tiny = false, is_large = false;
@@ -122,12 +129,12 @@ struct block_warp {
             } else if (num_larges >= 32) {
                 at = (num_larges -= 32) + lane;
                 is_large = true;
-            } else if (first < call.in.num_triangles) {
-                // The indices of a batch are loaded while the batch before it is worked on.
-                const glm::uvec3 next = load_index(call.in, first + step + static_cast<unsigned>(lane));
-                const std::uint32_t i = first + static_cast<unsigned>(lane);
-                batch(i, i < call.in.num_triangles && sink.check(index), index);
-                index = next;
+            } else if (first < num_triangles) {
+                // While a batch is worked on, the corners of the next one are on their way, and the indices of the one
+                // after that.
+                const glm::uvec3 second = load_index(call.in, triangle(first + 2 * step));
+                batch(triangle(first), triangle(first) < num_triangles, triangle(first + step) < num_triangles, index);
+                index = second;
                 first += step;
                 continue;
             } else {
@@ -182,6 +189,7 @@ __global__ __launch_bounds__(raster_threads,
     using sink_type = typename Call::sink;
     __shared__ warp_queues queues[raster_warps];
     __shared__ kept_rows rows_of_warps[raster_warps];
+    __shared__ coming_corners<typename Call::source_type> corners[raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ int left[3][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_big;
@@ -196,6 +204,7 @@ __global__ __launch_bounds__(raster_threads,
     block_warp<Call> warp{call,
                           queues[threadIdx.x / 32],
                           rows_of_warps[threadIdx.x / 32],
+                          corners[threadIdx.x / 32],
                           sink,
                           call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads,
                           num_big};

@@ -46,6 +46,15 @@ struct shading_source {
     }
     using loaded = glm::vec3; // a vertex on its way from memory
     [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(std::uint32_t vertex) const { return shade(vertex); }
+    // The same in two steps, for shaders that look at positions alone, as all do that are cheap.
+    using stored = glm::vec3;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE const stored* address(std::uint32_t vertex) const {
+        return mesh.positions.data() + vertex;
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(const stored& position) const {
+        const auto result = shader(voxelpipe::vertex<>{0, draw, position, {}});
+        return core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result).position;
+    }
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(const loaded& p, std::int32_t (&q)[3]) const {
         return core::snap_near(snap, p.x, p.y, p.z, q);
     }
@@ -64,6 +73,11 @@ struct stored_source {
     [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(std::uint32_t vertex) const {
         return geometry.positions.near[vertex];
     }
+    using stored = loaded;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE const stored* address(std::uint32_t vertex) const {
+        return geometry.positions.near + vertex;
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static loaded load(const stored& position) { return position; }
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(const loaded& p, std::int32_t (&q)[3]) const {
         for (int k = 0; k < 3; ++k) q[k] = p.q[k];
         return p.is_near != 0;
@@ -187,6 +201,45 @@ template <class Source>
                                                                   const glm::uvec3& index) {
     return make_near(call, load_corners(call, index));
 }
+
+// The corners of a warp's next triangles, on their way from memory while the ones before are drawn: registers would not
+// hold them that long. A lane's column of words is its own, so that no lane waits for another.
+template <class Source>
+struct coming_corners {
+    using stored = typename Source::stored;
+    static constexpr std::uint32_t words_each = sizeof(stored) / sizeof(std::uint32_t);
+    static_assert(sizeof(stored) % sizeof(std::uint32_t) == 0);
+    std::uint32_t words[3 * words_each][32];
+
+    __device__ VOXELPIPE_INLINE void fetch(const Source& source, const glm::uvec3& index) {
+        const auto to = static_cast<std::uint32_t>(__cvta_generic_to_shared(words[0] + threadIdx.x % 32));
+#pragma unroll
+        for (std::uint32_t v = 0; v < 3; ++v) {
+            const auto* const from = reinterpret_cast<const std::uint32_t*>(
+                source.address(v == 0 ? index.x : v == 1 ? index.y : index.z));
+#pragma unroll
+            for (std::uint32_t k = 0; k < words_each; ++k)
+                asm volatile("cp.async.ca.shared.global [%0], [%1], 4;" ::"r"(to + 128 * (v * words_each + k)),
+                             "l"(__cvta_generic_to_global(from + k))
+                             : "memory");
+        }
+    }
+    // Those that were fetched last.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle take(const raster_input<Source>& call) const {
+        asm volatile("cp.async.wait_all;" ::: "memory");
+        loaded_corners<Source> corners;
+#pragma unroll
+        for (std::uint32_t v = 0; v < 3; ++v) {
+            std::uint32_t mine[words_each];
+#pragma unroll
+            for (std::uint32_t k = 0; k < words_each; ++k) mine[k] = words[v * words_each + k][threadIdx.x % 32];
+            stored position;
+            memcpy(&position, mine, sizeof(position));
+            corners.of[v] = call.source.load(position);
+        }
+        return make_near(call, corners);
+    }
+};
 
 // What the threads of one warp keep of a triangle each (small_conservative::rows_of_16, small_thin::columns), a column
 // for each lane.
