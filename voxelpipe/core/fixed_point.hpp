@@ -109,10 +109,10 @@ struct snap_transform {
     q[0] = exact::round_to_int32(a, t.shift[0]);
     q[1] = exact::round_to_int32(b, t.shift[1]);
     q[2] = exact::round_to_int32(c, t.shift[2]);
-    // Magnitudes in the order of their high words, where infinities and NaNs come last.
-    constexpr std::uint32_t magnitude = 0x7fffffffu, limit = 0x41d00000u; // 2^30
-    const std::uint32_t ha = exact::high_word(a) & magnitude, hb = exact::high_word(b) & magnitude,
-                        hc = exact::high_word(c) & magnitude;
+    // Magnitudes in the order of their high words without the sign, where infinities and NaNs come last. Doubled: a
+    // product of integers leaves the unit alone that does all other bits, and first kernels are bound by that.
+    constexpr std::uint32_t limit = 0x41d00000u * 2u; // 2^30
+    const std::uint32_t ha = exact::high_word(a) * 2u, hb = exact::high_word(b) * 2u, hc = exact::high_word(c) * 2u;
     const std::uint32_t most = ha > hb ? ha : hb;
     return (most > hc ? most : hc) < limit;
 }

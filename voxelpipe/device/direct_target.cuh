@@ -444,11 +444,14 @@ __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, in
             constexpr bool sets = bit_blend<typename Target::blend_type>::sets;
             const auto row = static_cast<std::uint32_t>((t.extent.x + 31) / 32);
             const std::uint32_t slice = row * static_cast<std::uint32_t>(t.extent.y), first = word_of(t, x, y, z);
-            word* const at[4] = {t.elements + first, t.elements + (first + row), t.elements + (first + slice),
-                                 t.elements + (first + slice + row)};
+            const auto place = [&](std::uint32_t number) VOXELPIPE_INLINE_LAMBDA {
+                return reinterpret_cast<word*>(reinterpret_cast<char*>(t.elements) + 4u * number);
+            };
+            word* const at[4] = {place(first), place(first + row), place(first + slice), place(first + slice + row)};
             const int shift = x & 31;
+            const word unit = 1u << shift;
             word missing[4];
-            for (int k = 0; k < 4; ++k) missing[k] = (voxels >> 2 * k & 3u) << shift;
+            for (int k = 0; k < 4; ++k) missing[k] = (voxels >> 2 * k & 3u) * unit;
             for (int k = 0; k < 4; ++k)
                 if (missing[k] != 0) { // maybe an old word: what has changed stays so
                     const word seen = __ldca(at[k]);

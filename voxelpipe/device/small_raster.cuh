@@ -132,7 +132,8 @@ static_assert(core::small_voxels(16) == 16 && core::small_voxels(15) == 32 && co
 struct near_triangle {
     std::int32_t q[3][3]; // [vertex][axis], in units of 2^-F voxel from the first voxel of what is rasterised
     std::int32_t lo[3];   // lowest voxel of the bounding box
-    int last[3];          // its highest voxel, counted from the lowest
+    std::int32_t hi[3];   // its highest voxel
+    int last[3];          // the same, counted from the lowest
     bool is_near;         // otherwise nothing above holds
 
     __device__ VOXELPIPE_INLINE void find_box(int fraction) {
@@ -141,20 +142,20 @@ struct near_triangle {
                                high = core::max3(q[0][k], q[1][k], q[2][k]);
             // ceil - 1: a face touches both sides. Unsigned, for whatever is not near.
             lo[k] = static_cast<std::int32_t>(static_cast<std::uint32_t>(low) - 1u) >> fraction;
-            last[k] = (high >> fraction) - lo[k];
+            hi[k] = high >> fraction;
+            last[k] = hi[k] - lo[k];
         }
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE int most() const { return core::max3(last[0], last[1], last[2]) + 1; }
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_inside(const glm::ivec3& extent) const {
-        return (lo[0] | lo[1] | lo[2] | (extent.x - 1 - lo[0] - last[0]) | (extent.y - 1 - lo[1] - last[1]) |
-                (extent.z - 1 - lo[2] - last[2])) >= 0;
+        return (lo[0] | lo[1] | lo[2] | (extent.x - 1 - hi[0]) | (extent.y - 1 - hi[1]) | (extent.z - 1 - hi[2])) >= 0;
     }
     // Whether no voxel of the grid can be covered; a thin fragment may lie one voxel beyond the triangle's own depths.
     template <coverage Rule>
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_outside(const glm::ivec3& extent) const {
         constexpr int beyond = Rule == coverage::thin ? 1 : 0;
         return lo[0] - beyond >= extent.x || lo[1] - beyond >= extent.y || lo[2] - beyond >= extent.z ||
-               lo[0] + last[0] + beyond < 0 || lo[1] + last[1] + beyond < 0 || lo[2] + last[2] + beyond < 0;
+               hi[0] + beyond < 0 || hi[1] + beyond < 0 || hi[2] + beyond < 0;
     }
     // What of the box lies in the grid; 1 > 0 along an axis where nothing does.
     [[nodiscard]] __device__ VOXELPIPE_INLINE core::small_box part(const glm::ivec3& extent) const {
