@@ -321,8 +321,10 @@ TEST(CountedPlan, BesideATargetThatTellsFirstTouches) {
     EXPECT_TRUE(beside(1.0f).modes.counts_first);
     EXPECT_EQ(beside(1.0f).bits_of, -1);
     EXPECT_EQ(beside(1.0f).voxels_of, -1);
-    // Words beyond 2^32 want wider numbers.
-    fb = view_of<bits, float_sum>({32, 1 << 16, 1 << 16});
+    // Words beyond 2^30 want wider numbers: their places in bytes are beyond 2^32.
+    fb = view_of<bits, float_sum>({32, 1 << 15, (1 << 15) - 1});
+    EXPECT_EQ(plan(std::vector{vp::constant(true, 1.0f)}, fb, 1000, false).modes.of[0], direct_mode::blend);
+    fb = view_of<bits, float_sum>({32, 1 << 15, 1 << 15});
     EXPECT_EQ(plan(std::vector{vp::constant(true, 1.0f)}, fb, 1000, false).modes.of[0], direct_mode::blend_far);
     fb = view_of<bits, float_sum>({32, 32, 32});
     // What is counted anyway tells the voxels too.

@@ -110,11 +110,12 @@ struct block_warp {
     __device__ VOXELPIPE_INLINE unsigned run(glm::uvec3 index, const warp_queues (&all)[Warps], int (&left)[3][Warps]) {
         const std::uint32_t step = gridDim.x * Warps * 32;
         const std::uint32_t begin = blockIdx.x * Warps * 32 + threadIdx.x / 32 * 32;
-        // One loop for what waits while the mesh is read and what is left then: twice the code, with that of the sink in
-        // every place, and warps wait for instructions.
+        // One loop for what waits while the mesh is read and what is left then: twice the code, with that of the sink
+        // in every place, and warps wait for instructions.
         const int own = static_cast<int>(warp_in_block());
         int ended = 0; // kinds of which the rest is done
-        const auto triangle = [&](std::uint32_t first) VOXELPIPE_INLINE_LAMBDA { return first + static_cast<unsigned>(lane); };
+        const auto triangle = [&](std::uint32_t first)
+                                  VOXELPIPE_INLINE_LAMBDA { return first + static_cast<unsigned>(lane); };
         const std::uint32_t num_triangles = call.in.num_triangles;
         if (triangle(begin) < num_triangles) corners.fetch(call.in.source, index);
         index = load_index(call.in, triangle(begin + step));
@@ -157,9 +158,8 @@ struct block_warp {
                 if (is_tiny) {
                     raster_tiny<Call::rule>(call.in, take(all[w].tinies, at), sink);
                 } else {
-                    const near_triangle r = is_large
-                                                ? load_near(call.in, call.in.source.triangle(all[w].larges[at]))
-                                                : take(all[w].smalls, at);
+                    const near_triangle r = is_large ? load_near(call.in, call.in.source.triangle(all[w].larges[at]))
+                                                     : take(all[w].smalls, at);
                     raster_small<Call::rule, false>(call.in, r, lane_rows(kept), sink);
                 }
             }

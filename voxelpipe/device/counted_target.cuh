@@ -113,7 +113,7 @@ template <class Draw, class... Targets>
         if (tells && telling_bits < 0 && map::is_bit && map::elements(fb.extent) * sizeof(word) <= most_counted_bits)
             telling_bits = static_cast<int>(K);
         if (may_count && countable < 0) countable = static_cast<int>(K);
-        if (map::is_bit && map::elements(fb.extent) >> 32 != 0) plan.modes.of[K] = direct_mode::blend_far;
+        if (map::is_bit && map::elements(fb.extent) >> 30 != 0) plan.modes.of[K] = direct_mode::blend_far;
         if (in_place) return;
         if (may_count)
             plan.modes.of[K] = direct_mode::count;

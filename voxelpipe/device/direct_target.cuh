@@ -56,7 +56,7 @@ __device__ VOXELPIPE_INLINE void reduce_add(unsigned long long* at, unsigned lon
 
 // How the fragments of a call go into one of its targets.
 enum class direct_mode : std::uint32_t {
-    blend,       // where they lie; a target of bits in rows has fewer than 2^32 words then
+    blend,       // where they lie; a target of bits in rows has fewer than 2^30 words then
     blend_far,   // where they lie, in any number of words
     count_first, // the same, and voxels that had no fragment yet are counted, where tells_first holds
     count        // the target holds a number of fragments for each voxel
@@ -340,13 +340,18 @@ __device__ VOXELPIPE_INLINE void reduce_word(word* at, word bits) {
                      "r"(bits), "r"(~bits)
                      : "memory");
 }
-// The number of a voxel's word, of fewer than 2^32 in rows, modulo 2^32: it may lie outside of the extent.
+// The number of a voxel's word, of fewer than 2^30 in rows, modulo 2^32: it may lie outside of the extent.
 template <class Target>
 [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t word_of(const target_view<Target>& t, int x, int y, int z) {
     const auto words_x = static_cast<std::uint32_t>((t.extent.x + 31) / 32);
     return (static_cast<std::uint32_t>(z) * static_cast<std::uint32_t>(t.extent.y) + static_cast<std::uint32_t>(y)) *
                words_x +
            static_cast<std::uint32_t>(x >> 5);
+}
+// The word of a number, of fewer than 2^30: 32 bits are enough for its place in bytes.
+template <class Target>
+[[nodiscard]] __device__ VOXELPIPE_INLINE word* word_at(const target_view<Target>& t, std::uint32_t number) {
+    return reinterpret_cast<word*>(reinterpret_cast<char*>(t.elements) + 4u * number);
 }
 // Where a voxel lies among them, as something linear: the number of its row's first word, and x; modulo 2^32.
 struct word_place {
@@ -444,14 +449,11 @@ __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, in
             constexpr bool sets = bit_blend<typename Target::blend_type>::sets;
             const auto row = static_cast<std::uint32_t>((t.extent.x + 31) / 32);
             const std::uint32_t slice = row * static_cast<std::uint32_t>(t.extent.y), first = word_of(t, x, y, z);
-            const auto place = [&](std::uint32_t number) VOXELPIPE_INLINE_LAMBDA {
-                return reinterpret_cast<word*>(reinterpret_cast<char*>(t.elements) + 4u * number);
-            };
-            word* const at[4] = {place(first), place(first + row), place(first + slice), place(first + slice + row)};
+            word* const at[4] = {word_at(t, first), word_at(t, first + row), word_at(t, first + slice),
+                                 word_at(t, first + slice + row)};
             const int shift = x & 31;
-            const word unit = 1u << shift;
             word missing[4];
-            for (int k = 0; k < 4; ++k) missing[k] = (voxels >> 2 * k & 3u) * unit;
+            for (int k = 0; k < 4; ++k) missing[k] = (voxels >> 2 * k & 3u) << shift;
             for (int k = 0; k < 4; ++k)
                 if (missing[k] != 0) { // maybe an old word: what has changed stays so
                     const word seen = __ldca(at[k]);
@@ -484,7 +486,8 @@ __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, in
     return touched;
 }
 
-// ---- targets of values whose mode is to blend, which the compiler knows -----------------------------------------------
+// ---- targets of values whose mode is to blend, which the compiler knows
+// -----------------------------------------------
 
 // Values that lie along x.
 template <class Target>
@@ -513,8 +516,8 @@ __device__ VOXELPIPE_INLINE void add_row(const target_view<Target>& t, int x0, i
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE void add_cube(const target_view<Target>& t, int x, int y, int z, word voxels,
                                           const Value& value) {
-    const auto row = static_cast<std::uint64_t>(t.extent.x), slice = row * static_cast<std::uint64_t>(t.extent.y);
-    const std::uint64_t first = Target::map::cell(t.extent, x, y, z); // modulo 2^64
+    // The first one may lie outside, before the target's elements too.
+    const std::int64_t row = t.extent.x, slice = row * t.extent.y, first = (std::int64_t{z} * t.extent.y + y) * row + x;
     for (unsigned k = 0; k < 4; ++k) {
         auto* const at = t.elements + (first + (k % 2 != 0 ? row : 0) + (k / 2 != 0 ? slice : 0));
         for (unsigned i = 0; i < 2; ++i) add_where<Target>(at + i, value, (voxels >> (2 * k + i) & 1u) != 0);

@@ -216,8 +216,9 @@ struct coming_corners {
         const auto to = static_cast<std::uint32_t>(__cvta_generic_to_shared(words[0] + threadIdx.x % 32));
 #pragma unroll
         for (std::uint32_t v = 0; v < 3; ++v) {
-            const auto* const from = reinterpret_cast<const std::uint32_t*>(
-                source.address(v == 0 ? index.x : v == 1 ? index.y : index.z));
+            const auto* const from = reinterpret_cast<const std::uint32_t*>(source.address(v == 0   ? index.x
+                                                                                           : v == 1 ? index.y
+                                                                                                    : index.z));
 #pragma unroll
             for (std::uint32_t k = 0; k < words_each; ++k)
                 asm volatile("cp.async.ca.shared.global [%0], [%1], 4;" ::"r"(to + 128 * (v * words_each + k)),

@@ -41,7 +41,7 @@ struct touching_sink : blending_sink<Call> {
     using blending_sink<Call>::blending_sink;
 
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(const glm::uvec3& index) const {
-        return this->call.out.check(index);
+        return this->call.out.checked || this->call.out.check(index);
     }
 };
 

@@ -248,6 +248,11 @@ inline void red_shared_or_b32_second(std::uint32_t p, std::uint32_t v) { shared<
 inline void mov_u32(std::uint32_t& to, std::uint32_t from) { to = from; }
 inline void st_shared_u32(std::uint32_t p, std::uint32_t v) { *shared<std::uint32_t>(p) = v; }
 inline void ld_shared_u32(std::uint32_t& v, std::uint32_t p) { v = *shared<std::uint32_t>(p); }
+// At once, so that nothing is left to wait for.
+inline void cp_async_4(std::uint32_t to, std::uint64_t from) {
+    *shared<std::uint32_t>(to) = *global<std::uint32_t>(from);
+}
+inline void cp_async_wait_all() {}
 template <class T>
 void keep(T&) {} // an empty statement that the compiler must not see through
 } // namespace emulation::ptx
