@@ -486,10 +486,10 @@ __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, in
     return touched;
 }
 
-// ---- targets of values whose mode is to blend, which the compiler knows
-// -----------------------------------------------
+// ---- targets of values that the compiler knows to be blended in place -----------------------------------------------
 
-// Values that lie along x.
+// Values that lie along x: those of a row are neighbours in memory. What follows is for calls whose modes are all to
+// blend (blended_output).
 template <class Target>
 inline constexpr bool has_value_rows = !Target::map::is_bit && !Target::map::bricks && is_direct<Target>();
 
