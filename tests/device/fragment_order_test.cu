@@ -132,6 +132,21 @@ TEST(FragmentOrder, AtTheLimits) {
     }
 }
 
+TEST(FragmentOrder, DenseVoxels) {
+    const std::uint32_t part = device::dense_part, most = part * device::most_dense_parts;
+    const std::uint64_t block = device::most_of_block;
+    // Nearly all primitives, the fewest that are more than a block's, and what lies at a part's border.
+    for (const std::uint32_t num : {std::uint32_t{block} + 1, part - 1, part, part + 1, 3 * part + 17})
+        for (const std::uint32_t seed : {1u, 2u})
+            expect_ordered({7, num, block + 1, 300, num - 1, 2, num}, seed, num - 1);
+    // As many as are just dense, and one fewer: those are cut into runs.
+    for (const std::uint32_t num : {most, most - 1, most + 1}) {
+        const std::uint64_t least = num / device::least_dense;
+        expect_ordered({least - 1, least, 1, least + 1, 3 * least}, num, num - 1);
+    }
+    expect_ordered(std::vector<std::uint64_t>(70, 5000), 5, 100000); // more parts than blocks
+}
+
 TEST(FragmentOrder, FewAndMany) {
     std::mt19937 random(4);
     std::vector<std::uint64_t> lengths(20000);

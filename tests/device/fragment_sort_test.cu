@@ -24,7 +24,7 @@ struct sorted {
 };
 
 // num of the keys, in memory that nothing has zeroed; values are numbered.
-sorted sort_on_device(std::vector<std::uint32_t> keys, std::uint64_t num, int bits) {
+sorted sort_on_device(std::vector<std::uint32_t> keys, std::uint64_t num, int bits, int items) {
     vp::cuda_backend gpu;
     const std::uint64_t capacity = keys.size();
     const auto upload = [&](const auto& v) {
@@ -47,10 +47,10 @@ sorted sort_on_device(std::vector<std::uint32_t> keys, std::uint64_t num, int bi
     state.list_fragments = num;
     const auto d_state = upload(std::vector{state});
     device::arena plan;
-    (void)device::sort_memory::take(plan, capacity, bits);
+    (void)device::sort_memory::take(plan, capacity, bits, items);
     auto memory = upload(std::vector<std::byte>(plan.used(), std::byte{0xa5}));
     device::arena arena(memory.data());
-    const auto m = device::sort_memory::take(arena, capacity, bits);
+    const auto m = device::sort_memory::take(arena, capacity, bits, items);
     zero_kernel<<<64, 256, 0, gpu.stream>>>(m, num);
     const int at =
         device::sort_fragments(pairs, device::sort_count{d_state.data(), {0, 0, capacity, 0}}, capacity, m, gpu.stream);
@@ -70,10 +70,12 @@ void expect_sorted(std::uint64_t num, int bits, const Key& key) {
     std::vector<std::uint32_t> order(num);
     std::iota(order.begin(), order.end(), 0u);
     std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return keys[a] < keys[b]; });
-    const sorted s = sort_on_device(keys, num, bits);
-    for (std::uint64_t i = 0; i < num; ++i) {
-        ASSERT_EQ(s.values[i], order[i]) << i << " of " << num << ", " << bits << " bits";
-        ASSERT_EQ(s.keys[i], keys[order[i]]) << i << " of " << num << ", " << bits << " bits";
+    for (const int items : {device::few_sort_items, device::sort_items}) {
+        const sorted s = sort_on_device(keys, num, bits, items);
+        for (std::uint64_t i = 0; i < num; ++i) {
+            ASSERT_EQ(s.values[i], order[i]) << i << " of " << num << ", " << bits << " bits, " << items;
+            ASSERT_EQ(s.keys[i], keys[order[i]]) << i << " of " << num << ", " << bits << " bits, " << items;
+        }
     }
 }
 
@@ -93,7 +95,7 @@ TEST(FragmentSort, EveryNumberOfBits) {
 TEST(FragmentSort, NumbersAtTheBordersOfTiles) {
     for (const std::uint64_t tiles : {0, 1, 2, 7})
         for (const std::int64_t more : {-33, -1, 0, 1, 2, 31, 511}) {
-            const std::int64_t num = static_cast<std::int64_t>(tiles * device::sort_tile) + more;
+            const std::int64_t num = static_cast<std::int64_t>(tiles * device::sort_tile(device::sort_items)) + more;
             if (num < 0) continue;
             std::mt19937 random(static_cast<unsigned>(num));
             for (const int bits : {5, 21, 27, 30})
@@ -104,8 +106,8 @@ TEST(FragmentSort, NumbersAtTheBordersOfTiles) {
 
 // All alike, two kinds in turn, the largest key, runs, falling.
 TEST(FragmentSort, KeysThatLookAlike) {
-    constexpr std::uint64_t num = 5 * device::sort_tile + 1000;
-    for (const int bits : {9, 27, 30, 32}) {
+    constexpr std::uint64_t num = 5 * device::sort_tile(device::sort_items) + 1000;
+    for (const int bits : {9, 21, 27, 30, 32}) {
         const std::uint32_t largest = below(~0u, bits);
         expect_sorted(num, bits, [&](auto) { return largest; });
         expect_sorted(num, bits, [](auto) { return 0u; });
@@ -128,7 +130,7 @@ TEST(FragmentSort, ManyTiles) {
 TEST(FragmentSort, NothingWhereTheCallHasFailed) {
     std::vector<std::uint32_t> keys(20000);
     for (std::uint32_t i = 0; i < keys.size(); ++i) keys[i] = 20000 - i;
-    const sorted s = sort_on_device(keys, keys.size() + 1, 18); // two passes
+    const sorted s = sort_on_device(keys, keys.size() + 1, 18, device::sort_items); // two passes
     EXPECT_TRUE(s.keys == keys);
 }
 

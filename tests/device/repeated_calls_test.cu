@@ -182,6 +182,97 @@ TEST(RepeatedCalls, OfListsAndFramebuffers) {
     }
 }
 
+// What calls like the last did not need is left out of the next, which finds that it does: in turn meshes of as many
+// triangles, which lie in voxels of their own, and, `large`, reach over many voxels, or lie in one, `count` of them.
+mesh_data spread_triangles(int count, bool large) {
+    mesh_data m;
+    for (int i = 0; i < count; ++i) {
+        const glm::vec3 corner(0.2f + static_cast<float>(i % 40), 0.3f + static_cast<float>(i / 40 % 40),
+                               0.3f + static_cast<float>(i / 1600 % 40));
+        const float size = large && i % 50 == 0 ? 1.0f + static_cast<float>(i % 7) * 4.0f : 0.5f;
+        add_triangle(m, corner, corner + glm::vec3(size, 0.1f, 0.0f), corner + glm::vec3(0.1f, size, 0.7f * size));
+    }
+    return m;
+}
+
+TEST(RepeatedCalls, WithTrianglesForASecondKernelOrNone) {
+    using target = vp::target<float, blend::add>;
+    using shader_type = decltype(vp::constant(1.0f));
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, shader_type>;
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    const vp::grid g = box_grid({47, 46, 45});
+    const mesh_data meshes[] = {spread_triangles(3000, false), spread_triangles(3000, true)};
+    for (const bool loads : {false, true}) {
+        open_mesh on_gpu(gpu, meshes[0]);
+        const draw on_device{{on_gpu.positions.view(), on_gpu.triangles.view()}, {}, vp::constant(1.0f)};
+        vp::framebuffer<vp::cuda_backend, target> gpu_fb{gpu, g.extent};
+        vp::framebuffer<vp::cpu_backend, target> cpu_fb{cpu, g.extent};
+        bool is_first = true;
+        for (const int which : {0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1, 0, 1}) {
+            on_gpu.write(gpu, meshes[which]);
+            const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, meshes[which].positions, meshes[which].triangles};
+            const draw on_host{cpu_mesh.view(), {}, vp::constant(1.0f)};
+            auto to_gpu = gpu_fb.view();
+            auto to_cpu = cpu_fb.view();
+            if (loads && !is_first)
+                vp::get<0>(to_gpu.targets).load = vp::get<0>(to_cpu.targets).load = vp::load_operation::load;
+            is_first = false;
+            const vp::voxelize_options options{vp::coverage::conservative, false};
+            const vp::status a = vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, to_gpu, options);
+            const vp::status b = vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, to_cpu, options);
+            ASSERT_TRUE(a.ok() && b.ok()) << a.message();
+            expect_same_counts(b.counts, a.counts);
+            expect_same_bytes(vp::get<0>(cpu_fb).to_host(cpu), vp::get<0>(gpu_fb).to_host(gpu), "sums");
+        }
+        gpu.release();
+    }
+}
+
+// In voxels of their own; a window's voxels and ones for a warp; a block; dense, by bits; and runs that are merged, for
+// which there have to be many more triangles.
+TEST(RepeatedCalls, WithLongVoxelsOrNone) {
+    constexpr int count = 9000;
+    const auto lists_of = []<class Payload>(Payload*, const auto& shader, bool is_many) {
+        using draw = vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_cvref_t<decltype(shader)>>;
+        vp::cuda_backend gpu;
+        vp::cpu_backend cpu;
+        const vp::grid g = box_grid({41, 41, 41});
+        // The first `inside` of them in one voxel.
+        const auto make = [&](int inside) {
+            mesh_data m = spread_triangles(count, false);
+            if (is_many) append(m, spread_triangles(64 * count, false));
+            const mesh_data one = triangles_in_voxel(inside, {3, 4, 5}, 7);
+            std::copy(one.positions.begin(), one.positions.end(), m.positions.begin());
+            return m;
+        };
+        open_mesh on_gpu(gpu, make(0));
+        const draw on_device{{on_gpu.positions.view(), on_gpu.triangles.view()}, {}, shader};
+        vp::abuffer<vp::cuda_backend, Payload> lists{gpu};
+        vp::abuffer<vp::cpu_backend, Payload> expected{cpu};
+        const std::vector<int> sequence =
+            is_many ? std::vector{0, 0, 8000}
+                    : std::vector{0, 0, 0, 0, 0, 700, 0, 0, 0, 0, 3000, 0, 8000, 4000, 1, 8000, 300};
+        for (const int inside : sequence) {
+            SCOPED_TRACE(inside);
+            const mesh_data m = make(inside);
+            on_gpu.write(gpu, m);
+            const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+            const draw on_host{cpu_mesh.view(), {}, shader};
+            const vp::status a =
+                vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, lists, vp::coverage::conservative);
+            const vp::status b =
+                vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, expected, vp::coverage::conservative);
+            ASSERT_TRUE(a.ok() && b.ok()) << a.message();
+            expect_same_counts(b.counts, a.counts);
+            expect_same_on_host(expected.to_host(cpu), lists.to_host(gpu));
+        }
+    };
+    lists_of(static_cast<void*>(nullptr), vp::constant(true), false);
+    lists_of(static_cast<double*>(nullptr), any_double{}, false); // shaded in the finished lists
+    lists_of(static_cast<void*>(nullptr), vp::constant(true), true);
+}
+
 // Two sets of arguments in turn never make a graph; each after itself does.
 TEST(RepeatedCalls, InTurn) {
     const mesh_data m = mixed_triangles(800, 30.0f, 221);

@@ -89,6 +89,21 @@ TEST(CallRoom, AnArrayThatTheLastCallDidNotUseGetsTheFirstGuess) {
     EXPECT_EQ(given[0], 5000u);
 }
 
+TEST(CallRoom, SaysWhatCallsLikeTheLastNeeded) {
+    room r = make_room();
+    EXPECT_FALSE(r.most_needed(1, 0).has_value());
+    EXPECT_EQ(run(r, 1, {7, 0}, {100, 100}), 1);
+    EXPECT_EQ(r.most_needed(1, 0), 7u);
+    EXPECT_EQ(r.most_needed(1, 1), 0u);
+    EXPECT_FALSE(r.most_needed(2, 0).has_value());
+    EXPECT_EQ(run(r, 1, {3, 9}, {100, 100}), 1); // the most
+    EXPECT_EQ(r.most_needed(1, 0), 7u);
+    EXPECT_EQ(r.most_needed(1, 1), 9u);
+    EXPECT_EQ(run(r, 2, {1, 1}, {100, 100}), 1);
+    EXPECT_EQ(r.most_needed(2, 0), 1u);
+    EXPECT_FALSE(r.most_needed(1, 0).has_value());
+}
+
 TEST(CallRoom, NumberedArraysStayWithin32Bits) {
     room r = make_room();
     lengths there = r.guess(1, {core::most_numbered + 5, core::most_numbered + 5});

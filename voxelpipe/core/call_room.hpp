@@ -46,6 +46,11 @@ public:
         last_ = key;
     }
 
+    // The most of array k that calls like the last one have needed, where this is one of them.
+    [[nodiscard]] std::optional<std::uint64_t> most_needed(const Key& key, std::size_t k) const {
+        return last_ == key ? std::optional(needed_[k]) : std::nullopt;
+    }
+
 private:
     [[nodiscard]] std::uint64_t limited(std::size_t k, std::uint64_t length) const {
         return is_numbered_[k] ? std::min(length, most_numbered) : length;

@@ -203,17 +203,20 @@ public:
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              const framebuffer_view<Targets...>& fb, const voxelize_options& options,
                              std::uint64_t triangles_in) {
-        return attempt(framebuffer_room_, {triangles_in, g.extent, g.offset, options.rule},
-                       [&](const device::capacities& limits, std::uint64_t, device::pipeline_state& state,
-                           device::stage_clock* clock) {
-                           return device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits,
-                                                                          [&](auto call) {
-                                                                              call.clock = clock;
-                                                                              call.may_list = lists_fragments;
-                                                                              launch_where_it_fits(call, state);
-                                                                              return call.is_listed_call();
-                                                                          });
-                       });
+        return attempt(
+            framebuffer_room_, {triangles_in, g.extent, g.offset, options.rule},
+            [&](device::capacities& limits, std::uint64_t, device::pipeline_state& state, device::stage_clock* clock) {
+                limits.longest_ordered = ~0ull; // an order may come before a blend
+                return device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits,
+                                                               [&](auto call) {
+                                                                   call.clock = clock;
+                                                                   call.may_list = lists_fragments;
+                                                                   if (!call.may_leave_none())
+                                                                       limits.leaves_none = call.limits.leaves_none = 0;
+                                                                   launch_where_it_fits(call, state);
+                                                                   return call.is_listed_call();
+                                                               });
+            });
     }
 
     template <class Mesh, class VertexShader, class FragmentShader, class Payload>
@@ -224,8 +227,9 @@ public:
         abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
         status s =
             attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
-                    [&](const device::capacities& limits, std::uint64_t voxel_room, device::pipeline_state& state,
+                    [&](device::capacities& limits, std::uint64_t voxel_room, device::pipeline_state& state,
                         device::stage_clock* clock) {
+                        limits.leaves_none = 0;
                         call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
                         if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
                             fill<std::uint64_t>(options.rule, call, voxel_room, made, state);
@@ -267,11 +271,13 @@ private:
         coverage rule;
         friend bool operator==(const call_key&, const call_key&) = default;
     };
-    using room =
-        core::call_room<call_key, 5>; // of tile pairs, tile records, fragments, fragment records, lists of voxels
+    // Of tile pairs, tile records, fragments, fragment records, lists of voxels; and what calls may not need kernels
+    // for: fragments of a voxel that the windows leave, triangles that the first kernel does.
+    using room = core::call_room<call_key, 7>;
 
     // Runs the stages with capacities that should do, waits, and once more where something did not fit. launch_stages
-    // says whether fragments were listed that need not be, where they are too many.
+    // takes back of the capacities what does not hold for its call, and says whether fragments were listed that need
+    // not be, where they are too many.
     template <class Launch>
     [[nodiscard]] status attempt(room& memory, const call_key& key, Launch&& launch_stages) {
         status s;
@@ -282,18 +288,26 @@ private:
             // No room for the lists of voxels where nothing is known of the call: they are copied when all is.
             // Tiny triangles have few fragments: those of a framebuffer are not taken for too many beforehand.
             const std::uint64_t most = &memory == &framebuffer_room_ ? device::most_resolved : core::most_numbered;
-            room::lengths there =
-                memory.guess(key, {n + n / 4 + 16384, n / 16 + 4096, std::min(4 * n + 65536, most), n / 16 + 4096, 0});
+            room::lengths there = memory.guess(
+                key, {n + n / 4 + 16384, n / 16 + 4096, std::min(4 * n + 65536, most), n / 16 + 4096, 0, 0, 0});
+            const auto longest = memory.most_needed(key, 5), left = memory.most_needed(key, 6);
             for (int tries = 0;; ++tries) {
-                const device::capacities limits{there[0], there[1], there[2], there[3]};
+                device::capacities limits{there[0], there[1], there[2], there[3]};
+                if (tries == 0 && longest) limits.longest_ordered = device::longest_like(*longest);
+                limits.leaves_none = tries == 0 && left && *left == 0 ? 1 : 0;
                 device::pipeline_state state{};
                 const bool need_not_list = launch_stages(limits, there[4], state, clock ? &*clock : nullptr);
                 if (state.index_error != 0) {
                     s = core::failure(status_code::index_out_of_range, stage::coarse_raster);
                     break;
                 }
-                const room::lengths needed{state.tile_pairs, state.tile_records, state.list_fragments + state.filtered,
-                                           state.fragment_records, state.list_voxels};
+                const room::lengths needed{state.tile_pairs,
+                                           state.tile_records,
+                                           state.list_fragments + state.filtered,
+                                           state.fragment_records,
+                                           state.list_voxels,
+                                           state.longest_ordered(),
+                                           state.handed_on.are_none() ? 0u : 1u};
                 if (!device::has_failed(state, limits)) {
                     s = device::to_status(state);
                     memory.fitted(key, needed);
@@ -534,7 +548,7 @@ private:
         exact.give(lists, num_voxels, num_fragments);
     }
 
-    room framebuffer_room_{{true, false, true, false, false}}, list_room_{{true, false, true, false, false}};
+    room framebuffer_room_{{true, false, true}}, list_room_{{true, false, true}};
     device_block workspace_;
     device::state_reader state_reader_;
     device::call_graph call_graph_;

@@ -90,6 +90,15 @@ template <class... Targets>
     return all;
 }
 
+// Whether a call gives the same however often it is made.
+template <class... Targets>
+[[nodiscard]] bool clears_all_in_use(const framebuffer_view<Targets...>& fb) {
+    bool all = true;
+    core::for_each_index<sizeof...(Targets)>(
+        [&]<std::size_t K>() { all = all && voxelpipe::get<K>(fb.targets).load != load_operation::load; });
+    return all;
+}
+
 // How a call of constant shaders can do without tiles. A target is counted only where blending it in place would not
 // give its blend's bits, or where nothing else tells how many voxels are touched.
 template <class Draw, class... Targets>

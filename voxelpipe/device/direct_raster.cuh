@@ -543,7 +543,7 @@ __global__ __launch_bounds__(raster_threads,
     await_stream();
     call.out.prepare(std::uint64_t{blockIdx.x} * raster_threads + threadIdx.x,
                      std::uint64_t{gridDim.x} * raster_threads);
-    if (state->index_error != 0) return;
+    if (state->index_error != 0 || state->handed_on.are_none()) return;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();
     const unsigned in_block = warp_in_block();
@@ -598,9 +598,11 @@ inline void find_most_index(const array_view<const glm::uvec3>& triangles, std::
 }
 
 // is_first: whether these are a call's first kernels. They read indices before they await the stream, which the
-// caller's own kernel in front of them may still write.
+// caller's own kernel in front of them may still write. leaves_none: whether the first kernel hands nothing on, for all
+// that is known; where it does, that is not drawn.
 template <class Call>
-void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false) {
+void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
+                   bool leaves_none = false) {
     const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
     if constexpr (Call::output::hands_on)
         launch_kernel(!is_first, direct_raster_kernel<Call>,
@@ -609,6 +611,7 @@ void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStr
     else
         launch_kernel(!is_first, block_raster_kernel<Call>, raster_blocks(call.in.num_triangles, block_min_blocks),
                       raster_threads, 0, stream, where, call, state);
+    if (leaves_none) return;
     launch_behind(direct_rest_kernel<Call>, multiprocessors * rest_min_blocks<Call>, raster_threads, stream, where,
                   call, state);
 }

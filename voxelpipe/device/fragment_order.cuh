@@ -273,25 +273,43 @@ __global__ __launch_bounds__(32 * order_warps,
 
 // ---- host -----------------------------------------------------------------------------------------------------------
 
-// Puts b.from in order and lists the voxels; counts them in the state.
-inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipeline_state* state,
-                            const capacities& limits, cudaStream_t stream) {
+// What capacities::longest_ordered is to be for calls like one with this pipeline_state::longest_ordered(): the most
+// that the same kernels do.
+[[nodiscard]] inline std::uint64_t longest_like(std::uint64_t longest) {
+    constexpr std::uint64_t block = most_of_block, ways = merge_ways;
+    for (const std::uint64_t most : {std::uint64_t{0}, block, only_dense, block * ways, block * ways * ways})
+        if (longest <= most) return most;
+    return ~std::uint64_t{0};
+}
+
+// Puts b.from in order and lists the voxels; counts them in the state. No voxel of more than limits.longest_ordered
+// fragments, but then the state has_failed.
+inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipeline_state* state, capacities limits,
+                            cudaStream_t stream) {
     constexpr stage where = stage::abuffer_emit;
-    const std::uint64_t capacity = limits.fragments;
+    const std::uint64_t capacity = limits.fragments,
+                        longest =
+                            capacity > most_of_window ? std::min<std::uint64_t>(capacity, limits.longest_ordered) : 0;
+    limits.longest_ordered = ~0ull; // what the windows find out must not stop them
     for (const std::uint32_t* numbers : {b.keys, static_cast<const std::uint32_t*>(b.from)})
         VOXELPIPE_ASSERT(reinterpret_cast<std::uintptr_t>(numbers) % 16 == 0); // load_neighbours
+    if (num_primitives <= std::uint64_t{dense_part} * most_dense_parts)
+        b.lists.num_primitives = static_cast<std::uint32_t>(num_primitives);
     b.primitive_bits = num_primitives < 2 ? 1 : static_cast<int>(std::bit_width(num_primitives - 1));
     const auto windows =
         b.primitive_bits <= narrow_primitive_bits ? order_windows_kernel<true> : order_windows_kernel<false>;
     const std::uint64_t tiles = tile_counts::num(capacity);
     launch_behind(windows, static_cast<unsigned>(std::max<std::uint64_t>(tiles, 1)), 32 * order_warps, stream, where, b,
                   state, limits);
-    if (capacity > most_of_window)
+    if (longest != 0)
         launch_behind(order_long_kernel<order_buffers>, fill_device(capacity / (most_of_window + 1) * 32, 4),
                       block_sort_threads, stream, where, b);
+    if (longest > most_of_block && b.lists.num_primitives != 0)
+        launch_behind(order_dense_kernel<order_buffers>, static_cast<unsigned>(num_multiprocessors()), dense_threads,
+                      stream, where, b);
     // Runs of 2^12, 2^18 and 2^24 fragments; the last merge takes all that there are.
     std::uint64_t length = most_of_block;
-    for (int level = 0; level < 3 && capacity > length; ++level, length *= merge_ways)
+    for (int level = 0; level < 3 && longest > std::max(length, only_dense); ++level, length *= merge_ways)
         launch_behind(merge_runs_kernel<order_buffers>, fill_device(capacity), threads_per_block, stream, where, b,
                       level % 2 == 0 ? b.from : b.spare, level % 2 == 0 ? b.spare : b.from, length, level == 2);
 }

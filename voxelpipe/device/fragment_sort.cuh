@@ -22,8 +22,13 @@ namespace voxelpipe::device {
 
 inline constexpr int sort_threads = 512; // of a block, which takes a tile
 inline constexpr int sort_items = 16;    // pairs of a thread
-inline constexpr std::uint32_t sort_tile = sort_threads * sort_items;
-inline constexpr int sort_blocks = 2; // of a multiprocessor, at once
+inline constexpr int few_sort_items = 8; // where the device takes all tiles at once: shorter ones are done sooner
+[[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t sort_tile(int items) {
+    return static_cast<std::uint32_t>(sort_threads * items);
+}
+[[nodiscard]] VOXELPIPE_HD constexpr int sort_blocks(int items) { // of a multiprocessor, at once
+    return items == few_sort_items ? 3 : 2;
+}
 inline constexpr int digit_count_threads = 1024;
 inline constexpr int most_digit_bits = 10;
 inline constexpr int most_digit_passes = 4;
@@ -110,16 +115,27 @@ struct sort_memory {
     totals* all_tiles = nullptr;
     std::uint32_t* words[2]{}; // [tile][digit], of passes in turn: each zeroes those of the next
     digit_plan plan{1};
+    int items = sort_items; // of a thread
 
-    [[nodiscard]] static sort_memory take(arena& memory, std::uint64_t capacity, int key_bits) {
+    // Pairs of a thread where there are so many in all, at most.
+    [[nodiscard]] static int items_for(std::uint64_t capacity) {
+        const std::uint64_t at_once =
+            static_cast<std::uint64_t>(num_multiprocessors()) * static_cast<unsigned>(sort_blocks(few_sort_items));
+        return capacity <= at_once * sort_tile(few_sort_items) ? few_sort_items : sort_items;
+    }
+    [[nodiscard]] static sort_memory take(arena& memory, std::uint64_t capacity, int key_bits, int items) {
         sort_memory m{};
         m.plan = digit_plan(key_bits);
+        m.items = items;
         m.all_tiles = memory.take<totals>(1);
-        for (auto& w : m.words) w = memory.take<std::uint32_t>(num_tiles(capacity) * m.plan.num_digits());
+        for (auto& w : m.words) w = memory.take<std::uint32_t>(m.num_tiles(capacity) * m.plan.num_digits());
         return m;
     }
-    [[nodiscard]] VOXELPIPE_HD static std::uint64_t num_tiles(std::uint64_t num) {
-        return (num + sort_tile - 1) / sort_tile;
+    [[nodiscard]] static sort_memory take(arena& memory, std::uint64_t capacity, int key_bits) {
+        return take(memory, capacity, key_bits, items_for(capacity));
+    }
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_tiles(std::uint64_t num) const {
+        return (num + sort_tile(items) - 1) / sort_tile(items);
     }
     // What has to be zero when a sort of num pairs starts. By all threads of a grid.
     __device__ void zero(std::uint64_t num, std::uint64_t thread, std::uint64_t threads) const {
@@ -199,52 +215,79 @@ __global__ __launch_bounds__(digit_count_threads) void count_digits_kernel(const
     }
 }
 
-// How many pairs with this digit there are in the tiles before this one. Blocks begin in the order of their numbers, as
-// cub's scan takes for granted too, so those before are under way. (A tile's number from a counter took a tenth of the
-// pass.)
-[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t count_before(std::uint32_t* words, std::uint32_t tile,
-                                                                     std::uint32_t num_digits, std::uint32_t digit) {
-    using word = ::cuda::atomic_ref<std::uint32_t, ::cuda::thread_scope_device>;
+// Numbers of a thread's digits, one or two neighbours, side by side: of a warp of a tile 16 bits each, of a tile 32,
+// whose flags are the same, for they are stored at once.
+template <int DigitsEach>
+struct digit_group {
+    static_assert(DigitsEach == 1 || DigitsEach == 2);
+    using counts = std::conditional_t<DigitsEach == 1, std::uint16_t, std::uint32_t>;
+    using word = std::conditional_t<DigitsEach == 1, std::uint32_t, unsigned long long>;
+
+    [[nodiscard]] VOXELPIPE_HD static constexpr word each(std::uint32_t bits) {
+        return static_cast<word>(DigitsEach == 1 ? bits : std::uint64_t{bits} << 32 | bits);
+    }
+    [[nodiscard]] VOXELPIPE_HD static constexpr word widen(counts c) {
+        return static_cast<word>(DigitsEach == 1 ? c : std::uint64_t{c >> (DigitsEach - 1) * 16} << 32 | (c & 0xffffu));
+    }
+    [[nodiscard]] VOXELPIPE_HD static constexpr std::uint32_t get(word w, int k) { // of one digit
+        return static_cast<std::uint32_t>(w >> 32 * k);
+    }
+};
+
+// How many pairs with each of a thread's digits there are in the tiles before this one. mine: the thread's word of this
+// tile; so many, `apart`, from tile to tile. Blocks begin in the order of their numbers, as cub's scan takes for
+// granted too, so those before are under way. (A tile's number from a counter took a tenth of the pass.)
+template <int DigitsEach>
+[[nodiscard]] __device__ VOXELPIPE_INLINE typename digit_group<DigitsEach>::word
+count_before(typename digit_group<DigitsEach>::word* mine, std::uint32_t tile, std::uint32_t apart) {
+    using group = digit_group<DigitsEach>;
+    using word = typename group::word;
+    using atomic_word = ::cuda::atomic_ref<word, ::cuda::thread_scope_device>;
     constexpr int at_once = 4; // loads that do not wait for one another
-    std::uint32_t sum = 0;
+    constexpr word all = group::each(sort_memory::all), value = group::each(sort_memory::value);
+    word sum = 0;
     for (std::int64_t last = std::int64_t{tile} - 1;;) {
-        std::uint32_t w[at_once];
+        word w[at_once];
 #pragma unroll
         for (int k = 0; k < at_once; ++k)
-            w[k] = last < k ? sort_memory::all // before the first tile
-                            : word(words[static_cast<std::uint64_t>(last - k) * num_digits + digit])
-                                  .load(::cuda::memory_order_relaxed);
+            w[k] = last < k
+                       ? all // before the first tile
+                       : atomic_word(mine[(last - k - std::int64_t{tile}) * apart]).load(::cuda::memory_order_relaxed);
         bool is_ready = true;
 #pragma unroll
         for (int k = 0; k < at_once; ++k) {
-            is_ready = is_ready && (w[k] & ~sort_memory::value) != 0;
+            is_ready = is_ready && (w[k] & ~value) != 0;
             if (!is_ready) continue;
-            sum += w[k] & sort_memory::value;
+            sum += w[k] & value;
             --last;
-            if ((w[k] & sort_memory::all) != 0) return sum;
+            if ((w[k] & all) != 0) return sum;
         }
     }
 }
 
 // What a block keeps in shared memory: first how many pairs of each digit its warps have, then the pairs of its tile.
-template <int DigitsEach>
+template <int DigitsEach, int Items>
 union sort_tile_memory {
     std::uint16_t counts[sort_threads / 32][DigitsEach * sort_threads];
-    uint2 pairs[sort_tile];
+    uint2 pairs[sort_tile(Items)];
 };
 
 // Pass `pass` over the digits; a thread has DigitsEach digits to see to. A template, as all kernels in headers are.
-template <class Memory, int DigitsEach>
-__global__ __launch_bounds__(sort_threads, sort_blocks) void sort_pass_kernel(const __grid_constant__ pair_array from,
-                                                                              const __grid_constant__ pair_array to,
-                                                                              const __grid_constant__ Memory m,
-                                                                              int pass) {
+template <class Memory, int DigitsEach, int Items>
+__global__ __launch_bounds__(sort_threads,
+                             sort_blocks(Items)) void sort_pass_kernel(const __grid_constant__ pair_array from,
+                                                                       const __grid_constant__ pair_array to,
+                                                                       const __grid_constant__ Memory m, int pass) {
     using scan = cub::BlockScan<std::uint32_t, sort_threads, cub::BLOCK_SCAN_WARP_SCANS>; // in few registers
-    using word = ::cuda::atomic_ref<std::uint32_t, ::cuda::thread_scope_device>;
-    using tile_memory = sort_tile_memory<DigitsEach>;
+    using group = digit_group<DigitsEach>;
+    using word = typename group::word;
+    using atomic_word = ::cuda::atomic_ref<word, ::cuda::thread_scope_device>;
+    using counts = typename group::counts;
+    using tile_memory = sort_tile_memory<DigitsEach, Items>;
     constexpr unsigned warps = sort_threads / 32;
-    constexpr unsigned items = sort_items;
-    static_assert(items % 2 == 0 && sort_tile <= 1 << 16 && (DigitsEach == 1 || DigitsEach == 2));
+    constexpr unsigned items = Items;
+    constexpr std::uint32_t most = sort_tile(Items);
+    static_assert(items % 2 == 0 && most < 1 << 16);
     extern __shared__ __align__(16) unsigned char dynamic_memory[];
     auto& shared = *reinterpret_cast<tile_memory*>(dynamic_memory);
     // Of each digit, in the tile; then what takes it to its end.
@@ -257,9 +300,9 @@ __global__ __launch_bounds__(sort_threads, sort_blocks) void sort_pass_kernel(co
     await_stream();
     __syncthreads();
     const std::uint32_t tile = blockIdx.x;
-    const std::uint32_t n = m.all_tiles->num, begin = tile * sort_tile;
+    const std::uint32_t n = m.all_tiles->num, begin = tile * most;
     if (begin >= n) return;
-    const std::uint32_t length = n - begin < sort_tile ? n - begin : sort_tile;
+    const std::uint32_t length = n - begin < most ? n - begin : most;
     // A lane has every 32nd pair of its warp's. What is beyond the last counts as one with the last digit.
     const std::uint32_t first = warp * 32 * items + lane;
     std::uint32_t key[items], value[items], place[items / 2]; // two places in each
@@ -289,28 +332,27 @@ __global__ __launch_bounds__(sort_threads, sort_blocks) void sort_pass_kernel(co
     for (std::uint32_t i = 0; i < items; ++i) asm volatile("" : "+r"(key[i]));
     __syncthreads();
     // Of the thread's digits: how many there are in the warps before each, and in all.
-    std::uint32_t* const words = m.words[pass % 2];
     const std::uint32_t first_digit = DigitsEach * threadIdx.x;
-    const std::uint64_t mine = std::uint64_t{tile} * num_digits + first_digit;
     const bool has_digits = first_digit < num_digits;
-    std::uint32_t total[DigitsEach]{}, place_here[DigitsEach]{};
-#pragma unroll(8 / DigitsEach)
-    for (unsigned w = 0; w < warps; ++w)
+    const std::uint32_t apart = num_digits / DigitsEach;
+    const std::uint64_t my_word = std::uint64_t{tile} * apart + threadIdx.x;
+    word* const mine = reinterpret_cast<word*>(m.words[pass % 2]) + my_word;
+    std::uint32_t total[DigitsEach], place_here[DigitsEach];
+    counts sum{};
+#pragma unroll(8)
+    for (unsigned w = 0; w < warps; ++w) {
+        counts& of_warp = *reinterpret_cast<counts*>(&shared.counts[w][first_digit]);
+        const counts count = of_warp;
+        of_warp = sum;
+        sum = static_cast<counts>(sum + count); // of each less than 2^16
+    }
+    const word own = group::widen(sum);
 #pragma unroll
-        for (std::uint32_t k = 0; k < DigitsEach; ++k) {
-            std::uint16_t& of_warp = shared.counts[w][first_digit + k];
-            const std::uint32_t count = of_warp;
-            of_warp = static_cast<std::uint16_t>(total[k]);
-            total[k] += count;
-        }
+    for (int k = 0; k < DigitsEach; ++k) total[k] = group::get(own, k);
     if (has_digits) {
-        const bool zeroes = pass + 1 < m.plan.passes;
-#pragma unroll
-        for (std::uint32_t k = 0; k < DigitsEach; ++k) {
-            word(words[mine + k])
-                .store((tile == 0 ? sort_memory::all : sort_memory::own) | total[k], ::cuda::memory_order_relaxed);
-            if (zeroes) m.words[1 - pass % 2][mine + k] = 0;
-        }
+        atomic_word(*mine).store(group::each(tile == 0 ? sort_memory::all : sort_memory::own) | own,
+                                 ::cuda::memory_order_relaxed);
+        if (pass + 1 < m.plan.passes) reinterpret_cast<word*>(m.words[1 - pass % 2])[my_word] = 0;
     }
     scan(storage).ExclusiveSum(total, place_here);
 #pragma unroll
@@ -328,16 +370,15 @@ __global__ __launch_bounds__(sort_threads, sort_blocks) void sort_pass_kernel(co
         shared.pairs[place[i / 2] >> 16] = {key[i + 1], value[i + 1]};
     }
     if (has_digits) {
-#pragma unroll
-        for (std::uint32_t k = 0; k < DigitsEach; ++k) {
-            std::uint32_t before = 0;
-            if (tile != 0) {
-                before = count_before(words, tile, num_digits, first_digit + k);
-                word(words[mine + k]).store(sort_memory::all | (before + total[k]), ::cuda::memory_order_relaxed);
-            }
-            places[first_digit + k] =
-                m.all_tiles->digits[pass][first_digit + k] + before - place_here[k]; // modulo 2^32
+        word before = 0;
+        if (tile != 0) {
+            before = count_before<DigitsEach>(mine, tile, apart);
+            atomic_word(*mine).store(group::each(sort_memory::all) | (before + own), ::cuda::memory_order_relaxed);
         }
+#pragma unroll
+        for (int k = 0; k < DigitsEach; ++k)
+            places[first_digit + k] =
+                m.all_tiles->digits[pass][first_digit + k] + group::get(before, k) - place_here[k]; // modulo 2^32
     }
     __syncthreads();
     to.ask_once([&]<class Joined>(Joined) VOXELPIPE_INLINE_LAMBDA {
@@ -351,11 +392,11 @@ __global__ __launch_bounds__(sort_threads, sort_blocks) void sort_pass_kernel(co
     });
 }
 
-template <int DigitsEach>
+template <int DigitsEach, int Items>
 void launch_sort_pass(const pair_array& from, const pair_array& to, unsigned tiles, const sort_memory& m, int pass,
                       stage where, cudaStream_t stream) {
-    constexpr auto shared_bytes = sizeof(sort_tile_memory<DigitsEach>);
-    const auto kernel = sort_pass_kernel<sort_memory, DigitsEach>;
+    constexpr auto shared_bytes = sizeof(sort_tile_memory<DigitsEach, Items>);
+    const auto kernel = sort_pass_kernel<sort_memory, DigitsEach, Items>;
     check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared_bytes)),
           where);
     launch_behind(kernel, tiles, sort_threads, shared_bytes, stream, where, from, to, m, pass);
@@ -372,14 +413,17 @@ template <class Count>
     launch_behind(count_digits_kernel<Count>,
                   static_cast<unsigned>(std::min(capacity / pairs_of_block + 1, most_blocks)), digit_count_threads,
                   stream, where, pairs.keys[0], count, m);
-    const auto tiles = static_cast<unsigned>(sort_memory::num_tiles(capacity));
+    const auto tiles = static_cast<unsigned>(m.num_tiles(capacity));
+    const bool few = m.items == few_sort_items;
     for (int p = 0; p < m.plan.passes && tiles != 0; ++p) {
         const pair_array from = p == 0 ? pairs.apart(0) : pairs.joined(p % 2);
         const pair_array to = p + 1 == m.plan.passes ? pairs.apart(1 - p % 2) : pairs.joined(1 - p % 2);
         if (m.plan.bits == most_digit_bits)
-            launch_sort_pass<2>(from, to, tiles, m, p, where, stream);
+            few ? launch_sort_pass<2, few_sort_items>(from, to, tiles, m, p, where, stream)
+                : launch_sort_pass<2, sort_items>(from, to, tiles, m, p, where, stream);
         else
-            launch_sort_pass<1>(from, to, tiles, m, p, where, stream);
+            few ? launch_sort_pass<1, few_sort_items>(from, to, tiles, m, p, where, stream)
+                : launch_sort_pass<1, sort_items>(from, to, tiles, m, p, where, stream);
     }
     return tiles == 0 ? 0 : m.plan.passes % 2;
 }

@@ -132,6 +132,13 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         return groups::has_ordered ? stage::fine_raster : stage::tile_resolve;
     }
 
+    // Whether limits.leaves_none may hold: the call can be made once more, since it clears all that it draws into.
+    [[nodiscard]] bool may_leave_none() const {
+        if constexpr (can_be_direct<FragmentShader, Framebuffer>)
+            return draws.size() == 1 && !is_touched_call() && is_direct_call() && clears_all_in_use(fb);
+        return false;
+    }
+
 private:
     static constexpr bool can_be_touched = core::is_solid<FragmentShader> && depends_on_touched<Framebuffer>;
     [[nodiscard]] bool is_touched_call() const {
@@ -254,7 +261,7 @@ private:
                             {source, num_triangles, snap.fraction, g.extent}, output, handed_on.with(state)};
                         // Without a check and a clear these may be the first kernels, but then nobody writes to
                         // the indices (mesh_view::checked).
-                        direct_raster(call, state, stage::fine_raster, stream);
+                        direct_raster(call, state, stage::fine_raster, stream, false, limits.leaves_none != 0);
                         end_stage(clock, &stage_times::fine_raster);
                     };
                     // The kernels that know that they only set bits.

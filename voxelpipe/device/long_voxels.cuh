@@ -8,6 +8,8 @@
 #include <voxelpipe/device/order_memory.cuh>
 #include <voxelpipe/device/warp_sort.cuh>
 
+#include <cub/block/block_scan.cuh>
+
 #include <cstdint>
 
 namespace voxelpipe::device {
@@ -131,6 +133,72 @@ __global__ __launch_bounds__(block_sort_threads, 4) void order_long_kernel(const
     static_assert(num_warp_sorts == 2);
     __syncthreads();
     order_by_blocks(b, to, exchange);
+}
+
+// Dense voxels: a block sets a bit for each primitive of its part that it meets in a voxel, and counts those of the
+// parts before.
+template <class Buffers>
+__global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid_constant__ Buffers b) {
+    using scan = cub::BlockScan<std::uint32_t, dense_threads, cub::BLOCK_SCAN_WARP_SCANS>;
+    constexpr std::uint32_t num_words = dense_part / 32;
+    constexpr unsigned at_once = 4; // loads that do not wait for one another
+    static_assert(num_words == dense_threads);
+    __shared__ std::uint32_t words[num_words], places[num_words], all_before;
+    __shared__ typename scan::TempStorage storage;
+    await_stream();
+    std::uint32_t* const primitives = b.places().primitives;
+    const std::uint32_t parts = b.lists.dense_parts(), lane = threadIdx.x % 32,
+                        n = b.lists.counts[order_lists::dense_list] * parts;
+    for (std::uint32_t r = blockIdx.x; r < n; r += gridDim.x) {
+        const fragment_run run = b.lists.voxels[order_lists::dense_list][r / parts];
+        const std::uint32_t first = r % parts * dense_part;
+        const auto begin = static_cast<std::uint32_t>(run.begin), length = static_cast<std::uint32_t>(run.length);
+        words[threadIdx.x] = 0;
+        if (threadIdx.x == 0) all_before = 0;
+        __syncthreads();
+        // Fours of neighbours, aligned, some of which may lie outside of the voxel.
+        std::uint32_t before = 0;
+        const std::uint32_t end_four = (begin + length + 3) / 4;
+        for (std::uint32_t i = begin / 4 + threadIdx.x; i < end_four; i += at_once * dense_threads) {
+            uint4 fours[at_once];
+#pragma unroll
+            for (unsigned k = 0; k < at_once; ++k)
+                if (i + k * dense_threads < end_four)
+                    fours[k] = reinterpret_cast<const uint4*>(b.from)[i + k * dense_threads];
+#pragma unroll
+            for (unsigned k = 0; k < at_once; ++k) {
+                const std::uint32_t at = 4 * (i + k * dense_threads) - begin; // modulo 2^32
+                const auto add = [&](std::uint32_t primitive, std::uint32_t place) VOXELPIPE_INLINE_LAMBDA {
+                    if (place >= length) return;
+                    const std::uint32_t bit = primitive - first; // modulo 2^32
+                    before += primitive < first ? 1 : 0;
+                    if (bit < dense_part) atomicOr(&words[bit / 32], 1u << bit % 32);
+                };
+                if (i + k * dense_threads >= end_four) break;
+                add(fours[k].x, at);
+                add(fours[k].y, at + 1);
+                add(fours[k].z, at + 2);
+                add(fours[k].w, at + 3);
+            }
+        }
+        before = __reduce_add_sync(0xffffffffu, before);
+        if (lane == 0 && before != 0) atomicAdd(&all_before, before);
+        __syncthreads();
+        std::uint32_t place = static_cast<std::uint32_t>(__popc(words[threadIdx.x]));
+        scan(storage).ExclusiveSum(place, place);
+        places[threadIdx.x] = place;
+        __syncthreads();
+        // A warp a word, so that neighbours are written by neighbours.
+        std::uint32_t* const to = primitives + run.begin + all_before;
+        const unsigned below = (1u << lane) - 1;
+#pragma unroll(4)
+        for (std::uint32_t w = warp_in_block(); w < num_words; w += dense_threads / 32) {
+            const std::uint32_t word = words[w];
+            if ((word >> lane & 1u) != 0)
+                to[places[w] + static_cast<std::uint32_t>(__popc(word & below))] = first + 32 * w + lane;
+        }
+        __syncthreads();
+    }
 }
 
 // How many of n sorted numbers are less than w.

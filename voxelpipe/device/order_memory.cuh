@@ -24,7 +24,13 @@ inline constexpr int narrow_primitive_bits = 24; // beside the rank of a voxel i
 inline constexpr int order_warps = 4;            // of a block that takes windows
 inline constexpr int order_blocks = 8;           // on a multiprocessor
 inline constexpr int block_sort_threads = 256;
+inline constexpr int dense_threads = 1024;
 inline constexpr std::uint32_t merge_ways = 64; // runs that one merge takes
+// A voxel of more than most_of_block fragments whose primitives are dense among all: a bit for each of those, by blocks
+// for so many bits each, all of which read the whole voxel. At least one bit in 64 is set then, so that all bits of a
+// call are a few words a fragment.
+inline constexpr std::uint32_t dense_part = 1u << 15, most_dense_parts = 64, least_dense = 64;
+inline constexpr std::uint64_t only_dense = most_of_block + 1; // as the longest: there are such voxels, but no runs
 
 // A stretch of fragments.
 struct fragment_run {
@@ -38,10 +44,13 @@ struct voxel_run {
 // Voxels that are too long for a window, by how they are sorted. The lists cannot overflow: a voxel in one of them has
 // so many fragments.
 struct order_lists {
-    static constexpr int block_list = num_warp_sorts, run_list = num_warp_sorts + 1, num_lists = num_warp_sorts + 2;
-    fragment_run* voxels[num_warp_sorts + 1]; // of a warp; of a block
+    static constexpr int block_list = num_warp_sorts, dense_list = num_warp_sorts + 1, run_list = num_warp_sorts + 2,
+                         num_lists = num_warp_sorts + 3;
+    fragment_run* voxels[num_warp_sorts + 2]; // of a warp; of a block; dense ones
     voxel_run* runs;
-    unsigned int* counts; // of all lists; zeroed
+    std::uint32_t num_primitives = 0; // of a call where a voxel may be dense, or 0
+    unsigned int* counts;             // of all lists; zeroed
+    unsigned long long* longest_run;  // of the voxels; zeroed
 
     [[nodiscard]] static order_lists take(arena& memory, std::uint64_t capacity) {
         order_lists w{};
@@ -54,15 +63,26 @@ struct order_lists {
         static_assert(sizeof(state->num_ordered) == num_lists * sizeof(*counts));
         order_lists w = *this;
         w.counts = state->num_ordered;
+        w.longest_run = &state->longest_run;
         return w;
     }
     // The most fragments of a voxel that is too small for list k.
     [[nodiscard]] VOXELPIPE_HD static constexpr std::uint32_t most_below(int k) {
-        return k == 0 ? most_of_window : k == 1 ? 32 * 16 : most_of_warp;
+        return k == 0 ? most_of_window : k == 1 ? 32 * 16 : k == 2 ? most_of_warp : most_of_block;
+    }
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t dense_parts() const { // of a voxel
+        return (num_primitives + dense_part - 1) / dense_part;
     }
     // A voxel that begins at `begin`. By one thread.
     __device__ void push(unsigned long long begin, unsigned long long length) const {
+        const bool is_dense = length > most_of_block && num_primitives != 0 && length >= num_primitives / least_dense;
+        if (is_dense) {
+            atomicMax(longest_run, static_cast<unsigned long long>(only_dense));
+            voxels[dense_list][atomicAdd(&counts[dense_list], 1u)] = {begin, length};
+            return;
+        }
         if (length > most_of_block) {
+            atomicMax(longest_run, length > only_dense ? length : only_dense + 1);
             const auto entries = static_cast<unsigned>((length + most_of_block - 1) / most_of_block);
             const unsigned at = atomicAdd(&counts[run_list], entries);
             for (unsigned k = 0; k < entries; ++k) {

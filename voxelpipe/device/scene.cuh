@@ -28,21 +28,35 @@ struct pipeline_state {
     unsigned int index_error;
     unsigned int num_items, num_splits, num_images; // tile split
     unsigned int next_item;                         // fine raster
-    unsigned int num_ordered[4];                    // fragment order: order_lists
+    unsigned int num_ordered[5];                    // fragment order: order_lists
+    unsigned long long longest_run;                 // of those, fragments of a voxel that no block takes
     struct {
         unsigned long long cut, lengths[4];
+        [[nodiscard]] VOXELPIPE_HD bool are_none() const {
+            return (cut | lengths[0] | lengths[1] | lengths[2] | lengths[3]) == 0;
+        }
     } handed_on; // direct raster, of one draw: triangle_lists
+
+    // See capacities: 0 where the windows put all voxels in order, 1 where a block takes the longest that they leave.
+    [[nodiscard]] VOXELPIPE_HD unsigned long long longest_ordered() const {
+        return longest_run != 0 ? longest_run : (num_ordered[0] | num_ordered[1] | num_ordered[2]) != 0 ? 1 : 0;
+    }
 };
 
 // How many elements the arrays of a call have. What does not fit is counted, not written.
 struct capacities {
     unsigned long long tile_pairs, tile_records, fragments, fragment_records;
+    // What a call is launched without, for the one before it did not need that: kernels for voxels of more fragments,
+    // and a second kernel of a draw.
+    unsigned long long longest_ordered = ~0ull;
+    unsigned long long leaves_none = 0; // or 1: the first kernel, of its triangles. As wide as the rest, see call_bytes
 };
 
 // Whether the call must not write anything: a bad index, or something that did not fit.
 [[nodiscard]] VOXELPIPE_HD inline bool has_failed(const pipeline_state& s, const capacities& c) {
     return s.index_error != 0 || s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ||
-           s.list_fragments > c.fragments || s.fragment_records > c.fragment_records;
+           s.list_fragments > c.fragments || s.fragment_records > c.fragment_records ||
+           s.longest_ordered() > c.longest_ordered || (c.leaves_none != 0 && !s.handed_on.are_none());
 }
 
 // Where a call starts.
