@@ -227,7 +227,8 @@ struct digit_group {
         return static_cast<word>(DigitsEach == 1 ? bits : std::uint64_t{bits} << 32 | bits);
     }
     [[nodiscard]] VOXELPIPE_HD static constexpr word widen(counts c) {
-        return static_cast<word>(DigitsEach == 1 ? c : std::uint64_t{c >> (DigitsEach - 1) * 16} << 32 | (c & 0xffffu));
+        return static_cast<word>(
+            DigitsEach == 1 ? c : static_cast<std::uint64_t>(c >> (DigitsEach - 1) * 16) << 32 | (c & 0xffffu));
     }
     [[nodiscard]] VOXELPIPE_HD static constexpr std::uint32_t get(word w, int k) { // of one digit
         return static_cast<std::uint32_t>(w >> 32 * k);
