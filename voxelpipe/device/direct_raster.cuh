@@ -543,7 +543,7 @@ __global__ __launch_bounds__(raster_threads,
     await_stream();
     call.out.prepare(std::uint64_t{blockIdx.x} * raster_threads + threadIdx.x,
                      std::uint64_t{gridDim.x} * raster_threads);
-    if (state->index_error != 0 || state->handed_on.are_none()) return;
+    if (state->index_error != 0) return;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();
     const unsigned in_block = warp_in_block();
