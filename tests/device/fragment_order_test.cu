@@ -147,6 +147,19 @@ TEST(FragmentOrder, DenseVoxels) {
     expect_ordered(std::vector<std::uint64_t>(70, 5000), 5, 100000); // more parts than blocks
 }
 
+// One voxel, of far apart primitives, that fills the room to its end.
+TEST(FragmentOrder, NoMoreRoomThanFragments) {
+    for (const std::uint32_t n : {device::most_of_window + 1, device::most_of_block, device::most_of_block + 1,
+                                  device::most_of_block + 2, 2 * device::most_of_block + 1}) {
+        std::vector<std::uint32_t> primitives(n);
+        for (std::uint32_t i = 0; i < n; ++i) primitives[i] = 1000 * (n - i);
+        const ordered result(std::vector<std::uint32_t>(n, 3), primitives, n, 1000 * std::uint64_t{n} + 1, false, 1);
+        std::sort(primitives.begin(), primitives.end());
+        EXPECT_TRUE(result.primitives == primitives) << n;
+        EXPECT_EQ(result.state.list_voxels, 1u);
+    }
+}
+
 TEST(FragmentOrder, FewAndMany) {
     std::mt19937 random(4);
     std::vector<std::uint64_t> lengths(20000);

@@ -287,9 +287,7 @@ __global__ __launch_bounds__(32 * order_warps,
 inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipeline_state* state, capacities limits,
                             cudaStream_t stream) {
     constexpr stage where = stage::abuffer_emit;
-    const std::uint64_t capacity = limits.fragments,
-                        longest =
-                            capacity > most_of_window ? std::min<std::uint64_t>(capacity, limits.longest_ordered) : 0;
+    const std::uint64_t capacity = limits.fragments, longest = limits.longest_ordered;
     limits.longest_ordered = ~0ull; // what the windows find out must not stop them
     for (const std::uint32_t* numbers : {b.keys, static_cast<const std::uint32_t*>(b.from)})
         VOXELPIPE_ASSERT(reinterpret_cast<std::uintptr_t>(numbers) % 16 == 0); // load_neighbours
@@ -301,15 +299,16 @@ inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipel
     const std::uint64_t tiles = tile_counts::num(capacity);
     launch_behind(windows, static_cast<unsigned>(std::max<std::uint64_t>(tiles, 1)), 32 * order_warps, stream, where, b,
                   state, limits);
-    if (longest != 0)
+    if (capacity > most_of_window && longest != 0)
         launch_behind(order_long_kernel<order_buffers>, fill_device(capacity / (most_of_window + 1) * 32, 4),
                       block_sort_threads, stream, where, b);
-    if (longest > most_of_block && b.lists.num_primitives != 0)
+    if (capacity > most_of_block && longest > most_of_block && b.lists.num_primitives != 0)
         launch_behind(order_dense_kernel<order_buffers>, static_cast<unsigned>(num_multiprocessors()), dense_threads,
                       stream, where, b);
     // Runs of 2^12, 2^18 and 2^24 fragments; the last merge takes all that there are.
     std::uint64_t length = most_of_block;
-    for (int level = 0; level < 3 && longest > std::max(length, only_dense); ++level, length *= merge_ways)
+    for (int level = 0; level < 3 && capacity > length && longest > std::max(length, only_dense);
+         ++level, length *= merge_ways)
         launch_behind(merge_runs_kernel<order_buffers>, fill_device(capacity), threads_per_block, stream, where, b,
                       level % 2 == 0 ? b.from : b.spare, level % 2 == 0 ? b.spare : b.from, length, level == 2);
 }
