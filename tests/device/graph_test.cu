@@ -3,7 +3,7 @@
 
 // Calls in a CUDA graph, replayed with changed vertices, and on several streams at once: the way without tiles, the
 // fragment lists of constant and of shaded fragments, of several draws and in grids beyond 32 bits; capacities of the
-// lists that are too small. All against cpu_backend.
+// lists that are too small, and kernels that are left out. All against cpu_backend.
 
 #include "async_lists.hpp"
 #include "cells.hpp"
@@ -222,6 +222,82 @@ void compare_overflowing_lists(const FragmentShader& fs, std::uint32_t seed) {
 TEST(Graph, ListsThatDoNotFitSayWhatIsNeeded) {
     compare_overflowing_lists<void>(vp::constant(true), 105);
     compare_overflowing_lists<double>(any_double{}, 106);
+}
+
+// Without the kernels for long voxels: the same lists where there are none; otherwise none, and that they are wanted.
+template <class Payload, class FragmentShader>
+void compare_without_long_voxels(const FragmentShader& fs, bool lists_fragments) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;
+    const vp::grid g = box_grid({40, 33, 47});
+    for (const bool is_long : {false, true}) {
+        vp::cuda_backend be;
+        mesh_data m = triangles_at_faces(g.extent, 300, true, 107);
+        append(m, triangles_in_voxel(is_long ? 400 : 200, {3, 4, 5}, 108)); // of which a shader may discard some
+        const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+        const draw_type d{mesh.view(), {}, fs};
+        const std::span<const draw_type> draws(&d, 1);
+        vp::workspace_limits limits{0, 0, 1 << 17, 1 << 16, lists_fragments, false};
+        vp::abuffer_view<Payload> lists;
+        for (bool fails = is_long;; fails = false) {
+            const std::size_t bytes = vp::workspace_bytes(draws, g, lists, {}, limits);
+            ASSERT_GT(bytes, 0u);
+            const guarded_memory memory(be, bytes);
+            const vp::workspace_view workspace{const_cast<unsigned char*>(memory.memory.data()), bytes, limits};
+            for (int round = 0; round < 2; ++round)
+                ASSERT_TRUE(vp::voxelize_async(be, draws, g, lists, {}, workspace).ok());
+            const vp::status s = vp::read_status(be, workspace, &limits);
+            EXPECT_EQ(limits.orders_long_voxels, is_long);
+            memory.expect_untouched_behind(be);
+            if (!fails) {
+                expect_lists<Payload>({m}, g, fs, {}, lists.to_host(be), s);
+                break;
+            }
+            ASSERT_EQ(s.code, vp::status_code::capacity_exceeded);
+            EXPECT_EQ(s.where, vp::stage::abuffer_emit);
+            EXPECT_EQ(lists.to_host(be).voxels.size(), 0u);
+            EXPECT_EQ(lists.to_host(be).primitives.size(), 0u);
+        }
+    }
+}
+
+TEST(Graph, ListsWithoutLongVoxels) {
+    compare_without_long_voxels<void>(vp::constant(true), false);
+    compare_without_long_voxels<double>(vp::constant(0.5), false);
+    compare_without_long_voxels<double>(any_double{}, true);
+}
+
+// A blend that needs an order, which long voxels do not get: the target stays as it was.
+TEST(Graph, AnOrderedTargetWithoutLongVoxels) {
+    using target = vp::target<std::uint32_t, chain>;
+    using shader = decltype(vp::constant(std::uint32_t{5}));
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, shader>;
+    vp::cuda_backend be;
+    const vp::grid g = box_grid({20, 20, 20});
+    const mesh_data m = triangles_in_voxel(257, {3, 4, 5}, 109);
+    const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+    vp::framebuffer<vp::cuda_backend, target> fb(be, g.extent), expected(be, g.extent);
+    const draw_type d{mesh.view(), {}, vp::constant(std::uint32_t{5})};
+    const std::span<const draw_type> draws(&d, 1);
+    ASSERT_TRUE(vp::voxelize(be, draws, g, expected, {}).ok());
+    ASSERT_EQ(cudaMemset(const_cast<std::uint32_t*>(vp::get<0>(fb).view().elements), 0x5a, 20 * 20 * 20 * 4),
+              cudaSuccess);
+    vp::workspace_limits limits{0, 0, 1 << 16, 1 << 16, true, false};
+    for (const bool fails : {true, false}) {
+        const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), {}, limits);
+        ASSERT_GT(bytes, 0u);
+        vp::cuda_backend::buffer<std::byte> memory(be, bytes);
+        const vp::workspace_view workspace{memory.data(), bytes, limits};
+        ASSERT_TRUE(vp::voxelize_async(be, draws, g, fb.view(), {}, workspace).ok());
+        const vp::status s = vp::read_status(be, workspace, &limits);
+        EXPECT_TRUE(limits.orders_long_voxels);
+        if (fails) {
+            EXPECT_EQ(s.code, vp::status_code::capacity_exceeded);
+            for (const std::uint32_t v : vp::get<0>(fb).to_host(be)) ASSERT_EQ(v, 0x5a5a5a5au);
+        } else {
+            ASSERT_TRUE(s.ok()) << s.message();
+            expect_same_bytes(vp::get<0>(expected).to_host(be), vp::get<0>(fb).to_host(be), "with them");
+        }
+    }
 }
 
 template <class Payload, class FragmentShader>

@@ -55,25 +55,36 @@ struct abuffer_view {
 
 namespace device {
 
-// Carves the memory and, with Run, launches every stage and sets the view.
+// Carves the memory and, with Run, launches every stage and sets the view. What can be written where it is to go at
+// once is.
 template <coverage Rule, bool Run, class Key, class Payload, class Call>
 void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
-    [[maybe_unused]] pipeline_state* const state =
-        arena(memory).template take<pipeline_state>(1); // what `go` takes first
-    if constexpr (Run) zero_state(state, stream);
-    const auto sorted = call.template go<Rule, Run, Key>(memory, stream);
+    arena behind = memory; // what the stages take
+    (void)call.template go<Rule, false, Key>(behind, stream);
     const std::size_t room = call.limits.fragments;
-    auto* const counts = memory.take<list_counts>(1);
-    auto* const voxels = memory.take<std::uint64_t>(room);
-    auto* const offsets = memory.take<std::uint64_t>(room + 1);
-    auto* const primitives = memory.take<std::uint32_t>(room);
-    auto* const payloads = std::is_void_v<Payload> ? nullptr : memory.take<payload_storage<Payload>>(room);
+    auto* const counts = behind.take<list_counts>(1);
+    auto* const voxels = behind.take<std::uint64_t>(room);
+    auto* const offsets = behind.take<std::uint64_t>(room + 1);
+    auto* const primitives = behind.take<std::uint32_t>(room);
+    auto* const payloads = std::is_void_v<Payload> ? nullptr : behind.take<payload_storage<Payload>>(room);
     if constexpr (Run) {
-        publish_lists_kernel<<<fill_device(room), threads_per_block, 0, stream>>>(
-            sorted, state, call.limits, counts, voxels, offsets, primitives, payloads);
-        check(cudaGetLastError(), stage::abuffer_emit);
+        arena start = memory;
+        auto* const state = start.take<pipeline_state>(1); // what `go` takes first
+        zero_memory(state, start.used() - memory.used(), stream);
+        asked_places asked;
+        asked.value.voxels = voxels;
+        asked.value.offsets = offsets;
+        asked.value.room = room;
+        asked.value.primitives = primitives;
+        asked.value.payloads = payloads;
+        const auto sorted = call.template go<Rule, true, Key>(memory, stream, asked);
+        const bool are_done = sorted.are_placed && std::is_void_v<Payload>; // only their numbers are left
+        launch_behind(publish_lists_kernel<Key, payload_storage<Payload>>, are_done ? 1 : fill_device(room),
+                      threads_per_block, stream, stage::abuffer_emit, sorted, state, call.limits, counts, voxels,
+                      offsets, primitives, payloads);
         lists = {counts, voxels, offsets, primitives, payloads, call.g.extent};
     }
+    memory = behind;
 }
 
 template <bool Run, class Payload, class Call>

@@ -437,6 +437,7 @@ template <class Key, class Payload>
 __global__ void publish_lists_kernel(fragment_lists<Key, Payload> lists, pipeline_state* state, capacities limits,
                                      list_counts* counts, std::uint64_t* voxels, std::uint64_t* offsets,
                                      std::uint32_t* primitives, Payload* payloads) {
+    await_stream();
     const bool failed = has_failed(*state, limits);
     const std::uint64_t num_voxels = failed ? 0 : state->list_voxels;
     const std::uint64_t num_fragments = failed ? 0 : state->list_fragments;

@@ -59,9 +59,13 @@ struct capacities {
            s.longest_ordered() > c.longest_ordered || (c.leaves_none != 0 && !s.handed_on.are_none());
 }
 
-// Where a call starts.
-inline void zero_state(void* state, cudaStream_t stream) {
-    check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
+// Writes zeros. A template, as all kernels in headers are.
+template <class Word>
+__global__ void zero_kernel(Word* memory, std::uint64_t words) {
+    await_stream();
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < words;
+         i += std::uint64_t{gridDim.x} * blockDim.x)
+        memory[i] = {};
 }
 
 // Moves the state to memory that the device can write, and leaves zeros for the next call. One warp.
@@ -232,6 +236,13 @@ __device__ VOXELPIPE_INLINE unsigned warp_in_block() { return uniform(threadIdx.
 [[nodiscard]] inline unsigned fill_device(std::uint64_t items, unsigned blocks_per_multiprocessor = 8) {
     return core::blocks_to_fill(items, threads_per_block, static_cast<std::uint32_t>(num_multiprocessors()),
                                 blocks_per_multiprocessor);
+}
+
+// Where a call starts that leaves no zeros for the next: the start of its memory, whole uint4s. By a kernel, for the
+// next one can begin early behind a kernel, and not behind cudaMemsetAsync.
+inline void zero_memory(void* memory, std::size_t bytes, cudaStream_t stream) {
+    launch_behind(zero_kernel<uint4>, fill_device(bytes / sizeof(uint4)), threads_per_block, stream, stage::validate,
+                  static_cast<uint4*>(memory), std::uint64_t{bytes / sizeof(uint4)});
 }
 
 // Copies a few host values to the device as kernel arguments: no host memory has to outlive the call, and a captured

@@ -21,6 +21,10 @@ struct workspace_limits {
     // Whether shaders that compute may have their fragments listed and sorted by voxel, instead of being drawn in tiles
     // (cuda_backend::lists_fragments): then `fragments` is what has to suffice, in place of tile_pairs. Up to 2^28.
     bool lists_fragments = false;
+    // Of calls that list fragments: whether voxels of more than 256 may come. Without, the kernels that put those in
+    // order are left out, which takes some 10 us off a short call; one that meets such a voxel all the same fails for
+    // its capacity.
+    bool orders_long_voxels = true;
 
     // A start for a mesh whose triangles are mostly smaller than a tile.
     [[nodiscard]] static workspace_limits for_triangles(std::uint64_t triangles) {
@@ -53,7 +57,9 @@ template <class Call>
     return l.tile_pairs <= core::most_numbered && l.fragments <= core::most_numbered;
 }
 [[nodiscard]] inline capacities to_capacities(const workspace_limits& l) {
-    return {l.tile_pairs, l.tile_records, l.fragments, l.fragment_records};
+    capacities c{l.tile_pairs, l.tile_records, l.fragments, l.fragment_records};
+    if (!l.orders_long_voxels) c.longest_ordered = 0;
+    return c;
 }
 
 template <class Draw, class Framebuffer, class F>
@@ -106,7 +112,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
                 }
                 device::launch_until(call.last_stage(), [&] {
                     device::arena memory(workspace.memory);
-                    device::check(cudaMemsetAsync(workspace.memory, 0, call.zeroed_bytes(), backend.stream));
+                    device::zero_memory(workspace.memory, call.zeroed_bytes(), backend.stream);
                     if (options.rule == coverage::thin)
                         call.template go<coverage::thin, true>(memory, backend.stream);
                     else
@@ -147,7 +153,8 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
                      larger(workspace.limits.tile_records, state.tile_records),
                      larger(workspace.limits.fragments, state.list_fragments),
                      larger(workspace.limits.fragment_records, state.fragment_records),
-                     workspace.limits.lists_fragments};
+                     workspace.limits.lists_fragments,
+                     workspace.limits.orders_long_voxels || state.longest_ordered() != 0};
         }
         return s;
     }
