@@ -74,7 +74,8 @@ struct gpu_row {
     gpu_anchor published;
     std::string failure; // what went wrong; then there are no times
 
-    [[nodiscard]] double ahead_of_fastest() const; // fastest anchor / ours; 0 where there is none
+    [[nodiscard]] double ahead_of_fastest() const;       // fastest anchor / ours; 0 where there is none
+    [[nodiscard]] double async_ahead_of_fastest() const; // the same of voxelize_async
     [[nodiscard]] double ahead_of_baseline() const;
     [[nodiscard]] double of_target() const; // target / ours: 1 or more has reached it
     [[nodiscard]] double times_floor() const;

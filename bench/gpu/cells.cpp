@@ -64,8 +64,11 @@ cell_times time_cell(const session& s, prepared_cell& cell, const cell_choice& h
     t.whole = time_calls(s, how.repeat, [&] { t.counts = cell.call(); });
     must_agree("voxelize");
     if (how.async && cell.prepare_async()) {
-        t.async = time_calls(s, how.repeat, [&] { cell.call_async(); });
+        const captured_call captured(s, [&] { cell.call_async(); });
+        t.async = time_calls(s, how.repeat, [&] { captured.launch(); });
         must_agree("voxelize_async");
+        if (const std::uint64_t n = cell.async_differences(); n != 0)
+            throw std::runtime_error("voxelize_async differs from voxelize in " + std::to_string(n) + " words");
     }
     if (how.stage_runs > 0) {
         t.stages = time_stages(cell, how.stage_runs);

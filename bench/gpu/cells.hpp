@@ -29,9 +29,12 @@ public:
     // Where call() adds up the time of each stage from now on; null: nowhere.
     virtual void set_times(vp::stage_times* times) = 0;
 
-    // vp::voxelize_async in memory that was found to suffice; false where there is no such form.
+    // vp::voxelize_async in memory that is found to suffice, for a cell that has been called; false where there is
+    // none.
     virtual bool prepare_async() { return false; }
     virtual void call_async() {}
+    // Elements in which the last results of call() and of call_async() differ, where they lie apart.
+    virtual std::uint64_t async_differences() { return 0; }
 
     // The baseline (baseline/one_thread_a_triangle.cuh) with its clear; false where it has no such output.
     virtual bool prepare_baseline() { return false; }
@@ -40,7 +43,8 @@ public:
     virtual std::uint64_t differences() { return 0; }
 };
 
-// What is timed of a cell; runs = 0 where it has no such form.
+// What is timed of a cell; runs = 0 where it has no such form. async: captured once as a CUDA graph, as a program would
+// that never waits.
 struct cell_times {
     vp::counters counts;
     sample whole, async, baseline;

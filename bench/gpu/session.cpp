@@ -66,6 +66,26 @@ resident_mesh upload(const mesh_data& mesh) {
     return m;
 }
 
+captured_call::captured_call(const session& s, const std::function<void()>& call) : stream_(s.stream()) {
+    cudaGraph_t graph = nullptr;
+    check(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal), "capture");
+    try {
+        call();
+    } catch (...) {
+        cudaStreamEndCapture(stream_, &graph);
+        cudaGraphDestroy(graph);
+        (void)cudaGetLastError();
+        throw;
+    }
+    check(cudaStreamEndCapture(stream_, &graph), "capture");
+    const cudaError_t made = cudaGraphInstantiate(&graph_, graph, 0);
+    cudaGraphDestroy(graph);
+    check(made, "graph");
+}
+captured_call::~captured_call() { cudaGraphExecDestroy(graph_); }
+
+void captured_call::launch() const { check(cudaGraphLaunch(graph_, stream_), "graph"); }
+
 sample time_calls(const session& s, const repetition& how, const std::function<void()>& call) {
     const event start, stop;
     std::vector<double> times;

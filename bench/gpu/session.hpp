@@ -85,6 +85,22 @@ struct repetition {
     double seconds = 10;
 };
 
+// What a call that never waits puts on the session's stream, captured once as a CUDA graph and launched as often as
+// wanted.
+class captured_call {
+public:
+    captured_call(const session& s, const std::function<void()>& call);
+    ~captured_call();
+    captured_call(const captured_call&) = delete;
+    captured_call& operator=(const captured_call&) = delete;
+
+    void launch() const;
+
+private:
+    cudaStream_t stream_;
+    cudaGraphExec_t graph_ = nullptr;
+};
+
 // Times each run by two events on the session's stream around `call`, which may wait on the host or not.
 [[nodiscard]] sample time_calls(const session& s, const repetition& how, const std::function<void()>& call);
 
