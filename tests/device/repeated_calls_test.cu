@@ -274,6 +274,44 @@ TEST(RepeatedCalls, WithLongVoxelsOrNone) {
 }
 
 // Two sets of arguments in turn never make a graph; each after itself does.
+// Many fragments a voxel, which are sorted by counting, and few, which are not: what calls had before decides, whose
+// memory holds other things then.
+TEST(RepeatedCalls, WithManyFragmentsAVoxelOrFew) {
+    constexpr int count = 6400;
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, decltype(vp::constant(true))>;
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    const vp::grid g = box_grid({41, 41, 41});
+    const mesh_data few = spread_triangles(count, false);
+    mesh_data many;
+    for (int i = 0; i < 100; ++i)
+        append(many, triangles_in_voxel(count / 100, {i % 10, 3 * (i / 10), i % 7}, static_cast<std::uint32_t>(i)));
+    ASSERT_EQ(few.triangles.size(), many.triangles.size());
+    ASSERT_EQ(few.positions.size(), many.positions.size());
+    open_mesh on_gpu(gpu, few);
+    const draw on_device{{on_gpu.positions.view(), on_gpu.triangles.view()}, {}, vp::constant(true)};
+    vp::abuffer<vp::cuda_backend> lists{gpu};
+    vp::abuffer<vp::cpu_backend> expected{cpu};
+    for (const bool is_many :
+         {false, false, false, false, true, true, true, true, true, false, true, false, false, true}) {
+        const mesh_data& m = is_many ? many : few;
+        on_gpu.write(gpu, m);
+        const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+        const draw on_host{cpu_mesh.view(), {}, vp::constant(true)};
+        for (const vp::coverage rule : both_rules) {
+            const vp::status a = vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, lists, rule);
+            const vp::status b = vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, expected, rule);
+            ASSERT_TRUE(a.ok() && b.ok()) << a.message();
+            expect_same_counts(b.counts, a.counts);
+            expect_same_on_host(expected.to_host(cpu), lists.to_host(gpu));
+        }
+        for (int i = 0; i < 3; ++i) // as a graph
+            ASSERT_TRUE(vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, lists, vp::coverage::thin).ok());
+        ASSERT_TRUE(vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, expected, vp::coverage::thin).ok());
+        expect_same_on_host(expected.to_host(cpu), lists.to_host(gpu));
+    }
+}
+
 TEST(RepeatedCalls, InTurn) {
     const mesh_data m = mixed_triangles(800, 30.0f, 221);
     const vp::grid g = box_grid({31, 30, 29});

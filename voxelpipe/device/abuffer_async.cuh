@@ -110,11 +110,18 @@ template <class Call, class Payload>
 namespace device {
 
 // With lists_fragments, one draw of a shader that computes is listed by the raster; what it discards has to fit too.
+// How many voxels there will be nobody knows: small triangles are taken to share them.
 template <class Draw, class Payload>
 [[nodiscard]] abuffer_call<Draw, payload_storage<Payload>>
 make_list_call(std::span<const Draw> draws, const grid& g, std::uint64_t triangles, const workspace_limits& limits) {
-    return {draws, g, static_cast<std::uint32_t>(triangles), to_capacities(limits), nullptr, limits.lists_fragments,
-            true};
+    return {draws,
+            g,
+            static_cast<std::uint32_t>(triangles),
+            to_capacities(limits),
+            nullptr,
+            limits.lists_fragments,
+            true,
+            limits.fragments > 2 * triangles};
 }
 
 } // namespace device

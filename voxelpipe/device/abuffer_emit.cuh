@@ -8,6 +8,7 @@
 // the first fragment of each voxel is selected; what was listed in any order is put in order within each voxel on the
 // way (fragment_order.cuh), and shaded then. Memory is in proportion to the fragments (paper section 3, A-buffer).
 
+#include <voxelpipe/device/counting_sort.cuh>
 #include <voxelpipe/device/fragment_order.cuh>
 #include <voxelpipe/device/fragment_shade.cuh>
 #include <voxelpipe/device/fragment_sort.cuh>
@@ -109,7 +110,8 @@ struct list_buffers {
     Key* keys[2];
     std::uint32_t* values[2];
     int bits;                      // of a voxel
-    sort_memory sort;              // where are_sorted_here
+    sort_memory sort;              // where are_sorted_here,
+    counting_memory counting;      // or this, where it is in use
     std::uint32_t* primitives;     // by place; null without payloads of fragments
     Payload* payloads;             // by place; null likewise
     std::uint64_t* first_of_voxel; // fragment numbers, ascending; list_voxels of them, and room for one more
@@ -187,6 +189,7 @@ template <class Key, class Payload>
     p.is_wanted = true;
     p.sorts = are_sorted_here<Key>(limits.fragments);
     p.sort = b.sort;
+    p.counting = b.counting;
     p.capacity = limits.fragments;
     p.tiles = tiles;
     p.asked = asked;
@@ -253,20 +256,28 @@ template <class Payload>
 sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const asked_places& asked,
                std::uint32_t num_primitives, std::uint32_t* spare, pipeline_state* state, const capacities& limits,
                cudaStream_t stream, stage_clock* clock) {
-    sort_preparation preparation = prepare_lists(b, asked, order.tiles, limits);
-    preparation.is_wanted = !preparation.sorts; // for the fillers
-    const sorted_pairs<std::uint32_t> sorted = sort_by_voxel(b, preparation, state, limits, stream, clock);
     list_places here;
-    here.narrow_voxels = sorted.spare_keys;
     here.offsets = b.first_of_voxel;
     here.room = limits.fragments;
-    here.primitives = sorted.spare_values;
-    order_fragments({sorted.keys, sorted.values, spare != nullptr ? spare : sorted.keys, b.places, here, order.tiles,
-                     order.lists.with(state)},
-                    num_primitives, state, limits, stream);
-    end_stage(clock, &stage_times::abuffer_emit);
     fragment_lists<std::uint32_t, Payload> lists{};
-    lists.keys = sorted.keys;
+    if (b.counting.is_used()) {
+        VOXELPIPE_ASSERT(spare == nullptr);
+        here.narrow_voxels = b.keys[1];
+        here.primitives = b.values[0]; // once they have been read
+        order_by_counting({nullptr, b.values[1], b.keys[0], b.places, here, order.tiles, order.lists.with(state)},
+                          {b.keys[0], b.values[0]}, b.counting, num_primitives, state, limits, stream, clock);
+    } else {
+        sort_preparation preparation = prepare_lists(b, asked, order.tiles, limits);
+        preparation.is_wanted = !preparation.sorts; // for the fillers
+        const sorted_pairs<std::uint32_t> sorted = sort_by_voxel(b, preparation, state, limits, stream, clock);
+        here.narrow_voxels = sorted.spare_keys;
+        here.primitives = sorted.spare_values;
+        order_fragments({sorted.keys, sorted.values, spare != nullptr ? spare : sorted.keys, b.places, here,
+                         order.tiles, order.lists.with(state)},
+                        num_primitives, state, limits, stream);
+        lists.keys = sorted.keys;
+    }
+    end_stage(clock, &stage_times::abuffer_emit);
     lists.voxels = here.narrow_voxels;
     lists.first_of_voxel = here.offsets;
     lists.values = here.primitives; // a value is a primitive

@@ -231,6 +231,7 @@ public:
                         device::stage_clock* clock) {
                         limits.leaves_none = 0;
                         call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
+                        call.has_few_a_voxel = limits.fragments < device::least_counted * voxel_room;
                         if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
                             fill<std::uint64_t>(options.rule, call, voxel_room, made, state);
                             return false;

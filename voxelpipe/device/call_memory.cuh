@@ -86,10 +86,12 @@ private:
     }
 };
 
-// Fragment lists with payloads of one type. Where all fragments have one payload, it takes no memory.
+// Fragment lists with payloads of one type. Where all fragments have one payload, it takes no memory. may_count:
+// whether they may be sorted by counting, which leaves no sorted keys.
 template <class Key, class Payload>
 [[nodiscard]] list_buffers<Key, Payload> take_lists(arena& memory, std::uint64_t num_voxels,
-                                                    unsigned long long capacity, bool one_payload = false) {
+                                                    unsigned long long capacity, bool one_payload = false,
+                                                    bool may_count = false) {
     list_buffers<Key, Payload> b{};
     if constexpr (std::is_same_v<Key, std::uint32_t>) {
         const sort_pairs pairs = sort_pairs::take(memory, capacity);
@@ -102,7 +104,9 @@ template <class Key, class Payload>
         }
     }
     b.storage_bytes = select_bytes<Key>(capacity);
-    if (are_sorted_here<Key>(capacity)) {
+    if (may_count && counting_memory::suits(num_voxels, capacity)) {
+        b.counting = counting_memory::take(memory, capacity, num_voxels);
+    } else if (are_sorted_here<Key>(capacity)) {
         b.bits = static_cast<int>(std::bit_width(num_voxels - 1));
         b.sort = sort_memory::take(memory, capacity, b.bits);
     } else {

@@ -25,27 +25,42 @@ struct order_window {
     std::uint32_t voxels[window_length], first[window_length];
 };
 
+// Which of a lane's Items neighbouring places begin another voxel than was before, or none: bit k the place k. voxels:
+// of n fragments, from the window's first, those of the lane are left in `voxel`; before: the voxel of the one before,
+// or ~0.
+template <int Items>
+[[nodiscard]] __device__ VOXELPIPE_INLINE unsigned find_starts(const std::uint32_t* voxels, std::uint32_t n,
+                                                               std::uint32_t before, std::uint32_t (&voxel)[Items]) {
+    const std::uint32_t lane = threadIdx.x % 32;
+    load_neighbours(voxels, lane * Items, n, voxel);
+    std::uint32_t previous = __shfl_up_sync(0xffffffffu, voxel[Items - 1], 1);
+    if (lane == 0) previous = before;
+    unsigned starts = 0;
+#pragma unroll
+    for (int k = 0; k < Items; ++k) {
+        starts |= voxel[k] != previous ? 1u << k : 0;
+        previous = voxel[k];
+    }
+    return starts;
+}
+// The same from a bit for each place, of a window that begins at `begin`, a multiple of 32.
+template <int Items>
+[[nodiscard]] __device__ VOXELPIPE_INLINE unsigned load_starts(const std::uint32_t* starts, std::uint32_t begin) {
+    using bits = std::conditional_t<Items == 8, std::uint8_t, std::uint16_t>;
+    static_assert(Items == 8 || Items == 16);
+    return reinterpret_cast<const bits*>(starts)[begin / Items + threadIdx.x % 32];
+}
+
 // The voxels of a window of 32 * Items places, which count from its first; a lane has Items neighbours.
 template <int Items>
 struct window_voxels {
     static constexpr std::uint32_t places = 32 * Items;
-    std::uint32_t voxel[Items];
     unsigned starts;    // bit k: another voxel begins at the lane's place k than was before, or none
     unsigned begins;    // the same of voxels that begin within window_length and before n
     std::uint32_t rank; // of them, how many before this lane's places
 
-    // voxels: of n fragments, from the window's first; before: the voxel of the one before, or ~0.
-    __device__ VOXELPIPE_INLINE window_voxels(const std::uint32_t* voxels, std::uint32_t n, std::uint32_t before) {
+    __device__ VOXELPIPE_INLINE window_voxels(unsigned starts_, std::uint32_t n) : starts(starts_) {
         const std::uint32_t lane = threadIdx.x % 32, first = lane * Items;
-        load_neighbours(voxels, first, n, voxel);
-        std::uint32_t previous = __shfl_up_sync(0xffffffffu, voxel[Items - 1], 1);
-        if (lane == 0) previous = before;
-        starts = 0;
-#pragma unroll
-        for (int k = 0; k < Items; ++k) {
-            starts |= voxel[k] != previous ? 1u << k : 0;
-            previous = voxel[k];
-        }
         constexpr std::uint32_t length = window_length;
         const std::uint32_t most = n < length ? n : length, own = first < most ? most - first : 0;
         begins = starts & (own < Items ? (1u << own) - 1 : ~0u);
@@ -133,7 +148,8 @@ __device__ VOXELPIPE_INLINE void order_places(const std::uint32_t (&primitive)[I
     return static_cast<std::uint32_t>(end);
 }
 
-// The window of n fragments from `begin` on, by all lanes of a warp.
+// The window of n fragments from `begin` on, by all lanes of a warp. ByStarts: where voxels begin is known.
+template <bool ByStarts>
 struct order_of_window {
     static constexpr int items = 8, wide_items = 16;
     using voxels_type = window_voxels<items>;
@@ -142,13 +158,13 @@ struct order_of_window {
 
     const order_buffers& b;
     std::uint32_t begin, n, before; // n counts from the window's first, as all places do; the voxel before it
-    std::uint32_t primitive[items]{};
+    std::uint32_t primitive[items]{}, voxel[items]; // voxels by keys only
     voxels_type voxels;
     std::uint32_t count; // of voxels that begin in it
 
     __device__ VOXELPIPE_INLINE order_of_window(const order_buffers& buffers, std::uint32_t begin_, std::uint32_t n_)
-        : b(buffers), begin(begin_), n(n_ - begin_), before(begin_ == 0 ? ~0u : b.keys[begin_ - 1]),
-          voxels(b.keys + begin, n, before) {
+        : b(buffers), begin(begin_), n(n_ - begin_), before(ByStarts || begin_ == 0 ? ~0u : b.keys[begin_ - 1]),
+          voxels(get_starts(voxel), n) {
         load_neighbours(b.from + begin, threadIdx.x % 32 * items, n, primitive);
         count = __reduce_add_sync(0xffffffffu, static_cast<std::uint32_t>(__popc(voxels.begins)));
     }
@@ -159,7 +175,7 @@ struct order_of_window {
 #pragma unroll
         for (std::uint32_t k = 0; k < items; ++k)
             if ((voxels.begins >> k & 1u) != 0) {
-                kept.voxels[rank] = voxels.voxel[k];
+                kept.voxels[rank] = voxel[k];
                 kept.first[rank++] = first + k;
             }
     }
@@ -185,9 +201,9 @@ struct order_of_window {
             if (end <= voxels_type::places) {
                 order_places<Word>(primitive, to, voxels, skipped, end, primitive_bits);
             } else {
-                std::uint32_t all[wide_items];
+                std::uint32_t all[wide_items], voxels_of_all[wide_items];
                 load_neighbours(b.from + begin, threadIdx.x % 32 * wide_items, n, all);
-                order_places<Word>(all, to, wide_type(b.keys + begin, n, before), skipped, end, primitive_bits);
+                order_places<Word>(all, to, wide_type(get_starts(voxels_of_all), n), skipped, end, primitive_bits);
             }
         };
         if constexpr (Narrow)
@@ -200,10 +216,29 @@ struct order_of_window {
     }
 
 private:
+    template <int Items>
+    [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned get_starts(std::uint32_t (&voxel_of)[Items]) const {
+        if constexpr (ByStarts)
+            return load_starts<Items>(b.starts, begin);
+        else
+            return find_starts(b.keys + begin, n, before, voxel_of);
+    }
     // Where the last voxel ends, which does so at `end` or beyond. Returns 1 where it is too long: then `end` is where
     // it begins.
     [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t find_last(std::uint32_t& end) const {
         const std::uint32_t lane = threadIdx.x % 32, last = voxels_type::last_of(voxels.begins);
+        if constexpr (ByStarts) { // who found the starts has put it into its list
+            const unsigned word = b.starts[(begin + end) / 32 + lane];
+            const unsigned lanes = __ballot_sync(0xffffffffu, word != 0);
+            if (lanes != 0) {
+                const int nearest = __ffs(static_cast<int>(lanes)) - 1;
+                end += static_cast<std::uint32_t>(32 * nearest +
+                                                  __ffs(static_cast<int>(__shfl_sync(0xffffffffu, word, nearest))) - 1);
+                if (end - last <= most_of_window) return 0;
+            }
+            end = last;
+            return 1;
+        }
         const std::uint32_t* const keys = b.keys + begin;
         const std::uint32_t voxel = keys[last];
         do {
@@ -239,7 +274,7 @@ __global__ __launch_bounds__(32 * order_warps,
     const std::uint64_t first = std::uint64_t{tile} * tile_counts::length, begin = first + warp * window_length;
     if (first >= n) return;
     // Where the tile has no such window, one behind the last fragment, in which nothing begins.
-    const order_of_window window(b, static_cast<std::uint32_t>(begin < n ? begin : n), n);
+    const order_of_window<false> window(b, static_cast<std::uint32_t>(begin < n ? begin : n), n);
     if (lane == 0) counts[warp] = window.count;
     __syncthreads();
     std::uint32_t earlier = 0, all = 0;
@@ -271,6 +306,20 @@ __global__ __launch_bounds__(32 * order_warps,
     }
 }
 
+// The same where a counting sort has listed the voxels, and those that are long.
+template <bool Narrow>
+__global__ __launch_bounds__(32 * order_warps,
+                             order_blocks) void order_starts_kernel(const __grid_constant__ order_buffers b,
+                                                                    const pipeline_state* state, capacities limits) {
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const auto n = static_cast<std::uint32_t>(state->list_fragments);
+    const std::uint64_t begin = (std::uint64_t{blockIdx.x} * order_warps + warp_in_block()) * window_length;
+    if (begin >= n) return;
+    const order_of_window<true> window(b, static_cast<std::uint32_t>(begin), n);
+    window.template order<Narrow>(b.places().primitives);
+}
+
 // ---- host -----------------------------------------------------------------------------------------------------------
 
 // What capacities::longest_ordered is to be for calls like one with this pipeline_state::longest_ordered(): the most
@@ -289,6 +338,7 @@ inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipel
     constexpr stage where = stage::abuffer_emit;
     const std::uint64_t capacity = limits.fragments, longest = limits.longest_ordered;
     limits.longest_ordered = ~0ull; // what the windows find out must not stop them
+    const bool by_starts = b.starts != nullptr;
     for (const std::uint32_t* numbers : {b.keys, static_cast<const std::uint32_t*>(b.from)})
         VOXELPIPE_ASSERT(reinterpret_cast<std::uintptr_t>(numbers) % 16 == 0); // load_neighbours
     if (num_primitives <= std::uint64_t{dense_part} * most_dense_parts)
@@ -297,8 +347,13 @@ inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipel
     const auto windows =
         b.primitive_bits <= narrow_primitive_bits ? order_windows_kernel<true> : order_windows_kernel<false>;
     const std::uint64_t tiles = tile_counts::num(capacity);
-    launch_behind(windows, static_cast<unsigned>(std::max<std::uint64_t>(tiles, 1)), 32 * order_warps, stream, where, b,
-                  state, limits);
+    const auto blocks = static_cast<unsigned>(std::max<std::uint64_t>(tiles, 1));
+    if (by_starts)
+        launch_behind(b.primitive_bits <= narrow_primitive_bits ? order_starts_kernel<true>
+                                                                : order_starts_kernel<false>,
+                      blocks, 32 * order_warps, stream, where, b, state, limits);
+    else
+        launch_behind(windows, blocks, 32 * order_warps, stream, where, b, state, limits);
     if (capacity > most_of_window && longest != 0)
         launch_behind(order_long_kernel<order_buffers>, fill_device(capacity / (most_of_window + 1) * 32, 4),
                       block_sort_threads, stream, where, b);

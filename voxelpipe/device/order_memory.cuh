@@ -73,6 +73,19 @@ struct order_lists {
     [[nodiscard]] VOXELPIPE_HD std::uint32_t dense_parts() const { // of a voxel
         return (num_primitives + dense_part - 1) / dense_part;
     }
+    // The list of a voxel that is neither run nor dense, or -1.
+    [[nodiscard]] VOXELPIPE_HD static constexpr int list_of(unsigned long long length) {
+        return length > most_of_block || length <= most_of_window ? -1
+               : length > most_below(2)                           ? 2
+               : length > most_below(1)                           ? 1
+                                                                  : 0;
+    }
+    // Puts a voxel at a place that was taken for it in list_of(length).
+    __device__ VOXELPIPE_INLINE void put(unsigned at, unsigned long long begin, unsigned long long length) const {
+#pragma unroll
+        for (int k = 0; k <= block_list; ++k) // an index that is no constant would put the pointers in local memory
+            if (list_of(length) == k) voxels[k][at] = {begin, length};
+    }
     // A voxel that begins at `begin`. By one thread.
     __device__ void push(unsigned long long begin, unsigned long long length) const {
         const bool is_dense = length > most_of_block && num_primitives != 0 && length >= num_primitives / least_dense;
@@ -91,11 +104,8 @@ struct order_lists {
             }
             return;
         }
-        const int kind = length > most_below(2) ? 2 : length > most_below(1) ? 1 : 0;
         static_assert(block_list == 2);
-        const unsigned at = atomicAdd(&counts[kind], 1u);
-        for (int k = 0; k <= block_list; ++k) // an index that is no constant would put the pointers in local memory
-            if (kind == k) voxels[k][at] = {begin, length};
+        put(atomicAdd(&counts[list_of(length)], 1u), begin, length);
     }
 };
 
@@ -159,11 +169,50 @@ struct tile_counts {
     }
 };
 
+// Memory of a counting sort (counting_sort.cuh), in place of a sort_memory.
+struct counting_memory {
+    static constexpr std::uint32_t tile = 16384;                         // voxels
+    static constexpr std::uint64_t most_voxels = std::uint64_t{1} << 21; // of a grid: the counters fit the cache
+
+    std::uint64_t num_voxels = 0;        // of the grid, up to whole tiles; 0 where there is no counting sort
+    std::uint64_t capacity = 0;          // fragments
+    std::uint32_t* counts = nullptr;     // of each voxel; then where its first fragment goes. Zeroed
+    std::uint32_t* numbers = nullptr;    // of each fragment within its voxel
+    std::uint32_t* starts = nullptr;     // a bit for each place where a voxel begins, and behind the last one. Zeroed
+    unsigned long long* tiles = nullptr; // what tiles of voxels tell one another. Zeroed
+
+    // Whether a grid's fragments, so many at most, can be sorted by counting, with counters that are few beside them.
+    [[nodiscard]] static bool suits(std::uint64_t num_voxels, std::uint64_t capacity) {
+        return num_voxels <= most_voxels && num_voxels <= 8 * capacity && capacity < most_sorted;
+    }
+    [[nodiscard]] static counting_memory take(arena& memory, std::uint64_t capacity, std::uint64_t num_voxels) {
+        counting_memory m{};
+        m.num_voxels = (num_voxels + tile - 1) / tile * tile;
+        m.capacity = capacity;
+        m.counts = memory.take<std::uint32_t>(m.num_voxels);
+        m.numbers = memory.take<std::uint32_t>(capacity);
+        m.starts = memory.take<std::uint32_t>(m.num_starts());
+        m.tiles = memory.take<unsigned long long>(m.num_tiles());
+        return m;
+    }
+    [[nodiscard]] VOXELPIPE_HD bool is_used() const { return num_voxels != 0; }
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_tiles() const { return num_voxels / tile; }
+    // Words of `starts`: windows look beyond the last fragment.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_starts() const { return (capacity / 1024 + 3) * 32; }
+    // What has to be zero before. By all threads of a grid.
+    __device__ void zero(std::uint64_t thread, std::uint64_t threads) const {
+        for (std::uint64_t i = thread; i < num_voxels / 4; i += threads) reinterpret_cast<uint4*>(counts)[i] = {};
+        for (std::uint64_t i = thread; i < num_starts() / 4; i += threads) reinterpret_cast<uint4*>(starts)[i] = {};
+        for (std::uint64_t i = thread; i < num_tiles(); i += threads) tiles[i] = 0;
+    }
+};
+
 // What the sort and the order of a call's fragments want before they begin, which the raster that lists them does on
 // its way: zeros, and the page's word of where the lists are to go.
 struct sort_preparation {
     bool is_wanted = false;
-    bool sorts = false; // by sort_fragments
+    bool sorts = false;         // by sort_fragments, or,
+    counting_memory counting{}; // where it is in use, by counting
     sort_memory sort{};
     std::uint64_t capacity = 0;    // fragments
     tile_counts tiles{};           // or none
@@ -175,7 +224,10 @@ struct sort_preparation {
         if (places != nullptr && thread == 0) *places = asked.page != nullptr ? *asked.page : asked.value;
         if (tiles.words != nullptr)
             for (std::uint64_t i = thread; i < tile_counts::num(capacity); i += threads) tiles.words[i] = 0;
-        if (sorts) sort.zero(capacity, thread, threads);
+        if (counting.is_used())
+            counting.zero(thread, threads);
+        else if (sorts)
+            sort.zero(capacity, thread, threads);
     }
 };
 
@@ -192,9 +244,9 @@ struct order_memory {
     }
 };
 
-// keys: the voxels of the fragments, ascending; from: their primitives, in any order within a voxel, overwritten;
-// spare: room for as many, which may be where the keys are. The lists go where `asked` says, in device memory, or
-// `here` where that has no voxels.
+// keys: the voxels of the fragments, ascending, or null where a counting sort has listed the voxels, and `starts` is
+// its own; from: their primitives, in any order within a voxel, overwritten; spare: room for as many, which may be
+// where the keys are. The lists go where `asked` says, in device memory, or `here` where that has no voxels.
 struct order_buffers {
     const std::uint32_t* keys;
     std::uint32_t* from;
@@ -204,6 +256,7 @@ struct order_buffers {
     tile_counts tiles;
     order_lists lists;
     int primitive_bits = 32; // of the largest primitive
+    const std::uint32_t* starts = nullptr;
 
     [[nodiscard]] __device__ VOXELPIPE_INLINE const list_places& places() const {
         return asked->voxels != nullptr ? *asked : here;
