@@ -4,8 +4,6 @@
 #include "cell_factories.hpp"
 #include "framebuffer_cell.cuh"
 
-#include <voxelpipe/device/abuffer_async.cuh>
-
 namespace bench::gpu {
 
 namespace {

@@ -25,6 +25,7 @@ public:
         const vp::status s = call();
         EXPECT_EQ(cudaStreamEndCapture(stream, &graph_), cudaSuccess);
         EXPECT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(cudaGraphGetNodes(graph_, nullptr, &num_nodes_), cudaSuccess);
         EXPECT_EQ(cudaGraphInstantiate(&instance_, graph_, 0), cudaSuccess);
     }
     captured_graph(const captured_graph&) = delete;
@@ -33,11 +34,13 @@ public:
         cudaGraphExecDestroy(instance_);
         cudaGraphDestroy(graph_);
     }
+    [[nodiscard]] std::size_t num_nodes() const { return num_nodes_; }
     void launch(cudaStream_t stream) const { ASSERT_EQ(cudaGraphLaunch(instance_, stream), cudaSuccess); }
 
 private:
     cudaGraph_t graph_ = nullptr;
     cudaGraphExec_t instance_ = nullptr;
+    std::size_t num_nodes_ = 0; // kernels and whatever else
 };
 
 // Meshes with the same triangles and other vertices, of which the first is on the device.
@@ -264,6 +267,34 @@ TEST(Graph, ListsWithoutLongVoxels) {
     compare_without_long_voxels<void>(vp::constant(true), false);
     compare_without_long_voxels<double>(vp::constant(0.5), false);
     compare_without_long_voxels<double>(any_double{}, true);
+}
+
+// By the number of launches: kernels for long voxels, for dense ones and for merges of more than 2^12 fragments are
+// left out where they are not asked for or cannot be needed; a counting sort is three kernels, a radix sort of ten bits
+// two.
+TEST(Graph, ListsLaunchWhatTheyNeed) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, decltype(vp::constant(true))>;
+    stream_owner owner;
+    vp::cuda_backend be{owner.stream};
+    const mesh_data m = mixed_triangles(2000, 10.0f, 110);
+    const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+    const draw_type d{mesh.view(), {}, vp::constant(true)};
+    const std::span<const draw_type> draws(&d, 1);
+    const auto num_nodes = [&](const vp::grid& g, std::uint64_t fragments, bool orders_long_voxels) {
+        const vp::workspace_limits limits{0, 0, fragments, 1 << 10, false, orders_long_voxels};
+        vp::abuffer_view<> lists;
+        const std::size_t bytes = vp::workspace_bytes(draws, g, lists, {}, limits);
+        const vp::cuda_backend::buffer<std::byte> memory(be, bytes);
+        const vp::workspace_view workspace{const_cast<std::byte*>(memory.data()), bytes, limits};
+        return captured_graph(be.stream, [&] { return vp::voxelize_async(be, draws, g, lists, {}, workspace); })
+            .num_nodes();
+    };
+    const vp::grid g = box_grid({10, 10, 10});
+    const std::uint64_t counted = 2 * m.triangles.size(), block = vp::device::most_of_block;
+    EXPECT_EQ(num_nodes(g, counted, false), num_nodes(g, counted + 1, false) + 1);
+    EXPECT_EQ(num_nodes(g, block, true), num_nodes(g, block, false) + 1);
+    EXPECT_EQ(num_nodes(g, block + 1, true), num_nodes(g, block + 1, false) + 3);
+    EXPECT_EQ(num_nodes(g, vp::device::most_of_window, true), num_nodes(g, vp::device::most_of_window, false));
 }
 
 // A blend that needs an order, which long voxels do not get: the target stays as it was.
