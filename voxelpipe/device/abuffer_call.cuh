@@ -17,8 +17,8 @@
 
 namespace voxelpipe::device {
 
-// Fragments a voxel, on average, from which on they are sorted by counting: with 16 and 21, as on hairball, that took 2
-// % longer than the radix sort, and with 35 and more 10 to 20 % less (whole calls at 128^3 on an H200).
+// Fragments a voxel, on average, from which on they are sorted by counting: with 16 and 21, as on hairball, that took
+// 1 to 3 % longer than the radix sort, and with 35 and more 9 to 19 % less (whole calls at 128^3 on an H200).
 inline constexpr std::uint64_t least_counted = 24;
 
 template <class Draw, class Payload>

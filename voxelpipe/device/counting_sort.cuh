@@ -222,7 +222,8 @@ struct counted_pairs {
     std::uint32_t *voxels, *primitives;
 };
 
-// Puts listed fragments in order into b.places(), and lists the voxels; b.from: room for the primitives.
+// Puts listed fragments in order into b.places(), and lists the voxels; b.from: room for the primitives. The last stage
+// is not ended.
 inline void order_by_counting(order_buffers b, const counted_pairs& pairs, const counting_memory& m,
                               std::uint64_t num_primitives, pipeline_state* state, const capacities& limits,
                               cudaStream_t stream, stage_clock* clock) {
@@ -242,7 +243,6 @@ inline void order_by_counting(order_buffers b, const counted_pairs& pairs, const
                   pairs.primitives, b.from, count, m);
     end_stage(clock, &stage_times::tile_sort);
     order_fragments(b, num_primitives, state, limits, stream);
-    end_stage(clock, &stage_times::abuffer_emit);
 }
 
 } // namespace voxelpipe::device
