@@ -420,12 +420,19 @@ TEST(Pipeline, LaunchesFillTheDevice) {
         const std::uint64_t items = std::uint64_t{1} << bit;
         EXPECT_EQ(vp::device::fill_device(items), 8 * multiprocessors) << bit;
         EXPECT_EQ(vp::device::fill_device(items, 4), 4 * multiprocessors) << bit;
-        EXPECT_GE(vp::device::raster_blocks(items, 8), multiprocessors) << bit;
-        EXPECT_LE(vp::device::raster_blocks(items, 8), static_cast<unsigned>(properties.maxGridSize[0])) << bit;
     }
     EXPECT_EQ(vp::device::fill_device(0), 1u);
     EXPECT_EQ(vp::device::num_blocks(0), 1u);
-    EXPECT_GE(vp::device::raster_blocks(1, 8), 1u);
+    for (std::uint64_t bit = 0; bit <= 32; ++bit) {
+        const auto items = static_cast<std::uint32_t>((std::uint64_t{1} << bit) - (bit == 32 ? 1 : 0));
+        const std::uint64_t blocks = vp::device::raster_blocks(items, 8);
+        const std::uint64_t in_round = blocks * vp::device::raster_threads;
+        const std::uint64_t rounds = (items + in_round - 1) / in_round;
+        EXPECT_LE(rounds, vp::device::warp_triangles::most_rounds) << bit;
+        EXPECT_GE(blocks, std::min<std::uint64_t>(multiprocessors, (items + 127) / 128)) << bit;
+        EXPECT_LT((blocks - 1) * vp::device::raster_threads, items) << bit; // none without a triangle
+        EXPECT_LE(blocks, static_cast<unsigned>(properties.maxGridSize[0])) << bit;
+    }
 }
 
 // add_unordered is not the same bits: it stays within the rounding of its additions.

@@ -262,7 +262,7 @@ inline constexpr int rest_min_blocks = Call::sink::buffers            ? 4
 // sure of, and those of warps that have few.
 struct cube_queue {
     std::int32_t q[9][queue_places];
-    std::uint32_t triangle[queue_places];
+    std::uint32_t triangle[queue_places]; // by warp_triangles
 };
 struct no_queue {};
 
@@ -293,10 +293,11 @@ struct first_warp {
     unsigned& num_big;
     int num_cubes = 0; // that wait, of thin ones
 
-    // The lane's triangle i, where there is one: near() gives it. load_next() is called between coverage and blending,
-    // where few registers are in use.
+    // The lane's triangle i, where there is one, of this code: near() gives it. load_next() is called between coverage
+    // and blending, where few registers are in use.
     template <class Near, class LoadNext>
-    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, const Near& near, const LoadNext& load_next) {
+    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, std::uint32_t code, bool valid, const Near& near,
+                                           const LoadNext& load_next) {
         bool waits = false, is_big = false;
         bool is_inside = false;
         int most = 0;
@@ -331,7 +332,7 @@ struct first_warp {
                 const int at = take_place(is_cube && !sure, num_cubes);
                 if (is_cube && !sure) {
                     for (int k = 0; k < 9; ++k) memory.cubes.q[k][at] = r.q[k / 3][k % 3];
-                    memory.cubes.triangle[at] = i;
+                    memory.cubes.triangle[at] = code;
                 }
             }
             load_next();
@@ -343,7 +344,7 @@ struct first_warp {
                 });
         }
         if (__any_sync(0xffffffffu, waits || is_big)) {
-            writer.push(waits ? kind_of<Call::rule>(r, most) : -1, i);
+            writer.push(waits ? kind_of<Call::rule>(r, most) : -1, code);
             if (is_big) big[atomicAdd(&num_big, 1u)] = i; // no call of a function here: its registers would spill
         }
         __syncwarp();
@@ -360,7 +361,7 @@ struct first_warp {
         r.is_near = true;
         r.find_box(call.in.fraction);
         feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
-            sink.begin(memory.cubes.triangle[at]);
+            sink.begin(warp_triangles::of(memory.cubes.triangle[at]));
             raster_tiny<Call::rule>(call.in, r, sink);
         });
         __syncwarp();
@@ -377,21 +378,22 @@ struct first_warp {
             corners_type corners;
             if (valid) corners = load_corners(call.in, index);
             index = load_index(call.in, begin + step + lane);
-            for (std::uint32_t first = begin; first < num; first += step) {
+            for (std::uint32_t first = begin, code = lane; first < num; first += step, code += 32) {
                 const std::uint32_t next = first + step + lane;
                 const glm::uvec3 index_of_second = load_index(call.in, next + step);
                 const auto near = [&]() VOXELPIPE_INLINE_LAMBDA { return make_near(call.in, corners); };
-                batch(first + lane, valid, near, [&]() VOXELPIPE_INLINE_LAMBDA {
+                batch(first + lane, code, valid, near, [&]() VOXELPIPE_INLINE_LAMBDA {
                     valid = next < num && sink.check(index);
                     if (valid) corners = load_corners(call.in, index);
                 });
                 index = index_of_second;
             }
         } else {
-            for (std::uint32_t first = begin; first < num; first += step) {
+            for (std::uint32_t first = begin, code = lane; first < num; first += step, code += 32) {
                 const glm::uvec3 next = load_index(call.in, first + step + lane);
                 const auto near = [&]() VOXELPIPE_INLINE_LAMBDA { return load_near(call.in, index); };
-                batch(first + lane, first + lane < num && sink.check(index), near, []() VOXELPIPE_INLINE_LAMBDA {});
+                batch(first + lane, code, first + lane < num && sink.check(index), near,
+                      []() VOXELPIPE_INLINE_LAMBDA {});
                 index = next;
             }
         }
@@ -411,7 +413,7 @@ __global__ __launch_bounds__(raster_threads,
                                                                                pipeline_state* state) {
     using sink_type = typename Call::sink;
     __shared__ first_memory<Call> memories[raster_warps];
-    __shared__ int left[num_triangle_kinds][raster_warps];
+    __shared__ unsigned places[num_triangle_kinds][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_big;
     const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
     await_stream();
@@ -428,7 +430,7 @@ __global__ __launch_bounds__(raster_threads,
     const unsigned looked_at = warp.run(index);
     __syncthreads();
     cut_big(call, sink, warp.big, num_big);
-    writer.finish([&](int w) -> const kind_queues& { return memories[w].kinds; }, left);
+    writer.finish(places);
     sink.finish(state);
     count_looked_at(looked_at, dropped, state);
 }
@@ -589,12 +591,13 @@ inline void find_most_index(const array_view<const glm::uvec3>& triangles, std::
                   std::uint64_t{3} * triangles.size(), most);
 }
 
-// Blocks of the first kernel: what fits the device at once.
-[[nodiscard]] inline unsigned raster_blocks(std::uint64_t num_triangles, int per_multiprocessor) {
-    const std::uint64_t batches = (num_triangles + raster_threads - 1) / raster_threads;
-    const std::uint64_t most =
-        static_cast<std::uint64_t>(num_multiprocessors()) * static_cast<unsigned>(per_multiprocessor);
-    return static_cast<unsigned>(batches < most ? batches : most);
+// Blocks of the first kernel: what fits the device at once, but more where it is so small that there would be more
+// rounds of them than warp_triangles can number.
+[[nodiscard]] inline unsigned raster_blocks(std::uint32_t num_triangles, int per_multiprocessor) {
+    const auto ceil = [](std::uint32_t n, std::uint32_t of) { return n / of + (n % of != 0 ? 1 : 0); };
+    const std::uint32_t batches = ceil(num_triangles, raster_threads);
+    const auto at_once = static_cast<std::uint32_t>(num_multiprocessors() * per_multiprocessor);
+    return std::min(batches, std::max(at_once, ceil(batches, warp_triangles::most_rounds)));
 }
 
 // is_first: whether these are a call's first kernels. They read indices before they await the stream, which the

@@ -11,15 +11,17 @@
 
 namespace voxelpipe::device {
 
-// Room: fragments that may wait in a warp's shared memory.
-template <class Call, unsigned Room>
+// Room: fragments that may wait in a warp's shared memory. FlushAt: from how many on they go to the list, by an atomic
+// on the same word for all warps of the device (see kind_queues), so that there should be many; what 32 triangles bring
+// should fit behind what is less, or they have to come twice.
+template <class Call, unsigned Room, unsigned FlushAt>
 struct listing_sink : direct_sink<Call> {
     static constexpr bool buffers = true;
     static constexpr bool shares = false;
     static constexpr bool spreads = true;
     static constexpr bool has_rounds = true;
     static constexpr unsigned room = Room;
-    static constexpr unsigned flush_at = 64; // less may wait: a round of thin triangles brings up to 384
+    static constexpr unsigned flush_at = FlushAt;
     struct memory {
         std::uint32_t voxels[room], primitives[room];
         unsigned n;
@@ -188,10 +190,11 @@ private:
 };
 
 struct list_output {
+    // With the queues, less than 48 KB for a block. Of 2 x 2 x 2 voxels a triangle has up to eight, a thin one four.
     template <class Call>
-    using sink = listing_sink<Call, 448>; // with the queues, less than 48 KB for a block
+    using sink = listing_sink<Call, 448, Call::rule == coverage::thin ? 448 - 32 * 4 : 448 - 32 * 8>;
     template <class Call>
-    using rest_sink = listing_sink<Call, 960>; // fewer blocks, and triangles of many rows
+    using rest_sink = listing_sink<Call, 960, 192>; // fewer blocks, and triangles of many rows
     static constexpr bool hands_on = true;
     static constexpr bool only_sets = false;
     static constexpr bool only_blends = false;

@@ -52,6 +52,15 @@ __device__ inline void count_looked_at(unsigned looked_at, const unsigned (&drop
     if (all != none) atomicAdd(&state->drawn, all - none);
 }
 
+// The triangles of a warp whose blocks of raster_threads go through the mesh one after the other, round by round. In
+// 16 bits: 32 times the number of the round, and the lane. What it takes is there anyway, and in no register meanwhile.
+struct warp_triangles {
+    static constexpr std::uint32_t most_rounds = 1u << 11;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static std::uint32_t of(std::uint32_t code) {
+        return (code / 32 * gridDim.x + blockIdx.x) * raster_threads + threadIdx.x / 32 * 32 + code % 32;
+    }
+};
+
 struct triangle_lists {
     // Two lists share an array, from both ends: a triangle is in one list only.
     std::uint32_t* arrays[num_triangle_kinds / 2];
@@ -72,7 +81,8 @@ struct triangle_lists {
     [[nodiscard]] static triangle_lists take(arena& memory, std::size_t num_triangles) {
         triangle_lists l{};
         // Parts are whole batches of all threads of a persistent kernel.
-        const auto threads = static_cast<std::size_t>(num_multiprocessors()) * 2048;
+        const std::size_t threads = std::max(static_cast<std::size_t>(num_multiprocessors()) * 2048,
+                                             num_triangles / warp_triangles::most_rounds + raster_threads);
         l.big = memory.take<std::uint32_t>(num_triangles + std::min(threads, num_triangles + 2048));
         for (auto& array : l.arrays) array = memory.take<std::uint32_t>(num_triangles);
         l.capacity = static_cast<std::uint32_t>(num_triangles);
@@ -133,9 +143,13 @@ __device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
     return place;
 }
 
-// What of each kind waits in a warp for its list; the numbers are registers that all lanes agree on.
+// What of each kind waits in a warp for its list, by warp_triangles; the numbers are registers that all lanes agree on.
+// The lengths of the lists are the same words for all warps of the device, and an atomic that brings them back keeps
+// that part of L2 from what else lies there: with one for 32 triangles, first kernels waited for it, and took some 20 %
+// more or less by where the state and the target lay.
 struct kind_queues {
-    std::uint32_t triangles[num_triangle_kinds][queue_places];
+    static constexpr int places = 128, at_once = places - 32;
+    std::uint16_t triangles[num_triangle_kinds][places];
 };
 
 struct kind_writer {
@@ -144,43 +158,50 @@ struct kind_writer {
     int waiting[num_triangle_kinds] = {};
 
     // Every lane with a kind from 0 on adds its triangle. All lanes take part.
-    __device__ VOXELPIPE_INLINE void push(int kind, std::uint32_t triangle) {
+    __device__ VOXELPIPE_INLINE void push(int kind, std::uint32_t code) {
         const unsigned kinds = __reduce_or_sync(0xffffffffu, kind < 0 ? 0 : 1u << kind); // one or two, mostly
         for (int k = 0; k < num_triangle_kinds; ++k) {
             if ((kinds >> k & 1u) == 0) continue;
             const int place = take_place(kind == k, waiting[k]);
-            if (kind == k) queues.triangles[k][place] = triangle;
-            if (waiting[k] < 32) continue;
+            if (kind == k) queues.triangles[k][place] = static_cast<std::uint16_t>(code);
+            if (waiting[k] < kind_queues::at_once) continue;
             __syncwarp();
-            waiting[k] -= 32;
-            const unsigned long long first = take(k, 32);
-            const unsigned lane = threadIdx.x % 32;
-            lists.at(k, first + lane) = queues.triangles[k][waiting[k] + static_cast<int>(lane)];
+            waiting[k] -= kind_queues::at_once;
+            write(k, take(k, kind_queues::at_once), waiting[k], kind_queues::at_once);
             __syncwarp();
         }
     }
-    // What is left in the queues of all warps of a block. All threads take part; `left` is shared memory.
-    // queues_of(w): those of warp w.
-    template <int Warps, class QueuesOf>
-    __device__ VOXELPIPE_INLINE void finish(const QueuesOf& queues_of, int (&left)[num_triangle_kinds][Warps]) {
-        const int lane = static_cast<int>(threadIdx.x) % 32, warp = static_cast<int>(threadIdx.x) / 32;
+    // What is left in the queues of all warps of a block, which takes room for them together. All threads take part;
+    // `places` is shared memory.
+    template <int Warps>
+    __device__ VOXELPIPE_INLINE void finish(unsigned (&places)[num_triangle_kinds][Warps]) {
+        const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32;
         if (lane == 0)
-            for (int k = 0; k < num_triangle_kinds; ++k) left[k][warp] = waiting[k];
+            for (int k = 0; k < num_triangle_kinds; ++k) places[k][warp] = static_cast<unsigned>(waiting[k]);
         __syncthreads();
-        for (int k = warp; k < num_triangle_kinds; k += Warps) {
-            unsigned n = 0;
-            for (int w = 0; w < Warps; ++w) n += static_cast<unsigned>(left[k][w]);
-            if (n == 0) continue;
-            unsigned long long first = take(k, n);
-            for (int w = 0; w < Warps; ++w) {
-                if (lane < left[k][w])
-                    lists.at(k, first + static_cast<unsigned>(lane)) = queues_of(w).triangles[k][lane];
-                first += static_cast<unsigned>(left[k][w]);
+        for (int k = static_cast<int>(warp); k < num_triangle_kinds; k += Warps) {
+            unsigned n = 0, before = 0;
+            for (unsigned w = 0; w < Warps; ++w) {
+                before += w < lane ? places[k][w] : 0;
+                n += places[k][w];
             }
+            if (n == 0) continue;
+            __syncwarp();
+            const auto first = static_cast<unsigned>(take(k, n)); // there are fewer than 2^32
+            if (lane < Warps) places[k][lane] = first + before;
         }
+        __syncthreads();
+        for (int k = 0; k < num_triangle_kinds; ++k)
+            if (waiting[k] != 0) write(k, places[k][warp], 0, waiting[k]);
     }
 
 private:
+    // What waits from `at` on, n of a kind, into its list from place `first` on.
+    __device__ VOXELPIPE_INLINE void write(int kind, unsigned long long first, int at, int n) const {
+#pragma unroll 1
+        for (int i = static_cast<int>(threadIdx.x) % 32; i < n; i += 32)
+            lists.at(kind, first + static_cast<unsigned>(i)) = warp_triangles::of(queues.triangles[kind][at + i]);
+    }
     // Room for n of a kind.
     [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long take(int kind, unsigned n) const {
         unsigned long long first = 0;
