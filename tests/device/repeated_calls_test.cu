@@ -130,6 +130,17 @@ TEST(RepeatedCalls, WithoutTiles) {
     repeat_everywhere<vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>>(vp::constant(true, 0.1f));
 }
 
+// Counters that the host does not look for, since its threads are to sleep while they wait for the device.
+TEST(RepeatedCalls, WhereThreadsSleep) {
+    unsigned before = 0, now = 0;
+    ASSERT_EQ(cudaGetDeviceFlags(&before), cudaSuccess);
+    ASSERT_EQ(cudaSetDeviceFlags(cudaDeviceScheduleBlockingSync), cudaSuccess);
+    ASSERT_EQ(cudaGetDeviceFlags(&now), cudaSuccess);
+    EXPECT_NE(now & cudaDeviceScheduleBlockingSync, 0u);
+    repeat_everywhere<vp::target<vp::bit, blend::bit_or>>(vp::constant(true));
+    EXPECT_EQ(cudaSetDeviceFlags(before & cudaDeviceScheduleMask), cudaSuccess);
+}
+
 // Through tiles, and lists for the blend that needs an order.
 TEST(RepeatedCalls, ThroughTilesAndLists) {
     using first = vp::target<std::int32_t, blend::max>;

@@ -54,6 +54,15 @@ cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int) {
     properties->maxGridSize[0] = INT_MAX;
     return cudaSuccess;
 }
+static unsigned device_flags = cudaDeviceScheduleAuto;
+cudaError_t cudaGetDeviceFlags(unsigned* flags) {
+    *flags = device_flags;
+    return cudaSuccess;
+}
+cudaError_t cudaSetDeviceFlags(unsigned flags) {
+    device_flags = flags;
+    return cudaSuccess;
+}
 cudaError_t cudaDriverGetVersion(int* version) {
     *version = CUDART_VERSION;
     return cudaSuccess;
@@ -123,6 +132,7 @@ cudaError_t cudaStreamDestroy(cudaStream_t s) {
     return cudaSuccess;
 }
 cudaError_t cudaStreamSynchronize(cudaStream_t) { return cudaSuccess; }
+cudaError_t cudaStreamQuery(cudaStream_t) { return cudaSuccess; }
 cudaError_t cudaStreamBeginCapture(cudaStream_t s, cudaStreamCaptureMode) {
     if (s == nullptr || s->captures) return cudaErrorStreamCaptureUnsupported;
     s->captures = true;

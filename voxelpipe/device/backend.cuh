@@ -357,6 +357,7 @@ private:
         if (clock != nullptr) clock->start();
         if (zeroed_bytes_ < zeroed_bytes) device::check(cudaMemsetAsync(d_state, 0, zeroed_bytes, stream));
         zeroed_bytes_ = 0;
+        state_reader_.expect();
         const auto launch_and_send = [&](cudaStream_t on) {
             launch_all(on);
             state_reader_.send(d_state, on);

@@ -68,16 +68,33 @@ __global__ void zero_kernel(Word* memory, std::uint64_t words) {
         memory[i] = {};
 }
 
-// Moves the state to memory that the device can write, and leaves zeros for the next call. One warp.
+// A state on its way to the host, in words of which each says that it has arrived: whoever finds `arrived` in all of
+// them has the state, in whatever order they came, and sees all that the stream did before. No store waits for another.
 template <class State>
-__global__ void move_state_kernel(State* state, State* to) {
+struct sent_state {
+    static_assert(sizeof(State) % sizeof(std::uint32_t) == 0);
+    static constexpr unsigned count = sizeof(State) / sizeof(std::uint32_t);
+    static constexpr std::uint64_t arrived = std::uint64_t{1} << 32; // beside 32 bits of the state
+    std::uint64_t words[count];
+};
+
+// Sends the state to memory that the host sees, and leaves zeros for the next call. One warp.
+template <class State>
+__global__ void send_state_kernel(State* state, sent_state<State>* to) {
     await_stream();
-    using word = std::uint64_t;
-    static_assert(sizeof(State) % sizeof(word) == 0);
-    for (unsigned i = threadIdx.x; i < sizeof(State) / sizeof(word); i += 32) {
-        reinterpret_cast<word*>(to)[i] = reinterpret_cast<const word*>(state)[i];
-        reinterpret_cast<word*>(state)[i] = 0;
-    }
+    using sent = sent_state<State>;
+    std::uint32_t words[(sent::count + 31) / 32];
+    const auto each = [&](auto&& f) VOXELPIPE_INLINE_LAMBDA {
+#pragma unroll
+        for (unsigned k = 0; k < (sent::count + 31) / 32; ++k)
+            if (const unsigned i = 32 * k + threadIdx.x; i < sent::count) f(words[k], i);
+    };
+    each([&](std::uint32_t& word, unsigned i) { word = reinterpret_cast<const std::uint32_t*>(state)[i]; });
+    __threadfence_system();
+    each([&](std::uint32_t& word, unsigned i) {
+        *static_cast<volatile std::uint64_t*>(&to->words[i]) = sent::arrived | word;
+    });
+    each([&](std::uint32_t&, unsigned i) { reinterpret_cast<std::uint32_t*>(state)[i] = 0; });
 }
 
 // A snapped position in 32 bits, where it is no further than 2^30 units from the first voxel of what is rasterised. One

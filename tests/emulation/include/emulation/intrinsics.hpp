@@ -72,6 +72,7 @@ template <class T>
     return *p;
 }
 inline void __threadfence() {}
+inline void __threadfence_system() {}
 [[nodiscard]] inline std::size_t __cvta_generic_to_global(const void* p) { return reinterpret_cast<std::size_t>(p); }
 [[nodiscard]] inline std::size_t __cvta_generic_to_shared(const void* p) { return emulation::shared_address(p); }
 
