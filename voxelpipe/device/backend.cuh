@@ -9,6 +9,7 @@
 #include <voxelpipe/core/call_room.hpp>
 #include <voxelpipe/device/abuffer_call.cuh>
 #include <voxelpipe/device/call_graph.cuh>
+#include <voxelpipe/device/check_indices.cuh>
 #include <voxelpipe/device/framebuffer_call.cuh>
 #include <voxelpipe/device/state_reader.cuh>
 

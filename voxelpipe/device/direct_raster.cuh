@@ -34,40 +34,6 @@ struct direct_call {
     triangle_lists lists;
 };
 
-// ---- kernels --------------------------------------------------------------------------------------------------------
-
-// Before anything is written: whether every index is one of a vertex.
-template <class Index>
-__global__ void check_indices_kernel(const Index* indices, std::uint64_t count, Index num_vertices,
-                                     pipeline_state* state) {
-    await_stream();
-    bool bad = false;
-    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
-    std::uint64_t done = 0;
-    if (reinterpret_cast<std::uintptr_t>(indices) % 16 == 0) {
-        for (std::uint64_t i = thread; i < count / 4; i += threads) {
-            const uint4 v = __ldg(reinterpret_cast<const uint4*>(indices) + i);
-            bad = bad || v.x >= num_vertices || v.y >= num_vertices || v.z >= num_vertices || v.w >= num_vertices;
-        }
-        done = count / 4 * 4;
-    }
-    for (std::uint64_t i = done + thread; i < count; i += threads) bad = bad || indices[i] >= num_vertices;
-    if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, 1u);
-}
-
-// The greatest index, where `most` was 0.
-template <class Index>
-__global__ void most_index_kernel(const Index* indices, std::uint64_t count, Index* most) {
-    await_stream();
-    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
-    Index mine = 0;
-    for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < count; i += threads)
-        mine = indices[i] > mine ? indices[i] : mine;
-    mine = __reduce_max_sync(0xffffffffu, mine);
-    if (threadIdx.x % 32 == 0) atomicMax(most, mine);
-}
-
 // What every sink of a direct call does with triangles that are not drawn.
 template <class Call>
 struct direct_sink {
@@ -576,28 +542,12 @@ __global__ __launch_bounds__(raster_threads,
     }
 }
 
-inline void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangles, std::uint64_t num_vertices,
-                          pipeline_state* state, cudaStream_t stream) {
-    launch_behind(check_indices_kernel<std::uint32_t>, fill_device(num_triangles), threads_per_block, stream,
-                  stage::coarse_raster, reinterpret_cast<const std::uint32_t*>(triangles), 3 * num_triangles,
-                  static_cast<std::uint32_t>(num_vertices), state);
-}
-
-// Of some triangles, none of which there may be.
-inline void find_most_index(const array_view<const glm::uvec3>& triangles, std::uint32_t* most, cudaStream_t stream) {
-    if (triangles.size() == 0) return;
-    launch_behind(most_index_kernel<std::uint32_t>, fill_device(triangles.size()), threads_per_block, stream,
-                  stage::validate, reinterpret_cast<const std::uint32_t*>(triangles.data()),
-                  std::uint64_t{3} * triangles.size(), most);
-}
-
 // Blocks of the first kernel: what fits the device at once, but more where it is so small that there would be more
 // rounds of them than warp_triangles can number.
 [[nodiscard]] inline unsigned raster_blocks(std::uint32_t num_triangles, int per_multiprocessor) {
-    const auto ceil = [](std::uint32_t n, std::uint32_t of) { return n / of + (n % of != 0 ? 1 : 0); };
-    const std::uint32_t batches = ceil(num_triangles, raster_threads);
+    const std::uint32_t batches = core::blocks_for_each(num_triangles, raster_threads);
     const auto at_once = static_cast<std::uint32_t>(num_multiprocessors() * per_multiprocessor);
-    return std::min(batches, std::max(at_once, ceil(batches, warp_triangles::most_rounds)));
+    return std::min(batches, std::max(at_once, core::blocks_for_each(batches, warp_triangles::most_rounds)));
 }
 
 // is_first: whether these are a call's first kernels. They read indices before they await the stream, which the

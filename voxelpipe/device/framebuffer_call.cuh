@@ -8,6 +8,7 @@
 
 #include <voxelpipe/device/call_graph.cuh>
 #include <voxelpipe/device/call_memory.cuh>
+#include <voxelpipe/device/check_indices.cuh>
 #include <voxelpipe/device/clear_target.cuh>
 #include <voxelpipe/device/counted_target.cuh>
 #include <voxelpipe/device/direct_raster.cuh>
