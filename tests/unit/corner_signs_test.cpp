@@ -9,10 +9,12 @@
 #include "test_support.hpp"
 
 #include <voxelpipe/core/corner_signs.hpp>
+#include <voxelpipe/core/slim_box.hpp>
 #include <voxelpipe/core/small_conservative.hpp>
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cstdint>
 #include <map>
 #include <utility>
@@ -102,6 +104,44 @@ TEST(CornerSigns, ThreeVoxelsASide) {
     EXPECT_GT(compared, unit::cases(60000));
     EXPECT_GT(sure, compared / 10 * 8);
     EXPECT_GT(full, compared / 100);
+}
+
+TEST(CornerSigns, ThreeVoxelsAlongOneAxis) {
+    boxed_triangles g;
+    int compared = 0, sure = 0, partly = 0, lines = 0, flat[3] = {}, full[3] = {};
+    for (const int fraction : {12, 13, 14, 15, 16}) {
+        g.fraction = fraction;
+        for (int i = 0; i < unit::cases(200000); ++i) {
+            boxed_triangle t{};
+            if (!g.triangle(3, t) || !is_slim(t.last)) continue;
+            ++compared;
+            const slim_rows slim = slim_rows_by_signs(t.q, t.lo, t.last, fraction);
+            if (slim.bits == 0) {
+                ASSERT_GT(t.wide(), 1);
+                continue;
+            }
+            ++sure;
+            const int axis = t.last[0] == 2 ? 0 : t.last[1] == 2 ? 1 : 2;
+            if (t.last[axis] == 2) ++(t.wide() == 1 ? lines : t.wide() == 2 ? flat[axis] : full[axis]);
+            ASSERT_EQ(slim.along_y, axis == 1 && t.last[1] == 2);
+            if (std::popcount(slim.bits) < (t.last[0] + 1) * (t.last[1] + 1) * (t.last[2] + 1)) ++partly;
+            rows found;
+            for (int row = 0; row < 8; ++row) {
+                const std::uint32_t bits = slim.bits >> 4 * row & 15u;
+                if (bits != 0) found[slim.along_y ? std::pair(row / 2, row % 2) : std::pair(row % 2, row / 2)] = bits;
+            }
+            const rows expected = by_integers(t, fraction, {{0, 0, 0}, {t.last[0], t.last[1], t.last[2]}});
+            ASSERT_EQ(found, expected) << "fraction " << fraction << ", triangle " << i;
+        }
+    }
+    EXPECT_GT(compared, unit::cases(60000));
+    EXPECT_GT(sure, compared / 10 * 8);
+    EXPECT_GT(partly, compared / 20);
+    EXPECT_GT(lines, compared / 200);
+    for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_GT(flat[axis], compared / 200);
+        EXPECT_GT(full[axis], compared / 200);
+    }
 }
 
 // What rounding decides is not decided: every vertex and edge on the grid.

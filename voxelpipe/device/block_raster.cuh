@@ -58,8 +58,7 @@ struct block_warp {
     // these vertices.
     __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, bool has_next, const glm::uvec3& next) {
         bool waits = false, is_big = false;
-        bool is_inside = false;
-        int most = 0;
+        int inside = 0, most = 0;
         bool is_done = false;
         near_triangle r;
         r = corners.take(call.in);
@@ -67,8 +66,8 @@ struct block_warp {
         if (valid) {
             most = r.most();
             is_big = !r.is_near || most > most_medium_side(call.in.fraction);
-            is_inside = r.is_inside(call.in.extent);
-            if (!is_big && !is_inside && r.template is_outside<Call::rule>(call.in.extent))
+            inside = r.inside(call.in.extent);
+            if (!is_big && inside < 0 && r.template is_outside<Call::rule>(call.in.extent))
                 sink.drop(triangle_class::outside);
             else
                 waits = !is_big;
@@ -81,9 +80,9 @@ struct block_warp {
                 if (is_done) give_thin_cube(call.in, r, cube, sink);
             }
         } else {
-            const core::sure_bits cube = find_cube(call.in, waits && most <= 2, r, is_inside);
-            is_done = cube.sure;
-            if (is_done) give_cube(r, cube.bits, sink);
+            const word bits = find_cube(call.in, waits && most <= 2, r, inside);
+            is_done = bits != 0;
+            if (is_done) give_cube(r, bits, sink);
         }
         waits = waits && !is_done;
         if (__any_sync(0xffffffffu, waits || is_big)) {

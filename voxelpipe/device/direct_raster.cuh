@@ -120,6 +120,13 @@ struct blending_sink : direct_sink<Call> {
                 mine.touched += blend_cube(t, x, y, z, voxels, value_of<K>(), mode);
         });
     }
+    // As in blend_slim.
+    __device__ VOXELPIPE_INLINE void slim(int x, int y, int z, const core::slim_rows& rows) {
+        mine.fragments += static_cast<unsigned>(__popc(rows.bits));
+        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
+            mine.touched += blend_slim(t, x, y, z, rows, value_of<K>(), mode);
+        });
+    }
     // One voxel. Lanes that come here together may have the same.
     __device__ VOXELPIPE_INLINE void one(int x, int y, int z) {
         ++mine.fragments;
@@ -232,6 +239,11 @@ struct cube_queue {
 };
 struct no_queue {};
 
+// Of a warp's 32 triangles, so many whose boxes are three voxels long at least are drawn where they are read, with all
+// smaller ones, by instructions that cost half as much again as without them; fewer are handed on.
+inline constexpr int least_slim = 3;
+inline constexpr int big_side = 64; // of what is cut into pieces: beyond most_medium_side
+
 // What one warp of the first kernel keeps in shared memory.
 template <class Call>
 struct first_memory {
@@ -264,32 +276,33 @@ struct first_warp {
     template <class Near, class LoadNext>
     __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, std::uint32_t code, bool valid, const Near& near,
                                            const LoadNext& load_next) {
-        bool waits = false, is_big = false;
-        bool is_inside = false;
-        int most = 0;
+        // Of what is left to do, the longest side of the bounding box, or big_side. Not a few bools (see inside()).
+        int side = 0, inside = 0;
         near_triangle r;
         if (valid) {
             r = near();
-            most = r.most();
-            is_big = !r.is_near || most > most_medium_side(call.in.fraction);
-            is_inside = r.is_inside(call.in.extent);
-            if (!is_big && !is_inside && r.template is_outside<Call::rule>(call.in.extent))
+            side = r.most();
+            inside = r.inside(call.in.extent);
+            if (!r.is_near || side > most_medium_side(call.in.fraction)) {
+                side = big_side;
+            } else if (inside < 0 && r.template is_outside<Call::rule>(call.in.extent)) {
                 sink.drop(triangle_class::outside);
-            else
-                waits = !is_big;
+                side = 0;
+            }
         }
-        const bool is_cube = waits && most <= 2;
         if constexpr (!thin) {
-            const core::sure_bits cube = find_cube(call.in, is_cube, r, is_inside);
-            load_next();
-            feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
-                if (!cube.sure) return;
-                sink.begin(i);
-                give_cube(r, cube.bits, sink);
-            });
-            waits = waits && !cube.sure;
+            if (!draws_slim(i, r, inside, side, load_next)) {
+                const word bits = find_cube(call.in, side != 0 && side <= 2, r, inside);
+                load_next();
+                feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                    if (bits == 0) return;
+                    sink.begin(i);
+                    give_cube(r, bits, sink);
+                });
+                side = bits != 0 ? 0 : side;
+            }
         } else {
-            waits = waits && !is_cube;
+            const bool is_cube = side != 0 && side <= 2;
             const bool at_once = __popc(__ballot_sync(0xffffffffu, is_cube)) >= least_thin_cubes;
             bool sure = false;
             core::thin_cube cube{};
@@ -308,14 +321,34 @@ struct first_warp {
                     sink.begin(i);
                     give_thin_cube(call.in, r, cube, sink);
                 });
+            side = is_cube ? 0 : side;
         }
-        if (__any_sync(0xffffffffu, waits || is_big)) {
-            writer.push(waits ? kind_of<Call::rule>(r, most) : -1, code);
-            if (is_big) big[atomicAdd(&num_big, 1u)] = i; // no call of a function here: its registers would spill
+        if (__any_sync(0xffffffffu, side != 0)) {
+            writer.push(side != 0 && side != big_side ? kind_of<Call::rule>(r, side) : -1, code);
+            // No call of a function here: its registers would spill.
+            if (side == big_side) big[atomicAdd(&num_big, 1u)] = i;
         }
         __syncwarp();
         if constexpr (thin)
             if (num_cubes >= 32) drain_cubes();
+    }
+
+    // Whether this warp has drawn what has slim boxes: conservative triangles, where it has some of three voxels.
+    template <class LoadNext>
+    __device__ VOXELPIPE_INLINE bool draws_slim(std::uint32_t i, const near_triangle& r, int inside, int& side,
+                                                const LoadNext& load_next) {
+        if (__popc(__ballot_sync(0xffffffffu, side == 3)) < least_slim) return false;
+        core::slim_rows rows{};
+        if (side != 0 && side <= 3 && inside >= 0 && core::is_slim(r.last))
+            rows = core::slim_rows_by_signs(r.q, r.lo, r.last, call.in.fraction);
+        load_next();
+        feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+            if (rows.bits == 0) return;
+            sink.begin(i);
+            sink.slim(r.lo[0], r.lo[1], r.lo[2], rows);
+        });
+        side = rows.bits != 0 ? 0 : side;
+        return true;
     }
 
     // The last 32 cubes that wait.

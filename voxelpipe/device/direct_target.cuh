@@ -9,6 +9,7 @@
 // until the end of the call (counted_target.cuh).
 
 #include <voxelpipe/core/repeated_fold.hpp>
+#include <voxelpipe/core/slim_box.hpp>
 #include <voxelpipe/device/atomics.cuh>
 #include <voxelpipe/framebuffer.hpp>
 
@@ -482,6 +483,55 @@ __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, in
             const int i = __ffs(static_cast<int>(voxels)) - 1;
             touched += blend_row(t, x + i % 2, y + i / 2 % 2, z + i / 4, 1u, value, mode);
         }
+    }
+    return touched;
+}
+
+// Fragments of one value in rows of a slim box from (x, y, z) on, all of which lies in the extent. The rows' loads go out
+// together.
+template <class Target, class Value>
+__device__ VOXELPIPE_INLINE unsigned blend_slim(const target_view<Target>& t, int x, int y, int z,
+                                                const core::slim_rows& rows, const Value& value, direct_mode mode) {
+    constexpr int count = core::slim_rows::count;
+    if constexpr (has_word_rows<Target>) {
+        if (mode == direct_mode::blend) {
+            if (!changes_bits<Target>(value)) return 0;
+            constexpr bool sets = bit_blend<typename Target::blend_type>::sets;
+            const auto by_y = static_cast<std::uint32_t>((t.extent.x + 31) / 32);
+            const std::uint32_t by_z = by_y * static_cast<std::uint32_t>(t.extent.y);
+            const std::uint32_t even = rows.along_y ? by_y : by_z, odd = rows.along_y ? by_z : by_y;
+            const std::uint32_t first = word_of(t, x, y, z);
+            const int shift = x & 31;
+            word* at[count];
+            word missing[count];
+            for (unsigned k = 0; k < count; ++k) {
+                at[k] = word_at(t, first + k / 2 * even + k % 2 * odd);
+                missing[k] = (rows.bits >> 4 * k & 15u) << shift;
+            }
+            for (int k = 0; k < count; ++k)
+                if (missing[k] != 0) { // maybe an old word: what has changed stays so
+                    const word seen = __ldca(at[k]);
+                    missing[k] &= sets ? ~seen : seen;
+                }
+            for (int k = 0; k < count; ++k) reduce_word<Target>(at[k], missing[k]);
+            const word beyond = rows.bits & (shift < 30 ? 0u : shift == 30 ? 0x444444u : 0x666666u);
+            if (beyond != 0) { // in the words after them
+#pragma unroll 1
+                for (unsigned k = 0; k < count; ++k)
+                    reduce_word<Target>(word_at(t, first + k / 2 * even + k % 2 * odd + 1),
+                                        (beyond >> 4 * k & 15u) >> (32 - shift));
+            }
+            return 0;
+        }
+    }
+    unsigned touched = 0;
+#pragma unroll 1
+    for (int k = 0; k < count; ++k) {
+        const word bits = rows.bits >> 4 * k & 15u;
+        const int even = k / 2, odd = k % 2;
+        if (bits != 0)
+            touched += blend_row(t, x, y + (rows.along_y ? even : odd), z + (rows.along_y ? odd : even), bits, value,
+                                 mode);
     }
     return touched;
 }

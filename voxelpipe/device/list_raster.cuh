@@ -98,6 +98,15 @@ struct listing_sink : direct_sink<Call> {
             write(at++, first + (i & 1u) + ((i & 2u) != 0 ? row : 0) + ((i & 4u) != 0 ? slice : 0));
         }
     }
+    __device__ VOXELPIPE_INLINE void slim(int x, int y, int z, const core::slim_rows& rows) {
+        const std::uint32_t first = voxel(x, y, z), row = voxel(0, 1, 0), slice = voxel(0, 0, 1);
+        const std::uint32_t even = rows.along_y ? row : slice, odd = rows.along_y ? slice : row;
+        word bits = rows.bits;
+        for (unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(bits))); bits != 0; bits &= bits - 1) {
+            const unsigned i = static_cast<unsigned>(__ffs(static_cast<int>(bits)) - 1);
+            write(at++, first + (i & 3u) + ((i & 4u) != 0 ? odd : 0) + i / 8 * even);
+        }
+    }
     // Between triangles, by all lanes. True: the shared memory was too small for what came since the last time; it has
     // been counted and has to come once more, to be written to the list at once.
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool settle() {

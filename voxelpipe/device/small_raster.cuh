@@ -147,8 +147,10 @@ struct near_triangle {
         }
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE int most() const { return core::max3(last[0], last[1], last[2]) + 1; }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_inside(const glm::ivec3& extent) const {
-        return (lo[0] | lo[1] | lo[2] | (extent.x - 1 - hi[0]) | (extent.y - 1 - hi[1]) | (extent.z - 1 - hi[2])) >= 0;
+    // Negative where some of the box lies outside of the grid. Not a bool, which a register would be filled from and
+    // compared with zero, too, as often as it is asked for.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE int inside(const glm::ivec3& extent) const {
+        return lo[0] | lo[1] | lo[2] | (extent.x - 1 - hi[0]) | (extent.y - 1 - hi[1]) | (extent.z - 1 - hi[2]);
     }
     // Whether no voxel of the grid can be covered; a thin fragment may lie one voxel beyond the triangle's own depths.
     template <coverage Rule>
@@ -442,23 +444,25 @@ __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s,
            (box.hi[1] == 1 ? 0xffu : 0x33u) & (box.lo[2] == 0 ? 0xffu : 0xf0u) & (box.hi[2] == 1 ? 0xffu : 0x0fu);
 }
 // Conservative fragments within a bounding box of at most two voxels a side, most triangles of a fine mesh, of each
-// lane that wants them; not sure where that takes more bits than a float has: then raster_tiny. All lanes take part.
+// lane that wants them, as give_cube takes them. None where telling them takes more bits than a float has, or where
+// none lie in the grid: then raster_tiny. `inside`: of near_triangle. All lanes take part.
 template <class Source>
-[[nodiscard]] __device__ VOXELPIPE_INLINE core::sure_bits find_cube(const raster_input<Source>& call, bool wanted,
-                                                                    const near_triangle& r, bool inside) {
-    core::sure_bits cube{0, wanted};
+[[nodiscard]] __device__ VOXELPIPE_INLINE word find_cube(const raster_input<Source>& call, bool wanted,
+                                                         const near_triangle& r, int inside) {
+    word bits = 0;
     const int wide = wanted ? r.last[0] + r.last[1] + r.last[2] : 0; // along how many axes
     const bool all_ways = __any_sync(0xffffffffu, wide == 3);
     if (wanted) {
-        if (wide < 2) // a line is covered whole
-            cube.bits = core::cube_of(r.last);
-        else if (all_ways)
-            cube = core::cube_bits_by_signs(r.q, r.lo, r.last, call.fraction);
-        else
-            cube = core::quad_bits_by_signs(r.q, r.lo, r.last, call.fraction);
-        if (!inside) cube.bits &= cube_part(r.part(call.extent));
+        if (wide < 2) { // a line is covered whole
+            bits = core::cube_of(r.last);
+        } else {
+            const core::sure_bits cube = all_ways ? core::cube_bits_by_signs(r.q, r.lo, r.last, call.fraction)
+                                                  : core::quad_bits_by_signs(r.q, r.lo, r.last, call.fraction);
+            bits = cube.sure ? cube.bits : 0;
+        }
+        if (inside < 0) bits &= cube_part(r.part(call.extent));
     }
-    return cube;
+    return bits;
 }
 template <class Sink>
 __device__ VOXELPIPE_INLINE void give_cube(const near_triangle& r, word bits, Sink& sink) {
