@@ -123,9 +123,8 @@ struct blending_sink : direct_sink<Call> {
     // As in blend_slim.
     __device__ VOXELPIPE_INLINE void slim(int x, int y, int z, const core::slim_rows& rows) {
         mine.fragments += static_cast<unsigned>(__popc(rows.bits));
-        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
-            mine.touched += blend_slim(t, x, y, z, rows, value_of<K>(), mode);
-        });
+        each_target([&]<std::size_t K>(const auto& t, direct_mode mode)
+                        VOXELPIPE_INLINE_LAMBDA { mine.touched += blend_slim(t, x, y, z, rows, value_of<K>(), mode); });
     }
     // One voxel. Lanes that come here together may have the same.
     __device__ VOXELPIPE_INLINE void one(int x, int y, int z) {

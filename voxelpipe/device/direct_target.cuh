@@ -487,8 +487,8 @@ __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, in
     return touched;
 }
 
-// Fragments of one value in rows of a slim box from (x, y, z) on, all of which lies in the extent. The rows' loads go out
-// together.
+// Fragments of one value in rows of a slim box from (x, y, z) on, all of which lies in the extent. The rows' loads go
+// out together.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_slim(const target_view<Target>& t, int x, int y, int z,
                                                 const core::slim_rows& rows, const Value& value, direct_mode mode) {
@@ -530,8 +530,8 @@ __device__ VOXELPIPE_INLINE unsigned blend_slim(const target_view<Target>& t, in
         const word bits = rows.bits >> 4 * k & 15u;
         const int even = k / 2, odd = k % 2;
         if (bits != 0)
-            touched += blend_row(t, x, y + (rows.along_y ? even : odd), z + (rows.along_y ? odd : even), bits, value,
-                                 mode);
+            touched +=
+                blend_row(t, x, y + (rows.along_y ? even : odd), z + (rows.along_y ? odd : even), bits, value, mode);
     }
     return touched;
 }
