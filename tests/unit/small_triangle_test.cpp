@@ -194,6 +194,16 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
                         wanted.insert({x, y, z});
                 s.rows_of_16<true>(part, limits, into(by_sixteen));
                 ASSERT_EQ(by_sixteen, wanted) << "fraction " << fraction << ", triangle " << i;
+                by_sixteen.clear();
+                for (small_conservative::row_walk_16 walk(s, part, true, limits); !walk.is_done();)
+                    walk.next<true>(s, limits, into(by_sixteen));
+                ASSERT_EQ(by_sixteen, wanted) << "fraction " << fraction << ", triangle " << i;
+                if (max3(all.hi[0], all.hi[1], all.hi[2]) < 8) {
+                    for (auto walk = small_conservative::row_walk_8::of(s, part, true); !walk.is_done();)
+                        walk.next<true>(s, into(by_rows));
+                    ASSERT_EQ(by_rows, wanted) << "fraction " << fraction << ", triangle " << i;
+                    by_rows.clear();
+                }
                 if (part.hi[0] - part.lo[0] < 8) {
                     s.rows<true>(part, into(by_rows));
                     ASSERT_EQ(by_rows, wanted) << "fraction " << fraction << ", triangle " << i;
@@ -203,6 +213,8 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
             const small_box none{{1, 0, 0}, {0, all.hi[1], all.hi[2]}};
             s.rows<true>(none, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
             s.rows_of_16<true>(none, limits, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
+            ASSERT_TRUE(small_conservative::row_walk_8::of(s, none, true).is_done());
+            ASSERT_TRUE(small_conservative::row_walk_16(s, none, true, limits).is_done());
             const near_plane plane(s.n, s.below, s.above, from, true), as_it_is(s.n, s.below, s.above, from, false);
             for (int y = 0; y <= all.hi[1]; ++y)
                 for (int z = 0; z <= all.hi[2]; ++z) {

@@ -263,18 +263,38 @@ template <bool Swapped>
     return out;
 }
 
+// The rows of the box that something is left of, one by one.
+class row_walk_3 {
+public:
+    row_walk_3() = default; // none
+    VOXELPIPE_HD VOXELPIPE_INLINE row_walk_3(const ruled_out& out, const small_box& box)
+        : along_((2u << box.hi[0]) - (1u << box.lo[0])), first_(box.lo[0]), xy_(out.xy), zx_(out.zx),
+          plane_(out.plane) {
+        const std::uint32_t rows = (2u << box.hi[1]) - (1u << box.lo[1]); // y + 3 z
+        left_ = (box.lo[2] == 0 ? rows : 0) | (box.lo[2] <= 1 && box.hi[2] >= 1 ? rows << 3 : 0) |
+                (box.hi[2] == 2 ? rows << 6 : 0);
+        left_ &= ~out.yz;
+    }
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_done() const { return left_ == 0; }
+    // Calls emit(y, z, bits) for the next row, unless nothing is left of it; bit 0 is box.lo[0].
+    template <class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void next(Emit&& emit) {
+        const int at = exact::lowest_one(left_), z = at * 11 >> 5, y = at - 3 * z; // a third, below 11
+        left_ &= left_ - 1;
+        const std::uint32_t bits = along_ & ~(xy_ >> 3 * y | zx_ >> 3 * z | plane_ >> 3 * at) & 7u;
+        if (bits != 0) emit(y, z, bits >> first_);
+    }
+
+private:
+    std::uint32_t left_ = 0, along_ = 0;
+    int first_ = 0;
+    std::uint32_t xy_ = 0, zx_ = 0, plane_ = 0;
+};
+
 // Calls emit(y, z, bits) for the rows of the box that something is left of; bit 0 is box.lo[0].
 template <class Emit>
 VOXELPIPE_HD VOXELPIPE_INLINE void rows_of_three(const ruled_out& out, const small_box& box, Emit&& emit) {
-    const std::uint32_t along = (2u << box.hi[0]) - (1u << box.lo[0]);
-    std::uint32_t rows = (2u << box.hi[1]) - (1u << box.lo[1]); // y + 3 z
-    rows = (box.lo[2] == 0 ? rows : 0) | (box.lo[2] <= 1 && box.hi[2] >= 1 ? rows << 3 : 0) |
-           (box.hi[2] == 2 ? rows << 6 : 0);
-    for (std::uint32_t left = rows & ~out.yz; left != 0; left &= left - 1) {
-        const int at = exact::lowest_one(left), z = at * 11 >> 5, y = at - 3 * z; // a third, below 11
-        const std::uint32_t bits = along & ~(out.xy >> 3 * y | out.zx >> 3 * z | out.plane >> 3 * at) & 7u;
-        if (bits != 0) emit(y, z, bits >> box.lo[0]);
-    }
+    for (row_walk_3 rows(out, box); !rows.is_done();) rows.next(emit);
 }
 
 } // namespace voxelpipe::core

@@ -148,70 +148,131 @@ struct small_conservative {
     // Clips: see plane_bits.
     template <bool Clips, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void rows(const small_box& box, Emit&& emit) const {
-        const int x0 = box.lo[0], x7 = x0 + 7;
-        if (box.hi[0] < x0) return;
-        const near_plane plane(n, below, above, x0, Clips);
-        const std::uint32_t along = (2u << (box.hi[0] - x0)) - 1;
+        if (box.hi[0] < box.lo[0]) return;
+        row_walk_8 r(*this, box, Clips);
         for (int y0 = box.lo[1]; y0 <= box.hi[1]; y0 += 8) {
-            const int y1 = box.hi[1] < y0 + 7 ? box.hi[1] : y0 + 7;
-            const std::uint32_t across = (2u << (y1 - y0)) - 1;
-            std::uint64_t by_y = 0;
-            for (int y = y1; y >= y0; --y) by_y = by_y << 8 | (along & limits_at_y<8>(x7, y));
-            for (int z0 = box.lo[2]; z0 <= box.hi[2]; z0 += 8) {
-                const int z1 = box.hi[2] < z0 + 7 ? box.hi[2] : z0 + 7;
-                std::uint64_t by_z = 0, met = 0; // rows, bit y + 8 z
-                for (int z = z1; z >= z0; --z) {
-                    by_z = by_z << 8 | (along & limits_at_z<8>(x7, z));
-                    met = met << 8 | (across & rows_at_z<8>(y0 + 7, z));
-                }
-                for (; met != 0; met &= met - 1) {
-                    const int at = exact::lowest_one(met), y = at % 8, z = at / 8;
-                    const std::uint32_t limit =
-                        static_cast<std::uint32_t>(by_y >> 8 * y) & static_cast<std::uint32_t>(by_z >> 8 * z) & along;
-                    if (limit != 0) emit(y0 + y, z0 + z, plane_bits<Clips>(plane, x0, y0 + y, z0 + z, limit));
-                }
-            }
+            r.find_y(*this, y0, box.hi[1]);
+            for (int z0 = box.lo[2]; z0 <= box.hi[2]; z0 += 8)
+                for (r.find_z(*this, z0, box.hi[2]); !r.is_done();) r.template next<Clips>(*this, emit);
         }
     }
+    // The same, row by row, for a box of at most 8 voxels a side.
+    class row_walk_8 {
+    public:
+        VOXELPIPE_HD VOXELPIPE_INLINE static row_walk_8 of(const small_conservative& s, const small_box& box,
+                                                           bool clips) {
+            row_walk_8 r(s, box, clips);
+            if (box.empty()) return r;
+            r.find_y(s, box.lo[1], box.hi[1]);
+            r.find_z(s, box.lo[2], box.hi[2]);
+            return r;
+        }
+        [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_done() const { return met_ == 0; }
+        // The next row, which nothing may be left of: then it is not emitted.
+        template <bool Clips, class Emit>
+        VOXELPIPE_HD VOXELPIPE_INLINE void next(const small_conservative& s, Emit&& emit) {
+            const int at = exact::lowest_one(met_), y = at % 8, z = at / 8;
+            met_ &= met_ - 1;
+            const std::uint32_t limit =
+                static_cast<std::uint32_t>(by_y_ >> 8 * y) & static_cast<std::uint32_t>(by_z_ >> 8 * z) & along_;
+            if (limit != 0) emit(y0_ + y, z0_ + z, s.plane_bits<Clips>(plane_, x0_, y0_ + y, z0_ + z, limit));
+        }
+
+    private:
+        friend small_conservative;
+        near_plane plane_;
+        int x0_, y0_ = 0, z0_ = 0;
+        std::uint32_t along_, across_ = 0;
+        std::uint64_t by_y_ = 0, by_z_ = 0, met_ = 0; // met: rows, bit y + 8 z
+
+        VOXELPIPE_HD VOXELPIPE_INLINE row_walk_8(const small_conservative& s, const small_box& box, bool clips)
+            : plane_(s.n, s.below, s.above, box.lo[0], clips), x0_(box.lo[0]),
+              along_(box.hi[0] < box.lo[0] ? 0 : (2u << (box.hi[0] - box.lo[0])) - 1) {}
+        VOXELPIPE_HD VOXELPIPE_INLINE void find_y(const small_conservative& s, int y0, int last) {
+            const int y1 = last < y0 + 7 ? last : y0 + 7;
+            y0_ = y0;
+            across_ = (2u << (y1 - y0)) - 1;
+            by_y_ = 0;
+            for (int y = y1; y >= y0; --y) by_y_ = by_y_ << 8 | (along_ & s.limits_at_y<8>(x0_ + 7, y));
+        }
+        VOXELPIPE_HD VOXELPIPE_INLINE void find_z(const small_conservative& s, int z0, int last) {
+            const int z1 = last < z0 + 7 ? last : z0 + 7;
+            z0_ = z0;
+            by_z_ = met_ = 0;
+            for (int z = z1; z >= z0; --z) {
+                by_z_ = by_z_ << 8 | (along_ & s.limits_at_z<8>(x0_ + 7, z));
+                met_ = met_ << 8 | (across_ & s.rows_at_z<8>(y0_ + 7, z));
+            }
+        }
+    };
 
     // The same for a box of at most 16 voxels a side, all of it at once. `limits` holds 16 words: get(i), set(i, word).
     template <bool Clips, class Limits, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void rows_of_16(const small_box& box, Limits&& limits, Emit&& emit) const {
         if (box.empty()) return;
-        const int x0 = box.lo[0], y0 = box.lo[1], z0 = box.lo[2];
-        const int last_x = box.hi[0] - x0, last_y = box.hi[1] - y0, last_z = box.hi[2] - z0;
-        const near_plane plane(n, below, above, x0, Clips);
-        {
-            small_row_ends by_y(xy, false, x0, y0, 1);
-            for (int y = 0; y <= last_y; ++y) limits.set(y, by_y.next(last_x));
-        }
-        {
-            small_row_ends by_z(zx, true, x0, z0, 1);
-            for (int z = 0; z <= last_z; ++z)
-                limits.set(z, (z <= last_y ? limits.get(z) : 0) | by_z.next(last_x) << 16);
-        }
-        std::uint64_t met[4] = {}; // rows, bit y + 16 z
-        {
-            small_row_ends by_z(yz, false, y0, z0 + last_z, -1);
-            for (int z = last_z; z >= 0; --z) {
-                for (int k = 3; k > 0; --k) met[k] = met[k] << 16 | met[k - 1] >> 48;
-                met[0] = met[0] << 16 | by_z.next(last_y);
-            }
-        }
-        for (int first_z = 0;;) {
-            if (met[0] == 0) {
-                if ((met[1] | met[2] | met[3]) == 0) break;
-                for (int k = 1; k < 4; ++k) met[k - 1] = met[k];
-                met[3] = 0;
-                first_z += 4;
-            } else {
-                const int at = exact::lowest_one(met[0]), y = at % 16, z = first_z + at / 16;
-                met[0] &= met[0] - 1;
-                const std::uint32_t limit = limits.get(y) & limits.get(z) >> 16;
-                if (limit != 0) emit(y0 + y, z0 + z, plane_bits<Clips>(plane, x0, y0 + y, z0 + z, limit));
-            }
+        row_walk_16 r(*this, box, Clips, limits);
+        for (;;) {
+            if (r.is_here())
+                r.template next<Clips>(*this, limits, emit);
+            else if (!r.advance())
+                break;
         }
     }
+    // The same, row by row.
+    class row_walk_16 {
+    public:
+        template <class Limits>
+        VOXELPIPE_HD VOXELPIPE_INLINE row_walk_16(const small_conservative& s, const small_box& box, bool clips,
+                                                  Limits&& limits)
+            : plane_(s.n, s.below, s.above, box.lo[0], clips), x0_(box.lo[0]), y0_(box.lo[1]), z0_(box.lo[2]) {
+            if (box.empty()) return;
+            const int last_x = box.hi[0] - x0_, last_y = box.hi[1] - y0_, last_z = box.hi[2] - z0_;
+            {
+                small_row_ends by_y(s.xy, false, x0_, y0_, 1);
+                for (int y = 0; y <= last_y; ++y) limits.set(y, by_y.next(last_x));
+            }
+            {
+                small_row_ends by_z(s.zx, true, x0_, z0_, 1);
+                for (int z = 0; z <= last_z; ++z)
+                    limits.set(z, (z <= last_y ? limits.get(z) : 0) | by_z.next(last_x) << 16);
+            }
+            {
+                small_row_ends by_z(s.yz, false, y0_, z0_ + last_z, -1);
+                for (int z = last_z; z >= 0; --z) {
+                    for (int k = 3; k > 0; --k) met_[k] = met_[k] << 16 | met_[k - 1] >> 48;
+                    met_[0] = met_[0] << 16 | by_z.next(last_y);
+                }
+            }
+        }
+        // Whether there is a row among the next four z; otherwise they are left behind. False where none is left at
+        // all.
+        [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_here() const { return met_[0] != 0; }
+        VOXELPIPE_HD VOXELPIPE_INLINE bool advance() {
+            if ((met_[1] | met_[2] | met_[3]) == 0) return false;
+            for (int k = 1; k < 4; ++k) met_[k - 1] = met_[k];
+            met_[3] = 0;
+            first_z_ += 4;
+            return true;
+        }
+        [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_done() {
+            while (!is_here())
+                if (!advance()) return true;
+            return false;
+        }
+        // The next row, as of row_walk_8, where there is one here.
+        template <bool Clips, class Limits, class Emit>
+        VOXELPIPE_HD VOXELPIPE_INLINE void next(const small_conservative& s, Limits&& limits, Emit&& emit) {
+            const int at = exact::lowest_one(met_[0]), y = at % 16, z = first_z_ + at / 16;
+            met_[0] &= met_[0] - 1;
+            const std::uint32_t limit = limits.get(y) & limits.get(z) >> 16;
+            if (limit != 0) emit(y0_ + y, z0_ + z, s.plane_bits<Clips>(plane_, x0_, y0_ + y, z0_ + z, limit));
+        }
+
+    private:
+        near_plane plane_;
+        int x0_, y0_, z0_, first_z_ = 0;
+        std::uint64_t met_[4] = {}; // rows, bit y + 16 z, from first_z on
+    };
 
     // The same for boxes of up to 32 voxels a side.
     template <class Emit>

@@ -505,19 +505,24 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place
         const glm::uvec3 index_of_next = vertices(next, triangle_of_next);
         const std::uint32_t triangle_of_after = number(after);
         __syncwarp();
-        bool is_done = false;
-        if constexpr (Call::rule == coverage::thin && Sink::has_rounds) {
+        if constexpr (Call::rule == coverage::conservative && Sink::has_rounds) {
             sink.begin(triangle);
-            is_done = here.list != tiny_triangles && raster_thin_by_rounds(call.in, r, kept, sink);
-        }
-        if (!is_done)
-            feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+            raster_rows_by_rounds(call.in, r, here.list == tiny_triangles, kept, sink);
+        } else {
+            bool is_done = false;
+            if constexpr (Sink::has_rounds) {
                 sink.begin(triangle);
-                if (here.list == tiny_triangles)
-                    raster_tiny<Call::rule>(call.in, r, sink);
-                else
-                    raster_small<Call::rule, true>(call.in, r, kept, rows);
-            });
+                is_done = here.list != tiny_triangles && raster_thin_by_rounds(call.in, r, kept, sink);
+            }
+            if (!is_done)
+                feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                    sink.begin(triangle);
+                    if (here.list == tiny_triangles)
+                        raster_tiny<Call::rule>(call.in, r, sink);
+                    else
+                        raster_small<Call::rule, true>(call.in, r, kept, rows);
+                });
+        }
         __syncwarp();
         if constexpr (combines_words<Call>)
             if (here.list != tiny_triangles) rows.flush();

@@ -90,6 +90,40 @@ struct listing_sink : direct_sink<Call> {
             __syncwarp();
         }
     }
+    // They wait with what waits already; where there is no room for a round, that goes to the list first.
+    template <class IsDone, class Next>
+    __device__ VOXELPIPE_INLINE void row_rounds(IsDone&& is_done, Next&& next) {
+        static_assert(room >= 32 * most_long_side);
+        for (bool more = !is_done(); __any_sync(0xffffffffu, more); more = !is_done()) {
+            word mask = 0;
+            std::uint32_t first = 0;
+            if (more)
+                next([&](int x0, int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
+                    mask = bits;
+                    first = voxel(x0, y, z);
+                });
+            const auto length = static_cast<unsigned>(__popc(mask));
+            unsigned at = sum_before<0, 3>(length);
+            if (__any_sync(0xffffffffu, length > 7)) at += sum_before<3, 5>(length);
+            const unsigned all = __shfl_sync(0xffffffffu, at + length, 31);
+            if (kept_ + all > room) {
+                __syncwarp();
+                flush(kept_);
+                kept_ = 0;
+                __syncwarp();
+            }
+            if (mask != 0) {
+                first += static_cast<unsigned>(__ffs(static_cast<int>(mask)) - 1); // one run
+                at += kept_;
+                for (const unsigned end = at + length; at < end; ++at, ++first) {
+                    m_.voxels[at] = first;
+                    m_.primitives[at] = primitive_;
+                }
+            }
+            kept_ += all;
+        }
+        restart();
+    }
     __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word bits) {
         if (bits == 0) return;
         const std::uint32_t first = voxel(x, y, z), row = voxel(0, 1, 0), slice = voxel(0, 0, 1);
@@ -185,9 +219,19 @@ private:
             this->call.out.primitives[first + i] = m_.primitives[i];
         }
     }
+    // Of numbers below 32, the bits from Begin on and before End: their sum over the lanes before this one.
+    template <int Begin, int End>
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static unsigned sum_before(unsigned number) {
+        const unsigned before = (1u << threadIdx.x % 32) - 1;
+        unsigned sum = 0;
+#pragma unroll
+        for (int b = Begin; b < End; ++b)
+            sum += static_cast<unsigned>(__popc(__ballot_sync(0xffffffffu, (number >> b & 1u) != 0) & before)) << b;
+        return sum;
+    }
     __device__ VOXELPIPE_INLINE void restart() {
         __syncwarp();
-        if (threadIdx.x % 32 == 0) m_.n = 0;
+        if (threadIdx.x % 32 == 0) m_.n = kept_;
         __syncwarp();
     }
 

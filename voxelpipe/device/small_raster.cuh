@@ -14,9 +14,11 @@
 //   mark_boxes(wanted, triangle), mark_row(x0, x1, y, z), mark_brick(corner, lane): told of what a triangle may touch
 //                     before it comes, of a brick by each of medium_lanes lanes
 //   drop(class)       counts a triangle that is not drawn
-//   has_rounds        whether a warp had better give it thin fragments by
-//   rounds(count, is_done, next): those of all lanes, one of each lane at a time: next() is the place of the next of
-//                     this lane's `count`
+//   has_rounds        whether a warp had better give it fragments by
+//   rounds(count, is_done, next): thin ones of all lanes, one of each lane at a time: next() is the place of the next
+//                     of this lane's `count`
+//   row_rounds(is_done, next): rows of all lanes, one of each lane at a time, of at most 16 voxels: next(emit) calls
+//                     emit(x0, y, z, bits), unless nothing is left of it; bits are one run
 
 #include <voxelpipe/core/brick_triangle.hpp>
 #include <voxelpipe/core/corner_signs.hpp>
@@ -527,6 +529,40 @@ __device__ VOXELPIPE_INLINE void raster_tiny(const raster_input<Source>& call, c
         else
             core::small_conservative(r.relative(call.fraction), call.fraction).long_rows(box, emit);
     }
+}
+
+// Conservative fragments of the triangles of one list by a warp whose lanes have one each and give their rows one at a
+// time. tiny: whether the boxes are of at most three voxels a side, or of at most most_long_side. All lanes take part.
+template <class Source, class Kept, class Sink>
+__device__ VOXELPIPE_INLINE void raster_rows_by_rounds(const raster_input<Source>& call, const near_triangle& r,
+                                                       bool tiny, Kept&& kept, Sink& sink) {
+    core::small_box box = r.part(call.extent);
+    const auto emit_to = [&](const auto& emit) VOXELPIPE_INLINE_LAMBDA {
+        return [&](int y, int z, word bits)
+                   VOXELPIPE_INLINE_LAMBDA { emit(r.lo[0] + box.lo[0], r.lo[1] + y, r.lo[2] + z, bits); };
+    };
+    if (tiny) {
+        const core::ruled_out out = core::rule_out_by_signs(r.q, r.lo, r.last, call.fraction);
+        core::row_walk_3 rows;
+        if (out.sure && !box.empty()) rows = core::row_walk_3(out, box);
+        sink.row_rounds([&]() VOXELPIPE_INLINE_LAMBDA { return rows.is_done(); },
+                        [&](const auto& emit) VOXELPIPE_INLINE_LAMBDA { rows.next(emit_to(emit)); });
+        if (__all_sync(0xffffffffu, out.sure)) return;
+        if (out.sure) box = {{1, 1, 1}, {0, 0, 0}};
+    }
+    const core::small_conservative s(r.relative(call.fraction), call.fraction);
+    const bool is_long = r.most() > most_side;
+    {
+        const core::small_box part = is_long ? core::small_box{{1, 1, 1}, {0, 0, 0}} : box;
+        auto rows = core::small_conservative::row_walk_8::of(s, part, true);
+        sink.row_rounds([&]() VOXELPIPE_INLINE_LAMBDA { return rows.is_done(); },
+                        [&](const auto& emit) VOXELPIPE_INLINE_LAMBDA { rows.template next<true>(s, emit_to(emit)); });
+    }
+    if (!__any_sync(0xffffffffu, is_long)) return;
+    core::small_conservative::row_walk_16 rows(s, is_long ? box : core::small_box{{1, 1, 1}, {0, 0, 0}}, true, kept);
+    sink.row_rounds([&]() VOXELPIPE_INLINE_LAMBDA { return rows.is_done(); },
+                    [&](const auto& emit)
+                        VOXELPIPE_INLINE_LAMBDA { rows.template next<true>(s, kept, emit_to(emit)); });
 }
 
 // Any small triangle, by one thread. Apart: in a kernel that keeps nothing else in registers meanwhile.
