@@ -244,9 +244,9 @@ struct small_conservative {
                 }
             }
         }
-        // Whether there is a row among the next four z; otherwise they are left behind. False where none is left at
-        // all.
+        // Whether there is a row here, among the next four z.
         [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_here() const { return met_[0] != 0; }
+        // Leaves these z behind; false where no row is left.
         VOXELPIPE_HD VOXELPIPE_INLINE bool advance() {
             if ((met_[1] | met_[2] | met_[3]) == 0) return false;
             for (int k = 1; k < 4; ++k) met_[k - 1] = met_[k];
@@ -254,6 +254,7 @@ struct small_conservative {
             first_z_ += 4;
             return true;
         }
+        // Otherwise there is a row here.
         [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_done() {
             while (!is_here())
                 if (!advance()) return true;
