@@ -146,9 +146,25 @@ TEST(Direct, FewTrianglesInManyBits) {
 TEST(Direct, ManyRecordsOfLargeTriangles) {
     const glm::ivec3 extent(420, 390, 400);
     const mesh_data m = long_triangles(extent, 1500, 87);
-    for (const vp::coverage rule : both_rules)
+    for (const vp::coverage rule : both_rules) {
+        const vp::voxelize_options options{rule, false};
         expect_same(target_list<vp::target<vp::bit, blend::bit_or>, vp::target<std::uint32_t, blend::add>>{}, m,
-                    box_grid(extent), vp::passthrough{}, vp::constant(true, 1u), vp::voxelize_options{rule, false});
+                    box_grid(extent), vp::passthrough{}, vp::constant(true, 1u), options);
+        expect_same<vp::target<vp::bit, blend::bit_or>>(m, box_grid(extent), vp::passthrough{}, vp::constant(true),
+                                                        options);
+    }
+}
+
+// Some of them have their records find out what they need each for itself.
+TEST(Direct, MoreLargeTrianglesThanAreSetUp) {
+    constexpr auto most = static_cast<int>(vp::device::triangle_lists::most_setups);
+    const glm::ivec3 extent(150, 160, 140);
+    for (const int count : {most, most + 1500}) {
+        const mesh_data m = long_triangles(extent, count, 88);
+        for (const vp::coverage rule : both_rules)
+            expect_same<vp::target<vp::bit, blend::bit_or>>(m, box_grid(extent), vp::passthrough{}, vp::constant(true),
+                                                            vp::voxelize_options{rule, false});
+    }
 }
 
 // Exact partial sums, and values that have none and take the tiles.

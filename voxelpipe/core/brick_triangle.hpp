@@ -143,6 +143,7 @@ struct brick_thin {
     brick_half_plane uv[3];
     std::int64_t nu, nv, nw, depth; // as in small_thin
 
+    brick_thin() = default;
     VOXELPIPE_HD brick_thin(const snapped_position& a, const snapped_position& b, const snapped_position& c,
                             const voxel_box& box, int axis_, int fraction)
         : axis(axis_) {
@@ -188,6 +189,39 @@ struct brick_thin {
         for (int i = 0; i < 3; ++i)
             all = all && uv[i].at(u, v) + std::int64_t{brick_size - 1} * (uv[i].a > 0 ? uv[i].a : 0) >= 0;
         return all;
+    }
+};
+
+// The covered columns of a row of at most brick_size, one after the other.
+struct brick_row {
+    // A word of a walk over one row (small_thin::walk).
+    struct kept_row {
+        std::uint32_t word;
+        VOXELPIPE_HD VOXELPIPE_INLINE void set(int, std::uint32_t w) { word = w; }
+        [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t get(int) const { return word; }
+    };
+    small_thin s; // columns and depths count from the row's place
+    small_thin::walk left{};
+    kept_row kept{};
+    std::int32_t base = 0;   // the row's place: a depth that its first column's is near, from the bounding box
+    std::uint32_t count = 0; // of columns, before the first is taken
+
+    brick_row() = default; // none
+    // Columns first .. last, of which none is beyond brick_size, from (u, v) on.
+    VOXELPIPE_HD VOXELPIPE_INLINE brick_row(const brick_thin& t, int u, int v, int first, int last) : s(t.from(u, v)) {
+        // Floats tell depths of up to some twenty voxels. Whatever is within a voxel does.
+        const std::int64_t divisor = 2 * s.nw;
+        base = static_cast<std::int32_t>(
+            exact::div(static_cast<double>(s.depth - s.nu - s.nv), static_cast<double>(divisor)));
+        s.depth -= base * divisor;
+        left = s.find_columns(first, last, 0, 0, 1, kept, count);
+    }
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_done() const { return left.is_done(); }
+    // The next one, where it is not done: emit(column, depth from `base`), the last column first.
+    template <class Emit>
+    VOXELPIPE_HD VOXELPIPE_INLINE void next(Emit&& emit) {
+        s.next_column(
+            left, kept, [](int) VOXELPIPE_INLINE_LAMBDA {}, emit);
     }
 };
 

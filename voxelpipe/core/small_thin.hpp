@@ -37,39 +37,7 @@ struct small_thin {
         depth = exact::floor_shift(2 * (nu * turned.p[0][0] + nv * turned.p[0][1] + nw * turned.p[0][2]), fraction);
     }
 
-    // Calls emit(u, w) for the covered columns (u0 .. u1, v). All count from the bounding box; w may lie beyond it.
-    // Wide: the numbers may be those of a large triangle, whose quotient a double need not hold.
-    template <bool Wide = false, class Emit>
-    VOXELPIPE_HD VOXELPIPE_INLINE void row(int u0, int u1, int v, Emit&& emit) const {
-        std::int32_t e[3];
-        for (int i = 0; i < 3; ++i) e[i] = uv[i].at(u0, v);
-        const std::int64_t numerator = depth - nu * (2 * u0 + 1) - nv * (2 * v + 1), divisor = 2 * nw;
-        std::int32_t w = 0;
-        constexpr std::int64_t exact_below = std::int64_t{1} << 52;
-        if (!Wide || (numerator < exact_below && numerator > -exact_below)) {
-            const double quotient = exact::div(static_cast<double>(numerator), static_cast<double>(divisor));
-            w = static_cast<std::int32_t>(quotient);
-            w -= static_cast<std::int32_t>(static_cast<double>(w) > quotient); // towards minus infinity
-        } else {
-            w = static_cast<std::int32_t>(exact::floor_div(numerator, divisor));
-        }
-        std::int64_t remainder = numerator - w * divisor;
-        for (int u = u0; u <= u1; ++u) {
-            if ((e[0] | e[1] | e[2]) >= 0) emit(u, w);
-            for (int i = 0; i < 3; ++i) e[i] += uv[i].a;
-            // The slope is at most one voxel a column.
-            remainder -= 2 * nu;
-            if (remainder < 0) {
-                remainder += divisor;
-                --w;
-            } else if (remainder >= divisor) {
-                remainder -= divisor;
-                ++w;
-            }
-        }
-    }
-
-    // u and v for each other: `row`, `columns` and uv then have them the other way round.
+    // u and v for each other: `columns` and uv then have them the other way round.
     VOXELPIPE_HD VOXELPIPE_INLINE void swap_uv() {
         for (small_half_plane& e : uv) e = {e.b, e.a, e.c};
         const std::int64_t u = nu;
@@ -129,8 +97,8 @@ struct small_thin {
         if (over < 0x1p-12f || over > 1.0f - 0x1p-12f) w = depth_of(u, k.v, w);
         emit(u, w);
     }
-    // All of them: row() for threads that have a triangle each, as small_conservative::rows. First all rows, then one
-    // loop over the columns that are left.
+    // All of them, for threads that have a triangle each, as small_conservative::rows. First all rows, then one loop
+    // over the columns that are left.
     template <class Kept, class BeginRow, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void columns(int u0, int u1, int v0, int v1, int step, Kept&& kept,
                                                BeginRow&& begin_row, Emit&& emit) const {
@@ -150,7 +118,7 @@ private:
 
 // The depths of the columns (u, v) of 2 x 2 of a bounding box that is at most two voxels deep: w + 1 in two bits, at 2
 // u + 4 v. Only for columns that the triangle touches, whose depth at their centre is within a voxel of the triangle's
-// own: row() without its division.
+// own: no division.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t cube_depths(const small_thin& s) {
     const std::int64_t divisor = 2 * s.nw, first = s.depth - s.nu - s.nv;
     std::uint32_t packed = 0;

@@ -439,8 +439,8 @@ __global__ __launch_bounds__(raster_threads,
 // block's other warps at its end.
 template <class Call>
 __device__ __noinline__ typename Call::rest_sink::totals
-raster_all_records(const Call& call, unsigned* dropped, brick_memory& bricks, typename Call::rest_sink::memory& memory,
-                   unsigned warp, unsigned warps) {
+raster_all_records(const Call& call, unsigned* dropped, brick_memory<Call::rule>& bricks,
+                   typename Call::rest_sink::memory& memory, unsigned warp, unsigned warps) {
     typename Call::rest_sink sink(call, dropped, memory);
     raster_records(call, sink, bricks, warp, warps);
     __syncwarp();
@@ -540,8 +540,12 @@ __global__ __launch_bounds__(raster_threads,
                                                                             pipeline_state* state) {
     using sink_type = typename Call::rest_sink;
     constexpr bool thin = Call::rule == coverage::thin;
-    __shared__ brick_memory bricks[thin ? 1 : raster_warps];
-    __shared__ kept_rows rows_of_warps[raster_warps];
+    // Of a warp: what its large triangles want comes first, and is gone then. More shared memory would leave less to
+    // the cache of vertices.
+    __shared__ union {
+        brick_memory<Call::rule> bricks;
+        kept_rows rows;
+    } memory_of_warps[raster_warps];
     __shared__ warp_words<Call> words[raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ unsigned dropped[num_triangle_classes];
@@ -552,14 +556,14 @@ __global__ __launch_bounds__(raster_threads,
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();
     const unsigned in_block = warp_in_block();
-    const lane_rows kept(rows_of_warps[in_block]);
+    const lane_rows kept(memory_of_warps[in_block].rows);
     const warp_place place{blockIdx.x * raster_warps + in_block, gridDim.x * raster_warps, threadIdx.x % 32};
     typename sink_type::memory& memory = memories[in_block];
     typename sink_type::totals of_records{};
     if (uniform(*call.lists.next) != 0) {
         // Parts of few large triangles go to different multiprocessors.
         const unsigned warp = thin ? place.warp : in_block * gridDim.x + blockIdx.x;
-        of_records = raster_all_records(call, dropped, bricks[thin ? 0 : in_block], memory, warp, place.warps);
+        of_records = raster_all_records(call, dropped, memory_of_warps[in_block].bricks, memory, warp, place.warps);
     }
     sink_type sink(call, dropped, memory);
     sink.take_over(of_records);

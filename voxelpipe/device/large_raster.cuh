@@ -4,18 +4,22 @@
 
 // Raster of large triangles without tiles: each is cut into pieces that warps share out, whatever triangles they belong
 // to. Conservative coverage finds the bricks (core/brick_triangle.hpp) that a triangle meets, then the voxels of each;
-// thin coverage takes rows of 16 columns. A triangle that the 64-bit path cannot hold goes through 128 bits.
+// thin coverage takes rows of 16 columns. What all pieces of a triangle need of it is found once where there are many
+// (large_setup). A triangle that the 64-bit path cannot hold goes through 128 bits.
 
 #include <voxelpipe/device/small_raster.cuh>
 #include <voxelpipe/device/triangle_lists.cuh>
 #include <voxelpipe/device/wide_path.cuh>
 #include <voxelpipe/device/work_share.cuh>
 
+#include <cuda/atomic>
+
 #include <algorithm>
 
 namespace voxelpipe::device {
 
 inline constexpr int most_direct_extent = 1 << 16; // bricks are numbered with 16 bits, voxels with 32
+static_assert((std::int64_t{most_direct_extent} / core::brick_size + 1) * (most_direct_extent + 1) < 1u << 31);
 
 // How a large triangle's box of voxels is cut into pieces, a lane each, some to a record, which is a warp's.
 // Conservative: columns of bricks along the dominant axis, few, for the bricks of a column keep eight lanes busy, and
@@ -25,9 +29,10 @@ struct large_pieces {
     static constexpr int across = Rule == coverage::thin ? 1 : core::brick_size; // voxels along v
     static constexpr int per_record = Rule == coverage::thin ? 32 : 8;
     int axis;
-    core::triple<std::int64_t> lo, hi; // uvw, the box
-    std::int64_t first_u, first_v, per_row, rows;
+    core::triple<std::int64_t> lo, hi;            // uvw, the box
+    std::int64_t first_u, first_v, per_row, rows; // 32 bits number pieces (most_direct_extent)
 
+    large_pieces() = default;
     VOXELPIPE_HD large_pieces(const core::voxel_box& box, int axis_)
         : axis(axis_), lo(core::to_uvw(axis_, box.lo[0], box.lo[1], box.lo[2])),
           hi(core::to_uvw(axis_, box.hi[0], box.hi[1], box.hi[2])), first_u(lo[0] >> core::log2_brick),
@@ -37,9 +42,11 @@ struct large_pieces {
     [[nodiscard]] VOXELPIPE_HD std::int64_t records() const { return (count() + per_record - 1) / per_record; }
     // The lowest voxel of piece i along u and v, maybe outside the box.
     [[nodiscard]] VOXELPIPE_HD std::int64_t u(std::int64_t i) const {
-        return (first_u + i % per_row) << core::log2_brick;
+        return (first_u + static_cast<std::uint32_t>(i) % static_cast<std::uint32_t>(per_row)) << core::log2_brick;
     }
-    [[nodiscard]] VOXELPIPE_HD std::int64_t v(std::int64_t i) const { return (first_v + i / per_row) * across; }
+    [[nodiscard]] VOXELPIPE_HD std::int64_t v(std::int64_t i) const {
+        return (first_v + static_cast<std::uint32_t>(i) / static_cast<std::uint32_t>(per_row)) * across;
+    }
     // A piece by several lanes: whether part `part` of lanes_each has rows within the box, and these as a box of
     // voxels.
     static constexpr int lanes_each = 32 / per_record;
@@ -106,6 +113,72 @@ __device__ VOXELPIPE_INLINE void cut_big(const Call& call, Sink& sink, const std
     }
 }
 
+// What all records of a large triangle need of it.
+template <coverage Rule>
+struct alignas(16) large_setup {
+    std::conditional_t<Rule == coverage::thin, core::brick_thin, core::brick_triangle> bricks; // where is_narrow
+    core::voxel_box box, reach; // of the triangle; what of it lies in the grid
+    large_pieces<Rule> pieces;
+    std::uint32_t is_narrow; // or the 64-bit path cannot hold it
+    static_assert(sizeof(bricks) + 2 * sizeof(box) + sizeof(pieces) + 16 <= triangle_lists::setup_bytes);
+
+    // Of a triangle that has records, by all lanes of a warp, into its shared memory.
+    template <class Call>
+    __device__ VOXELPIPE_INLINE void find(const Call& call, std::uint32_t triangle) {
+        const int fraction = call.in.fraction;
+        const glm::uvec3 index = call.in.source.triangle(triangle);
+        const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
+                                     c = call.in.source.position(index.z);
+        const core::voxel_box whole{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
+        core::voxel_box within{};
+        (void)core::classify<Rule>(a, b, c, fraction, whole, within);
+        const int axis = core::dominant_axis(a, b, c, fraction);
+        const core::voxel_box whole_box = core::bounds(a, b, c, fraction);
+        const bool narrow = core::fits_narrow(a, b, c, fraction);
+        if (threadIdx.x % 32 == 0) {
+            reach = within;
+            box = whole_box;
+            pieces = large_pieces<Rule>(within, axis);
+            is_narrow = narrow;
+        }
+        if (!narrow) return;
+        if constexpr (Rule == coverage::thin) {
+            const core::brick_thin t(a, b, c, whole_box, axis, fraction);
+            if (threadIdx.x % 32 == 0) bricks = t;
+        } else {
+            const core::brick_triangle t(a, b, c, whole_box, fraction);
+            if (threadIdx.x % 32 == 0) bricks = t;
+        }
+    }
+    // From where another warp has kept it, or to there, for others. All lanes take part; false: it is not there, or not
+    // yet, for nobody waits long.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool load(const triangle_lists& lists, unsigned number) {
+        const unsigned lane = threadIdx.x % 32;
+        unsigned there = 0;
+        for (int look = 0; look < 64 && there == 0; ++look) {
+            if (lane == 0) there = ready(lists.has_setup[number]).load(::cuda::memory_order_acquire);
+            there = __shfl_sync(0xffffffffu, there, 0);
+        }
+        if (there == 0) return false;
+        const auto* const from =
+            reinterpret_cast<const uint4*>(lists.setups) + number * (sizeof(*this) / sizeof(uint4));
+        for (unsigned i = lane; i < sizeof(*this) / sizeof(uint4); i += 32) reinterpret_cast<uint4*>(this)[i] = from[i];
+        return true;
+    }
+    __device__ VOXELPIPE_INLINE void keep(const triangle_lists& lists, unsigned number) const {
+        const unsigned lane = threadIdx.x % 32;
+        auto* const to = reinterpret_cast<uint4*>(lists.setups) + number * (sizeof(*this) / sizeof(uint4));
+        for (unsigned i = lane; i < sizeof(*this) / sizeof(uint4); i += 32)
+            to[i] = reinterpret_cast<const uint4*>(this)[i];
+        __threadfence();
+        __syncwarp();
+        if (lane == 0) ready(lists.has_setup[number]).store(1, ::cuda::memory_order_release);
+    }
+
+private:
+    using ready = ::cuda::atomic_ref<std::uint32_t, ::cuda::thread_scope_device>;
+};
+
 // Rows of bits along x from spans of columns: columns next to each other with one voxel at the same depth become one.
 template <class Sink>
 struct span_writer {
@@ -162,10 +235,11 @@ struct span_writer {
 
 inline constexpr int most_bricks = 64;
 
-// What one warp keeps in shared memory for a large triangle: nothing where coverage is thin.
+// What one warp keeps in shared memory for a large triangle.
+template <coverage Rule>
 struct brick_memory {
-    core::brick_triangle triangle;
-    std::int16_t bricks[3][most_bricks]; // that wait, in bricks of the grid
+    large_setup<Rule> setup;
+    std::int16_t bricks[Rule == coverage::thin ? 1 : 3][most_bricks]; // that wait, in bricks of the grid
 };
 
 // Into how many parts, a power of two, a record is cut. A warp goes through the bricks of its columns four at a time:
@@ -178,84 +252,161 @@ template <coverage Rule>
     return parts;
 }
 
+// A lane's piece of a large thin triangle: a row of columns, and where its voxels lie (see thin_columns).
+template <class Place>
+struct thin_piece {
+    core::brick_row row;
+    int axis, u, v;      // of the row's first column; its depths count from
+    std::int32_t w;      // this one
+    std::int32_t lo, hi; // depths of the grid that the triangle can have, from the same
+    Place origin, by_u, by_w;
+
+    // No columns where it is not `wanted`.
+    template <class Sink>
+    __device__ VOXELPIPE_INLINE thin_piece(const large_setup<coverage::thin>& t, std::int64_t piece, bool wanted,
+                                           const Sink& sink)
+        : axis(t.pieces.axis), u(static_cast<int>(t.pieces.u(piece))), v(static_cast<int>(t.pieces.v(piece))) {
+        const core::voxel_box& box = t.box;
+        const large_pieces<coverage::thin>& pieces = t.pieces;
+        const auto first = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
+        const auto last = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
+        wanted = wanted && v >= first[1] && v <= last[1]; // the box within the grid is a voxel wider
+        const auto from_u = static_cast<int>(u - first[0]), from_v = static_cast<int>(v - first[1]);
+        if (wanted && t.bricks.meets_row(from_u, from_v)) {
+            // Columns of the bounding box, within the grid.
+            const std::int64_t begin = u > first[0] ? u : first[0], end = u + core::brick_size - 1;
+            row = core::brick_row(t.bricks, from_u, from_v,
+                                  static_cast<int>((begin > pieces.lo[0] ? begin : pieces.lo[0]) - u),
+                                  static_cast<int>(core::min3(end, last[0], pieces.hi[0]) - u));
+        }
+        w = static_cast<std::int32_t>(first[2]) + row.base;
+        lo = static_cast<std::int32_t>(pieces.lo[2]) - w;
+        hi = static_cast<std::int32_t>(pieces.hi[2]) - w;
+        const auto place = [&](int along_u, int along_v, int along_w) {
+            const auto p = core::to_xyz(axis, along_u, along_v, along_w);
+            return sink.place(p[0], p[1], p[2]);
+        };
+        origin = place(u, v, w);
+        by_u = place(1, 0, 0);
+        by_w = place(0, 0, 1);
+    }
+
+    // For a sink that wants to know how many columns all lanes have; false where that cannot be known, for some may lie
+    // outside of the grid. All lanes take part.
+    template <class Sink>
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool give_by_rounds(Sink& sink) const {
+        constexpr int most = core::brick_size + 1; // slopes are at most one
+        if (!__all_sync(0xffffffffu, row.count == 0 || (lo <= -most && hi >= most))) return false;
+        core::brick_row left = row;
+        sink.rounds(
+            left.count, [&]() VOXELPIPE_INLINE_LAMBDA { return left.is_done(); },
+            [&]() VOXELPIPE_INLINE_LAMBDA {
+                Place at = origin;
+                left.next([&](int column, int depth)
+                              VOXELPIPE_INLINE_LAMBDA { at = origin + by_u * column + by_w * depth; });
+                return at;
+            });
+        return true;
+    }
+    // ByPlace: columns that do not lie along x go to where they lie; otherwise all are rows, of which the sink is told.
+    template <bool ByPlace, class Sink>
+    __device__ VOXELPIPE_INLINE void give(Sink& sink) {
+        word mask = 0; // of columns next to each other along x that have one depth
+        std::int32_t of_mask = 0;
+        const auto give_mask = [&]() VOXELPIPE_INLINE_LAMBDA {
+            if (mask == 0) return;
+            const auto p = core::to_xyz(axis, u, v, w + of_mask);
+            const int low = __ffs(static_cast<int>(mask)) - 1;
+            sink.mark_row(p[0] + low, p[0] + 31 - __clz(static_cast<int>(mask)), p[1], p[2]);
+            sink.row(p[0], p[1], p[2], mask);
+            mask = 0;
+        };
+        while (!row.is_done()) {
+            row.next([&](int column, int depth) VOXELPIPE_INLINE_LAMBDA {
+                const bool inside = depth >= lo && depth <= hi;
+                if (axis == 2) { // then u is x
+                    if (depth != of_mask) give_mask();
+                    of_mask = depth;
+                    mask |= inside ? 1u << column : 0;
+                } else if constexpr (ByPlace) {
+                    sink.put(origin + by_u * column + by_w * depth, inside);
+                } else if (inside) {
+                    const auto p = core::to_xyz(axis, u + column, v, w + depth);
+                    sink.mark_row(p[0], p[0], p[1], p[2]);
+                    sink.row(p[0], p[1], p[2], 1u);
+                }
+            });
+        }
+        give_mask();
+    }
+};
+
 // The pieces of all triangles in call.lists.cut, a lane each; parts warp, warp + warps, ... of the
 // records are this warp's. Conservative: the lanes find the bricks that the triangle meets in their columns, and
 // medium_lanes of them then take a brick each.
 template <class Call, class Sink>
-__device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, brick_memory& memory, unsigned warp,
-                                                unsigned warps) {
+__device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, brick_memory<Call::rule>& memory,
+                                                unsigned warp, unsigned warps) {
     constexpr bool thin = Call::rule == coverage::thin;
     constexpr auto rule = core::to_rule(Call::rule);
     constexpr int per_record = large_pieces<Call::rule>::per_record;
     using sink_type = Sink;
     const unsigned lane = threadIdx.x % 32;
-    const core::voxel_box whole{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
     const unsigned long long packed = uniform(*call.lists.next);
     const unsigned long long records = packed & ((1ull << triangle_lists::record_bits) - 1);
     const unsigned long long num = packed >> triangle_lists::record_bits;
     const unsigned parts = parts_of_record<Call::rule>(records, warps);
-    for (unsigned long long i = uniform(warp); i < records * parts; i += warps) {
-        const unsigned long long r = i / parts;
-        __syncwarp(); // lanes that the last pieces kept apart come together
-        const unsigned lo = find_last(call.lists.first_records, static_cast<unsigned>(num), r);
+    // Where each warp has several records, all triangles are set up first, for whoever has one of their records.
+    const unsigned long long num_first = num <= call.lists.num_setups && records >= 2 * warps ? num : 0;
+    for (unsigned long long i = uniform(warp); i < num_first + records * parts; i += warps) {
+        const bool is_first = i < num_first;
+        const unsigned long long part = i - num_first, r = part / parts;
+        __syncwarp(); // lanes that the last pieces kept apart come together; nobody reads the last setup any more
+        const unsigned lo =
+            is_first ? static_cast<unsigned>(i) : find_last(call.lists.first_records, static_cast<unsigned>(num), r);
+        if (is_first || num_first == 0 || !memory.setup.load(call.lists, lo))
+            memory.setup.find(call, call.lists.cut[lo]);
+        __syncwarp();
+        if (is_first) {
+            memory.setup.keep(call.lists, lo);
+            continue;
+        }
         const auto piece = static_cast<std::int64_t>((r - call.lists.first_records[lo]) * per_record + lane);
         sink.begin(call.lists.cut[lo]);
-        const glm::uvec3 index = call.in.source.triangle(call.lists.cut[lo]);
-        const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
-                                     c = call.in.source.position(index.z);
-        core::voxel_box reach{};
-        (void)core::classify<Call::rule>(a, b, c, call.in.fraction, whole, reach);
-        const int axis = core::dominant_axis(a, b, c, call.in.fraction);
-        const large_pieces<Call::rule> pieces(reach, axis);
+        const large_setup<Call::rule>& setup = memory.setup;
+        const large_pieces<Call::rule>& pieces = setup.pieces;
         // Lanes beyond the record's pieces have the number of no part.
-        const bool valid = piece < pieces.count() && lane * parts / per_record == i % parts;
-        if (!core::fits_narrow(a, b, c, call.in.fraction)) {
+        const bool valid = piece < pieces.count() && lane * parts / per_record == part % parts;
+        if (setup.is_narrow == 0) {
+            const glm::uvec3 index = call.in.source.triangle(call.lists.cut[lo]);
+            const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
+                                         c = call.in.source.position(index.z);
             // All lanes: those beyond the record's pieces take part of one.
             const std::int64_t shared = piece - lane + lane % per_record;
-            const bool wanted = shared < pieces.count() && lane % per_record * parts / per_record == i % parts &&
+            const bool wanted = shared < pieces.count() && lane % per_record * parts / per_record == part % parts &&
                                 pieces.has_rows(shared, lane / per_record);
             feed(sink, [&] {
                 if (!wanted) return;
                 span_writer<sink_type> writer{sink};
-                for_each_wide_span<rule>(a, b, c, call.in.fraction, pieces.piece(shared, lane / per_record),
-                                         [&](const wide_span& s) { writer.span(axis, s.u, s.v, s.w_first, s.w_last); });
+                for_each_wide_span<rule>(
+                    a, b, c, call.in.fraction, pieces.piece(shared, lane / per_record),
+                    [&](const wide_span& s) { writer.span(pieces.axis, s.u, s.v, s.w_first, s.w_last); });
                 writer.flush();
             });
             continue;
         }
-        const core::voxel_box box = core::bounds(a, b, c, call.in.fraction);
         if constexpr (thin) {
+            const thin_piece<place_of_sink<Sink>> found(setup, piece, valid, sink);
+            if constexpr (Sink::has_rounds)
+                if (found.give_by_rounds(sink)) continue;
             feed(sink, [&] {
-                if (!valid) return;
-                const core::brick_thin t(a, b, c, box, axis, call.in.fraction);
-                const auto origin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
-                const auto last = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
-                const std::int64_t u0 = pieces.u(piece), v = pieces.v(piece);
-                if (v < origin[1] || v > last[1]) return; // reach is a voxel wider
-                const auto u = static_cast<int>(u0 - origin[0]), at_v = static_cast<int>(v - origin[1]);
-                if (!t.meets_row(u, at_v)) return;
-                // Columns of the bounding box, within the grid.
-                const std::int64_t from = u0 > origin[0] ? u0 : origin[0], to = u0 + core::brick_size - 1;
-                const std::int64_t begin = from > pieces.lo[0] ? from : pieces.lo[0];
-                const std::int64_t end = core::min3(to, last[0], pieces.hi[0]);
-                span_writer<sink_type> writer{sink};
-                t.from(u, at_v).template row<true>(
-                    static_cast<int>(begin - u0), static_cast<int>(end - u0), 0, [&](int column, int depth) {
-                        const std::int64_t w = origin[2] + depth;
-                        if (w < pieces.lo[2] || w > pieces.hi[2]) return;
-                        writer.span(axis, static_cast<int>(u0) + column, static_cast<int>(v), static_cast<int>(w),
-                                    static_cast<int>(w));
-                    });
-                writer.flush();
+                thin_piece<place_of_sink<Sink>> one = found; // it may come once more
+                one.template give<Call::output::only_sets || Sink::buffers>(sink);
             });
         } else {
-            __syncwarp(); // the last triangle's bricks are done
-            {
-                const core::brick_triangle t(a, b, c, box, call.in.fraction);
-                if (lane == 0) memory.triangle = t;
-            }
-            __syncwarp();
-            const core::brick_triangle& t = memory.triangle;
+            const core::brick_triangle& t = setup.bricks;
+            const core::voxel_box &box = setup.box, &reach = setup.reach;
+            const int axis = pieces.axis;
             const auto raster_bricks = [&](int n) {
                 __syncwarp();
                 for (int first = 0; first < n; first += 32 / medium_lanes) {

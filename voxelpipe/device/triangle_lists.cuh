@@ -75,6 +75,13 @@ struct triangle_lists {
     unsigned long long* first_records;
     unsigned long long* next;
 
+    // What the records of a triangle need of it (large_raster.cuh), where that is kept: room for the first ones, and
+    // for each whether it is there yet.
+    static constexpr std::size_t most_setups = 1u << 14, setup_bytes = 384;
+    std::byte* setups;
+    std::uint32_t* has_setup;
+    std::uint32_t num_setups;
+
     // Those that a block of the first kernel leaves until its end; each has a part of its own.
     std::uint32_t* big;
 
@@ -88,6 +95,9 @@ struct triangle_lists {
         l.capacity = static_cast<std::uint32_t>(num_triangles);
         l.cut = memory.take<std::uint32_t>(num_triangles);
         l.first_records = memory.take<unsigned long long>(num_triangles);
+        l.num_setups = static_cast<std::uint32_t>(std::min(num_triangles, most_setups));
+        l.setups = memory.take<std::byte>(l.num_setups * setup_bytes);
+        l.has_setup = memory.take<std::uint32_t>(l.num_setups);
         return l;
     }
     // With its counters, which are zeroed.
@@ -128,8 +138,10 @@ struct triangle_lists {
         if (lane == 31 && sum != 0) first = atomicAdd(next, sum);
         const unsigned long long place = __shfl_sync(0xffffffffu, first, 31) + sum - mine;
         if (records == 0) return;
-        cut[place >> record_bits] = triangle;
-        first_records[place >> record_bits] = place & ((1ull << record_bits) - 1);
+        const unsigned long long number = place >> record_bits;
+        cut[number] = triangle;
+        first_records[number] = place & ((1ull << record_bits) - 1);
+        if (number < num_setups) has_setup[number] = 0;
     }
 };
 
