@@ -18,7 +18,7 @@ template <class Call, unsigned Room, unsigned FlushAt>
 struct listing_sink : direct_sink<Call> {
     static constexpr bool buffers = true;
     static constexpr bool shares = false;
-    static constexpr bool spreads = true;
+    static constexpr bool spreads = false; // a lane's row is written by itself, whatever its length
     static constexpr bool has_rounds = true;
     static constexpr unsigned room = Room;
     static constexpr unsigned flush_at = FlushAt;
@@ -47,16 +47,6 @@ struct listing_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
         write_row(atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask))), voxel(x0, y, z), mask);
-    }
-    __device__ VOXELPIPE_INLINE void row_by_all(unsigned group, int x0, int y, int z, word mask) {
-        unsigned at = 0;
-        if (threadIdx.x % medium_lanes == 0) at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask)));
-        at = __shfl_sync(group, at, 0, medium_lanes);
-        const std::uint32_t first = voxel(x0, y, z);
-        for (word own = mask & bits_of_lane(); own != 0; own &= own - 1) {
-            const int i = __ffs(static_cast<int>(own)) - 1;
-            write(at + static_cast<unsigned>(__popc(mask & ((1u << i) - 1))), first + static_cast<unsigned>(i));
-        }
     }
     template <class Place>
     __device__ VOXELPIPE_INLINE void voxels(word bits, const Place& place_of) {

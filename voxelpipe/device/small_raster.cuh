@@ -402,7 +402,8 @@ __device__ VOXELPIPE_INLINE bool raster_thin_cube(const raster_input<Source>& ca
 }
 
 // Conservative fragments within a box of at most 32 voxels a side, by medium_lanes neighbouring lanes that all take
-// part: each has rows of its own y, and what the z of a row cuts off is found by one of them for all.
+// part. Of 8 x 8 rows along x, those of one y or of one z at a time, whichever of these have fewer that something is
+// left of: a floor has rows of one y, a wall may have rows of one z.
 template <class Sink>
 __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s, const std::int32_t (&lo)[3],
                                               const core::small_box& box, Sink& sink) {
@@ -411,27 +412,30 @@ __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s,
     const unsigned group = ((1u << medium_lanes) - 1) << first_of_group;
     const int x0 = box.lo[0], x1 = box.hi[0];
     for (int first_y = box.lo[1]; first_y <= box.hi[1]; first_y += medium_lanes) {
-        const int y = first_y + lane;
-        const word at_y = y <= box.hi[1] ? s.limit_at_y(x0, x1, y) : 0;
-        // A floor has all its voxels in the rows of few y, each a lane's: then all lanes look at each row.
-        const bool is_flat = Sink::spreads && __popc(__ballot_sync(group, at_y != 0)) <= medium_lanes / 4;
+        const word at_y = first_y + lane <= box.hi[1] ? s.limit_at_y(x0, x1, first_y + lane) : 0;
+        const unsigned ys = __ballot_sync(group, at_y != 0) >> first_of_group;
+        if (ys == 0) continue;
         for (int first_z = box.lo[2]; first_z <= box.hi[2]; first_z += medium_lanes) {
-            const word mine = first_z + lane <= box.hi[2] ? s.limit_at_z(x0, x1, first_z + lane) : 0;
-            const int end = box.hi[2] - first_z + 1 < medium_lanes ? box.hi[2] - first_z + 1 : medium_lanes;
-            for (int k = 0; k < end; ++k) {
-                const word limit = __shfl_sync(group, mine, k, medium_lanes) & at_y;
-                const int z = first_z + k;
+            const word at_z = first_z + lane <= box.hi[2] ? s.limit_at_z(x0, x1, first_z + lane) : 0;
+            const unsigned zs = __ballot_sync(group, at_z != 0) >> first_of_group;
+            const bool by_y = __popc(ys) <= __popc(zs);
+            for (unsigned left = by_y ? ys : zs; left != 0; left &= left - 1) {
+                const int one = __ffs(static_cast<int>(left)) - 1;
+                const word limit = __shfl_sync(group, by_y ? at_y : at_z, one, medium_lanes) & (by_y ? at_z : at_y);
+                const int y = first_y + (by_y ? one : lane), z = first_z + (by_y ? lane : one);
                 const word bits = limit == 0 || !s.meets_row(y, z) ? 0 : s.plane_bits(x0, y, z, limit);
-                if (is_flat) { // few long rows: each by all lanes
-                    word rows = __ballot_sync(group, bits != 0) >> first_of_group;
-                    const unsigned longest = __reduce_max_sync(group, static_cast<unsigned>(__popc(bits)));
-                    if (static_cast<unsigned>(__popc(rows)) * 5 <= longest * 3) {
-                        for (; rows != 0; rows &= rows - 1) {
-                            const int of = __ffs(static_cast<int>(rows)) - 1;
-                            const word mask = __shfl_sync(group, bits, of, medium_lanes);
-                            sink.row_by_all(group, lo[0] + x0, lo[1] + first_y + of, lo[2] + z, mask);
+                if constexpr (Sink::spreads) {
+                    if (by_y && __popc(ys) <= medium_lanes / 4) { // few long rows: each by all lanes
+                        word rows = __ballot_sync(group, bits != 0) >> first_of_group;
+                        const unsigned longest = __reduce_max_sync(group, static_cast<unsigned>(__popc(bits)));
+                        if (static_cast<unsigned>(__popc(rows)) * 5 <= longest * 3) {
+                            for (; rows != 0; rows &= rows - 1) {
+                                const int of = __ffs(static_cast<int>(rows)) - 1;
+                                const word mask = __shfl_sync(group, bits, of, medium_lanes);
+                                sink.row_by_all(group, lo[0] + x0, lo[1] + y, lo[2] + first_z + of, mask);
+                            }
+                            continue;
                         }
-                        continue;
                     }
                 }
                 sink.row(lo[0] + x0, lo[1] + y, lo[2] + z, bits);
