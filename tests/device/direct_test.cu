@@ -168,6 +168,36 @@ TEST(Direct, MoreLargeTrianglesThanAreSetUp) {
     }
 }
 
+// Floors, walls and ceilings, some a little or more out of level, at the centres and faces of voxels and in between,
+// out of the grid too: rows of one depth, of few and of many, along each axis.
+TEST(Direct, FlatLargeTriangles) {
+    const glm::ivec3 extent(130, 100, 110);
+    mesh_data m;
+    for (int axis = 0; axis < 3; ++axis)
+        for (int i = 0; i < 8; ++i) {
+            const float at = 11.25f * static_cast<float>(i) + 3.0f, slope = i % 4 == 3 ? 0.3f : 0.01f * (i % 4 - 1.0f);
+            const auto corner = [&](float a, float b) {
+                glm::vec3 p;
+                p[(axis + 1) % 3] = a;
+                p[(axis + 2) % 3] = b;
+                p[axis] = at + slope * (a - 0.5f * b);
+                return p;
+            };
+            const glm::vec3 p = corner(-7.0f, 1.5f), q = corner(119.0f, 4.0f), r = corner(113.5f, 97.0f),
+                            s = corner(2.25f, 140.0f);
+            add_triangle(m, p, q, r);
+            add_triangle(m, r, s, p);
+        }
+    for (const vp::coverage rule : both_rules) {
+        const vp::voxelize_options options{rule, false};
+        expect_same<vp::target<vp::bit, blend::bit_or>>(m, box_grid(extent), vp::passthrough{}, vp::constant(true),
+                                                        options);
+        expect_same(target_list<vp::target<vp::bit, blend::bit_or>, vp::target<std::uint32_t, blend::add>>{}, m,
+                    box_grid(extent), vp::passthrough{}, vp::constant(true, 1u), options);
+        expect_same_lists<void>(m, box_grid(extent), vp::passthrough{}, vp::constant(true), options);
+    }
+}
+
 // Exact partial sums, and values that have none and take the tiles.
 TEST(Direct, Sums) {
     for (const float value : {1.0f, -0.75f, 0.1f, 3e9f, 1e-20f, std::numeric_limits<float>::infinity()})

@@ -34,6 +34,7 @@ PTX = {
     "mov.u32 %0, %1;": "mov_u32",
     "st.shared.u32 [%0], %1;": "st_shared_u32",
     "cp.async.ca.shared.global [%0], [%1], 4;": "cp_async_4",
+    "cp.async.cg.shared.global [%0], [%1], 16;": "cp_async_16",
     "cp.async.wait_all;": "cp_async_wait_all",
     "ld.shared.u32 %0, [%1];": "ld_shared_u32",
     "griddepcontrol.wait;": None,

@@ -339,7 +339,7 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
 
 TEST(BrickTriangle, BricksMakeTheGeneralSet) {
     generator g;
-    std::uint64_t covered = 0, tested = 0, met = 0;
+    std::uint64_t covered = 0, tested = 0, met = 0, runs = 0, long_runs = 0;
     for (const int fraction : {12, 13, 14, 15, 16}) {
         g.fraction = fraction;
         for (int i = 0; i < unit::cases(600); ++i) {
@@ -398,39 +398,49 @@ TEST(BrickTriangle, BricksMakeTheGeneralSet) {
             ASSERT_EQ(found, expected) << "fraction " << fraction << ", triangle " << i;
 
             if (setup.zero_area) continue;
-            const brick_thin thin(v[0], v[1], v[2], box, setup.axis, fraction);
-            const auto last = to_uvw(setup.axis, box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
-            const auto origin = to_uvw(setup.axis, box.lo[0], box.lo[1], box.lo[2]);
-            voxels columns;
-            for (int at_v = 0; at_v <= last[1]; ++at_v)
-                for (int at_u = 0; at_u <= last[0]; at_u += brick_size) {
-                    const int end = static_cast<int>(last[0]) - at_u < brick_size - 1 ? static_cast<int>(last[0]) - at_u
-                                                                                      : brick_size - 1;
-                    bool any = false;
-                    brick_row row(thin, at_u, at_v, 0, end);
-                    std::uint32_t taken = 0;
-                    for (int before = brick_size; !row.is_done(); any = true, ++taken)
-                        row.next([&](int u, int w) {
-                            EXPECT_LT(u, before);
-                            before = u;
-                            const auto p =
-                                to_xyz(setup.axis, origin[0] + at_u + u, origin[1] + at_v, origin[2] + row.base + w);
-                            columns.insert({static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])});
-                        });
-                    ASSERT_EQ(taken, row.count);
-                    ASSERT_TRUE(!any || thin.meets_row(at_u, at_v));
-                }
             voxel_box wide = box;
             for (int k = 0; k < 3; ++k) {
                 wide.lo[k] -= 2;
                 wide.hi[k] += 2;
             }
-            ASSERT_EQ(columns, by_the_general_path<span_rule::thin>(v, fraction, wide))
-                << "fraction " << fraction << ", triangle " << i;
+            const voxels expected_thin = by_the_general_path<span_rule::thin>(v, fraction, wide);
+            for (const bool along_v : {false, true}) {
+                const row_axes axes{setup.axis, along_v};
+                const brick_thin thin(v[0], v[1], v[2], box, axes, fraction);
+                const auto last = axes.to_rows(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
+                const auto origin = axes.to_rows(box.lo[0], box.lo[1], box.lo[2]);
+                voxels columns;
+                const auto before = static_cast<int>(g.number(0, brick_size - 1)); // the box, where a brick begins
+                for (int at_v = 0; at_v <= last[1]; ++at_v)
+                    for (int at_u = -before; at_u <= last[0]; at_u += brick_size) {
+                        const int end = static_cast<int>(last[0]) - at_u;
+                        brick_row row(thin, at_u, at_v, at_u < 0 ? before : 0, end < brick_size ? end : brick_size - 1);
+                        if (row.columns == 0) continue;
+                        ASSERT_TRUE(thin.meets_row(at_u, at_v));
+                        const int lowest = row.first_column(), highest = row.last_column();
+                        ASSERT_EQ(row.columns, (2u << highest) - (1u << lowest)); // no gaps
+                        for (int u = lowest, end = 0; u <= highest; u = end + 1, ++runs) {
+                            const std::int32_t depth = row.depth(thin, u);
+                            end = row.last_of_depth(thin, depth, u, highest);
+                            ASSERT_TRUE(u <= end && end <= highest);
+                            ASSERT_TRUE(end == highest || row.depth(thin, end + 1) != depth);
+                            long_runs += end - u > 3 ? 1 : 0;
+                            for (int k = u; k <= end; ++k) {
+                                const auto p = axes.from_rows(origin[0] + at_u + k, origin[1] + at_v,
+                                                              origin[2] + row.base + depth);
+                                columns.insert(
+                                    {static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])});
+                            }
+                        }
+                    }
+                ASSERT_EQ(columns, expected_thin) << "fraction " << fraction << ", triangle " << i << ", " << along_v;
+            }
         }
     }
     EXPECT_GT(covered, static_cast<std::uint64_t>(150 * unit::cases(600)));
     EXPECT_LT(met, tested);
+    EXPECT_GT(long_runs, static_cast<std::uint64_t>(unit::cases(600)));
+    EXPECT_GT(runs, 2 * long_runs);
 }
 
 TEST(SmallTriangle, NearPositionsSnapAsAllDo) {

@@ -137,18 +137,44 @@ private:
     }
 };
 
-// The same for thin coverage, in rows of 16 columns of the dominant axis. For triangles that have an area.
+// How the rows of columns of a large thin triangle lie: along u of its dominant axis, or along v.
+struct row_axes {
+    int dominant;
+    bool along_v;
+
+    // (x, y, z) -> along rows, across them, along the dominant axis; and back.
+    template <class T>
+    [[nodiscard]] VOXELPIPE_HD constexpr triple<T> to_rows(const T& x, const T& y, const T& z) const {
+        const triple<T> uvw = to_uvw(dominant, x, y, z);
+        return along_v ? triple<T>{{uvw[1], uvw[0], uvw[2]}} : uvw;
+    }
+    template <class T>
+    [[nodiscard]] VOXELPIPE_HD constexpr triple<T> from_rows(const T& along, const T& across, const T& w) const {
+        return to_xyz(dominant, along_v ? across : along, along_v ? along : across, w);
+    }
+    [[nodiscard]] VOXELPIPE_HD constexpr bool are_along_x() const { return dominant == (along_v ? 1 : 2); }
+};
+
+// The same for thin coverage, in rows of 16 columns of the dominant axis. For triangles that have an area. Here and in
+// brick_row, u is the axis along the rows.
 struct brick_thin {
-    int axis;
     brick_half_plane uv[3];
     std::int64_t nu, nv, nw, depth; // as in small_thin
+    row_axes axes;
+    std::int32_t first[3], last[3]; // the bounding box by these axes: 32 bits hold one that meets a grid
 
     brick_thin() = default;
     VOXELPIPE_HD brick_thin(const snapped_position& a, const snapped_position& b, const snapped_position& c,
-                            const voxel_box& box, int axis_, int fraction)
-        : axis(axis_) {
+                            const voxel_box& box, const row_axes& axes_, int fraction)
+        : axes(axes_) {
+        const auto low = axes.to_rows(box.lo[0], box.lo[1], box.lo[2]),
+                   high = axes.to_rows(box.hi[0], box.hi[1], box.hi[2]);
+        for (int k = 0; k < 3; ++k) {
+            first[k] = static_cast<std::int32_t>(low[k]);
+            last[k] = static_cast<std::int32_t>(high[k]);
+        }
         const auto place = [&](const snapped_position& v) {
-            return to_uvw<std::int64_t>(axis_, v.x - (box.lo[0] << fraction), v.y - (box.lo[1] << fraction),
+            return to_uvw<std::int64_t>(axes.dominant, v.x - (box.lo[0] << fraction), v.y - (box.lo[1] << fraction),
                                         v.z - (box.lo[2] << fraction));
         };
         const triple<std::int64_t> p[3] = {place(a), place(b), place(c)};
@@ -161,21 +187,23 @@ struct brick_thin {
         for (int i = 0; i < 3; ++i) {
             const int j = i == 2 ? 0 : i + 1;
             const half_plane<std::int64_t> h = edge(p[i][0], p[i][1], p[j][0], p[j][1], sign, fraction);
-            uv[i] = {static_cast<std::int32_t>(h.a), static_cast<std::int32_t>(h.b), h.c};
+            const auto by_u = static_cast<std::int32_t>(h.a), by_v = static_cast<std::int32_t>(h.b);
+            uv[i] = {axes.along_v ? by_v : by_u, axes.along_v ? by_u : by_v, h.c};
         }
-        nu = sign * n[0];
-        nv = sign * n[1];
+        nu = sign * n[axes.along_v ? 1 : 0];
+        nv = sign * n[axes.along_v ? 0 : 1];
         nw = sign * n[2];
         depth = static_cast<std::int64_t>(
-            exact::floor_shift(2 * (static_cast<int128>(nu) * p[0][0] + static_cast<int128>(nv) * p[0][1] +
-                                    static_cast<int128>(nw) * p[0][2]),
+            exact::floor_shift(2 * sign *
+                                   (static_cast<int128>(n[0]) * p[0][0] + static_cast<int128>(n[1]) * p[0][1] +
+                                    static_cast<int128>(n[2]) * p[0][2]),
                                fraction));
     }
 
     // Columns count from (u, v) in what this gives.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE small_thin from(int u, int v) const {
         small_thin s;
-        s.axis = axis;
+        s.axis = axes.dominant;
         for (int i = 0; i < 3; ++i) s.uv[i] = uv[i].from(u, v);
         s.nu = nu;
         s.nv = nv;
@@ -192,36 +220,52 @@ struct brick_thin {
     }
 };
 
-// The covered columns of a row of at most brick_size, one after the other.
+// The covered columns of a row of at most brick_size, which are next to each other, and their depths, which ascend or
+// descend. What the triangle's other rows have too is asked of it.
 struct brick_row {
-    // A word of a walk over one row (small_thin::walk).
-    struct kept_row {
-        std::uint32_t word;
-        VOXELPIPE_HD VOXELPIPE_INLINE void set(int, std::uint32_t w) { word = w; }
-        [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t get(int) const { return word; }
-    };
-    small_thin s; // columns and depths count from the row's place
-    small_thin::walk left{};
-    kept_row kept{};
-    std::int32_t base = 0;   // the row's place: a depth that its first column's is near, from the bounding box
-    std::uint32_t count = 0; // of columns, before the first is taken
+    std::int64_t plane = 0;    // small_thin::depth; columns and depths count from the row's place
+    float by_u = 0, first = 0; // depths in floats: of the next column, of column 0
+    std::uint32_t columns = 0; // as bits
+    std::int32_t base = 0;     // the row's place: a depth that its first column's is near, from the bounding box
 
     brick_row() = default; // none
-    // Columns first .. last, of which none is beyond brick_size, from (u, v) on.
-    VOXELPIPE_HD VOXELPIPE_INLINE brick_row(const brick_thin& t, int u, int v, int first, int last) : s(t.from(u, v)) {
-        // Floats tell depths of up to some twenty voxels. Whatever is within a voxel does.
-        const std::int64_t divisor = 2 * s.nw;
-        base = static_cast<std::int32_t>(
-            exact::div(static_cast<double>(s.depth - s.nu - s.nv), static_cast<double>(divisor)));
-        s.depth -= base * divisor;
-        left = s.find_columns(first, last, 0, 0, 1, kept, count);
+    // Columns from .. to, of which none is beyond brick_size, from (u, v) on.
+    VOXELPIPE_HD VOXELPIPE_INLINE brick_row(const brick_thin& t, int u, int v, int from, int to) {
+        small_thin s = t.from(u, v);
+        // Floats tell depths of up to some twenty voxels. Whatever is within a voxel or two does, as this is: of 2^16
+        // voxels less than 2^-3 is lost.
+        base = static_cast<std::int32_t>(exact::mul(static_cast<float>(s.depth - s.nu - s.nv),
+                                                    exact::mul(0.5f, exact::near_inverse(static_cast<float>(s.nw)))));
+        s.depth -= base * (2 * s.nw);
+        struct {
+            std::uint32_t word;
+            VOXELPIPE_HD VOXELPIPE_INLINE void set(int, std::uint32_t w) { word = w; }
+        } kept{};
+        std::uint32_t count = 0;
+        const small_thin::walk walk = s.find_columns(from, to, 0, 0, 1, kept, count);
+        plane = s.depth;
+        by_u = walk.by_u;
+        first = walk.first;
+        columns = kept.word << from;
     }
-    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_done() const { return left.is_done(); }
-    // The next one, where it is not done: emit(column, depth from `base`), the last column first.
-    template <class Emit>
-    VOXELPIPE_HD VOXELPIPE_INLINE void next(Emit&& emit) {
-        s.next_column(
-            left, kept, [](int) VOXELPIPE_INLINE_LAMBDA {}, emit);
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE int first_column() const { return exact::lowest_one(columns); }
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE int last_column() const { return exact::highest_one(columns); }
+    // From `base`. Here and below, of the row's triangle.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t depth(const brick_thin& t, int column) const {
+        return small_thin::depth_of(t.nu, t.nv, t.nw, plane, by_u, first, column, 0);
+    }
+    // The last column, up to `last`, that has the depth of this one.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE int last_of_depth(const brick_thin& t, std::int32_t of_column,
+                                                                  int column, int last) const {
+        if (depth(t, last) == of_column) return last;
+        // Where the next depth begins in floats, or near it.
+        const float edge = exact::sub(static_cast<float>(of_column + (by_u > 0.0f ? 1 : 0)), first),
+                    at = exact::mul(edge, exact::near_inverse(by_u));
+        auto end = static_cast<int>(
+            exact::greatest(exact::least(at, static_cast<float>(last - 1)), static_cast<float>(column)));
+        while (end > column && depth(t, end) != of_column) --end;
+        while (depth(t, end + 1) == of_column) ++end;
+        return end;
     }
 };
 

@@ -90,12 +90,20 @@ struct small_thin {
         }
         const int i = exact::highest_one(k.row), u = k.u0 + i;
         k.row ^= 1u << i;
+        emit(u, depth_of(nu, nv, nw, depth, k.by_u, k.of_row, u, k.v));
+    }
+    // The depth of the touched column u of row v of a plane as above, in floats first + by_u u.
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE static std::int32_t depth_of(std::int64_t nu, std::int64_t nv,
+                                                                             std::int64_t nw, std::int64_t depth,
+                                                                             float by_u, float first, int u, int v) {
         // Slopes are at most one, and depths from -1 to 33, so that `first` is below 100, and what is lost on the way
         // below 2^-14 voxel.
         float over = 0;
-        std::int32_t w = exact::integer_below(exact::fma(k.by_u, static_cast<float>(u), k.of_row), over);
-        if (over < 0x1p-12f || over > 1.0f - 0x1p-12f) w = depth_of(u, k.v, w);
-        emit(u, w);
+        const std::int32_t w = exact::integer_below(exact::fma(by_u, static_cast<float>(u), first), over);
+        if (over >= 0x1p-12f && over <= 1.0f - 0x1p-12f) return w;
+        const std::int64_t divisor = 2 * nw; // at most one off
+        const std::int64_t remainder = depth - times(nu, 2 * u + 1) - times(nv, 2 * v + 1) - w * divisor;
+        return w + static_cast<std::int32_t>(remainder >= divisor) - static_cast<std::int32_t>(remainder < 0);
     }
     // All of them, for threads that have a triangle each, as small_conservative::rows. First all rows, then one loop
     // over the columns that are left.
@@ -105,14 +113,6 @@ struct small_thin {
         std::uint32_t count = 0;
         for (walk k = find_columns(u0, u1, v0, v1, step, kept, count); !k.is_done();)
             next_column(k, kept, begin_row, emit);
-    }
-
-private:
-    // The depth of a column at its centre, where `near` is at most one off.
-    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t depth_of(int u, int v, std::int32_t near) const {
-        const std::int64_t divisor = 2 * nw;
-        const std::int64_t remainder = depth - times(nu, 2 * u + 1) - times(nv, 2 * v + 1) - near * divisor;
-        return near + static_cast<std::int32_t>(remainder >= divisor) - static_cast<std::int32_t>(remainder < 0);
     }
 };
 

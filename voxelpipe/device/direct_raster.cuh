@@ -110,6 +110,12 @@ struct blending_sink : direct_sink<Call> {
         ++mine.fragments;
         reduce_or(voxelpipe::get<0>(this->call.out.fb.targets).elements + at.number(), at.bit());
     }
+    __device__ VOXELPIPE_INLINE void put_line(word_place first, const word_place& step, unsigned count) {
+        mine.fragments += count;
+        // Read once: behind each reduction, what is not in a register may have changed.
+        word* const words = voxelpipe::get<0>(this->call.out.fb.targets).elements;
+        for (; count != 0; --count, first = first + step) reduce_or(words + first.number(), first.bit());
+    }
     // As in blend_cube.
     __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word voxels) {
         mine.fragments += static_cast<unsigned>(__popc(voxels));
@@ -447,6 +453,14 @@ raster_all_records(const Call& call, unsigned* dropped, brick_memory<Call::rule>
     return sink.end();
 }
 
+// The warp's share of what records need (large_raster.cuh).
+template <class Call>
+__device__ __noinline__ void keep_setups(const Call& call, unsigned warp, unsigned warps) {
+    const large_records all(call.lists);
+    if (all.want_setups(call.lists, warps))
+        large_setup<Call::rule>::keep(call, warp, warps, static_cast<std::uint32_t>(all.triangles));
+}
+
 // What a warp of the second kernel knows of its place.
 struct warp_place {
     unsigned warp, warps; // of the grid
@@ -540,8 +554,8 @@ __global__ __launch_bounds__(raster_threads,
                                                                             pipeline_state* state) {
     using sink_type = typename Call::rest_sink;
     constexpr bool thin = Call::rule == coverage::thin;
-    // Of a warp: what its large triangles want comes first, and is gone then. More shared memory would leave less to
-    // the cache of vertices.
+    // Of a warp: what its large triangles want, or the rest. More shared memory would leave less to the cache of
+    // vertices.
     __shared__ union {
         brick_memory<Call::rule> bricks;
         kept_rows rows;
@@ -559,11 +573,19 @@ __global__ __launch_bounds__(raster_threads,
     const lane_rows kept(memory_of_warps[in_block].rows);
     const warp_place place{blockIdx.x * raster_warps + in_block, gridDim.x * raster_warps, threadIdx.x % 32};
     typename sink_type::memory& memory = memories[in_block];
+    const bool has_records = uniform(*call.lists.next) != 0;
+    // Parts of few large triangles go to different multiprocessors.
+    const unsigned warp_of_records = thin ? place.warp : in_block * gridDim.x + blockIdx.x;
+    const auto draw_records = [&]() VOXELPIPE_INLINE_LAMBDA {
+        return raster_all_records(call, dropped, memory_of_warps[in_block].bricks, memory, warp_of_records,
+                                  place.warps);
+    };
+    // Thin records come last: what they need is there when all else is drawn. Conservative ones take longest, and other
+    // warps had better have the rest.
     typename sink_type::totals of_records{};
-    if (uniform(*call.lists.next) != 0) {
-        // Parts of few large triangles go to different multiprocessors.
-        const unsigned warp = thin ? place.warp : in_block * gridDim.x + blockIdx.x;
-        of_records = raster_all_records(call, dropped, memory_of_warps[in_block].bricks, memory, warp, place.warps);
+    if (has_records) {
+        keep_setups(call, warp_of_records, place.warps);
+        if constexpr (!thin) of_records = draw_records();
     }
     sink_type sink(call, dropped, memory);
     sink.take_over(of_records);
@@ -574,6 +596,12 @@ __global__ __launch_bounds__(raster_threads,
         sink.take_over(rows.end());
     } else {
         raster_lists(call, place, kept, sink, sink);
+    }
+    if constexpr (thin) {
+        if (has_records) {
+            (void)sink.end(); // the memory is another sink's
+            sink.take_over(draw_records());
+        }
     }
     sink.finish(state);
     __syncthreads();

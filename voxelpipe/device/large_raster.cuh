@@ -23,21 +23,27 @@ static_assert((std::int64_t{most_direct_extent} / core::brick_size + 1) * (most_
 
 // How a large triangle's box of voxels is cut into pieces, a lane each, some to a record, which is a warp's.
 // Conservative: columns of bricks along the dominant axis, few, for the bricks of a column keep eight lanes busy, and
-// the last warp to end is one with a floor or a wall. Thin: rows of 16 columns of voxels.
+// the last warp to end is one with a floor or a wall. Thin: rows of 16 columns of voxels, along that axis of the other
+// two which makes fewer of them.
 template <coverage Rule>
 struct large_pieces {
     static constexpr int across = Rule == coverage::thin ? 1 : core::brick_size; // voxels along v
     static constexpr int per_record = Rule == coverage::thin ? 32 : 8;
-    int axis;
-    core::triple<std::int64_t> lo, hi;            // uvw, the box
+    core::row_axes axes;
+    core::triple<std::int64_t> lo, hi;            // uvw by these axes, the box
     std::int64_t first_u, first_v, per_row, rows; // 32 bits number pieces (most_direct_extent)
 
     large_pieces() = default;
-    VOXELPIPE_HD large_pieces(const core::voxel_box& box, int axis_)
-        : axis(axis_), lo(core::to_uvw(axis_, box.lo[0], box.lo[1], box.lo[2])),
-          hi(core::to_uvw(axis_, box.hi[0], box.hi[1], box.hi[2])), first_u(lo[0] >> core::log2_brick),
-          first_v(lo[1] / across), per_row((hi[0] >> core::log2_brick) - first_u + 1),
-          rows(hi[1] / across - first_v + 1) {}
+    VOXELPIPE_HD large_pieces(const core::voxel_box& box, int dominant)
+        : large_pieces(box, core::row_axes{dominant, false}) {
+        if constexpr (Rule == coverage::thin) {
+            const large_pieces by_v(box, core::row_axes{dominant, true});
+            // Columns along x may be set by one word.
+            const std::int64_t mine = count() * (axes.are_along_x() ? 3 : 4),
+                               other = by_v.count() * (by_v.axes.are_along_x() ? 3 : 4);
+            if (other < mine) *this = by_v;
+        }
+    }
     [[nodiscard]] VOXELPIPE_HD std::int64_t count() const { return per_row * rows; }
     [[nodiscard]] VOXELPIPE_HD std::int64_t records() const { return (count() + per_record - 1) / per_record; }
     // The lowest voxel of piece i along u and v, maybe outside the box.
@@ -57,8 +63,8 @@ struct large_pieces {
         const std::int64_t u0 = u(i), u1 = u0 + core::brick_size - 1;
         const std::int64_t v0 = first_row(i, part), v1 = first_row(i, part + 1) - 1;
         const auto inside = [&](std::int64_t at, int k) { return at < lo[k] ? lo[k] : at > hi[k] ? hi[k] : at; };
-        return {core::to_xyz(axis, inside(u0, 0), inside(v0, 1), lo[2]),
-                core::to_xyz(axis, inside(u1, 0), inside(v1, 1), hi[2])};
+        return {axes.from_rows(inside(u0, 0), inside(v0, 1), lo[2]),
+                axes.from_rows(inside(u1, 0), inside(v1, 1), hi[2])};
     }
     // The most records that a triangle can have in a grid.
     [[nodiscard]] static std::uint64_t most_records(glm::ivec3 extent) {
@@ -66,10 +72,16 @@ struct large_pieces {
             const std::int64_t pieces = (along / core::brick_size + 1) * (rest / across + 1);
             return static_cast<std::uint64_t>((pieces + per_record - 1) / per_record);
         };
-        return core::max3(of(extent.y, extent.z), of(extent.z, extent.x), of(extent.x, extent.y));
+        return std::max(core::max3(of(extent.y, extent.z), of(extent.z, extent.x), of(extent.x, extent.y)),
+                        core::max3(of(extent.z, extent.y), of(extent.x, extent.z), of(extent.y, extent.x)));
     }
 
 private:
+    VOXELPIPE_HD large_pieces(const core::voxel_box& box, const core::row_axes& axes_)
+        : axes(axes_), lo(axes_.to_rows(box.lo[0], box.lo[1], box.lo[2])),
+          hi(axes_.to_rows(box.hi[0], box.hi[1], box.hi[2])), first_u(lo[0] >> core::log2_brick),
+          first_v(lo[1] / across), per_row((hi[0] >> core::log2_brick) - first_u + 1),
+          rows(hi[1] / across - first_v + 1) {}
     [[nodiscard]] VOXELPIPE_HD std::int64_t first_row(std::int64_t i, unsigned part) const {
         return v(i) + part * (across / lanes_each);
     }
@@ -119,64 +131,93 @@ struct alignas(16) large_setup {
     std::conditional_t<Rule == coverage::thin, core::brick_thin, core::brick_triangle> bricks; // where is_narrow
     core::voxel_box box, reach; // of the triangle; what of it lies in the grid
     large_pieces<Rule> pieces;
+    unsigned long long first_record; // of all, the triangle's first one
+    std::uint32_t triangle;
     std::uint32_t is_narrow; // or the 64-bit path cannot hold it
-    static_assert(sizeof(bricks) + 2 * sizeof(box) + sizeof(pieces) + 16 <= triangle_lists::setup_bytes);
 
-    // Of a triangle that has records, by all lanes of a warp, into its shared memory.
+    // Of a triangle that has records, this one of those. By one thread.
     template <class Call>
-    __device__ VOXELPIPE_INLINE void find(const Call& call, std::uint32_t triangle) {
+    __device__ VOXELPIPE_INLINE void find(const Call& call, std::uint32_t number) {
         const int fraction = call.in.fraction;
+        first_record = call.lists.first_records[number];
+        triangle = call.lists.cut[number];
         const glm::uvec3 index = call.in.source.triangle(triangle);
         const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
                                      c = call.in.source.position(index.z);
         const core::voxel_box whole{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
         core::voxel_box within{};
         (void)core::classify<Rule>(a, b, c, fraction, whole, within);
-        const int axis = core::dominant_axis(a, b, c, fraction);
         const core::voxel_box whole_box = core::bounds(a, b, c, fraction);
+        const large_pieces<Rule> cut(within, core::dominant_axis(a, b, c, fraction));
         const bool narrow = core::fits_narrow(a, b, c, fraction);
-        if (threadIdx.x % 32 == 0) {
-            reach = within;
-            box = whole_box;
-            pieces = large_pieces<Rule>(within, axis);
-            is_narrow = narrow;
-        }
+        reach = within;
+        box = whole_box;
+        pieces = cut;
+        is_narrow = narrow;
         if (!narrow) return;
-        if constexpr (Rule == coverage::thin) {
-            const core::brick_thin t(a, b, c, whole_box, axis, fraction);
-            if (threadIdx.x % 32 == 0) bricks = t;
-        } else {
-            const core::brick_triangle t(a, b, c, whole_box, fraction);
-            if (threadIdx.x % 32 == 0) bricks = t;
-        }
+        if constexpr (Rule == coverage::thin)
+            bricks = core::brick_thin(a, b, c, whole_box, cut.axes, fraction);
+        else
+            bricks = core::brick_triangle(a, b, c, whole_box, fraction);
     }
-    // From where another warp has kept it, or to there, for others. All lanes take part; false: it is not there, or not
-    // yet, for nobody waits long.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool load(const triangle_lists& lists, unsigned number) {
+    // Those that this warp keeps for all warps, a lane each, so that all warps have one to do before any has two; and
+    // for each of their records, whose it is.
+    template <class Call>
+    __device__ VOXELPIPE_INLINE static void keep(const Call& call, unsigned warp, unsigned warps, std::uint32_t num) {
         const unsigned lane = threadIdx.x % 32;
-        unsigned there = 0;
-        for (int look = 0; look < 64 && there == 0; ++look) {
-            if (lane == 0) there = ready(lists.has_setup[number]).load(::cuda::memory_order_acquire);
-            there = __shfl_sync(0xffffffffu, there, 0);
+        unsigned kept = 0;
+        for (std::uint32_t first = warp; first < num; first += 32 * warps) {
+            const std::uint32_t mine = first + lane * warps;
+            unsigned record = 0, records = 0;
+            if (mine < num) {
+                large_setup& setup = kept_of(call.lists)[mine];
+                setup.find(call, mine);
+                record = static_cast<unsigned>(setup.first_record);
+                records = static_cast<unsigned>(setup.pieces.records());
+            }
+            const unsigned lanes = __ballot_sync(0xffffffffu, mine < num);
+            kept += static_cast<unsigned>(__popc(lanes));
+            for (unsigned left = lanes; left != 0; left &= left - 1) {
+                const int of = __ffs(static_cast<int>(left)) - 1;
+                const unsigned begin = __shfl_sync(0xffffffffu, record, of),
+                               count = __shfl_sync(0xffffffffu, records, of);
+                for (unsigned i = lane; i < count; i += 32)
+                    call.lists.big[begin + i] = first + static_cast<unsigned>(of) * warps;
+            }
         }
-        if (there == 0) return false;
-        const auto* const from =
-            reinterpret_cast<const uint4*>(lists.setups) + number * (sizeof(*this) / sizeof(uint4));
-        for (unsigned i = lane; i < sizeof(*this) / sizeof(uint4); i += 32) reinterpret_cast<uint4*>(this)[i] = from[i];
-        return true;
-    }
-    __device__ VOXELPIPE_INLINE void keep(const triangle_lists& lists, unsigned number) const {
-        const unsigned lane = threadIdx.x % 32;
-        auto* const to = reinterpret_cast<uint4*>(lists.setups) + number * (sizeof(*this) / sizeof(uint4));
-        for (unsigned i = lane; i < sizeof(*this) / sizeof(uint4); i += 32)
-            to[i] = reinterpret_cast<const uint4*>(this)[i];
         __threadfence();
         __syncwarp();
-        if (lane == 0) ready(lists.has_setup[number]).store(1, ::cuda::memory_order_release);
+        if (lane == 0 && kept != 0) atomicAdd(call.lists.set_up, static_cast<unsigned long long>(kept));
+    }
+    // Whether all `num` are there, soon: nobody waits long, for there may be blocks that have not begun. All lanes take
+    // part.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool are_kept(const triangle_lists& lists, std::uint32_t num) {
+        ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device> kept(*lists.set_up);
+        bool all = false;
+        for (int look = 0; look < 256 && !all; ++look) {
+            if (threadIdx.x % 32 == 0) all = kept.load(::cuda::memory_order_relaxed) == num;
+            all = __shfl_sync(0xffffffffu, static_cast<int>(all), 0) != 0;
+        }
+        __syncwarp();
+        __threadfence();
+        return all;
+    }
+    // Begins to bring one of those to this place in shared memory; to wait for it is the caller's. All lanes take part.
+    __device__ VOXELPIPE_INLINE void fetch(const triangle_lists& lists, std::uint32_t number) {
+        constexpr unsigned parts = sizeof(large_setup) / sizeof(uint4);
+        static_assert(parts <= 32 && sizeof(large_setup) <= triangle_lists::setup_bytes);
+        const unsigned lane = threadIdx.x % 32;
+        if (lane < parts)
+            asm volatile("cp.async.cg.shared.global [%0], [%1], 16;" ::"r"(
+                             static_cast<std::uint32_t>(__cvta_generic_to_shared(this)) + 16 * lane),
+                         "l"(__cvta_generic_to_global(reinterpret_cast<const uint4*>(kept_of(lists) + number) + lane))
+                         : "memory");
     }
 
 private:
-    using ready = ::cuda::atomic_ref<std::uint32_t, ::cuda::thread_scope_device>;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static large_setup* kept_of(const triangle_lists& lists) {
+        return reinterpret_cast<large_setup*>(lists.setups);
+    }
 };
 
 // Rows of bits along x from spans of columns: columns next to each other with one voxel at the same depth become one.
@@ -238,8 +279,10 @@ inline constexpr int most_bricks = 64;
 // What one warp keeps in shared memory for a large triangle.
 template <coverage Rule>
 struct brick_memory {
-    large_setup<Rule> setup;
-    std::int16_t bricks[Rule == coverage::thin ? 1 : 3][most_bricks]; // that wait, in bricks of the grid
+    large_setup<Rule> setups[2]; // of a record and of the next one
+    std::uint32_t next;          // the number of the next one's, or of the one after that
+    // Those that wait, in bricks of the grid.
+    std::int16_t bricks[Rule == coverage::thin ? 1 : 3][most_bricks];
 };
 
 // Into how many parts, a power of two, a record is cut. A warp goes through the bricks of its columns four at a time:
@@ -256,7 +299,8 @@ template <coverage Rule>
 template <class Place>
 struct thin_piece {
     core::brick_row row;
-    int axis, u, v;      // of the row's first column; its depths count from
+    core::row_axes axes;
+    int u, v;            // of the row's first column; its depths count from
     std::int32_t w;      // this one
     std::int32_t lo, hi; // depths of the grid that the triangle can have, from the same
     Place origin, by_u, by_w;
@@ -265,25 +309,21 @@ struct thin_piece {
     template <class Sink>
     __device__ VOXELPIPE_INLINE thin_piece(const large_setup<coverage::thin>& t, std::int64_t piece, bool wanted,
                                            const Sink& sink)
-        : axis(t.pieces.axis), u(static_cast<int>(t.pieces.u(piece))), v(static_cast<int>(t.pieces.v(piece))) {
-        const core::voxel_box& box = t.box;
-        const large_pieces<coverage::thin>& pieces = t.pieces;
-        const auto first = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
-        const auto last = core::to_uvw(axis, box.hi[0], box.hi[1], box.hi[2]);
+        : axes(t.pieces.axes), u(static_cast<int>(t.pieces.u(piece))), v(static_cast<int>(t.pieces.v(piece))) {
+        const auto& first = t.bricks.first;
+        const auto& last = t.bricks.last;
+        const auto low = [&](int k) { return static_cast<std::int32_t>(t.pieces.lo[k]); };
+        const auto high = [&](int k) { return static_cast<std::int32_t>(t.pieces.hi[k]); };
         wanted = wanted && v >= first[1] && v <= last[1]; // the box within the grid is a voxel wider
-        const auto from_u = static_cast<int>(u - first[0]), from_v = static_cast<int>(v - first[1]);
-        if (wanted && t.bricks.meets_row(from_u, from_v)) {
-            // Columns of the bounding box, within the grid.
-            const std::int64_t begin = u > first[0] ? u : first[0], end = u + core::brick_size - 1;
-            row = core::brick_row(t.bricks, from_u, from_v,
-                                  static_cast<int>((begin > pieces.lo[0] ? begin : pieces.lo[0]) - u),
-                                  static_cast<int>(core::min3(end, last[0], pieces.hi[0]) - u));
-        }
-        w = static_cast<std::int32_t>(first[2]) + row.base;
-        lo = static_cast<std::int32_t>(pieces.lo[2]) - w;
-        hi = static_cast<std::int32_t>(pieces.hi[2]) - w;
+        if (wanted && t.bricks.meets_row(u - first[0], v - first[1]))
+            row = core::brick_row(t.bricks, u - first[0], v - first[1],
+                                  core::max3(u, first[0], low(0)) - u, // columns of the bounding box, within the grid
+                                  core::min3(u + core::brick_size - 1, last[0], high(0)) - u);
+        w = first[2] + row.base;
+        lo = low(2) - w;
+        hi = high(2) - w;
         const auto place = [&](int along_u, int along_v, int along_w) {
-            const auto p = core::to_xyz(axis, along_u, along_v, along_w);
+            const auto p = axes.from_rows(along_u, along_v, along_w);
             return sink.place(p[0], p[1], p[2]);
         };
         origin = place(u, v, w);
@@ -291,53 +331,66 @@ struct thin_piece {
         by_w = place(0, 0, 1);
     }
 
-    // For a sink that wants to know how many columns all lanes have; false where that cannot be known, for some may lie
-    // outside of the grid. All lanes take part.
+    // To a sink that shares out what all lanes have, 32 columns at a time whosever row they are in; false where that
+    // cannot be, for some may lie outside of the grid. All lanes take part, with rows of one triangle.
     template <class Sink>
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool give_by_rounds(Sink& sink) const {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool give_by_all(const large_setup<coverage::thin>& t, Sink& sink) const {
         constexpr int most = core::brick_size + 1; // slopes are at most one
-        if (!__all_sync(0xffffffffu, row.count == 0 || (lo <= -most && hi >= most))) return false;
-        core::brick_row left = row;
-        sink.rounds(
-            left.count, [&]() VOXELPIPE_INLINE_LAMBDA { return left.is_done(); },
-            [&]() VOXELPIPE_INLINE_LAMBDA {
-                Place at = origin;
-                left.next([&](int column, int depth)
-                              VOXELPIPE_INLINE_LAMBDA { at = origin + by_u * column + by_w * depth; });
-                return at;
-            });
+        if (!__all_sync(0xffffffffu, row.columns == 0 || (lo <= -most && hi >= most))) return false;
+        const int first = row.columns != 0 ? row.first_column() : 0; // of no lane that has none is anything asked
+        sink.share(__popc(row.columns), [&](unsigned lane, unsigned i) VOXELPIPE_INLINE_LAMBDA {
+            constexpr unsigned all = 0xffffffffu;
+            core::brick_row of_lane;
+            of_lane.plane = __shfl_sync(all, row.plane, lane);
+            of_lane.by_u = __shfl_sync(all, row.by_u, lane);
+            of_lane.first = __shfl_sync(all, row.first, lane);
+            const int column = __shfl_sync(all, first, lane) + static_cast<int>(i);
+            const std::int32_t depth = of_lane.depth(t.bricks, column);
+            return __shfl_sync(all, origin, lane) + by_u * column + by_w * depth;
+        });
         return true;
     }
-    // ByPlace: columns that do not lie along x go to where they lie; otherwise all are rows, of which the sink is told.
+    // Run by run of columns that have one depth. ByPlace: those that do not lie along x go to where they lie; otherwise
+    // all are rows, of which the sink is told.
     template <bool ByPlace, class Sink>
-    __device__ VOXELPIPE_INLINE void give(Sink& sink) {
-        word mask = 0; // of columns next to each other along x that have one depth
-        std::int32_t of_mask = 0;
-        const auto give_mask = [&]() VOXELPIPE_INLINE_LAMBDA {
-            if (mask == 0) return;
-            const auto p = core::to_xyz(axis, u, v, w + of_mask);
-            const int low = __ffs(static_cast<int>(mask)) - 1;
-            sink.mark_row(p[0] + low, p[0] + 31 - __clz(static_cast<int>(mask)), p[1], p[2]);
-            sink.row(p[0], p[1], p[2], mask);
-            mask = 0;
-        };
-        while (!row.is_done()) {
-            row.next([&](int column, int depth) VOXELPIPE_INLINE_LAMBDA {
-                const bool inside = depth >= lo && depth <= hi;
-                if (axis == 2) { // then u is x
-                    if (depth != of_mask) give_mask();
-                    of_mask = depth;
-                    mask |= inside ? 1u << column : 0;
-                } else if constexpr (ByPlace) {
-                    sink.put(origin + by_u * column + by_w * depth, inside);
-                } else if (inside) {
-                    const auto p = core::to_xyz(axis, u + column, v, w + depth);
+    __device__ VOXELPIPE_INLINE void give(const large_setup<coverage::thin>& t, Sink& sink) const {
+        if (row.columns == 0) return;
+        const int last = row.last_column();
+        for (int from = row.first_column(), to = 0; from <= last; from = to + 1) {
+            const std::int32_t depth = row.depth(t.bricks, from);
+            to = row.last_of_depth(t.bricks, depth, from, last);
+            if (depth < lo || depth > hi) continue;
+            if (axes.are_along_x()) {
+                const auto p = axes.from_rows(u, v, w + depth);
+                sink.mark_row(p[0] + from, p[0] + to, p[1], p[2]);
+                sink.row(p[0], p[1], p[2], (2u << to) - (1u << from));
+                continue;
+            }
+            if constexpr (ByPlace) {
+                sink.put_line(origin + by_u * from + by_w * depth, by_u, static_cast<unsigned>(to - from + 1));
+            } else {
+                for (int column = from; column <= to; ++column) {
+                    const auto p = axes.from_rows(u + column, v, w + depth);
                     sink.mark_row(p[0], p[0], p[1], p[2]);
                     sink.row(p[0], p[1], p[2], 1u);
                 }
-            });
+            }
         }
-        give_mask();
+    }
+};
+
+// How many records there are, and triangles that have some.
+struct large_records {
+    unsigned long long records, triangles;
+
+    __device__ VOXELPIPE_INLINE explicit large_records(const triangle_lists& lists) {
+        const unsigned long long packed = uniform(*lists.next);
+        records = packed & ((1ull << triangle_lists::record_bits) - 1);
+        triangles = packed >> triangle_lists::record_bits;
+    }
+    // Whether all triangles are set up first, for whoever has one of their records: where warps have several.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool want_setups(const triangle_lists& lists, unsigned warps) const {
+        return triangles <= lists.num_setups && records >= 3 * warps && records <= lists.big_room;
     }
 };
 
@@ -352,45 +405,59 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
     constexpr int per_record = large_pieces<Call::rule>::per_record;
     using sink_type = Sink;
     const unsigned lane = threadIdx.x % 32;
-    const unsigned long long packed = uniform(*call.lists.next);
-    const unsigned long long records = packed & ((1ull << triangle_lists::record_bits) - 1);
-    const unsigned long long num = packed >> triangle_lists::record_bits;
+    const large_records all(call.lists);
+    const unsigned long long records = all.records;
     const unsigned parts = parts_of_record<Call::rule>(records, warps);
-    // Where each warp has several records, all triangles are set up first, for whoever has one of their records.
-    const unsigned long long num_first = num <= call.lists.num_setups && records >= 2 * warps ? num : 0;
-    for (unsigned long long i = uniform(warp); i < num_first + records * parts; i += warps) {
-        const bool is_first = i < num_first;
-        const unsigned long long part = i - num_first, r = part / parts;
+    using setup_type = large_setup<Call::rule>;
+    // What is kept comes while the record before is drawn, and the number of a record's, while the one before that is;
+    // in registers they would be waited for.
+    const bool are_kept = all.want_setups(call.lists, warps) &&
+                          setup_type::are_kept(call.lists, static_cast<std::uint32_t>(all.triangles));
+    const auto fetch_number = [&](unsigned long long record) VOXELPIPE_INLINE_LAMBDA {
+        if (lane == 0 && record < records)
+            asm volatile("cp.async.ca.shared.global [%0], [%1], 4;" ::"r"(
+                             static_cast<std::uint32_t>(__cvta_generic_to_shared(&memory.next))),
+                         "l"(__cvta_generic_to_global(call.lists.big + record))
+                         : "memory");
+    };
+    if (are_kept) {
+        memory.setups[0].fetch(call.lists, call.lists.big[warp]);
+        fetch_number(std::uint64_t{warp} + warps);
+    }
+    unsigned which = 0;
+    for (unsigned long long i = uniform(warp); i < records * parts; i += warps, which ^= are_kept ? 1u : 0u) {
+        const unsigned long long r = i / parts;
         __syncwarp(); // lanes that the last pieces kept apart come together; nobody reads the last setup any more
-        const unsigned lo =
-            is_first ? static_cast<unsigned>(i) : find_last(call.lists.first_records, static_cast<unsigned>(num), r);
-        if (is_first || num_first == 0 || !memory.setup.load(call.lists, lo))
-            memory.setup.find(call, call.lists.cut[lo]);
-        __syncwarp();
-        if (is_first) {
-            memory.setup.keep(call.lists, lo);
-            continue;
+        // Records whose triangles are kept have one part.
+        if (are_kept) {
+            asm volatile("cp.async.wait_all;" ::: "memory");
+            __syncwarp();
+            const std::uint32_t next = memory.next;
+            __syncwarp();
+            if (r + warps < records) memory.setups[which ^ 1].fetch(call.lists, next);
+            fetch_number(r + 2ull * warps);
+        } else {
+            const unsigned number = find_last(call.lists.first_records, static_cast<unsigned>(all.triangles), r);
+            if (lane == 0) memory.setups[0].find(call, number);
+            __syncwarp();
         }
-        const auto piece = static_cast<std::int64_t>((r - call.lists.first_records[lo]) * per_record + lane);
-        sink.begin(call.lists.cut[lo]);
-        const large_setup<Call::rule>& setup = memory.setup;
+        const setup_type& setup = memory.setups[which];
         const large_pieces<Call::rule>& pieces = setup.pieces;
-        // Lanes beyond the record's pieces have the number of no part.
-        const bool valid = piece < pieces.count() && lane * parts / per_record == part % parts;
+        const unsigned of_record = lane % per_record, of_piece = lane / per_record;
+        const auto piece = static_cast<std::int64_t>((r - setup.first_record) * per_record + of_record);
+        sink.begin(setup.triangle);
+        const bool valid = piece < pieces.count() && of_record * parts / per_record == static_cast<unsigned>(i % parts);
         if (setup.is_narrow == 0) {
-            const glm::uvec3 index = call.in.source.triangle(call.lists.cut[lo]);
+            const glm::uvec3 index = call.in.source.triangle(setup.triangle);
             const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
                                          c = call.in.source.position(index.z);
-            // All lanes: those beyond the record's pieces take part of one.
-            const std::int64_t shared = piece - lane + lane % per_record;
-            const bool wanted = shared < pieces.count() && lane % per_record * parts / per_record == part % parts &&
-                                pieces.has_rows(shared, lane / per_record);
+            const bool wanted = valid && pieces.has_rows(piece, of_piece);
             feed(sink, [&] {
                 if (!wanted) return;
                 span_writer<sink_type> writer{sink};
                 for_each_wide_span<rule>(
-                    a, b, c, call.in.fraction, pieces.piece(shared, lane / per_record),
-                    [&](const wide_span& s) { writer.span(pieces.axis, s.u, s.v, s.w_first, s.w_last); });
+                    a, b, c, call.in.fraction, pieces.piece(piece, of_piece),
+                    [&](const wide_span& s) { writer.span(pieces.axes.dominant, s.u, s.v, s.w_first, s.w_last); });
                 writer.flush();
             });
             continue;
@@ -398,15 +465,12 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
         if constexpr (thin) {
             const thin_piece<place_of_sink<Sink>> found(setup, piece, valid, sink);
             if constexpr (Sink::has_rounds)
-                if (found.give_by_rounds(sink)) continue;
-            feed(sink, [&] {
-                thin_piece<place_of_sink<Sink>> one = found; // it may come once more
-                one.template give<Call::output::only_sets || Sink::buffers>(sink);
-            });
+                if (found.give_by_all(setup, sink)) continue;
+            feed(sink, [&] { found.template give<Call::output::only_sets || Sink::buffers>(setup, sink); });
         } else {
             const core::brick_triangle& t = setup.bricks;
             const core::voxel_box &box = setup.box, &reach = setup.reach;
-            const int axis = pieces.axis;
+            const int axis = pieces.axes.dominant;
             const auto raster_bricks = [&](int n) {
                 __syncwarp();
                 for (int first = 0; first < n; first += 32 / medium_lanes) {
@@ -430,7 +494,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
                 }
                 __syncwarp();
             };
-            int w = 0, w_end = -1; // bricks
+            int w = 0, w_end = -1; // bricks, of which each of a piece's lanes has some
             const std::int64_t u0 = pieces.u(piece), v0 = pieces.v(piece);
             if (valid) {
                 const auto origin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
@@ -440,7 +504,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
                 first += static_cast<double>(origin[2]);
                 last += static_cast<double>(origin[2]);
                 if (first <= high && last >= low) {
-                    w = static_cast<int>(first > low ? first : low) >> core::log2_brick;
+                    w = (static_cast<int>(first > low ? first : low) >> core::log2_brick) + static_cast<int>(of_piece);
                     w_end = static_cast<int>(last < high ? last : high) >> core::log2_brick;
                 }
             }
@@ -455,7 +519,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
                                   brick[1] * core::brick_size - static_cast<int>(box.lo[1]),
                                   brick[2] * core::brick_size - static_cast<int>(box.lo[2]));
                 }
-                ++w;
+                w += pieces.lanes_each;
                 const int place = take_place(hit, waiting);
                 if (hit)
                     for (int k = 0; k < 3; ++k) memory.bricks[k][place] = static_cast<std::int16_t>(brick[k]);

@@ -58,6 +58,9 @@ struct listing_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE void put(std::uint32_t voxel, bool wanted) {
         if (wanted) write(atomicAdd(&m_.n, 1u), voxel);
     }
+    __device__ VOXELPIPE_INLINE void put_line(std::uint32_t first, std::uint32_t step, unsigned count) {
+        for (unsigned at = atomicAdd(&m_.n, count), end = at + count; at < end; ++at, first += step) write(at, first);
+    }
     // They go to the list at once: neighbours, as the lanes that give one.
     template <class IsDone, class Next>
     __device__ VOXELPIPE_INLINE void rounds(std::uint32_t count, IsDone&& is_done, Next&& next) {
@@ -78,6 +81,28 @@ struct listing_sink : direct_sink<Call> {
             }
             given += static_cast<unsigned>(__popc(lanes));
             __syncwarp();
+        }
+    }
+    // The same for fragments that all lanes share out, up to 31 each: of(lane, i) is the voxel of a lane's number i.
+    // All lanes call it.
+    template <class Of>
+    __device__ VOXELPIPE_INLINE void share(std::uint32_t count, Of&& of) {
+        const unsigned begin = sum_before<0, 5>(count), all = __shfl_sync(0xffffffffu, begin + count, 31);
+        if (all == 0) return;
+        const unsigned long long first = take(all), rest = room_from(first);
+        std::uint32_t *const voxels = this->call.out.voxels + first, *const primitives =
+                                                                         this->call.out.primitives + first;
+        for (unsigned given = 0; given < all; given += 32) {
+            const unsigned at = given + threadIdx.x % 32, number = at < all ? at : all - 1;
+            unsigned lane = 0; // the last that begins here or before
+#pragma unroll
+            for (unsigned step = 16; step != 0; step /= 2)
+                lane += __shfl_sync(0xffffffffu, begin, lane + step) <= number ? step : 0;
+            const std::uint32_t voxel = of(lane, number - __shfl_sync(0xffffffffu, begin, lane));
+            if (at < all && at < rest) {
+                voxels[at] = voxel;
+                primitives[at] = primitive_;
+            }
         }
     }
     // They wait with what waits already; where there is no room for a round, that goes to the list first.

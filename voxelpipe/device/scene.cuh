@@ -32,6 +32,7 @@ struct pipeline_state {
     unsigned long long longest_run;                 // of those, fragments of a voxel that no block takes
     struct {
         unsigned long long cut, lengths[4];
+        unsigned long long set_up; // of what is cut, what all its pieces need
         [[nodiscard]] VOXELPIPE_HD bool are_none() const {
             return (cut | lengths[0] | lengths[1] | lengths[2] | lengths[3]) == 0;
         }

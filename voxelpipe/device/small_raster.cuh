@@ -9,6 +9,7 @@
 //   begin(triangle), row(x0, y, z, mask), cube(x, y, z, bits), voxels(bits, place), put(place, wanted):
 //                     the fragments of one triangle, as a row of bits along x, as 2 x 2 x 2 (blend_cube) or one by one
 //   shares            whether one(x, y, z), a fragment of a triangle that has no other, is more than a row of one
+//   put_line(place, step, count): count fragments from a place on, step apart
 //   spreads           whether a row costs by its voxels, so that lanes had better share long ones:
 //   row_by_all(group, x0, y, z, mask): a row by medium_lanes neighbours, all with the same arguments
 //   mark_boxes(wanted, triangle), mark_row(x0, x1, y, z), mark_brick(corner, lane): told of what a triangle may touch
@@ -17,6 +18,7 @@
 //   has_rounds        whether a warp had better give it fragments by
 //   rounds(count, is_done, next): thin ones of all lanes, one of each lane at a time: next() is the place of the next
 //                     of this lane's `count`
+//   share(count, of): thin ones of all lanes, 32 at a time whoever's they are: of(lane, i) is the place of a lane's i
 //   row_rounds(is_done, next): rows of all lanes, one of each lane at a time, of at most 16 voxels: next(emit) calls
 //                     emit(x0, y, z, bits), unless nothing is left of it; bits are one run
 

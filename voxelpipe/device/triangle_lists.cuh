@@ -75,29 +75,31 @@ struct triangle_lists {
     unsigned long long* first_records;
     unsigned long long* next;
 
-    // What the records of a triangle need of it (large_raster.cuh), where that is kept: room for the first ones, and
-    // for each whether it is there yet.
+    // What the records of a triangle need of it (large_raster.cuh), where that is kept for all: room for so many, and
+    // how many are there.
     static constexpr std::size_t most_setups = 1u << 14, setup_bytes = 384;
     std::byte* setups;
-    std::uint32_t* has_setup;
+    unsigned long long* set_up;
     std::uint32_t num_setups;
 
-    // Those that a block of the first kernel leaves until its end; each has a part of its own.
+    // Those that a block of the first kernel leaves until its end; each has a part of its own. Then, where set-ups are
+    // kept, for each record whose it is.
     std::uint32_t* big;
+    std::uint64_t big_room;
 
     [[nodiscard]] static triangle_lists take(arena& memory, std::size_t num_triangles) {
         triangle_lists l{};
         // Parts are whole batches of all threads of a persistent kernel.
         const std::size_t threads = std::max(static_cast<std::size_t>(num_multiprocessors()) * 2048,
                                              num_triangles / warp_triangles::most_rounds + raster_threads);
-        l.big = memory.take<std::uint32_t>(num_triangles + std::min(threads, num_triangles + 2048));
+        l.big_room = num_triangles + std::min(threads, num_triangles + 2048);
+        l.big = memory.take<std::uint32_t>(l.big_room);
         for (auto& array : l.arrays) array = memory.take<std::uint32_t>(num_triangles);
         l.capacity = static_cast<std::uint32_t>(num_triangles);
         l.cut = memory.take<std::uint32_t>(num_triangles);
         l.first_records = memory.take<unsigned long long>(num_triangles);
         l.num_setups = static_cast<std::uint32_t>(std::min(num_triangles, most_setups));
         l.setups = memory.take<std::byte>(l.num_setups * setup_bytes);
-        l.has_setup = memory.take<std::uint32_t>(l.num_setups);
         return l;
     }
     // With its counters, which are zeroed.
@@ -105,6 +107,7 @@ struct triangle_lists {
         triangle_lists l = *this;
         l.lengths = state->handed_on.lengths;
         l.next = &state->handed_on.cut;
+        l.set_up = &state->handed_on.set_up;
         return l;
     }
     [[nodiscard]] static constexpr bool holds(std::uint64_t triangles, std::uint64_t records_each) {
@@ -141,7 +144,6 @@ struct triangle_lists {
         const unsigned long long number = place >> record_bits;
         cut[number] = triangle;
         first_records[number] = place & ((1ull << record_bits) - 1);
-        if (number < num_setups) has_setup[number] = 0;
     }
 };
 

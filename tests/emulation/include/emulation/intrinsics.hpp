@@ -253,6 +253,7 @@ inline void ld_shared_u32(std::uint32_t& v, std::uint32_t p) { v = *shared<std::
 inline void cp_async_4(std::uint32_t to, std::uint64_t from) {
     *shared<std::uint32_t>(to) = *global<std::uint32_t>(from);
 }
+inline void cp_async_16(std::uint32_t to, std::uint64_t from) { *shared<uint4>(to) = *global<uint4>(from); }
 inline void cp_async_wait_all() {}
 template <class T>
 void keep(T&) {} // an empty statement that the compiler must not see through
