@@ -29,9 +29,6 @@ inline constexpr int small_most_voxels = 32; // a row is one word
 }
 static_assert(3 * small_edge_bits + 3 <= 63, "the plane of a small triangle would overflow 64 bits");
 static_assert(small_voxels(16) == 16 && small_voxels(14) == 32 && small_voxels(12) == 32 && small_voxels(11) == 0);
-// Thin depths are found by one division in double: numerator and divisor are exact (3e + 3 - F and 2e + 2 bits), and a
-// quotient below 2^8 that is no integer is further from the next one than the rounding reaches.
-static_assert(3 * small_edge_bits + 3 - 12 <= 53 && 2 * small_edge_bits + 2 + 8 <= 52);
 
 // A triangle relative to the corner of the lowest voxel of its bounding box: 0 < p <= 2^small_edge_bits.
 struct small_triangle {

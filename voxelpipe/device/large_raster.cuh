@@ -208,10 +208,8 @@ struct alignas(16) large_setup {
         static_assert(parts <= 32 && sizeof(large_setup) <= triangle_lists::setup_bytes);
         const unsigned lane = threadIdx.x % 32;
         if (lane < parts)
-            asm volatile("cp.async.cg.shared.global [%0], [%1], 16;" ::"r"(
-                             static_cast<std::uint32_t>(__cvta_generic_to_shared(this)) + 16 * lane),
-                         "l"(__cvta_generic_to_global(reinterpret_cast<const uint4*>(kept_of(lists) + number) + lane))
-                         : "memory");
+            copy_four_words(static_cast<std::uint32_t>(__cvta_generic_to_shared(this)) + 16 * lane,
+                            reinterpret_cast<const uint4*>(kept_of(lists) + number) + lane);
     }
 
 private:
@@ -415,10 +413,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
                           setup_type::are_kept(call.lists, static_cast<std::uint32_t>(all.triangles));
     const auto fetch_number = [&](unsigned long long record) VOXELPIPE_INLINE_LAMBDA {
         if (lane == 0 && record < records)
-            asm volatile("cp.async.ca.shared.global [%0], [%1], 4;" ::"r"(
-                             static_cast<std::uint32_t>(__cvta_generic_to_shared(&memory.next))),
-                         "l"(__cvta_generic_to_global(call.lists.big + record))
-                         : "memory");
+            copy_word(static_cast<std::uint32_t>(__cvta_generic_to_shared(&memory.next)), call.lists.big + record);
     };
     if (are_kept) {
         memory.setups[0].fetch(call.lists, call.lists.big[warp]);
@@ -430,7 +425,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
         __syncwarp(); // lanes that the last pieces kept apart come together; nobody reads the last setup any more
         // Records whose triangles are kept have one part.
         if (are_kept) {
-            asm volatile("cp.async.wait_all;" ::: "memory");
+            await_copies();
             __syncwarp();
             const std::uint32_t next = memory.next;
             __syncwarp();

@@ -209,6 +209,16 @@ template <class Source>
     return make_near(call, load_corners(call, index));
 }
 
+// A word, or four where both places are multiples of 16 bytes, on its way to shared memory, by an address there: no
+// register holds it meanwhile. await_copies: the thread's own are there.
+__device__ VOXELPIPE_INLINE void copy_word(std::uint32_t to, const std::uint32_t* from) {
+    asm volatile("cp.async.ca.shared.global [%0], [%1], 4;" ::"r"(to), "l"(__cvta_generic_to_global(from)) : "memory");
+}
+__device__ VOXELPIPE_INLINE void copy_four_words(std::uint32_t to, const uint4* from) {
+    asm volatile("cp.async.cg.shared.global [%0], [%1], 16;" ::"r"(to), "l"(__cvta_generic_to_global(from)) : "memory");
+}
+__device__ VOXELPIPE_INLINE void await_copies() { asm volatile("cp.async.wait_all;" ::: "memory"); }
+
 // The corners of a warp's next triangles, on their way from memory while the ones before are drawn: registers would not
 // hold them that long. A lane's column of words is its own, so that no lane waits for another.
 template <class Source>
@@ -226,15 +236,12 @@ struct coming_corners {
                                                                                            : v == 1 ? index.y
                                                                                                     : index.z));
 #pragma unroll
-            for (std::uint32_t k = 0; k < words_each; ++k)
-                asm volatile("cp.async.ca.shared.global [%0], [%1], 4;" ::"r"(to + 128 * (v * words_each + k)),
-                             "l"(__cvta_generic_to_global(from + k))
-                             : "memory");
+            for (std::uint32_t k = 0; k < words_each; ++k) copy_word(to + 128 * (v * words_each + k), from + k);
         }
     }
     // Those that were fetched last.
     [[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle take(const raster_input<Source>& call) const {
-        asm volatile("cp.async.wait_all;" ::: "memory");
+        await_copies();
         loaded_corners<Source> corners;
 #pragma unroll
         for (std::uint32_t v = 0; v < 3; ++v) {
