@@ -443,6 +443,55 @@ TEST(BrickTriangle, BricksMakeTheGeneralSet) {
     EXPECT_GT(runs, 2 * long_runs);
 }
 
+// Rows of triangles as large as the 64-bit path holds, some thousand voxels, where depths in floats count from a place
+// of the row's own.
+TEST(BrickTriangle, RowsOfTheLargestTriangles) {
+    generator g;
+    std::uint64_t rows = 0, far_rows = 0;
+    for (const int fraction : {12, 13, 14, 15, 16})
+        for (int i = 0; i < unit::cases(300); ++i) {
+            const std::int64_t most = (std::int64_t{1} << narrow_edge_bits(fraction)) - 1;
+            const std::int64_t size[3] = {g.number(most / 2, most), g.number(most / 64, most),
+                                          g.number(most / 2, most)};
+            const snapped_position corner{g.number(-most, most), g.number(-most, most), g.number(-most, most)};
+            snapped_position v[3];
+            for (auto& p : v)
+                p = {corner.x + g.number(0, size[0]), corner.y + g.number(0, size[1]), corner.z + g.number(0, size[2])};
+            if (!fits_narrow(v[0], v[1], v[2], fraction)) continue;
+            const auto setup = setup_triangle<span_rule::thin, std::int64_t>(v[0], v[1], v[2], fraction);
+            if (setup.zero_area) continue;
+            const voxel_box box = bounds(v[0], v[1], v[2], fraction);
+            for (const bool along_v : {false, true}) {
+                const row_axes axes{setup.axis, along_v};
+                const brick_thin thin(v[0], v[1], v[2], box, axes, fraction);
+                const auto origin = axes.to_rows(box.lo[0], box.lo[1], box.lo[2]),
+                           end = axes.to_rows(box.hi[0], box.hi[1], box.hi[2]);
+                for (int k = 0; k < 20; ++k) {
+                    const auto at_u = static_cast<int>(g.number(0, end[0] - origin[0])),
+                               at_v = static_cast<int>(g.number(0, end[1] - origin[1]));
+                    const std::int64_t left = end[0] - origin[0] - at_u;
+                    const int last = left < brick_size ? static_cast<int>(left) : brick_size - 1;
+                    const brick_row row(thin, at_u, at_v, 0, last);
+                    voxels columns;
+                    for (std::uint32_t rest = row.columns; rest != 0; rest &= rest - 1) {
+                        const int u = voxelpipe::exact::lowest_one(rest);
+                        const auto p = axes.from_rows(origin[0] + at_u + u, origin[1] + at_v,
+                                                      origin[2] + row.base + row.depth(thin, u));
+                        columns.insert({static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])});
+                    }
+                    const voxel_box clip{axes.from_rows(origin[0] + at_u, origin[1] + at_v, origin[2] - 2),
+                                         axes.from_rows(origin[0] + at_u + last, origin[1] + at_v, end[2] + 2)};
+                    ASSERT_EQ(columns, by_the_general_path<span_rule::thin>(v, fraction, clip))
+                        << "fraction " << fraction << ", triangle " << i << ", " << along_v;
+                    rows += columns.empty() ? 0 : 1;
+                    far_rows += !columns.empty() && row.base > 200 ? 1 : 0;
+                }
+            }
+        }
+    EXPECT_GT(rows, static_cast<std::uint64_t>(5 * unit::cases(300)));
+    EXPECT_GT(far_rows, static_cast<std::uint64_t>(unit::cases(300)));
+}
+
 TEST(SmallTriangle, NearPositionsSnapAsAllDo) {
     generator g;
     snap_transform t{
