@@ -232,8 +232,8 @@ struct brick_row {
     // Columns from .. to, of which none is beyond brick_size, from (u, v) on.
     VOXELPIPE_HD VOXELPIPE_INLINE brick_row(const brick_thin& t, int u, int v, int from, int to) {
         small_thin s = t.from(u, v);
-        // Floats tell depths of up to some twenty voxels. Whatever is within a voxel or two does, as this is: a triangle
-        // that fits_narrow has up to 2^11 voxels a side, of which three roundings lose less than 2^-8.
+        // Floats tell depths of up to some twenty voxels. Whatever is within a voxel or two does, as this is: a
+        // triangle that fits_narrow has up to 2^11 voxels a side, of which three roundings lose less than 2^-8.
         base = static_cast<std::int32_t>(exact::mul(static_cast<float>(s.depth - s.nu - s.nv),
                                                     exact::mul(0.5f, exact::near_inverse(static_cast<float>(s.nw)))));
         s.depth -= base * (2 * s.nw);
