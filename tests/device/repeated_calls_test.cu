@@ -206,37 +206,129 @@ mesh_data spread_triangles(int count, bool large) {
     return m;
 }
 
-TEST(RepeatedCalls, WithTrianglesForASecondKernelOrNone) {
-    using target = vp::target<float, blend::add>;
-    using shader_type = decltype(vp::constant(1.0f));
-    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, shader_type>;
+// Meshes of as many triangles, by number in turn, into one target, which is cleared, or with `loads` the first time
+// only.
+template <class Target, class Shader>
+void draw_in_turn(const std::vector<mesh_data>& meshes, const std::vector<int>& sequence, const Shader& shader,
+                  const vp::voxelize_options& options, indices known, bool loads = false) {
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, Shader>;
     vp::cuda_backend gpu;
     vp::cpu_backend cpu;
     const vp::grid g = box_grid({47, 46, 45});
-    const mesh_data meshes[] = {spread_triangles(3000, false), spread_triangles(3000, true)};
-    for (const bool loads : {false, true}) {
+    open_mesh on_gpu(gpu, meshes[0]);
+    draw on_device{{on_gpu.positions.view(), on_gpu.triangles.view()}, {}, shader};
+    if (known == indices::checked) on_device.mesh.checked = vp::check_indices(gpu, on_device.mesh.triangles);
+    vp::framebuffer<vp::cuda_backend, Target> gpu_fb{gpu, g.extent};
+    vp::framebuffer<vp::cpu_backend, Target> cpu_fb{cpu, g.extent};
+    for (std::size_t i = 0; i < sequence.size(); ++i) {
+        SCOPED_TRACE(testing::Message() << "call " << i << ", mesh " << sequence[i]);
+        const mesh_data& m = meshes[static_cast<std::size_t>(sequence[i])];
+        on_gpu.write(gpu, m);
+        const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+        const draw on_host{cpu_mesh.view(), {}, shader};
+        auto to_gpu = gpu_fb.view();
+        auto to_cpu = cpu_fb.view();
+        if (loads && i != 0)
+            vp::get<0>(to_gpu.targets).load = vp::get<0>(to_cpu.targets).load = vp::load_operation::load;
+        const vp::status a = vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, to_gpu, options);
+        const vp::status b = vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, to_cpu, options);
+        ASSERT_TRUE(a.ok() && b.ok()) << a.message();
+        expect_same_counts(b.counts, a.counts);
+        expect_same_bytes(vp::get<0>(cpu_fb).to_host(cpu), vp::get<0>(gpu_fb).to_host(gpu), "target");
+    }
+}
+
+TEST(RepeatedCalls, WithTrianglesForASecondKernelOrNone) {
+    const std::vector<mesh_data> meshes{spread_triangles(3000, false), spread_triangles(3000, true)};
+    for (const bool loads : {false, true})
+        draw_in_turn<vp::target<float, blend::add>>(meshes, {0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1, 0, 1},
+                                                    vp::constant(1.0f), {vp::coverage::conservative, false},
+                                                    indices::unknown, loads);
+}
+
+// Of a fine mesh, one triangle in `step`, up to `longest` voxels long and one or two wide, some of them without an area
+// or beyond the grid: where these are few, the blocks of the first kernel draw them at their end from the second call
+// on.
+mesh_data fine_triangles(int step, float longest) {
+    constexpr int count = 2000;
+    mesh_data m;
+    for (int i = 0; i < count; ++i) {
+        const glm::vec3 corner(0.9f * static_cast<float>(i % 50), 0.37f * static_cast<float>(i / 50 % 120),
+                               0.53f * static_cast<float>(i % 83));
+        const bool is_long = step != 0 && i % step == 0;
+        const float size = is_long ? longest * (0.5f + 0.125f * static_cast<float>(i / step % 5)) : 0.7f;
+        const int axis = i % 3;
+        glm::vec3 along(0.1f), across(0.4f);
+        along[axis] = size;
+        across[(axis + 1) % 3] = is_long ? 1.2f : 0.7f;
+        const bool is_flat = is_long && i / step % 6 == 5;
+        add_triangle(m, corner, corner + along, is_flat ? corner + 0.5f * along : corner + across);
+    }
+    return m;
+}
+enum : int { none_left, few_left, many_left, large_left };
+std::vector<mesh_data> fine_meshes() {
+    return {fine_triangles(0, 0.0f), fine_triangles(20, 2.8f), fine_triangles(2, 2.8f), fine_triangles(20, 30.0f)};
+}
+const std::vector<int> fine_sequence{few_left, few_left,  few_left, few_left, none_left,  many_left,
+                                     few_left, none_left, few_left, few_left, large_left, few_left};
+const std::vector<int> fine_sequence_from_none{none_left,  none_left, few_left, few_left,
+                                               large_left, few_left,  few_left};
+
+TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTriangles) {
+    const std::vector<mesh_data> meshes = fine_meshes();
+    for (const vp::coverage rule : both_rules)
+        for (const auto& sequence : {fine_sequence, fine_sequence_from_none}) {
+            using bits = vp::target<vp::bit, blend::bit_or>;
+            const vp::voxelize_options uncounted{rule, false}, counted{rule, true};
+            draw_in_turn<bits>(meshes, sequence, vp::constant(true), uncounted, indices::checked);
+            draw_in_turn<bits>(meshes, sequence, vp::constant(true), uncounted, indices::checked, true);
+            draw_in_turn<bits>(meshes, sequence, vp::constant(true), counted, indices::unknown);
+            draw_in_turn<bits>(meshes, sequence, vp::constant(true), counted, indices::unknown, true);
+            draw_in_turn<vp::target<vp::bit, blend::bit_xor>>(meshes, sequence, vp::constant(true), counted,
+                                                              indices::unknown);
+            draw_in_turn<vp::target<float, blend::replace>>(meshes, sequence, vp::constant(2.5f), counted,
+                                                            indices::unknown);
+        }
+}
+
+TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesShaded) {
+    using sum = vp::target<float, blend::add>;
+    using last = vp::target<double, blend::replace>;
+    const std::vector<mesh_data> meshes = fine_meshes();
+    for (const vp::coverage rule : both_rules) {
+        draw_in_turn<sum>(meshes, fine_sequence, any_values<sum>{}, rule, indices::unknown);
+        draw_in_turn<last>(meshes, fine_sequence, any_values<last>{}, rule, indices::unknown, true);
+    }
+}
+
+TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesIntoLists) {
+    const std::vector<mesh_data> meshes = fine_meshes();
+    const auto list_in_turn = [&]<class Payload>(Payload*, const auto& shader, vp::coverage rule) {
+        using draw = vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_cvref_t<decltype(shader)>>;
+        vp::cuda_backend gpu;
+        vp::cpu_backend cpu;
+        const vp::grid g = box_grid({47, 46, 45});
         open_mesh on_gpu(gpu, meshes[0]);
-        const draw on_device{{on_gpu.positions.view(), on_gpu.triangles.view()}, {}, vp::constant(1.0f)};
-        vp::framebuffer<vp::cuda_backend, target> gpu_fb{gpu, g.extent};
-        vp::framebuffer<vp::cpu_backend, target> cpu_fb{cpu, g.extent};
-        bool is_first = true;
-        for (const int which : {0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1, 0, 1}) {
-            on_gpu.write(gpu, meshes[which]);
-            const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, meshes[which].positions, meshes[which].triangles};
-            const draw on_host{cpu_mesh.view(), {}, vp::constant(1.0f)};
-            auto to_gpu = gpu_fb.view();
-            auto to_cpu = cpu_fb.view();
-            if (loads && !is_first)
-                vp::get<0>(to_gpu.targets).load = vp::get<0>(to_cpu.targets).load = vp::load_operation::load;
-            is_first = false;
-            const vp::voxelize_options options{vp::coverage::conservative, false};
-            const vp::status a = vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, to_gpu, options);
-            const vp::status b = vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, to_cpu, options);
+        const draw on_device{{on_gpu.positions.view(), on_gpu.triangles.view()}, {}, shader};
+        vp::abuffer<vp::cuda_backend, Payload> lists{gpu};
+        vp::abuffer<vp::cpu_backend, Payload> expected{cpu};
+        for (const int which : fine_sequence) {
+            SCOPED_TRACE(which);
+            const mesh_data& m = meshes[static_cast<std::size_t>(which)];
+            on_gpu.write(gpu, m);
+            const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+            const draw on_host{cpu_mesh.view(), {}, shader};
+            const vp::status a = vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, lists, rule);
+            const vp::status b = vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, expected, rule);
             ASSERT_TRUE(a.ok() && b.ok()) << a.message();
             expect_same_counts(b.counts, a.counts);
-            expect_same_bytes(vp::get<0>(cpu_fb).to_host(cpu), vp::get<0>(gpu_fb).to_host(gpu), "sums");
+            expect_same_on_host(expected.to_host(cpu), lists.to_host(gpu));
         }
-        gpu.release();
+    };
+    for (const vp::coverage rule : both_rules) {
+        list_in_turn(static_cast<void*>(nullptr), vp::constant(true), rule);
+        list_in_turn(static_cast<double*>(nullptr), any_double{}, rule); // some are discarded
     }
 }
 

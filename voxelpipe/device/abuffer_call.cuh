@@ -60,6 +60,8 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
         return sizeof(Key) == sizeof(std::uint32_t) && (core::is_solid<FragmentShader> || may_shade_late) &&
                draws.size() == 1 && is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
     }
+    // As framebuffer_call's.
+    [[nodiscard]] bool may_leave_none(std::uint64_t left) const { return may_be_alone(num_primitives, left); }
     template <class Key>
     [[nodiscard]] bool shades_late() const {
         return !core::is_solid<FragmentShader> && is_listed_call<Key>();

@@ -43,7 +43,9 @@ namespace device {
 
 // Where a call that has_failed for a capacity met it.
 [[nodiscard]] inline stage find_overflow(const pipeline_state& s, const capacities& c) {
-    return s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ? stage::coarse_raster : stage::abuffer_emit;
+    return s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ? stage::coarse_raster
+           : has_left_some(s, c)                                          ? stage::fine_raster
+                                                                          : stage::abuffer_emit;
 }
 
 // Runs f, which launches stages. A failure that names none, of a query in between, is put down to the last of them:
@@ -204,20 +206,19 @@ public:
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              const framebuffer_view<Targets...>& fb, const voxelize_options& options,
                              std::uint64_t triangles_in) {
-        return attempt(
-            framebuffer_room_, {triangles_in, g.extent, g.offset, options.rule},
-            [&](device::capacities& limits, std::uint64_t, device::pipeline_state& state, device::stage_clock* clock) {
-                limits.longest_ordered = ~0ull; // an order may come before a blend
-                return device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits,
-                                                               [&](auto call) {
-                                                                   call.clock = clock;
-                                                                   call.may_list = lists_fragments;
-                                                                   if (!call.may_leave_none())
-                                                                       limits.leaves_none = call.limits.leaves_none = 0;
-                                                                   launch_where_it_fits(call, state);
-                                                                   return call.is_listed_call();
-                                                               });
-            });
+        return attempt(framebuffer_room_, {triangles_in, g.extent, g.offset, options.rule},
+                       [&](device::capacities& limits, std::uint64_t, std::uint64_t left, device::pipeline_state& state,
+                           device::stage_clock* clock) {
+                           limits.longest_ordered = ~0ull; // an order may come before a blend
+                           return device::with_framebuffer_call<Selector>(
+                               draws, g, fb, options, triangles_in, limits, [&](auto call) {
+                                   call.clock = clock;
+                                   call.may_list = lists_fragments;
+                                   limits.leaves_none = call.limits.leaves_none = call.may_leave_none(left) ? 1 : 0;
+                                   launch_where_it_fits(call, state);
+                                   return call.is_listed_call();
+                               });
+                       });
     }
 
     template <class Mesh, class VertexShader, class FragmentShader, class Payload>
@@ -228,10 +229,10 @@ public:
         abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
         status s =
             attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
-                    [&](device::capacities& limits, std::uint64_t voxel_room, device::pipeline_state& state,
-                        device::stage_clock* clock) {
-                        limits.leaves_none = 0;
+                    [&](device::capacities& limits, std::uint64_t voxel_room, std::uint64_t left,
+                        device::pipeline_state& state, device::stage_clock* clock) {
                         call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
+                        limits.leaves_none = call.limits.leaves_none = call.may_leave_none(left) ? 1 : 0;
                         call.has_few_a_voxel = limits.fragments < device::least_counted * voxel_room;
                         if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
                             fill<std::uint64_t>(options.rule, call, voxel_room, made, state);
@@ -274,12 +275,12 @@ private:
         friend bool operator==(const call_key&, const call_key&) = default;
     };
     // Of tile pairs, tile records, fragments, fragment records, lists of voxels; and what calls may not need kernels
-    // for: fragments of a voxel that the windows leave, triangles that the first kernel does.
+    // for: fragments of a voxel that the windows leave, triangles that the first kernel does (left_alone).
     using room = core::call_room<call_key, 7>;
 
     // Runs the stages with capacities that should do, waits, and once more where something did not fit. launch_stages
-    // takes back of the capacities what does not hold for its call, and says whether fragments were listed that need
-    // not be, where they are too many.
+    // takes back of the capacities what does not hold for its call, is told what calls like it left_alone, and says
+    // whether fragments were listed that need not be, where they are too many.
     template <class Launch>
     [[nodiscard]] status attempt(room& memory, const call_key& key, Launch&& launch_stages) {
         status s;
@@ -293,12 +294,14 @@ private:
             room::lengths there = memory.guess(
                 key, {n + n / 4 + 16384, n / 16 + 4096, std::min(4 * n + 65536, most), n / 16 + 4096, 0, 0, 0});
             const auto longest = memory.most_needed(key, 5), left = memory.most_needed(key, 6);
+            bool left_some = false; // where that was taken for little
             for (int tries = 0;; ++tries) {
                 device::capacities limits{there[0], there[1], there[2], there[3]};
                 if (tries == 0 && longest) limits.longest_ordered = device::longest_like(*longest);
-                limits.leaves_none = tries == 0 && left && *left == 0 ? 1 : 0;
                 device::pipeline_state state{};
-                const bool need_not_list = launch_stages(limits, there[4], state, clock ? &*clock : nullptr);
+                const bool need_not_list = launch_stages(
+                    limits, there[4], tries == 0 && left ? *left : ~std::uint64_t{0}, state, clock ? &*clock : nullptr);
+                left_some = left_some || (limits.leaves_none != 0 && !state.handed_on.are_none());
                 if (state.index_error != 0) {
                     s = core::failure(status_code::index_out_of_range, stage::coarse_raster);
                     break;
@@ -309,7 +312,7 @@ private:
                                            state.fragment_records,
                                            state.list_voxels,
                                            state.longest_ordered(),
-                                           state.handed_on.are_none() ? 0u : 1u};
+                                           left_some ? ~std::uint64_t{0} : state.handed_on.left_alone(key.rule)};
                 if (!device::has_failed(state, limits)) {
                     s = device::to_status(state);
                     memory.fitted(key, needed);

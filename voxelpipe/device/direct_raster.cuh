@@ -35,22 +35,31 @@ struct cube_queue {
     std::uint32_t triangle[queue_places]; // by warp_triangles
 };
 struct no_queue {};
+// Of thin coverage: the cubes, and when none waits any more, what draw_left wants.
+union cubes_or_rows {
+    cube_queue cubes;
+    kept_rows rows;
+};
 
 // Of a warp's 32 triangles, so many whose boxes are three voxels long at least are drawn where they are read, with all
 // smaller ones, by instructions that cost half as much again as without them; fewer are handed on.
 inline constexpr int least_slim = 3;
+// Of a mesh that is finer than the grid few triangles are handed on: where there were so many on average for each of
+// the first kernel's blocks, each can draw its own at its end, and takes no more than a second kernel does to begin.
+inline constexpr std::uint64_t most_left_of_block = 14, most_left_blocks = 6; // a multiprocessor
 inline constexpr int big_side = 64; // of what is cut into pieces: beyond most_medium_side
 
 // What one warp of the first kernel keeps in shared memory.
 template <class Call>
 struct first_memory {
     kind_queues kinds;
-    std::conditional_t<Call::rule == coverage::thin, cube_queue, no_queue> cubes;
+    std::conditional_t<Call::rule == coverage::thin, cubes_or_rows, no_queue> thin;
     typename Call::sink::memory sink;
 };
 
-// A warp of the first kernel. Every warp has its own queues: no thread waits for another warp.
-template <class Call>
+// A warp of the first kernel. Every warp has its own queues: no thread waits for another warp. Alone: whether there is
+// no second kernel (raster_first).
+template <class Call, bool Alone>
 struct first_warp {
     static constexpr bool thin = Call::rule == coverage::thin;
     using triangle_class = core::triangle_class;
@@ -107,8 +116,8 @@ struct first_warp {
             if (__any_sync(0xffffffffu, is_cube && !sure)) {
                 const int at = take_place(is_cube && !sure, num_cubes);
                 if (is_cube && !sure) {
-                    for (int k = 0; k < 9; ++k) memory.cubes.q[k][at] = r.q[k / 3][k % 3];
-                    memory.cubes.triangle[at] = code;
+                    for (int k = 0; k < 9; ++k) memory.thin.cubes.q[k][at] = r.q[k / 3][k % 3];
+                    memory.thin.cubes.triangle[at] = code;
                 }
             }
             load_next();
@@ -127,7 +136,7 @@ struct first_warp {
         }
         __syncwarp();
         if constexpr (thin)
-            if (num_cubes >= 32) drain_cubes();
+            if (num_cubes >= 32) drain_cubes<true>();
     }
 
     // Whether this warp has drawn what has slim boxes: conservative triangles, where it has some of three voxels.
@@ -148,16 +157,20 @@ struct first_warp {
         return true;
     }
 
-    // The last 32 cubes that wait.
+    // The last 32 cubes that wait; where these may be fewer, and are all, not AllLanes.
+    template <bool AllLanes>
     __device__ VOXELPIPE_INLINE void drain_cubes() {
-        num_cubes -= 32;
-        const int at = num_cubes + static_cast<int>(threadIdx.x) % 32;
+        const int lane = static_cast<int>(threadIdx.x) % 32;
+        const bool wanted = AllLanes || lane < num_cubes;
+        num_cubes = AllLanes ? num_cubes - 32 : 0;
+        const int at = wanted ? num_cubes + lane : 0;
         near_triangle r;
-        for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = memory.cubes.q[k][at];
+        for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = memory.thin.cubes.q[k][at];
         r.is_near = true;
         r.find_box(call.in.fraction);
         feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
-            sink.begin(warp_triangles::of(memory.cubes.triangle[at]));
+            if (!wanted) return;
+            sink.begin(warp_triangles::of(memory.thin.cubes.triangle[at]));
             raster_tiny<Call::rule>(call.in, r, sink);
         });
         __syncwarp();
@@ -193,9 +206,11 @@ struct first_warp {
                 index = next;
             }
         }
-        if constexpr (thin) { // the rest of the cubes is handed on
+        if constexpr (thin && Alone) {
+            if (num_cubes != 0) drain_cubes<false>();
+        } else if constexpr (thin) { // the rest of the cubes is handed on
             const int at = static_cast<int>(lane);
-            writer.push(at < num_cubes ? static_cast<int>(tiny_triangles) : -1, memory.cubes.triangle[at]);
+            writer.push(at < num_cubes ? static_cast<int>(tiny_triangles) : -1, memory.thin.cubes.triangle[at]);
         }
         if (begin >= num) return 0;
         const std::uint32_t batches = (num - begin - 1) / step + 1, of_last = num - (begin + (batches - 1) * step);
@@ -203,16 +218,55 @@ struct first_warp {
     }
 };
 
+// The n triangles that wait in a block's queues, up to 32, none of which is large, by one warp, a thread each.
 template <class Call>
-__global__ __launch_bounds__(raster_threads,
-                             first_min_blocks<Call>) void direct_raster_kernel(const __grid_constant__ Call call,
-                                                                               pipeline_state* state) {
+__device__ __noinline__ typename Call::sink::totals
+draw_left(const Call& call, unsigned* dropped, first_memory<Call> (&memories)[raster_warps],
+          const unsigned (&waiting)[num_triangle_kinds][raster_warps], unsigned n) {
+    first_memory<Call>& memory = memories[warp_in_block()];
+    typename Call::sink sink(call, dropped, memory.sink);
+    unsigned at = threadIdx.x % 32;
+    const bool wanted = at < n;
+    int kind = 0;
+    std::uint32_t triangle = 0;
+    near_triangle r{};
+    if (wanted) {
+        unsigned warp = 0;
+        while (at >= waiting[kind][warp]) {
+            at -= waiting[kind][warp];
+            warp = (warp + 1) % raster_warps;
+            kind += warp == 0 ? 1 : 0;
+        }
+        triangle = warp_triangles::of(memories[warp].kinds.triangles[kind][at], warp);
+        r = load_near(call.in, call.in.source.triangle(triangle));
+    }
+    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+        if (!wanted) return;
+        sink.begin(triangle);
+        if (kind == tiny_triangles)
+            raster_tiny<Call::rule>(call.in, r, sink);
+        else if constexpr (Call::rule == coverage::thin)
+            raster_small<Call::rule, true>(call.in, r, lane_rows(memory.thin.rows), sink);
+        else
+            raster_small<Call::rule, true>(call.in, r, no_rows{}, sink);
+    });
+    return sink.end();
+}
+
+// The first kernel. Alone: there is no second one, since nothing is handed on for all that is known. What a block would
+// hand on at its end is drawn there then, where it is little; what is handed on all the same is not drawn. `again` is
+// the call once more, for functions that are called: what has its address taken is read anew behind each reduction.
+template <class Call, bool Alone>
+__device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& again, pipeline_state* state) {
     using sink_type = typename Call::sink;
     __shared__ first_memory<Call> memories[raster_warps];
     __shared__ unsigned places[num_triangle_kinds][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_big;
     const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
     await_stream();
+    if constexpr (Alone)
+        call.out.prepare(std::uint64_t{blockIdx.x} * raster_threads + threadIdx.x,
+                         std::uint64_t{gridDim.x} * raster_threads);
     if (call.out.is_checked() && state->index_error != 0) return;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     if (threadIdx.x == 0) num_big = 0;
@@ -221,14 +275,39 @@ __global__ __launch_bounds__(raster_threads,
     sink_type sink(call, dropped, memory.sink);
     kind_writer writer{call.lists, memory.kinds};
     const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
-    first_warp<Call> warp{
+    first_warp<Call, Alone> warp{
         call, memory, sink, writer, call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads, num_big};
     const unsigned looked_at = warp.run(index);
     __syncthreads();
     cut_big(call, sink, warp.big, num_big);
-    writer.finish(places);
+    writer.note(places);
+    int left = kind_writer::many;
+    if constexpr (Alone)
+        left = writer.count();
+    else
+        __syncthreads();
+    if (left >= kind_writer::many) {
+        writer.finish(places);
+    } else if (left != 0 && threadIdx.x < 32) {
+        (void)sink.end(); // the memory is another sink's
+        sink.take_over(draw_left(again, dropped, memories, places, static_cast<unsigned>(left)));
+    }
     sink.finish(state);
     count_looked_at(looked_at, dropped, state);
+}
+
+template <class Call>
+__global__ __launch_bounds__(raster_threads,
+                             first_min_blocks<Call>) void direct_raster_kernel(const __grid_constant__ Call call,
+                                                                               pipeline_state* state) {
+    raster_first<Call, false>(call, call, state);
+}
+template <class Call>
+__global__ __launch_bounds__(raster_threads,
+                             first_min_blocks<Call>) void direct_alone_kernel(const __grid_constant__ Call call,
+                                                                              const __grid_constant__ Call again,
+                                                                              pipeline_state* state) {
+    raster_first<Call, true>(call, again, state);
 }
 
 // ---- the second kernel: what the first left ------------------------------------------------------------------------
@@ -411,21 +490,34 @@ __global__ __launch_bounds__(raster_threads,
     return std::min(batches, std::max(at_once, core::blocks_for_each(batches, warp_triangles::most_rounds)));
 }
 
+// Whether a call of one draw may be launched without its second kernel, where others like it left_alone so many
+// triangles.
+[[nodiscard]] inline bool may_be_alone(std::size_t num_triangles, std::uint64_t left) {
+    const std::uint64_t batches = core::blocks_for_each(num_triangles, raster_threads);
+    const auto at_once = static_cast<std::uint64_t>(num_multiprocessors()) * most_left_blocks;
+    return left <= std::min(batches, at_once) * most_left_of_block;
+}
+
 // is_first: whether these are a call's first kernels. They read indices before they await the stream, which the
-// caller's own kernel in front of them may still write. leaves_none: whether the first kernel hands nothing on, for all
-// that is known; where it does, that is not drawn.
+// caller's own kernel in front of them may still write. leaves_none: whether the first kernel does it all, for all that
+// is known; what it hands on all the same is not drawn.
 template <class Call>
 void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
                    bool leaves_none = false) {
-    const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
-    if constexpr (Call::output::hands_on)
-        launch_kernel(!is_first, direct_raster_kernel<Call>,
-                      raster_blocks(call.in.num_triangles, first_min_blocks<Call>), raster_threads, 0, stream, where,
-                      call, state);
-    else
-        launch_kernel(!is_first, block_raster_kernel<Call>, raster_blocks(call.in.num_triangles, block_min_blocks),
-                      raster_threads, 0, stream, where, call, state);
+    const unsigned triangles = call.in.num_triangles;
+    if constexpr (Call::output::hands_on) {
+        const unsigned blocks = raster_blocks(triangles, first_min_blocks<Call>);
+        if (leaves_none)
+            launch_kernel(!is_first, direct_alone_kernel<Call>, blocks, raster_threads, 0, stream, where, call, call,
+                          state);
+        else
+            launch_kernel(!is_first, direct_raster_kernel<Call>, blocks, raster_threads, 0, stream, where, call, state);
+    } else {
+        launch_kernel(!is_first, block_raster_kernel<Call>, raster_blocks(triangles, block_min_blocks), raster_threads,
+                      0, stream, where, call, state);
+    }
     if (leaves_none) return;
+    const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
     launch_behind(direct_rest_kernel<Call>, multiprocessors * rest_min_blocks<Call>, raster_threads, stream, where,
                   call, state);
 }

@@ -133,10 +133,15 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         return groups::has_ordered ? stage::fine_raster : stage::tile_resolve;
     }
 
-    // Whether limits.leaves_none may hold: the call can be made once more, since it clears all that it draws into.
-    [[nodiscard]] bool may_leave_none() const {
+    // Whether limits.leaves_none may hold, where calls like this one left_alone so many triangles: it can be made once
+    // more, since it writes nothing where that was wrong, or clears all that it draws into.
+    [[nodiscard]] bool may_leave_none(std::uint64_t left) const {
+        if (draws.size() != 1) return false;
+        const bool may_draw_them = may_be_alone(most_triangles(), left);
+        if (is_touched_call() || is_listed_call()) return may_draw_them;
         if constexpr (can_be_direct<FragmentShader, Framebuffer>)
-            return draws.size() == 1 && !is_touched_call() && is_direct_call() && clears_all_in_use(fb);
+            if (is_direct_call())
+                return clears_all_in_use(fb) && (has_only_bits<Framebuffer> ? may_draw_them : left == 0);
         return false;
     }
 
@@ -199,7 +204,8 @@ private:
                         {source, num_triangles, snap.fraction, g.extent},
                         {touched, g.extent, num_vertices, state, false},
                         handed_on.with(state)};
-                    direct_raster(call, state, stage::fine_raster, stream, on_the_spot && i == 0);
+                    direct_raster(call, state, stage::fine_raster, stream, on_the_spot && i == 0,
+                                  limits.leaves_none != 0);
                     end_stage(clock, &stage_times::fine_raster);
                 };
                 raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);

@@ -295,7 +295,7 @@ void list_raster(const raster_input<Source>& in, std::uint32_t num_vertices, std
                  cudaStream_t stream) {
     const direct_call<Rule, Source, list_output> call{
         in, {voxels, primitives, limits.fragments, num_vertices, first_primitive, state, preparation}, handed_on};
-    direct_raster(call, state, stage::abuffer_emit, stream);
+    direct_raster(call, state, stage::abuffer_emit, stream, false, limits.leaves_none != 0);
 }
 
 } // namespace voxelpipe::device

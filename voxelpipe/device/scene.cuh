@@ -36,6 +36,12 @@ struct pipeline_state {
         [[nodiscard]] VOXELPIPE_HD bool are_none() const {
             return (cut | lengths[0] | lengths[1] | lengths[2] | lengths[3]) == 0;
         }
+        // How many there are that a first kernel by itself would be left with at its end, or ~0 where some are more
+        // than little work for one thread. Thin tiny ones wait for others of their warp only.
+        [[nodiscard]] VOXELPIPE_HD unsigned long long left_alone(coverage rule) const {
+            if ((cut | lengths[2] | lengths[3]) != 0) return ~0ull;
+            return rule == coverage::thin ? lengths[1] : lengths[0] + lengths[1];
+        }
     } handed_on; // direct raster, of one draw: triangle_lists
 
     // See capacities: 0 where the windows put all voxels in order, 1 where a block takes the longest that they leave.
@@ -47,10 +53,10 @@ struct pipeline_state {
 // How many elements the arrays of a call have. What does not fit is counted, not written.
 struct capacities {
     unsigned long long tile_pairs, tile_records, fragments, fragment_records;
-    // What a call is launched without, for the one before it did not need that: kernels for voxels of more fragments,
+    // What a call is launched without, for the one before it hardly needed that: kernels for voxels of more fragments,
     // and a second kernel of a draw.
     unsigned long long longest_ordered = ~0ull;
-    unsigned long long leaves_none = 0; // or 1: the first kernel, of its triangles. As wide as the rest, see call_bytes
+    unsigned long long leaves_none = 0; // or 1: the first kernel does it all. As wide as the rest, see call_bytes
 };
 
 // Whether the call must not write anything: a bad index, or something that did not fit.
@@ -58,6 +64,10 @@ struct capacities {
     return s.index_error != 0 || s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ||
            s.list_fragments > c.fragments || s.fragment_records > c.fragment_records ||
            s.longest_ordered() > c.longest_ordered || (c.leaves_none != 0 && !s.handed_on.are_none());
+}
+// The same of a call that fills no arrays.
+[[nodiscard]] VOXELPIPE_HD inline bool has_left_some(const pipeline_state& s, const capacities& c) {
+    return s.index_error != 0 || (c.leaves_none != 0 && !s.handed_on.are_none());
 }
 
 // Writes zeros. A template, as all kernels in headers are.

@@ -30,6 +30,7 @@
 #include <voxelpipe/device/scene.cuh>
 #include <voxelpipe/device/vertex_shade.cuh>
 
+#include <type_traits>
 #include <utility>
 
 namespace voxelpipe::device {
@@ -279,6 +280,7 @@ struct lane_rows {
     }
 };
 static_assert(sizeof(kept_rows::words[0]) == 128);
+struct no_rows {};
 // A part of at most 32 x 32 columns by medium_lanes lanes, or of most_columns by one, has so few rows along its shorter
 // side.
 static_assert(most_columns < most_long_side * most_long_side && 32 / medium_lanes <= most_long_side);
@@ -578,10 +580,11 @@ __device__ VOXELPIPE_INLINE void raster_rows_by_rounds(const raster_input<Source
                         VOXELPIPE_INLINE_LAMBDA { rows.template next<true>(s, kept, emit_to(emit)); });
 }
 
-// Any small triangle, by one thread. Apart: in a kernel that keeps nothing else in registers meanwhile.
-template <coverage Rule, bool Apart, class Source, class Sink>
+// Any small triangle, by one thread. Apart: in a kernel that keeps nothing else in registers meanwhile. kept:
+// lane_rows, or no_rows for conservative boxes of at most most_side voxels a side.
+template <coverage Rule, bool Apart, class Source, class Kept, class Sink>
 __device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, const near_triangle& r,
-                                              const lane_rows& kept, Sink& sink) {
+                                              const Kept& kept, Sink& sink) {
     const core::small_box box = r.part(call.extent);
     if constexpr (Rule == coverage::thin) {
         if (!raster_thin(call, r.relative(call.fraction), r.lo, box, 0, 1, kept, sink))
@@ -592,9 +595,9 @@ __device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, 
             sink.row(r.lo[0] + box.lo[0], r.lo[1] + y, r.lo[2] + z, bits);
         };
         const int most = core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) + 1;
-        if (most <= most_side)
+        if (std::is_same_v<Kept, no_rows> || most <= most_side)
             s.template rows<Apart>(box, emit);
-        else
+        else if constexpr (!std::is_same_v<Kept, no_rows>)
             s.template rows_of_16<Apart>(box, kept, emit);
     }
 }

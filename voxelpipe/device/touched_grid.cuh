@@ -181,10 +181,10 @@ __global__ __launch_bounds__(threads_per_block) void end_values_kernel(const wor
                                                                        const __grid_constant__ target_view<Target> t,
                                                                        const __grid_constant__
                                                                        typename Target::value_type value,
-                                                                       const pipeline_state* state) {
+                                                                       const pipeline_state* state, capacities limits) {
     using writer = value_writer<Target>;
     await_stream();
-    if (state->index_error != 0) return;
+    if (has_left_some(*state, limits)) return;
     const writer w{touched, t, value};
     const bool is_cleared = t.load == load_operation::clear;
     if constexpr (writer::goes_wide) {
@@ -245,10 +245,11 @@ template <class Framebuffer, class Values>
 __global__ __launch_bounds__(threads_per_block) void end_touched_kernel(uint4* touched, std::uint64_t num_words,
                                                                         const __grid_constant__ Framebuffer fb,
                                                                         const __grid_constant__ Values values,
-                                                                        bool count_voxels, pipeline_state* state) {
+                                                                        bool count_voxels, pipeline_state* state,
+                                                                        capacities limits) {
     constexpr unsigned batch = 4; // loads that go out together
     await_stream();
-    const bool failed = state->index_error != 0;
+    const bool failed = has_left_some(*state, limits);
     const std::uint64_t num = (num_words + 3) / 4, threads = std::uint64_t{gridDim.x} * blockDim.x;
     unsigned found = 0;
     for (std::uint64_t first = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; first < num;
@@ -296,13 +297,13 @@ void end_touched(word* touched, const framebuffer_view<Targets...>& fb, const Va
             if (t.load != load_operation::off)
                 launch_behind(end_values_kernel<target>, static_cast<unsigned>(blocks), threads_per_block, stream,
                               stage::tile_resolve, touched, t,
-                              static_cast<typename target::value_type>(voxelpipe::get<K>(values)), state);
+                              static_cast<typename target::value_type>(voxelpipe::get<K>(values)), state, limits);
         }
     });
     const std::uint64_t num = touched_target::map::elements(fb.extent);
     launch_behind(end_touched_kernel<framebuffer_view<Targets...>, Values>, fill_device(num / 16 + 1),
                   threads_per_block, stream, stage::tile_resolve, reinterpret_cast<uint4*>(touched), num, fb, values,
-                  count_voxels, state);
+                  count_voxels, state, limits);
 }
 
 } // namespace voxelpipe::device

@@ -57,7 +57,11 @@ __device__ inline void count_looked_at(unsigned looked_at, const unsigned (&drop
 struct warp_triangles {
     static constexpr std::uint32_t most_rounds = 1u << 11;
     [[nodiscard]] __device__ VOXELPIPE_INLINE static std::uint32_t of(std::uint32_t code) {
-        return (code / 32 * gridDim.x + blockIdx.x) * raster_threads + threadIdx.x / 32 * 32 + code % 32;
+        return of(code, threadIdx.x / 32);
+    }
+    // Of another warp of the block.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static std::uint32_t of(std::uint32_t code, unsigned warp) {
+        return (code / 32 * gridDim.x + blockIdx.x) * raster_threads + warp * 32 + code % 32;
     }
 };
 
@@ -185,14 +189,25 @@ struct kind_writer {
             __syncwarp();
         }
     }
-    // What is left in the queues of all warps of a block, which takes room for them together. All threads take part;
-    // `places` is shared memory.
+    // How much waits in the queues of all warps of a block: noted in shared memory for each. All threads take part;
+    // then the block has to meet.
+    template <int Warps>
+    __device__ VOXELPIPE_INLINE void note(unsigned (&places)[num_triangle_kinds][Warps]) const {
+        if (threadIdx.x % 32 == 0)
+            for (int k = 0; k < num_triangle_kinds; ++k)
+                places[k][threadIdx.x / 32] = static_cast<unsigned>(waiting[k]);
+    }
+    // The same as a number, or `many` or more, as where some of it is large. All threads meet.
+    static constexpr int many = 32;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE int count() const {
+        const bool has_large = (waiting[large_triangles] | waiting[medium_triangles]) != 0;
+        const int lane = static_cast<int>(threadIdx.x) % 32, small = waiting[tiny_triangles] + waiting[small_triangles];
+        return __syncthreads_count(has_large || lane < small);
+    }
+    // Hands on what has been noted, for which the block takes room together. All threads take part.
     template <int Warps>
     __device__ VOXELPIPE_INLINE void finish(unsigned (&places)[num_triangle_kinds][Warps]) {
         const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32;
-        if (lane == 0)
-            for (int k = 0; k < num_triangle_kinds; ++k) places[k][warp] = static_cast<unsigned>(waiting[k]);
-        __syncthreads();
         for (int k = static_cast<int>(warp); k < num_triangle_kinds; k += Warps) {
             unsigned n = 0, before = 0;
             for (unsigned w = 0; w < Warps; ++w) {
