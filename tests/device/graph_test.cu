@@ -297,6 +297,140 @@ TEST(Graph, ListsLaunchWhatTheyNeed) {
     EXPECT_EQ(num_nodes(g, vp::device::most_of_window, true), num_nodes(g, vp::device::most_of_window, false));
 }
 
+// Fine triangles, and one in twenty up to `longest` voxels long.
+mesh_data fine_triangles(float longest) {
+    mesh_data m;
+    for (int i = 0; i < 1500; ++i) {
+        const glm::vec3 corner(0.9f * static_cast<float>(i % 40), 0.37f * static_cast<float>(i / 40 % 80),
+                               0.53f * static_cast<float>(i % 83));
+        glm::vec3 along(0.1f), across(0.4f);
+        along[i % 3] = i % 20 == 0 ? longest : 0.7f;
+        across[(i + 1) % 3] = 0.7f;
+        add_triangle(m, corner, corner + along, corner + across);
+    }
+    return m;
+}
+
+// Without the kernel for larger triangles: the same voxels by a launch less where there are few of these; otherwise,
+// with `fails`, that it is wanted, and then, by a call that does not clear, a target that stays as it was. Without
+// `fails`: a call that has the kernel anyway.
+template <class Target, class Shader>
+void compare_without_larger(const Shader& shader, bool fails, int num_draws, bool loads, indices known) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, Shader>;
+    const vp::grid g = box_grid({41, 33, 47});
+    for (const vp::coverage rule : both_rules)
+        for (const float longest : {2.6f, 30.0f}) {
+            SCOPED_TRACE(longest);
+            const bool is_large = longest > 3.0f;
+            stream_owner owner;
+            vp::cuda_backend be{owner.stream};
+            const mesh_data m = fine_triangles(longest);
+            const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+            const std::vector<draw_type> list(static_cast<std::size_t>(num_draws),
+                                              draw_type{view_of(mesh, known), {}, shader});
+            const std::span<const draw_type> draws(list);
+            const vp::voxelize_options options{rule, false};
+            const auto start = [&](auto& fb) {
+                if (!loads) return;
+                std::vector<unsigned char> pattern(vp::get<0>(fb).to_host(be).size() *
+                                                   sizeof(*vp::get<0>(fb).view().elements));
+                for (std::size_t i = 0; i < pattern.size(); ++i) pattern[i] = i % 4 == 1 ? 0x21 : 0;
+                ASSERT_EQ(cudaMemcpy(const_cast<void*>(static_cast<const void*>(vp::get<0>(fb).view().elements)),
+                                     pattern.data(), pattern.size(), cudaMemcpyHostToDevice),
+                          cudaSuccess);
+                vp::get<0>(fb).load();
+            };
+            vp::framebuffer<vp::cuda_backend, Target> expected{be, g.extent}, fb{be, g.extent};
+            start(expected);
+            const auto untouched = vp::get<0>(expected).to_host(be);
+            ASSERT_TRUE(vp::voxelize(be, draws, g, expected, options).ok());
+            vp::workspace_limits limits = vp::workspace_limits::for_triangles(draws.size() * m.triangles.size());
+            limits.lists_fragments = true;
+            std::size_t nodes[2] = {};
+            for (const bool hands_on : {false, true}) {
+                limits.hands_on_triangles = hands_on;
+                start(fb);
+                const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), options, limits);
+                ASSERT_GT(bytes, 0u);
+                vp::cuda_backend::buffer<std::byte> memory(be, bytes);
+                const vp::workspace_view workspace{memory.data(), bytes, limits};
+                const captured_graph graph(
+                    be.stream, [&] { return vp::voxelize_async(be, draws, g, fb.view(), options, workspace); });
+                graph.launch(be.stream);
+                vp::workspace_limits need = limits;
+                const vp::status s = vp::read_status(be, workspace, &need);
+                nodes[hands_on ? 1 : 0] = graph.num_nodes();
+                if (fails && is_large && !hands_on) {
+                    EXPECT_EQ(s.code, vp::status_code::capacity_exceeded);
+                    EXPECT_EQ(s.where, vp::stage::fine_raster);
+                    EXPECT_TRUE(need.hands_on_triangles);
+                    if (loads) expect_same_bytes(untouched, vp::get<0>(fb).to_host(be), "as it was");
+                } else {
+                    ASSERT_TRUE(s.ok()) << s.message();
+                    EXPECT_EQ(need.hands_on_triangles, hands_on);
+                    expect_same_bytes(vp::get<0>(expected).to_host(be), vp::get<0>(fb).to_host(be), "target");
+                }
+            }
+            EXPECT_EQ(nodes[0] + 1, nodes[1] + (fails ? 0 : 2)); // what says that nothing is missing
+        }
+}
+
+TEST(Graph, WithoutTheKernelForLargerTriangles) {
+    using occupied = vp::target<vp::bit, blend::bit_or>;
+    using parity = vp::target<vp::bit, blend::bit_xor>;
+    for (const indices known : {indices::checked, indices::unknown}) {
+        compare_without_larger<occupied>(vp::constant(true), true, 1, false, known);
+        compare_without_larger<parity>(vp::constant(true), true, 1, false, known);
+        compare_without_larger<parity>(vp::constant(true), false, 1, true, known);
+        compare_without_larger<parity>(vp::constant(true), false, 2, false, known);
+        compare_without_larger<sums>(vp::constant(1.0f), true, 1, false, known);
+    }
+    compare_without_larger<occupied>(vp::constant(true), true, 1, true, indices::unknown); // of which touched are known
+    compare_without_larger<vp::target<float, blend::replace>>(vp::constant(2.0f), true, 1, true, indices::unknown);
+    compare_without_larger<sums>(any_values<sums>{}, true, 1, true, indices::unknown); // listed
+    compare_without_larger<sums>(any_values<sums>{}, false, 2, true, indices::unknown);
+}
+
+template <class Payload, class Shader>
+void compare_lists_without_larger(const Shader& shader) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, Shader>;
+    const vp::grid g = box_grid({41, 33, 47});
+    for (const vp::coverage rule : both_rules)
+        for (const float longest : {2.6f, 30.0f}) {
+            SCOPED_TRACE(longest);
+            vp::cuda_backend be;
+            const mesh_data m = fine_triangles(longest);
+            const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
+            const draw_type d{mesh.view(), {}, shader};
+            const std::span<const draw_type> draws(&d, 1);
+            vp::workspace_limits limits{0, 0, 1 << 17, 1 << 16, true, true, false};
+            vp::abuffer_view<Payload> lists;
+            for (bool fails = longest > 3.0f;; fails = false) {
+                const std::size_t bytes = vp::workspace_bytes(draws, g, lists, rule, limits);
+                ASSERT_GT(bytes, 0u);
+                const guarded_memory memory(be, bytes);
+                const vp::workspace_view workspace{const_cast<unsigned char*>(memory.memory.data()), bytes, limits};
+                for (int round = 0; round < 2; ++round)
+                    ASSERT_TRUE(vp::voxelize_async(be, draws, g, lists, rule, workspace).ok());
+                const vp::status s = vp::read_status(be, workspace, &limits);
+                EXPECT_EQ(limits.hands_on_triangles, longest > 3.0f);
+                memory.expect_untouched_behind(be);
+                if (!fails) {
+                    expect_lists<Payload>({m}, g, shader, rule, lists.to_host(be), s);
+                    break;
+                }
+                ASSERT_EQ(s.code, vp::status_code::capacity_exceeded);
+                EXPECT_EQ(lists.to_host(be).voxels.size(), 0u);
+                EXPECT_EQ(lists.to_host(be).primitives.size(), 0u);
+            }
+        }
+}
+
+TEST(Graph, ListsWithoutTheKernelForLargerTriangles) {
+    compare_lists_without_larger<void>(vp::constant(true));
+    compare_lists_without_larger<double>(any_double{});
+}
+
 // A blend that needs an order, which long voxels do not get: the target stays as it was.
 TEST(Graph, AnOrderedTargetWithoutLongVoxels) {
     using target = vp::target<std::uint32_t, chain>;
