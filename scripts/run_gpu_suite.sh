@@ -14,6 +14,7 @@
 # VOXELPIPE_STEP: build, or run, for a machine that has no device but time, and one that has a device for a short time only.
 #   build compiles the parts for VOXELPIPE_ARCHITECTURE (90 where that is not set) and needs no device; run takes the programs
 #   that lie in build/ of the same folder, whichever there are, and the record says so.
+# VOXELPIPE_PROGRAMS: a regular expression; only programs whose name in the record matches it are run. The record names it.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 parts=("$@")
@@ -40,6 +41,7 @@ if [[ $step != build ]]; then
             "$device" "$driver" "${toolkit:-unknown}" "$clocks" "$commit"
         [[ $step != run ]] || printf 'built: before, by this script with VOXELPIPE_STEP=build\n'
         [[ -z ${VOXELPIPE_CUDA_FLAGS:-} ]] || printf 'nvcc with: %s\n' "$VOXELPIPE_CUDA_FLAGS"
+        [[ -z ${VOXELPIPE_PROGRAMS:-} ]] || printf 'only: %s\n' "$VOXELPIPE_PROGRAMS"
         printf '\n'
         printf '%-15s %-28s %8s %8s %8s %8s\n' part program passed failed 'not run' seconds
     } >"$record"
@@ -73,6 +75,7 @@ run_program() {
     local part=$1 name=$2 start=$SECONDS log passed failed skipped status=0 program
     shift 2
     [[ $step != build ]] || return 0
+    [[ -z ${VOXELPIPE_PROGRAMS:-} || $name =~ $VOXELPIPE_PROGRAMS ]] || return 0
     for program in "$@"; do
         if [[ $step == run && $program == build/* && ! -x $program ]]; then
             printf '%-15s %-28s not built\n' "$part" "$name" | tee -a "$record"
@@ -147,7 +150,7 @@ for part in "${parts[@]}"; do
     sanitizer)
         [[ $step == build ]] || command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"
         # Of this commit, whatever lies there.
-        sanitized=(reduced reduced_lists counting_sort fragment_order fragment_sort direct)
+        sanitized=(reduced reduced_lists counting_sort fragment_order fragment_sort direct repeated_calls)
         for program in "${sanitized[@]}"; do target=device_${program}_test build_suite gpu; done
         for tool in memcheck racecheck initcheck synccheck; do
             for program in "${sanitized[@]}"; do
@@ -155,7 +158,8 @@ for part in "${parts[@]}"; do
                 [[ $program != fragment_order ]] || filter='*AtTheLimits:*DenseVoxels:*NothingWhereTheCallHasFailed'
                 [[ $program != fragment_sort ]] || filter='*LookAlike:*NothingWhereTheCallHasFailed'
                 [[ $program != counting_sort ]] || filter='*EveryLength:*NoRoom*:*NotExpected:*NothingWhereTheCallHasFailed'
-                [[ $program != direct ]] || filter='*ManyMiddlingTriangles'
+                [[ $program != direct ]] || filter='*ManyMiddlingTriangles:*ManyRecordsOfLargeTriangles'
+                [[ $program != repeated_calls ]] || filter='*AFewLargerTriangles*'
                 run_program sanitizer "$tool, $program" compute-sanitizer --tool "$tool" --error-exitcode 9 \
                     "build/gpu/tests/device/device_${program}_test" --gtest_filter="$filter"
             done
