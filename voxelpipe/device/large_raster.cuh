@@ -92,21 +92,36 @@ private:
                     large_pieces<coverage::conservative>::most_records(extent));
 }
 
-// Decides about a triangle in full width; records: how many it has, where it is drawn.
+// A triangle in full width, and what it may touch.
+template <class Call>
+struct located_triangle {
+    core::snapped_position a, b, c;
+    core::voxel_box reach{}; // what of the grid, where it is drawn
+    core::triangle_class kind;
+
+    __device__ VOXELPIPE_INLINE located_triangle(const Call& call, std::uint32_t triangle) {
+        const glm::uvec3 index = call.in.source.triangle(triangle);
+        a = call.in.source.position(index.x);
+        b = call.in.source.position(index.y);
+        c = call.in.source.position(index.z);
+        const core::voxel_box grid{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
+        kind = core::classify<Call::rule>(a, b, c, call.in.fraction, grid, reach);
+    }
+    // How it is cut, where it is drawn.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE large_pieces<Call::rule> pieces(int fraction) const {
+        return {reach, core::dominant_axis(a, b, c, fraction)};
+    }
+};
+
+// Decides about a triangle; records: how many it has, where it is drawn.
 template <class Call>
 __device__ inline core::triangle_class find_records(const Call& call, std::uint32_t triangle,
                                                     unsigned long long& records) {
-    const glm::uvec3 index = call.in.source.triangle(triangle);
-    const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
-                                 c = call.in.source.position(index.z);
-    const core::voxel_box whole{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
-    core::voxel_box reach{};
-    core::triangle_class kind = core::classify<Call::rule>(a, b, c, call.in.fraction, whole, reach);
-    if (kind != core::triangle_class::drawn) return kind;
-    if (Call::rule == coverage::thin && core::has_zero_area(a, b, c)) return core::triangle_class::zero_area;
-    const large_pieces<Call::rule> pieces(reach, core::dominant_axis(a, b, c, call.in.fraction));
-    records = static_cast<unsigned long long>(pieces.records());
-    return kind;
+    const located_triangle<Call> t(call, triangle);
+    if (t.kind != core::triangle_class::drawn) return t.kind;
+    if (Call::rule == coverage::thin && core::has_zero_area(t.a, t.b, t.c)) return core::triangle_class::zero_area;
+    records = static_cast<unsigned long long>(t.pieces(call.in.fraction).records());
+    return t.kind;
 }
 
 // The big triangles that a block left until its end, by all its threads.
@@ -141,24 +156,19 @@ struct alignas(16) large_setup {
         const int fraction = call.in.fraction;
         first_record = call.lists.first_records[number];
         triangle = call.lists.cut[number];
-        const glm::uvec3 index = call.in.source.triangle(triangle);
-        const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
-                                     c = call.in.source.position(index.z);
-        const core::voxel_box whole{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
-        core::voxel_box within{};
-        (void)core::classify<Rule>(a, b, c, fraction, whole, within);
-        const core::voxel_box whole_box = core::bounds(a, b, c, fraction);
-        const large_pieces<Rule> cut(within, core::dominant_axis(a, b, c, fraction));
-        const bool narrow = core::fits_narrow(a, b, c, fraction);
-        reach = within;
-        box = whole_box;
+        const located_triangle<Call> t(call, triangle);
+        const core::voxel_box whole = core::bounds(t.a, t.b, t.c, fraction);
+        const large_pieces<Rule> cut = t.pieces(fraction);
+        const bool narrow = core::fits_narrow(t.a, t.b, t.c, fraction);
+        reach = t.reach;
+        box = whole;
         pieces = cut;
         is_narrow = narrow;
         if (!narrow) return;
         if constexpr (Rule == coverage::thin)
-            bricks = core::brick_thin(a, b, c, whole_box, cut.axes, fraction);
+            bricks = core::brick_thin(t.a, t.b, t.c, whole, cut.axes, fraction);
         else
-            bricks = core::brick_triangle(a, b, c, whole_box, fraction);
+            bricks = core::brick_triangle(t.a, t.b, t.c, whole, fraction);
     }
     // Those that this warp keeps for all warps, a lane each, so that all warps have one to do before any has two; and
     // for each of their records, whose it is.
