@@ -20,8 +20,12 @@ struct fill_pattern {
 // A block fills 16 KB and ends: 4 GiB take 0.92 ms so, and 1.0 by blocks that go on as long as there is something left.
 inline constexpr unsigned fill_stores = 4; // of 16 bytes a thread, a block's width apart
 
+// Bits that are longer than the cache go past it (Streams), so that it keeps what it has of the mesh: calls at 1024^3
+// took 0.3 to 2 % less on average. Values are written as they come: with 512 MB it was the same, with 4 GiB 1 % more.
+inline constexpr std::uint64_t least_streamed = std::uint64_t{64} << 20, most_streamed = std::uint64_t{256} << 20;
+
 // Elements of 1, 2, 4, 8 or 16 bytes go out 16 bytes at a time.
-template <class Element>
+template <bool Streams, class Element>
 __global__ void fill_kernel(Element* to, std::uint64_t count, const __grid_constant__ fill_pattern<Element> pattern,
                             const pipeline_state* state, capacities limits) {
     await_stream();
@@ -37,7 +41,11 @@ __global__ void fill_kernel(Element* to, std::uint64_t count, const __grid_const
             for (std::uint64_t first = blockIdx.x * per_block; first < stores; first += gridDim.x * per_block)
                 for (unsigned k = 0; k < fill_stores; ++k) {
                     const std::uint64_t i = first + k * blockDim.x + threadIdx.x;
-                    if (i < stores) reinterpret_cast<uint4*>(to)[i] = wide;
+                    if (i >= stores) continue;
+                    if constexpr (Streams)
+                        __stcs(reinterpret_cast<uint4*>(to) + i, wide);
+                    else
+                        reinterpret_cast<uint4*>(to)[i] = wide;
                 }
             if (blockIdx.x == 0)
                 for (std::uint64_t i = stores * per_store + threadIdx.x; i < count; i += blockDim.x)
@@ -75,10 +83,12 @@ void clear_target(const target_view<Target>& t, const pipeline_state* state, con
     using element = typename Target::element_type;
     const auto fill = [&](element* to, std::size_t count, const element& value) {
         constexpr std::uint64_t bytes_per_block = std::uint64_t{16} * fill_stores * threads_per_block;
-        const std::uint64_t blocks = count * sizeof(element) / bytes_per_block + 1;
-        launch_behind(fill_kernel<element>, static_cast<unsigned>(std::min(blocks, core::most_blocks)),
-                      threads_per_block, stream, stage::fine_raster, to, count, fill_pattern<element>{value}, state,
-                      limits);
+        const std::uint64_t bytes = count * sizeof(element), blocks = bytes / bytes_per_block + 1;
+        auto* kernel = fill_kernel<false, element>;
+        if constexpr (map::is_bit)
+            if (bytes >= least_streamed && bytes <= most_streamed) kernel = fill_kernel<true, element>;
+        launch_behind(kernel, static_cast<unsigned>(std::min(blocks, core::most_blocks)), threads_per_block, stream,
+                      stage::fine_raster, to, count, fill_pattern<element>{value}, state, limits);
     };
     if constexpr (map::is_bit) {
         fill(t.elements, map::elements(t.extent), 0u);

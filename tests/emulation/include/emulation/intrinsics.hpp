@@ -71,6 +71,10 @@ template <class T>
 [[nodiscard]] T __ldcg(const T* p) {
     return *p;
 }
+template <class T>
+void __stcs(T* p, const T& value) {
+    *p = value;
+}
 inline void __threadfence() {}
 inline void __threadfence_system() {}
 [[nodiscard]] inline std::size_t __cvta_generic_to_global(const void* p) { return reinterpret_cast<std::size_t>(p); }
