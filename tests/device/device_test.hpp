@@ -123,6 +123,26 @@ inline mesh_data triangles_at_faces(glm::ivec3 extent, int count, bool upper, st
     return m;
 }
 
+// A mesh finer than a grid of some 46 voxels a side, of which one triangle in `step` (0: none) is up to `longest`
+// voxels long and one or two wide, some of these without an area; some lie beyond the grid. Where the long ones are few
+// and short, blocks of a first kernel draw them at their end (direct_raster.cuh).
+inline mesh_data fine_triangles(int count, int step, float longest) {
+    mesh_data m;
+    for (int i = 0; i < count; ++i) {
+        const glm::vec3 corner(0.9f * static_cast<float>(i % 50), 0.37f * static_cast<float>(i / 50 % 120),
+                               0.53f * static_cast<float>(i % 83));
+        const bool is_long = step != 0 && i % step == 0;
+        const float size = is_long ? longest * (0.5f + 0.125f * static_cast<float>(i / step % 5)) : 0.7f;
+        const int axis = i % 3;
+        glm::vec3 along(0.1f), across(0.4f);
+        along[axis] = size;
+        across[(axis + 1) % 3] = is_long ? 1.2f : 0.7f;
+        const bool is_flat = is_long && i / step % 6 == 5;
+        add_triangle(m, corner, corner + along, is_flat ? corner + 0.5f * along : corner + across);
+    }
+    return m;
+}
+
 inline mesh_data translated(mesh_data m, glm::vec3 by) {
     for (glm::vec3& p : m.positions) p += by;
     return m;

@@ -297,20 +297,6 @@ TEST(Graph, ListsLaunchWhatTheyNeed) {
     EXPECT_EQ(num_nodes(g, vp::device::most_of_window, true), num_nodes(g, vp::device::most_of_window, false));
 }
 
-// Fine triangles, and one in twenty up to `longest` voxels long.
-mesh_data fine_triangles(float longest) {
-    mesh_data m;
-    for (int i = 0; i < 1500; ++i) {
-        const glm::vec3 corner(0.9f * static_cast<float>(i % 40), 0.37f * static_cast<float>(i / 40 % 80),
-                               0.53f * static_cast<float>(i % 83));
-        glm::vec3 along(0.1f), across(0.4f);
-        along[i % 3] = i % 20 == 0 ? longest : 0.7f;
-        across[(i + 1) % 3] = 0.7f;
-        add_triangle(m, corner, corner + along, corner + across);
-    }
-    return m;
-}
-
 // Without the kernel for larger triangles: the same voxels by a launch less where there are few of these; otherwise,
 // with `fails`, that it is wanted, and then, by a call that does not clear, a target that stays as it was. Without
 // `fails`: a call that has the kernel anyway.
@@ -324,7 +310,7 @@ void compare_without_larger(const Shader& shader, bool fails, int num_draws, boo
             const bool is_large = longest > 3.0f;
             stream_owner owner;
             vp::cuda_backend be{owner.stream};
-            const mesh_data m = fine_triangles(longest);
+            const mesh_data m = fine_triangles(1500, 20, longest);
             const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
             const std::vector<draw_type> list(static_cast<std::size_t>(num_draws),
                                               draw_type{view_of(mesh, known), {}, shader});
@@ -399,7 +385,7 @@ void compare_lists_without_larger(const Shader& shader) {
         for (const float longest : {2.6f, 30.0f}) {
             SCOPED_TRACE(longest);
             vp::cuda_backend be;
-            const mesh_data m = fine_triangles(longest);
+            const mesh_data m = fine_triangles(1500, 20, longest);
             const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
             const draw_type d{mesh.view(), {}, shader};
             const std::span<const draw_type> draws(&d, 1);

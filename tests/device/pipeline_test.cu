@@ -435,6 +435,32 @@ TEST(Pipeline, LaunchesFillTheDevice) {
     }
 }
 
+// When a call's first kernel is launched alone: which results are right either way, so no comparison would tell.
+TEST(Pipeline, OfFineMeshesTheFirstKernelIsAlone) {
+    using handed_on = decltype(vp::device::pipeline_state::handed_on);
+    const std::uint64_t much = ~std::uint64_t{0};
+    for (const vp::coverage rule : both_rules) {
+        const bool thin = rule == vp::coverage::thin;
+        EXPECT_EQ(handed_on{}.left_alone(rule), 0u);
+        EXPECT_EQ((handed_on{0, {5, 3, 0, 0}, 0}.left_alone(rule)), thin ? 3u : 8u);
+        EXPECT_EQ((handed_on{1, {5, 3, 0, 0}, 1}.left_alone(rule)), much);
+        EXPECT_EQ((handed_on{0, {5, 3, 1, 0}, 0}.left_alone(rule)), much);
+        EXPECT_EQ((handed_on{0, {0, 0, 0, 1}, 0}.left_alone(rule)), much);
+    }
+    const std::uint64_t each = vp::device::most_left_of_block;
+    for (const std::size_t triangles : {1u, 128u, 129u, 1u << 30}) {
+        SCOPED_TRACE(triangles);
+        EXPECT_TRUE(vp::device::may_be_alone(triangles, 0));
+        EXPECT_TRUE(vp::device::may_be_alone(triangles, each));
+        EXPECT_FALSE(vp::device::may_be_alone(triangles, much));
+    }
+    EXPECT_FALSE(vp::device::may_be_alone(128, each + 1)); // a block's
+    EXPECT_TRUE(vp::device::may_be_alone(129, each + 1));
+    const auto at_once = static_cast<std::uint64_t>(vp::device::num_multiprocessors()) * vp::device::most_left_blocks;
+    EXPECT_TRUE(vp::device::may_be_alone(1u << 30, each * at_once));
+    EXPECT_FALSE(vp::device::may_be_alone(1u << 30, each * at_once + 1));
+}
+
 // add_unordered is not the same bits: it stays within the rounding of its additions.
 TEST(Pipeline, UnorderedSumsStayWithinABound) {
     const mesh_data m = mixed_triangles(3000, 30.0f, 41);

@@ -246,29 +246,12 @@ TEST(RepeatedCalls, WithTrianglesForASecondKernelOrNone) {
                                                     indices::unknown, loads);
 }
 
-// Of a fine mesh, one triangle in `step`, up to `longest` voxels long and one or two wide, some of them without an area
-// or beyond the grid: where these are few, the blocks of the first kernel draw them at their end from the second call
-// on.
-mesh_data fine_triangles(int step, float longest) {
-    constexpr int count = 2000;
-    mesh_data m;
-    for (int i = 0; i < count; ++i) {
-        const glm::vec3 corner(0.9f * static_cast<float>(i % 50), 0.37f * static_cast<float>(i / 50 % 120),
-                               0.53f * static_cast<float>(i % 83));
-        const bool is_long = step != 0 && i % step == 0;
-        const float size = is_long ? longest * (0.5f + 0.125f * static_cast<float>(i / step % 5)) : 0.7f;
-        const int axis = i % 3;
-        glm::vec3 along(0.1f), across(0.4f);
-        along[axis] = size;
-        across[(axis + 1) % 3] = is_long ? 1.2f : 0.7f;
-        const bool is_flat = is_long && i / step % 6 == 5;
-        add_triangle(m, corner, corner + along, is_flat ? corner + 0.5f * along : corner + across);
-    }
-    return m;
-}
+// Fine meshes whose larger triangles are drawn by the first kernel alone, from the second call on, where these are few.
 enum : int { none_left, few_left, many_left, large_left };
 std::vector<mesh_data> fine_meshes() {
-    return {fine_triangles(0, 0.0f), fine_triangles(20, 2.8f), fine_triangles(2, 2.8f), fine_triangles(20, 30.0f)};
+    constexpr int count = 2000;
+    return {fine_triangles(count, 0, 0.0f), fine_triangles(count, 20, 2.8f), fine_triangles(count, 2, 2.8f),
+            fine_triangles(count, 20, 30.0f)};
 }
 const std::vector<int> fine_sequence{few_left, few_left,  few_left, few_left, none_left,  many_left,
                                      few_left, none_left, few_left, few_left, large_left, few_left};
@@ -302,78 +285,61 @@ TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesShaded) {
     }
 }
 
+// The same into lists, which each call makes anew: mesh_of(i) for the numbers i of the sequence.
+template <class Payload, class Shader, class MeshOf>
+void list_in_turn(const MeshOf& mesh_of, const std::vector<int>& sequence, const vp::grid& g, const Shader& shader,
+                  vp::coverage rule) {
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, Shader>;
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    open_mesh on_gpu(gpu, mesh_of(sequence[0]));
+    const draw on_device{{on_gpu.positions.view(), on_gpu.triangles.view()}, {}, shader};
+    vp::abuffer<vp::cuda_backend, Payload> lists{gpu};
+    vp::abuffer<vp::cpu_backend, Payload> expected{cpu};
+    for (std::size_t i = 0; i < sequence.size(); ++i) {
+        SCOPED_TRACE(testing::Message() << "call " << i << ", mesh " << sequence[i]);
+        const mesh_data m = mesh_of(sequence[i]);
+        on_gpu.write(gpu, m);
+        const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
+        const draw on_host{cpu_mesh.view(), {}, shader};
+        const vp::status a = vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, lists, rule);
+        const vp::status b = vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, expected, rule);
+        ASSERT_TRUE(a.ok() && b.ok()) << a.message();
+        expect_same_counts(b.counts, a.counts);
+        expect_same_on_host(expected.to_host(cpu), lists.to_host(gpu));
+    }
+}
+
 TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesIntoLists) {
     const std::vector<mesh_data> meshes = fine_meshes();
-    const auto list_in_turn = [&]<class Payload>(Payload*, const auto& shader, vp::coverage rule) {
-        using draw = vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_cvref_t<decltype(shader)>>;
-        vp::cuda_backend gpu;
-        vp::cpu_backend cpu;
-        const vp::grid g = box_grid({47, 46, 45});
-        open_mesh on_gpu(gpu, meshes[0]);
-        const draw on_device{{on_gpu.positions.view(), on_gpu.triangles.view()}, {}, shader};
-        vp::abuffer<vp::cuda_backend, Payload> lists{gpu};
-        vp::abuffer<vp::cpu_backend, Payload> expected{cpu};
-        for (const int which : fine_sequence) {
-            SCOPED_TRACE(which);
-            const mesh_data& m = meshes[static_cast<std::size_t>(which)];
-            on_gpu.write(gpu, m);
-            const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
-            const draw on_host{cpu_mesh.view(), {}, shader};
-            const vp::status a = vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, lists, rule);
-            const vp::status b = vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, expected, rule);
-            ASSERT_TRUE(a.ok() && b.ok()) << a.message();
-            expect_same_counts(b.counts, a.counts);
-            expect_same_on_host(expected.to_host(cpu), lists.to_host(gpu));
-        }
-    };
+    const auto mesh_of = [&](int which) { return meshes[static_cast<std::size_t>(which)]; };
+    const vp::grid g = box_grid({47, 46, 45});
     for (const vp::coverage rule : both_rules) {
-        list_in_turn(static_cast<void*>(nullptr), vp::constant(true), rule);
-        list_in_turn(static_cast<double*>(nullptr), any_double{}, rule); // some are discarded
+        list_in_turn<void>(mesh_of, fine_sequence, g, vp::constant(true), rule);
+        list_in_turn<double>(mesh_of, fine_sequence, g, any_double{}, rule); // some are discarded
     }
 }
 
 // In voxels of their own; a window's voxels and ones for a warp; a block; dense, by bits; and runs that are merged, for
 // which there have to be many more triangles.
 TEST(RepeatedCalls, WithLongVoxelsOrNone) {
-    constexpr int count = 9000;
-    const auto lists_of = []<class Payload>(Payload*, const auto& shader, bool is_many) {
-        using draw = vp::draw<vp::mesh_view<>, vp::passthrough, std::remove_cvref_t<decltype(shader)>>;
-        vp::cuda_backend gpu;
-        vp::cpu_backend cpu;
-        const vp::grid g = box_grid({41, 41, 41});
-        // The first `inside` of them in one voxel.
-        const auto make = [&](int inside) {
+    // The first `inside` triangles lie in one voxel.
+    const auto meshes_of = [](bool is_many) {
+        return [is_many](int inside) {
+            constexpr int count = 9000;
             mesh_data m = spread_triangles(count, false);
             if (is_many) append(m, spread_triangles(64 * count, false));
             const mesh_data one = triangles_in_voxel(inside, {3, 4, 5}, 7);
             std::copy(one.positions.begin(), one.positions.end(), m.positions.begin());
             return m;
         };
-        open_mesh on_gpu(gpu, make(0));
-        const draw on_device{{on_gpu.positions.view(), on_gpu.triangles.view()}, {}, shader};
-        vp::abuffer<vp::cuda_backend, Payload> lists{gpu};
-        vp::abuffer<vp::cpu_backend, Payload> expected{cpu};
-        const std::vector<int> sequence =
-            is_many ? std::vector{0, 0, 8000}
-                    : std::vector{0, 0, 0, 0, 0, 700, 0, 0, 0, 0, 3000, 0, 8000, 4000, 1, 8000, 300};
-        for (const int inside : sequence) {
-            SCOPED_TRACE(inside);
-            const mesh_data m = make(inside);
-            on_gpu.write(gpu, m);
-            const vp::mesh<vp::cpu_backend> cpu_mesh{cpu, m.positions, m.triangles};
-            const draw on_host{cpu_mesh.view(), {}, shader};
-            const vp::status a =
-                vp::voxelize(gpu, std::span<const draw>(&on_device, 1), g, lists, vp::coverage::conservative);
-            const vp::status b =
-                vp::voxelize(cpu, std::span<const draw>(&on_host, 1), g, expected, vp::coverage::conservative);
-            ASSERT_TRUE(a.ok() && b.ok()) << a.message();
-            expect_same_counts(b.counts, a.counts);
-            expect_same_on_host(expected.to_host(cpu), lists.to_host(gpu));
-        }
     };
-    lists_of(static_cast<void*>(nullptr), vp::constant(true), false);
-    lists_of(static_cast<double*>(nullptr), any_double{}, false); // shaded in the finished lists
-    lists_of(static_cast<void*>(nullptr), vp::constant(true), true);
+    const vp::grid g = box_grid({41, 41, 41});
+    const vp::coverage rule = vp::coverage::conservative;
+    const std::vector<int> sequence{0, 0, 0, 0, 0, 700, 0, 0, 0, 0, 3000, 0, 8000, 4000, 1, 8000, 300};
+    list_in_turn<void>(meshes_of(false), sequence, g, vp::constant(true), rule);
+    list_in_turn<double>(meshes_of(false), sequence, g, any_double{}, rule); // shaded in the finished lists
+    list_in_turn<void>(meshes_of(true), {0, 0, 8000}, g, vp::constant(true), rule);
 }
 
 // Two sets of arguments in turn never make a graph; each after itself does.

@@ -44,7 +44,7 @@ namespace device {
 // Where a call that has_failed for a capacity met it.
 [[nodiscard]] inline stage find_overflow(const pipeline_state& s, const capacities& c) {
     return s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ? stage::coarse_raster
-           : has_left_some(s, c)                                          ? stage::fine_raster
+           : misses_triangles(s, c)                                       ? stage::fine_raster
                                                                           : stage::abuffer_emit;
 }
 
@@ -301,7 +301,7 @@ private:
                 device::pipeline_state state{};
                 const bool need_not_list = launch_stages(
                     limits, there[4], tries == 0 && left ? *left : ~std::uint64_t{0}, state, clock ? &*clock : nullptr);
-                left_some = left_some || (limits.leaves_none != 0 && !state.handed_on.are_none());
+                left_some = left_some || device::misses_triangles(state, limits);
                 if (state.index_error != 0) {
                     s = core::failure(status_code::index_out_of_range, stage::coarse_raster);
                     break;

@@ -110,9 +110,9 @@ struct direct_value<blend::count, T> {
     }
 };
 
-// The integer blends that one atomic does.
-template <class Blend, class T>
-struct direct_integer {
+// Blends that may always be done in place, and never tell.
+template <class T>
+struct always_direct {
     static constexpr bool available = true;
     template <class Target>
     [[nodiscard]] static bool allowed(T, const Target&, std::uint64_t) {
@@ -122,6 +122,11 @@ struct direct_integer {
     [[nodiscard]] static bool tells_first(const Target&, std::uint64_t) {
         return false;
     }
+};
+
+// The integer blends that one atomic does.
+template <class Blend, class T>
+struct direct_integer : always_direct<T> {
     __device__ static void apply(T* at, T v) {
         if constexpr (std::is_same_v<Blend, blend::add>)
             atomicAdd(reinterpret_cast<unsigned_word<T>*>(at), static_cast<unsigned_word<T>>(v));
@@ -217,16 +222,8 @@ struct direct_value<blend::add_quantum<Log2Quantum>, float> : direct_sum<float, 
 
 // Order is free by definition.
 template <class T>
-requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_value<blend::add_unordered, T> {
-    static constexpr bool available = true;
-    template <class Target>
-    [[nodiscard]] static bool allowed(T, const Target&, std::uint64_t) {
-        return true;
-    }
-    template <class Target>
-    [[nodiscard]] static bool tells_first(const Target&, std::uint64_t) {
-        return false;
-    }
+requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_value<blend::add_unordered, T>
+    : always_direct<T> {
     __device__ static void apply(T* at, T v) { reduce_add(at, v); }
     __device__ static void apply_many(T* at, T v, unsigned n) { reduce_add(at, v * static_cast<T>(n)); }
 };

@@ -136,12 +136,11 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     // Whether limits.leaves_none may hold, where calls like this one left_alone so many triangles: it can be made once
     // more, since it writes nothing where that was wrong, or clears all that it draws into.
     [[nodiscard]] bool may_leave_none(std::uint64_t left) const {
-        if (draws.size() != 1) return false;
-        const bool may_draw_them = may_be_alone(most_triangles(), left);
-        if (is_touched_call() || is_listed_call()) return may_draw_them;
+        if (draws.size() != 1 || !may_be_alone(most_triangles(), left)) return false;
+        if (is_touched_call() || is_listed_call()) return true;
         if constexpr (can_be_direct<FragmentShader, Framebuffer>)
-            if (is_direct_call())
-                return clears_all_in_use(fb) && (has_only_bits<Framebuffer> ? may_draw_them : left == 0);
+            // Sums' first kernel (block_raster.cuh) draws nothing at its end for the second.
+            return is_direct_call() && clears_all_in_use(fb) && (has_only_bits<Framebuffer> || left == 0);
         return false;
     }
 

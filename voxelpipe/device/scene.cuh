@@ -59,15 +59,15 @@ struct capacities {
     unsigned long long leaves_none = 0; // or 1: the first kernel does it all. As wide as the rest, see call_bytes
 };
 
+// Whether triangles were handed on to a kernel that has not been launched.
+[[nodiscard]] VOXELPIPE_HD inline bool misses_triangles(const pipeline_state& s, const capacities& c) {
+    return c.leaves_none != 0 && !s.handed_on.are_none();
+}
 // Whether the call must not write anything: a bad index, or something that did not fit.
 [[nodiscard]] VOXELPIPE_HD inline bool has_failed(const pipeline_state& s, const capacities& c) {
     return s.index_error != 0 || s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ||
            s.list_fragments > c.fragments || s.fragment_records > c.fragment_records ||
-           s.longest_ordered() > c.longest_ordered || (c.leaves_none != 0 && !s.handed_on.are_none());
-}
-// The same of a call that fills no arrays.
-[[nodiscard]] VOXELPIPE_HD inline bool has_left_some(const pipeline_state& s, const capacities& c) {
-    return s.index_error != 0 || (c.leaves_none != 0 && !s.handed_on.are_none());
+           s.longest_ordered() > c.longest_ordered || misses_triangles(s, c);
 }
 
 // Writes zeros. A template, as all kernels in headers are.

@@ -184,7 +184,7 @@ __global__ __launch_bounds__(threads_per_block) void end_values_kernel(const wor
                                                                        const pipeline_state* state, capacities limits) {
     using writer = value_writer<Target>;
     await_stream();
-    if (has_left_some(*state, limits)) return;
+    if (state->index_error != 0 || misses_triangles(*state, limits)) return;
     const writer w{touched, t, value};
     const bool is_cleared = t.load == load_operation::clear;
     if constexpr (writer::goes_wide) {
@@ -249,7 +249,7 @@ __global__ __launch_bounds__(threads_per_block) void end_touched_kernel(uint4* t
                                                                         capacities limits) {
     constexpr unsigned batch = 4; // loads that go out together
     await_stream();
-    const bool failed = has_left_some(*state, limits);
+    const bool failed = state->index_error != 0 || misses_triangles(*state, limits);
     const std::uint64_t num = (num_words + 3) / 4, threads = std::uint64_t{gridDim.x} * blockDim.x;
     unsigned found = 0;
     for (std::uint64_t first = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; first < num;

@@ -73,13 +73,12 @@ template <class Call>
 template <class Draw, class Framebuffer, class F>
 auto with_call(std::span<const Draw> draws, const grid& g, const Framebuffer& fb, const voxelize_options& options,
                std::uint64_t triangles, const workspace_limits& limits, const F& f) {
-    return with_framebuffer_call<tuning::fine_raster_selector>(draws, g, fb, options, triangles, to_capacities(limits),
-                                                               [&](auto call) {
-                                                                   call.may_list = limits.lists_fragments;
-                                                                   if (!call.may_leave_none(0))
-                                                                       call.limits.leaves_none = 0;
-                                                                   return f(call);
-                                                               });
+    return with_framebuffer_call<tuning::fine_raster_selector>(
+        draws, g, fb, options, triangles, to_capacities(limits), [&](auto call) {
+            call.may_list = limits.lists_fragments;
+            if (!limits.hands_on_triangles && !call.may_leave_none(0)) call.limits.leaves_none = 0;
+            return f(call);
+        });
 }
 
 } // namespace device
