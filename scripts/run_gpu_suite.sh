@@ -158,7 +158,7 @@ for part in "${parts[@]}"; do
                 [[ $program != fragment_order ]] || filter='*AtTheLimits:*DenseVoxels:*NothingWhereTheCallHasFailed'
                 [[ $program != fragment_sort ]] || filter='*LookAlike:*NothingWhereTheCallHasFailed'
                 [[ $program != counting_sort ]] || filter='*EveryLength:*NoRoom*:*NotExpected:*NothingWhereTheCallHasFailed'
-                [[ $program != direct ]] || filter='*ManyMiddlingTriangles:*ManyRecordsOfLargeTriangles'
+                [[ $program != direct ]] || filter='*ManyMiddlingTriangles:*ManyRecordsOfLargeTriangles:*CloseTriangles'
                 [[ $program != repeated_calls ]] || filter='*AFewLargerTriangles*'
                 run_program sanitizer "$tool, $program" compute-sanitizer --tool "$tool" --error-exitcode 9 \
                     "build/gpu/tests/device/device_${program}_test" --gtest_filter="$filter"

@@ -199,6 +199,36 @@ TEST(Direct, FlatLargeTriangles) {
 }
 
 // Exact partial sums, and values that have none and take the tiles.
+// Many triangles for their grid (may_be_close), of which a warp's lie within two, three or six voxels, over a grid
+// whose rows are more than a word long, at its faces and beyond them; one in some batches is longer, lies apart or has
+// no area.
+TEST(Direct, CloseTriangles) {
+    const glm::ivec3 extent(70, 5, 6);
+    std::mt19937 random(91);
+    std::uniform_real_distribution<float> unit(0.0f, 1.0f);
+    const auto vector = [&] { return glm::vec3(unit(random), unit(random), unit(random)); };
+    mesh_data m;
+    for (int batch = 0; batch < 600; ++batch) {
+        const float reach = batch % 3 == 0 ? 0.6f : batch % 3 == 1 ? 1.4f : 5.0f;
+        const glm::vec3 corner = vector() * glm::vec3(extent + 2) - 1.5f;
+        for (int i = 0; i < 32; ++i) {
+            const glm::vec3 a = corner + reach * vector(), b = a + 0.7f * vector();
+            const bool is_odd = i == batch % 41;
+            const glm::vec3 c = !is_odd          ? a + 0.7f * vector()
+                                : batch % 4 == 0 ? a + 4.0f * vector()
+                                : batch % 4 == 1 ? a
+                                : batch % 4 == 2 ? vector() * glm::vec3(extent)
+                                                 : a + 100.0f;
+            add_triangle(m, a, b, c);
+        }
+    }
+    for (const vp::coverage rule : both_rules)
+        for (const bool counts : {false, true})
+            for (const start how : {start::clear, start::load})
+                expect_same<vp::target<vp::bit, blend::bit_or>>(m, box_grid(extent), vp::passthrough{},
+                                                                vp::constant(true), {rule, counts}, how);
+}
+
 TEST(Direct, Sums) {
     for (const float value : {1.0f, -0.75f, 0.1f, 3e9f, 1e-20f, std::numeric_limits<float>::infinity()})
         compare_constants(sum_targets{}, same_sums(value, value));

@@ -122,6 +122,8 @@ struct blending_sink : direct_sink<Call> {
                 mine.touched += blend_cube(t, x, y, z, voxels, value_of<K>(), mode);
         });
     }
+    // Voxels that are drawn by other means.
+    __device__ VOXELPIPE_INLINE void count(word voxels) { mine.fragments += static_cast<unsigned>(__popc(voxels)); }
     // As in blend_slim.
     __device__ VOXELPIPE_INLINE void slim(int x, int y, int z, const core::slim_rows& rows) {
         mine.fragments += static_cast<unsigned>(__popc(rows.bits));

@@ -10,6 +10,7 @@
 
 #include <voxelpipe/core/list_walk.hpp>
 #include <voxelpipe/device/block_raster.cuh>
+#include <voxelpipe/device/close_cubes.cuh>
 #include <voxelpipe/device/combined_words.cuh>
 #include <voxelpipe/device/direct_output.cuh>
 #include <voxelpipe/device/large_raster.cuh>
@@ -57,9 +58,13 @@ struct first_memory {
     typename Call::sink::memory sink;
 };
 
+// Whether a first kernel can set close cubes together (close_cubes.cuh).
+template <class Call>
+inline constexpr bool has_close_cubes = Call::output::only_sets&& Call::rule == coverage::conservative;
+
 // A warp of the first kernel. Every warp has its own queues: no thread waits for another warp. Alone: whether there is
-// no second kernel (raster_first).
-template <class Call, bool Alone>
+// no second kernel (raster_first). Close: whether batches are looked at for close cubes.
+template <class Call, bool Alone, bool Close>
 struct first_warp {
     static constexpr bool thin = Call::rule == coverage::thin;
     using triangle_class = core::triangle_class;
@@ -75,12 +80,13 @@ struct first_warp {
     kind_writer& writer;
     std::uint32_t* big; // triangles, of the block
     unsigned& num_big;
-    int num_cubes = 0; // that wait, of thin ones
+    int num_cubes = 0;                                   // that wait, of thin ones
+    static constexpr std::uint32_t not_close = 1u << 31; // of a code, which has 16 bits: the batch before was not
 
-    // The lane's triangle i, where there is one, of this code: near() gives it. load_next() is called between coverage
-    // and blending, where few registers are in use.
+    // The lane's triangle i, where there is one, of this code, maybe with its mark: near() gives it. load_next() is
+    // called between coverage and blending, where few registers are in use.
     template <class Near, class LoadNext>
-    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, std::uint32_t code, bool valid, const Near& near,
+    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, std::uint32_t& code, bool valid, const Near& near,
                                            const LoadNext& load_next) {
         // Of what is left to do, the longest side of the bounding box, or big_side. Not a few bools (see inside()).
         int side = 0, inside = 0;
@@ -100,11 +106,14 @@ struct first_warp {
             if (!draws_slim(i, r, inside, side, load_next)) {
                 const word bits = find_cube(call.in, side != 0 && side <= 2, r, inside);
                 load_next();
-                feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
-                    if (bits == 0) return;
-                    sink.begin(i);
-                    give_cube(r, bits, sink);
-                });
+                bool is_done = false;
+                if constexpr (Close) is_done = sets_close_cubes(code, r, bits);
+                if (!is_done)
+                    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                        if (bits == 0) return;
+                        sink.begin(i);
+                        give_cube(r, bits, sink);
+                    });
                 side = bits != 0 ? 0 : side;
             }
         } else {
@@ -137,6 +146,19 @@ struct first_warp {
         __syncwarp();
         if constexpr (thin)
             if (num_cubes >= 32) drain_cubes<true>();
+    }
+
+    // Whether this warp has set what find_cube has found. Where one batch does not lie close together, 15 after it are
+    // not looked at.
+    __device__ VOXELPIPE_INLINE bool sets_close_cubes(std::uint32_t& code, const near_triangle& r, word bits) {
+        const bool looks = (code & not_close) == 0 || code / 32 % 16 == 0;
+        if (looks && set_close_cubes(voxelpipe::get<0>(call.out.fb.targets), r.lo, bits)) {
+            code &= ~not_close;
+            sink.count(bits);
+            return true;
+        }
+        code |= not_close;
+        return false;
     }
 
     // Whether this warp has drawn what has slim boxes: conservative triangles, where it has some of three voxels.
@@ -256,7 +278,7 @@ draw_left(const Call& call, unsigned* dropped, first_memory<Call> (&memories)[ra
 // The first kernel. Alone: there is no second one, since nothing is handed on for all that is known. What a block would
 // hand on at its end is drawn there then, where it is little; what is handed on all the same is not drawn. `again` is
 // the call once more, for functions that are called: what has its address taken is read anew behind each reduction.
-template <class Call, bool Alone>
+template <class Call, bool Alone, bool Close>
 __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& again, pipeline_state* state) {
     using sink_type = typename Call::sink;
     __shared__ first_memory<Call> memories[raster_warps];
@@ -275,7 +297,7 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
     sink_type sink(call, dropped, memory.sink);
     kind_writer writer{call.lists, memory.kinds};
     const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
-    first_warp<Call, Alone> warp{
+    first_warp<Call, Alone, Close> warp{
         call, memory, sink, writer, call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads, num_big};
     const unsigned looked_at = warp.run(index);
     __syncthreads();
@@ -296,18 +318,18 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
     count_looked_at(looked_at, dropped, state);
 }
 
-template <class Call>
+template <class Call, bool Close>
 __global__ __launch_bounds__(raster_threads,
                              first_min_blocks<Call>) void direct_raster_kernel(const __grid_constant__ Call call,
                                                                                pipeline_state* state) {
-    raster_first<Call, false>(call, call, state);
+    raster_first<Call, false, Close>(call, call, state);
 }
-template <class Call>
+template <class Call, bool Close>
 __global__ __launch_bounds__(raster_threads,
                              first_min_blocks<Call>) void direct_alone_kernel(const __grid_constant__ Call call,
                                                                               const __grid_constant__ Call again,
                                                                               pipeline_state* state) {
-    raster_first<Call, true>(call, again, state);
+    raster_first<Call, true, Close>(call, again, state);
 }
 
 // ---- the second kernel: what the first left ------------------------------------------------------------------------
@@ -506,12 +528,19 @@ void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStr
                    bool leaves_none = false) {
     const unsigned triangles = call.in.num_triangles;
     if constexpr (Call::output::hands_on) {
+        bool are_close = false;
+        if constexpr (has_close_cubes<Call>) are_close = may_be_close(triangles, call.in.extent);
         const unsigned blocks = raster_blocks(triangles, first_min_blocks<Call>);
-        if (leaves_none)
-            launch_kernel(!is_first, direct_alone_kernel<Call>, blocks, raster_threads, 0, stream, where, call, call,
-                          state);
+        const auto launch = [&](auto* raster, auto* alone) {
+            if (leaves_none)
+                launch_kernel(!is_first, alone, blocks, raster_threads, 0, stream, where, call, call, state);
+            else
+                launch_kernel(!is_first, raster, blocks, raster_threads, 0, stream, where, call, state);
+        };
+        if (are_close)
+            launch(direct_raster_kernel<Call, has_close_cubes<Call>>, direct_alone_kernel<Call, has_close_cubes<Call>>);
         else
-            launch_kernel(!is_first, direct_raster_kernel<Call>, blocks, raster_threads, 0, stream, where, call, state);
+            launch(direct_raster_kernel<Call, false>, direct_alone_kernel<Call, false>);
     } else {
         launch_kernel(!is_first, block_raster_kernel<Call>, raster_blocks(triangles, block_min_blocks), raster_threads,
                       0, stream, where, call, state);
