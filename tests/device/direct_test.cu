@@ -199,29 +199,31 @@ TEST(Direct, FlatLargeTriangles) {
 }
 
 // Exact partial sums, and values that have none and take the tiles.
-// Many triangles for their grid (may_be_close), of which a warp's lie within two, three or six voxels, over a grid
+// Many triangles for their grid (may_be_close), of which a warp's lie within two, three or five voxels, over a grid
 // whose rows are more than a word long, at its faces and beyond them; one in some batches is longer, lies apart or has
 // no area.
 TEST(Direct, CloseTriangles) {
-    const glm::ivec3 extent(70, 5, 6);
+    const glm::ivec3 extent(70, 30, 24);
     std::mt19937 random(91);
     std::uniform_real_distribution<float> unit(0.0f, 1.0f);
     const auto vector = [&] { return glm::vec3(unit(random), unit(random), unit(random)); };
     mesh_data m;
-    for (int batch = 0; batch < 600; ++batch) {
-        const float reach = batch % 3 == 0 ? 0.6f : batch % 3 == 1 ? 1.4f : 5.0f;
-        const glm::vec3 corner = vector() * glm::vec3(extent + 2) - 1.5f;
+    glm::vec3 corner(0.0f);
+    for (int batch = 0; batch < 900; ++batch) {
+        const float reach = batch % 3 == 0 ? 0.6f : batch % 3 == 1 ? 1.4f : 2.5f;
+        if (batch % 4 == 0) corner = vector() * glm::vec3(extent + 2) - 1.5f; // most of the grid stays empty
         for (int i = 0; i < 32; ++i) {
             const glm::vec3 a = corner + reach * vector(), b = a + 0.7f * vector();
             const bool is_odd = i == batch % 41;
             const glm::vec3 c = !is_odd          ? a + 0.7f * vector()
                                 : batch % 4 == 0 ? a + 4.0f * vector()
                                 : batch % 4 == 1 ? a
-                                : batch % 4 == 2 ? vector() * glm::vec3(extent)
+                                : batch % 4 == 2 ? a + 9.0f * vector()
                                                  : a + 100.0f;
             add_triangle(m, a, b, c);
         }
     }
+    ASSERT_TRUE(vp::device::may_be_close(static_cast<std::uint32_t>(m.triangles.size()), extent));
     for (const vp::coverage rule : both_rules)
         for (const bool counts : {false, true})
             for (const start how : {start::clear, start::load})
