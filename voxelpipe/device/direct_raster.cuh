@@ -60,7 +60,7 @@ struct first_memory {
 
 // Whether a first kernel can set close cubes together (close_cubes.cuh).
 template <class Call>
-inline constexpr bool has_close_cubes = Call::output::only_sets&& Call::rule == coverage::conservative;
+inline constexpr bool has_close_cubes = Call::output::only_sets && (Call::rule == coverage::conservative);
 
 // A warp of the first kernel. Every warp has its own queues: no thread waits for another warp. Alone: whether there is
 // no second kernel (raster_first). Close: whether batches are looked at for close cubes.
