@@ -210,7 +210,8 @@ TEST(Direct, CloseTriangles) {
     mesh_data m;
     glm::vec3 corner(0.0f);
     for (int batch = 0; batch < 900; ++batch) {
-        const float reach = batch % 3 == 0 ? 0.6f : batch % 3 == 1 ? 1.4f : 2.5f;
+        const int place = batch / 4;
+        const float reach = place % 3 == 0 ? 0.6f : place % 3 == 1 ? 1.4f : 2.5f;
         if (batch % 4 == 0) corner = vector() * glm::vec3(extent + 2) - 1.5f; // most of the grid stays empty
         for (int i = 0; i < 32; ++i) {
             const glm::vec3 a = corner + reach * vector(), b = a + 0.7f * vector();
