@@ -27,6 +27,9 @@ CELL_NAMES = {
     "float_add_conservative": "float add, reproducible, conservative",
     "float_add_unordered_conservative": "float add, unordered, conservative",
     "float_add_varying_conservative": "float add of a varying, conservative",
+    "float_replace_tracked_conservative": "float replace by a constant, changes tracked",
+    "float_add_tracked_conservative": "float add, changes tracked",
+    "float_add_varying_tracked_conservative": "float add of a varying, changes tracked",
     "abuffer_thin": "A-buffer, thin",
     "abuffer_conservative": "A-buffer, conservative",
 }

@@ -265,6 +265,7 @@ template <coverage Rule, class Key, class Scene, class... Targets>
     const std::vector<tile_range> ranges = tile_sort(how, coarse.pairs, tiles.count());
 
     how.enter(stage::fine_raster);
+    if (fb.changes != nullptr) core::change_log::forget(fb.changes); // all is cleared, and nothing is marked
     const unsigned workers =
         static_cast<unsigned>(std::max<std::size_t>(1, std::min<std::size_t>(how.threads, ranges.size())));
     bool solid = false;

@@ -19,6 +19,9 @@ constexpr std::array<std::string_view, gpu_cells.size()> names{
     "float_add_conservative",
     "float_add_unordered_conservative",
     "float_add_varying_conservative",
+    "float_replace_tracked_conservative",
+    "float_add_tracked_conservative",
+    "float_add_varying_tracked_conservative",
     "abuffer_thin",
     "abuffer_conservative",
 };
@@ -56,6 +59,19 @@ bool is_bit(gpu_cell cell) {
            cell == gpu_cell::bit_counted_conservative;
 }
 
+gpu_cell untracked(gpu_cell cell) {
+    switch (cell) {
+    case gpu_cell::float_replace_tracked_conservative:
+        return gpu_cell::float_replace_conservative;
+    case gpu_cell::float_add_tracked_conservative:
+        return gpu_cell::float_add_conservative;
+    case gpu_cell::float_add_varying_tracked_conservative:
+        return gpu_cell::float_add_varying_conservative;
+    default:
+        return cell;
+    }
+}
+
 double gpu_anchor::fastest() const {
     if (original > 0 && peer > 0) return std::min(original, peer);
     return original > 0 ? original : peer;
@@ -67,7 +83,7 @@ gpu_anchor published_anchor(std::string_view scene, int resolution, gpu_cell cel
                      [&](const published_gpu_scene& s) { return s.scene == scene && s.resolution == resolution; });
     if (p == published_gpu_scenes.end()) return {};
     gpu_anchor a;
-    switch (cell) {
+    switch (untracked(cell)) {
     case gpu_cell::bit_conservative:
         a = {p->original_bit, p->peer_bit, p->peer, p->floor_bit, p->target_bit, p->paper_bit};
         break;
@@ -85,6 +101,7 @@ gpu_anchor published_anchor(std::string_view scene, int resolution, gpu_cell cel
     case gpu_cell::bit_counted_conservative:
     case gpu_cell::float_replace_conservative:
     case gpu_cell::abuffer_conservative:
+    default:
         return {};
     }
     a.target = std::max(a.target, 1.3 * a.floor);
@@ -93,7 +110,7 @@ gpu_anchor published_anchor(std::string_view scene, int resolution, gpu_cell cel
 
 std::uint64_t framebuffer_bytes(gpu_cell cell, int n) {
     const auto side = static_cast<std::uint64_t>(n);
-    if (is_abuffer(cell)) return 0;
+    if (is_abuffer(cell) || is_tracked(cell)) return 0;
     return is_bit(cell) ? (side + 31) / 32 * 4 * side * side : 4 * side * side * side;
 }
 
@@ -229,7 +246,8 @@ table gpu_means(const std::vector<gpu_row>& rows) {
     for (const gpu_cell cell : gpu_cells)
         line(std::string(name_of(cell)), [&](const gpu_row& r) { return r.cell == cell; });
     line("all with a figure of their own", [](const gpu_row& r) {
-        return r.published.fastest() > 0 && r.cell != gpu_cell::float_add_unordered_conservative &&
+        return r.published.fastest() > 0 && !is_tracked(r.cell) &&
+               r.cell != gpu_cell::float_add_unordered_conservative &&
                r.cell != gpu_cell::float_add_varying_conservative;
     });
     line("all with a figure", [](const gpu_row& r) { return r.published.fastest() > 0; });

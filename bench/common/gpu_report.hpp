@@ -26,10 +26,14 @@ enum class gpu_cell : std::uint8_t {
     float_add_conservative,           // reproducible sum of a constant
     float_add_unordered_conservative, // plain additions of a constant
     float_add_varying_conservative,   // reproducible sum of an interpolated value: no short cut for constants
+    // The same into framebuffers that track their changes.
+    float_replace_tracked_conservative,
+    float_add_tracked_conservative,
+    float_add_varying_tracked_conservative,
     abuffer_thin,
     abuffer_conservative,
 };
-inline constexpr std::array<gpu_cell, 9> gpu_cells{
+inline constexpr std::array<gpu_cell, 12> gpu_cells{
     gpu_cell::bit_conservative,
     gpu_cell::bit_thin,
     gpu_cell::bit_counted_conservative,
@@ -37,6 +41,9 @@ inline constexpr std::array<gpu_cell, 9> gpu_cells{
     gpu_cell::float_add_conservative,
     gpu_cell::float_add_unordered_conservative,
     gpu_cell::float_add_varying_conservative,
+    gpu_cell::float_replace_tracked_conservative,
+    gpu_cell::float_add_tracked_conservative,
+    gpu_cell::float_add_varying_tracked_conservative,
     gpu_cell::abuffer_thin,
     gpu_cell::abuffer_conservative,
 };
@@ -46,6 +53,9 @@ inline constexpr std::array<gpu_cell, 9> gpu_cells{
 [[nodiscard]] bool is_thin(gpu_cell cell);
 [[nodiscard]] bool is_abuffer(gpu_cell cell);
 [[nodiscard]] bool is_bit(gpu_cell cell);
+// The same cell where nothing is tracked.
+[[nodiscard]] gpu_cell untracked(gpu_cell cell);
+[[nodiscard]] inline bool is_tracked(gpu_cell cell) { return untracked(cell) != cell; }
 
 // What is published for a cell of a scene; 0 or empty where nothing is. target: never under 1.3 x the published floor.
 struct gpu_anchor {
@@ -57,10 +67,11 @@ struct gpu_anchor {
     double paper = 0;
     [[nodiscard]] double fastest() const;
 };
-// The varying and the unordered sum stand beside the one float figure of 2011.
+// Tracked, varying and unordered sums stand beside the one float figure of 2011.
 [[nodiscard]] gpu_anchor published_anchor(std::string_view scene, int resolution, gpu_cell cell);
 
-// Bytes of the framebuffer of a cube of n^3 voxels; 0 for an A-buffer.
+// Bytes that a call writes whatever it draws, the framebuffer of a cube of n^3 voxels; 0 for an A-buffer, and for one
+// that tracks its changes.
 [[nodiscard]] std::uint64_t framebuffer_bytes(gpu_cell cell, int n);
 
 struct gpu_row {

@@ -10,23 +10,26 @@ namespace bench::gpu {
 
 std::unique_ptr<prepared_cell> prepare(session& s, const resident_mesh& mesh, const vp::grid& grid, gpu_cell cell) {
     const vp::coverage rule = is_thin(cell) ? vp::coverage::thin : vp::coverage::conservative;
-    switch (cell) {
+    const bool tracks = is_tracked(cell);
+    switch (untracked(cell)) {
     case gpu_cell::bit_conservative:
     case gpu_cell::bit_thin:
         return make_bits(s, mesh, grid, rule, false);
     case gpu_cell::bit_counted_conservative:
         return make_bits(s, mesh, grid, rule, true);
     case gpu_cell::float_replace_conservative:
-        return make_float_replace(s, mesh, grid, rule);
+        return make_float_replace(s, mesh, grid, rule, tracks);
     case gpu_cell::float_add_conservative:
-        return make_float_add(s, mesh, grid, rule);
+        return make_float_add(s, mesh, grid, rule, tracks);
     case gpu_cell::float_add_unordered_conservative:
         return make_float_add_unordered(s, mesh, grid, rule);
     case gpu_cell::float_add_varying_conservative:
-        return make_float_add_varying(s, mesh, grid, rule);
+        return make_float_add_varying(s, mesh, grid, rule, tracks);
     case gpu_cell::abuffer_thin:
     case gpu_cell::abuffer_conservative:
         return make_abuffer(s, mesh, grid, rule);
+    default:
+        break;
     }
     throw std::invalid_argument("no such cell");
 }

@@ -28,9 +28,10 @@ struct give_height {
 
 } // namespace
 
-cell_pointer make_float_add_varying(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule) {
+cell_pointer make_float_add_varying(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule,
+                                    bool tracks) {
     using cell = framebuffer_cell<vp::target<float, vp::blend::add>, pass_height, give_height>;
-    return std::make_unique<cell>(s, mesh, grid, rule, give_height{}, std::nullopt);
+    return std::make_unique<cell>(s, mesh, grid, rule, give_height{}, std::nullopt, false, tracks);
 }
 
 } // namespace bench::gpu

@@ -34,9 +34,12 @@ class framebuffer_cell : public prepared_cell {
 
 public:
     framebuffer_cell(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule,
-                     const FragmentShader& shader, std::optional<baseline_output> baseline, bool count_voxels = false)
+                     const FragmentShader& shader, std::optional<baseline_output> baseline, bool count_voxels = false,
+                     bool tracks = false)
         : session_(s), backend_(s.stream()), draw_{view(mesh, backend_), {}, shader}, grid_(grid),
-          options_(rule, count_voxels), framebuffer_(backend_, grid.extent), baseline_(baseline) {}
+          options_(rule, count_voxels), framebuffer_(backend_, grid.extent), baseline_(baseline) {
+        if (tracks) framebuffer_.track_changes(backend_);
+    }
 
     vp::counters call() override {
         const vp::status s = vp::voxelize(backend_, draws(), grid_, framebuffer_, options_);

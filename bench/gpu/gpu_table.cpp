@@ -113,8 +113,8 @@ int run(const options& how, const std::string& command) {
         "its counters, as in the published programs\n"
         "- baseline: one thread a triangle, atomics in global memory, the library's exact sets; "
         "compared word by word before it is timed, fewer runs where it is slow\n"
-        "- floor: triangles read once and the grid written once, or 8 bytes a fragment (A-buffer), "
-        "measured in this run\n"
+        "- floor: triangles read once and the grid written once (but where changes are tracked: nothing of it), "
+        "or 8 bytes a fragment (A-buffer), measured in this run\n"
         "- 2011, peer, target: quoted (bench/published_gpu_figures.hpp), NVIDIA H200\n";
     for (const std::string& n : notes) text += "- " + n + "\n";
     const bool agree = same_fragments(rows);

@@ -76,6 +76,7 @@ TEST(GpuCells, FramebufferBytes) {
     EXPECT_EQ(framebuffer_bytes(gpu_cell::bit_thin, 33), 8u * 33 * 33); // rows are padded to words
     EXPECT_EQ(framebuffer_bytes(gpu_cell::float_add_conservative, 1024), std::uint64_t{4} << 30);
     EXPECT_EQ(framebuffer_bytes(gpu_cell::abuffer_thin, 128), 0u);
+    EXPECT_EQ(framebuffer_bytes(gpu_cell::float_add_tracked_conservative, 1024), 0u);
 }
 
 // The quoted targets follow from the quoted anchors by the rule that stands beside them; a slip of a digit breaks it.
@@ -110,7 +111,7 @@ TEST(PublishedGpuFigures, NoTargetUnderOnePointThreeTimesTheFloor) {
             EXPECT_GE(a.target, 1.3 * a.floor);
             EXPECT_EQ(a.fastest() > 0, cell != gpu_cell::abuffer_conservative &&
                                            cell != gpu_cell::bit_counted_conservative &&
-                                           cell != gpu_cell::float_replace_conservative);
+                                           untracked(cell) != gpu_cell::float_replace_conservative);
         }
     const gpu_anchor dragon = published_anchor("dragon", 128, gpu_cell::bit_conservative);
     EXPECT_EQ(dragon.fastest(), 0.058);

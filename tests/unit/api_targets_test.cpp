@@ -218,6 +218,27 @@ TEST(LoadOperation, UntouchedVoxelsKeepTheirBits) {
     }
 }
 
+// A framebuffer that tracks its changes holds what one that does not holds. tests/device/tracked_test.cu has targets
+// large enough for clears to go by what was drawn.
+TEST(LoadOperation, TrackedChangesMakeNoDifference) {
+    backend_type backend = unit::make_backend();
+    two plain{backend, extent}, tracked{backend, extent};
+    EXPECT_EQ(tracked.view().changes, nullptr);
+    tracked.track_changes(backend);
+    EXPECT_NE(tracked.view().changes, nullptr);
+    const auto grid = unit::unit_grid(extent);
+    for (const unsigned seed : {3u, 4u, 5u}) {
+        const unit::small_mesh mesh = unit::make_mesh(seed, 40, extent);
+        for (two* fb : {&plain, &tracked}) {
+            vp::get<1>(*fb).clear(seed == 5 ? 1.0f : 2.0f);
+            vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, two_values{}, *fb).or_throw();
+        }
+        EXPECT_TRUE(unit::same_bytes(vp::get<0>(plain).to_host(backend), vp::get<0>(tracked).to_host(backend)));
+        EXPECT_TRUE(unit::same_bytes(vp::get<1>(plain).to_host(backend), vp::get<1>(tracked).to_host(backend)));
+        if (seed == 4) tracked.forget_changes(backend);
+    }
+}
+
 TEST(LoadOperation, BitsClearToOneUpToTheExtentAndPaddingToZero) {
     backend_type backend = unit::make_backend();
     unit::small_mesh far;

@@ -163,4 +163,36 @@ TEST(TileGrid, CoversTheExtentOnceAndNumbersBothWays) {
         }
 }
 
+// ---- core/change_log.hpp --------------------------------------------------------------------------------------------
+
+TEST(ChangeLog, HasABitForEachChunk) {
+    const auto rows = [](glm::ivec3 e) { return vp::core::chunk_rows(e); };
+    const vp::core::chunk_rows one = rows({1, 1, 1}), exact = rows({1024, 8, 16}), more = rows({1025, 9, 17});
+    EXPECT_EQ(one.num_words(), 1u);
+    EXPECT_EQ(exact.words, 1);
+    EXPECT_EQ(exact.count(), 2u);
+    EXPECT_EQ(more.words, 2);
+    EXPECT_EQ(more.y, 2);
+    EXPECT_EQ(more.z, 3);
+    EXPECT_EQ(more.num_words(), 12u);
+    EXPECT_EQ(rows({2147483647, 1, 1}).words, 1 << 21);
+    EXPECT_EQ(rows({0, -5, 7}).num_words(), 0u);
+    EXPECT_EQ(vp::change_words({1024, 1024, 1024}), vp::core::change_log::header_words + 128u * 128u);
+}
+
+TEST(ChangeLog, KnowsValuesByTheirBytes) {
+    using known = vp::core::change_log::known;
+    const auto same = [](const known& a, const known& b) {
+        return std::memcmp(a.words, b.words, sizeof(a.words)) == 0;
+    };
+    EXPECT_TRUE(same(known(1.5f), known(1.5f)));
+    EXPECT_FALSE(same(known(0.0f), known(-0.0f)));
+    EXPECT_FALSE(same(known(0.0f), known())); // something, though all its bytes are zeros
+    EXPECT_FALSE(same(known(glm::dvec4(1, 2, 3, 4)), known(glm::dvec4(1, 2, 3, 5))));
+    std::vector<std::uint32_t> words(vp::change_words({40, 9, 9}), ~0u);
+    vp::core::change_log::forget(words.data());
+    EXPECT_EQ(words[vp::core::change_log::header_words - 1], 0u);
+    EXPECT_EQ(words[vp::core::change_log::header_words], ~0u); // marks stay: they say less without the rest
+}
+
 } // namespace

@@ -6,6 +6,7 @@
 // it: 4 GiB against 0.2 GB for the chunks of the dragon in 1024^3. The raster marks the chunks of a small triangle's
 // bounding box, and of what it draws of a large one; more than what is touched may be marked, never less.
 
+#include <voxelpipe/core/change_log.hpp>
 #include <voxelpipe/device/direct_target.cuh>
 #include <voxelpipe/device/small_raster.cuh>
 
@@ -14,31 +15,24 @@
 
 namespace voxelpipe::device {
 
-// A chunk is a box of voxels: a few lines of memory in each row of a target.
-inline constexpr int log2_chunk_x = 5, log2_chunk_yz = 3;
-inline constexpr int chunk_x = 1 << log2_chunk_x, chunk_yz = 1 << log2_chunk_yz;
+using core::chunk_x, core::chunk_yz, core::log2_chunk_x, core::log2_chunk_yz;
 
-// A bit for each chunk, 32 along x to a word; each row of chunks along x begins a word.
+// The words of the marks (core/change_log.hpp).
 struct chunk_marks {
     word* words = nullptr; // none: nothing is marked
     glm::ivec3 extent{};   // of the grid
-    int per_row = 0, rows_y = 0;
+    core::chunk_rows rows;
 
+    chunk_marks() = default;
+    chunk_marks(word* words_, const glm::ivec3& extent_) : words(words_), extent(extent_), rows(extent_) {}
     [[nodiscard]] static chunk_marks take(arena& memory, const glm::ivec3& extent) {
-        chunk_marks m{nullptr, extent, (extent.x + 32 * chunk_x - 1) / (32 * chunk_x),
-                      (extent.y + chunk_yz - 1) / chunk_yz};
-        m.words = memory.take<word>(m.num_words());
-        return m;
-    }
-    [[nodiscard]] std::size_t num_words() const {
-        return static_cast<std::size_t>(per_row) * static_cast<unsigned>(rows_y) *
-               static_cast<unsigned>((extent.z + chunk_yz - 1) / chunk_yz);
+        return {memory.take<word>(core::chunk_rows(extent).num_words()), extent};
     }
 
     // Of a row of chunks, by their numbers along y and z.
     [[nodiscard]] __device__ VOXELPIPE_INLINE word* row(int y, int z) const {
-        return words + (static_cast<std::size_t>(z) * static_cast<unsigned>(rows_y) + static_cast<unsigned>(y)) *
-                           static_cast<unsigned>(per_row);
+        return words + (static_cast<std::size_t>(z) * static_cast<unsigned>(rows.y) + static_cast<unsigned>(y)) *
+                           static_cast<unsigned>(rows.words);
     }
     // The brick (core/brick_triangle.hpp) whose lowest voxel this is, by medium_lanes lanes.
     __device__ VOXELPIPE_INLINE void mark_brick(const std::int32_t (&corner)[3], unsigned lane) const {
@@ -60,11 +54,12 @@ struct chunk_marks {
 };
 
 // The chunks of each lane's bounding box where the lane wants that: a box of up to 32 voxels a side, not outside the
-// grid. All lanes take part. Triangles next to each other mostly share a word, which then is written once, without a
-// look, that all would wait for.
+// grid. All lanes take part. Triangles next to each other mostly lie within two chunks along each axis, all of which
+// are marked then, and otherwise mostly share a word, which is written once; without a look, that all would wait for.
 template <coverage Rule>
 __device__ VOXELPIPE_INLINE void mark_boxes(const chunk_marks& marks, bool wanted, const near_triangle& r) {
     constexpr int beyond = Rule == coverage::thin ? 1 : 0; // a thin fragment may lie one voxel beyond the triangle
+    if (!__any_sync(0xffffffffu, wanted)) return;
     int lo[3] = {}, hi[3] = {};
     if (wanted)
         for (int k = 0; k < 3; ++k) {
@@ -74,6 +69,18 @@ __device__ VOXELPIPE_INLINE void mark_boxes(const chunk_marks& marks, bool wante
             lo[k] = (low > 0 ? low : 0) >> shift;
             hi[k] = (high < end ? high : end) >> shift;
         }
+    unsigned first[3], num_of_all[3];
+    for (int k = 0; k < 3; ++k) {
+        first[k] = __reduce_min_sync(0xffffffffu, wanted ? static_cast<unsigned>(lo[k]) : ~0u);
+        num_of_all[k] = __reduce_max_sync(0xffffffffu, wanted ? static_cast<unsigned>(hi[k]) : 0u) - first[k] + 1;
+    }
+    if (num_of_all[0] <= 2 && num_of_all[1] <= 2 && num_of_all[2] <= 2 && first[0] % 32 + num_of_all[0] <= 32) {
+        const unsigned lane = threadIdx.x % 32, y = lane % 2, z = lane / 2;
+        if (y < num_of_all[1] && z < num_of_all[2])
+            reduce_or(marks.row(static_cast<int>(first[1] + y), static_cast<int>(first[2] + z)) + first[0] / 32,
+                      (num_of_all[0] == 2 ? 3u : 1u) << first[0] % 32);
+        return;
+    }
     // Chunk by chunk of the box: two or three along x at most, which may lie in two words.
     const int nx = hi[0] - lo[0] + 1, ny = hi[1] - lo[1] + 1, nz = hi[2] - lo[2] + 1;
     const int first_word = lo[0] / 32, num_words = hi[0] / 32 - first_word + 1;
@@ -113,13 +120,13 @@ __device__ VOXELPIPE_INLINE void for_each_marked(Element* elements, const chunk_
     constexpr int per_place = static_cast<int>(sizeof(Place) / sizeof(Element));
     const int lane = static_cast<int>(threadIdx.x) % 32;
     const unsigned warps = gridDim.x * (blockDim.x / 32);
-    const std::size_t slices = static_cast<std::size_t>(marks.rows_y) * static_cast<unsigned>(marks.extent.z);
+    const std::size_t slices = static_cast<std::size_t>(marks.rows.y) * static_cast<unsigned>(marks.extent.z);
     for (std::size_t slice = blockIdx.x * (blockDim.x / 32) + threadIdx.x / 32; slice < slices; slice += warps) {
-        const auto z = static_cast<int>(slice / static_cast<unsigned>(marks.rows_y)),
-                   y = static_cast<int>(slice % static_cast<unsigned>(marks.rows_y)) * chunk_yz;
+        const auto z = static_cast<int>(slice / static_cast<unsigned>(marks.rows.y)),
+                   y = static_cast<int>(slice % static_cast<unsigned>(marks.rows.y)) * chunk_yz;
         const word* const row = marks.row(y >> log2_chunk_yz, z >> log2_chunk_yz);
         const int rows = marks.extent.y - y < chunk_yz ? marks.extent.y - y : chunk_yz;
-        for (int w = 0; w < marks.per_row; ++w) {
+        for (int w = 0; w < marks.rows.words; ++w) {
             const word marked = row[w];
             if (marked == 0) continue;
             for (int x0 = 0; x0 < 32 * chunk_x; x0 += 32 * per_place) {

@@ -64,15 +64,15 @@ struct blending_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE static void begin(std::uint32_t) {}
     // Where there are marks: what a triangle may touch that is not large, what is touched of one that is.
     __device__ VOXELPIPE_INLINE void mark_boxes(bool wanted, const near_triangle& r) const {
-        if constexpr (!Call::output::only_blends)
+        if constexpr (Call::output::has_marks)
             if (this->call.out.marks.words != nullptr) device::mark_boxes<Call::rule>(this->call.out.marks, wanted, r);
     }
     __device__ VOXELPIPE_INLINE void mark_row(int x0, int x1, int y, int z) const {
-        if constexpr (shares && !Call::output::only_blends)
+        if constexpr (shares && Call::output::has_marks)
             if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_row(x0, x1, y, z);
     }
     __device__ VOXELPIPE_INLINE void mark_brick(const std::int32_t (&corner)[3], unsigned lane) const {
-        if constexpr (shares && !Call::output::only_blends)
+        if constexpr (shares && Call::output::has_marks)
             if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_brick(corner, lane);
     }
     // In the voxels x0 + i of a row, for the bits i of the mask.
@@ -200,6 +200,7 @@ struct framebuffer_output {
     // Known to the compiler: all targets are in use, and all values true, or the mode of all is to blend.
     static constexpr bool only_sets = false;
     static constexpr bool only_blends = false;
+    static constexpr bool has_marks = true; // or may have
     Framebuffer fb;
     Values values;
     direct_modes<targets_of<Framebuffer>::count> modes;
@@ -215,13 +216,14 @@ template <class Framebuffer>
 inline constexpr bool has_only_values = false;
 template <class... Targets>
 inline constexpr bool has_only_values<framebuffer_view<Targets...>> = (has_value_rows<Targets> && ...);
-template <class Framebuffer, class Values>
+template <class Framebuffer, class Values, bool HasMarks>
 struct blended_output : framebuffer_output<Framebuffer, Values> {
     template <class Call>
     using sink = blending_sink<Call>;
     template <class Call>
     using rest_sink = sink<Call>;
     static constexpr bool only_blends = true;
+    static constexpr bool has_marks = HasMarks;
 };
 
 } // namespace voxelpipe::device

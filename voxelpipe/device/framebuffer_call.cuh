@@ -44,6 +44,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     using values = decltype(std::declval<typename scene_type::fragment_output>().values);
     static constexpr bool in_tiles = groups::num_groups() > 0;
     static constexpr bool can_be_listed = is_resolvable<Framebuffer> || groups::has_ordered;
+    using tracking_type = change_tracking<Framebuffer>;
 
     std::span<const draw_type> draws;
     grid g;
@@ -60,6 +61,9 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     template <coverage Rule, bool Run>
     void go(arena& memory, cudaStream_t stream) const {
         pipeline_state* const state = memory.take<pipeline_state>(1);
+        if constexpr (Run)
+            if (can_be_known(fb) && !is_tracked_call())
+                check(cudaMemsetAsync(fb.changes, 0, core::change_log::header_words * sizeof(word), stream));
         if constexpr (can_be_touched) {
             if (is_touched_call()) {
                 go_touched<Rule, Run>(memory, state, stream);
@@ -181,6 +185,18 @@ private:
         return plan_direct(draws, fb, num_primitives, options.count_voxels).possible;
     }
 
+    // Whether all that the call draws is marked, since the framebuffer tracks its changes.
+    [[nodiscard]] bool is_tracked_call() const {
+        if (!can_be_known(fb)) return false;
+        if constexpr (can_be_direct<FragmentShader, Framebuffer>)
+            if (is_direct_call()) return true;
+        return is_touched_call() || is_listed_call();
+    }
+    // Of calls that know what a voxel ends with when it is drawn.
+    [[nodiscard]] tracking_type track() const {
+        return {fb, is_tracked_call(), [](const auto&, std::size_t) { return true; }};
+    }
+
     // Vertices are shaded by the raster itself where that costs nothing.
     static constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
 
@@ -209,7 +225,10 @@ private:
                 };
                 raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);
             }
-            end_touched(touched, fb, draws[0].fragment_shader.values, options.count_voxels, state, limits, stream);
+            const tracking_type tracking = track();
+            clear_by_chunks(tracking, fb, state, limits, stream);
+            end_touched(touched, fb, tracking, draws[0].fragment_shader.values, options.count_voxels, state, limits,
+                        stream);
             end_stage(clock, &stage_times::tile_resolve);
         }
     }
@@ -232,16 +251,20 @@ private:
     template <coverage Rule, bool Run>
     void go_direct(arena& memory, pipeline_state* state, cudaStream_t stream) const {
         const auto plan = plan_direct(draws, fb, num_primitives, options.count_voxels);
-        bool has_marks = false;
+        bool has_marks = false; // of this call alone
         core::for_each_index<groups::count>([&]<std::size_t K>() {
             has_marks = has_marks || (plan.counts(K) && ends_by_marks(voxelpipe::get<K>(fb.targets)));
         });
-        chunk_marks marks;
+        const tracking_type tracking(fb, is_tracked_call(),
+                                     [&](const auto& t, std::size_t k) { return !plan.counts(k) || ends_by_marks(t); });
+        chunk_marks marks = tracking.marks();
+        const bool is_tracked = marks.words != nullptr; // those hold what the call's own would, and more
+        has_marks = has_marks && !is_tracked;
         if (has_marks) marks = chunk_marks::take(memory, g.extent);
         const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : most_vertices());
         const triangle_lists handed_on = triangle_lists::take(memory, most_triangles());
         if constexpr (Run) {
-            if (has_marks) check(cudaMemsetAsync(marks.words, 0, marks.num_words() * sizeof(word), stream));
+            if (has_marks) check(cudaMemsetAsync(marks.words, 0, marks.rows.num_words() * sizeof(word), stream));
             for (const draw_type& d : draws)
                 if (!d.mesh.has_checked_indices())
                     check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state,
@@ -250,8 +273,9 @@ private:
             core::for_each_index<groups::count>([&]<std::size_t K>() {
                 auto t = voxelpipe::get<K>(fb.targets);
                 if (plan.counts(K)) t.clear_value = {}; // no fragments
-                if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
+                if (t.load == load_operation::clear && !tracking.by_chunks[K]) clear_target(t, state, limits, stream);
             });
+            clear_by_chunks(tracking, fb, state, limits, stream);
             end_stage(clock, &stage_times::clear);
             const core::snap_transform snap = core::make_snap_transform(g);
             for (std::size_t i = 0; i < draws.size(); ++i) {
@@ -284,7 +308,10 @@ private:
                                                                               marks};
                     if constexpr (has_only_values<Framebuffer>) {
                         if (plan.only_blends() && all_in_use(fb)) {
-                            draw_into(blended_output<Framebuffer, values_type>{output});
+                            if (is_tracked)
+                                draw_into(blended_output<Framebuffer, values_type, true>{output});
+                            else
+                                draw_into(blended_output<Framebuffer, values_type, false>{output});
                             return;
                         }
                     }
@@ -354,7 +381,9 @@ private:
             end_stage(clock, &stage_times::fine_raster);
             const int at = sort_fragments(pairs, sort_count{state, limits}, limits.fragments, sort, stream);
             end_stage(clock, &stage_times::tile_sort);
-            clear_targets(state, stream);
+            const tracking_type tracking = track();
+            clear_targets(tracking, state, stream);
+            mark_voxels(tracking, pairs.keys[at], &state->list_fragments, limits.fragments, state, limits, stream);
             resolve_fragments(s, fb, {pairs.keys[at], pairs.values[at]}, ends, options.count_voxels, state, limits,
                               stream);
             end_stage(clock, &stage_times::tile_resolve);
@@ -384,17 +413,20 @@ private:
             end_stage(clock, &stage_times::abuffer_emit);
             sorted.payloads = payloads;
             sorted.payloads_in_order = true;
-            clear_targets(state, stream);
+            const tracking_type tracking = track();
+            clear_targets(tracking, state, stream);
+            mark_voxels(tracking, sorted.voxels, &state->list_voxels, limits.fragments, state, limits, stream);
             fold_lists(sorted, fb, options.count_voxels, state, limits, std::make_index_sequence<groups::count>{},
                        stream, clock);
         }
     }
 
-    void clear_targets(const pipeline_state* state, cudaStream_t stream) const {
+    void clear_targets(const tracking_type& tracking, const pipeline_state* state, cudaStream_t stream) const {
         core::for_each_index<groups::count>([&]<std::size_t K>() {
             const auto& t = voxelpipe::get<K>(fb.targets);
-            if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
+            if (t.load == load_operation::clear && !tracking.by_chunks[K]) clear_target(t, state, limits, stream);
         });
+        clear_by_chunks(tracking, fb, state, limits, stream);
         end_stage(clock, &stage_times::clear);
     }
 
@@ -416,7 +448,7 @@ private:
         fragment_lists<Key, values> lists{};
         if constexpr (groups::has_ordered) lists = list_fragments<Rule, Run, Key>(memory, s, state, stream);
         if constexpr (Run) {
-            clear_targets(state, stream);
+            clear_targets(track(), state, stream);
             // Fragments and voxels are counted once: by the lists, where there are any.
             if constexpr (in_tiles)
                 fine_pass<Rule, Policy>(s, fb, work,

@@ -11,6 +11,7 @@
 
 #include <voxelpipe/device/clear_target.cuh>
 #include <voxelpipe/device/direct_raster.cuh>
+#include <voxelpipe/device/tracked_clear.cuh>
 
 #include <cstddef>
 #include <cstdint>
@@ -149,8 +150,9 @@ struct value_writer {
             }
         }
     }
-    // Any other: with `fill`, voxels that are not touched get the clear value. A warp takes 32 words at once.
-    __device__ VOXELPIPE_INLINE void write(bool fill) const {
+    // Any other: with `fill`, voxels that are not touched get the clear value. A warp takes 32 words at once. Where
+    // there are marks, what is touched is marked.
+    __device__ VOXELPIPE_INLINE void write(bool fill, const chunk_marks& marks) const {
         const std::uint64_t words = std::uint64_t{rows} * words_x, threads = std::uint64_t{gridDim.x} * blockDim.x;
         const std::uint32_t lane = threadIdx.x % 32;
         const bool is_cleared = t.load == load_operation::clear;
@@ -166,6 +168,9 @@ struct value_writer {
                 const auto x = static_cast<std::uint32_t>(at - std::uint64_t{row} * words_x) * 32 + lane;
                 if (x >= nx) continue;
                 const auto y = static_cast<int>(row % ny), z = static_cast<int>(row / ny);
+                static_assert(chunk_x == 32);
+                if (marks.words != nullptr && bits != 0 && x % 32 == 0)
+                    marks.mark_row(static_cast<int>(x), static_cast<int>(x), y, z);
                 if ((bits >> lane & 1u) != 0)
                     t.store(static_cast<int>(x), y, z,
                             blended(is_cleared ? t.clear_value : t(static_cast<int>(x), y, z)));
@@ -177,24 +182,22 @@ struct value_writer {
 };
 
 template <class Target>
-__global__ __launch_bounds__(threads_per_block) void end_values_kernel(const word* touched,
-                                                                       const __grid_constant__ target_view<Target> t,
-                                                                       const __grid_constant__
-                                                                       typename Target::value_type value,
-                                                                       const pipeline_state* state, capacities limits) {
+__global__ __launch_bounds__(threads_per_block) void end_values_kernel(
+    const word* touched, const __grid_constant__ target_view<Target> t,
+    const __grid_constant__ typename Target::value_type value, const __grid_constant__ chunk_marks marks,
+    bool is_filled, const pipeline_state* state, capacities limits) {
     using writer = value_writer<Target>;
     await_stream();
     if (state->index_error != 0 || misses_triangles(*state, limits)) return;
     const writer w{touched, t, value};
-    const bool is_cleared = t.load == load_operation::clear;
     if constexpr (writer::goes_wide) {
-        if (is_cleared && static_cast<unsigned>(t.extent.x) * sizeof(value) % 16 == 0 &&
+        if (is_filled && marks.words == nullptr && static_cast<unsigned>(t.extent.x) * sizeof(value) % 16 == 0 &&
             reinterpret_cast<std::uintptr_t>(t.elements) % 16 == 0) {
             w.fill_wide();
             return;
         }
     }
-    w.write(is_cleared && !Target::map::bricks); // those of bricks have been cleared, with their padding
+    w.write(is_filled, marks);
 }
 
 // What a word of a target becomes, of which these bits are touched by fragments of this value.
@@ -280,9 +283,11 @@ __global__ __launch_bounds__(threads_per_block) void end_touched_kernel(uint4* t
     if (threadIdx.x == 0 && sum != 0) atomicAdd(&state->voxels, sum);
 }
 
-// Ends a call: touched voxels become values of the targets, and zeros.
+// Ends a call: touched voxels become values of the targets, where those that the tracking says have been cleared, and
+// zeros.
 template <class... Targets, class Values>
-void end_touched(word* touched, const framebuffer_view<Targets...>& fb, const Values& values, bool count_voxels,
+void end_touched(word* touched, const framebuffer_view<Targets...>& fb,
+                 const change_tracking<framebuffer_view<Targets...>>& tracking, const Values& values, bool count_voxels,
                  pipeline_state* state, const capacities& limits, cudaStream_t stream) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         using target = typename core::pack_element<K, Targets...>::type;
@@ -294,10 +299,13 @@ void end_touched(word* touched, const framebuffer_view<Targets...>& fb, const Va
             const std::uint64_t bytes = target::map::elements(t.extent) * sizeof(typename target::element_type);
             const std::uint64_t blocks =
                 std::min(bytes / (16 * fill_stores * threads_per_block) + 1, core::most_blocks);
+            // Those of bricks have been cleared, with their padding.
+            const bool fills = t.load == load_operation::clear && !target::map::bricks && !tracking.by_chunks[K];
             if (t.load != load_operation::off)
                 launch_behind(end_values_kernel<target>, static_cast<unsigned>(blocks), threads_per_block, stream,
                               stage::tile_resolve, touched, t,
-                              static_cast<typename target::value_type>(voxelpipe::get<K>(values)), state, limits);
+                              static_cast<typename target::value_type>(voxelpipe::get<K>(values)),
+                              fills ? chunk_marks{} : tracking.marks(), fills, state, limits);
         }
     });
     const std::uint64_t num = touched_target::map::elements(fb.extent);

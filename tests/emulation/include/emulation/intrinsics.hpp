@@ -115,6 +115,9 @@ template <class T>
 [[nodiscard]] inline unsigned __reduce_max_sync(unsigned mask, unsigned value) {
     return static_cast<unsigned>(emulation::meet(emulation::meeting_kind::most, mask, value, 0));
 }
+[[nodiscard]] inline unsigned __reduce_min_sync(unsigned mask, unsigned value) {
+    return ~__reduce_max_sync(mask, ~value);
+}
 [[nodiscard]] inline unsigned __reduce_or_sync(unsigned mask, unsigned value) {
     return static_cast<unsigned>(emulation::meet(emulation::meeting_kind::disjunction, mask, value, 0));
 }
