@@ -6,8 +6,11 @@
 // the value that it is cleared to but for some chunks (core/change_log.hpp), those alone are written. What is known
 // lies on the device, so that a call that failed, or was captured in a graph and launched again, leaves it right.
 
+#include <voxelpipe/device/clear_target.cuh>
 #include <voxelpipe/device/counted_target.cuh>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstring>
 
 namespace voxelpipe::device {
