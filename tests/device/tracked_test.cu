@@ -274,7 +274,7 @@ TEST(Tracked, GraphLaunchedAgain) {
         ASSERT_EQ(cudaMalloc(&memory.emplace_back(nullptr), bytes), cudaSuccess);
         const vp::workspace_view workspace{memory.back(), bytes, limits};
         cudaGraph_t graph = nullptr;
-        ASSERT_EQ(cudaStreamBeginCapture(owner.stream, cudaStreamCaptureModeThreadLocal), cudaSuccess);
+        ASSERT_EQ(cudaStreamBeginCapture(owner.stream, cudaStreamCaptureModeGlobal), cudaSuccess);
         ASSERT_TRUE(vp::voxelize_async(be, draws, g, fb.view(), {}, workspace).ok());
         ASSERT_EQ(cudaStreamEndCapture(owner.stream, &graph), cudaSuccess);
         ASSERT_EQ(cudaGraphInstantiate(&graphs.emplace_back(nullptr), graph, 0), cudaSuccess);
