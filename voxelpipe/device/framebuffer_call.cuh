@@ -225,9 +225,7 @@ private:
                 };
                 raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);
             }
-            const tracking_type tracking = track();
-            clear_by_chunks(tracking, fb, state, limits, stream);
-            end_touched(touched, fb, tracking, draws[0].fragment_shader.values, options.count_voxels, state, limits,
+            end_touched(touched, fb, track(), draws[0].fragment_shader.values, options.count_voxels, state, limits,
                         stream);
             end_stage(clock, &stage_times::tile_resolve);
         }

@@ -11,6 +11,7 @@
 
 #include <voxelpipe/device/clear_target.cuh>
 #include <voxelpipe/device/direct_raster.cuh>
+#include <voxelpipe/device/touched_values.cuh>
 #include <voxelpipe/device/tracked_clear.cuh>
 
 #include <cstddef>
@@ -98,108 +99,6 @@ template <class... Targets>
     return any;
 }
 
-// How the values of a target are ended: `touched` gives bit x of a row of words, `made` is what the fragments' value
-// makes of a cleared voxel. By all threads of a grid.
-template <class Target>
-struct value_writer {
-    using map = typename Target::map;
-    using value_type = typename Target::value_type;
-    static constexpr bool goes_wide =
-        !map::bricks && !map::planes && sizeof(value_type) <= 16 && 16 % sizeof(value_type) == 0;
-    static constexpr unsigned batch = 4; // loads that go out together
-
-    const word* touched;
-    const target_view<Target>& t;
-    const value_type& value;
-    std::uint32_t nx = static_cast<std::uint32_t>(t.extent.x), ny = static_cast<std::uint32_t>(t.extent.y);
-    std::uint32_t words_x = (nx + 31) / 32, rows = ny * static_cast<std::uint32_t>(t.extent.z);
-
-    [[nodiscard]] __device__ VOXELPIPE_INLINE value_type blended(const value_type& old) const {
-        auto a = Target::traits::begin(old);
-        Target::traits::apply(a, value);
-        return value_type(Target::traits::end(a));
-    }
-    // A cleared target of rows whose values fill 16 bytes, in order.
-    __device__ VOXELPIPE_INLINE void fill_wide() const {
-        constexpr unsigned per_store = 16 / sizeof(value_type);
-        const value_type made = blended(t.clear_value);
-        auto* const to = reinterpret_cast<uint4*>(t.elements);
-        const std::uint64_t stores = std::uint64_t{rows} * nx / per_store,
-                            per_block = std::uint64_t{batch} * blockDim.x;
-        for (std::uint64_t first = blockIdx.x * per_block; first < stores; first += gridDim.x * per_block) {
-            word bits[batch];
-            for (unsigned b = 0; b < batch; ++b) {
-                const std::uint64_t i = first + b * blockDim.x + threadIdx.x, at = i * per_store;
-                if (i >= stores) break;
-                if (nx % 32 == 0) {
-                    bits[b] = touched[at / 32] >> at % 32;
-                } else {
-                    const auto row = static_cast<std::uint32_t>(at / nx);
-                    const auto x = static_cast<std::uint32_t>(at - std::uint64_t{row} * nx);
-                    bits[b] = touched[std::uint64_t{row} * words_x + x / 32] >> x % 32;
-                }
-            }
-            for (unsigned b = 0; b < batch; ++b) {
-                const std::uint64_t i = first + b * blockDim.x + threadIdx.x;
-                if (i >= stores) break;
-                value_type values[per_store];
-                for (unsigned k = 0; k < per_store; ++k) values[k] = (bits[b] >> k & 1u) != 0 ? made : t.clear_value;
-                uint4 wide;
-                memcpy(&wide, values, 16);
-                to[i] = wide;
-            }
-        }
-    }
-    // Any other: with `fill`, voxels that are not touched get the clear value. A warp takes 32 words at once. Where
-    // there are marks, what is touched is marked.
-    __device__ VOXELPIPE_INLINE void write(bool fill, const chunk_marks& marks) const {
-        const std::uint64_t words = std::uint64_t{rows} * words_x, threads = std::uint64_t{gridDim.x} * blockDim.x;
-        const std::uint32_t lane = threadIdx.x % 32;
-        const bool is_cleared = t.load == load_operation::clear;
-        for (std::uint64_t first = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x - lane; first < words;
-             first += threads) {
-            const word mine = first + lane < words ? touched[first + lane] : 0;
-            const unsigned wanted = __ballot_sync(0xffffffffu, fill ? first + lane < words : mine != 0);
-            for (unsigned rest = wanted; rest != 0; rest &= rest - 1) {
-                const int from = __ffs(static_cast<int>(rest)) - 1;
-                const word bits = __shfl_sync(0xffffffffu, mine, from);
-                const std::uint64_t at = first + static_cast<unsigned>(from);
-                const auto row = static_cast<std::uint32_t>(at / words_x);
-                const auto x = static_cast<std::uint32_t>(at - std::uint64_t{row} * words_x) * 32 + lane;
-                if (x >= nx) continue;
-                const auto y = static_cast<int>(row % ny), z = static_cast<int>(row / ny);
-                static_assert(chunk_x == 32);
-                if (marks.words != nullptr && bits != 0 && x % 32 == 0)
-                    marks.mark_row(static_cast<int>(x), static_cast<int>(x), y, z);
-                if ((bits >> lane & 1u) != 0)
-                    t.store(static_cast<int>(x), y, z,
-                            blended(is_cleared ? t.clear_value : t(static_cast<int>(x), y, z)));
-                else if (fill)
-                    t.store(static_cast<int>(x), y, z, t.clear_value);
-            }
-        }
-    }
-};
-
-template <class Target>
-__global__ __launch_bounds__(threads_per_block) void end_values_kernel(
-    const word* touched, const __grid_constant__ target_view<Target> t,
-    const __grid_constant__ typename Target::value_type value, const __grid_constant__ chunk_marks marks,
-    bool is_filled, const pipeline_state* state, capacities limits) {
-    using writer = value_writer<Target>;
-    await_stream();
-    if (state->index_error != 0 || misses_triangles(*state, limits)) return;
-    const writer w{touched, t, value};
-    if constexpr (writer::goes_wide) {
-        if (is_filled && marks.words == nullptr && static_cast<unsigned>(t.extent.x) * sizeof(value) % 16 == 0 &&
-            reinterpret_cast<std::uintptr_t>(t.elements) % 16 == 0) {
-            w.fill_wide();
-            return;
-        }
-    }
-    w.write(is_filled, marks);
-}
-
 // What a word of a target becomes, of which these bits are touched by fragments of this value.
 template <class Target>
 __device__ VOXELPIPE_INLINE word end_word(word old, word touched, bool value) {
@@ -283,31 +182,26 @@ __global__ __launch_bounds__(threads_per_block) void end_touched_kernel(uint4* t
     if (threadIdx.x == 0 && sum != 0) atomicAdd(&state->voxels, sum);
 }
 
-// Ends a call: touched voxels become values of the targets, where those that the tracking says have been cleared, and
-// zeros.
+// Ends a call: touched voxels become values of the targets, and zeros.
 template <class... Targets, class Values>
 void end_touched(word* touched, const framebuffer_view<Targets...>& fb,
                  const change_tracking<framebuffer_view<Targets...>>& tracking, const Values& values, bool count_voxels,
                  pipeline_state* state, const capacities& limits, cudaStream_t stream) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         using target = typename core::pack_element<K, Targets...>::type;
+        using map = typename target::map;
         const auto& t = voxelpipe::get<K>(fb.targets);
-        if constexpr (target::map::bricks) // whose padding has no places in rows
+        if constexpr (map::bricks) // whose padding has no places in rows
             if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
-        if constexpr (!target::map::is_bit) {
-            // By blocks that end, as in clear_target.
-            const std::uint64_t bytes = target::map::elements(t.extent) * sizeof(typename target::element_type);
-            const std::uint64_t blocks =
-                std::min(bytes / (16 * fill_stores * threads_per_block) + 1, core::most_blocks);
-            // Those of bricks have been cleared, with their padding.
-            const bool fills = t.load == load_operation::clear && !target::map::bricks && !tracking.by_chunks[K];
-            if (t.load != load_operation::off)
-                launch_behind(end_values_kernel<target>, static_cast<unsigned>(blocks), threads_per_block, stream,
-                              stage::tile_resolve, touched, t,
-                              static_cast<typename target::value_type>(voxelpipe::get<K>(values)),
-                              fills ? chunk_marks{} : tracking.marks(), fills, state, limits);
+        if constexpr (!map::is_bit) {
+            const auto value = static_cast<typename target::value_type>(voxelpipe::get<K>(values));
+            if constexpr (!map::bricks)
+                if (tracking.by_chunks[K]) end_chunks<K>(touched, t, value, tracking, state, limits, stream);
+            if (t.load != load_operation::off && !tracking.by_chunks[K])
+                end_values(touched, t, value, tracking, state, limits, stream);
         }
     });
+    note_clears(tracking, false, state, limits, stream);
     const std::uint64_t num = touched_target::map::elements(fb.extent);
     launch_behind(end_touched_kernel<framebuffer_view<Targets...>, Values>, fill_device(num / 16 + 1),
                   threads_per_block, stream, stage::tile_resolve, reinterpret_cast<uint4*>(touched), num, fb, values,

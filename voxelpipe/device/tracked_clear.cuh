@@ -74,8 +74,16 @@ struct change_tracking<framebuffer_view<Targets...>> {
     [[nodiscard]] word* known_of(std::size_t k) const { return log + k * core::change_log::known_words; }
 };
 
-// A word of marks in a row of chunks: by one warp, whose lanes write a place of `value` each. `Place`: one element, or
-// as many as fill 16 bytes.
+// Whether this is what a log knows. All lanes of a warp take part.
+[[nodiscard]] __device__ VOXELPIPE_INLINE bool is_known_as(const word* known, const core::change_log::known& wanted) {
+    constexpr int known_words = core::change_log::known_words;
+    static_assert(known_words <= 32);
+    const int lane = static_cast<int>(threadIdx.x) % 32;
+    return __all_sync(0xffffffffu,
+                      lane >= known_words || known[lane % known_words] == wanted.words[lane % known_words]);
+}
+
+// Writes chunks of a target in rows along x. `Place`: one element, or as many as fill 16 bytes.
 template <class Element, class Place>
 struct chunk_filler {
     static constexpr int per_place = static_cast<int>(sizeof(Place) / sizeof(Element));
@@ -84,118 +92,131 @@ struct chunk_filler {
 
     Place* to;
     glm::ivec3 extent;
-    Place value;
 
-    __device__ VOXELPIPE_INLINE void put(int x, int y, int z) const {
-        const std::size_t row =
-            static_cast<std::size_t>(z) * static_cast<unsigned>(extent.y) + static_cast<unsigned>(y);
-        to[(row * static_cast<unsigned>(extent.x) + static_cast<unsigned>(x)) / per_place] = value;
-    }
-    // The lowest voxel of the word's first chunk.
-    __device__ VOXELPIPE_INLINE void fill(int x0, int y0, int z0, word marked) const {
-        const int lane = static_cast<int>(threadIdx.x) % 32;
-        const int rows_y = min(chunk_yz, extent.y - y0), rows = rows_y * min(chunk_yz, extent.z - z0);
+    // What lies at this z of the chunks that a word marks: by one warp, whose lanes write a place each. (x0, y0): the
+    // lowest voxel of the word's first chunk; place_at(x, row) gives what begins at x of the row y0 + row.
+    template <class PlaceAt>
+    __device__ VOXELPIPE_INLINE void fill(int x0, int y0, int z, word marked, PlaceAt&& place_at) const {
+        const int lane = static_cast<int>(threadIdx.x) % 32, rows = min(chunk_yz, extent.y - y0);
+        const std::size_t first_row =
+            static_cast<std::size_t>(z) * static_cast<unsigned>(extent.y) + static_cast<unsigned>(y0);
+        const auto put = [&](int x, int row) {
+            to[((first_row + static_cast<unsigned>(row)) * static_cast<unsigned>(extent.x) + static_cast<unsigned>(x)) /
+               per_place] = place_at(x, row);
+        };
         if (marked == ~0u) { // in the order of memory
             const int end = min(x0 + 32 * chunk_x, extent.x);
-            for (int i = 0; i < rows; ++i)
-                for (int x = x0 + lane * per_place; x < end; x += 32 * per_place)
-                    put(x, y0 + i % rows_y, z0 + i / rows_y);
+            for (int row = 0; row < rows; ++row)
+                for (int x = x0 + lane * per_place; x < end; x += 32 * per_place) put(x, row);
             return;
         }
         for (; marked != 0; marked &= marked - 1) {
             const int x = x0 + (__ffs(static_cast<int>(marked)) - 1) * chunk_x + lane % lanes_of_row * per_place;
             if (x >= extent.x) continue;
-            for (int i = lane / lanes_of_row; i < rows; i += rows_at_once) put(x, y0 + i % rows_y, z0 + i / rows_y);
+            for (int row = lane / lanes_of_row; row < rows; row += rows_at_once) put(x, row);
         }
     }
 };
+// f(filler), 16 bytes at a time where rows allow that.
+template <class Element, class F>
+__device__ VOXELPIPE_INLINE void with_chunk_filler(Element* elements, const chunk_marks& marks, F&& f) {
+    if constexpr (sizeof(Element) <= 16 && 16 % sizeof(Element) == 0) {
+        if (has_wide_rows(elements, marks)) {
+            f(chunk_filler<Element, uint4>{reinterpret_cast<uint4*>(elements), marks.extent});
+            return;
+        }
+    }
+    f(chunk_filler<Element, Element>{elements, marks.extent});
+}
 
-// One target. A warp takes a row of chunks, and wipes its marks where no other target is to be cleared by them.
+// One target, to the value that the log may know.
 template <class Element>
 __global__ __launch_bounds__(threads_per_block) void clear_chunks_kernel(
     Element* elements, const __grid_constant__ chunk_marks marks, const word* known,
     const __grid_constant__ core::change_log::known wanted, const __grid_constant__ fill_pattern<Element> pattern,
-    bool wipes, const pipeline_state* state, capacities limits) {
-    constexpr int known_words = core::change_log::known_words;
-    static_assert(known_words <= 32);
+    const pipeline_state* state, capacities limits) {
     await_stream();
     if (has_failed(*state, limits)) return;
-    const int lane = static_cast<int>(threadIdx.x) % 32;
-    const bool is_known =
-        __all_sync(0xffffffffu, lane >= known_words || known[lane % known_words] == wanted.words[lane % known_words]);
-    const auto clear_all = [&](const auto& filler) {
-        const unsigned warps = gridDim.x * (blockDim.x / 32), rows_y = static_cast<unsigned>(marks.rows.y);
-        const auto num_rows = static_cast<unsigned>(marks.rows.count());
-        for (unsigned i = blockIdx.x * (blockDim.x / 32) + threadIdx.x / 32; i < num_rows; i += warps) {
+    const bool is_known = is_known_as(known, wanted);
+    with_chunk_filler(elements, marks, [&]<class Place>(const chunk_filler<Element, Place>& filler) {
+        Element lanes[sizeof(Place) / sizeof(Element)];
+        for (Element& e : lanes) e = pattern.value;
+        Place place;
+        memcpy(&place, lanes, sizeof(place));
+        // A warp takes what lies at one z of a row of chunks.
+        const unsigned warps = gridDim.x * (blockDim.x / 32);
+        const auto rows_y = static_cast<unsigned>(marks.rows.y);
+        const std::size_t slices = std::size_t{rows_y} * static_cast<unsigned>(marks.extent.z);
+        for (std::size_t i = blockIdx.x * (blockDim.x / 32) + threadIdx.x / 32; i < slices; i += warps) {
             const auto y = static_cast<int>(i % rows_y), z = static_cast<int>(i / rows_y);
-            word* const row = marks.row(y, z);
-            for (int w = 0; w < marks.rows.words; ++w) {
-                const word marked = is_known ? row[w] : ~0u;
-                __syncwarp();
-                if (wipes && lane == 0) row[w] = 0;
-                filler.fill(w * 32 * chunk_x, y * chunk_yz, z * chunk_yz, marked);
-            }
+            const word* const row = marks.row(y, z >> log2_chunk_yz);
+            for (int w = 0; w < marks.rows.words; ++w)
+                filler.fill(w * 32 * chunk_x, y * chunk_yz, z, is_known ? row[w] : ~0u,
+                            [&](int, int) { return place; });
         }
-    };
-    if constexpr (16 % sizeof(Element) == 0) {
-        if (has_wide_rows(elements, marks)) {
-            Element lanes[16 / sizeof(Element)];
-            for (Element& e : lanes) e = pattern.value;
-            chunk_filler<Element, uint4> filler{reinterpret_cast<uint4*>(elements), marks.extent, {}};
-            memcpy(&filler.value, lanes, 16);
-            clear_all(filler);
-            return;
-        }
-    }
-    clear_all(chunk_filler<Element, Element>{elements, marks.extent, pattern.value});
+    });
 }
 
-// What is known from now on. One block.
+// What is known from now on; with `wipes`, nothing is marked.
 template <std::size_t N>
 struct known_targets {
     core::change_log::known of[N];
 };
 template <std::size_t N>
 __global__ void note_clears_kernel(word* log, const __grid_constant__ known_targets<N> after,
-                                   const pipeline_state* state, capacities limits) {
+                                   const __grid_constant__ chunk_marks marks, bool wipes, const pipeline_state* state,
+                                   capacities limits) {
     await_stream();
     if (has_failed(*state, limits)) return;
-    for (unsigned i = threadIdx.x; i < N * core::change_log::known_words; i += blockDim.x)
+    const std::size_t first = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x,
+                      threads = std::size_t{gridDim.x} * blockDim.x;
+    for (std::size_t i = first; i < N * core::change_log::known_words; i += threads)
         log[i] = after.of[i / core::change_log::known_words].words[i % core::change_log::known_words];
+    if (!wipes) return;
+    for (std::size_t i = first; i < marks.rows.num_words(); i += threads) marks.words[i] = 0;
+}
+// When all targets are cleared. The log knows nothing of those that the call does not clear by chunks: the marks are
+// those of all.
+template <class... Targets>
+void note_clears(const change_tracking<framebuffer_view<Targets...>>& tracking, bool wipes, const pipeline_state* state,
+                 const capacities& limits, cudaStream_t stream) {
+    constexpr std::size_t count = sizeof...(Targets);
+    if (!tracking.changes_known) return;
+    known_targets<count> after;
+    std::copy_n(tracking.after, count, after.of);
+    const chunk_marks marks = tracking.marks();
+    launch_behind(note_clears_kernel<count>, wipes ? fill_device(marks.rows.num_words()) : 1, threads_per_block, stream,
+                  stage::fine_raster, tracking.log, after, marks, wipes, state, limits);
 }
 
-// Clears what the tracking says, by chunks. Then the log knows that, and nothing of the other targets: the marks are
-// those of all.
+// Clears what the tracking says, by chunks, and notes that.
 template <class... Targets>
 void clear_by_chunks(const change_tracking<framebuffer_view<Targets...>>& tracking,
                      const framebuffer_view<Targets...>& fb, const pipeline_state* state, const capacities& limits,
                      cudaStream_t stream) {
-    constexpr std::size_t count = sizeof...(Targets);
     if (!tracking.changes_known) return;
     const chunk_marks marks = tracking.marks();
-    const auto blocks = static_cast<unsigned>(marks.rows.count() / (threads_per_block / 32) + 1);
-    core::for_each_index<count>([&]<std::size_t K>() {
+    const std::size_t slices = static_cast<std::size_t>(marks.rows.y) * static_cast<unsigned>(fb.extent.z),
+                      blocks = std::min<std::size_t>(slices / (threads_per_block / 32) + 1, core::most_blocks);
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         using target = typename core::pack_element<K, Targets...>::type;
         using map = typename target::map;
         using element = typename target::element_type;
         if (!tracking.by_chunks[K]) return;
         const auto& t = voxelpipe::get<K>(fb.targets);
-        const auto clear = [&](element* to, const element& value, bool is_last) {
-            launch_behind(clear_chunks_kernel<element>, blocks, threads_per_block, stream, stage::fine_raster, to,
-                          marks, tracking.known_of(K), tracking.after[K], fill_pattern<element>{value},
-                          is_last && tracking.last_by_chunks == static_cast<int>(K), state, limits);
+        const auto clear = [&](element* to, const element& value) {
+            launch_behind(clear_chunks_kernel<element>, static_cast<unsigned>(blocks), threads_per_block, stream,
+                          stage::fine_raster, to, marks, tracking.known_of(K), tracking.after[K],
+                          fill_pattern<element>{value}, state, limits);
         };
         if constexpr (map::planes) {
             for (int c = 0; c < map::components; ++c)
-                clear(t.elements + static_cast<std::size_t>(c) * map::cells(t.extent), t.clear_value[c],
-                      c + 1 == map::components);
+                clear(t.elements + static_cast<std::size_t>(c) * map::cells(t.extent), t.clear_value[c]);
         } else if constexpr (!map::is_bit && !map::bricks) {
-            clear(t.elements, t.clear_value, true);
+            clear(t.elements, t.clear_value);
         }
     });
-    known_targets<count> after;
-    std::copy_n(tracking.after, count, after.of);
-    launch_behind(note_clears_kernel<count>, 1, 32, stream, stage::fine_raster, tracking.log, after, state, limits);
+    note_clears(tracking, true, state, limits, stream);
 }
 
 // Marks the chunks of voxels that are listed, neighbours mostly in one.
