@@ -36,8 +36,7 @@ template <class Target>
         begin[k] = static_cast<std::int32_t>(first);
         from[k] = mine - first;
     }
-    const std::uint32_t most = from[0] > from[1] ? from[0] : from[1];
-    if (!__all_sync(all, voxels != 0 ? (most > from[2] ? most : from[2]) <= 2 : lane != middle_lane)) return false;
+    if (!__all_sync(all, voxels != 0 ? core::max3(from[0], from[1], from[2]) <= 2 : lane != middle_lane)) return false;
     const word by_z = (voxels & 0xfu) | (voxels & 0xf0u) << 12;
     const word by_y = ((by_z & 0x30003u) | (by_z << 2 & 0x300030u)) << ((from[0] + 4 * from[1]) & 31); // x + 4 y + 16 z
     const std::uint64_t mine = std::uint64_t{by_y} << (16 * from[2] & 63);

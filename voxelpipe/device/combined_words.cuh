@@ -5,8 +5,8 @@
 // Words of bits that a warp sets together. Neighbouring triangles, which are a warp's, touch the same words again and
 // again: of hairball's thin fragments in 1024^3, 76 in 100 are the first of their triangle in a word, but 17 in 100 the
 // first of 32 triangles. So a warp gathers bits in shared memory, by the number of their word, and each word takes one
-// reduction in L2. For thin coverage only: conservative rows have several bits, and gathering takes more instructions
-// than it saves.
+// reduction in L2. For thin coverage only: conservative rows, of 1.8 bits on average there, have gathered some already,
+// and to gather more takes more instructions than it saves.
 
 #include <voxelpipe/core/triangle_setup.hpp>
 #include <voxelpipe/device/direct_target.cuh>

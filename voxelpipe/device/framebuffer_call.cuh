@@ -446,7 +446,7 @@ private:
         fragment_lists<Key, values> lists{};
         if constexpr (groups::has_ordered) lists = list_fragments<Rule, Run, Key>(memory, s, state, stream);
         if constexpr (Run) {
-            clear_targets(track(), state, stream);
+            clear_targets({}, state, stream);
             // Fragments and voxels are counted once: by the lists, where there are any.
             if constexpr (in_tiles)
                 fine_pass<Rule, Policy>(s, fb, work,

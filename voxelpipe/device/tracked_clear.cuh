@@ -49,8 +49,9 @@ struct change_tracking<framebuffer_view<Targets...>> {
     bool changes_known = false; // whether any target is cleared of which the log may know what it was
     known after[count];         // what is known of each target when all are cleared
 
-    // Of a call that marks all that it draws. may_end(t, k): whether what the call does not draw ends with the bits
-    // that target k is cleared to.
+    change_tracking() = default; // of a call that does not mark what it draws
+    // Of a call that marks all that it draws, where it is_tracked. may_end(t, k): whether what the call does not draw
+    // ends with the bits that target k is cleared to.
     template <class MayEnd>
     change_tracking(const framebuffer_view<Targets...>& fb, bool is_tracked, const MayEnd& may_end)
         : log(is_tracked ? fb.changes : nullptr), extent(fb.extent) {
