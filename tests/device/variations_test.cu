@@ -181,6 +181,39 @@ TEST(Variations, ThePolicyDoesNotShow) {
     }
 }
 
+// Bits alone, for which a tile can have any size.
+struct bits_of_some {
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& f) const {
+        return vp::outputs(f.primitive % 3 != 0);
+    }
+};
+template <class Selector>
+std::vector<std::uint32_t> bits_with(const mesh_data& m, const vp::grid& g, vp::coverage rule) {
+    vp::cuda_backend be;
+    be.lists_fragments = false;
+    const vp::mesh mesh{be, m.positions, m.triangles};
+    vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_xor>> fb{be, g.extent};
+    const vp::draw<vp::mesh_view<>, vp::passthrough, bits_of_some> d{mesh.view(), {}, {}};
+    const vp::status s =
+        be.run<Selector>(std::span(&d, 1), g, fb.view(), vp::voxelize_options{rule}, m.triangles.size());
+    EXPECT_TRUE(s.ok()) << s.message();
+    return vp::get<0>(fb).to_host(be);
+}
+
+TEST(Variations, TheTilesOfBitsDoNotShow) {
+    mesh_data m = mixed_triangles(4000, 60.0f, 17);
+    add_triangle(m, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
+    const vp::grid g = box_grid({61, 50, 67});
+    for (const vp::coverage rule : both_rules) {
+        const std::vector<std::uint32_t> expected = bits_with<vp::tuning::fine_raster_selector>(m, g, rule);
+        expect_same_bytes(expected, bits_with<fixed_policy<128, 3, 4>>(m, g, rule), "tiles of 8^3");
+        expect_same_bytes(expected, bits_with<fixed_policy<512, 4, 1>>(m, g, rule), "tiles of 16^3");
+        expect_same_bytes(expected, bits_with<fixed_policy<256, 5, 2>>(m, g, rule), "tiles of 32^3");
+        EXPECT_NE(std::count(expected.begin(), expected.end(), 0u), static_cast<std::ptrdiff_t>(expected.size()));
+    }
+}
+
 // Small tiles for the code of one architecture, larger ones for all others.
 template <int Capability>
 struct small_tiles_for {

@@ -36,6 +36,14 @@ TEST(Tuning, PoliciesAreLegalWhereverTheyAreUsed) {
         }
 }
 
+// The winners of the sweep on an NVIDIA H200, a bit that says whether a voxel is touched among the voxel's.
+TEST(Tuning, NumbersOfTheH200) {
+    constexpr tuning::fine_raster_selector select;
+    EXPECT_EQ(select(1 + 1, 90), (tuning::fine_raster_policy{256, 4, 4}));  // a target of bits
+    EXPECT_EQ(select(96 + 1, 90), (tuning::fine_raster_policy{256, 4, 2})); // a sum of floats
+    EXPECT_EQ(select(2 + 1, 90), (tuning::fine_raster_policy{256, 5, 2}));  // not swept: the largest tile
+}
+
 TEST(Tuning, ADeviceRunsTheNewestArchitectureThatIsNotNewer) {
     EXPECT_EQ(tuning::architecture_of(75).capability, 80);
     EXPECT_EQ(tuning::architecture_of(80).capability, 80);

@@ -28,22 +28,32 @@ struct fine_raster_policy {
     friend constexpr bool operator==(const fine_raster_policy&, const fine_raster_policy&) = default;
 };
 
-// One row an architecture. Beside a row stands what it was measured on.
-struct fine_raster_numbers {
-    int capability;
+// What is chosen for voxels of so many bits, a bit included that says whether one is touched.
+struct fine_raster_numbers_of_bits {
     int threads_per_block;
     int min_blocks_per_sm;
     int tile_bytes; // the tile is the largest that needs no more than this
+};
+// One row an architecture. Beside a row stands what it was measured on.
+struct fine_raster_numbers {
+    int capability;
+    fine_raster_numbers_of_bits one_bit, more; // a target of bits alone; any others
     int blocks_per_sm;
 };
 
+// Measured by bench_gpu_tune on conference, dragon and hairball at 128^3, 512^3 and 1024^3, both rules: distance to the
+// best policy of each cell, geometric mean and at worst, of eleven policies for one bit and of seven for sums of floats
+// (97 bits). NVIDIA H200, driver 580.159.04, CUDA 13.0, commit df1a416, bench/results/2026-11-25-h200-chunks. One bit:
+// 256 threads, 4 blocks, 16^3 1.184 x and 1.62 x; 128, 4, 32^3 1.210 and 2.14; 256, 2, 32^3 1.216 and 3.03; 128, 4,
+// 16^3 1.222 and 1.57. Sums: 256, 2, 16^3 1.077 and 1.48; 512, 2, 16^3 1.094 and 1.30; 128, 4, 16^3 1.151 and 1.84.
+inline constexpr fine_raster_numbers_of_bits h200_one_bit{256, 4, 2 * 1024}, h200_more{256, 2, 49 * 1024};
 inline constexpr std::array fine_raster_table{
-    fine_raster_numbers{80, 256, 2, 49 * 1024, 0},  // not measured
-    fine_raster_numbers{86, 256, 2, 49 * 1024, 0},  // not measured
-    fine_raster_numbers{89, 256, 2, 49 * 1024, 0},  // not measured
-    fine_raster_numbers{90, 256, 2, 49 * 1024, 0},  // NVIDIA H200: the records of bench/results; no other was tried
-    fine_raster_numbers{100, 256, 2, 49 * 1024, 0}, // not measured
-    fine_raster_numbers{120, 256, 2, 49 * 1024, 0}, // not measured
+    fine_raster_numbers{80, h200_one_bit, h200_more, 0},  // not measured
+    fine_raster_numbers{86, h200_one_bit, h200_more, 0},  // not measured
+    fine_raster_numbers{89, h200_one_bit, h200_more, 0},  // not measured
+    fine_raster_numbers{90, h200_one_bit, h200_more, 0},  // NVIDIA H200: above
+    fine_raster_numbers{100, h200_one_bit, h200_more, 0}, // not measured
+    fine_raster_numbers{120, h200_one_bit, h200_more, 0}, // not measured
 };
 
 [[nodiscard]] constexpr const fine_raster_numbers& fine_raster_numbers_of(int capability) {
@@ -58,10 +68,11 @@ static_assert(most_bits_per_voxel / 8 * 512 <= portable_shared_per_block() - bat
 
 struct fine_raster_selector {
     constexpr fine_raster_policy operator()(int bits_per_voxel, int capability = architectures[0].capability) const {
-        const fine_raster_numbers& numbers = fine_raster_numbers_of(capability);
+        const fine_raster_numbers& row = fine_raster_numbers_of(capability);
+        const fine_raster_numbers_of_bits& numbers = bits_per_voxel <= 2 ? row.one_bit : row.more;
         int log2_size = 5;
         while (log2_size > 3 && (std::int64_t{bits_per_voxel} << (3 * log2_size)) / 8 > numbers.tile_bytes) --log2_size;
-        return {numbers.threads_per_block, log2_size, numbers.min_blocks_per_sm, numbers.blocks_per_sm};
+        return {numbers.threads_per_block, log2_size, numbers.min_blocks_per_sm, row.blocks_per_sm};
     }
 };
 
