@@ -64,6 +64,19 @@ struct by_touched_voxels { // constants that need only these; fragments listed a
     };
     static auto cleared(float v) { return std::pair(v, glm::vec3(v, v, -v)); }
 };
+struct by_touched_vectors { // the same, of 12 and 16 bytes a voxel
+    using first = vp::target<glm::vec3, blend::min>;
+    using second = vp::target<glm::dvec2, blend::replace>;
+    static auto constant(float v) { return vp::constant(glm::vec3(v, -1, 2), glm::dvec2(v, 0.3)); }
+    struct shader {
+        float scale;
+        VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+            const float v = scale * static_cast<float>(f.primitive % 8);
+            return vp::outputs(glm::vec3(v, -v, 1), glm::dvec2(v, -2));
+        }
+    };
+    static auto cleared(float v) { return std::pair(glm::vec3(v, v, -v), glm::dvec2(-v, v)); }
+};
 struct hash_chain {
     static constexpr bool order_free = false;
     VOXELPIPE_HD std::uint32_t identity() const { return 7; }
@@ -193,6 +206,7 @@ TEST(Tracked, SequencesByAtomicsInOddRows) { expect_same_sequences<by_atomics>({
 TEST(Tracked, SequencesByAtomicsInLongRows) { expect_same_sequences<by_atomics>({1060, 95, 84}); }
 TEST(Tracked, SequencesByTouchedVoxels) { expect_same_sequences<by_touched_voxels>({256, 160, 206}); }
 TEST(Tracked, SequencesByTouchedVoxelsInOddRows) { expect_same_sequences<by_touched_voxels>({1061, 95, 84}); }
+TEST(Tracked, SequencesByTouchedVoxelsOfVectors) { expect_same_sequences<by_touched_vectors>({160, 131, 140}); }
 TEST(Tracked, SequencesInOrder) { expect_same_sequences<in_order>({203, 211, 197}); }
 
 // What a clear does not write to is what no call has drawn into, so that what was put there by other means stays,

@@ -11,13 +11,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
 
 namespace voxelpipe::device {
 
 // What fragments of a value make of a voxel that holds another.
 template <class Target>
-__device__ VOXELPIPE_INLINE typename Target::value_type blended_once(const typename Target::value_type& old,
-                                                                     const typename Target::value_type& value) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE typename Target::value_type
+blended_once(const typename Target::value_type& old, const typename Target::value_type& value) {
     auto a = Target::traits::begin(old);
     Target::traits::apply(a, value);
     return typename Target::value_type(Target::traits::end(a));
@@ -136,38 +137,40 @@ void end_values(const word* touched, const target_view<Target>& t, const typenam
 
 // ---- of chunks alone ------------------------------------------------------------------------------------------------
 
+// What voxels hold that are not touched, and what those do that are.
+template <class Element>
+struct cleared_and_drawn {
+    Element cleared, drawn;
+};
+
 // What a clear and the fragments leave, each element written once: in chunks that are marked or touched where the log
 // knows that the target holds what it is cleared to, otherwise in all. A block takes a word of marks, a warp what lies
 // at one z of it. The elements are those of one plane, or of all; with keeps_marks, what is touched is marked from then
 // on, and nothing else.
-template <class Target>
+template <class Element>
 __global__ __launch_bounds__(threads_per_block) void end_chunks_kernel(
-    const word* touched, const __grid_constant__ target_view<Target> t,
-    const __grid_constant__ typename Target::value_type value, int plane, const __grid_constant__ chunk_marks marks,
+    const word* touched, Element* to, cleared_and_drawn<Element> values, const __grid_constant__ chunk_marks marks,
     const word* known, const __grid_constant__ core::change_log::known wanted, bool keeps_marks,
     const pipeline_state* state, capacities limits) {
-    using map = typename Target::map;
-    using element = typename Target::element_type;
     constexpr int warps = chunk_yz, rows = chunk_yz; // of a warp
-    static_assert(!map::is_bit && !map::bricks && threads_per_block == 32 * warps && chunk_x == 32);
+    static_assert(threads_per_block == 32 * warps && chunk_x == 32);
     __shared__ word bits[warps][rows][32];
     __shared__ word touched_by[warps], old; // chunks
     await_stream();
     if (state->index_error != 0 || misses_triangles(*state, limits)) return;
     const bool is_known = is_known_as(known, wanted);
     const int lane = static_cast<int>(threadIdx.x) % 32, warp = static_cast<int>(threadIdx.x) / 32;
-    const typename Target::value_type made = blended_once<Target>(t.clear_value, value);
-    element cleared, drawn;
-    element* to = t.elements;
-    if constexpr (map::planes) {
-        cleared = t.clear_value[plane];
-        drawn = made[plane];
-        to += static_cast<std::size_t>(plane) * map::cells(t.extent);
-    } else {
-        cleared = t.clear_value;
-        drawn = made;
-    }
-    const auto words_x = static_cast<unsigned>((t.extent.x + 31) / 32), parts = static_cast<unsigned>(marks.rows.words);
+    // As numbers, of which the touched bits choose by arithmetic.
+    using number = std::conditional_t<sizeof(Element) % 4 == 0, std::uint32_t,
+                                      std::conditional_t<sizeof(Element) % 2 == 0, std::uint16_t, std::uint8_t>>;
+    constexpr int numbers = sizeof(Element) / sizeof(number);
+    number cleared[numbers], changed[numbers]; // what the fragments change of it
+    memcpy(cleared, &values.cleared, sizeof(cleared));
+    memcpy(changed, &values.drawn, sizeof(changed));
+    for (int k = 0; k < numbers; ++k) changed[k] = static_cast<number>(changed[k] ^ cleared[k]);
+    const int ny = marks.extent.y, nz = marks.extent.z;
+    const auto words_x = static_cast<unsigned>((marks.extent.x + 31) / 32),
+               parts = static_cast<unsigned>(marks.rows.words);
     for (std::size_t i = blockIdx.x; i < marks.rows.num_words(); i += gridDim.x) {
         const auto row_of_chunks = static_cast<unsigned>(i / parts), rows_y = static_cast<unsigned>(marks.rows.y);
         const auto w = static_cast<int>(i % parts), y0 = static_cast<int>(row_of_chunks % rows_y) * chunk_yz,
@@ -177,9 +180,8 @@ __global__ __launch_bounds__(threads_per_block) void end_chunks_kernel(
         for (int row = 0; row < rows; ++row) {
             const int y = y0 + row;
             word mine = 0;
-            if (z < t.extent.z && y < t.extent.y && x_word < words_x)
-                mine = touched[(static_cast<std::size_t>(z) * static_cast<unsigned>(t.extent.y) +
-                                static_cast<unsigned>(y)) *
+            if (z < nz && y < ny && x_word < words_x)
+                mine = touched[(static_cast<std::size_t>(z) * static_cast<unsigned>(ny) + static_cast<unsigned>(y)) *
                                    words_x +
                                x_word];
             bits[warp][row][lane] = mine;
@@ -191,18 +193,21 @@ __global__ __launch_bounds__(threads_per_block) void end_chunks_kernel(
         __syncthreads();
         const word fresh = __reduce_or_sync(0xffffffffu, lane < warps ? touched_by[lane] : 0u), marked = old | fresh;
         if (keeps_marks && threadIdx.x == 0) marks.words[i] = fresh;
-        if (z < t.extent.z)
-            with_chunk_filler(to, marks, [&]<class Place>(const chunk_filler<element, Place>& filler) {
-                filler.fill(w * 32 * chunk_x, y0, z, marked, [&](int x, int row) {
-                    constexpr int count = sizeof(Place) / sizeof(element);
-                    const word of_place = bits[warp][row][x / 32 % 32] >> x % 32;
-                    element lanes[count];
-                    for (int k = 0; k < count; ++k) lanes[k] = (of_place >> k & 1u) != 0 ? drawn : cleared;
-                    Place place;
-                    memcpy(&place, lanes, sizeof(place));
-                    return place;
+        if (z < nz)
+            with_chunk_filler(
+                to, marks, [&]<class Place>(const chunk_filler<Element, Place>& filler) VOXELPIPE_INLINE_LAMBDA {
+                    filler.fill(w * 32 * chunk_x, y0, z, marked, [&](int x, int row) VOXELPIPE_INLINE_LAMBDA {
+                        constexpr int count = sizeof(Place) / sizeof(Element);
+                        const word of_place = bits[warp][row][x / 32 % 32] >> x % 32;
+                        number lanes[count * numbers];
+                        for (int k = 0; k < count * numbers; ++k)
+                            lanes[k] = static_cast<number>(
+                                cleared[k % numbers] ^ (changed[k % numbers] & (0u - (of_place >> k / numbers & 1u))));
+                        Place place;
+                        memcpy(&place, lanes, sizeof(place));
+                        return place;
+                    });
                 });
-            });
         __syncthreads(); // before shared memory is written to again
     }
 }
@@ -210,13 +215,24 @@ __global__ __launch_bounds__(threads_per_block) void end_chunks_kernel(
 template <std::size_t K, class Target, class Tracking>
 void end_chunks(const word* touched, const target_view<Target>& t, const typename Target::value_type& value,
                 const Tracking& tracking, const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+    using map = typename Target::map;
+    using element = typename Target::element_type;
     const chunk_marks marks = tracking.marks();
     const std::size_t blocks = std::min<std::size_t>(marks.rows.num_words(), core::most_blocks);
-    constexpr int planes = Target::map::planes ? Target::map::components : 1;
-    for (int plane = 0; plane < planes; ++plane)
-        launch_behind(end_chunks_kernel<Target>, static_cast<unsigned>(blocks), threads_per_block, stream,
-                      stage::tile_resolve, touched, t, value, plane, marks, tracking.known_of(K), tracking.after[K],
-                      plane + 1 == planes && tracking.last_by_chunks == static_cast<int>(K), state, limits);
+    const auto end = [&](element* to, const element& cleared, const element& drawn, bool is_last) {
+        launch_behind(end_chunks_kernel<element>, static_cast<unsigned>(blocks), threads_per_block, stream,
+                      stage::tile_resolve, touched, to, cleared_and_drawn<element>{cleared, drawn}, marks,
+                      tracking.known_of(K), tracking.after[K],
+                      is_last && tracking.last_by_chunks == static_cast<int>(K), state, limits);
+    };
+    const typename Target::value_type drawn = blended_once<Target>(t.clear_value, value);
+    if constexpr (map::planes) {
+        for (int c = 0; c < map::components; ++c)
+            end(t.elements + static_cast<std::size_t>(c) * map::cells(t.extent), t.clear_value[c], drawn[c],
+                c + 1 == map::components);
+    } else {
+        end(t.elements, t.clear_value, drawn, true);
+    }
 }
 
 } // namespace voxelpipe::device

@@ -101,7 +101,7 @@ struct chunk_filler {
         const int lane = static_cast<int>(threadIdx.x) % 32, rows = min(chunk_yz, extent.y - y0);
         const std::size_t first_row =
             static_cast<std::size_t>(z) * static_cast<unsigned>(extent.y) + static_cast<unsigned>(y0);
-        const auto put = [&](int x, int row) {
+        const auto put = [&](int x, int row) VOXELPIPE_INLINE_LAMBDA {
             to[((first_row + static_cast<unsigned>(row)) * static_cast<unsigned>(extent.x) + static_cast<unsigned>(x)) /
                per_place] = place_at(x, row);
         };
@@ -139,23 +139,24 @@ __global__ __launch_bounds__(threads_per_block) void clear_chunks_kernel(
     await_stream();
     if (has_failed(*state, limits)) return;
     const bool is_known = is_known_as(known, wanted);
-    with_chunk_filler(elements, marks, [&]<class Place>(const chunk_filler<Element, Place>& filler) {
-        Element lanes[sizeof(Place) / sizeof(Element)];
-        for (Element& e : lanes) e = pattern.value;
-        Place place;
-        memcpy(&place, lanes, sizeof(place));
-        // A warp takes what lies at one z of a row of chunks.
-        const unsigned warps = gridDim.x * (blockDim.x / 32);
-        const auto rows_y = static_cast<unsigned>(marks.rows.y);
-        const std::size_t slices = std::size_t{rows_y} * static_cast<unsigned>(marks.extent.z);
-        for (std::size_t i = blockIdx.x * (blockDim.x / 32) + threadIdx.x / 32; i < slices; i += warps) {
-            const auto y = static_cast<int>(i % rows_y), z = static_cast<int>(i / rows_y);
-            const word* const row = marks.row(y, z >> log2_chunk_yz);
-            for (int w = 0; w < marks.rows.words; ++w)
-                filler.fill(w * 32 * chunk_x, y * chunk_yz, z, is_known ? row[w] : ~0u,
-                            [&](int, int) { return place; });
-        }
-    });
+    with_chunk_filler(
+        elements, marks, [&]<class Place>(const chunk_filler<Element, Place>& filler) VOXELPIPE_INLINE_LAMBDA {
+            Element lanes[sizeof(Place) / sizeof(Element)];
+            for (Element& e : lanes) e = pattern.value;
+            Place place;
+            memcpy(&place, lanes, sizeof(place));
+            // A warp takes what lies at one z of a row of chunks.
+            const unsigned warps = gridDim.x * (blockDim.x / 32);
+            const auto rows_y = static_cast<unsigned>(marks.rows.y);
+            const std::size_t slices = std::size_t{rows_y} * static_cast<unsigned>(marks.extent.z);
+            for (std::size_t i = blockIdx.x * (blockDim.x / 32) + threadIdx.x / 32; i < slices; i += warps) {
+                const auto y = static_cast<int>(i % rows_y), z = static_cast<int>(i / rows_y);
+                const word* const row = marks.row(y, z >> log2_chunk_yz);
+                for (int w = 0; w < marks.rows.words; ++w)
+                    filler.fill(w * 32 * chunk_x, y * chunk_yz, z, is_known ? row[w] : ~0u,
+                                [&](int, int) VOXELPIPE_INLINE_LAMBDA { return place; });
+            }
+        });
 }
 
 // What is known from now on; with `wipes`, nothing is marked.
