@@ -128,13 +128,12 @@ public:
 
     // From now on calls keep account of where they draw, and one that clears a target to the value of the clear before
     // writes only where something has been drawn since: of floats in 1024^3 some 0.2 GB instead of 4 for a surface.
-    // Where most of the grid is drawn into it gains nothing, and costs a few percent (blend::replace: up to half as
-    // much again). The results are the same. In exchange the targets' memory is for voxelize alone to write to: who has
-    // written to it by other means says so by forget_changes. Takes 64 KB for 1024^3. On cuda_backend it holds for
-    // targets of values in rows (layout::linear, layout::planar), of 32 MB or more and up to 32 bytes a value, and for
-    // calls that need no tiles; other targets, and what other calls have drawn, are cleared as a whole, and so is all
-    // on cpu_backend. A call that clears some targets and not others tracks those that it clears. Throws
-    // std::bad_alloc.
+    // Where most of the grid is drawn into it gains little, or costs a few percent. The results are the same. In
+    // exchange the targets' memory is for voxelize alone to write to: who has written to it by other means says so by
+    // forget_changes. Takes 64 KB for 1024^3. On cuda_backend it holds for targets of values in rows (layout::linear,
+    // layout::planar), of 32 MB or more and up to 32 bytes a value, and for calls that need no tiles; other targets,
+    // and what other calls have drawn, are cleared as a whole, and so is all on cpu_backend. A call that clears some
+    // targets and not others tracks those that it clears. Throws std::bad_alloc.
     void track_changes(Backend& backend) { forget_changes(backend); }
     // Nothing is known of what the targets hold, as before the first call. Views of before must not be used any more.
     void forget_changes(Backend& backend) {
