@@ -8,7 +8,7 @@
 #   scripts/bench.sh --gpu [OPTION...]       the GPU table (needs nvcc and a GPU)
 #   scripts/bench.sh --scaling [OPTION...]   the GPU's scaling curves, and plots of what is in build/bench-gpu/bench/results
 #   scripts/bench.sh --tune [OPTION...]      sweeps the fine raster's policies on the GPU
-#   scripts/bench.sh --plot                  only the plots
+#   scripts/bench.sh --plot [FILE|FOLDER]    plots of that in build/plots, e.g. of records/h200; by default those of --scaling
 #   scripts/bench.sh --nvbench [OPTION...]   the table's cells under NVBench (its options; caches are flushed between calls)
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -36,13 +36,11 @@ python_modules() {
     cp "bench/$1" ".venv/bench-$1"
 }
 
+# plot FILE_OR_FOLDER OUT_FOLDER
 plot() {
-    local files=()
-    [[ -f $results/gpu_scaling.csv ]] && files+=(--scaling "$results/gpu_scaling.csv")
-    [[ -f $results/gpu.csv ]] && files+=(--table "$results/gpu.csv")
-    [[ ${#files[@]} -gt 0 ]] || die "there is nothing to plot in $results"
+    [[ -e $1 ]] || die "there is nothing to plot in $1"
     python_modules requirements.txt
-    .venv/bin/python bench/plot.py "${files[@]}" "$results"
+    .venv/bin/python bench/plot.py --out "$2" "$1"
 }
 
 case ${1:-} in
@@ -53,13 +51,13 @@ case ${1:-} in
     --scaling)
         build_gpu bench_gpu_scaling
         "$gpu_folder/bench/gpu/bench_gpu_scaling" "${@:2}"
-        plot
+        plot "$results" "$results"
         ;;
     --tune)
         build_gpu bench_gpu_tune
         "$gpu_folder/bench/tune/bench_gpu_tune" "${@:2}"
         ;;
-    --plot) plot ;;
+    --plot) if [[ $# -gt 1 ]]; then plot "$2" build/plots; else plot "$results" "$results"; fi ;;
     --nvbench)
         python_modules requirements-nvbench.txt
         build_gpu bench_gpu_nvbench

@@ -2,8 +2,9 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# run_gpu_suite.sh [part...]: the CUDA tests on this machine's GPU, with a record under tests/gpu_results/ (or where
-# VOXELPIPE_RESULTS says). Fails without a device, and where a part cannot run. Parts, all by default:
+# run_gpu_suite.sh [part...]: the CUDA tests on this machine's GPU, with a record under build/gpu_results/ (or where
+# VOXELPIPE_RESULTS says). A run of all parts replaces records/MACHINE/suite.txt at its end, passed or failed; MACHINE is the
+# second word of the device's name (h200). Fails without a device, and where a part cannot run. Parts, all by default:
 #   default     the equality suite, scenes included where VOXELPIPE_SCENES_DIR has them
 #   fast_math   the suite without the scenes, built with -use_fast_math
 #   no_fmad     the same with --fmad=false
@@ -26,7 +27,7 @@ step="${VOXELPIPE_STEP:-all}"
 record=/dev/null
 architecture="${VOXELPIPE_ARCHITECTURE:-90}"
 if [[ $step != build ]]; then
-    results="${VOXELPIPE_RESULTS:-tests/gpu_results}"
+    results="${VOXELPIPE_RESULTS:-build/gpu_results}"
     mkdir -p "$results"
     device="$(nvidia-smi --query-gpu=name --format=csv,noheader 2>/dev/null | sed -n 1p)" || true
     [[ -n $device ]] || die "no CUDA device: the suite was not run"
@@ -173,5 +174,11 @@ done
 if [[ $step != build ]]; then
     printf '\nfailures: %d\nnot run: %d\n' "$failures" "$not_run" | tee -a "$record"
     printf 'record: %s\n' "$record"
+    if [[ $# -eq 0 && -z ${VOXELPIPE_PROGRAMS:-} ]]; then
+        machine="$(cut -d ' ' -f 2 <<<"$device" | tr '[:upper:]' '[:lower:]')"
+        mkdir -p "records/$machine"
+        cp "$record" "records/$machine/suite.txt"
+        printf 'record: records/%s/suite.txt\n' "$machine"
+    fi
 fi
 [[ $failures -eq 0 ]]

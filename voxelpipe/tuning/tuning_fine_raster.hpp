@@ -43,7 +43,7 @@ struct fine_raster_numbers {
 
 // Measured by bench_gpu_tune on conference, dragon and hairball at 128^3, 512^3 and 1024^3, both rules: distance to the
 // best policy of each cell, geometric mean and at worst, of eleven policies for one bit and of seven for sums of floats
-// (97 bits). NVIDIA H200, driver 580.159.04, CUDA 13.0, commit df1a416, bench/results/2026-11-25-h200-chunks. One bit:
+// (97 bits). NVIDIA H200, driver 580.159.04, CUDA 13.0, commit df1a416, records/h200/tune.csv. One bit:
 // 256 threads, 4 blocks, 16^3 1.184 x and 1.62 x; 128, 4, 32^3 1.210 and 2.14; 256, 2, 32^3 1.216 and 3.03; 128, 4,
 // 16^3 1.222 and 1.57. Sums: 256, 2, 16^3 1.077 and 1.48; 512, 2, 16^3 1.094 and 1.30; 128, 4, 16^3 1.151 and 1.84.
 inline constexpr fine_raster_numbers_of_bits h200_one_bit{256, 4, 2 * 1024}, h200_more{256, 2, 49 * 1024};
