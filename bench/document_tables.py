@@ -1,0 +1,141 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+"""Writes the tables of measured times in README.md and docs/performance.md from records/.
+
+    document_tables.py [--update]
+
+A table stands between the lines `<!-- records: NAME -->` and `<!-- /records -->`. Without --update the script only compares, and
+fails where a document shows other figures than the records. Needs the standard library only.
+"""
+import argparse
+import math
+import re
+import sys
+
+from record import ROOT, read, sections
+
+DOCUMENTS = ["README.md", "docs/performance.md"]
+COLUMNS = [
+    ("bit_conservative", "bit, conservative"),
+    ("bit_thin", "bit, thin"),
+    ("float_add_conservative", "float sum of 1"),
+    ("float_add_tracked_conservative", "the same, changes tracked"),
+    ("float_add_varying_conservative", "float sum of a varying"),
+    ("abuffer_thin", "A-buffer, thin"),
+    ("abuffer_conservative", "A-buffer, conservative"),
+]
+PUBLISHED = ["bit_conservative", "bit_thin", "float_add_conservative", "abuffer_thin"]
+NAMES = dict(COLUMNS)
+
+
+def table(head, rows):
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
+
+
+def short(ms):
+    """Three significant digits, as the benchmark's own tables have them."""
+    value = float(ms)
+    return f"{value:.{max(0, 2 - math.floor(math.log10(value)))}f}"
+
+
+def mean(values):
+    return math.exp(sum(map(math.log, values)) / len(values))
+
+
+def gpu_rows():
+    return {(r["scene"], int(r["resolution"]), r["cell"]): r for r in read(ROOT / "h200" / "table.csv")}
+
+
+def fastest(row):
+    """The fastest published figure of a cell in milliseconds, as text."""
+    return min((text for text in (row["original_ms"], row["peer_ms"]) if text), key=float)
+
+
+def ahead(rows, cells, column="ms"):
+    """How many times as fast as the fastest published figure, of every scene and grid that has one."""
+    return [float(fastest(r)) / float(r[column]) for (_, _, cell), r in rows.items() if cell in cells]
+
+
+def head_line(machine, file="table.csv"):
+    parts = sections((ROOT / machine / "README.md").read_text(encoding="utf-8"))
+    head = next(body for title, body in parts.items() if file in title.split(", "))
+    value = {k: re.search(rf"^- {k}: (.*)$", head, flags=re.M) for k in ("device", "processor", "driver", "commit", "date")}
+    got = {k: found.group(1) for k, found in value.items() if found}
+    device = got.get("device", got.get("processor", "")).split(", ")[0].replace("(R)", "")
+    driver = f", driver {got['driver'].split(' ')[0]}" if "driver" in got else ""
+    return f"{device}{driver}, {got['date'].split(' ')[0]}, commit {got['commit'][:7]}."
+
+
+def times():
+    """Every scene and grid in the columns of the GPU's table."""
+    rows = gpu_rows()
+    places = list(dict.fromkeys(key[:2] for key in rows))
+    body = [[f"{scene} {n}"] + [short(rows[scene, n, cell]["ms"]) for cell, _ in COLUMNS] for scene, n in places]
+    return head_line("h200") + " Milliseconds, medians of 20 calls.\n\n" + table(["scene, N"] + [t for _, t in COLUMNS], body)
+
+
+def means():
+    """Geometric means against the fastest published figures."""
+    rows = gpu_rows()
+    body = []
+    tracked = ["float_add_tracked_conservative" if c == "float_add_conservative" else c for c in PUBLISHED]
+    for name, cells, column in (
+        ("`voxelize`", PUBLISHED, "ms"),
+        ("`voxelize_async`", PUBLISHED, "async_ms"),
+        ("`voxelize`, sums with tracked changes", tracked, "ms"),
+        ("`voxelize_async`, sums with tracked changes", tracked, "async_ms"),
+    ):
+        values = ahead(rows, cells, column)
+        body.append([name] + [f"{mean(ahead(rows, [c], column)):.2f} ×" for c in cells] + [f"{mean(values):.2f} ×"] +
+                    [str(sum(v >= least for v in values)) for least in (1.5, 3)])
+    head = [""] + [NAMES[c] for c in PUBLISHED] + [f"all {len(ahead(rows, PUBLISHED))}", "1.5 × or more", "3 × or more"]
+    return table(head, body)
+
+
+def summary():
+    """A row a kind of target: two scenes at 512, and the mean over all scenes and grids."""
+    rows = gpu_rows()
+    body = []
+    for cell in PUBLISHED:
+        pair = [rows[scene, 512, cell] for scene in ("dragon", "conference")]
+        body.append([NAMES[cell]] + [text for r in pair for text in (short(r["ms"]), short(fastest(r)))] +
+                    [f"{mean(ahead(rows, [cell])):.1f} ×"])
+    dragon, conference = (int(rows[scene, 512, "bit_thin"]["triangles"]) for scene in ("dragon", "conference"))
+    head = ["512³ voxels, milliseconds", f"dragon, {dragon:,} triangles", "fastest published", f"conference, {conference:,} triangles",
+            "fastest published", "mean of 5 scenes at 128³, 512³, 1024³"]
+    return head_line("h200") + "\n\n" + table(head, body)
+
+
+def icosphere():
+    rows = read(ROOT / "xeon" / "published.csv")
+    ours = ["VoxelPipe, 1 thread", "VoxelPipe, 2 threads"]
+    others = [c for c in rows[0] if c not in ("N", "voxels", "baseline, 1 thread", *ours) and not c.startswith("ahead")]
+    body = [[r["N"]] + [r[c] for c in ours + others] for r in rows]
+    return head_line("xeon", "published.csv") + " Milliseconds.\n\n" + table(["N"] + ours + others, body)
+
+
+TABLES = {"times": times, "means": means, "summary": summary, "icosphere": icosphere}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--update", action="store_true")
+    update = parser.parse_args().update
+    status = 0
+    for name in DOCUMENTS:
+        path = ROOT.parent / name
+        text = path.read_text(encoding="utf-8")
+        fresh = re.sub(r"(<!-- records: (\w+) -->\n).*?(<!-- /records -->)",
+                       lambda m: f"{m[1]}{TABLES[m[2]]()}\n{m[3]}", text, flags=re.S)
+        if update and fresh != text:
+            path.write_text(fresh, encoding="utf-8")
+        elif fresh != text:
+            print(f"error: {name} shows other figures than records/; bench/document_tables.py --update writes them", file=sys.stderr)
+            status = 1
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())
