@@ -1,10 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-#include "check.hpp"
+#include "checker.hpp"
 
 #include "container.hpp"
 #include "extensions.hpp"
-#include "json_at.hpp"
 
 #include <tiny_gltf.h>
 
@@ -14,8 +13,6 @@
 namespace voxelize::gltf {
 
 namespace {
-
-constexpr std::uint64_t most = std::uint64_t{1} << 53; // the largest count or offset that JSON carries exactly
 
 std::uint64_t component_bytes(std::uint64_t component_type) {
     switch (component_type) {
@@ -47,363 +44,188 @@ std::uint64_t element_bytes(std::string_view type, std::uint64_t component) {
     return 0;
 }
 
-class checker {
-public:
-    checker(json& root, bool has_binary_chunk, budget& memory, std::vector<std::string>& warnings)
-        : root_{root}, has_binary_chunk_{has_binary_chunk}, memory_{memory}, warnings_{warnings} {}
-
-    checked_document run() {
-        check_asset();
-        count_lists();
-        check_extensions();
-        check_buffers();
-        check_buffer_views();
-        check_accessors();
-        check_images();
-        check_samplers_and_textures();
-        check_materials();
-        check_meshes();
-        check_nodes_and_scenes();
-        warn_of_what_is_left_out();
-        root_.keep_only({"asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews", "materials",
-                         "textures", "samplers"});
-        if (placeholder_view_) root_.value()["bufferViews"].push_back({{"buffer", 0}, {"byteLength", 1}});
-        document_.json = root_.value().dump();
-        return std::move(document_);
-    }
-
-private:
-    void check_asset() {
-        if (!root_.value().is_object()) root_.fail("the JSON text is not an object");
-        const json_at asset = root_.required("asset", root_.object("asset"));
-        const std::string_view version = asset.required("version", asset.string("version"));
-        if (version.substr(0, 2) != "2.")
-            asset.fail("glTF version " + in_quotes(version) + " is not supported, only 2.x");
-        if (const auto least = asset.string("minVersion"); least && *least != "2.0")
-            asset.fail("the file requires glTF version " + in_quotes(*least) + ", supported is 2.0");
-        asset.keep_only({"version"});
-    }
-
-    // The list sizes that references are checked against; what tinygltf will build for each element is charged.
-    void count_lists() {
-        const auto count = [&](std::string_view list, std::size_t bytes_each) {
-            const std::size_t size = root_.array_size(list);
-            memory_.charge(size, bytes_each, std::string(list));
-            return size;
-        };
-        num_buffers_ = count("buffers", sizeof(buffer_source));
-        num_views_ = count("bufferViews", sizeof(tinygltf::BufferView) + sizeof(view));
-        num_accessors_ = count("accessors", sizeof(tinygltf::Accessor));
-        num_images_ = count("images", sizeof(image_source));
-        num_samplers_ = count("samplers", sizeof(tinygltf::Sampler));
-        num_textures_ = count("textures", sizeof(tinygltf::Texture));
-        num_materials_ = count("materials", sizeof(tinygltf::Material));
-        num_meshes_ = count("meshes", sizeof(tinygltf::Mesh));
-        num_nodes_ = count("nodes", sizeof(tinygltf::Node));
-        num_scenes_ = count("scenes", sizeof(tinygltf::Scene));
-    }
-
-    void check_extensions() {
-        const auto names = [&](std::string_view key) {
-            std::set<std::string> list;
-            root_.each(key, [&](const json_at& entry) {
-                if (!entry.value().is_string()) entry.fail("must be a string");
-                list.insert(entry.value().get<std::string>());
-            });
-            return list;
-        };
-        const std::set<std::string> required = names("extensionsRequired");
-        for (const std::string& name : required) {
-            switch (effect_of(name)) {
-            case extension_effect::honoured:
-            case extension_effect::appearance:
-                break;
-            case extension_effect::fallback:
-                throw gltf_error("geometry is compressed with " + printable(name) + ", which is not supported");
-            case extension_effect::lost:
-            case extension_effect::unknown:
-                throw gltf_error("the file requires the extension " + printable(name) + ", which is not supported");
-            }
-        }
-        std::set<std::string> used = names("extensionsUsed");
-        used.insert(required.begin(), required.end());
-        for (const std::string& name : used) {
-            const extension_effect effect = effect_of(name);
-            if (effect == extension_effect::appearance)
-                warnings_.push_back("extension " + printable(name) +
-                                    " is not supported: only base colour, texture and alpha of materials are used");
-            if (effect == extension_effect::unknown)
-                warnings_.push_back("extension " + printable(name) + " is not known and ignored");
-            if (effect == extension_effect::fallback)
-                warnings_.push_back("extension " + printable(name) +
-                                    " is not supported: the file's uncompressed copy of the geometry is used");
-        }
-    }
-
-    void check_buffers() {
-        root_.each_object("buffers", [&](const json_at& buffer) {
-            buffer_source source;
-            source.byte_length = buffer.required("byteLength", buffer.integer("byteLength", 1, most));
-            if (const auto uri = buffer.string("uri")) source.uri = std::string(*uri);
-            document_.buffers.push_back(std::move(source));
-        });
-    }
-
-    // Nothing stands behind this buffer: compressed files keep such a one in place of their uncompressed copy.
-    [[nodiscard]] bool is_placeholder(std::size_t buffer) const {
-        return !document_.buffers[buffer].uri && !(buffer == 0 && has_binary_chunk_);
-    }
-
-    void check_buffer_views() {
-        root_.each_object("bufferViews", [&](const json_at& entry) {
-            view checked;
-            const std::uint32_t buffer = entry.required("buffer", entry.index("buffer", "buffers", num_buffers_));
-            const std::uint64_t offset = entry.integer("byteOffset", 0, most).value_or(0);
-            checked.byte_length = entry.required("byteLength", entry.integer("byteLength", 1, most));
-            const std::uint64_t has = document_.buffers[buffer].byte_length;
-            if (offset + checked.byte_length > has)
-                entry.fail("ends at byte " + std::to_string(offset + checked.byte_length) + " of a buffer with " +
-                           std::to_string(has));
-            if (const auto stride = entry.integer("byteStride", 4, 252)) {
-                if (*stride % 4 != 0) entry.fail("byteStride " + std::to_string(*stride) + " is not a multiple of 4");
-                checked.byte_stride = *stride;
-            }
-            if (const auto extensions = entry.object("extensions"))
-                for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression", "MESHOPT_compression"})
-                    if (extensions->member(name) && is_placeholder(buffer))
-                        entry.fail("geometry is compressed with " + std::string(name) + ", which is not supported");
-            views_.push_back(checked);
-            entry.keep_only({"buffer", "byteOffset", "byteLength", "byteStride"});
-        });
-    }
-
-    // Bytes [offset, offset + stride * (count - 1) + element) must lie inside the view. All of it fits 64 bits:
-    // offset < 2^54, stride < 2^8, count < 2^32.
-    void check_span(const json_at& at, std::uint32_t view_index, std::uint64_t offset, std::uint64_t stride,
-                    std::uint64_t count, std::uint64_t element) const {
-        const std::uint64_t end = offset + stride * (count - 1) + element;
-        if (end > views_[view_index].byte_length)
-            at.fail("needs " + std::to_string(end) + " bytes of bufferViews[" + std::to_string(view_index) +
-                    "], which has " + std::to_string(views_[view_index].byte_length));
-    }
-
-    void check_accessors() {
-        root_.each_object("accessors", [&](const json_at& accessor) {
-            const std::uint64_t type = accessor.required("componentType", accessor.integer("componentType", 0, most));
-            const std::uint64_t component = component_bytes(type);
-            if (component == 0) accessor.fail("componentType " + std::to_string(type) + " is not one of glTF's");
-            const std::string_view shape = accessor.required("type", accessor.string("type"));
-            const std::uint64_t element = element_bytes(shape, component);
-            if (element == 0) accessor.fail("type " + in_quotes(shape) + " is not one of glTF's");
-            const std::uint64_t count = accessor.required("count", accessor.integer("count", 1, UINT32_MAX));
-            const std::uint64_t offset = accessor.integer("byteOffset", 0, most).value_or(0);
-            (void)accessor.boolean("normalized");
-            const auto view_index = accessor.index("bufferView", "bufferViews", num_views_);
-            document_.zero_base.push_back(!view_index);
-            if (view_index) {
-                const std::uint64_t stride = views_[*view_index].byte_stride.value_or(element);
-                if (stride < element)
-                    accessor.fail("its elements of " + std::to_string(element) + " bytes overlap at byteStride " +
-                                  std::to_string(stride));
-                check_span(accessor, *view_index, offset, stride, count, element);
-            }
-            if (const auto sparse = accessor.object("sparse")) check_sparse(*sparse, count, element);
-            accessor.keep_only({"bufferView", "byteOffset", "componentType", "normalized", "count", "type", "sparse"});
-        });
-    }
-
-    void check_sparse(const json_at& sparse, std::uint64_t accessor_count, std::uint64_t element) const {
-        const std::uint64_t count = sparse.required("count", sparse.integer("count", 1, accessor_count));
-        const auto part = [&](const char* key, std::uint64_t bytes_each, const json_at& at) {
-            const std::uint32_t index = at.required("bufferView", at.index("bufferView", "bufferViews", num_views_));
-            if (views_[index].byte_stride) at.fail(std::string("sparse ") + key + " may not have a byteStride");
-            // tinygltf keeps these two offsets in an int.
-            const std::uint64_t offset = at.integer("byteOffset", 0, INT32_MAX).value_or(0);
-            check_span(at, index, offset, bytes_each, count, bytes_each);
-        };
-        const json_at indices = sparse.required("indices", sparse.object("indices"));
-        const std::uint64_t type = indices.required("componentType", indices.integer("componentType", 0, most));
-        if (type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
-            type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
-            indices.fail("componentType " + std::to_string(type) + " is not an unsigned integer");
-        part("indices", component_bytes(type), indices);
-        part("values", element, sparse.required("values", sparse.object("values")));
-        indices.keep_only({"bufferView", "byteOffset", "componentType"});
-        sparse.object("values")->keep_only({"bufferView", "byteOffset"});
-        sparse.keep_only({"count", "indices", "values"});
-    }
-
-    void check_images() {
-        root_.each_object("images", [&](const json_at& image) {
-            image_source source;
-            source.name = printable(image.string("name").value_or(""));
-            if (const auto uri = image.string("uri")) source.uri = std::string(*uri);
-            source.buffer_view = image.index("bufferView", "bufferViews", num_views_);
-            if (source.uri && source.buffer_view) image.fail("has both a uri and a bufferView");
-            document_.images.push_back(std::move(source));
-        });
-    }
-
-    static void check_choice(const json_at& at, std::string_view key, std::initializer_list<int> choices) {
-        const auto value = at.integer(key, 0, most);
-        bool listed = !value;
-        for (const int choice : choices) listed = listed || *value == static_cast<std::uint64_t>(choice);
-        if (!listed) at.fail(std::string(key) + ' ' + std::to_string(*value) + " is not one of glTF's");
-    }
-
-    void check_samplers_and_textures() {
-        root_.each_object("samplers", [&](const json_at& sampler) {
-            check_choice(sampler, "magFilter", {TINYGLTF_TEXTURE_FILTER_NEAREST, TINYGLTF_TEXTURE_FILTER_LINEAR});
-            check_choice(sampler, "minFilter",
-                         {TINYGLTF_TEXTURE_FILTER_NEAREST, TINYGLTF_TEXTURE_FILTER_LINEAR,
-                          TINYGLTF_TEXTURE_FILTER_NEAREST_MIPMAP_NEAREST, TINYGLTF_TEXTURE_FILTER_LINEAR_MIPMAP_NEAREST,
-                          TINYGLTF_TEXTURE_FILTER_NEAREST_MIPMAP_LINEAR, TINYGLTF_TEXTURE_FILTER_LINEAR_MIPMAP_LINEAR});
-            for (const char* key : {"wrapS", "wrapT"})
-                check_choice(sampler, key,
-                             {TINYGLTF_TEXTURE_WRAP_REPEAT, TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE,
-                              TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT});
-            sampler.keep_only({"magFilter", "minFilter", "wrapS", "wrapT"});
-        });
-        root_.each_object("textures", [&](const json_at& texture) {
-            (void)texture.index("sampler", "samplers", num_samplers_);
-            (void)texture.index("source", "images", num_images_);
-            texture.keep_only({"sampler", "source"});
-        });
-    }
-
-    void check_materials() {
-        root_.each_object("materials", [&](const json_at& material) {
-            (void)material.string("name");
-            const std::string_view mode = material.string("alphaMode").value_or("OPAQUE");
-            if (mode != "OPAQUE" && mode != "MASK" && mode != "BLEND")
-                material.fail("alphaMode " + in_quotes(mode) + " is not one of glTF's");
-            if (const auto cutoff = material.number("alphaCutoff"); cutoff && *cutoff < 0)
-                material.fail("alphaCutoff is negative");
-            (void)material.boolean("doubleSided");
-            if (const auto pbr = material.object("pbrMetallicRoughness")) {
-                pbr->check_numbers("baseColorFactor", 4);
-                if (const auto info = pbr->object("baseColorTexture")) check_texture_info(*info);
-                pbr->keep_only({"baseColorFactor", "baseColorTexture"});
-            }
-            material.keep_only({"name", "alphaMode", "alphaCutoff", "doubleSided", "pbrMetallicRoughness"});
-        });
-    }
-
-    void check_texture_info(const json_at& info) const {
-        (void)info.required("index", info.index("index", "textures", num_textures_));
-        (void)info.integer("texCoord", 0, INT32_MAX);
-        if (const auto extensions = info.object("extensions")) {
-            if (const auto transform = extensions->object("KHR_texture_transform")) {
-                transform->check_numbers("offset", 2);
-                transform->check_numbers("scale", 2);
-                (void)transform->number("rotation");
-                (void)transform->integer("texCoord", 0, INT32_MAX);
-                transform->keep_only({"offset", "scale", "rotation", "texCoord"});
-            }
-            extensions->keep_only({"KHR_texture_transform"});
-        }
-        info.keep_only({"index", "texCoord", "extensions"});
-    }
-
-    void check_meshes() {
-        std::size_t with_targets = 0;
-        root_.each_object("meshes", [&](const json_at& mesh) {
-            (void)mesh.string("name");
-            memory_.charge(mesh.array_size("primitives"), sizeof(tinygltf::Primitive), "meshes");
-            mesh.each_object("primitives", [&](const json_at& primitive) { check_primitive(primitive, with_targets); });
-            mesh.keep_only({"name", "primitives"});
-        });
-        if (with_targets != 0)
-            warnings_.push_back("morph targets are not supported: " + std::to_string(with_targets) +
-                                " primitive(s) taken at their base shape");
-    }
-
-    void check_primitive(const json_at& primitive, std::size_t& with_targets) {
-        const json_at attributes = primitive.required("attributes", primitive.object("attributes"));
-        for (const auto& entry : attributes.value().items())
-            (void)attributes.index(entry.key(), "accessors", num_accessors_);
-        (void)primitive.integer("mode", 0, 6);
-        (void)primitive.index("material", "materials", num_materials_);
-        if (const auto indices = primitive.index("indices", "accessors", num_accessors_))
-            check_index_accessor(primitive, *indices);
-        if (primitive.array_size("targets") != 0) ++with_targets;
-        if (const auto extensions = primitive.object("extensions")) {
-            const auto position = attributes.index("POSITION", "accessors", num_accessors_);
-            if (extensions->member("KHR_draco_mesh_compression") && (!position || document_.zero_base[*position]))
-                primitive.fail("geometry is compressed with KHR_draco_mesh_compression, which is not supported");
-        }
-        primitive.keep_only({"attributes", "mode", "material", "indices"});
-    }
-
-    void check_index_accessor(const json_at& primitive, std::uint32_t index) {
-        json& accessor = root_.value()["accessors"][index];
-        const auto type = accessor["componentType"].get<std::uint64_t>();
-        if (accessor["type"] != "SCALAR" ||
-            (type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
-             type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT))
-            primitive.fail("indices are not scalars of an unsigned integer type");
-        if (document_.zero_base[index]) {
-            accessor["bufferView"] = num_views_; // tinygltf insists on one: the placeholder of run()
-            placeholder_view_ = true;
-        } else if (views_[accessor["bufferView"].get<std::size_t>()].byte_stride) {
-            primitive.fail("indices lie in a buffer view with a byteStride");
-        }
-    }
-
-    void check_nodes_and_scenes() {
-        std::size_t with_skin = 0;
-        std::size_t with_matrix_and_parts = 0;
-        root_.each_object("nodes", [&](const json_at& node) {
-            (void)node.string("name");
-            (void)node.index("mesh", "meshes", num_meshes_);
-            node.each("children", [&](const json_at& child) { (void)child.as_index("nodes", num_nodes_); });
-            const bool matrix = node.check_numbers("matrix", 16);
-            bool parts = node.check_numbers("rotation", 4);
-            parts = node.check_numbers("scale", 3) || parts;
-            parts = node.check_numbers("translation", 3) || parts;
-            if (matrix && parts) ++with_matrix_and_parts;
-            if (node.member("skin")) ++with_skin;
-            if (const auto extensions = node.object("extensions"))
-                if (extensions->member("EXT_mesh_gpu_instancing"))
-                    node.fail("is repeated by EXT_mesh_gpu_instancing, which is not supported");
-            node.keep_only({"name", "mesh", "children", "matrix", "rotation", "scale", "translation"});
-        });
-        if (with_skin != 0)
-            warnings_.push_back("skins are not supported: " + std::to_string(with_skin) +
-                                " node(s) show their mesh in its bind pose");
-        if (with_matrix_and_parts != 0)
-            warnings_.push_back(std::to_string(with_matrix_and_parts) +
-                                " node(s) with a matrix beside translation, rotation or scale: the matrix is used");
-        root_.each_object("scenes", [&](const json_at& scene) {
-            scene.each("nodes", [&](const json_at& node) { (void)node.as_index("nodes", num_nodes_); });
-            scene.keep_only({"nodes"});
-        });
-        (void)root_.index("scene", "scenes", num_scenes_);
-    }
-
-    void warn_of_what_is_left_out() {
-        if (const auto animations = root_.member("animations"); animations && !animations->value().empty())
-            warnings_.push_back("animations are not supported: nodes stand as the file places them");
-    }
-
-    // What the bounds checks need of a buffer view.
-    struct view {
-        std::uint64_t byte_length = 0;
-        std::optional<std::uint64_t> byte_stride;
-    };
-
-    json_at root_;
-    bool has_binary_chunk_;
-    budget& memory_;
-    std::vector<std::string>& warnings_;
-    checked_document document_;
-    std::vector<view> views_;
-    bool placeholder_view_ = false;
-    std::size_t num_buffers_ = 0, num_views_ = 0, num_accessors_ = 0, num_images_ = 0, num_samplers_ = 0;
-    std::size_t num_textures_ = 0, num_materials_ = 0, num_meshes_ = 0, num_nodes_ = 0, num_scenes_ = 0;
-};
-
 } // namespace
+
+checked_document checker::run() {
+    check_asset();
+    count_lists();
+    check_extensions();
+    check_buffers();
+    check_buffer_views();
+    check_accessors();
+    check_images();
+    check_samplers();
+    check_textures();
+    check_materials();
+    check_meshes();
+    check_nodes_and_scenes();
+    warn_of_what_is_left_out();
+    root_.keep_only({"asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews", "materials", "textures",
+                     "samplers"});
+    if (placeholder_view_) root_.value()["bufferViews"].push_back({{"buffer", 0}, {"byteLength", 1}});
+    document_.json = root_.value().dump();
+    return std::move(document_);
+}
+
+void checker::check_asset() {
+    if (!root_.value().is_object()) root_.fail("the JSON text is not an object");
+    const json_at asset = root_.required("asset", root_.object("asset"));
+    const std::string_view version = asset.required("version", asset.string("version"));
+    if (version.substr(0, 2) != "2.") asset.fail("glTF version " + in_quotes(version) + " is not supported, only 2.x");
+    if (const auto least = asset.string("minVersion"); least && *least != "2.0")
+        asset.fail("the file requires glTF version " + in_quotes(*least) + ", supported is 2.0");
+    asset.keep_only({"version"});
+}
+
+// The list sizes that references are checked against; what tinygltf will build for each element is charged.
+void checker::count_lists() {
+    const auto count = [&](std::string_view list, std::size_t bytes_each) {
+        const std::size_t size = root_.array_size(list);
+        memory_.charge(size, bytes_each, std::string(list));
+        return size;
+    };
+    num_buffers_ = count("buffers", sizeof(buffer_source));
+    num_views_ = count("bufferViews", sizeof(tinygltf::BufferView) + sizeof(view));
+    num_accessors_ = count("accessors", sizeof(tinygltf::Accessor));
+    num_images_ = count("images", sizeof(image_source));
+    num_samplers_ = count("samplers", sizeof(tinygltf::Sampler));
+    num_textures_ = count("textures", sizeof(tinygltf::Texture));
+    num_materials_ = count("materials", sizeof(tinygltf::Material));
+    num_meshes_ = count("meshes", sizeof(tinygltf::Mesh));
+    num_nodes_ = count("nodes", sizeof(tinygltf::Node));
+    num_scenes_ = count("scenes", sizeof(tinygltf::Scene));
+}
+
+void checker::check_extensions() {
+    const auto names = [&](std::string_view key) {
+        std::set<std::string> list;
+        root_.each(key, [&](const json_at& entry) {
+            if (!entry.value().is_string()) entry.fail("must be a string");
+            list.insert(entry.value().get<std::string>());
+        });
+        return list;
+    };
+    const std::set<std::string> required = names("extensionsRequired");
+    for (const std::string& name : required) {
+        switch (effect_of(name)) {
+        case extension_effect::honoured:
+        case extension_effect::appearance:
+            break;
+        case extension_effect::fallback:
+            throw gltf_error("geometry is compressed with " + printable(name) + ", which is not supported");
+        case extension_effect::lost:
+        case extension_effect::unknown:
+            throw gltf_error("the file requires the extension " + printable(name) + ", which is not supported");
+        }
+    }
+    std::set<std::string> used = names("extensionsUsed");
+    used.insert(required.begin(), required.end());
+    for (const std::string& name : used) {
+        const extension_effect effect = effect_of(name);
+        if (effect == extension_effect::appearance)
+            warnings_.push_back("extension " + printable(name) +
+                                " is not supported: only base colour, texture and alpha of materials are used");
+        if (effect == extension_effect::unknown)
+            warnings_.push_back("extension " + printable(name) + " is not known and ignored");
+        if (effect == extension_effect::fallback)
+            warnings_.push_back("extension " + printable(name) +
+                                " is not supported: the file's uncompressed copy of the geometry is used");
+    }
+}
+
+void checker::check_buffers() {
+    root_.each_object("buffers", [&](const json_at& buffer) {
+        buffer_source source;
+        source.byte_length = buffer.required("byteLength", buffer.integer("byteLength", 1, largest_integer));
+        if (const auto uri = buffer.string("uri")) source.uri = std::string(*uri);
+        document_.buffers.push_back(std::move(source));
+    });
+}
+
+// Nothing stands behind this buffer: compressed files keep such a one in place of their uncompressed copy.
+bool checker::is_placeholder(std::size_t buffer) const {
+    return !document_.buffers[buffer].uri && !(buffer == 0 && has_binary_chunk_);
+}
+
+void checker::check_buffer_views() {
+    root_.each_object("bufferViews", [&](const json_at& entry) {
+        view checked;
+        const std::uint32_t buffer = entry.required("buffer", entry.index("buffer", "buffers", num_buffers_));
+        const std::uint64_t offset = entry.integer("byteOffset", 0, largest_integer).value_or(0);
+        checked.byte_length = entry.required("byteLength", entry.integer("byteLength", 1, largest_integer));
+        const std::uint64_t has = document_.buffers[buffer].byte_length;
+        if (offset + checked.byte_length > has)
+            entry.fail("ends at byte " + std::to_string(offset + checked.byte_length) + " of a buffer with " +
+                       std::to_string(has));
+        if (const auto stride = entry.integer("byteStride", 4, 252)) {
+            if (*stride % 4 != 0) entry.fail("byteStride " + std::to_string(*stride) + " is not a multiple of 4");
+            checked.byte_stride = *stride;
+        }
+        if (const auto extensions = entry.object("extensions"))
+            for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression", "MESHOPT_compression"})
+                if (extensions->member(name) && is_placeholder(buffer))
+                    entry.fail("geometry is compressed with " + std::string(name) + ", which is not supported");
+        views_.push_back(checked);
+        entry.keep_only({"buffer", "byteOffset", "byteLength", "byteStride"});
+    });
+}
+
+// Bytes [offset, offset + stride * (count - 1) + element) must lie inside the view. All of it fits 64 bits:
+// offset < 2^54, stride < 2^8, count < 2^32.
+void checker::check_span(const json_at& at, std::uint32_t view_index, std::uint64_t offset, std::uint64_t stride,
+                         std::uint64_t count, std::uint64_t element) const {
+    const std::uint64_t end = offset + stride * (count - 1) + element;
+    if (end > views_[view_index].byte_length)
+        at.fail("needs " + std::to_string(end) + " bytes of bufferViews[" + std::to_string(view_index) +
+                "], which has " + std::to_string(views_[view_index].byte_length));
+}
+
+void checker::check_accessors() {
+    root_.each_object("accessors", [&](const json_at& accessor) {
+        const std::uint64_t type =
+            accessor.required("componentType", accessor.integer("componentType", 0, largest_integer));
+        const std::uint64_t component = component_bytes(type);
+        if (component == 0) accessor.fail("componentType " + std::to_string(type) + " is not one of glTF's");
+        const std::string_view shape = accessor.required("type", accessor.string("type"));
+        const std::uint64_t element = element_bytes(shape, component);
+        if (element == 0) accessor.fail("type " + in_quotes(shape) + " is not one of glTF's");
+        const std::uint64_t count = accessor.required("count", accessor.integer("count", 1, UINT32_MAX));
+        const std::uint64_t offset = accessor.integer("byteOffset", 0, largest_integer).value_or(0);
+        (void)accessor.boolean("normalized");
+        const auto view_index = accessor.index("bufferView", "bufferViews", num_views_);
+        document_.zero_base.push_back(!view_index);
+        if (view_index) {
+            const std::uint64_t stride = views_[*view_index].byte_stride.value_or(element);
+            if (stride < element)
+                accessor.fail("its elements of " + std::to_string(element) + " bytes overlap at byteStride " +
+                              std::to_string(stride));
+            check_span(accessor, *view_index, offset, stride, count, element);
+        }
+        if (const auto sparse = accessor.object("sparse")) check_sparse(*sparse, count, element);
+        accessor.keep_only({"bufferView", "byteOffset", "componentType", "normalized", "count", "type", "sparse"});
+    });
+}
+
+void checker::check_sparse(const json_at& sparse, std::uint64_t accessor_count, std::uint64_t element) const {
+    const std::uint64_t count = sparse.required("count", sparse.integer("count", 1, accessor_count));
+    const auto part = [&](const char* key, std::uint64_t bytes_each, const json_at& at) {
+        const std::uint32_t index = at.required("bufferView", at.index("bufferView", "bufferViews", num_views_));
+        if (views_[index].byte_stride) at.fail(std::string("sparse ") + key + " may not have a byteStride");
+        // tinygltf keeps these two offsets in an int.
+        const std::uint64_t offset = at.integer("byteOffset", 0, INT32_MAX).value_or(0);
+        check_span(at, index, offset, bytes_each, count, bytes_each);
+    };
+    const json_at indices = sparse.required("indices", sparse.object("indices"));
+    const std::uint64_t type = indices.required("componentType", indices.integer("componentType", 0, largest_integer));
+    if (type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
+        type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
+        indices.fail("componentType " + std::to_string(type) + " is not an unsigned integer");
+    part("indices", component_bytes(type), indices);
+    part("values", element, sparse.required("values", sparse.object("values")));
+    indices.keep_only({"bufferView", "byteOffset", "componentType"});
+    sparse.object("values")->keep_only({"bufferView", "byteOffset"});
+    sparse.keep_only({"count", "indices", "values"});
+}
 
 checked_document check_document(std::string_view json_text, bool has_binary_chunk, budget& memory,
                                 std::vector<std::string>& warnings) {

@@ -20,7 +20,7 @@ struct buffer_source {
     std::optional<std::string> uri; // none: the BIN chunk where it is the first buffer, otherwise no data
 };
 
-// Neither a uri nor a view: the picture is in an extension that is not known.
+// Neither a uri nor a view: there is no picture.
 struct image_source {
     std::string name;
     std::optional<std::string> uri;
@@ -31,6 +31,8 @@ struct checked_document {
     std::string json; // for tinygltf: without buffers, images, animations, skins, cameras, extras
     std::vector<buffer_source> buffers;
     std::vector<image_source> images;
+    // Per texture: indices into images that show the same thing, the one to try first in front. Empty: none is named.
+    std::vector<std::vector<std::uint32_t>> texture_images;
     // Per accessor: it has no buffer view of its own, its base values are zero. (tinygltf insists on a view for
     // indices, so the reduced text gives them one that is never read.)
     std::vector<bool> zero_base;

@@ -16,8 +16,8 @@ enum class extension_effect {
     unknown     // not in the table: a warning, an error where it is required
 };
 
-// extensionsUsed / extensionsRequired name -> effect. KHR_materials_*, the other vendors' materials and all texture
-// formats count as appearance.
+// extensionsUsed / extensionsRequired name -> effect. KHR_materials_* and the other vendors' materials count as
+// appearance.
 [[nodiscard]] constexpr extension_effect effect_of(std::string_view name) {
     struct rule {
         std::string_view name;
@@ -35,10 +35,13 @@ enum class extension_effect {
         rule{"KHR_meshopt_compression", extension_effect::fallback},
         rule{"MESHOPT_compression", extension_effect::fallback},
         rule{"EXT_mesh_gpu_instancing", extension_effect::lost},
-        rule{"KHR_texture_basisu", extension_effect::appearance},
-        rule{"EXT_texture_webp", extension_effect::appearance},
-        rule{"EXT_texture_avif", extension_effect::appearance},
-        rule{"MSFT_texture_dds", extension_effect::appearance},
+        // A picture that cannot be decoded is named when it is needed.
+        rule{"KHR_texture_basisu", extension_effect::honoured},
+        rule{"EXT_texture_webp", extension_effect::honoured},
+        rule{"EXT_texture_avif", extension_effect::honoured},
+        rule{"MSFT_texture_dds", extension_effect::honoured},
+        rule{"KHR_materials_pbrSpecularGlossiness",
+             extension_effect::honoured}, // its diffuse colour is the base colour
         rule{"EXT_lights_image_based", extension_effect::appearance},
         rule{"KHR_techniques_webgl", extension_effect::appearance},
     };

@@ -68,12 +68,16 @@ std::int32_t material_reader::scene_texture(std::size_t index) {
     if (result) return *result;
     result = material::no_texture;
     const tinygltf::Texture& source = model_.textures[index];
-    if (source.source < 0) {
+    const std::vector<std::uint32_t>& pictures = bytes_.texture_images(index);
+    if (pictures.empty()) {
         scene_.warnings.push_back("textures[" + std::to_string(index) +
-                                  "] has no picture in a supported format: the colour factor is used alone");
+                                  "] names no picture: the colour factor is used alone");
         return *result;
     }
-    const std::int32_t image = scene_image(static_cast<std::size_t>(source.source));
+    std::int32_t image = material::no_texture;
+    for (std::size_t i = 0; i < pictures.size() && image == material::no_texture; ++i)
+        image = scene_image(pictures[i], i + 1 == pictures.size() ? "the colour factor is used alone"
+                                                                  : "the texture's other picture is tried");
     if (image == material::no_texture) return *result;
     texture entry;
     entry.image = static_cast<std::uint32_t>(image);
@@ -89,8 +93,7 @@ std::int32_t material_reader::scene_texture(std::size_t index) {
     return *result;
 }
 
-std::int32_t material_reader::scene_image(std::size_t index) {
-    if (index >= image_of_.size()) image_of_.resize(index + 1);
+std::int32_t material_reader::scene_image(std::size_t index, const char* instead) {
     std::optional<std::int32_t>& result = image_of_[index];
     if (result) return *result;
     result = material::no_texture;
@@ -100,8 +103,8 @@ std::int32_t material_reader::scene_image(std::size_t index) {
             bytes_.decode_image(index, view ? accessors_.view(*view) : std::span<const std::byte>{}));
         result = static_cast<std::int32_t>(scene_.images.size() - 1);
     } catch (const gltf_error& error) {
-        scene_.warnings.push_back("images[" + std::to_string(index) + "] cannot be used: " + error.what() +
-                                  "; the colour factor is used alone");
+        scene_.warnings.push_back("images[" + std::to_string(index) + "] cannot be used: " + error.what() + "; " +
+                                  instead);
     }
     return *result;
 }

@@ -30,7 +30,7 @@ public:
     material_reader(const tinygltf::Model& model, const accessor_reader& accessors, const resources& bytes,
                     scene& result)
         : model_{model}, accessors_{accessors}, bytes_{bytes}, scene_{result}, texture_of_(model.textures.size()),
-          image_of_(model.textures.size()) {}
+          image_of_(bytes.image_count()) {}
 
     // Fills scene.materials with the file's, all without their textures.
     void read_factors();
@@ -41,7 +41,8 @@ public:
 
 private:
     [[nodiscard]] std::int32_t scene_texture(std::size_t texture);
-    [[nodiscard]] std::int32_t scene_image(std::size_t image);
+    // INSTEAD says in the warning what is done without the picture.
+    [[nodiscard]] std::int32_t scene_image(std::size_t image, const char* instead);
 
     const tinygltf::Model& model_;
     const accessor_reader& accessors_;

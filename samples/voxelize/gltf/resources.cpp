@@ -2,23 +2,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "resources.hpp"
 
+#include "picture_file.hpp"
 #include "text.hpp"
 
-#include <stb_image.h>
 #include <tiny_gltf.h>
 
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-#include <memory>
-#include <optional>
 #include <system_error>
 
 namespace voxelize::gltf {
 
 namespace {
 
-std::vector<std::byte> decode_data_uri(const std::string& uri) {
+std::vector<std::byte> decode_data_uri(std::string uri) {
+    // tinygltf knows PNG, JPEG and a few more; what a picture really is, its bytes say.
+    constexpr std::string_view image = "data:image/";
+    constexpr std::string_view base64 = ";base64,";
+    if (const std::size_t end = uri.find(base64); uri.starts_with(image) && end < 64)
+        uri.replace(0, end + base64.size(), "data:image/png;base64,");
     if (!tinygltf::IsDataURI(uri)) throw gltf_error("a data URI that is not base64 of a known media type");
     std::vector<unsigned char> decoded;
     std::string media_type;
@@ -60,29 +63,6 @@ std::filesystem::path local_path(const std::string& uri) {
     if (path.is_absolute() || text.front() == '\\') throw gltf_error("not a relative path");
     if (path.begin()->string() == "..") throw gltf_error("a path that leaves the folder of the file");
     return path;
-}
-
-enum class picture_format { png, jpeg };
-
-std::optional<picture_format> format_of(std::span<const std::byte> bytes) {
-    const auto starts_with = [&](std::string_view magic) {
-        return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
-    };
-    if (starts_with("\x89PNG\r\n\x1a\n")) return picture_format::png;
-    if (starts_with("\xFF\xD8\xFF")) return picture_format::jpeg;
-    return std::nullopt;
-}
-
-// A picture may take 64 MiB, or 1024 times its encoded size, whichever is more: deflate cannot do better on channels of
-// 8 bits. Colour values of less than a byte can, and are no loss.
-void check_picture_size(std::uint64_t width, std::uint64_t height, std::uint64_t encoded_bytes,
-                        const gltf_limits& limits) {
-    const std::string size = std::to_string(width) + " x " + std::to_string(height);
-    if (width > limits.max_image_side || height > limits.max_image_side)
-        throw gltf_error("its " + size + " pixels are more than " + std::to_string(limits.max_image_side) + " a side");
-    const std::uint64_t allowed = (std::uint64_t{64} << 20) + 1024 * encoded_bytes;
-    if (width * height * 4 > allowed)
-        throw gltf_error("its " + size + " pixels cannot come from " + std::to_string(encoded_bytes) + " bytes");
 }
 
 } // namespace
@@ -141,34 +121,10 @@ picture resources::decode_image(std::size_t index, std::span<const std::byte> vi
         }
         bytes = fetched;
     } else if (!source.buffer_view) {
-        throw gltf_error("it is stored in a format that is not supported");
+        throw gltf_error("it has neither a uri nor a bufferView");
     }
-    if (!format_of(bytes)) throw gltf_error("it is neither PNG nor JPEG");
-    if (bytes.size() > INT32_MAX) throw gltf_error("it is larger than 2 GiB");
-
-    const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
-    const int size = static_cast<int>(bytes.size());
-    const auto reason = [] { return printable(stbi_failure_reason() != nullptr ? stbi_failure_reason() : "unknown"); };
-    int width = 0;
-    int height = 0;
-    int channels = 0;
-    if (stbi_info_from_memory(data, size, &width, &height, &channels) == 0 || width < 1 || height < 1)
-        throw gltf_error("it cannot be decoded (" + reason() + ")");
-    check_picture_size(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), bytes.size(),
-                       memory_.limits());
-    const std::uint64_t pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-    memory_.charge(pixels, 4, "images[" + std::to_string(index) + "]");
-    struct free_pixels {
-        void operator()(stbi_uc* pixels) const { stbi_image_free(pixels); }
-    };
-    const std::unique_ptr<stbi_uc, free_pixels> decoded{
-        stbi_load_from_memory(data, size, &width, &height, &channels, 4)};
-    if (!decoded) throw gltf_error("it cannot be decoded (" + reason() + ")");
-    picture result;
+    picture result = decode_picture(bytes, memory_, "images[" + std::to_string(index) + "]");
     result.name = source.name;
-    result.width = static_cast<std::uint32_t>(width);
-    result.height = static_cast<std::uint32_t>(height);
-    result.rgba.assign(decoded.get(), decoded.get() + pixels * 4);
     return result;
 }
 

@@ -29,13 +29,20 @@ public:
     // Bytes of buffer INDEX, byte_length of them as declared; throws gltf_error for a placeholder without data.
     [[nodiscard]] std::span<const std::byte> buffer(std::size_t index) const;
 
+    // The pictures of texture INDEX, the one to try first in front.
+    [[nodiscard]] const std::vector<std::uint32_t>& texture_images(std::size_t index) const {
+        return document_.texture_images[index];
+    }
+
+    [[nodiscard]] std::size_t image_count() const { return document_.images.size(); }
+
     // The buffer view that picture INDEX lies in, if it lies in one.
     [[nodiscard]] std::optional<std::uint32_t> image_view(std::size_t index) const {
         return document_.images[index].buffer_view;
     }
 
-    // Decodes picture INDEX, PNG or JPEG. VIEW_BYTES are those of its buffer view where it has one. Throws gltf_error
-    // with the reason; the caller decides whether that is fatal.
+    // Decodes picture INDEX (see picture_file.hpp). VIEW_BYTES are those of its buffer view where it has one. Throws
+    // gltf_error with the reason; the caller decides whether that is fatal.
     [[nodiscard]] picture decode_image(std::size_t index, std::span<const std::byte> view_bytes) const;
 
 private:

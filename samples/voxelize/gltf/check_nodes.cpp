@@ -1,0 +1,90 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "checker.hpp"
+
+#include <tiny_gltf.h>
+
+namespace voxelize::gltf {
+
+void checker::check_meshes() {
+    std::size_t with_targets = 0;
+    root_.each_object("meshes", [&](const json_at& mesh) {
+        (void)mesh.string("name");
+        memory_.charge(mesh.array_size("primitives"), sizeof(tinygltf::Primitive), "meshes");
+        mesh.each_object("primitives", [&](const json_at& primitive) { check_primitive(primitive, with_targets); });
+        mesh.keep_only({"name", "primitives"});
+    });
+    if (with_targets != 0)
+        warnings_.push_back("morph targets are not supported: " + std::to_string(with_targets) +
+                            " primitive(s) taken at their base shape");
+}
+
+void checker::check_primitive(const json_at& primitive, std::size_t& with_targets) {
+    const json_at attributes = primitive.required("attributes", primitive.object("attributes"));
+    for (const auto& entry : attributes.value().items())
+        (void)attributes.index(entry.key(), "accessors", num_accessors_);
+    (void)primitive.integer("mode", 0, 6);
+    (void)primitive.index("material", "materials", num_materials_);
+    if (const auto indices = primitive.index("indices", "accessors", num_accessors_))
+        check_index_accessor(primitive, *indices);
+    if (primitive.array_size("targets") != 0) ++with_targets;
+    if (const auto extensions = primitive.object("extensions")) {
+        const auto position = attributes.index("POSITION", "accessors", num_accessors_);
+        if (extensions->member("KHR_draco_mesh_compression") && (!position || document_.zero_base[*position]))
+            primitive.fail("geometry is compressed with KHR_draco_mesh_compression, which is not supported");
+    }
+    primitive.keep_only({"attributes", "mode", "material", "indices"});
+}
+
+void checker::check_index_accessor(const json_at& primitive, std::uint32_t index) {
+    json& accessor = root_.value()["accessors"][index];
+    const auto type = accessor["componentType"].get<std::uint64_t>();
+    if (accessor["type"] != "SCALAR" ||
+        (type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
+         type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT))
+        primitive.fail("indices are not scalars of an unsigned integer type");
+    if (document_.zero_base[index]) {
+        accessor["bufferView"] = num_views_; // tinygltf insists on one: the placeholder of run()
+        placeholder_view_ = true;
+    } else if (views_[accessor["bufferView"].get<std::size_t>()].byte_stride) {
+        primitive.fail("indices lie in a buffer view with a byteStride");
+    }
+}
+
+void checker::check_nodes_and_scenes() {
+    std::size_t with_skin = 0;
+    std::size_t with_matrix_and_parts = 0;
+    root_.each_object("nodes", [&](const json_at& node) {
+        (void)node.string("name");
+        (void)node.index("mesh", "meshes", num_meshes_);
+        node.each("children", [&](const json_at& child) { (void)child.as_index("nodes", num_nodes_); });
+        const bool matrix = node.check_numbers("matrix", 16);
+        bool parts = node.check_numbers("rotation", 4);
+        parts = node.check_numbers("scale", 3) || parts;
+        parts = node.check_numbers("translation", 3) || parts;
+        if (matrix && parts) ++with_matrix_and_parts;
+        if (node.member("skin")) ++with_skin;
+        if (const auto extensions = node.object("extensions"))
+            if (extensions->member("EXT_mesh_gpu_instancing"))
+                node.fail("is repeated by EXT_mesh_gpu_instancing, which is not supported");
+        node.keep_only({"name", "mesh", "children", "matrix", "rotation", "scale", "translation"});
+    });
+    if (with_skin != 0)
+        warnings_.push_back("skins are not supported: " + std::to_string(with_skin) +
+                            " node(s) show their mesh in its bind pose");
+    if (with_matrix_and_parts != 0)
+        warnings_.push_back(std::to_string(with_matrix_and_parts) +
+                            " node(s) with a matrix beside translation, rotation or scale: the matrix is used");
+    root_.each_object("scenes", [&](const json_at& scene) {
+        scene.each("nodes", [&](const json_at& node) { (void)node.as_index("nodes", num_nodes_); });
+        scene.keep_only({"nodes"});
+    });
+    (void)root_.index("scene", "scenes", num_scenes_);
+}
+
+void checker::warn_of_what_is_left_out() {
+    if (const auto animations = root_.member("animations"); animations && !animations->value().empty())
+        warnings_.push_back("animations are not supported: nodes stand as the file places them");
+}
+
+} // namespace voxelize::gltf

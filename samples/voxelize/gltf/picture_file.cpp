@@ -1,0 +1,133 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "picture_file.hpp"
+
+#include "text.hpp"
+
+#include <stb_image.h>
+#ifdef VOXELIZE_HAS_WEBP
+#include <webp/decode.h>
+#endif
+
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <string_view>
+
+namespace voxelize::gltf {
+
+namespace {
+
+enum class picture_format { png, jpeg, webp, other };
+
+// MAGIC stands AT bytes behind the start.
+bool has_magic(std::span<const std::byte> bytes, std::size_t at, std::string_view magic) {
+    return bytes.size() >= at + magic.size() && std::memcmp(bytes.data() + at, magic.data(), magic.size()) == 0;
+}
+
+picture_format format_of(std::span<const std::byte> bytes) {
+    if (has_magic(bytes, 0, "\x89PNG\r\n\x1a\n")) return picture_format::png;
+    if (has_magic(bytes, 0, "\xFF\xD8\xFF")) return picture_format::jpeg;
+    if (has_magic(bytes, 0, "RIFF") && has_magic(bytes, 8, "WEBP")) return picture_format::webp;
+    return picture_format::other;
+}
+
+// Why BYTES, which are in none of the formats above, are refused.
+std::string reason_against(std::span<const std::byte> bytes) {
+    struct known {
+        std::size_t at;
+        std::string_view magic;
+        const char* name;
+    };
+    using namespace std::string_view_literals;
+    constexpr known formats[] = {{0, "\xABKTX 20\xBB\r\n\x1A\n"sv, "KTX2"},
+                                 {0, "\xABKTX 11\xBB\r\n\x1A\n"sv, "KTX"},
+                                 {4, "ftypavif"sv, "AVIF"},
+                                 {0, "DDS "sv, "DDS"},
+                                 {0, "GIF8"sv, "GIF"},
+                                 {0, "BM"sv, "BMP"},
+                                 {0, "II*\0"sv, "TIFF"},
+                                 {0, "MM\0*"sv, "TIFF"},
+                                 {0, "sB"sv, "Basis Universal"}};
+    for (const known& format : formats)
+        if (has_magic(bytes, format.at, format.magic))
+            return std::string("it is ") + format.name + ", which is not supported (PNG, JPEG and WebP are)";
+    return "it is neither PNG, JPEG nor WebP";
+}
+
+// A picture may take 64 MiB, or 1024 times its encoded size, whichever is more: deflate cannot do better on channels of
+// 8 bits. Colour values of less than a byte can, and are no loss. Charges what it will take.
+void check_and_charge(std::uint64_t width, std::uint64_t height, std::uint64_t encoded_bytes, budget& memory,
+                      const std::string& what) {
+    const std::string size = std::to_string(width) + " x " + std::to_string(height);
+    const std::uint32_t side = memory.limits().max_image_side;
+    if (width > side || height > side)
+        throw gltf_error("its " + size + " pixels are more than " + std::to_string(side) + " a side");
+    const std::uint64_t allowed = (std::uint64_t{64} << 20) + 1024 * encoded_bytes;
+    if (width * height * 4 > allowed)
+        throw gltf_error("its " + size + " pixels cannot come from " + std::to_string(encoded_bytes) + " bytes");
+    memory.charge(width * height, 4, what);
+}
+
+picture decode_by_stb(std::span<const std::byte> bytes, budget& memory, const std::string& what) {
+    const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
+    const int size = static_cast<int>(bytes.size());
+    const auto reason = [] { return printable(stbi_failure_reason() != nullptr ? stbi_failure_reason() : "unknown"); };
+    int width = 0;
+    int height = 0;
+    int channels = 0;
+    if (stbi_info_from_memory(data, size, &width, &height, &channels) == 0 || width < 1 || height < 1)
+        throw gltf_error("it cannot be decoded (" + reason() + ")");
+    check_and_charge(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), bytes.size(), memory, what);
+    struct free_pixels {
+        void operator()(stbi_uc* pixels) const { stbi_image_free(pixels); }
+    };
+    const std::unique_ptr<stbi_uc, free_pixels> decoded{
+        stbi_load_from_memory(data, size, &width, &height, &channels, 4)};
+    if (!decoded) throw gltf_error("it cannot be decoded (" + reason() + ")");
+    picture result;
+    result.width = static_cast<std::uint32_t>(width);
+    result.height = static_cast<std::uint32_t>(height);
+    result.rgba.assign(decoded.get(), decoded.get() + std::size_t{4} * result.width * result.height);
+    return result;
+}
+
+#ifdef VOXELIZE_HAS_WEBP
+picture decode_webp(std::span<const std::byte> bytes, budget& memory, const std::string& what) {
+    const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+    int width = 0;
+    int height = 0;
+    if (WebPGetInfo(data, bytes.size(), &width, &height) == 0 || width < 1 || height < 1)
+        throw gltf_error("it cannot be decoded (not a WebP picture)");
+    check_and_charge(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), bytes.size(), memory, what);
+    picture result;
+    result.width = static_cast<std::uint32_t>(width);
+    result.height = static_cast<std::uint32_t>(height);
+    result.rgba.resize(std::size_t{4} * result.width * result.height);
+    if (WebPDecodeRGBAInto(data, bytes.size(), result.rgba.data(), result.rgba.size(), 4 * width) == nullptr)
+        throw gltf_error("it cannot be decoded (damaged WebP)");
+    return result;
+}
+#else
+picture decode_webp(std::span<const std::byte>, budget&, const std::string&) {
+    throw gltf_error("it is WebP, and this build has no libwebp");
+}
+#endif
+
+} // namespace
+
+picture decode_picture(std::span<const std::byte> bytes, budget& memory, const std::string& what) {
+    if (bytes.size() > INT32_MAX) throw gltf_error("it is larger than 2 GiB");
+    switch (format_of(bytes)) {
+    case picture_format::png:
+    case picture_format::jpeg:
+        return decode_by_stb(bytes, memory, what);
+    case picture_format::webp:
+        return decode_webp(bytes, memory, what);
+    case picture_format::other:
+        break;
+    }
+    throw gltf_error(reason_against(bytes));
+}
+
+} // namespace voxelize::gltf

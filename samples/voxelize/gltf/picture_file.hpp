@@ -1,0 +1,22 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Encoded pictures -> RGBA: PNG and JPEG, and WebP in a build with libwebp. The bytes say what they are, not a file's
+// name or media type.
+
+#include "budget.hpp"
+
+#include "../scene.hpp"
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+namespace voxelize::gltf {
+
+// The picture in BYTES, without a name. Its memory is charged to MEMORY in the name of WHAT before it is taken. Throws
+// gltf_error with the bare reason: a format that is not supported is named (KTX2, AVIF, ...), a size that the bytes
+// cannot hold is refused.
+[[nodiscard]] picture decode_picture(std::span<const std::byte> bytes, budget& memory, const std::string& what);
+
+} // namespace voxelize::gltf

@@ -1,0 +1,169 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// Where a material's colour comes from: the alternatives that extensions bring, and the formats of pictures.
+#include "gltf_builder.hpp"
+
+#include <gltf_scene.hpp>
+
+#include <gtest/gtest.h>
+
+using gltf_test::builder;
+using gltf_test::json;
+using voxelize::scene;
+
+namespace {
+
+constexpr bool has_webp = VOXELPIPE_TOOL_HAS_WEBP;
+
+// 2 x 2 pixels that decode to 255, 1, 0.
+constexpr const char* red_webp =
+    "data:image/webp;base64,UklGRjwAAABXRUJQVlA4IDAAAADQAQCdASoCAAIAAUAmJaACdLoB+AADsAD+8ut//NgVzXPv9//S4P0uD9Lg/"
+    "9KQAAA=";
+
+std::string uri(const char* type, const std::vector<std::byte>& bytes) {
+    return std::string("data:image/") + type + ";base64," + gltf_test::base64(bytes);
+}
+
+std::string green_png() { return uri("png", gltf_test::png(1, 1, {0, 255, 0, 255})); }
+
+// A triangle with a texture; its JSON is left to the test.
+builder with_texture(const json& texture, const json& images) {
+    builder file;
+    json& primitive = file.triangle();
+    primitive["attributes"]["TEXCOORD_0"] = file.accessor(std::vector<float>{0, 0, 1, 0, 0, 1}, "VEC2");
+    primitive["material"] = 0;
+    file.root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+    file.root["textures"] = {texture};
+    file.root["images"] = images;
+    return file;
+}
+
+scene load(const builder& file) { return voxelize::load_gltf(file.glb()); }
+
+std::string text_of(const std::vector<std::string>& lines) {
+    std::string text;
+    for (const std::string& line : lines) text += line + '\n';
+    return text;
+}
+
+// The first pixel of the picture that the triangle shows; nothing where it shows none.
+std::vector<int> first_pixel(const scene& scene) {
+    const std::int32_t texture = scene.materials.at(scene.primitives.at(0).material).texture;
+    if (texture < 0) return {};
+    const auto& rgba = scene.images.at(scene.textures.at(static_cast<std::size_t>(texture)).image).rgba;
+    return {rgba[0], rgba[1], rgba[2], rgba[3]};
+}
+
+json with_webp(int source) { return {{"source", 0}, {"extensions", {{"EXT_texture_webp", {{"source", source}}}}}}; }
+
+TEST(GltfPictures, WebpIsPreferredToItsFallback) {
+    builder file = with_texture(with_webp(1), {{{"uri", green_png()}}, {{"uri", red_webp}}});
+    file.root["extensionsUsed"] = {"EXT_texture_webp"};
+    const scene scene = load(file);
+    if (has_webp) {
+        EXPECT_EQ((std::vector<int>{255, 1, 0, 255}), first_pixel(scene));
+        EXPECT_EQ("", text_of(scene.warnings));
+        EXPECT_EQ(1U, scene.images.size()); // the other one is not even decoded
+    } else {
+        EXPECT_EQ((std::vector<int>{0, 255, 0, 255}), first_pixel(scene));
+        EXPECT_EQ("images[1] cannot be used: it is WebP, and this build has no libwebp; the texture's other picture is "
+                  "tried\n",
+                  text_of(scene.warnings));
+    }
+}
+
+TEST(GltfPictures, WebpAloneIsEnough) {
+    builder file =
+        with_texture({{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}}, json::array({{{"uri", red_webp}}}));
+    file.root["extensionsUsed"] = {"EXT_texture_webp"};
+    file.root["extensionsRequired"] = {"EXT_texture_webp"};
+    const scene scene = load(file);
+    EXPECT_EQ(has_webp, first_pixel(scene) == (std::vector<int>{255, 1, 0, 255}));
+    EXPECT_EQ(has_webp, scene.warnings.empty());
+}
+
+TEST(GltfPictures, TheFallbackStandsInForADamagedPicture) {
+    std::string cut(red_webp);
+    cut.resize(cut.size() - 44);
+    const scene scene = load(with_texture(with_webp(1), {{{"uri", green_png()}}, {{"uri", cut}}}));
+    EXPECT_EQ((std::vector<int>{0, 255, 0, 255}), first_pixel(scene));
+    ASSERT_EQ(1U, scene.warnings.size());
+    EXPECT_EQ(0U, scene.warnings[0].find("images[1] cannot be used: it ")) << scene.warnings[0];
+    EXPECT_NE(std::string::npos, scene.warnings[0].find("the texture's other picture is tried")) << scene.warnings[0];
+}
+
+TEST(GltfPictures, AWebpOfImpossibleSizeIsRefused) {
+    if (!has_webp) GTEST_SKIP() << "built without libwebp";
+    // A lossless header of 16384 x 16384 and nothing behind it.
+    std::vector<std::byte> bomb = gltf_test::bytes_of("RIFF\x18xxxWEBPVP8L");
+    for (const int byte : {0x0C, 0, 0, 0, 0x2F, 0xFF, 0xFF, 0xFF, 0x0F, 0, 0, 0, 0, 0, 0, 0})
+        bomb.push_back(static_cast<std::byte>(byte));
+    for (std::size_t i = 5; i < 8; ++i) bomb[i] = std::byte{0};
+    const scene scene = load(with_texture({{"source", 0}}, json::array({{{"uri", uri("webp", bomb)}}})));
+    EXPECT_EQ("images[0] cannot be used: its 16384 x 16384 pixels cannot come from 32 bytes; the colour factor is used "
+              "alone\n",
+              text_of(scene.warnings));
+}
+
+TEST(GltfPictures, AFormatThatIsRefusedIsNamed) {
+    const auto warning = [](const char* extension, std::string_view magic) {
+        std::vector<std::byte> bytes = gltf_test::bytes_of(magic);
+        bytes.resize(64);
+        builder file =
+            with_texture({{"extensions", {{extension, {{"source", 0}}}}}}, json::array({{{"uri", uri("png", bytes)}}}));
+        file.root["extensionsUsed"] = {extension};
+        file.root["extensionsRequired"] = {extension};
+        return text_of(load(file).warnings);
+    };
+    const std::string end = ", which is not supported (PNG, JPEG and WebP are); the colour factor is used alone\n";
+    EXPECT_EQ("images[0] cannot be used: it is KTX2" + end,
+              warning("KHR_texture_basisu", std::string_view("\xABKTX 20\xBB\r\n\x1A\n", 12)));
+    EXPECT_EQ("images[0] cannot be used: it is AVIF" + end, warning("EXT_texture_avif", std::string_view("\0\0\0\x1C"
+                                                                                                         "ftypavif",
+                                                                                                         12)));
+    EXPECT_EQ("images[0] cannot be used: it is DDS" + end, warning("MSFT_texture_dds", "DDS "));
+}
+
+TEST(GltfPictures, APlainPictureBesideKtx2IsUsedInSilence) {
+    builder file = with_texture({{"source", 0}, {"extensions", {{"KHR_texture_basisu", {{"source", 1}}}}}},
+                                {{{"uri", green_png()}}, {{"uri", "data:image/ktx2;base64,AAAA"}}});
+    file.root["extensionsUsed"] = {"KHR_texture_basisu"};
+    const scene scene = load(file);
+    EXPECT_EQ((std::vector<int>{0, 255, 0, 255}), first_pixel(scene));
+    EXPECT_EQ("", text_of(scene.warnings));
+}
+
+TEST(GltfPictures, AlternativesThatPointNowhereAreErrors) {
+    try {
+        (void)load(with_texture(with_webp(2), {{{"uri", green_png()}}, {{"uri", red_webp}}}));
+        ADD_FAILURE() << "no error";
+    } catch (const voxelize::gltf_error& error) {
+        EXPECT_STREQ("textures[0].extensions.EXT_texture_webp.source: 2 is not in images, which has 2", error.what());
+    }
+}
+
+// KHR_materials_pbrSpecularGlossiness: what is drawn is its diffuse colour, whatever the fallback says.
+TEST(GltfPictures, DiffuseTakesThePlaceOfBaseColour) {
+    builder file = with_texture({{"source", 0}}, json::array({{{"uri", green_png()}}}));
+    file.root["extensionsUsed"] = {"KHR_materials_pbrSpecularGlossiness"};
+    json& material = file.root["materials"][0];
+    material = {{"alphaMode", "MASK"},
+                {"extensions",
+                 {{"KHR_materials_pbrSpecularGlossiness",
+                   {{"diffuseTexture", {{"index", 0}}}, {"diffuseFactor", {1, 0.5, 0.25, 0.75}}}}}}};
+    scene scene = load(file);
+    EXPECT_EQ("", text_of(scene.warnings));
+    EXPECT_EQ((std::vector<int>{0, 255, 0, 255}), first_pixel(scene));
+    EXPECT_EQ(glm::vec4(1, 0.5F, 0.25F, 0.75F), scene.materials[0].base_color);
+    EXPECT_EQ(voxelize::alpha_mode::mask, scene.materials[0].alpha);
+    EXPECT_EQ(3U, scene.primitives[0].texcoords.size());
+
+    material["pbrMetallicRoughness"]["baseColorFactor"] = {0, 0, 1, 1};
+    EXPECT_EQ(glm::vec4(1, 0.5F, 0.25F, 0.75F), load(file).materials[0].base_color);
+    material["extensions"]["KHR_materials_pbrSpecularGlossiness"] = json::object(); // its own default is white
+    scene = load(file);
+    EXPECT_EQ(glm::vec4(1), scene.materials[0].base_color);
+    EXPECT_TRUE(first_pixel(scene).empty());
+}
+
+} // namespace
