@@ -46,7 +46,7 @@ scene load(std::span<const std::byte> bytes, const gltf_file_reader& read_file, 
     gltf::primitive_reader primitives{model, accessors, materials, memory, result};
     for (const gltf::shown_mesh& shown : gltf::shown_meshes(model, result.warnings))
         for (std::size_t part = 0; part < model.meshes[shown.mesh].primitives.size(); ++part)
-            primitives.read(shown.mesh, part, shown.to_world);
+            primitives.show(shown.mesh, part, shown.to_world);
     primitives.finish();
     return result;
 }

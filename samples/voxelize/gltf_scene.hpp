@@ -4,9 +4,9 @@
 // glTF 2.0 (.gltf and .glb) -> scene. What a file may ask for is bounded by its own size before any memory is taken:
 // a malformed or hostile file gives a gltf_error of one line, never a crash, a hang or a huge allocation.
 //
-// Positions are taken as the file gives them after node transforms: no axis swap, no recentring. Node matrices are
-// composed in double and a position is rounded to float once, with every operation written out, so the same file gives
-// the same bits whatever the compiler's floating-point flags.
+// Positions are taken as the file gives them: no axis swap, no recentring. Node transforms are composed in double and
+// stay apart from the positions, with every operation written out, so the same file gives the same bits whatever the
+// compiler's floating-point flags. A mesh that many nodes show is kept once.
 //
 // What is not supported: where geometry would be lost (Draco or meshopt compression, GPU instancing, required
 // extensions that are not known) the load fails and says so; otherwise scene::warnings names it. Skinned meshes stand

@@ -34,9 +34,11 @@ void run(const command_line& options) {
     report.vertices = model.vertex_count();
     for (const material& m : model.materials) report.materials.push_back(m.name);
     if (model.triangle_count() == 0) throw gltf_error("there are no triangles to voxelize");
-    const bounding_box bounds = bounds_of(model);
+    const bounding_box bounds = bounds_of(model, options.voxelize.threads);
     if (bounds.empty) throw gltf_error("no triangle has a corner at a finite position");
     report.request.grid = place_grid(options.grid, bounds);
+    if (std::string warning = precision_warning(model, report.request.grid); !warning.empty())
+        report.warnings.push_back(std::move(warning));
     report.stats.milliseconds.emplace_back("read", milliseconds_since(start));
 
     bar.start("voxelizing");

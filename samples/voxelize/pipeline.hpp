@@ -6,6 +6,7 @@
 // and resolves it into the volume.
 
 #include "parallel.hpp"
+#include "placement.hpp"
 #include "resolve.hpp"
 #include "surface.hpp"
 #include "voxelizer.hpp"
@@ -70,11 +71,16 @@ public:
         const stage_timer timer{*this, "upload"};
         tables_.push_back({backend_, one(make_color_tables())});
         upload_pictures(model);
-        for (primitive& part : model.primitives) upload_primitive(part, model);
-        draw_table_.push_back({backend_, numbered_draws_});
-        stats_.triangles = num_triangles_;
+        reference_ = reference_point(request.grid);
+        relative_grid_ = request.grid;
+        relative_grid_.origin -= reference_;
+        for (const instance& shown : model.instances)
+            num_triangles_ += model.primitives[shown.primitive].triangles.size();
         if (wants(target::triangle) && num_triangles_ > INT32_MAX)
             throw std::runtime_error("more triangles than --target triangle can number");
+        upload_primitives(model);
+        draw_table_.push_back({backend_, numbered_draws_});
+        stats_.triangles = num_triangles_;
         only_bits_ = !any_mask_ && !wants(target::color) && !wants(target::color_max) &&
                      !wants(target::color_replace) && !wants(target::normal) && !wants(target::material) &&
                      !wants(target::triangle) && !wants(target::depth);
@@ -98,7 +104,7 @@ public:
         for (int slab = 0; slab < num_slabs; ++slab) {
             const int begin = slab * depth;
             const glm::ivec3 size{grid.extent.x, grid.extent.y, std::min(depth, grid.extent.z - begin)};
-            const voxelpipe::grid part = grid.crop({0, 0, begin}, size);
+            const voxelpipe::grid part = relative_grid_.crop({0, 0, begin}, size);
             report_ = [this, slab, num_slabs](double done) {
                 if (request_.progress) request_.progress((slab + done) / num_slabs);
             };
@@ -115,7 +121,7 @@ private:
     using buffer = typename Backend::template buffer<T>;
     using mesh_view = vp::mesh_view<>;
     using surface_draw = vp::draw<mesh_view, surface_vertex_shader, surface_fragment_shader>;
-    using bits_draw = vp::draw<mesh_view, vp::passthrough, vp::solid<bool, std::uint32_t>>;
+    using bits_draw = vp::draw<mesh_view, placed_vertex_shader, vp::solid<bool, std::uint32_t>>;
 
     // In the order of surface_fragment_shader's outputs.
     enum : std::size_t { occupancy, count, color_sum, color_max, color_last, normal_sum, triangle, depth, num_targets };
@@ -185,34 +191,64 @@ private:
         return result;
     }
 
-    void upload_primitive(primitive& part, const scene& model) {
-        const material& m = model.materials[part.material];
-        positions_.push_back({backend_, part.positions});
-        triangles_.push_back({backend_, part.triangles});
-        texcoords_.push_back({backend_, part.texcoords});
-        colors_.push_back({backend_, part.colors});
+    // Every primitive once, then a draw for each instance.
+    void upload_primitives(scene& model) {
+        std::vector<char> mirrored(model.primitives.size());
+        for (const instance& shown : model.instances)
+            if (shown.to_world.mirrors()) mirrored[shown.primitive] = 1;
+        for (std::size_t i = 0; i < model.primitives.size(); ++i) {
+            primitive& part = model.primitives[i];
+            uploaded_primitive& done =
+                primitives_.emplace_back(uploaded_primitive{{backend_, part.positions},
+                                                            {backend_, part.triangles},
+                                                            {},
+                                                            {backend_, part.texcoords},
+                                                            {backend_, part.colors},
+                                                            {},
+                                                            {},
+                                                            static_cast<std::int32_t>(part.material)});
+            if (mirrored[i] != 0) {
+                std::vector<glm::uvec3> turned = part.triangles;
+                for (glm::uvec3& corners : turned) std::swap(corners.y, corners.z);
+                done.mirrored_triangles.push_back({backend_, turned});
+            }
+            const material& m = model.materials[part.material];
+            if (!part.texcoords.empty()) done.vertex_shader.texcoords = done.texcoords.data();
+            if (!part.colors.empty()) done.vertex_shader.colors = done.colors.data();
+            done.fragment_shader = fragment_shader_of(m, model, !part.texcoords.empty());
+            any_mask_ = any_mask_ || m.alpha == alpha_mode::mask;
+            if constexpr (memory_access<Backend>::on_host) part = {};
+        }
+        std::uint64_t first_triangle = 0;
+        for (const instance& shown : model.instances) {
+            const uploaded_primitive& part = primitives_[shown.primitive];
+            const auto& triangles = shown.to_world.mirrors() ? part.mirrored_triangles.front() : part.triangles;
+            mesh_view mesh{part.positions.view(), triangles.view()};
+            // The scene's indices are in range.
+            mesh.checked = {mesh.triangles.data(), mesh.triangles.size(), mesh.positions.size()};
+            const placed_vertex_shader place{shown.to_world, reference_};
+            surface_vertex_shader vertex_shader = part.vertex_shader;
+            vertex_shader.place = place;
+            draws_.push_back({mesh, vertex_shader, part.fragment_shader});
+            bits_draws_.push_back({mesh, place, vp::constant(true, 1U)});
+            numbered_draws_.push_back({first_triangle, part.material});
+            first_triangle += mesh.triangles.size();
+        }
+    }
 
-        surface_vertex_shader vertex_shader;
-        if (!part.texcoords.empty()) vertex_shader.texcoords = texcoords_.back().data();
-        if (!part.colors.empty()) vertex_shader.colors = colors_.back().data();
-        surface_fragment_shader fragment_shader;
-        if (!part.texcoords.empty()) fragment_shader.texture = texture_of(m, model);
-        fragment_shader.tables = tables_.front().data();
-        fragment_shader.base_color = m.base_color;
-        fragment_shader.alpha = m.alpha;
-        fragment_shader.alpha_cutoff = m.alpha_cutoff;
-        fragment_shader.centers = {request_.grid.origin, request_.grid.voxel_size};
-        fragment_shader.depth_axis = request_.depth_axis;
-        fragment_shader.wanted = {wants(target::color), wants(target::color_max) || wants(target::color_replace),
-                                  wants(target::depth)};
-        const mesh_view mesh{positions_.back().view(), triangles_.back().view()};
-        draws_.push_back({mesh, vertex_shader, fragment_shader});
-        bits_draws_.push_back({mesh, vp::passthrough{}, vp::constant(true, 1U)});
-
-        any_mask_ = any_mask_ || m.alpha == alpha_mode::mask;
-        numbered_draws_.push_back({num_triangles_, static_cast<std::int32_t>(part.material)});
-        num_triangles_ += part.triangles.size();
-        if constexpr (memory_access<Backend>::on_host) part = {};
+    [[nodiscard]] surface_fragment_shader fragment_shader_of(const material& m, const scene& model, bool textured) {
+        surface_fragment_shader shader;
+        if (textured) shader.texture = texture_of(m, model);
+        shader.tables = tables_.front().data();
+        shader.base_color = m.base_color;
+        shader.alpha = m.alpha;
+        shader.alpha_cutoff = m.alpha_cutoff;
+        shader.centers = {relative_grid_.origin, relative_grid_.voxel_size};
+        shader.depth_axis = request_.depth_axis;
+        shader.depth_reference = reference_[request_.depth_axis];
+        shader.wanted = {wants(target::color), wants(target::color_max) || wants(target::color_replace),
+                         wants(target::depth)};
+        return shader;
     }
 
     // ---- slabs -----------------------------------------------------------------------------------------------------
@@ -359,14 +395,23 @@ private:
     bool any_mask_ = false;
     bool only_bits_ = false;
     std::function<void(double)> report_;
+    glm::dvec3 reference_{0.0};     // what positions are relative to; see reference_point
+    voxelpipe::grid relative_grid_; // the grid, its origin taken from there
 
     // The scene in the backend's memory; draws point into it.
     std::vector<buffer<color_tables>> tables_;
     std::vector<buffer<glm::u8vec4>> texels_; // of each picture
-    std::vector<buffer<glm::vec3>> positions_;
-    std::vector<buffer<glm::uvec3>> triangles_;
-    std::vector<buffer<glm::vec2>> texcoords_;
-    std::vector<buffer<glm::vec4>> colors_;
+    struct uploaded_primitive {
+        buffer<glm::vec3> positions;
+        buffer<glm::uvec3> triangles;
+        std::vector<buffer<glm::uvec3>> mirrored_triangles; // one, where an instance mirrors
+        buffer<glm::vec2> texcoords;
+        buffer<glm::vec4> colors;
+        surface_vertex_shader vertex_shader; // all but its place
+        surface_fragment_shader fragment_shader;
+        std::int32_t material;
+    };
+    std::vector<uploaded_primitive> primitives_;
     std::vector<surface_draw> draws_;
     std::vector<bits_draw> bits_draws_;
     std::unique_ptr<surface_framebuffer> surface_framebuffer_;

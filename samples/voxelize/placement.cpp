@@ -2,13 +2,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "placement.hpp"
 
+#include "parallel.hpp"
+
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <sstream>
 #include <string>
+#include <vector>
 
 namespace voxelize {
 
 namespace {
+
+bool is_finite(const glm::vec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
 // Keeps surfaces that lie in the faces of the bounding box off the grid's border, where rounding would decide whether
 // they are inside: a ten-thousandth of the longest side.
@@ -52,23 +60,92 @@ voxelpipe::grid fit_voxel_size(const glm::dvec3& voxel, int padding, const bound
 
 } // namespace
 
-bounding_box bounds_of(const scene& model) {
-    bounding_box box;
-    for (const primitive& part : model.primitives) {
-        for (const glm::uvec3& corners : part.triangles) {
-            for (int i = 0; i < 3; ++i) {
-                const glm::dvec3 p = part.positions[corners[i]];
-                if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) continue;
-                box.low = box.empty ? p : glm::min(box.low, p);
-                box.high = box.empty ? p : glm::max(box.high, p);
-                box.empty = false;
-            }
-        }
+bounding_box bounds_of(const scene& model, int threads) {
+    std::vector<std::vector<bool>> corners(model.primitives.size()); // of each primitive: which vertices are any
+    parallel_for(model.primitives.size(), thread_count(threads), [&](std::size_t n) {
+        const primitive& part = model.primitives[n];
+        corners[n].resize(part.positions.size());
+        for (const glm::uvec3& triangle : part.triangles)
+            for (int i = 0; i < 3; ++i) corners[n][triangle[i]] = true;
+        for (std::size_t i = 0; i < part.positions.size(); ++i)
+            if (const glm::vec3& p = part.positions[i]; !is_finite(p)) corners[n][i] = false;
+    });
+
+    struct piece {
+        const instance* shown;
+        std::size_t begin, end; // of its vertices
+    };
+    constexpr std::size_t piece_size = 1 << 16;
+    std::vector<piece> pieces;
+    for (const instance& shown : model.instances) {
+        const std::size_t count = model.primitives[shown.primitive].positions.size();
+        for (std::size_t begin = 0; begin < count; begin += piece_size)
+            pieces.push_back({&shown, begin, std::min(count, begin + piece_size)});
     }
-    return box;
+    std::vector<bounding_box> boxes(pieces.size());
+    parallel_for(pieces.size(), thread_count(threads), [&](std::size_t n) {
+        const auto& [shown, begin, end] = pieces[n];
+        const std::vector<glm::vec3>& positions = model.primitives[shown->primitive].positions;
+        for (std::size_t i = begin; i < end; ++i) {
+            if (!corners[shown->primitive][i]) continue;
+            const glm::dvec3 p = shown->to_world(positions[i]);
+            // What is no float is not drawn.
+            if (is_finite(glm::vec3(p))) boxes[n].include({p, p, false});
+        }
+    });
+    bounding_box all;
+    for (const bounding_box& box : boxes) all.include(box);
+    return all;
 }
 
-voxelpipe::grid place_grid(const grid_request& request, const bounding_box& bounds) {
+glm::dvec3 reference_point(const voxelpipe::grid& grid) {
+    const glm::ivec3 whole = grid.whole_extent();
+    const int fraction = voxelpipe::core::fraction_bits(std::max({whole.x, whole.y, whole.z}));
+    const double most = static_cast<double>(std::int64_t{1} << (24 - fraction)); // voxels from zero
+    for (int axis = 0; axis < 3; ++axis) {
+        const double size = grid.voxel_size[axis];
+        const double low = grid.origin[axis];
+        const double high = std::fma(whole[axis], size, low);
+        if (std::max(std::abs(low), std::abs(high)) > most * size) return grid.origin;
+    }
+    return glm::dvec3(0);
+}
+
+std::string precision_warning(const scene& model, const voxelpipe::grid& grid) {
+    std::vector<glm::vec3> greatest(model.primitives.size(), glm::vec3(0)); // coordinate of each primitive, by axis
+    for (std::size_t n = 0; n < greatest.size(); ++n)
+        for (const glm::vec3& p : model.primitives[n].positions)
+            if (is_finite(p)) greatest[n] = glm::max(greatest[n], glm::abs(p));
+
+    constexpr double harmless = 0.25; // of a voxel: rounding is off by half of that at most
+    double worst = harmless;
+    std::string text;
+    for (const instance& shown : model.instances) {
+        const glm::vec3& reach = greatest[shown.primitive];
+        for (std::size_t row = 0; row < 3; ++row) {
+            double step = 0; // between neighbouring positions, along this axis of the world
+            for (std::size_t column = 0; column < 3; ++column) {
+                const float at = reach[static_cast<glm::length_t>(column)];
+                const float next = std::nextafter(at, std::numeric_limits<float>::infinity());
+                step = std::fma(std::abs(shown.to_world.m[row][column]), double{next} - double{at}, step);
+            }
+            const double voxel = grid.voxel_size[static_cast<glm::length_t>(row)];
+            if (!(step > worst * voxel)) continue;
+            worst = step / voxel;
+            std::ostringstream line;
+            line << "the positions of \"" << model.primitives[shown.primitive].name << "\" are floats of up to "
+                 << std::max({reach.x, reach.y, reach.z}) << ", which lie " << step
+                 << " apart in the world, and voxels are " << voxel << " wide: the surface may be off by "
+                 << step / voxel / 2 << " voxels. Small positions under a node's translation would keep their digits";
+            text = line.str();
+        }
+    }
+    return text;
+}
+
+namespace {
+
+voxelpipe::grid place(const grid_request& request, const bounding_box& bounds) {
     if (request.padding < 0) throw grid_error("--padding cannot be negative");
     voxelpipe::grid grid;
     if (request.origin || request.extent) {
@@ -94,6 +171,15 @@ voxelpipe::grid place_grid(const grid_request& request, const bounding_box& boun
     if (const voxelpipe::status status = voxelpipe::validate(grid); !status.ok())
         throw grid_error(std::string("the grid is not usable: ") + voxelpipe::to_string(status.code));
     return grid;
+}
+
+} // namespace
+
+voxelpipe::grid place_grid(const grid_request& request, const bounding_box& bounds) {
+    // The bounds of what is drawn: of positions as they are rounded.
+    const bounding_box rounded{glm::vec3(bounds.low), glm::vec3(bounds.high), bounds.empty};
+    const voxelpipe::grid grid = place(request, rounded);
+    return reference_point(grid) == glm::dvec3(0) ? grid : place(request, bounds);
 }
 
 } // namespace voxelize

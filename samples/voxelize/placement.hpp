@@ -11,6 +11,7 @@
 
 #include <optional>
 #include <stdexcept>
+#include <string>
 
 namespace voxelize {
 
@@ -36,10 +37,28 @@ struct bounding_box {
     glm::dvec3 low{0.0};
     glm::dvec3 high{0.0};
     bool empty = true;
+
+    void include(const bounding_box& other) {
+        if (other.empty) return;
+        low = empty ? other.low : glm::min(low, other.low);
+        high = empty ? other.high : glm::max(high, other.high);
+        empty = false;
+    }
 };
 
-// Of the corners of the scene's triangles; those with a position that is not finite are left out.
-[[nodiscard]] bounding_box bounds_of(const scene& model);
+// Of the corners of the scene's triangles in world space, in double; those with a position that is not finite are left
+// out. THREADS <= 0 takes one for each core.
+[[nodiscard]] bounding_box bounds_of(const scene& model, int threads = 0);
+
+// What positions are taken relative to before they are rounded to float, for the library to snap: the world's own
+// origin, as long as a float there is no coarser than the grid's sub-voxel lattice at any corner of the grid; otherwise
+// the grid's lowest corner. So no precision is lost at any distance, and models near the origin are drawn by their
+// world positions.
+[[nodiscard]] glm::dvec3 reference_point(const voxelpipe::grid& grid);
+
+// One line where the model's own floats are so far apart that its surface may be off by more than an eighth of a voxel,
+// with the figures of the worst mesh; empty where they are not. Nothing that the tool does can bring the digits back.
+[[nodiscard]] std::string precision_warning(const scene& model, const voxelpipe::grid& grid);
 
 // Throws grid_error.
 [[nodiscard]] voxelpipe::grid place_grid(const grid_request& request, const bounding_box& bounds);

@@ -1,9 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the tool voxelizes: triangles in world space with the base colour of their materials, in plain vectors.
-// Nothing here knows of the file format that it came from. Everything is valid as it stands: every index points into
-// its list, every optional list is empty or has one entry a vertex.
+// What the tool voxelizes: triangles with the base colour of their materials, in plain vectors, each mesh once, and the
+// places where it stands. Nothing here knows of the file format that it came from. Everything is valid as it stands:
+// every index points into its list, every optional list is empty or has one entry a vertex.
+
+#include "affine.hpp"
 
 #include <glm/glm.hpp>
 
@@ -54,31 +56,40 @@ struct material {
     bool double_sided = false;
 };
 
-// One list of triangles with one material. A mesh that several nodes show gives one primitive for each of them.
+// One list of triangles with one material, in the coordinates of its mesh. It is shown only where an instance says so.
 struct primitive {
     std::string name;                  // the mesh's name, or where it stands in the file; for messages
-    std::vector<glm::vec3> positions;  // world space, the file's units and axes
+    std::vector<glm::vec3> positions;  // the mesh's own coordinates, as the file has them
     std::vector<glm::uvec3> triangles; // indices into positions, counter-clockwise seen from the front
     std::vector<glm::vec2> texcoords;  // of the base-colour texture, its transform applied; empty: no texture
     std::vector<glm::vec4> colors;     // linear vertex colours and alpha; empty: white
     std::uint32_t material = 0;        // index into scene::materials
 };
 
+// A primitive at one place of the world. Nothing is copied for it. A transform that mirrors exchanges the last two
+// corners of every triangle, so that fronts stay fronts.
+struct instance {
+    std::uint32_t primitive = 0; // index into scene::primitives
+    affine to_world;             // to the file's units and axes; finite
+};
+
 struct scene {
     std::vector<primitive> primitives;
+    std::vector<instance> instances; // what is drawn, in this order; later triangles win where only one can
     std::vector<material> materials; // the file's, in its order; then, where one is needed, the default material
     std::vector<texture> textures;
     std::vector<picture> images;
     std::vector<std::string> warnings; // what was left out or put right; one line each
 
+    // Of all instances: a primitive that is shown twice counts twice.
     [[nodiscard]] std::uint64_t vertex_count() const {
         std::uint64_t count = 0;
-        for (const primitive& part : primitives) count += part.positions.size();
+        for (const instance& shown : instances) count += primitives[shown.primitive].positions.size();
         return count;
     }
     [[nodiscard]] std::uint64_t triangle_count() const {
         std::uint64_t count = 0;
-        for (const primitive& part : primitives) count += part.triangles.size();
+        for (const instance& shown : instances) count += primitives[shown.primitive].triangles.size();
         return count;
     }
 };

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The tool's shaders: world-space triangles in, one value for each of the tool's render targets out. Base colour =
-// factor * texture * vertex colour, in linear light. Plain functors over pointers, for every backend; floats follow the
-// rule of voxelpipe/core/exact.hpp, so the CPU and a GPU give the same bits.
+// The tool's shaders: triangles of a mesh and the place where it stands in, one value for each of the tool's render
+// targets out. Base colour = factor * texture * vertex colour, in linear light. Plain functors over pointers, for every
+// backend; floats follow the rule of voxelpipe/core/exact.hpp, so the CPU and a GPU give the same bits.
 
 #include "scene.hpp"
 #include "srgb.hpp"
@@ -88,10 +88,10 @@ struct sampled_texture {
 struct surface_varyings {
     glm::vec2 texcoord;
     glm::vec4 color;
-    glm::vec3 position; // world space
+    glm::vec3 position; // world, relative to the reference point
 };
 
-// World coordinates of voxel centres, for nearest_on_triangle.
+// Voxel centres in the coordinates of surface_varyings::position, for nearest_on_triangle.
 struct voxel_centers {
     glm::dvec3 origin{0.0};
     glm::dvec3 voxel_size{1.0};
@@ -140,15 +140,42 @@ struct voxel_centers {
     return nearest;
 }
 
+// From a mesh's own coordinates to the world's, relative to the reference point: in double, rounded to float once.
+struct placed_vertex_shader {
+    double m[3][4]; // as affine has it
+
+    placed_vertex_shader() : placed_vertex_shader(affine{}, glm::dvec3(0)) {}
+    placed_vertex_shader(const affine& to_world, const glm::dvec3& reference) {
+        for (std::size_t r = 0; r < 3; ++r) {
+            for (std::size_t c = 0; c < 3; ++c) m[r][c] = to_world.m[r][c];
+            m[r][3] = to_world.m[r][3] - reference[static_cast<glm::length_t>(r)];
+        }
+    }
+
+    [[nodiscard]] VOXELPIPE_HD glm::vec3 operator()(const glm::vec3& p) const {
+        const double x = vp::exact::to_double(p.x);
+        const double y = vp::exact::to_double(p.y);
+        const double z = vp::exact::to_double(p.z);
+        glm::vec3 result;
+        for (int r = 0; r < 3; ++r)
+            result[r] = vp::exact::to_float(
+                vp::exact::fma(m[r][0], x, vp::exact::fma(m[r][1], y, vp::exact::fma(m[r][2], z, m[r][3]))));
+        return result;
+    }
+    VOXELPIPE_HD glm::vec3 operator()(const vp::vertex<>& v) const { return (*this)(v.position); }
+};
+
 // Attributes by pointer, so that a primitive without them needs no array of ones.
 struct surface_vertex_shader {
+    placed_vertex_shader place;
     const glm::vec2* texcoords = nullptr; // null: 0
     const glm::vec4* colors = nullptr;    // null: white
 
     VOXELPIPE_HD vp::vertex_output<surface_varyings> operator()(const vp::vertex<>& v) const {
-        return {v.position,
+        const glm::vec3 position = place(v.position);
+        return {position,
                 {texcoords != nullptr ? texcoords[v.index] : glm::vec2(0.0f),
-                 colors != nullptr ? colors[v.index] : glm::vec4(1.0f), v.position}};
+                 colors != nullptr ? colors[v.index] : glm::vec4(1.0f), position}};
     }
 };
 
@@ -170,6 +197,7 @@ struct surface_fragment_shader {
     float alpha_cutoff = 0.5f;
     voxel_centers centers;
     int depth_axis = 2;
+    double depth_reference = 0; // of the reference point, along depth_axis
     surface_outputs wanted;
 
     VOXELPIPE_HD auto operator()(const vp::fragment<surface_varyings>& f) const {
@@ -184,8 +212,8 @@ struct surface_fragment_shader {
         }
         glm::u8vec4 encoded(0);
         if (wanted.encoded_color) encoded = encode(*tables, color);
-        return vp::outputs(true, 1u, color, encoded, encoded, f.normal, f.primitive, at.position[depth_axis])
-            .discard_if(discarded);
+        const float depth = vp::exact::to_float(vp::exact::to_double(at.position[depth_axis]) + depth_reference);
+        return vp::outputs(true, 1u, color, encoded, encoded, f.normal, f.primitive, depth).discard_if(discarded);
     }
 
     // Linear, every component in [0, 1].

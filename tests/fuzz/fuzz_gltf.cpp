@@ -28,6 +28,10 @@ void check(const voxelize::scene& scene) {
             require(t.x < part.positions.size() && t.y < part.positions.size() && t.z < part.positions.size(),
                     "vertex index out of range");
     }
+    for (const voxelize::instance& shown : scene.instances) {
+        require(shown.primitive < scene.primitives.size(), "primitive out of range");
+        require(shown.to_world.is_finite(), "transform that is not finite");
+    }
     for (const voxelize::material& material : scene.materials)
         require(material.texture >= -1 && material.texture < static_cast<std::int64_t>(scene.textures.size()),
                 "texture out of range");

@@ -26,7 +26,7 @@ std::string outcome(const fs::path& file) {
     try {
         const voxelize::scene scene = voxelize::load_gltf(file);
         std::ostringstream text;
-        text << "ok: " << scene.primitives.size() << " primitives, " << scene.triangle_count() << " triangles, "
+        text << "ok: " << scene.instances.size() << " primitives, " << scene.triangle_count() << " triangles, "
              << scene.vertex_count() << " vertices, " << scene.images.size() << " images\n";
         for (const std::string& warning : scene.warnings) text << "  warning: " << warning << '\n';
         return text.str();

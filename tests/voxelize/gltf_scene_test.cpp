@@ -53,6 +53,14 @@ TEST(GltfScene, EveryIndexTypeGivesTheSameTriangles) {
     EXPECT_EQ(expected, with(std::uint32_t{}, "SCALAR"));
 }
 
+// World positions of the corners of instance N.
+std::vector<glm::vec3> world_positions(const scene& scene, std::size_t n) {
+    const voxelize::instance& shown = scene.instances.at(n);
+    std::vector<glm::vec3> result;
+    for (const glm::vec3& p : scene.primitives.at(shown.primitive).positions) result.emplace_back(shown.to_world(p));
+    return result;
+}
+
 // Positions in a plane, corner i at (i, i % 2).
 builder zigzag(int corners) {
     builder file;
@@ -118,7 +126,7 @@ TEST(GltfScene, QuantizedPositionsAreIntegersOrFractions) {
         file.root["extensionsRequired"] = {"KHR_mesh_quantization"};
         file.mesh({{"POSITION",
                     file.accessor(std::vector<Value>{least, 0, most, most, 0, 0, 0, most, 0}, "VEC3", normalized)}});
-        return load(file).primitives.at(0).positions.at(0);
+        return world_positions(load(file), 0).at(0);
     };
     EXPECT_EQ(glm::vec3(-1, 0, 1), with(std::int8_t{-128}, std::int8_t{127}, true));
     EXPECT_EQ(glm::vec3(-128, 0, 127), with(std::int8_t{-128}, std::int8_t{127}, false));
@@ -212,7 +220,7 @@ TEST(GltfScene, NodeTransformsComposeFromTheRoot) {
         {{"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1}}, {"mesh", 0}},
     };
     const scene scene = load(file);
-    const auto& p = scene.primitives.at(0).positions;
+    const std::vector<glm::vec3> p = world_positions(scene, 0);
     const std::vector<glm::vec3> expected{{10, 0, 10}, {10, 2, 10}, {8, 0, 10}};
     for (std::size_t i = 0; i < 3; ++i) EXPECT_LT(glm::length(p.at(i) - expected[i]), 1e-6F) << i;
     EXPECT_EQ(triangles({{0, 1, 2}}), scene.primitives[0].triangles);
@@ -224,33 +232,51 @@ TEST(GltfScene, MatricesAreComposedInDouble) {
     file.triangle();
     file.root["nodes"] = {{{"translation", {16777217.0, 0, 0}}, {"children", {1}}},
                           {{"translation", {-16777216.0, 0, 0}}, {"mesh", 0}}};
-    EXPECT_EQ(glm::vec3(1, 0, 0), load(file).primitives.at(0).positions.at(0));
+    EXPECT_EQ(glm::vec3(1, 0, 0), world_positions(load(file), 0).at(0));
 }
 
 TEST(GltfScene, QuaternionsAreBroughtToLengthOne) {
     builder file;
     file.triangle();
     file.root["nodes"][0]["rotation"] = {0, 0, 3, 3};
-    EXPECT_LT(glm::length(load(file).primitives.at(0).positions.at(1) - glm::vec3(0, 1, 0)), 1e-6F);
+    EXPECT_LT(glm::length(world_positions(load(file), 0).at(1) - glm::vec3(0, 1, 0)), 1e-6F);
 }
 
-TEST(GltfScene, MirroringExchangesTheWinding) {
+TEST(GltfScene, TransformsKnowWhetherTheyMirror) {
     builder file;
     file.triangle();
-    file.root["nodes"][0]["scale"] = {-1, 1, 1};
-    EXPECT_EQ(triangles({{0, 2, 1}}), load(file).primitives.at(0).triangles);
-    file.root["nodes"][0]["scale"] = {-1, -1, 1};
-    EXPECT_EQ(triangles({{0, 1, 2}}), load(file).primitives.at(0).triangles);
+    const auto mirrors = [&](const std::vector<double>& scale) {
+        file.root["nodes"][0]["scale"] = scale;
+        const scene scene = load(file);
+        EXPECT_EQ(triangles({{0, 1, 2}}), scene.primitives.at(0).triangles);
+        return scene.instances.at(0).to_world.mirrors();
+    };
+    EXPECT_TRUE(mirrors({-1, 1, 1}));
+    EXPECT_FALSE(mirrors({-1, -1, 1}));
 }
 
-TEST(GltfScene, AMeshIsShownByEachOfItsNodes) {
+TEST(GltfScene, AMeshIsKeptOnceAndShownByEachOfItsNodes) {
     builder file;
     file.triangle();
     file.append("nodes", {{"mesh", 0}, {"translation", {0, 0, 3}}});
     const scene scene = load(file);
-    ASSERT_EQ(2U, scene.primitives.size());
-    EXPECT_EQ(glm::vec3(1, 0, 0), scene.primitives[0].positions[1]);
-    EXPECT_EQ(glm::vec3(1, 0, 3), scene.primitives[1].positions[1]);
+    EXPECT_EQ(1U, scene.primitives.size());
+    ASSERT_EQ(2U, scene.instances.size());
+    EXPECT_EQ(glm::vec3(1, 0, 0), world_positions(scene, 0)[1]);
+    EXPECT_EQ(glm::vec3(1, 0, 3), world_positions(scene, 1)[1]);
+    EXPECT_EQ(2U, scene.triangle_count());
+    EXPECT_EQ(6U, scene.vertex_count());
+}
+
+TEST(GltfScene, NodesWithoutAFinitePlaceAreLeftOut) {
+    builder file;
+    file.triangle();
+    file.root["nodes"] = {{{"scale", {1e200, 1e200, 1e200}}, {"children", {1}}},
+                          {{"scale", {1e200, 1e200, 1e200}}, {"mesh", 0}},
+                          {{"mesh", 0}}};
+    const scene scene = load(file);
+    EXPECT_EQ(1U, scene.instances.size());
+    EXPECT_TRUE(warns(scene, "1 node(s) with a transform that is not finite"));
 }
 
 TEST(GltfScene, TheDefaultSceneIsTakenElseTheFirst) {
@@ -260,14 +286,14 @@ TEST(GltfScene, TheDefaultSceneIsTakenElseTheFirst) {
     file.append("nodes", {{"mesh", 0}, {"translation", {9, 0, 0}}});
     file.root["scenes"] = {{{"nodes", {1}}}, {{"nodes", {2}}}};
     scene first = load(file);
-    ASSERT_EQ(1U, first.primitives.size());
-    EXPECT_EQ(7, first.primitives[0].positions[0].x);
+    ASSERT_EQ(1U, first.instances.size());
+    EXPECT_EQ(7, world_positions(first, 0)[0].x);
     EXPECT_TRUE(warns(first, "2 scenes"));
     file.root["scene"] = 1;
-    EXPECT_EQ(9, load(file).primitives.at(0).positions[0].x);
+    EXPECT_EQ(9, world_positions(load(file), 0)[0].x);
     file.root.erase("scene");
     file.root.erase("scenes");
-    EXPECT_EQ(3U, load(file).primitives.size());
+    EXPECT_EQ(3U, load(file).instances.size());
 }
 
 TEST(GltfScene, MeshesWithoutAnyNodeStandAsTheyAre) {

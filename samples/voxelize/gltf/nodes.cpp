@@ -95,6 +95,7 @@ std::vector<shown_mesh> shown_meshes(const tinygltf::Model& model, std::vector<s
     for (std::size_t i = roots.size(); i-- > 0;) pending.push_back({roots[i], affine{}});
     std::vector<bool> seen(model.nodes.size());
     std::vector<shown_mesh> shown;
+    std::size_t without_place = 0;
     while (!pending.empty()) {
         const visit current = pending.back();
         pending.pop_back();
@@ -103,10 +104,13 @@ std::vector<shown_mesh> shown_meshes(const tinygltf::Model& model, std::vector<s
         seen[current.node] = true;
         const tinygltf::Node& node = model.nodes[current.node];
         const affine to_world = current.parent_to_world.after(local_transform(node, current.node));
-        if (node.mesh >= 0) shown.push_back({static_cast<std::size_t>(node.mesh), to_world});
+        if (node.mesh >= 0 && to_world.is_finite()) shown.push_back({static_cast<std::size_t>(node.mesh), to_world});
+        if (node.mesh >= 0 && !to_world.is_finite()) ++without_place;
         for (std::size_t i = node.children.size(); i-- > 0;)
             pending.push_back({static_cast<std::size_t>(node.children[i]), to_world});
     }
+    if (without_place != 0)
+        warnings.push_back(std::to_string(without_place) + " node(s) with a transform that is not finite are left out");
     if (shown.empty() && !model.meshes.empty()) warnings.push_back("no node of the scene shows a mesh");
     return shown;
 }

@@ -3,7 +3,7 @@
 #pragma once
 // The node hierarchy -> the meshes that the scene shows, each with its world transform.
 
-#include "affine.hpp"
+#include "../affine.hpp"
 
 #include <tiny_gltf.h>
 

@@ -4,7 +4,9 @@
 
 #include "text.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -15,8 +17,7 @@ std::uint64_t triangle_count(int mode, std::uint64_t count) {
     return count < 3 ? 0 : count - 2;
 }
 
-std::vector<glm::uvec3> unrolled(int mode, const std::vector<std::uint32_t>& indices, std::uint64_t count,
-                                 bool mirror) {
+std::vector<glm::uvec3> unrolled(int mode, const std::vector<std::uint32_t>& indices, std::uint64_t count) {
     const auto index = [&](std::uint64_t i) {
         return indices.empty() ? static_cast<std::uint32_t>(i) : indices[static_cast<std::size_t>(i)];
     };
@@ -34,23 +35,33 @@ std::vector<glm::uvec3> unrolled(int mode, const std::vector<std::uint32_t>& ind
         }
         const bool stitch = corners.x == corners.y || corners.y == corners.z || corners.z == corners.x;
         if (stitch && mode != TINYGLTF_MODE_TRIANGLES) continue;
-        if (mirror) std::swap(corners.y, corners.z);
         triangles.push_back(corners);
     }
     return triangles;
 }
 
-void primitive_reader::read(std::size_t mesh, std::size_t part, const affine& to_world) {
+void primitive_reader::show(std::size_t mesh, std::size_t part, const affine& to_world) {
+    auto found = known_.find({mesh, part});
+    if (found == known_.end()) found = known_.emplace(std::pair{mesh, part}, read(mesh, part)).first;
+    const read_part& shown = found->second;
+    if (!shown.primitive) return;
+    memory_.charge(1, sizeof(instance), "nodes");
+    // A unit of 1 must leave every bit of the transform, even that of -0.
+    scene_.instances.push_back(
+        {*shown.primitive, shown.unit == 1 ? to_world : to_world.after(affine::scaling(shown.unit))});
+}
+
+primitive_reader::read_part primitive_reader::read(std::size_t mesh, std::size_t part) {
     const tinygltf::Primitive& source = model_.meshes[mesh].primitives[part];
     const std::string where = "meshes[" + std::to_string(mesh) + "].primitives[" + std::to_string(part) + "]";
     if (source.mode < TINYGLTF_MODE_TRIANGLES) {
         ++counted_["primitive(s) of points or lines have no surface and are left out"];
-        return;
+        return {};
     }
     const auto position = source.attributes.find("POSITION");
     if (position == source.attributes.end()) {
         ++counted_["primitive(s) without POSITION are left out"];
-        return;
+        return {};
     }
     const std::size_t vertices = model_.accessors[static_cast<std::size_t>(position->second)].count;
     if (vertices > UINT32_MAX) throw gltf_error(where + ": has more vertices than an index can count");
@@ -64,7 +75,8 @@ void primitive_reader::read(std::size_t mesh, std::size_t part, const affine& to
     primitive result;
     result.name = model_.meshes[mesh].name.empty() ? where : printable(model_.meshes[mesh].name);
     result.material = material_index(source);
-    read_positions(result, source, to_world, where);
+    read_part known;
+    known.unit = read_positions(result, source, where);
     {
         const budget::scope temporary{memory_};
         std::vector<std::uint32_t> indices;
@@ -73,31 +85,48 @@ void primitive_reader::read(std::size_t mesh, std::size_t part, const affine& to
             if (indices[i] >= vertices)
                 throw gltf_error(where + ": index " + std::to_string(indices[i]) + " at place " + std::to_string(i) +
                                  " is out of range, there are " + std::to_string(vertices) + " vertices");
-        result.triangles = unrolled(source.mode, indices, count, to_world.mirrors());
+        result.triangles = unrolled(source.mode, indices, count);
     }
     read_texcoords(result, source, where);
     read_colors(result, source, where);
-    if (!result.triangles.empty()) scene_.primitives.push_back(std::move(result));
+    if (result.triangles.empty()) return {};
+    known.primitive = static_cast<std::uint32_t>(scene_.primitives.size());
+    scene_.primitives.push_back(std::move(result));
+    return known;
 }
 
-void primitive_reader::read_positions(primitive& result, const tinygltf::Primitive& source, const affine& to_world,
-                                      const std::string& where) {
+double primitive_reader::read_positions(primitive& result, const tinygltf::Primitive& source,
+                                        const std::string& where) {
     const auto index = static_cast<std::size_t>(source.attributes.at("POSITION"));
     const tinygltf::Accessor& accessor = model_.accessors[index];
     if (accessor.type != TINYGLTF_TYPE_VEC3 || accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
         throw gltf_error(where + ": POSITION is not a VEC3 of floats or of 8 or 16 bit integers");
     memory_.charge(accessor.count, sizeof(glm::vec3), where);
     const budget::scope temporary{memory_};
-    const std::vector<double> local = accessors_.numbers(index, accessor.normalized, where);
+    // Integers of at most 16 bits are floats as they stand. Their fractions are not: the transform divides.
+    const std::vector<double> local = accessors_.numbers(index, false, where);
+    double least = -std::numeric_limits<double>::infinity();
+    double unit = 1;
+    if (accessor.normalized && accessor.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) {
+        const bool byte = accessor.componentType == TINYGLTF_COMPONENT_TYPE_BYTE ||
+                          accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE;
+        const bool is_signed = accessor.componentType == TINYGLTF_COMPONENT_TYPE_BYTE ||
+                               accessor.componentType == TINYGLTF_COMPONENT_TYPE_SHORT;
+        const double greatest = (byte ? 255 : 65535) >> static_cast<int>(is_signed);
+        unit = 1 / greatest;
+        least = -greatest; // the most negative integer has no partner: both it and its neighbour are -1
+    }
     result.positions.reserve(accessor.count);
     std::uint64_t unusable = 0;
     for (std::size_t i = 0; i < accessor.count; ++i) {
-        const glm::vec3 p = to_world(local[3 * i], local[3 * i + 1], local[3 * i + 2]);
+        const glm::vec3 p(std::max(local[3 * i], least), std::max(local[3 * i + 1], least),
+                          std::max(local[3 * i + 2], least));
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) ++unusable;
         result.positions.push_back(p);
     }
     if (unusable != 0)
         counted_["vertices at positions that are not finite: their triangles will be dropped"] += unusable;
+    return unit;
 }
 
 // The accessor of attribute NAME, one element a vertex; null where the primitive has none.

@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A glTF primitive under a node's transform -> world-space triangles with the attributes that the tool uses.
+// A glTF primitive -> triangles with the attributes that the tool uses, once, and an instance for each node that shows
+// it.
 
 #include "accessor.hpp"
-#include "affine.hpp"
 #include "materials.hpp"
 
+#include "../affine.hpp"
 #include "../scene.hpp"
 
 #include <tiny_gltf.h>
@@ -14,7 +15,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace voxelize::gltf {
@@ -24,9 +27,9 @@ namespace voxelize::gltf {
 
 // The triangles themselves, indices given by INDICES or, where it is empty, counting up to COUNT. Strips and fans keep
 // the winding of their first triangle; their degenerate triangles (two equal indices), which only stitch pieces
-// together, are dropped. MIRROR exchanges front and back.
-[[nodiscard]] std::vector<glm::uvec3> unrolled(int mode, const std::vector<std::uint32_t>& indices, std::uint64_t count,
-                                               bool mirror);
+// together, are dropped.
+[[nodiscard]] std::vector<glm::uvec3> unrolled(int mode, const std::vector<std::uint32_t>& indices,
+                                               std::uint64_t count);
 
 class primitive_reader {
 public:
@@ -34,17 +37,24 @@ public:
                      budget& memory, scene& result)
         : model_{model}, accessors_{accessors}, materials_{materials}, memory_{memory}, scene_{result} {}
 
-    // Appends primitive PART of mesh MESH to the scene; warns instead where it has no triangles.
-    void read(std::size_t mesh, std::size_t part, const affine& to_world);
+    // Shows primitive PART of mesh MESH once more, at TO_WORLD. The first call for it appends it to the scene, or warns
+    // where it has no triangles.
+    void show(std::size_t mesh, std::size_t part, const affine& to_world);
 
     // Appends the warnings that are counted over the whole file.
     void finish();
 
 private:
+    // What reading a primitive gives: nothing where it has no triangles.
+    struct read_part {
+        std::optional<std::uint32_t> primitive;
+        double unit = 1; // of its positions: those of normalised integers stay integers
+    };
+    [[nodiscard]] read_part read(std::size_t mesh, std::size_t part);
     [[nodiscard]] const tinygltf::Accessor* attribute(const tinygltf::Primitive& source, const std::string& name,
                                                       std::size_t vertices, const std::string& where) const;
-    void read_positions(primitive& result, const tinygltf::Primitive& source, const affine& to_world,
-                        const std::string& where);
+    // Gives the unit.
+    double read_positions(primitive& result, const tinygltf::Primitive& source, const std::string& where);
     void read_texcoords(primitive& result, const tinygltf::Primitive& source, const std::string& where);
     void read_colors(primitive& result, const tinygltf::Primitive& source, const std::string& where) const;
     [[nodiscard]] std::uint32_t material_index(const tinygltf::Primitive& source);
@@ -54,7 +64,8 @@ private:
     material_reader& materials_;
     budget& memory_;
     scene& scene_;
-    std::map<std::string, std::uint64_t> counted_; // warning -> how often
+    std::map<std::pair<std::size_t, std::size_t>, read_part> known_; // by mesh and part
+    std::map<std::string, std::uint64_t> counted_;                   // warning -> how often
 };
 
 } // namespace voxelize::gltf

@@ -1,14 +1,15 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Node transforms in double. Every product feeds an fma, so that all compilers and flags give the same bits.
+// Affine maps in double: where an instance stands in the world. Every product feeds an fma, so that all compilers and
+// flags give the same bits.
 
 #include <glm/glm.hpp>
 
 #include <array>
 #include <cmath>
 
-namespace voxelize::gltf {
+namespace voxelize {
 
 // Maps p to (row r) m[r][0] p.x + m[r][1] p.y + m[r][2] p.z + m[r][3].
 struct affine {
@@ -18,10 +19,8 @@ struct affine {
         return std::fma(m[r][0], x, std::fma(m[r][1], y, std::fma(m[r][2], z, m[r][3] * w)));
     }
 
-    // Rounds to float once.
-    [[nodiscard]] glm::vec3 operator()(double x, double y, double z) const {
-        return {static_cast<float>(row(0, x, y, z, 1)), static_cast<float>(row(1, x, y, z, 1)),
-                static_cast<float>(row(2, x, y, z, 1))};
+    [[nodiscard]] glm::dvec3 operator()(const glm::dvec3& p) const {
+        return {row(0, p.x, p.y, p.z, 1), row(1, p.x, p.y, p.z, 1), row(2, p.x, p.y, p.z, 1)};
     }
 
     // First INNER, then this.
@@ -41,6 +40,19 @@ struct affine {
         return std::fma(m[0][0], minor(1, 2), std::fma(m[0][1], minor(2, 0), m[0][2] * minor(0, 1))) < 0;
     }
 
+    [[nodiscard]] bool is_finite() const {
+        for (const auto& line : m)
+            for (const double entry : line)
+                if (!std::isfinite(entry)) return false;
+        return true;
+    }
+
+    [[nodiscard]] static affine scaling(double factor) {
+        affine result;
+        for (std::size_t i = 0; i < 3; ++i) result.m[i][i] = factor;
+        return result;
+    }
+
     // translation * rotation (a unit quaternion x, y, z, w) * scale
     [[nodiscard]] static affine from_parts(const std::array<double, 3>& t, const std::array<double, 4>& q,
                                            const std::array<double, 3>& s) {
@@ -55,4 +67,4 @@ struct affine {
     }
 };
 
-} // namespace voxelize::gltf
+} // namespace voxelize
