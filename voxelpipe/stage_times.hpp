@@ -3,7 +3,7 @@
 #pragma once
 
 // How long each stage of a call took: what a backend adds up where its `times` points. What a backend does not do as a
-// stage of its own stays 0 (docs/design.md, "Stage times").
+// stage of its own stays 0 (docs/pipeline.md, "Stage times").
 
 #include <array>
 #include <utility>

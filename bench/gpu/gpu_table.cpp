@@ -131,7 +131,7 @@ int run(const options& how, const std::string& command) {
                        " calls of vp::voxelize with an event at the end of each stage, after the table's own; an event "
                        "takes a few microseconds of the stream, so short calls come out longer than without\n"
                        "- call: the whole call without events, as in the table\n"
-                       "- which stage a call without tiles has: docs/design.md, \"Stage times\"\n\n" +
+                       "- which stage a call without tiles has: docs/pipeline.md, \"Stage times\"\n\n" +
                        stages.markdown());
         write_file(folder / "gpu_stages.csv", stages.csv());
         files += ", gpu_stages.md and gpu_stages.csv";
