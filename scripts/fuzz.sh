@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # fuzz.sh [SECONDS]: runs every libFuzzer target of build/fuzz, all at once, for SECONDS (default 30), each from its corpus:
-# tests/fuzz/corpus/NAME where there is one and, for the glTF targets, the glTF files beside the project where they are.
+# tests/robustness/fuzz/corpus/NAME where there is one and, for the glTF targets, the glTF files beside the project where they are.
 # New inputs go to build/fuzz/corpus/NAME, a failing one to build/fuzz/failures/.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -15,7 +15,7 @@ fuzz() {
     local name=$1 program=$2
     local corpus="build/fuzz/corpus/$name" seeds=()
     mkdir -p "$corpus"
-    [[ -d tests/fuzz/corpus/$name ]] && seeds+=("tests/fuzz/corpus/$name")
+    [[ -d tests/robustness/fuzz/corpus/$name ]] && seeds+=("tests/robustness/fuzz/corpus/$name")
     if [[ $name == fuzz_gltf* && -n $gltf && -d $gltf ]]; then
         # Small files only: a seed is mutated as a whole, and a large one makes every run slow.
         mkdir -p "build/fuzz/seeds/$name"

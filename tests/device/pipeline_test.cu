@@ -409,7 +409,7 @@ TEST(Pipeline, AWorkspaceBeyond32BitsIsRefused) {
     }
 }
 
-// The arithmetic is tests/unit/launch_size_test.cpp's; here with this device's multiprocessors.
+// The arithmetic is tests/core/launch_size_test.cpp's; here with this device's multiprocessors.
 TEST(Pipeline, LaunchesFillTheDevice) {
     int device = 0;
     cudaDeviceProp properties{};

@@ -4,12 +4,12 @@
 // A part of a grid gives exactly the crop of the whole: coverage, every fragment value, every blended byte. Slabs of a
 // grid put together give the whole.
 
-#include "theorems.hpp"
+#include "properties.hpp"
 
 #include <cstring>
 #include <tuple>
 
-namespace theorems {
+namespace properties {
 namespace {
 
 template <class T>
@@ -132,4 +132,4 @@ TEST_P(Crop, PartsOfAHugeGridAgreeWhereTheyOverlap) {
 INSTANTIATE_TEST_SUITE_P(BothRules, Crop, ::testing::Values(vp::coverage::conservative, vp::coverage::thin), rule_of);
 
 } // namespace
-} // namespace theorems
+} // namespace properties

@@ -6,7 +6,7 @@
 // coverage (26-separating).
 
 #include "closed_meshes.hpp"
-#include "theorems.hpp"
+#include "properties.hpp"
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-namespace theorems {
+namespace properties {
 namespace {
 
 std::vector<bool> occupancy(const std::vector<oracle::world_triangle>& triangles, const grid& g, vp::coverage rule) {
@@ -205,4 +205,4 @@ TEST(SeparationControl, SidesAreTheBallsOwn) {
 }
 
 } // namespace
-} // namespace theorems
+} // namespace properties

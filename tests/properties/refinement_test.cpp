@@ -9,9 +9,9 @@
 // Up to 256 voxels F stays 16 and positions at 2N have one bit more: there the theorem is tested on positions that lie
 // on the lattice of N.
 
-#include "theorems.hpp"
+#include "properties.hpp"
 
-namespace theorems {
+namespace properties {
 namespace {
 
 grid doubled(const grid& g) {
@@ -138,4 +138,4 @@ INSTANTIATE_TEST_SUITE_P(BothRules, Subdivision, ::testing::Values(vp::coverage:
                          rule_of);
 
 } // namespace
-} // namespace theorems
+} // namespace properties

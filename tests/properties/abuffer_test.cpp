@@ -4,7 +4,7 @@
 // The A-buffer holds every fragment once, in order; folding a voxel's list with a blend gives that voxel of a
 // framebuffer. The folds here are written from the definition of each blend, not with the library's.
 
-#include "theorems.hpp"
+#include "properties.hpp"
 
 #include <bit>
 #include <cmath>
@@ -13,7 +13,7 @@
 #include <span>
 #include <tuple>
 
-namespace theorems {
+namespace properties {
 namespace {
 
 // What the fragment shader gives; every bit of it depends on triangle, voxel and sample point.
@@ -281,4 +281,4 @@ INSTANTIATE_TEST_SUITE_P(BothRules, ABuffer, ::testing::Values(vp::coverage::con
                          rule_of);
 
 } // namespace
-} // namespace theorems
+} // namespace properties

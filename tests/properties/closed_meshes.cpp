@@ -8,7 +8,7 @@
 #include <map>
 #include <utility>
 
-namespace theorems {
+namespace properties {
 namespace {
 
 double length(const point& p) { return std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z); }
@@ -210,4 +210,4 @@ std::vector<std::uint32_t> inside_of(const closed_mesh& m, const oracle::grid& g
     return inside;
 }
 
-} // namespace theorems
+} // namespace properties

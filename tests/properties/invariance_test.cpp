@@ -6,13 +6,13 @@
 // coverage floors a depth that is exactly an integer (its mirror image goes to the voxel on the other side), and gives
 // ties of the dominant axis to x before y before z (so renaming axes may choose another axis).
 
-#include "theorems.hpp"
+#include "properties.hpp"
 
 #include <array>
 #include <span>
 #include <utility>
 
-namespace theorems {
+namespace properties {
 namespace {
 
 class Invariance : public ::testing::TestWithParam<vp::coverage> {};
@@ -322,4 +322,4 @@ INSTANTIATE_TEST_SUITE_P(BothRules, Invariance, ::testing::Values(vp::coverage::
                          rule_of);
 
 } // namespace
-} // namespace theorems
+} // namespace properties

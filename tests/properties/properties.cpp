@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The library calls that several theorems share, in one place, because each is a pipeline that has to be compiled.
+// Library calls that several files share. Each is a whole pipeline, so each is compiled once.
 
-#include "theorems.hpp"
+#include "properties.hpp"
 
-namespace theorems {
+namespace properties {
 namespace {
 
 struct shade {
@@ -46,4 +46,4 @@ std::vector<world_triangle> all_kinds(splitmix64& random, const test_grid& where
     return list;
 }
 
-} // namespace theorems
+} // namespace properties

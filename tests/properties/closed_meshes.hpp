@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-namespace theorems {
+namespace properties {
 
 struct point {
     double x, y, z;
@@ -51,4 +51,4 @@ std::vector<oracle::world_triangle> place(const closed_mesh& m, const oracle::gr
 std::vector<std::uint32_t> inside_of(const closed_mesh& m, const oracle::grid& g,
                                      const std::vector<oracle::world_triangle>& placed);
 
-} // namespace theorems
+} // namespace properties

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the theorem tests share: triangles with exact positions, and the library's voxel set of each triangle.
+// What these tests share: triangles with exact positions, and the library's voxel set of each triangle.
 
 #include "library.hpp"
 
@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-namespace theorems {
+namespace properties {
 
 using oracle::grid;
 using oracle::snapped_triangle;
@@ -89,4 +89,4 @@ inline int scaled(int count) {
 // Random triangles of every class for a grid; on grids that are not dense without those that cover much.
 std::vector<world_triangle> all_kinds(splitmix64& random, const test_grid& where, int of_each);
 
-} // namespace theorems
+} // namespace properties
