@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// core/exact.hpp: roundings against the compiler's own conversions and against wide integers, integer helpers against
-// their definitions.
+// core/exact.hpp, what needs more cases than roundings_test.cpp has: conversions of wide integers against the
+// compiler's own and against the exact ones, ends of the range, integer division.
 
 #include "test_support.hpp"
 
@@ -190,53 +190,6 @@ TEST(BitWidth, CountsFromTheHighestBit) {
         }
         EXPECT_EQ(ex::bit_width(uint128{1} << i), i + 1);
         EXPECT_EQ(ex::bit_width(~uint128{0} >> (127 - i)), i + 1);
-    }
-}
-
-// Each is the exact result rounded once.
-TEST(FloatOperations, RoundOnce) {
-    splitmix64 random(8);
-    const auto plus = [](const unit::rational& a, const unit::rational& b) {
-        return unit::rational{a.numerator * b.denominator + b.numerator * a.denominator, a.denominator * b.denominator};
-    };
-    const auto times = [](const unit::rational& a, const unit::rational& b) {
-        return unit::rational{a.numerator * b.numerator, a.denominator * b.denominator};
-    };
-    for (std::int64_t i = 0; i < unit::cases(20'000); ++i) {
-        const auto f = [&] { return static_cast<float>(unit::spread_double(random, -20, 20)); };
-        const float a = f(), b = f(), c = f();
-        if (a == 0 || b == 0 || c == 0) continue;
-        const unit::rational ra = unit::exact(a), rb = unit::exact(b), rc = unit::exact(c);
-        ASSERT_EQ(ex::add(a, b), unit::nearest_float(plus(ra, rb)));
-        ASSERT_EQ(ex::sub(a, b), unit::nearest_float(plus(ra, unit::exact(-b))));
-        ASSERT_EQ(ex::mul(a, b), unit::nearest_float(times(ra, rb)));
-        ASSERT_EQ(ex::fma(a, b, c), unit::nearest_float(plus(times(ra, rb), rc)));
-        const unit::rational inverse =
-            b > 0 ? unit::rational{rb.denominator, rb.numerator} : unit::rational{-rb.denominator, -rb.numerator};
-        ASSERT_EQ(ex::div(a, b), unit::nearest_float(times(ra, inverse)));
-        // s = sqrt(|a|) is nearest: |a| lies between the squares of the points half-way to its neighbours.
-        const float root = ex::sqrt(std::fabs(a));
-        const double below = 0.5 * (double{root} + double{std::nextafterf(root, 0.0f)});
-        const double above = 0.5 * (double{root} + double{std::nextafterf(root, HUGE_VALF)});
-        ASSERT_LE(below * below, double{std::fabs(a)});
-        ASSERT_GE(above * above, double{std::fabs(a)});
-    }
-}
-
-TEST(FloatOperations, DotAndLerpAreTheWrittenSteps) {
-    struct vec {
-        float x, y, z;
-    };
-    splitmix64 random(9);
-    for (std::int64_t i = 0; i < unit::cases(100'000); ++i) {
-        const auto f = [&] { return static_cast<float>(unit::spread_double(random, -10, 10)); };
-        const vec a{f(), f(), f()}, b{f(), f(), f()};
-        const float xx = ex::mul(a.x, b.x);
-        ASSERT_EQ(ex::dot(a, b), std::fma(a.z, b.z, std::fma(a.y, b.y, xx)));
-        ASSERT_EQ(ex::lerp(a.x, b.x, 0.0f), a.x);
-        ASSERT_EQ(ex::lerp(a.x, a.x, b.z), a.x);
-        const float difference = ex::sub(b.x, a.x);
-        ASSERT_EQ(ex::lerp(a.x, b.x, a.z), std::fma(a.z, difference, a.x));
     }
 }
 
