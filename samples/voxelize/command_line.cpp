@@ -3,7 +3,6 @@
 #include "command_line.hpp"
 
 #include "exit_code.hpp"
-#include "formats/binvox.hpp"
 
 #include <voxelpipe/config.hpp>
 
@@ -147,7 +146,7 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->option_text("FILE");
     app.add_option("-t,--target", raw.targets,
                    "What to compute for each voxel, see TARGETS; may be repeated. Default: occupancy, with color where "
-                   "an output shows colours (.vox, .png)")
+                   "an output shows colours (.vox, .glb, .obj, .ply, .xyz, .png)")
         ->allow_extra_args(false)
         ->delimiter(',')
         ->option_text("NAME");
@@ -250,6 +249,11 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->transform(CLI::CheckedTransformer(ups).description(""))
         ->option_text("AXIS")
         ->group("Files");
+    app.add_flag("--merge", options.write.merge_faces,
+                 "Join the faces of .glb, .obj and .ply: coplanar ones of equal colour become one rectangle")
+        ->group("Files");
+    app.add_flag("--points", options.write.points, "Write the centres of the voxels into .ply, not their outer sides")
+        ->group("Files");
     app.add_option("--compression", options.write.compression, "Level of .npz, .vti and .nrrd, 0 to 9. Default: 1")
         ->check(CLI::Range(0, 9).description(""))
         ->option_text("N")
@@ -303,11 +307,11 @@ void understand_outputs(command_line& options, const raw_options& raw) {
             throw usage_error("\"" + output.string() + "\" is given twice");
         // Now, not when all is computed.
         if (const auto& size = options.grid.voxel_size;
-            size && found->extension == ".binvox" && !are_cubic({size->x, size->y, size->z}))
-            throw usage_error("\"" + output.string() +
-                              "\": .binvox has one voxel size for all axes, --voxel-size has several");
+            size && found->needs_cubes && !are_cubic({size->x, size->y, size->z}))
+            throw usage_error("\"" + output.string() + "\": " + std::string(found->extension) +
+                              " has one voxel size for all axes, --voxel-size has several");
         needs_occupancy = needs_occupancy || found->needs_occupancy;
-        shows_colors = shows_colors || found->extension == ".vox" || found->extension == ".png";
+        shows_colors = shows_colors || found->shows_colors;
     }
     std::vector<target>& targets = options.voxelize.targets;
     targets.clear();
@@ -319,10 +323,11 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     }
     if (targets.empty()) {
         targets.push_back(target::occupancy);
-        if (shows_colors && !raw.no_color) targets.push_back(target::color);
+        if (shows_colors && !raw.no_color) options.implied.push_back(target::color);
     }
     if (needs_occupancy && std::find(targets.begin(), targets.end(), target::occupancy) == targets.end())
-        targets.insert(targets.begin(), target::occupancy);
+        options.implied.push_back(target::occupancy);
+    targets.insert(targets.end(), options.implied.begin(), options.implied.end());
 }
 
 void understand_picture(command_line& options, const raw_options& raw) {

@@ -21,6 +21,9 @@ struct command_line {
     std::vector<std::filesystem::path> outputs;
     grid_request grid;
     voxelize_request voxelize; // all but its grid and progress
+    // Targets that only some outputs ask for: those that show the voxels' shape or colours. Formats that hold every
+    // target leave them out, so that one output does not change the content or the names of another.
+    std::vector<target> implied;
     write_options write;       // all but its progress
     stats_format stats = stats_format::none;
     bool quiet = false;

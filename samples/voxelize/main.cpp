@@ -18,6 +18,20 @@ int fail(exit_code code, const std::string& why) {
     return code;
 }
 
+// Writes one output. Formats that hold every channel get those that were asked for, which come first in the volume.
+std::vector<std::filesystem::path> write_output(volume& voxels, const command_line& options,
+                                                const std::filesystem::path& output, const write_options& how) {
+    std::vector<channel> aside;
+    if (find_format(output)->all_channels)
+        while (aside.size() < options.implied.size()) {
+            aside.push_back(std::move(voxels.channels.back()));
+            voxels.channels.pop_back();
+        }
+    std::vector<std::filesystem::path> files = write(voxels, output, how);
+    for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
+    return files;
+}
+
 // What comes after the command line; every way to fail is an exception.
 void run(const command_line& options) {
     const auto milliseconds_since = [](std::chrono::steady_clock::time_point start) {
@@ -43,7 +57,7 @@ void run(const command_line& options) {
 
     bar.start("voxelizing");
     report.request.progress = [&bar](double done) { bar.show(done); };
-    const volume voxels = run_voxelizer(std::move(model), report.request, report.stats);
+    volume voxels = run_voxelizer(std::move(model), report.request, report.stats);
     for (const std::string& warning : report.stats.warnings) report.warnings.push_back(warning);
     if (report.stats.triangles_dropped != 0)
         report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
@@ -55,7 +69,8 @@ void run(const command_line& options) {
         write_options how = options.write;
         bar.start("writing " + output.filename().string());
         how.progress = [&bar](double done) { bar.show(done); };
-        for (std::filesystem::path& file : write(voxels, output, how)) report.files.push_back(std::move(file));
+        for (std::filesystem::path& file : write_output(voxels, options, output, how))
+            report.files.push_back(std::move(file));
     }
     bar.clear();
     report.stats.milliseconds.emplace_back("write", milliseconds_since(start));

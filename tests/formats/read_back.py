@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads files of the voxelize writers with other people's readers and compares every value.
 
-usage: read_back.py FORMAT FOLDER     FORMAT is npy, npz, vti, nrrd, vox, binvox or png; FOLDER was filled by write_samples
+usage: read_back.py FORMAT FOLDER     FORMAT is an extension that write_samples, which filled FOLDER, writes: npy, glb, ...
        read_back.py --have-modules    exit code 0 when all the readers are installed
 
 The expected values are computed here from the voxel's position, by the function that test_volumes.hpp describes; nothing is
@@ -13,7 +13,7 @@ import json
 import pathlib
 import sys
 
-MODULES = ["numpy", "vtkmodules", "nrrd", "trimesh", "PIL", "pyvox", "midvoxio"]
+MODULES = ["numpy", "vtkmodules", "nrrd", "trimesh", "PIL", "pyvox", "midvoxio", "pygltflib"]
 
 
 def have_modules():
@@ -209,6 +209,202 @@ def check_vox(case, files):
     few = len(np.unique(want, axis=0)) <= 255
     assert distance.max() <= (0 if few else 100), f"a colour is off by {distance.max()}"
     assert distance.mean() <= 25, f"colours are off by {distance.mean()}"
+
+
+def expected_sides(case):
+    """Every side between an occupied and an empty voxel: for each of -x, +x, -y, +y, -z, +z its voxels (i, j, k) in storage
+    order."""
+    import numpy as np
+
+    padded = np.pad(expected(case, 0) != 0, 1)
+    inner = padded[1:-1, 1:-1, 1:-1]
+    sides = []
+    for axis in (2, 1, 0):  # x, y, z of an array (nz, ny, nx)
+        for shift in (1, -1):
+            beside = np.roll(padded, shift, axis)[1:-1, 1:-1, 1:-1]
+            sides.append(np.argwhere(inner & ~beside)[:, ::-1])
+    return sides
+
+
+def check_sides(case, triangles, colors, relative):
+    """Compares triangles (n, 3, 3) in world units, with one colour (n, 3) each or None, with the sides of the voxels. Two
+    triangles make a rectangle, which is the bounding box of either; rectangles must not overlap or leave a side out.
+    relative: largest error of a coordinate, in voxels."""
+    import numpy as np
+
+    lattice = (triangles - np.array(case["origin"])) / np.array(case["voxel_size"])
+    corners = np.rint(lattice).astype(int)
+    assert len(triangles) == 0 or np.abs(lattice - corners).max() <= relative, f"off by {np.abs(lattice - corners).max()}"
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.all(np.count_nonzero(normals, axis=1) == 1), "a triangle that leans, or has no area"
+    axis = np.abs(normals).argmax(axis=1)
+    direction = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] > 0)
+    want_colors = None if len(case["channels"]) < 2 else expected(case, 1)
+    joined = 0
+    for d, voxels in enumerate(expected_sides(case)):
+        here = direction == d
+        boxes = np.concatenate([corners[here].min(axis=1), corners[here].max(axis=1)], axis=1)
+        rectangles, first, count = np.unique(boxes, axis=0, return_index=True, return_counts=True)
+        assert np.all(count == 2), "a rectangle without its two triangles"
+        low, high = rectangles[:, :3].copy(), rectangles[:, 3:].copy()
+        low[:, d // 2] -= d % 2  # from the plane to the voxel before it
+        high[:, d // 2] = low[:, d // 2] + 1
+        cells, owners = [], []
+        for n, (a, b) in enumerate(zip(low, high)):
+            grid = np.stack(np.meshgrid(*[np.arange(a[m], b[m]) for m in range(3)], indexing="ij"), -1).reshape(-1, 3)
+            cells.append(grid)
+            owners.append(np.full(len(grid), n))
+        cells = np.concatenate(cells) if cells else np.zeros((0, 3), int)
+        owners = np.concatenate(owners) if owners else np.zeros(0, int)
+        joined += len(cells) - len(rectangles)
+        order = np.lexsort(cells.T)
+        wanted = voxels[np.lexsort(voxels.T)]
+        assert len(cells) == len(wanted), f"direction {d}: {len(cells)} sides, expected {len(wanted)}"
+        assert np.array_equal(cells[order], wanted), f"direction {d}: sides elsewhere"
+        if colors is not None and len(wanted):
+            got = colors[here][first][owners[order]]
+            i, j, k = wanted.T
+            off = np.abs(got.astype(int) - want_colors[k, j, i, :3].astype(int)).max()
+            assert off == 0, f"direction {d}: a colour is off by {off}"
+    assert case["merge"] or joined == 0, f"{joined} sides were joined"
+    assert not case["merge"] or want_colors is not None or joined > 0, "nothing was joined"
+    assert (colors is None) == (want_colors is None)
+
+
+def one_color(corners):
+    """(n, corners, 3) -> (n, 3): all corners of a face have the same colour."""
+    import numpy as np
+
+    assert np.all(corners == corners[:, :1]), "a face with several colours"
+    return corners[:, 0]
+
+
+def check_ply(case, files):
+    import numpy as np
+    import trimesh
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOPLY import vtkPLYReader
+
+    if case["points"]:
+        check_points(case, trimesh.load(files[0]))
+        return
+    triangles, colors = [], []
+    for file in files:
+        reader = vtkPLYReader()
+        reader.SetFileName(str(file))
+        reader.Update()
+        mesh = reader.GetOutput()
+        if case["density"] == 0:
+            assert mesh.GetNumberOfCells() == 0
+            continue
+        quads = vtk_to_numpy(mesh.GetPolys().GetConnectivityArray()).reshape(-1, 4)
+        rgb = mesh.GetPointData().GetArray("RGB")
+        if rgb is not None:
+            colors.append(np.repeat(one_color(vtk_to_numpy(rgb)[quads]), 2, axis=0))
+        # trimesh keeps the doubles, VTK makes them floats.
+        loaded = trimesh.load(file, process=False)
+        assert len(loaded.faces) == 2 * len(quads)
+        points = np.asarray(loaded.vertices)
+        triangles.append(points[np.stack([quads[:, :3], quads[:, [0, 2, 3]]], 1).reshape(-1, 3)])
+        assert len(np.unique(np.column_stack([points, vtk_to_numpy(rgb) if rgb is not None else points]), axis=0)) == len(
+            points
+        ), "a vertex twice"
+    assert case["name"] != "pieces" or len(files) > 3
+    if triangles:
+        check_sides(case, np.concatenate(triangles), np.concatenate(colors) if colors else None, 1e-9)
+
+
+def check_obj(case, files):
+    import numpy as np
+    import trimesh
+
+    if case["density"] == 0:
+        assert not any(line.startswith(("v ", "f ")) for line in files[0].read_text().splitlines())
+        return
+    triangles, colors = [], []
+    for file in files:
+        mesh = trimesh.load(file, process=False, maintain_order=True)
+        triangles.append(np.asarray(mesh.triangles))
+        if len(case["channels"]) > 1:
+            colors.append(one_color(np.asarray(mesh.visual.vertex_colors)[mesh.faces][:, :, :3]))
+        else:
+            assert mesh.visual.kind != "vertex"
+    check_sides(case, np.concatenate(triangles), np.concatenate(colors) if colors else None, 1e-9)
+
+
+def check_glb(case, files):
+    import numpy as np
+    import pygltflib
+    import trimesh
+
+    triangles, colors = [], []
+    for file in files:
+        gltf = pygltflib.GLTF2().load(str(file))
+        assert gltf.asset.version == "2.0"
+        if case["density"] == 0:
+            assert not gltf.meshes
+            continue
+        blob = gltf.binary_blob()
+        assert len(blob) == gltf.buffers[0].byteLength
+
+        def values(number):
+            accessor = gltf.accessors[number]
+            view = gltf.bufferViews[accessor.bufferView]
+            kind = {5123: np.uint16, 5125: np.uint32, 5126: np.float32}[accessor.componentType]
+            width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor.type]
+            array = np.frombuffer(blob, kind, accessor.count * width, view.byteOffset).reshape(accessor.count, width)
+            assert array.nbytes == view.byteLength
+            if accessor.min:
+                assert np.array_equal(array.min(axis=0), np.array(accessor.min, np.float32))
+                assert np.array_equal(array.max(axis=0), np.array(accessor.max, np.float32))
+            return array
+
+        (primitive,) = gltf.meshes[0].primitives
+        (node,) = gltf.nodes
+        close(node.translation, case["origin"], "translation")
+        positions = values(primitive.attributes.POSITION).astype(float) + np.array(node.translation)
+        faces = values(primitive.indices).reshape(-1, 3)
+        triangles.append(positions[faces])
+        if primitive.attributes.COLOR_0 is not None:
+            linear = values(primitive.attributes.COLOR_0) / 65535.0
+            assert np.all(linear[:, 3] == 1)
+            srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)[:, :3]
+            colors.append(one_color(np.rint(srgb * 255).astype(np.uint8)[faces]))
+        # The bounds of the scene, as a viewer places it.
+        scene = trimesh.load(file)
+        assert np.allclose(scene.bounds, [positions.min(axis=0), positions.max(axis=0)], rtol=1e-6, atol=1e-6)
+        if not case["merge"] and case["name"] != "pieces":
+            merged = scene.to_geometry()
+            merged.merge_vertices(merge_tex=True, merge_norm=True)
+            voxels = expected(case, 0).sum() * np.prod(case["voxel_size"])
+            assert abs(merged.volume - voxels) <= 1e-4 * voxels, f"encloses {merged.volume}, not {voxels}"
+    assert case["name"] != "pieces" or len(files) > 3
+    if triangles:
+        check_sides(case, np.concatenate(triangles), np.concatenate(colors) if colors else None, 1e-4)
+
+
+def check_points(case, cloud):
+    import numpy as np
+
+    k, j, i = np.nonzero(expected(case, 0))
+    want = np.stack([i, j, k], axis=1)
+    got = (np.asarray(cloud.vertices) - np.array(case["origin"])) / np.array(case["voxel_size"]) - 0.5
+    assert got.shape == want.shape, f"{len(got)} points, expected {len(want)}"
+    assert np.abs(got - want).max() <= 1e-9, "points elsewhere"
+    if len(case["channels"]) > 1:
+        colors = np.asarray(cloud.colors)[:, :3]
+        assert np.array_equal(colors, expected(case, 1)[k, j, i, :3]), "colours differ"
+
+
+def check_xyz(case, files):
+    import trimesh
+
+    if case["density"] == 0:
+        assert files[0].read_text() == ""
+        return
+    columns = {len(line.split()) for line in files[0].read_text().splitlines()}
+    assert columns == {3 if len(case["channels"]) < 2 else 6}, columns
+    check_points(case, trimesh.load(files[0]))
 
 
 def check_png(case, files):

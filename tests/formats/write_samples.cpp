@@ -38,7 +38,9 @@ volume with_channels(std::array<std::int64_t, 3> extent, std::uint32_t density, 
 
 std::vector<sample_case> make_cases() {
     const std::vector<std::string> any{".npy", ".npz", ".vti", ".nrrd"};
-    const std::vector<std::string> solid{".npy", ".npz", ".vti", ".nrrd", ".vox", ".binvox", ".png"};
+    const std::vector<std::string> solid{".npy", ".npz", ".vti", ".nrrd", ".vox", ".binvox",
+                                         ".glb", ".obj", ".ply", ".xyz",  ".png"};
+    const std::vector<std::string> meshes{".glb", ".obj", ".ply"};
     std::vector<sample_case> cases;
     const auto add = [&](const char* name, std::array<std::int64_t, 3> extent, std::uint32_t density, bool color,
                          bool all_types, const std::vector<std::string>& extensions) -> sample_case& {
@@ -55,7 +57,13 @@ std::vector<sample_case> make_cases() {
     add("long", {300, 17, 40}, 23, true, false, solid);
     add("split", {260, 40, 513}, 997, true, false, {".vox", ".binvox"}).options.up = up_axis::z;
     add("split_y", {270, 513, 33}, 997, true, false, {".vox"});
-    add("empty", {9, 8, 7}, 0, false, false, {".npy", ".npz", ".vti", ".nrrd", ".binvox", ".png"});
+    add("empty", {9, 8, 7}, 0, false, false,
+        {".npy", ".npz", ".vti", ".nrrd", ".binvox", ".glb", ".obj", ".ply", ".xyz", ".png"});
+    add("merged", {40, 33, 21}, 2, false, false, meshes).options.merge_faces = true;
+    add("merged_colors", {40, 33, 21}, 1, true, false, meshes).options.merge_faces = true;
+    add("pieces", {37, 23, 11}, 5, true, false, meshes).options.faces_per_file = 1000;
+    add("points", {37, 23, 11}, 5, true, false, {".ply"}).options.points = true;
+    add("boxes", {37, 23, 11}, 5, true, false, {".glb", ".obj", ".ply", ".xyz"}).v.voxel_size = {0.1, 0.25, 3};
     sample_case& types = add("types", {13, 7, 5}, 2, false, true, any);
     types.v.voxel_size = {0.1, 0.25, 3};
     sample_case& raw = add("raw", {13, 7, 5}, 2, false, true, any);
@@ -79,7 +87,9 @@ std::string describe(const sample_case& c, const std::map<std::string, std::vect
     std::string out = "  {\"name\": \"" + c.name + "\", \"density\": " + std::to_string(c.density);
     out += ", \"up\": \"";
     out += c.options.up == up_axis::y ? "y" : "z";
-    out += "\", \"extent\": [" + list_of(c.v.extent) + "], \"origin\": [" + list_of(c.v.origin);
+    out += std::string("\", \"merge\": ") + (c.options.merge_faces ? "true" : "false") +
+           ", \"points\": " + (c.options.points ? "true" : "false");
+    out += ", \"extent\": [" + list_of(c.v.extent) + "], \"origin\": [" + list_of(c.v.origin);
     out += "], \"voxel_size\": [" + list_of(c.v.voxel_size) + "],\n   \"channels\": [";
     for (std::size_t n = 0; n < c.v.channels.size(); ++n) {
         const channel& ch = c.v.channels[n];

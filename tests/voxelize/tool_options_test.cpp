@@ -50,6 +50,8 @@ std::set<std::string> all_options() {
             "--no-ground",
             "--up AXIS",
             "--compression N",
+            "--merge",
+            "--points",
             "--stats [json]",
             "-q,--quiet",
             "-h,--help",
@@ -191,6 +193,58 @@ TEST(Tool, UpTurnsTheVox) {
     const std::string z = vox({"--up", "z"});
     EXPECT_EQ(ints({5, 4, 3}), vox_chunk(z, "SIZE"));
     EXPECT_EQ((ints({1}) + std::string{0, 1, 2}), vox_chunk(z, "XYZI").substr(0, 7));
+}
+
+// A picture, or a format that shows colours, leaves the names and the content of other outputs as they are.
+TEST(Tool, OutputsDoNotRenameEachOther) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const auto voxelize = [&](const std::vector<std::string>& how) {
+        std::vector<std::string> arguments{folder / "m.glb", "-q", "-r", "12", "--image-size", "32x24"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+    };
+    for (const char* extension : {".npy", ".npz", ".vti", ".nrrd"}) {
+        const std::string alone = folder / std::string("alone").append(extension);
+        const std::string beside = folder / std::string("beside").append(extension);
+        voxelize({"-o", alone});
+        voxelize({"-o", beside, "-o", folder / "a.png", "-o", folder / "a.vox"});
+        EXPECT_TRUE(read_file(alone) == read_file(beside)) << extension;
+        voxelize({"-o", alone, "-t", "count"});
+        voxelize({"-o", folder / "a.glb", "-o", beside, "-o", folder / "a.binvox", "-t", "count"});
+        EXPECT_TRUE(read_file(alone) == read_file(beside)) << extension;
+    }
+    // What is asked for is in all of them.
+    voxelize({"-o", folder / "b.npy", "-o", folder / "b.vox", "-t", "occupancy,color"});
+    EXPECT_TRUE(std::filesystem::exists(folder / "b.occupancy.npy"));
+    EXPECT_TRUE(std::filesystem::exists(folder / "b.color.npy"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "b.npy"));
+    // Colours reach the formats that show them.
+    voxelize({"-o", folder / "c.npy", "-o", folder / "c.xyz"});
+    voxelize({"-o", folder / "d.xyz", "-t", "color"});
+    EXPECT_TRUE(read_file(folder / "c.xyz") == read_file(folder / "d.xyz"));
+    EXPECT_TRUE(std::filesystem::exists(folder / "c.npy"));
+}
+
+TEST(Tool, MergeAndPointsChangeTheFilesThatTheyName) {
+    const scratch_folder folder;
+    builder file;
+    gltf_test::add_cube(file, {0, 0, 0}, 1, gltf_test::add_material(file, {0.5, 0.5, 0.5, 1}));
+    file.write_glb(folder / "m.glb");
+    const auto size = [&](const char* extension, const std::vector<std::string>& how) {
+        const std::string out = folder / std::string("o").append(extension);
+        std::vector<std::string> arguments{folder / "m.glb", "-q", "-r", "16", "-o", out};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        return std::filesystem::file_size(out);
+    };
+    for (const char* extension : {".glb", ".obj", ".ply"})
+        EXPECT_LT(10 * size(extension, {"--merge"}), size(extension, {})) << extension;
+    EXPECT_EQ(size(".xyz", {"--merge"}), size(".xyz", {}));
+    EXPECT_NE(size(".ply", {"--points"}), size(".ply", {}));
+    EXPECT_EQ(size(".glb", {"--points"}), size(".glb", {}));
 }
 
 TEST(Tool, CompressionIsAChoice) {

@@ -41,7 +41,7 @@ TEST(Tool, WrongCommandLinesAreExplained) {
     };
     expect({}, "INPUT is required");
     expect({model}, "--output is required");
-    expect({model, "-o", folder / "o.xyz"}, "must be one of .npy");
+    expect({model, "-o", folder / "o.abc"}, "must be one of .npy");
     expect({model, "-o", out, "-o", out}, "given twice");
     expect({model, "-o", out, "--target", "colour"}, "is not one of occupancy, count");
     expect({model, "-o", out, "--resolution", "0"}, "at least 1");
@@ -62,6 +62,7 @@ TEST(Tool, WrongCommandLinesAreExplained) {
     expect({model, "-o", out, "--image-size", "100"}, "--image-size");
     expect({model, "-o", out, "--background", "mauve"}, "mauve");
     expect({model, "-o", out, "-o", folder / "o.binvox", "--voxel-size", "1,1,2"}, "one voxel size for all axes");
+    expect({model, "-o", out, "-o", folder / "o.vox", "--voxel-size", "1,1,2"}, ".vox has one voxel size for all axes");
     expect({model, "-o", out, "--no-such-option"}, "--no-such-option");
     expect({model, model, "-o", out}, "m.glb");
 }
@@ -350,7 +351,7 @@ TEST(Tool, ColourIsTheDefaultWhereItShows) {
     EXPECT_EQ(json({"occupancy", "color"}), targets({"-o", folder / "a.png"}));
     EXPECT_EQ(json({"occupancy", "color"}), targets({"-o", folder / "a.vox", "-o", folder / "a.npz"}));
     EXPECT_EQ(json({"occupancy"}), targets({"-o", folder / "a.png", "--no-color"}));
-    EXPECT_EQ(json({"occupancy", "count"}), targets({"-o", folder / "a.binvox", "-t", "count"}));
+    EXPECT_EQ(json({"count", "occupancy"}), targets({"-o", folder / "a.binvox", "-t", "count"}));
     EXPECT_EQ(json({"count", "depth"}), targets({"-o", folder / "a.vti", "-t", "count", "-t", "depth", "-t", "count"}));
 }
 

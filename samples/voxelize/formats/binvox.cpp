@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 
 namespace voxelize {
 namespace {
@@ -77,18 +76,8 @@ void add_bits(run_writer& runs, std::uint32_t bits, int n) {
 
 } // namespace
 
-bool are_cubic(const std::array<double, 3>& voxel_size) {
-    constexpr double tolerance = 1e-9; // relative
-    const auto [x, y, z] = voxel_size;
-    return std::abs(x - y) <= tolerance * x && std::abs(x - z) <= tolerance * x;
-}
-
 std::vector<std::filesystem::path> write_binvox(const volume& v, const std::filesystem::path& path,
                                                 const write_options& options) {
-    const double sx = v.voxel_size[0], sy = v.voxel_size[1], sz = v.voxel_size[2];
-    if (!are_cubic(v.voxel_size))
-        throw write_error(path, ".binvox has one voxel size for all axes, but this grid's are " + number(sx) + ", " +
-                                    number(sy) + " and " + number(sz));
     const channel& bits = *v.occupancy();
     const std::int64_t nx = v.extent[0], ny = v.extent[1], nz = v.extent[2];
     const std::int64_t side = std::max({nx, ny, nz});
@@ -98,7 +87,7 @@ std::vector<std::filesystem::path> write_binvox(const volume& v, const std::file
     const std::string n = std::to_string(side);
     out.write("#binvox 1\ndim " + n + " " + n + " " + n + "\n");
     out.write("translate " + number(v.origin[0]) + " " + number(v.origin[1]) + " " + number(v.origin[2]) + "\n");
-    out.write("scale " + number(sx * static_cast<double>(side)) + "\ndata\n");
+    out.write("scale " + number(v.voxel_size[0] * static_cast<double>(side)) + "\ndata\n");
 
     // The file wants x slowest and the bits have it fastest. So take one column of words, 32 slices of x, at a time,
     // and transpose it in blocks of 32 rows along y: then slice x reads as nz rows of ny packed bits.

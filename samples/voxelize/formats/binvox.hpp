@@ -8,12 +8,7 @@
 
 #include "formats.hpp"
 
-#include <array>
-
 namespace voxelize {
-
-// Whether voxels of this size are cubes to the format, but for what fitting a grid loses by rounding.
-[[nodiscard]] bool are_cubic(const std::array<double, 3>& voxel_size);
 
 std::vector<std::filesystem::path> write_binvox(const volume& v, const std::filesystem::path& path,
                                                 const write_options& options);

@@ -4,14 +4,17 @@
 #include "formats.hpp"
 
 #include "binvox.hpp"
+#include "mesh.hpp"
 #include "npy.hpp"
 #include "npz.hpp"
 #include "nrrd.hpp"
 #include "png.hpp"
+#include "text.hpp"
 #include "vox.hpp"
 #include "vti.hpp"
 
 #include <array>
+#include <cmath>
 #include <string>
 
 namespace voxelize {
@@ -20,17 +23,21 @@ namespace {
 using writer = std::vector<std::filesystem::path> (*)(const volume&, const std::filesystem::path&,
                                                       const write_options&);
 
-constexpr std::array<format, 7> all_formats{{
-    {".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", false, true},
-    {".npz", "NumPy archive with one array for each channel", false, true},
-    {".vox", "MagicaVoxel model, split above 256 voxels, 255 colours", true, false},
-    {".binvox", "binvox occupancy, padded to a cube", true, false},
-    {".vti", "VTK image data for ParaView, all channels as cell data", false, true},
-    {".nrrd", "NRRD for 3D Slicer and teem; OUT.CHANNEL.nrrd for several", false, true},
-    {".png", "shaded picture of the voxels", true, false},
+constexpr std::array<format, 11> all_formats{{
+    {".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", false, true, false, false},
+    {".npz", "NumPy archive with one array for each channel", false, true, false, false},
+    {".vox", "MagicaVoxel model, split above 256 voxels, 255 colours", true, false, true, true},
+    {".binvox", "binvox occupancy, padded to a cube", true, false, false, true},
+    {".vti", "VTK image data for ParaView, all channels as cell data", false, true, false, false},
+    {".nrrd", "NRRD for 3D Slicer and teem; OUT.CHANNEL.nrrd for several", false, true, false, false},
+    {".glb", "glTF mesh of the voxels' outer sides, with colours; see --merge", true, false, true, false},
+    {".obj", "the same as a Wavefront OBJ of quads, colours at the vertices", true, false, true, false},
+    {".ply", "the same as a PLY of quads; with --points the centres of the voxels", true, false, true, false},
+    {".xyz", "centres of the voxels as text: x y z and red green blue, 0 to 255", true, false, true, false},
+    {".png", "shaded picture of the voxels", true, false, true, false},
 }};
-constexpr std::array<writer, 7> all_writers{write_npy, write_npz,  write_vox, write_binvox,
-                                            write_vti, write_nrrd, write_png};
+constexpr std::array<writer, 11> all_writers{write_npy, write_npz, write_vox, write_binvox, write_vti, write_nrrd,
+                                             write_glb, write_obj, write_ply, write_xyz,    write_png};
 
 std::string extension_of(const std::filesystem::path& path) {
     std::string extension = path.extension().string();
@@ -40,6 +47,12 @@ std::string extension_of(const std::filesystem::path& path) {
 }
 
 } // namespace
+
+bool are_cubic(const std::array<double, 3>& voxel_size) {
+    constexpr double tolerance = 1e-9; // relative
+    const auto [x, y, z] = voxel_size;
+    return std::abs(x - y) <= tolerance * x && std::abs(x - z) <= tolerance * x;
+}
 
 std::span<const format> formats() { return all_formats; }
 
@@ -62,6 +75,11 @@ std::vector<std::filesystem::path> write(const volume& v, const std::filesystem:
     if (v.channels.empty()) throw write_error(path, "there is no channel to write");
     if (f->needs_occupancy && v.occupancy() == nullptr)
         throw write_error(path, std::string(f->extension) + " needs the occupancy");
+    if (f->needs_cubes && !are_cubic(v.voxel_size)) {
+        const auto& [x, y, z] = v.voxel_size;
+        throw write_error(path, std::string(f->extension) + " has one voxel size for all axes, but this grid's are " +
+                                    number(x) + ", " + number(y) + " and " + number(z));
+    }
     return all_writers[static_cast<std::size_t>(f - all_formats.data())](v, path, options);
 }
 

@@ -9,6 +9,8 @@
 #include "../volume.hpp"
 #include "output_file.hpp" // write_error
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <span>
@@ -20,7 +22,10 @@ namespace voxelize {
 struct write_options {
     int compression = 1;                  // zlib level of .npz, .vti and .nrrd: 0 stores, 1 is fast, 9 is smallest
     up_axis up = up_axis::y;              // which world axis stands upright in .vox; glTF's is y
-    int threads = 0;                      // of the preview; 0 takes all cores. No output depends on it
+    int threads = 0;                      // 0 takes all cores. No output depends on it
+    bool merge_faces = false;             // .ply, .obj, .glb: coplanar faces of equal colour become one rectangle
+    bool points = false;                  // .ply holds the voxels' centres, not their outer sides
+    std::uint64_t faces_per_file = 0;     // .ply, .obj, .glb: most faces in a file; 0: what the format can number
     preview_options preview;              // camera and light of .png
     std::function<void(double)> progress; // called with 0..1 now and then, from the calling thread; may be empty
 };
@@ -31,7 +36,12 @@ struct format {
     std::string_view description; // one line
     bool needs_occupancy;         // without the "occupancy" channel the writer refuses
     bool all_channels;            // false: occupancy, with "color" where the format has colours
+    bool shows_colors;            // takes the colours of find_colors() where there are any
+    bool needs_cubes;             // knows one voxel size for all axes: without are_cubic() the writer refuses
 };
+
+// Whether voxels of this size are cubes, but for what fitting a grid loses by rounding.
+[[nodiscard]] bool are_cubic(const std::array<double, 3>& voxel_size);
 
 // In the order in which --help lists them.
 [[nodiscard]] std::span<const format> formats();

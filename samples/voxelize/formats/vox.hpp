@@ -4,7 +4,8 @@
 
 // MagicaVoxel's .vox. MagicaVoxel is z up; with write_options::up == y a voxel (i,j,k) of the volume therefore stands
 // at (i, nz-1-k, j) of the file, a quarter turn about x, so that the model stands upright and is not mirrored. With up
-// == z it stands at (i,j,k). The format knows neither origin nor voxel size.
+// == z it stands at (i,j,k). The format knows neither origin nor voxel size; a grid whose voxel sizes differ from axis
+// to axis is refused.
 //
 // A model is at most 256 voxels a side. What fits is one model in a version 150 file, which every reader knows. A
 // larger grid becomes blocks of 256, each that is not empty a model, placed by a scene graph of transform, group and

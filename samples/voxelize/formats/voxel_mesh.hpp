@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The surface of the occupied voxels as rectangles: one for each side of a voxel that has no occupied neighbour there
+// (voxels at the grid's border have none outside). Shared by the writers of .ply, .obj and .glb.
+
+#include "../volume.hpp"
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+namespace voxelize {
+
+// A rectangle of voxel sides in one plane of the lattice, all of one colour. Corner `low` is a lattice corner:
+// world position origin + low * voxel_size. The rectangle spans size[0] voxels along axis (direction / 2 + 1) % 3 and
+// size[1] along axis (direction / 2 + 2) % 3.
+struct voxel_face {
+    std::array<std::uint32_t, 3> low{};
+    std::array<std::uint32_t, 2> size{1, 1};
+    std::uint32_t rgb = 0;      // sRGB, red in the low byte
+    std::uint8_t direction = 0; // outward normal: 0 -x, 1 +x, 2 -y, 3 +y, 4 -z, 5 +z
+
+    friend bool operator==(const voxel_face&, const voxel_face&) = default;
+};
+
+// All faces, by axis, then layer along it, then direction, then position; the same list for any number of threads. With
+// `merge`, sides of equal colour in one plane are joined greedily: each rectangle first grows along its first axis,
+// then along its second. The colours are find_colors(v)'s, or clay. `v` has an occupancy channel. `progress` gets 0..1
+// from the calling thread; it may be empty.
+[[nodiscard]] std::vector<voxel_face> voxel_faces(const volume& v, bool merge, int threads,
+                                                  const std::function<void(double)>& progress);
+
+// Faces as an indexed mesh in which equal corners of equal colour are one vertex.
+struct welded_mesh {
+    struct vertex {
+        std::array<std::uint32_t, 3> corner; // lattice corner
+        std::uint32_t rgb;
+    };
+    std::vector<vertex> vertices;                    // by z, then in order of use
+    std::vector<std::array<std::uint32_t, 4>> quads; // vertex numbers, counter-clockwise seen from outside; in the
+                                                     // order of the faces
+};
+
+// At most 2^30 faces, so that vertex numbers fit into 32 bits. `extent` is the volume's.
+[[nodiscard]] welded_mesh weld(std::span<const voxel_face> faces, const std::array<std::int64_t, 3>& extent,
+                               int threads);
+
+} // namespace voxelize
