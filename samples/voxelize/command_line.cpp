@@ -78,7 +78,17 @@ std::string footer() {
     }
     text += "\nOUTPUTS (by extension; .npy has the shape (nz, ny, nx) or (nz, ny, nx, components))\n";
     for (const format& entry : formats()) line(entry.extension, entry.description);
-    text += "\nEXIT CODES\n"
+    text += "\nGRID\n"
+            "  -r N            N voxels along the longest side of the model, as few as hold it along the others: 2 x 1 "
+            "x 1\n"
+            "                  gets 128 x 64 x 64. With --padding P, N - 2 P of them.\n"
+            "  -s S            Voxel (i, j, k) spans i S to (i + 1) S, and so on. The grid is the voxels that the "
+            "model's box\n"
+            "                  spans: 6 of 0.1 for 0.6. A layer that the box only touches is left out, unless "
+            "--coverage thin\n"
+            "                  needs it: a face in the plane between two voxels lies in the upper one.\n"
+            "  --padding P     Nothing is drawn in the P outermost layers.\n"
+            "\nEXIT CODES\n"
             "  0 done   1 wrong command line   2 the model cannot be used   3 not enough memory\n"
             "  4 an output cannot be written   5 --backend cuda cannot be used   70 a bug of this program\n"
             "  5 is: built without CUDA, no driver, a driver too old, no GPU, or one that there is no code for; too\n"
@@ -287,6 +297,7 @@ void understand_grid(command_line& options, const raw_options& raw, bool has_res
     unit.high = glm::dvec3(1);
     try {
         grid_request probe = options.grid;
+        options.grid.coverage = options.voxelize.coverage;
         if (probe.voxel_size && !probe.origin && !probe.extent) unit.high = *probe.voxel_size;
         (void)place_grid(probe, unit);
     } catch (const grid_error& error) {

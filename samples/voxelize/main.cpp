@@ -51,6 +51,7 @@ void run(const command_line& options) {
     const bounding_box bounds = bounds_of(model, options.voxelize.threads);
     if (bounds.empty) throw gltf_error("no triangle has a corner at a finite position");
     report.request.grid = place_grid(options.grid, bounds);
+    report.request.padding = options.grid.padding;
     if (std::string warning = precision_warning(model, report.request.grid); !warning.empty())
         report.warnings.push_back(std::move(warning));
     report.stats.milliseconds.emplace_back("read", milliseconds_since(start));

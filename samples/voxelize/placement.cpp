@@ -4,6 +4,8 @@
 
 #include "parallel.hpp"
 
+#include <voxelpipe/core/fixed_point.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -18,13 +20,19 @@ namespace {
 
 bool is_finite(const glm::vec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
-// Keeps surfaces that lie in the faces of the bounding box off the grid's border, where rounding would decide whether
-// they are inside: a ten-thousandth of the longest side.
+// How much larger than the model a grid of --resolution is along its longest side, at either end: surfaces that lie in
+// the faces of the bounding box stay off the grid's border.
 constexpr double margin = 1e-4;
 
 [[noreturn]] void too_many_voxels(double count, int axis) {
     throw grid_error("the grid would have " + std::to_string(static_cast<long long>(std::fmin(count, 9e18))) +
                      " voxels along " + "xyz"[axis] + ", the most is " + std::to_string(voxelpipe::grid::max_extent));
+}
+
+// Sub-voxel units: places that a position can be snapped to, along one voxel.
+double units(const glm::ivec3& extent) {
+    return static_cast<double>(std::int64_t{1}
+                               << voxelpipe::core::fraction_bits(std::max({extent.x, extent.y, extent.z})));
 }
 
 voxelpipe::grid fit_resolution(int resolution, int padding, const bounding_box& bounds) {
@@ -35,25 +43,71 @@ voxelpipe::grid fit_resolution(int resolution, int padding, const bounding_box& 
     const glm::dvec3 size = bounds.high - bounds.low;
     const double longest = std::max({size.x, size.y, size.z});
     const double voxel = longest > 0 ? longest * (1 + 2 * margin) / inner : 1.0;
+    // Along the other axes as few as leave room for rounding at both ends: a box of 2 : 1 : 1 gets half the voxels.
+    const double room = 8 / units(glm::ivec3(resolution));
     voxelpipe::grid grid;
     grid.voxel_size = glm::dvec3(voxel);
     for (int axis = 0; axis < 3; ++axis) {
-        const double wanted = std::ceil((size[axis] + 2 * margin * longest) / voxel);
+        const double wanted = std::ceil(size[axis] / voxel + room);
         grid.extent[axis] = static_cast<int>(std::clamp(wanted, 1.0, static_cast<double>(inner))) + 2 * padding;
         grid.origin[axis] = std::fma(-0.5 * grid.extent[axis], voxel, 0.5 * bounds.low[axis] + 0.5 * bounds.high[axis]);
     }
     return grid;
 }
 
-voxelpipe::grid fit_voxel_size(const glm::dvec3& voxel, int padding, const bounding_box& bounds) {
-    voxelpipe::grid grid;
-    grid.voxel_size = voxel;
+// Voxels of the lattice, numbers along each axis; the last is not among them.
+struct lattice_box {
+    glm::dvec3 first{0.0};
+    glm::dvec3 last{1.0};
+
+    [[nodiscard]] voxelpipe::grid grid(const glm::dvec3& voxel, int padding) const {
+        voxelpipe::grid result;
+        result.voxel_size = voxel;
+        for (int axis = 0; axis < 3; ++axis) {
+            const double count = last[axis] - first[axis] + 2 * padding;
+            if (!(count <= voxelpipe::grid::max_extent)) too_many_voxels(count, axis);
+            result.extent[axis] = static_cast<int>(count);
+            result.origin[axis] = (first[axis] - padding) * voxel[axis];
+        }
+        return result;
+    }
+};
+
+// Where the library snaps a position of the world, in units from the grid's lowest corner.
+voxelpipe::core::snapped_position snapped(voxelpipe::grid grid, const glm::dvec3& position) {
+    const glm::dvec3 reference = reference_point(grid);
+    grid.origin -= reference;
+    const glm::vec3 p(position - reference);
+    return voxelpipe::core::snap(voxelpipe::core::make_snap_transform(grid), p.x, p.y, p.z);
+}
+
+// The rule of --voxel-size, which --help states. The box is taken as the library snaps it, so that what is drawn and
+// where the grid ends are decided by the same integers.
+voxelpipe::grid fit_voxel_size(const grid_request& request, const bounding_box& bounds) {
+    const glm::dvec3& voxel = *request.voxel_size;
+    lattice_box box; // too small by a layer at most
     for (int axis = 0; axis < 3; ++axis) {
-        const double first = std::floor(bounds.low[axis] / voxel[axis]) - padding;
-        const double last = std::max(std::ceil(bounds.high[axis] / voxel[axis]) + padding, first + 1 + 2 * padding);
-        if (!(last - first <= voxelpipe::grid::max_extent)) too_many_voxels(last - first, axis);
-        grid.extent[axis] = static_cast<int>(last - first);
-        grid.origin[axis] = first * voxel[axis];
+        constexpr double rounding = 1.0 / 16; // no unit of snapping is larger
+        box.first[axis] = std::floor(bounds.low[axis] / voxel[axis] + rounding);
+        box.last[axis] = std::max(std::ceil(bounds.high[axis] / voxel[axis] - rounding), box.first[axis] + 1);
+    }
+    voxelpipe::grid grid = box.grid(voxel, request.padding);
+    for (bool grown = true; grown;) {
+        grown = false;
+        const voxelpipe::core::snapped_position low = snapped(grid, bounds.low), high = snapped(grid, bounds.high);
+        if (!voxelpipe::core::is_drawable(low) || !voxelpipe::core::is_drawable(high)) break;
+        const std::int64_t lowest[3] = {low.x, low.y, low.z}, highest[3] = {high.x, high.y, high.z};
+        const auto unit = static_cast<std::int64_t>(units(grid.extent));
+        // Thin fragments of a face in a plane between two voxels lie in the upper one: without it there is a hole.
+        const std::int64_t in_plane = request.coverage == voxelpipe::coverage::thin ? 1 : 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            const bool below = lowest[axis] < request.padding * unit;
+            const bool above = highest[axis] + in_plane > (grid.extent[axis] - request.padding) * unit;
+            if (below) --box.first[axis];
+            if (above) ++box.last[axis];
+            grown = grown || below || above;
+        }
+        grid = box.grid(voxel, request.padding);
     }
     return grid;
 }
@@ -161,7 +215,7 @@ voxelpipe::grid place(const grid_request& request, const bounding_box& bounds) {
     } else if (request.voxel_size) {
         for (int axis = 0; axis < 3; ++axis)
             if (!((*request.voxel_size)[axis] > 0)) throw grid_error("--voxel-size must be positive");
-        grid = fit_voxel_size(*request.voxel_size, request.padding, bounds);
+        grid = fit_voxel_size(request, bounds);
     } else {
         const int resolution = request.resolution.value_or(128);
         if (resolution < 1) throw grid_error("--resolution must be at least 1");

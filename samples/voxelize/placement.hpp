@@ -5,6 +5,7 @@
 
 #include "scene.hpp"
 
+#include <voxelpipe/core/coverage.hpp>
 #include <voxelpipe/grid.hpp>
 
 #include <glm/glm.hpp>
@@ -17,15 +18,20 @@ namespace voxelize {
 
 // Exactly one of three ways:
 //   resolution                     that many cubic voxels along the longest side of the model, centred
-//   voxel_size                     voxels of that size on the lattice of its multiples, as many as the model needs
-//   origin, voxel_size, extent     as given
-// The first two leave `padding` voxels free on every side; with resolution they are among the number asked for.
+//   voxel_size                     voxels of that size on the lattice of its multiples: those that the model's box
+//   spans origin, voxel_size, extent     as given
+// The first two leave `padding` voxels on every side in which nothing is drawn; with resolution they are among the
+// number asked for.
+// With voxel_size a face of the box in a plane of the lattice ends there, and rounding noise does not count: 6 voxels
+// of 0.1 for 0.60000002. Conservative fragments in the layer beyond, which the box only touches, are cropped. Thin
+// fragments of a face in a plane lie in the voxel above it, so thin coverage gets that layer too.
 struct grid_request {
     std::optional<int> resolution;
     int padding = 0;
     std::optional<glm::dvec3> voxel_size;
     std::optional<glm::dvec3> origin;
     std::optional<glm::ivec3> extent;
+    voxelpipe::coverage coverage = voxelpipe::coverage::conservative; // with voxel_size: see above
 };
 
 // A request that names no grid: contradictory, or with more voxels than there can be.

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 
@@ -31,6 +32,7 @@ struct target_info {
     scalar type;
     int components;
     std::string_view description; // one line, with the value of an empty voxel where it is not 0
+    std::uint32_t empty = 0;      // the bits of each component of an empty voxel
 };
 
 inline constexpr std::array target_table{
@@ -40,9 +42,10 @@ inline constexpr std::array target_table{
     target_info{target::color_max, "color-max", scalar::u8, 4, "sRGB and alpha: greatest of each component"},
     target_info{target::color_replace, "color-replace", scalar::u8, 4, "sRGB and alpha: of the last triangle"},
     target_info{target::normal, "normal", scalar::f32, 3, "mean of the unit normals, made unit again"},
-    target_info{target::material, "material", scalar::i32, 1, "material of the last triangle; empty: -1"},
-    target_info{target::triangle, "triangle", scalar::i32, 1, "number of the last triangle; empty: -1"},
-    target_info{target::depth, "depth", scalar::f32, 1, "least world position along --depth-axis; empty: NaN"},
+    target_info{target::material, "material", scalar::i32, 1, "material of the last triangle; empty: -1", UINT32_MAX},
+    target_info{target::triangle, "triangle", scalar::i32, 1, "number of the last triangle; empty: -1", UINT32_MAX},
+    target_info{target::depth, "depth", scalar::f32, 1, "least world position along --depth-axis; empty: NaN",
+                0x7fc00000},
 };
 
 [[nodiscard]] constexpr const target_info& info_of(target id) { return target_table[static_cast<std::size_t>(id)]; }

@@ -3,6 +3,7 @@
 #include "voxelizer.hpp"
 
 #include "cuda_device.hpp"
+#include "padding.hpp"
 #include "pipeline.hpp"
 
 #include <cpu_ref/backend.hpp>
@@ -79,16 +80,25 @@ std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_
     }
 }
 
+volume with_ring(volume inside, const voxelize_request& request) {
+    volume result = padded(std::move(inside), request.padding);
+    for (std::size_t axis = 0; axis < 3; ++axis) // without the rounding of a way there and back
+        result.origin[axis] = request.grid.part_origin()[static_cast<glm::length_t>(axis)];
+    return result;
+}
+
 } // namespace
 
 volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
     check_memory(request);
     try {
+        voxelize_request inside = request;
+        inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
         if (request.backend != backend_choice::cpu)
-            if (std::optional<volume> result = try_cuda(model, request, stats)) return std::move(*result);
-        voxelize_request on_cpu = request;
-        if (on_cpu.work_memory == 0) on_cpu.work_memory = std::uint64_t{128} << 20;
-        return run_on_cpu(model, on_cpu, stats);
+            if (std::optional<volume> result = try_cuda(model, inside, stats))
+                return with_ring(std::move(*result), request);
+        if (inside.work_memory == 0) inside.work_memory = std::uint64_t{128} << 20;
+        return with_ring(run_on_cpu(model, inside, stats), request);
     } catch (const std::bad_alloc&) {
         throw memory_error("not enough memory: take fewer targets or voxels");
     }

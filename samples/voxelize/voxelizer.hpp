@@ -25,6 +25,7 @@ enum class backend_choice : std::uint8_t { automatic, cpu, cuda };
 
 struct voxelize_request {
     voxelpipe::grid grid;
+    int padding = 0; // voxels of it on every side in which nothing is drawn
     voxelpipe::coverage coverage = voxelpipe::coverage::conservative;
     std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
     int depth_axis = 2;                             // 0 x, 1 y, 2 z

@@ -262,10 +262,10 @@ TEST(Tool, GridsAreWhatWasAskedFor) {
     };
     // The nodes' bounds: 0.1 to 2.1, 0.2 to 1.2, -0.3 to 0.2.
     const json resolution = grid({"-r", "20"});
-    EXPECT_EQ(json({20, 11, 6}), resolution["extent"]);
+    EXPECT_EQ(json({20, 10, 5}), resolution["extent"]);
     EXPECT_NEAR(2.0 * 1.0002 / 20, resolution["voxel_size"][0], 1e-7);
     array bits = read_npy(folder / "o.npy");
-    EXPECT_EQ((std::vector<std::size_t>{6, 11, 20}), bits.shape);
+    EXPECT_EQ((std::vector<std::size_t>{5, 10, 20}), bits.shape);
 
     const json padded = grid({"-r", "20", "--padding", "3"});
     EXPECT_EQ(20, padded["extent"][0]);
