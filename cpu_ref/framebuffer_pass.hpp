@@ -6,7 +6,7 @@
 // Blends that accumulate in their own format (reproducible sums) keep a tile of accumulators; all others work in place.
 // A shader that gives every fragment the same values takes the way of solid_tile.hpp.
 
-#include <cpu_ref/solid_tile.hpp>
+#include <cpu_ref/constant_tile.hpp>
 
 #include <array>
 #include <atomic>

@@ -7,8 +7,8 @@
 // y + tile_size * z, its bits run along x.
 
 #include <cpu_ref/pipeline.hpp>
-#include <voxelpipe/core/small_box.hpp>
-#include <voxelpipe/core/tile_columns.hpp>
+#include <cpu_ref/small_box.hpp>
+#include <cpu_ref/tile_columns.hpp>
 
 namespace voxelpipe::cpu {
 

@@ -5,8 +5,9 @@
 // Render targets and framebuffers: target<T, Blend, Layout> says what a voxel holds and how fragments meet there,
 // framebuffer<Backend, Targets...> owns up to 8 of them, framebuffer_view names memory that someone else owns.
 
+#include <voxelpipe/blend.hpp>
 #include <voxelpipe/core/change_log.hpp>
-#include <voxelpipe/core/tile.hpp>
+#include <voxelpipe/core/layout.hpp>
 #include <voxelpipe/status.hpp>
 
 #include <array>

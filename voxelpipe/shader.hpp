@@ -229,6 +229,16 @@ template <class Mesh, class VertexShader, class FragmentShader>
     return false;
 }
 
+template <class... Attributes>
+[[nodiscard]] VOXELPIPE_HD vertex<Attributes...> fetch_vertex(const mesh_view<Attributes...>& m, std::uint32_t index,
+                                                              std::uint32_t draw) {
+    return [&]<std::size_t... I>(std::index_sequence<I...>) {
+        return vertex<Attributes...>{index, draw, m.positions[index],
+                                     make_pack(Attributes(voxelpipe::get<I>(m.attributes)[index])...)};
+    }
+    (std::index_sequence_for<Attributes...>{});
+}
+
 } // namespace core
 
 // ---- draws ----------------------------------------------------------------------------------------------------------

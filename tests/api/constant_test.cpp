@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Shaders that give every fragment the same values take ways of their own (cpu_ref/solid_tile.hpp,
-// device/direct_raster.cuh): the same bytes and counters as a shader of the user's that returns these values, which is
+// Shaders that give every fragment the same values take ways of their own (cpu_ref/constant_tile.hpp,
+// device/raster/raster.cuh): the same bytes and counters as a shader of the user's that returns these values, which is
 // shaded fragment by fragment.
 
 #include "api_model.hpp"

@@ -7,7 +7,7 @@
 #include "test_support.hpp"
 
 #include <voxelpipe/blend.hpp>
-#include <voxelpipe/core/repeated_fold.hpp>
+#include <voxelpipe/device/targets/repeated_fold.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 // How much room a call gets for what only the device finds out: calls that come again fit at once, and not by far.
 
-#include <voxelpipe/core/call_room.hpp>
+#include <voxelpipe/device/call/capacity_history.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 // Numbers of blocks for any number of items: a count that is cut to 32 bits leaves a device idle, or work undone.
 
-#include <voxelpipe/core/launch_size.hpp>
+#include <voxelpipe/device/base/launch_size.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 // The way of many workers through several lists: every chunk once, all lists at the same pace.
 
-#include <voxelpipe/core/list_walk.hpp>
+#include <voxelpipe/device/raster/list_walk.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// core/tile_columns.hpp and core/small_box.hpp: columns and rows of bits are the voxels of coverage.hpp's spans, for
-// every class of triangle, in boxes of every shape up to 32 voxels a side.
+// cpu_ref/tile_columns.hpp and cpu_ref/small_box.hpp: columns and rows of bits are the voxels of coverage.hpp's spans,
+// for every class of triangle, in boxes of every shape up to 32 voxels a side.
 
 #include "test_support.hpp"
 
-#include <voxelpipe/core/small_box.hpp>
-#include <voxelpipe/core/tile_columns.hpp>
+#include <cpu_ref/small_box.hpp>
+#include <cpu_ref/tile_columns.hpp>
 #include <voxelpipe/grid.hpp>
 
 #include <gtest/gtest.h>

@@ -5,7 +5,7 @@
 
 #include "device_test.hpp"
 
-#include <voxelpipe/device/counting_sort.cuh>
+#include <voxelpipe/device/fragments/counting_sort.cuh>
 
 #include <algorithm>
 #include <numeric>

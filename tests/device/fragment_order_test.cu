@@ -6,7 +6,7 @@
 
 #include "device_test.hpp"
 
-#include <voxelpipe/device/fragment_order.cuh>
+#include <voxelpipe/device/fragments/order_voxels.cuh>
 
 #include <algorithm>
 #include <numeric>

@@ -5,7 +5,7 @@
 
 #include "device_test.hpp"
 
-#include <voxelpipe/device/fragment_sort.cuh>
+#include <voxelpipe/device/fragments/radix_sort.cuh>
 
 #include <algorithm>
 #include <numeric>

@@ -2,27 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the backends do alike with one vertex or one triangle outside the raster itself: fetching a vertex, deciding
-// whether a triangle is drawn and if not why, which tiles it has work in, and the voxels of a tile.
+// What the backends do alike with one triangle outside the raster itself: whether it is drawn and if not why, which
+// tiles it has work in, and the voxels of a tile.
 
 #include <voxelpipe/core/coverage.hpp>
-#include <voxelpipe/core/tile.hpp>
-#include <voxelpipe/shader.hpp>
+#include <voxelpipe/core/tile_grid.hpp>
 
 #include <cstdint>
-#include <utility>
 
 namespace voxelpipe::core {
-
-template <class... Attributes>
-[[nodiscard]] VOXELPIPE_HD vertex<Attributes...> fetch_vertex(const mesh_view<Attributes...>& m, std::uint32_t index,
-                                                              std::uint32_t draw) {
-    return [&]<std::size_t... I>(std::index_sequence<I...>) {
-        return vertex<Attributes...>{index, draw, m.positions[index],
-                                     make_pack(Attributes(voxelpipe::get<I>(m.attributes)[index])...)};
-    }
-    (std::index_sequence_for<Attributes...>{});
-}
 
 enum class triangle_class : std::uint8_t { drawn, nonfinite, too_far, zero_area, outside };
 

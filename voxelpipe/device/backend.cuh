@@ -6,12 +6,12 @@
 // stream of the current device; a call to voxelize waits once, for the counters in its status, unless it has to run
 // again.
 
-#include <voxelpipe/core/call_room.hpp>
-#include <voxelpipe/device/abuffer_call.cuh>
-#include <voxelpipe/device/call_graph.cuh>
-#include <voxelpipe/device/check_indices.cuh>
-#include <voxelpipe/device/framebuffer_call.cuh>
-#include <voxelpipe/device/state_reader.cuh>
+#include <voxelpipe/device/call/abuffer_call.cuh>
+#include <voxelpipe/device/call/capacity_history.hpp>
+#include <voxelpipe/device/call/framebuffer_call.cuh>
+#include <voxelpipe/device/call/graph_cache.cuh>
+#include <voxelpipe/device/call/readback.cuh>
+#include <voxelpipe/device/scene/check_indices.cuh>
 
 #include <algorithm>
 #include <cstddef>

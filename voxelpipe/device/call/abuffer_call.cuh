@@ -1,0 +1,178 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Host side of an A-buffer call, as call/framebuffer_call.cuh: what memory its stages take, and their launches.
+
+#include <voxelpipe/device/base/stage_clock.cuh>
+#include <voxelpipe/device/call/graph_cache.cuh>
+#include <voxelpipe/device/fragments/fragment_lists.cuh>
+#include <voxelpipe/device/fragments/list_sink.cuh>
+#include <voxelpipe/device/fragments/segmented_reduce.cuh>
+#include <voxelpipe/device/scene/scene_memory.cuh>
+
+#include <cstdint>
+#include <span>
+#include <type_traits>
+
+namespace voxelpipe::device {
+
+// Fragments a voxel, on average, from which on they are sorted by counting: with 16 and 21, as on hairball, that took
+// 1 to 3 % longer than the radix sort, and with 35 and more 9 to 19 % less (whole calls at 128^3 on an H200).
+inline constexpr std::uint64_t least_counted = 24;
+
+template <class Draw, class Payload>
+struct abuffer_call;
+template <class Mesh, class VertexShader, class FragmentShader, class Payload>
+struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
+    using draw_type = draw<Mesh, VertexShader, FragmentShader>;
+    using scene_buffers = scene_memory<Mesh, VertexShader, FragmentShader>;
+    using scene_type = typename scene_buffers::scene_type;
+
+    std::span<const draw_type> draws;
+    grid g;
+    std::uint32_t num_primitives;
+    capacities limits;
+    stage_clock* clock = nullptr;
+    // Whether fragments may be shaded when they are listed: in the finished lists, and then these are not what is
+    // wanted if any was discarded; with `filters`, before that as well.
+    bool may_shade_late = false, filters = false;
+    bool has_few_a_voxel = false; // fragments: see least_counted
+
+    // All that the launches of this call depend on, where it is plain bytes.
+    static constexpr bool has_bytes = std::is_trivially_copyable_v<draw_type>;
+    template <coverage Rule, class Key>
+    [[nodiscard]] call_bytes bytes(const void* workspace, const void* page) const {
+        call_bytes b = bytes_of_call<abuffer_call, Key>(workspace, page);
+        b.add(Rule);
+        for (const draw_type& d : draws) b.add(d);
+        b.add(g);
+        b.add(num_primitives);
+        b.add(limits);
+        b.add(may_shade_late);
+        b.add(filters);
+        b.add(has_few_a_voxel);
+        return b;
+    }
+    // Whether fragments are listed by the raster, and shaded afterwards where the shader is not constant.
+    template <class Key>
+    [[nodiscard]] bool is_listed_call() const {
+        return sizeof(Key) == sizeof(std::uint32_t) && (core::is_solid<FragmentShader> || may_shade_late) &&
+               draws.size() == 1 && is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
+    }
+    // As framebuffer_call's.
+    [[nodiscard]] bool may_leave_none(std::uint64_t left) const { return may_be_alone(num_primitives, left); }
+    template <class Key>
+    [[nodiscard]] bool shades_late() const {
+        return !core::is_solid<FragmentShader> && is_listed_call<Key>();
+    }
+
+    // Carves the memory and, with Run, launches the stages up to the sorted lists, which may be where they are asked
+    // for already (are_placed): there is room for limits.fragments primitives. The state comes first in the memory, and
+    // is zeroed before.
+    template <coverage Rule, bool Run, class Key>
+    [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, cudaStream_t stream,
+                                                  const asked_places& asked = {}) const {
+        pipeline_state* const state = memory.take<pipeline_state>(1);
+        if constexpr (sizeof(Key) == sizeof(std::uint32_t)) {
+            if (is_listed_call<Key>()) {
+                if constexpr (core::is_solid<FragmentShader>)
+                    return go_direct<Rule, Run>(memory, state, stream, asked);
+                else
+                    return go_shaded<Rule, Run>(memory, state, stream, asked);
+            }
+        }
+        const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
+        const scene_buffers buffers(memory, draws);
+        const list_memory share(memory, num_primitives, limits.fragment_records);
+        if constexpr (Run) {
+            const scene_type s = buffers.shade(draws, g, stream);
+            end_stage(clock, &stage_times::vertex_shade);
+            return build_lists<Rule, first_value>(s, lists, share.with(state), state, limits, true, stream, clock,
+                                                  asked);
+        } else {
+            return {};
+        }
+    }
+
+private:
+    // By counting, but not where voxels are known to have so many fragments that atomics wait for one another, or so
+    // few that each is by itself.
+    [[nodiscard]] bool may_count() const {
+        return !has_few_a_voxel && (limits.longest_ordered <= most_of_block || limits.longest_ordered == ~0ull);
+    }
+
+    // One draw of a constant shader.
+    template <coverage Rule, bool Run>
+    [[nodiscard]] fragment_lists<std::uint32_t, Payload>
+    go_direct(arena& memory, pipeline_state* state, cudaStream_t stream, const asked_places& asked) const {
+        constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
+        const draw_type& d = draws[0];
+        const auto lists =
+            take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true, may_count());
+        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : d.mesh.positions.size());
+        const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
+        const order_memory order = order_memory::take(memory, limits.fragments);
+        if constexpr (Run) {
+            const core::snap_transform snap = core::make_snap_transform(g);
+            const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
+            const auto raster = [&](const auto& source) {
+                const raster_input<std::remove_cvref_t<decltype(source)>> in{source, num_primitives, snap.fraction,
+                                                                             g.extent};
+                list_raster<Rule>(in, num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0],
+                                  prepare_lists(lists, asked, order.tiles, limits), state, limits, stream);
+            };
+            if constexpr (on_the_spot) {
+                raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, 0});
+            } else {
+                vertex_shade(d.mesh, d.vertex_shader, snap, 0, positions, static_cast<no_varyings*>(nullptr), stream);
+                end_stage(clock, &stage_times::vertex_shade);
+                raster(stored_source{{d.mesh.triangles.data(), positions, 0, num_vertices}});
+            }
+            end_stage(clock, &stage_times::fine_raster);
+            fragment_lists<std::uint32_t, Payload> sorted =
+                sort_unordered(lists, order, asked, num_primitives, nullptr, state, limits, stream, clock);
+            if constexpr (!std::is_same_v<Payload, no_payload>)
+                sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
+            return sorted;
+        } else {
+            return {};
+        }
+    }
+
+    // One draw of any other shader.
+    template <coverage Rule, bool Run>
+    [[nodiscard]] fragment_lists<std::uint32_t, Payload>
+    go_shaded(arena& memory, pipeline_state* state, cudaStream_t stream, const asked_places& asked) const {
+        constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
+        auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
+        const scene_buffers buffers(memory, draws);
+        const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
+        const order_memory order = order_memory::take(memory, limits.fragments);
+        auto* const spare = memory.take<std::uint32_t>(limits.fragments);
+        auto* const payloads = memory.take<Payload>(has_payload ? limits.fragments : 0);
+        if constexpr (Run) {
+            const scene_type s = buffers.shade(draws, g, stream);
+            end_stage(clock, &stage_times::vertex_shade);
+            const raster_input<stored_source> in{{s.geo.one}, num_primitives, s.geo.snap.fraction, g.extent};
+            list_raster<Rule>(in, s.geo.one.num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0],
+                              prepare_lists(lists, asked, order.tiles, limits), state, limits, stream);
+            if (filters) filter_lists(s, lists, state, limits, stream);
+            end_stage(clock, &stage_times::fine_raster);
+            fragment_lists<std::uint32_t, Payload> sorted =
+                sort_unordered(lists, order, asked, num_primitives, spare, state, limits, stream, clock);
+            if (!filters || has_payload) {
+                launch_behind(shade_lists_kernel<first_value, scene_type, Payload>, fill_device(limits.fragments),
+                              threads_per_block, stream, stage::abuffer_emit, s, sorted, payloads, state, limits);
+                end_stage(clock, &stage_times::abuffer_emit);
+            }
+            sorted.payloads = has_payload ? payloads : nullptr;
+            sorted.payloads_in_order = true;
+            return sorted;
+        } else {
+            return {};
+        }
+    }
+};
+
+} // namespace voxelpipe::device

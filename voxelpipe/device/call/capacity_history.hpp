@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Room for arrays whose lengths a call finds out on the device: the host has to say beforehand how much there is, what
+// does not fit costs a second run, and what is too much costs time too, where a sort is as long as its room.
+
+#include <voxelpipe/device/base/launch_size.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+namespace voxelpipe::core {
+
+// Key: what the host knows of a call, compared by ==. N arrays, numbered with 32 bits where `is_numbered` says so.
+template <class Key, std::size_t N>
+class call_room {
+public:
+    using lengths = std::array<std::uint64_t, N>;
+
+    explicit call_room(const std::array<bool, N>& is_numbered) : is_numbered_(is_numbered) {}
+
+    // For a call. One like the last gets a little more than such calls have needed so far; any other gets `first`, what
+    // a call needs of which nothing is known, or more where an earlier one did not fit.
+    [[nodiscard]] lengths guess(const Key& key, const lengths& first) const {
+        const bool known = last_ == key;
+        lengths room{};
+        for (std::size_t k = 0; k < N; ++k)
+            room[k] = limited(k, known && needed_[k] != 0 ? needed_[k] + needed_[k] / 16 + 1024
+                                                          : std::max(most_[k], first[k]));
+        return room;
+    }
+    // For the next try of a call that did not fit.
+    void raise(lengths& room, const lengths& needed) {
+        for (std::size_t k = 0; k < N; ++k) {
+            if (needed[k] > room[k]) room[k] = limited(k, needed[k] + needed[k] / 16);
+            most_[k] = std::max(most_[k], room[k]);
+        }
+    }
+    // Of a call that fitted. The key does not tell all calls apart: one of several gets what the largest needed.
+    void fitted(const Key& key, const lengths& needed) {
+        for (std::size_t k = 0; k < N; ++k) needed_[k] = last_ == key ? std::max(needed_[k], needed[k]) : needed[k];
+        last_ = key;
+    }
+
+    // The most of array k that calls like the last one have needed, where this is one of them.
+    [[nodiscard]] std::optional<std::uint64_t> most_needed(const Key& key, std::size_t k) const {
+        return last_ == key ? std::optional(needed_[k]) : std::nullopt;
+    }
+
+private:
+    [[nodiscard]] std::uint64_t limited(std::size_t k, std::uint64_t length) const {
+        return is_numbered_[k] ? std::min(length, most_numbered) : length;
+    }
+    std::array<bool, N> is_numbered_;
+    lengths most_{}, needed_{};
+    std::optional<Key> last_;
+};
+
+} // namespace voxelpipe::core

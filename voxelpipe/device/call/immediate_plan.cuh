@@ -1,0 +1,109 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Which targets of a call of constant shaders are blended in place, and which count their fragments (plan_direct).
+
+#include <voxelpipe/device/targets/finalize_counts.cuh>
+
+#include <bit>
+#include <cstring>
+#include <span>
+
+namespace voxelpipe::device {
+
+// Without marks the last pass goes through the whole grid, the tiles only through what is touched: they take over where
+// the counted targets have more bytes than this for each triangle, beyond what takes some microseconds. At 4 TB/s these
+// are 4 ns, which a few fragments cost in the tiles.
+inline constexpr std::uint64_t counted_bytes_per_triangle = 16384, counted_bytes = marked_bytes;
+
+// Bits are counted when all is drawn, which takes as long as the clear did: the atomics that tell first touches make
+// every warp wait for them. Beyond so many bytes they tell it in less time.
+inline constexpr std::uint64_t most_counted_bits = std::uint64_t{256} << 20;
+
+template <std::size_t K, class Target, class Draw>
+[[nodiscard]] bool may_be_counted(std::span<const Draw> draws, const target_view<Target>& t) {
+    if constexpr (is_countable<Target>) {
+        if (t.load != load_operation::clear) return false;
+        if constexpr (!std::is_same_v<typename Target::blend_type, blend::count>) {
+            const auto& first = voxelpipe::get<K>(draws[0].fragment_shader.values);
+            for (const Draw& d : draws) // numbers, whose equal bytes are equal values
+                if (std::memcmp(&first, &voxelpipe::get<K>(d.fragment_shader.values), sizeof(first)) != 0) return false;
+        }
+        return true;
+    } else {
+        return false;
+    }
+}
+
+template <class... Targets>
+[[nodiscard]] bool all_in_use(const framebuffer_view<Targets...>& fb) {
+    bool all = true;
+    core::for_each_index<sizeof...(Targets)>(
+        [&]<std::size_t K>() { all = all && voxelpipe::get<K>(fb.targets).load != load_operation::off; });
+    return all;
+}
+
+// Whether a call gives the same however often it is made.
+template <class... Targets>
+[[nodiscard]] bool clears_all_in_use(const framebuffer_view<Targets...>& fb) {
+    bool all = true;
+    core::for_each_index<sizeof...(Targets)>(
+        [&]<std::size_t K>() { all = all && voxelpipe::get<K>(fb.targets).load != load_operation::load; });
+    return all;
+}
+
+// How a call of constant shaders can do without tiles. A target is counted only where blending it in place would not
+// give its blend's bits, or where nothing else tells how many voxels are touched.
+template <class Draw, class... Targets>
+[[nodiscard]] direct_plan<sizeof...(Targets)> plan_direct(std::span<const Draw> draws,
+                                                          const framebuffer_view<Targets...>& fb,
+                                                          std::uint64_t num_primitives, bool count_voxels) {
+    direct_plan<sizeof...(Targets)> plan;
+    int telling = -1, countable = -1; // the first target that tells first touches, that may be counted
+    int telling_bits = -1;            // that tells them by its bits when all is drawn
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
+        const auto& t = voxelpipe::get<K>(fb.targets);
+        bool in_place = true, tells = true;
+        for (const Draw& d : draws) {
+            const auto& value = voxelpipe::get<K>(d.fragment_shader.values);
+            in_place = in_place && may_be_direct(t, value, num_primitives);
+            tells = tells && tells_first(t, value, num_primitives);
+        }
+        const bool may_count = may_be_counted<K>(draws, t);
+        if (tells && telling < 0) telling = static_cast<int>(K);
+        using map = typename core::pack_element<K, Targets...>::type::map;
+        if (tells && telling_bits < 0 && map::is_bit && map::elements(fb.extent) * sizeof(word) <= most_counted_bits)
+            telling_bits = static_cast<int>(K);
+        if (may_count && countable < 0) countable = static_cast<int>(K);
+        if (map::is_bit && map::elements(fb.extent) >> 30 != 0) plan.modes.of[K] = direct_mode::blend_far;
+        if (in_place) return;
+        if (may_count)
+            plan.modes.of[K] = direct_mode::count;
+        else
+            plan.possible = false;
+    });
+    if (count_voxels && !plan.any_counted()) {
+        if (telling_bits >= 0) {
+            plan.bits_of = telling_bits;
+        } else if (telling >= 0) {
+            plan.modes.of[telling] = direct_mode::count_first;
+            plan.modes.counts_first = true;
+        } else if (countable >= 0) {
+            plan.modes.of[countable] = direct_mode::count;
+        } else {
+            plan.possible = false;
+        }
+    }
+    if (count_voxels) plan.voxels_of = plan.first_counted();
+    std::uint64_t bytes = 0;
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
+        using target = typename core::pack_element<K, Targets...>::type;
+        if (plan.counts(K) && !ends_by_marks(voxelpipe::get<K>(fb.targets)))
+            bytes += target::map::elements(fb.extent) * sizeof(typename target::element_type);
+    });
+    if (bytes > counted_bytes + num_primitives * counted_bytes_per_triangle) plan.possible = false;
+    return plan;
+}
+
+} // namespace voxelpipe::device

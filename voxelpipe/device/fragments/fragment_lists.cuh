@@ -1,0 +1,503 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A-buffer: every fragment, ordered by (voxel, primitive). Fragments are counted, given their places by a
+// scan and written by ascending primitive; those of one draw are listed in one pass, in any order
+// (fragments/list_sink.cuh), where its shader is constant or discards nothing. A stable radix sort by voxel over just
+// the bits in use follows, and the first fragment of each voxel is selected; what was listed in any order is put in
+// order within each voxel on the way (fragments/order_voxels.cuh), and shaded then. Memory is in proportion to the
+// fragments (paper section 3, A-buffer).
+
+#include <voxelpipe/device/base/stage_clock.cuh>
+#include <voxelpipe/device/fragments/counting_sort.cuh>
+#include <voxelpipe/device/fragments/list_sink.cuh>
+#include <voxelpipe/device/fragments/order_voxels.cuh>
+#include <voxelpipe/device/fragments/radix_sort.cuh>
+#include <voxelpipe/device/scene/count_and_emit.cuh>
+#include <voxelpipe/device/scene/cub_sort.cuh>
+#include <voxelpipe/device/scene/fragment_shade.cuh>
+
+#include <cub/device/device_select.cuh>
+#include <thrust/iterator/counting_iterator.h>
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+namespace voxelpipe::device {
+
+// Fragments as cells of work_share: the voxel is the key; the value is the primitive or, where there are payloads, the
+// fragment's place among them.
+template <coverage Rule, class Scene, class Key, class Payload, class MakePayload>
+struct fragment_cells {
+    static constexpr coverage rule = Rule;
+    static constexpr std::int64_t small_columns = 256; // a warp per triangle pays only beyond
+    static constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
+
+    Scene s;
+    Key* keys;
+    std::uint32_t* values;
+    std::uint32_t* primitives; // by place, where there are payloads
+    Payload* payloads;         // by place
+    bool counts_triangles;
+
+    struct cell {
+        std::uint64_t voxel;
+        typename Scene::fragment_output out;
+    };
+
+    [[nodiscard]] __device__ core::voxel_box cells(const core::voxel_box& reach) const { return reach; }
+    template <class Visit>
+    __device__ void enumerate(const geometry& geo, const loaded_triangle& t, std::uint32_t id,
+                              const core::voxel_box& box, bool, Visit&& visit) const {
+        const auto nx = static_cast<std::uint64_t>(geo.extent.x), ny = static_cast<std::uint64_t>(geo.extent.y);
+        shade_fragments<Rule>(s, t, id, box, [&](int x, int y, int z, const auto& out) {
+            visit(cell{(static_cast<std::uint64_t>(z) * ny + static_cast<std::uint64_t>(y)) * nx +
+                           static_cast<std::uint64_t>(x),
+                       out});
+        });
+    }
+    [[nodiscard]] __device__ static bool keep(const cell& c) { return c.out.keep; }
+    __device__ void store(unsigned long long at, std::uint32_t primitive, const cell& c) const {
+        std::uint32_t value = primitive;
+        if constexpr (has_payload) {
+            value = static_cast<std::uint32_t>(at);
+            primitives[at] = primitive;
+            payloads[at] = MakePayload{}(c.out);
+        }
+        keys[at] = static_cast<Key>(c.voxel);
+        values[at] = value;
+    }
+};
+
+// The A-buffer's payload: the fragment shader's one output.
+struct first_value {
+    template <class Output>
+    __device__ auto operator()(const Output& o) const {
+        return voxelpipe::get<0>(o.values);
+    }
+};
+// All outputs, for folding them in order.
+struct all_values {
+    template <class Output>
+    __device__ auto operator()(const Output& o) const {
+        return o.values;
+    }
+};
+
+// Whether fragment i is the first of its voxel.
+template <class Key>
+struct is_first_of_voxel {
+    const Key* keys;
+    const pipeline_state* state;
+    capacities limits;
+    [[nodiscard]] __device__ bool operator()(unsigned long long i) const {
+        return !has_failed(*state, limits) && i < state->list_fragments && (i == 0 || keys[i] != keys[i - 1]);
+    }
+};
+
+template <class Key>
+[[nodiscard]] std::size_t select_bytes(std::uint64_t capacity) {
+    std::size_t bytes = 0;
+    check(cub::DeviceSelect::If(nullptr, bytes, thrust::counting_iterator<unsigned long long>(0),
+                                static_cast<std::uint64_t*>(nullptr), static_cast<unsigned long long*>(nullptr),
+                                capacity, is_first_of_voxel<Key>{}),
+          stage::abuffer_emit);
+    return bytes;
+}
+
+// Arrays of the fragment lists of one call.
+template <class Key, class Payload>
+struct list_buffers {
+    Key* keys[2];
+    std::uint32_t* values[2];
+    int bits;                      // of a voxel
+    sort_memory sort;              // where are_sorted_here,
+    counting_memory counting;      // or this, where it is in use
+    std::uint32_t* primitives;     // by place; null without payloads of fragments
+    Payload* payloads;             // by place; null likewise
+    std::uint64_t* first_of_voxel; // fragment numbers, ascending; list_voxels of them, and room for one more
+    list_places* places;           // where the lists are to go
+    void* storage;
+    std::size_t storage_bytes;
+};
+
+// Whether keys of this type, so many at most, are sorted by fragments/radix_sort.cuh: what is longer goes to cub.
+template <class Key>
+[[nodiscard]] VOXELPIPE_HD constexpr bool are_sorted_here(std::uint64_t capacity) {
+    return sizeof(Key) == sizeof(std::uint32_t) && capacity < most_sorted;
+}
+
+// Arrays for counting and writing fragments.
+struct list_memory {
+    share_buffers share;
+    void* storage; // of the scan
+    std::size_t storage_bytes;
+
+    list_memory(arena& memory, std::uint32_t num_primitives, unsigned long long record_capacity)
+        : share(take_share(memory, num_primitives, record_capacity)), storage_bytes(share_scan_bytes(num_primitives)) {
+        storage = memory.take<std::byte>(storage_bytes);
+    }
+    [[nodiscard]] list_memory with(pipeline_state* state) const {
+        list_memory m = *this;
+        m.share.num_records = &state->fragment_records;
+        m.share.num_cells = &state->list_fragments;
+        return m;
+    }
+};
+
+// The sorted lists, where they came to lie.
+template <class Key, class Payload>
+struct fragment_lists {
+    const Key* keys;
+    const std::uint32_t* voxels; // of each first_of_voxel; null: its key
+    const std::uint32_t* values;
+    const std::uint32_t* primitives; // null: a value is a primitive
+    const Payload* payloads;         // null: all are `payload`
+    const std::uint64_t* first_of_voxel;
+    const list_places* places; // where the lists are to go
+    Payload payload;
+    bool are_placed;        // all but the payloads are there, and nowhere else
+    bool payloads_in_order; // payloads are by fragment, not by place
+
+    [[nodiscard]] __device__ std::uint64_t voxel(std::uint64_t i) const {
+        return voxels != nullptr ? voxels[i] : keys[first_of_voxel[i]];
+    }
+    [[nodiscard]] __device__ std::uint32_t primitive(std::uint64_t i) const {
+        const std::uint32_t value = values[i];
+        return primitives == nullptr ? value : primitives[value];
+    }
+    [[nodiscard]] __device__ const Payload& payload_of(std::uint64_t i) const {
+        return payloads == nullptr ? payload : payloads[payloads_in_order ? i : values[i]];
+    }
+};
+
+// Between what lists fragments and the sort, where the raster has not done it: what the sort and the order want of
+// their memory, and fillers where cub sorts.
+template <class Key>
+__global__ void prepare_sort_kernel(Key* keys, std::uint32_t* values, std::uint64_t capacity,
+                                    const __grid_constant__ sort_preparation preparation, const pipeline_state* state,
+                                    capacities limits) {
+    await_stream();
+    preparation.run(std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x, std::uint64_t{gridDim.x} * blockDim.x);
+    if (!are_sorted_here<Key>(capacity)) fill_end_by_all(keys, values, state->list_fragments, capacity, *state, limits);
+}
+
+// What has to be done for the lists of a call before they are sorted.
+template <class Key, class Payload>
+[[nodiscard]] sort_preparation prepare_lists(const list_buffers<Key, Payload>& b, const asked_places& asked,
+                                             const tile_counts& tiles, const capacities& limits) {
+    sort_preparation p;
+    p.is_wanted = true;
+    p.sorts = are_sorted_here<Key>(limits.fragments);
+    p.sort = b.sort;
+    p.counting = b.counting;
+    p.capacity = limits.fragments;
+    p.tiles = tiles;
+    p.asked = asked;
+    p.places = b.places;
+    return p;
+}
+
+template <class Key>
+struct sorted_pairs {
+    Key *keys, *spare_keys;
+    std::uint32_t *values, *spare_values;
+};
+// Sorts what was listed by voxel, stably, for which `preparation` is to be done, if that is wanted.
+template <class Key, class Payload>
+[[nodiscard]] sorted_pairs<Key> sort_by_voxel(const list_buffers<Key, Payload>& b, const sort_preparation& preparation,
+                                              pipeline_state* state, const capacities& limits, cudaStream_t stream,
+                                              stage_clock* clock) {
+    if (preparation.is_wanted)
+        launch_behind(prepare_sort_kernel<Key>, fill_device(limits.fragments), threads_per_block, stream,
+                      stage::tile_sort, b.keys[0], b.values[0], limits.fragments, preparation, state, limits);
+    int at = 0;
+    if (!are_sorted_here<Key>(limits.fragments)) {
+        cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
+        cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
+        sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
+        at = keys.selector;
+        VOXELPIPE_ASSERT(values.selector == at);
+    } else if constexpr (sizeof(Key) == sizeof(std::uint32_t)) {
+        at = sort_fragments({{b.keys[0], b.keys[1]}, {b.values[0], b.values[1]}}, sort_count{state, limits},
+                            limits.fragments, b.sort, stream);
+    }
+    end_stage(clock, &stage_times::tile_sort);
+    return {b.keys[at], b.keys[1 - at], b.values[at], b.values[1 - at]};
+}
+
+// What was listed, sorted by voxel, and the first fragment of each.
+template <class Key, class Payload>
+[[nodiscard]] fragment_lists<Key, Payload> sort_lists(const list_buffers<Key, Payload>& b, const asked_places& asked,
+                                                      pipeline_state* state, const capacities& limits,
+                                                      cudaStream_t stream, stage_clock* clock) {
+    const sorted_pairs<Key> sorted =
+        sort_by_voxel(b, prepare_lists(b, asked, {}, limits), state, limits, stream, clock);
+    fragment_lists<Key, Payload> lists{};
+    lists.keys = sorted.keys;
+    lists.values = sorted.values;
+    lists.primitives = b.primitives;
+    lists.payloads = b.payloads;
+    lists.first_of_voxel = b.first_of_voxel;
+    lists.places = b.places;
+    std::size_t bytes = b.storage_bytes;
+    check(cub::DeviceSelect::If(b.storage, bytes, thrust::counting_iterator<unsigned long long>(0), b.first_of_voxel,
+                                &state->list_voxels, limits.fragments,
+                                is_first_of_voxel<Key>{lists.keys, state, limits}, stream),
+          stage::abuffer_emit);
+    end_stage(clock, &stage_times::abuffer_emit);
+    return lists;
+}
+
+// The same for primitives that were listed in any order; the lists are then where they are to go. The raster has done
+// what sort_preparation says, but for fillers. spare: room for limits.fragments, where the sorted voxels are wanted
+// afterwards; otherwise null.
+template <class Payload>
+[[nodiscard]] fragment_lists<std::uint32_t, Payload>
+sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const asked_places& asked,
+               std::uint32_t num_primitives, std::uint32_t* spare, pipeline_state* state, const capacities& limits,
+               cudaStream_t stream, stage_clock* clock) {
+    list_places here;
+    here.offsets = b.first_of_voxel;
+    here.room = limits.fragments;
+    fragment_lists<std::uint32_t, Payload> lists{};
+    if (b.counting.is_used()) {
+        VOXELPIPE_ASSERT(spare == nullptr);
+        here.narrow_voxels = b.keys[1];
+        here.primitives = b.values[0]; // once they have been read
+        order_by_counting({nullptr, b.values[1], b.keys[0], b.places, here, order.tiles, order.lists.with(state)},
+                          {b.keys[0], b.values[0]}, b.counting, num_primitives, state, limits, stream, clock);
+    } else {
+        sort_preparation preparation = prepare_lists(b, asked, order.tiles, limits);
+        preparation.is_wanted = !preparation.sorts; // for the fillers
+        const sorted_pairs<std::uint32_t> sorted = sort_by_voxel(b, preparation, state, limits, stream, clock);
+        here.narrow_voxels = sorted.spare_keys;
+        here.primitives = sorted.spare_values;
+        order_fragments({sorted.keys, sorted.values, spare != nullptr ? spare : sorted.keys, b.places, here,
+                         order.tiles, order.lists.with(state)},
+                        num_primitives, state, limits, stream);
+        lists.keys = sorted.keys;
+    }
+    end_stage(clock, &stage_times::abuffer_emit);
+    lists.voxels = here.narrow_voxels;
+    lists.first_of_voxel = here.offsets;
+    lists.values = here.primitives; // a value is a primitive
+    lists.places = b.places;
+    lists.are_placed = asked.value.voxels != nullptr;
+    return lists;
+}
+
+// Fragments as they were listed.
+struct listed_fragments {
+    std::uint32_t *voxels, *primitives;
+};
+
+// Shades fragments that are listed in any order, to leave out those that are discarded.
+template <class Scene>
+__global__ __launch_bounds__(threads_per_block, 4) void filter_lists_kernel(const __grid_constant__ Scene s,
+                                                                            listed_fragments from, listed_fragments to,
+                                                                            pipeline_state* state, capacities limits) {
+    constexpr int rounds = 4; // of a warp, for one atomic
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::most_numbered
+    const std::uint32_t lane = threadIdx.x % 32;
+    std::uint32_t discarded = 0;
+    for (std::uint64_t start = std::uint64_t{blockIdx.x} * threads_per_block * rounds + warp_in_block() * 32 * rounds;
+         start < n; start += std::uint64_t{gridDim.x} * threads_per_block * rounds) {
+        unsigned keeps[rounds];
+        unsigned num = 0;
+        for (int k = 0; k < rounds; ++k) {
+            const std::uint64_t i = start + 32 * static_cast<unsigned>(k) + lane;
+            bool keep = false;
+            if (i < n) {
+                const voxel_place at = place_of(from.voxels[i], s.geo.extent);
+                keep = shade_small_fragment<false>(s, from.primitives[i], at.x, at.y, at.z).keep;
+                discarded += static_cast<std::uint32_t>(!keep);
+            }
+            __syncwarp();
+            keeps[k] = __ballot_sync(0xffffffffu, keep);
+            num += static_cast<unsigned>(__popc(keeps[k]));
+        }
+        unsigned long long first = 0;
+        if (lane == 0 && num != 0) first = atomicAdd(&state->kept, static_cast<unsigned long long>(num));
+        first = __shfl_sync(0xffffffffu, first, 0);
+        for (int k = 0; k < rounds; ++k) {
+            const std::uint64_t i = start + 32 * static_cast<unsigned>(k) + lane;
+            if ((keeps[k] >> lane & 1u) != 0) {
+                const auto at = first + static_cast<unsigned>(__popc(keeps[k] & ((1u << lane) - 1)));
+                to.voxels[at] = from.voxels[i];
+                to.primitives[at] = from.primitives[i];
+            }
+            first += static_cast<unsigned>(__popc(keeps[k]));
+        }
+    }
+    const unsigned long long sum = block_sum(discarded);
+    if (threadIdx.x == 0 && sum != 0) {
+        atomicAdd(&state->filtered, sum);
+        atomicAdd(&state->discarded, sum);
+    }
+}
+// Behind it: the list is what was kept. One thread.
+template <class State>
+__global__ void end_filter_kernel(State* state, capacities limits) {
+    await_stream();
+    if (!has_failed(*state, limits)) state->list_fragments = state->kept;
+}
+
+// Leaves fragments out that are discarded. The buffers' first arrays hold what there is, before and after.
+template <class Scene, class Payload>
+void filter_lists(const Scene& s, list_buffers<std::uint32_t, Payload>& b, pipeline_state* state,
+                  const capacities& limits, cudaStream_t stream) {
+    const listed_fragments all{b.keys[0], b.values[0]}, kept{b.keys[1], b.values[1]};
+    launch_behind(filter_lists_kernel<Scene>, fill_device(limits.fragments), threads_per_block, stream,
+                  stage::abuffer_emit, s, all, kept, state, limits);
+    launch_behind(end_filter_kernel<pipeline_state>, 1, 1, stream, stage::abuffer_emit, state, limits);
+    std::swap(b.keys[0], b.keys[1]);
+    std::swap(b.values[0], b.values[1]);
+}
+
+// Shades fragments in their lists: payloads[i] is fragment i's, where there are payloads. Counts those that are
+// discarded, whose lists are not what the call is to give.
+template <class MakePayload, class Scene, class Payload>
+__global__ __launch_bounds__(threads_per_block, 4) void shade_lists_kernel(
+    const __grid_constant__ Scene s, const __grid_constant__ fragment_lists<std::uint32_t, Payload> lists,
+    Payload* payloads, pipeline_state* state, capacities limits) {
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::most_numbered
+    const std::uint32_t* const primitives = lists.are_placed ? lists.places->primitives : lists.values;
+    std::uint32_t discarded = 0;
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * threads_per_block + threadIdx.x; i < n;
+         i += std::uint64_t{gridDim.x} * threads_per_block) {
+        const voxel_place at = place_of(lists.keys[i], s.geo.extent);
+        const auto out = shade_small_fragment<false>(s, primitives[i], at.x, at.y, at.z);
+        discarded += static_cast<std::uint32_t>(!out.keep);
+        if constexpr (!std::is_same_v<Payload, no_payload>) payloads[i] = MakePayload{}(out);
+    }
+    count_discarded(discarded, state);
+}
+
+template <coverage Rule, class MakePayload, class Scene, class Key, class Payload>
+[[nodiscard]] fragment_lists<Key, Payload>
+build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const list_memory& m, pipeline_state* state,
+            const capacities& limits, bool counts_triangles, cudaStream_t stream, stage_clock* clock,
+            const asked_places& asked = {}) {
+    const fragment_cells<Rule, Scene, Key, Payload, MakePayload> op{
+        s, b.keys[0], b.values[0], b.primitives, b.payloads, counts_triangles};
+    share_count(s.geo, op, m.share, state, m.storage, m.storage_bytes, stage::abuffer_emit, stream);
+    share_emit(s.geo, op, m.share, state, limits, stage::abuffer_emit, stream);
+    end_stage(clock, &stage_times::fine_raster);
+    return sort_lists(b, asked, state, limits, stream, clock);
+}
+
+// ---- into an A-buffer -----------------------------------------------------------------------------------------------
+
+// What became of the lists, for readers on the device: both 0 where the call failed.
+struct list_counts {
+    std::uint64_t voxels, fragments;
+};
+
+// By all threads of a grid. What is where it is to go stays there.
+template <class Key, class Payload>
+__device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint64_t num_voxels,
+                           std::uint64_t num_fragments, std::uint64_t* voxels, std::uint64_t* offsets,
+                           std::uint32_t* primitives, Payload* payloads) {
+    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
+    if (!lists.are_placed) {
+        for (std::uint64_t i = thread; i < num_voxels; i += threads) {
+            voxels[i] = lists.voxel(i);
+            offsets[i] = lists.first_of_voxel[i];
+        }
+        if (thread == 0 && num_voxels != 0) offsets[num_voxels] = num_fragments;
+    }
+    for (std::uint64_t i = thread; i < num_fragments; i += threads) {
+        if (!lists.are_placed) primitives[i] = lists.primitive(i);
+        if constexpr (!std::is_same_v<Payload, no_payload>) payloads[i] = lists.payload_of(i);
+    }
+}
+
+template <class Key, class Payload>
+__global__ void copy_lists_kernel(fragment_lists<Key, Payload> lists, std::uint64_t num_voxels,
+                                  std::uint64_t num_fragments, std::uint64_t* voxels, std::uint64_t* offsets,
+                                  std::uint32_t* primitives, Payload* payloads) {
+    copy_lists(lists, num_voxels, num_fragments, voxels, offsets, primitives, payloads);
+}
+
+// The same with the numbers that the state holds, to where the lists are to go, if there is room for so many voxels.
+template <class Key, class Payload>
+__global__ void place_lists_kernel(const __grid_constant__ fragment_lists<Key, Payload> lists,
+                                   const pipeline_state* state, capacities limits) {
+    await_stream();
+    const list_places to = *lists.places;
+    if (has_failed(*state, limits) || state->list_voxels > to.room) return;
+    copy_lists(lists, state->list_voxels, state->list_fragments, to.voxels, to.offsets, to.primitives,
+               static_cast<Payload*>(to.payloads));
+}
+template <class Key, class Payload>
+void place_lists(const fragment_lists<Key, Payload>& lists, const pipeline_state* state, const capacities& limits,
+                 cudaStream_t stream, stage_clock* clock) {
+    if (lists.are_placed && std::is_same_v<Payload, no_payload>) return;
+    launch_behind(place_lists_kernel<Key, Payload>, fill_device(limits.fragments), threads_per_block, stream,
+                  stage::abuffer_emit, lists, state, limits);
+    end_stage(clock, &stage_times::abuffer_emit);
+}
+
+// The same, for as many voxels as there are fragments. Leaves the numbers in the counters.
+template <class Key, class Payload>
+__global__ void publish_lists_kernel(fragment_lists<Key, Payload> lists, pipeline_state* state, capacities limits,
+                                     list_counts* counts, std::uint64_t* voxels, std::uint64_t* offsets,
+                                     std::uint32_t* primitives, Payload* payloads) {
+    await_stream();
+    const bool failed = has_failed(*state, limits);
+    const std::uint64_t num_voxels = failed ? 0 : state->list_voxels;
+    const std::uint64_t num_fragments = failed ? 0 : state->list_fragments;
+    if (blockIdx.x == 0 && threadIdx.x == 0) {
+        *counts = {num_voxels, num_fragments};
+        state->voxels = num_voxels; // has_failed reads neither of the two
+        state->fragments = num_fragments;
+    }
+    copy_lists(lists, num_voxels, num_fragments, voxels, offsets, primitives, payloads);
+}
+
+// Fragment lists with payloads of one type. Where all fragments have one payload, it takes no memory. may_count:
+// whether they may be sorted by counting, which leaves no sorted keys.
+template <class Key, class Payload>
+[[nodiscard]] list_buffers<Key, Payload> take_lists(arena& memory, std::uint64_t num_voxels,
+                                                    unsigned long long capacity, bool one_payload = false,
+                                                    bool may_count = false) {
+    list_buffers<Key, Payload> b{};
+    if constexpr (std::is_same_v<Key, std::uint32_t>) {
+        const sort_pairs pairs = sort_pairs::take(memory, capacity);
+        std::copy_n(pairs.keys, 2, b.keys);
+        std::copy_n(pairs.values, 2, b.values);
+    } else {
+        for (int i = 0; i < 2; ++i) {
+            b.keys[i] = memory.take<Key>(capacity);
+            b.values[i] = memory.take<std::uint32_t>(capacity);
+        }
+    }
+    b.storage_bytes = select_bytes<Key>(capacity);
+    if (may_count && counting_memory::suits(num_voxels, capacity)) {
+        b.counting = counting_memory::take(memory, capacity, num_voxels);
+    } else if (are_sorted_here<Key>(capacity)) {
+        b.bits = static_cast<int>(std::bit_width(num_voxels - 1));
+        b.sort = sort_memory::take(memory, capacity, b.bits);
+    } else {
+        b.bits = key_bits(num_voxels);
+        b.storage_bytes = std::max(b.storage_bytes, sort_bytes<Key>(capacity, b.bits));
+    }
+    if (!std::is_same_v<Payload, no_payload> && !one_payload) {
+        b.primitives = memory.take<std::uint32_t>(capacity);
+        b.payloads = memory.take<Payload>(capacity);
+    }
+    b.first_of_voxel = memory.take<std::uint64_t>(capacity + 1);
+    b.places = memory.take<list_places>(1);
+    b.storage = memory.take<std::byte>(b.storage_bytes);
+    return b;
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,301 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Fragment lists: raster/raster.cuh with a sink that appends what it finds to one list, in any order. One pass: no
+// fragment is counted before it is written, and none is shaded. A warp gathers fragments in shared memory and takes
+// room in the list for all of them at once.
+
+#include <voxelpipe/device/fragments/order_memory.cuh>
+#include <voxelpipe/device/raster/raster.cuh>
+
+namespace voxelpipe::device {
+
+// Room: fragments that may wait in a warp's shared memory. FlushAt: from how many on they go to the list, by an atomic
+// on the same word for all warps of the device (see kind_queues), so that there should be many; what 32 triangles bring
+// should fit behind what is less, or they have to come twice.
+template <class Call, unsigned Room, unsigned FlushAt>
+struct listing_sink : direct_sink<Call> {
+    static constexpr bool buffers = true;
+    static constexpr bool shares = false;
+    static constexpr bool spreads = false; // a lane's row is written by itself, whatever its length
+    static constexpr bool has_rounds = true;
+    static constexpr unsigned room = Room;
+    static constexpr unsigned flush_at = FlushAt;
+    struct memory {
+        std::uint32_t voxels[room], primitives[room];
+        unsigned n;
+    };
+
+    __device__ VOXELPIPE_INLINE listing_sink(const Call& call, unsigned* dropped, memory& m)
+        : direct_sink<Call>{call, dropped}, m_(m) {
+        if (threadIdx.x % 32 == 0) m_.n = 0;
+        __syncwarp();
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(const glm::uvec3& index) const {
+        const std::uint32_t num = this->call.out.num_vertices;
+        const bool ok = index.x < num && index.y < num && index.z < num;
+        if (!ok) atomicOr(&this->call.out.state->index_error, 1u);
+        return ok;
+    }
+    __device__ VOXELPIPE_INLINE void begin(std::uint32_t triangle) {
+        primitive_ = this->call.out.first_primitive + triangle;
+    }
+    __device__ VOXELPIPE_INLINE void drop(core::triangle_class kind) {
+        if (!straight_) direct_sink<Call>::drop(kind); // once, where a triangle comes twice
+    }
+    __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
+        if (mask == 0) return;
+        write_row(atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask))), voxel(x0, y, z), mask);
+    }
+    template <class Place>
+    __device__ VOXELPIPE_INLINE void voxels(word bits, const Place& place_of) {
+        if (bits == 0) return;
+        for (unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(bits))); bits != 0; bits &= bits - 1)
+            write(at++, place_of(__ffs(static_cast<int>(bits)) - 1));
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t place(int x, int y, int z) const { return voxel(x, y, z); }
+    __device__ VOXELPIPE_INLINE void put(std::uint32_t voxel, bool wanted) {
+        if (wanted) write(atomicAdd(&m_.n, 1u), voxel);
+    }
+    __device__ VOXELPIPE_INLINE void put_line(std::uint32_t first, std::uint32_t step, unsigned count) {
+        for (unsigned at = atomicAdd(&m_.n, count), end = at + count; at < end; ++at, first += step) write(at, first);
+    }
+    // They go to the list at once: neighbours, as the lanes that give one.
+    template <class IsDone, class Next>
+    __device__ VOXELPIPE_INLINE void rounds(std::uint32_t count, IsDone&& is_done, Next&& next) {
+        const unsigned all = __reduce_add_sync(0xffffffffu, count), before = (1u << threadIdx.x % 32) - 1;
+        if (all == 0) return;
+        const unsigned long long first = take(all), rest = room_from(first);
+        std::uint32_t *const voxels = this->call.out.voxels + first, *const primitives =
+                                                                         this->call.out.primitives + first;
+        unsigned given = 0;
+        for (unsigned lanes = 0; (lanes = __ballot_sync(0xffffffffu, !is_done())) != 0;) {
+            if ((lanes & (before + 1)) != 0) {
+                const std::uint32_t voxel = next();
+                const unsigned at = given + static_cast<unsigned>(__popc(lanes & before));
+                if (at < rest) {
+                    voxels[at] = voxel;
+                    primitives[at] = primitive_;
+                }
+            }
+            given += static_cast<unsigned>(__popc(lanes));
+            __syncwarp();
+        }
+    }
+    // The same for fragments that all lanes share out, up to 31 each: of(lane, i) is the voxel of a lane's number i.
+    // All lanes call it.
+    template <class Of>
+    __device__ VOXELPIPE_INLINE void share(std::uint32_t count, Of&& of) {
+        const unsigned begin = sum_before<0, 5>(count), all = __shfl_sync(0xffffffffu, begin + count, 31);
+        if (all == 0) return;
+        const unsigned long long first = take(all), rest = room_from(first);
+        std::uint32_t *const voxels = this->call.out.voxels + first, *const primitives =
+                                                                         this->call.out.primitives + first;
+        for (unsigned given = 0; given < all; given += 32) {
+            const unsigned at = given + threadIdx.x % 32, number = at < all ? at : all - 1;
+            unsigned lane = 0; // the last that begins here or before
+#pragma unroll
+            for (unsigned step = 16; step != 0; step /= 2)
+                lane += __shfl_sync(0xffffffffu, begin, lane + step) <= number ? step : 0;
+            const std::uint32_t voxel = of(lane, number - __shfl_sync(0xffffffffu, begin, lane));
+            if (at < all && at < rest) {
+                voxels[at] = voxel;
+                primitives[at] = primitive_;
+            }
+        }
+    }
+    // They wait with what waits already; where there is no room for a round, that goes to the list first.
+    template <class IsDone, class Next>
+    __device__ VOXELPIPE_INLINE void row_rounds(IsDone&& is_done, Next&& next) {
+        static_assert(room >= 32 * most_long_side);
+        for (bool more = !is_done(); __any_sync(0xffffffffu, more); more = !is_done()) {
+            word mask = 0;
+            std::uint32_t first = 0;
+            if (more)
+                next([&](int x0, int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
+                    mask = bits;
+                    first = voxel(x0, y, z);
+                });
+            const auto length = static_cast<unsigned>(__popc(mask));
+            unsigned at = sum_before<0, 3>(length);
+            if (__any_sync(0xffffffffu, length > 7)) at += sum_before<3, 5>(length);
+            const unsigned all = __shfl_sync(0xffffffffu, at + length, 31);
+            if (kept_ + all > room) {
+                __syncwarp();
+                flush(kept_);
+                kept_ = 0;
+                __syncwarp();
+            }
+            if (mask != 0) {
+                first += static_cast<unsigned>(__ffs(static_cast<int>(mask)) - 1); // one run
+                at += kept_;
+                for (const unsigned end = at + length; at < end; ++at, ++first) {
+                    m_.voxels[at] = first;
+                    m_.primitives[at] = primitive_;
+                }
+            }
+            kept_ += all;
+        }
+        restart();
+    }
+    __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word bits) {
+        if (bits == 0) return;
+        const std::uint32_t first = voxel(x, y, z), row = voxel(0, 1, 0), slice = voxel(0, 0, 1);
+        for (unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(bits))); bits != 0; bits &= bits - 1) {
+            const unsigned i = static_cast<unsigned>(__ffs(static_cast<int>(bits)) - 1);
+            write(at++, first + (i & 1u) + ((i & 2u) != 0 ? row : 0) + ((i & 4u) != 0 ? slice : 0));
+        }
+    }
+    __device__ VOXELPIPE_INLINE void slim(int x, int y, int z, const core::slim_rows& rows) {
+        const std::uint32_t first = voxel(x, y, z), row = voxel(0, 1, 0), slice = voxel(0, 0, 1);
+        const std::uint32_t even = rows.along_y ? row : slice, odd = rows.along_y ? slice : row;
+        word bits = rows.bits;
+        for (unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(bits))); bits != 0; bits &= bits - 1) {
+            const unsigned i = static_cast<unsigned>(__ffs(static_cast<int>(bits)) - 1);
+            write(at++, first + (i & 3u) + ((i & 4u) != 0 ? odd : 0) + i / 8 * even);
+        }
+    }
+    // Between triangles, by all lanes. True: the shared memory was too small for what came since the last time; it has
+    // been counted and has to come once more, to be written to the list at once.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool settle() {
+        const unsigned n = m_.n;
+        __syncwarp();
+        if (straight_) {
+            straight_ = false;
+            restart();
+            return false;
+        }
+        if (n > room) {
+            flush(kept_);
+            base_ = take(n - kept_);
+            kept_ = 0;
+            straight_ = true;
+            restart();
+            return true;
+        }
+        kept_ = n;
+        if (n >= flush_at) {
+            flush(n);
+            kept_ = 0;
+            restart();
+        }
+        return false;
+    }
+    struct totals {};
+    [[nodiscard]] __device__ VOXELPIPE_INLINE totals end() {
+        __syncwarp();
+        flush(kept_);
+        kept_ = 0;
+        return {};
+    }
+    __device__ VOXELPIPE_INLINE void take_over(const totals&) {}
+    __device__ void finish(pipeline_state*) { (void)end(); }
+
+private:
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t voxel(int x, int y, int z) const { // modulo 2^32
+        const glm::ivec3& e = this->call.in.extent;
+        return (static_cast<std::uint32_t>(z) * static_cast<std::uint32_t>(e.y) + static_cast<std::uint32_t>(y)) *
+                   static_cast<std::uint32_t>(e.x) +
+               static_cast<std::uint32_t>(x);
+    }
+    __device__ VOXELPIPE_INLINE unsigned write_row(unsigned at, std::uint32_t first, word mask) {
+        for (; mask != 0; mask &= mask - 1)
+            write(at++, first + static_cast<unsigned>(__ffs(static_cast<int>(mask)) - 1));
+        return at;
+    }
+    __device__ VOXELPIPE_INLINE void write(unsigned at, std::uint32_t voxel) {
+        if (!straight_) {
+            if (at >= room) return;
+            m_.voxels[at] = voxel;
+            m_.primitives[at] = primitive_;
+        } else if (base_ + at < this->call.out.capacity) {
+            this->call.out.voxels[base_ + at] = voxel;
+            this->call.out.primitives[base_ + at] = primitive_;
+        }
+    }
+    // Room in the list for n fragments; what is beyond its capacity is counted only.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long take(unsigned n) const {
+        unsigned long long first = 0;
+        if (threadIdx.x % 32 == 0)
+            first = atomicAdd(&this->call.out.state->list_fragments, static_cast<unsigned long long>(n));
+        return __shfl_sync(0xffffffffu, first, 0);
+    }
+    // How many fragments there is room for from number `first` on.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long room_from(unsigned long long first) const {
+        const unsigned long long capacity = this->call.out.capacity;
+        return first < capacity ? capacity - first : 0;
+    }
+    __device__ VOXELPIPE_INLINE void flush(unsigned n) const {
+        if (n == 0) return;
+        const unsigned long long first = take(n);
+        for (unsigned i = threadIdx.x % 32; i < n && first + i < this->call.out.capacity; i += 32) {
+            this->call.out.voxels[first + i] = m_.voxels[i];
+            this->call.out.primitives[first + i] = m_.primitives[i];
+        }
+    }
+    // Of numbers below 32, the bits from Begin on and before End: their sum over the lanes before this one.
+    template <int Begin, int End>
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static unsigned sum_before(unsigned number) {
+        const unsigned before = (1u << threadIdx.x % 32) - 1;
+        unsigned sum = 0;
+#pragma unroll
+        for (int b = Begin; b < End; ++b)
+            sum += static_cast<unsigned>(__popc(__ballot_sync(0xffffffffu, (number >> b & 1u) != 0) & before)) << b;
+        return sum;
+    }
+    __device__ VOXELPIPE_INLINE void restart() {
+        __syncwarp();
+        if (threadIdx.x % 32 == 0) m_.n = kept_;
+        __syncwarp();
+    }
+
+    memory& m_;
+    unsigned kept_ = 0;           // of the memory; what lies behind belongs to this round
+    bool straight_ = false;       // this round goes to the list at once,
+    unsigned long long base_ = 0; // from here on
+    std::uint32_t primitive_ = 0;
+};
+
+struct list_output {
+    // With the queues, less than 48 KB for a block. Of 2 x 2 x 2 voxels a triangle has up to eight, a thin one four.
+    template <class Call>
+    using sink = listing_sink<Call, 448, Call::rule == coverage::thin ? 448 - 32 * 4 : 448 - 32 * 8>;
+    template <class Call>
+    using rest_sink = listing_sink<Call, 960, 192>; // fewer blocks, and triangles of many rows
+    static constexpr bool hands_on = true;
+    static constexpr bool only_sets = false;
+    static constexpr bool only_blends = false;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return false; }
+
+    std::uint32_t* voxels; // by fragment
+    std::uint32_t* primitives;
+    unsigned long long capacity;
+    std::uint32_t num_vertices, first_primitive;
+    pipeline_state* state;
+    sort_preparation preparation;
+
+    __device__ VOXELPIPE_INLINE void prepare(std::uint64_t thread, std::uint64_t threads) const {
+        if (preparation.is_wanted) preparation.run(thread, threads);
+    }
+};
+
+// Whether the fragments of a draw can be listed this way.
+[[nodiscard]] inline bool is_listable(std::uint64_t num_triangles, int fraction, glm::ivec3 extent) {
+    return core::small_voxels(fraction) > 0 && std::max({extent.x, extent.y, extent.z}) <= most_direct_extent &&
+           triangle_lists::holds(num_triangles, most_large_records(extent));
+}
+
+// Appends the fragments of a draw to two arrays of limits.fragments elements each; counts them in the state.
+// first_primitive: of the draw. Does what `preparation` says, if that is wanted.
+template <coverage Rule, class Source>
+void list_raster(const raster_input<Source>& in, std::uint32_t num_vertices, std::uint32_t first_primitive,
+                 const triangle_lists& handed_on, std::uint32_t* voxels, std::uint32_t* primitives,
+                 const sort_preparation& preparation, pipeline_state* state, const capacities& limits,
+                 cudaStream_t stream) {
+    const direct_call<Rule, Source, list_output> call{
+        in, {voxels, primitives, limits.fragments, num_vertices, first_primitive, state, preparation}, handed_on};
+    direct_raster(call, state, stage::abuffer_emit, stream, false, limits.leaves_none != 0);
+}
+
+} // namespace voxelpipe::device

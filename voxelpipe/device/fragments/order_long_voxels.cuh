@@ -1,0 +1,264 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Long voxels: the fragments of a voxel that are more than a window holds (fragments/order_voxels.cuh) are sorted by a
+// warp or a block; what is more than that was cut into runs, which are sorted and merged.
+
+#include <voxelpipe/device/fragments/order_memory.cuh>
+#include <voxelpipe/device/fragments/warp_sort.cuh>
+
+#include <cub/block/block_scan.cuh>
+
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+// Numbers of a block, on their way from one lane to another. Those of a warp lie apart; a word more for 32, so that
+// lanes meet no bank twice.
+struct sort_exchange {
+    static constexpr std::uint32_t of_warp = most_of_warp + most_of_warp / 32;
+    std::uint32_t numbers[block_sort_threads / 32 * of_warp];
+    static_assert(block_sort_threads / 32 * of_warp >= most_of_block);
+};
+
+// Writes the first n numbers of a warp, of which a lane has Items neighbours.
+template <int Items>
+__device__ VOXELPIPE_INLINE void store_warp(const std::uint32_t (&w)[Items], sort_exchange& exchange, std::uint32_t* to,
+                                            std::uint32_t n) {
+    std::uint32_t* const mine = exchange.numbers + warp_in_block() * sort_exchange::of_warp;
+    const std::uint32_t lane = threadIdx.x % 32;
+#pragma unroll
+    for (std::uint32_t k = 0; k < Items; ++k) mine[lane * Items + k + (lane * Items + k) / 32] = w[k];
+    __syncwarp();
+#pragma unroll
+    for (std::uint32_t k = 0; k < Items; ++k)
+        if (lane + 32 * k < n) to[lane + 32 * k] = mine[lane + 33 * k];
+    __syncwarp();
+}
+
+// The voxels of a list by a warp each, the first one by the first warp of block `start`. What is beyond the fragments
+// of a voxel is more than any primitive, or equal to the last.
+template <int List>
+__device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uint32_t* to, sort_exchange& exchange,
+                                                unsigned start) {
+    constexpr int items = static_cast<int>(order_lists::most_below(List + 1) / 32);
+    constexpr std::uint32_t warps = block_sort_threads / 32;
+    const std::uint32_t n = uniform(b.lists.counts[List]), lane = threadIdx.x % 32;
+    const std::uint32_t block = blockIdx.x >= start ? blockIdx.x - start : blockIdx.x + gridDim.x - start;
+    for (std::uint32_t r = block * warps + warp_in_block(); r < n; r += gridDim.x * warps) {
+        const fragment_run run = b.lists.voxels[List][r];
+        std::uint32_t w[items];
+#pragma unroll
+        for (std::uint32_t k = 0; k < items; ++k) {
+            const std::uint32_t i = lane + 32 * k;
+            w[k] = i < run.length ? b.from[run.begin + i] : ~0u;
+        }
+        sort_warp(w);
+        store_warp(w, exchange, to + run.begin, static_cast<std::uint32_t>(run.length));
+    }
+}
+
+// Sorts the numbers of a block, of which a thread has Items neighbours: the network of sort_warp, in which warps
+// exchange theirs through shared memory.
+template <int Items>
+__device__ VOXELPIPE_INLINE void sort_block(std::uint32_t (&w)[Items], sort_exchange& exchange) {
+    constexpr int of_warp = 32 * Items, all = block_sort_threads * Items;
+    sort_warp(w);
+    // Number k of this thread with that of another, whose number differs by the bits of `threads`.
+    const auto compare = [&](unsigned threads, unsigned lower_bit, bool mirrored) VOXELPIPE_INLINE_LAMBDA {
+        __syncthreads();
+#pragma unroll
+        for (int k = 0; k < Items; ++k) exchange.numbers[k * block_sort_threads + threadIdx.x] = w[k];
+        __syncthreads();
+        const bool lower = (threadIdx.x & lower_bit) == 0;
+#pragma unroll
+        for (int k = 0; k < Items; ++k) {
+            const std::uint32_t other =
+                exchange.numbers[(mirrored ? Items - 1 - k : k) * block_sort_threads + (threadIdx.x ^ threads)];
+            w[k] = lower ? min(w[k], other) : max(w[k], other);
+        }
+    };
+    for (int size = 2 * of_warp; size <= all; size *= 2) {
+        const auto threads = static_cast<unsigned>(size / Items);
+        compare(threads - 1, threads / 2, true);
+        for (unsigned apart = threads / 4; apart >= 32; apart /= 2) compare(apart, apart, false);
+        merge_warp(w, of_warp / 2);
+    }
+}
+
+// A run of at most Items * block_sort_threads primitives.
+template <int Items>
+__device__ VOXELPIPE_INLINE void order_run(const std::uint32_t* from, std::uint32_t* to, std::uint32_t length,
+                                           sort_exchange& exchange) {
+    std::uint32_t w[Items];
+#pragma unroll
+    for (std::uint32_t k = 0; k < Items; ++k) {
+        const std::uint32_t i = threadIdx.x + block_sort_threads * k;
+        w[k] = i < length ? from[i] : ~0u;
+    }
+    sort_block(w, exchange);
+    __syncthreads(); // nobody reads what others wrote into the exchange
+    const std::uint32_t first = warp_in_block() * 32 * Items;
+    if (first < length) store_warp(w, exchange, to + first, length - first);
+    __syncthreads();
+}
+
+// By a block each: voxels, and runs of one, which go back to where they were.
+__device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::uint32_t* primitives,
+                                                 sort_exchange& exchange) {
+    constexpr int most_items = most_of_block / block_sort_threads;
+    using lists = order_lists;
+    const std::uint32_t whole = b.lists.counts[lists::block_list], all = whole + b.lists.counts[lists::run_list];
+    for (std::uint32_t r = blockIdx.x; r < all; r += gridDim.x) {
+        const fragment_run run = r < whole ? b.lists.voxels[lists::block_list][r] : b.lists.runs[r - whole].run;
+        const std::uint32_t* const from = b.from + run.begin;
+        std::uint32_t* const to = (r < whole ? primitives : b.from) + run.begin;
+        const auto length = static_cast<std::uint32_t>(run.length);
+        if (length <= most_of_block / 2)
+            order_run<most_items / 2>(from, to, length, exchange);
+        else
+            order_run<most_items>(from, to, length, exchange);
+    }
+}
+
+template <class Buffers>
+__global__ __launch_bounds__(block_sort_threads, 4) void order_long_kernel(const __grid_constant__ Buffers b) {
+    __shared__ sort_exchange exchange;
+    await_stream();
+    std::uint32_t* const to = b.places().primitives;
+    // Where there are few, each list has blocks of its own.
+    order_by_warps<0>(b, to, exchange, gridDim.x / 3);
+    order_by_warps<1>(b, to, exchange, gridDim.x / 3 * 2);
+    static_assert(num_warp_sorts == 2);
+    __syncthreads();
+    order_by_blocks(b, to, exchange);
+}
+
+// Dense voxels: a block sets a bit for each primitive of its part that it meets in a voxel, and counts those of the
+// parts before.
+template <class Buffers>
+__global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid_constant__ Buffers b) {
+    using scan = cub::BlockScan<std::uint32_t, dense_threads, cub::BLOCK_SCAN_WARP_SCANS>;
+    constexpr std::uint32_t num_words = dense_part / 32;
+    constexpr unsigned at_once = 4; // loads that do not wait for one another
+    static_assert(num_words == dense_threads);
+    __shared__ std::uint32_t words[num_words], places[num_words], all_before;
+    __shared__ typename scan::TempStorage storage;
+    await_stream();
+    std::uint32_t* const primitives = b.places().primitives;
+    const std::uint32_t parts = b.lists.dense_parts(), lane = threadIdx.x % 32,
+                        n = b.lists.counts[order_lists::dense_list] * parts;
+    for (std::uint32_t r = blockIdx.x; r < n; r += gridDim.x) {
+        const fragment_run run = b.lists.voxels[order_lists::dense_list][r / parts];
+        const std::uint32_t first = r % parts * dense_part;
+        const auto begin = static_cast<std::uint32_t>(run.begin), length = static_cast<std::uint32_t>(run.length);
+        words[threadIdx.x] = 0;
+        if (threadIdx.x == 0) all_before = 0;
+        __syncthreads();
+        // Fours of neighbours, aligned, some of which may lie outside of the voxel.
+        std::uint32_t before = 0;
+        const std::uint32_t end_four = (begin + length + 3) / 4;
+        for (std::uint32_t i = begin / 4 + threadIdx.x; i < end_four; i += at_once * dense_threads) {
+            uint4 fours[at_once];
+#pragma unroll
+            for (unsigned k = 0; k < at_once; ++k)
+                if (i + k * dense_threads < end_four)
+                    fours[k] = reinterpret_cast<const uint4*>(b.from)[i + k * dense_threads];
+#pragma unroll
+            for (unsigned k = 0; k < at_once; ++k) {
+                const std::uint32_t at = 4 * (i + k * dense_threads) - begin; // modulo 2^32
+                const auto add = [&](std::uint32_t primitive, std::uint32_t place) VOXELPIPE_INLINE_LAMBDA {
+                    if (place >= length) return;
+                    const std::uint32_t bit = primitive - first; // modulo 2^32
+                    before += primitive < first ? 1 : 0;
+                    if (bit < dense_part) atomicOr(&words[bit / 32], 1u << bit % 32);
+                };
+                if (i + k * dense_threads >= end_four) break;
+                add(fours[k].x, at);
+                add(fours[k].y, at + 1);
+                add(fours[k].z, at + 2);
+                add(fours[k].w, at + 3);
+            }
+        }
+        before = __reduce_add_sync(0xffffffffu, before);
+        if (lane == 0 && before != 0) atomicAdd(&all_before, before);
+        __syncthreads();
+        std::uint32_t place = static_cast<std::uint32_t>(__popc(words[threadIdx.x]));
+        scan(storage).ExclusiveSum(place, place);
+        places[threadIdx.x] = place;
+        __syncthreads();
+        // A warp a word, so that neighbours are written by neighbours.
+        std::uint32_t* const to = primitives + run.begin + all_before;
+        const unsigned below = (1u << lane) - 1;
+#pragma unroll(4)
+        for (std::uint32_t w = warp_in_block(); w < num_words; w += dense_threads / 32) {
+            const std::uint32_t word = words[w];
+            if ((word >> lane & 1u) != 0)
+                to[places[w] + static_cast<std::uint32_t>(__popc(word & below))] = first + 32 * w + lane;
+        }
+        __syncthreads();
+    }
+}
+
+// How many of n sorted numbers are less than w.
+[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t count_less(const std::uint32_t* numbers, std::uint32_t n,
+                                                                   std::uint32_t w) {
+    std::uint32_t lo = 0;
+    while (n > 0) {
+        const std::uint32_t half = n / 2;
+        if (numbers[lo + half] < w) {
+            lo += half + 1;
+            n -= half + 1;
+        } else {
+            n = half;
+        }
+    }
+    return lo;
+}
+
+// Merges up to merge_ways sorted runs of `length` each: a primitive's place is the sum of how many are less in each. A
+// thread takes one fragment, a warp 32 neighbours of a run: each lane finds where those begin and end in another run,
+// and all search between. Last: the rest of the voxel in one go, however many runs that is.
+template <class Buffers>
+__global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::uint32_t* from, std::uint32_t* to,
+                                  std::uint64_t length, bool last) {
+    constexpr std::uint32_t parts = most_of_block / threads_per_block;
+    await_stream();
+    const std::uint32_t lane = threadIdx.x % 32;
+    const std::uint64_t n = std::uint64_t{b.lists.counts[order_lists::run_list]} * parts;
+    for (std::uint64_t r = blockIdx.x; r < n; r += gridDim.x) {
+        const voxel_run entry = b.lists.runs[r / parts];
+        const fragment_run voxel = entry.voxel;
+        if (voxel.length <= length) continue; // was done by the merge before
+        const std::uint64_t i = r % parts * threads_per_block + threadIdx.x;
+        if (i - lane >= entry.run.length) continue; // no lane has one
+        const std::uint64_t group_length = last ? voxel.length : length * merge_ways;
+        // Within the voxel. Lanes beyond the last fragment take that.
+        const std::uint64_t at = entry.run.begin - voxel.begin + (i < entry.run.length ? i : entry.run.length - 1);
+        const std::uint64_t group = at / group_length * group_length, own = at / length * length;
+        const std::uint64_t end = group + group_length < voxel.length ? group + group_length : voxel.length;
+        const std::uint32_t* const numbers = from + voxel.begin;
+        const std::uint32_t primitive = numbers[at];
+        const std::uint32_t least = __shfl_sync(0xffffffffu, primitive, 0),
+                            most = __shfl_sync(0xffffffffu, primitive, 31);
+        std::uint64_t place = voxel.begin + group + (at - own);
+        for (std::uint64_t start = group; start < end; start += 32 * length) {
+            const std::uint64_t mine = start + lane * length;
+            std::uint32_t low = 0, high = 0; // of the run's numbers, those before `least` and before `most`
+            if (mine < end && mine != own) {
+                const auto of_run = static_cast<std::uint32_t>(end - mine < length ? end - mine : length);
+                low = count_less(numbers + mine, of_run, least);
+                high = low + count_less(numbers + mine + low, of_run - low, most);
+            }
+            for (unsigned k = 0; k < 32 && start + k * length < end; ++k) {
+                const std::uint32_t first = __shfl_sync(0xffffffffu, low, k);
+                const std::uint32_t between = __shfl_sync(0xffffffffu, high, k) - first;
+                place += first + count_less(numbers + start + k * length + first, between, primitive);
+            }
+        }
+        if (i < entry.run.length) (voxel.length <= group_length ? b.places().primitives : to)[place] = primitive;
+    }
+}
+
+} // namespace voxelpipe::device

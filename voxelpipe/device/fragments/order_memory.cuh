@@ -1,0 +1,266 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the order of fragments (fragments/order_voxels.cuh) keeps in memory: lists of long voxels, what tiles tell one
+// another, where the result goes, and what has to be zero before.
+
+#include <voxelpipe/device/fragments/radix_sort.cuh>
+#include <voxelpipe/device/scene/scene.cuh>
+
+#include <cuda/atomic>
+
+#include <bit>
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+inline constexpr std::uint32_t window_length = 192;  // a warp takes the voxels that begin in so many fragments
+inline constexpr std::uint32_t most_of_window = 256; // fragments of a voxel
+inline constexpr int num_warp_sorts = 2;             // with 16 or 32 fragments a lane
+inline constexpr std::uint32_t most_of_warp = 32 * 32;
+inline constexpr std::uint32_t most_of_block = 4096;
+inline constexpr int narrow_primitive_bits = 24; // beside the rank of a voxel in its window, in 32
+inline constexpr int order_warps = 4;            // of a block that takes windows
+inline constexpr int order_blocks = 8;           // on a multiprocessor
+inline constexpr int block_sort_threads = 256;
+inline constexpr int dense_threads = 1024;
+inline constexpr std::uint32_t merge_ways = 64; // runs that one merge takes
+// A voxel of more than most_of_block fragments whose primitives are dense among all: a bit for each of those, by blocks
+// for so many bits each, all of which read the whole voxel. At least one bit in 64 is set then, so that all bits of a
+// call are a few words a fragment.
+inline constexpr std::uint32_t dense_part = 1u << 15, most_dense_parts = 64, least_dense = 64;
+inline constexpr std::uint64_t only_dense = most_of_block + 1; // as the longest: there are such voxels, but no runs
+
+// A stretch of fragments.
+struct fragment_run {
+    unsigned long long begin, length;
+};
+// A run of at most most_of_block fragments, of a voxel that has more.
+struct voxel_run {
+    fragment_run run, voxel;
+};
+
+// Voxels that are too long for a window, by how they are sorted. The lists cannot overflow: a voxel in one of them has
+// so many fragments.
+struct order_lists {
+    static constexpr int block_list = num_warp_sorts, dense_list = num_warp_sorts + 1, run_list = num_warp_sorts + 2,
+                         num_lists = num_warp_sorts + 3;
+    fragment_run* voxels[num_warp_sorts + 2]; // of a warp; of a block; dense ones
+    voxel_run* runs;
+    std::uint32_t num_primitives = 0; // of a call where a voxel may be dense, or 0
+    unsigned int* counts;             // of all lists; zeroed
+    unsigned long long* longest_run;  // of the voxels; zeroed
+
+    [[nodiscard]] static order_lists take(arena& memory, std::uint64_t capacity) {
+        order_lists w{};
+        for (int k = 0; k < num_lists - 1; ++k) w.voxels[k] = memory.take<fragment_run>(capacity / (most_below(k) + 1));
+        w.runs = memory.take<voxel_run>(2 * (capacity / most_of_block)); // each voxel's last may be short
+        return w;
+    }
+    // With its counters.
+    [[nodiscard]] order_lists with(pipeline_state* state) const {
+        static_assert(sizeof(state->num_ordered) == num_lists * sizeof(*counts));
+        order_lists w = *this;
+        w.counts = state->num_ordered;
+        w.longest_run = &state->longest_run;
+        return w;
+    }
+    // The most fragments of a voxel that is too small for list k.
+    [[nodiscard]] VOXELPIPE_HD static constexpr std::uint32_t most_below(int k) {
+        return k == 0 ? most_of_window : k == 1 ? 32 * 16 : k == 2 ? most_of_warp : most_of_block;
+    }
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t dense_parts() const { // of a voxel
+        return (num_primitives + dense_part - 1) / dense_part;
+    }
+    // The list of a voxel that is neither run nor dense, or -1.
+    [[nodiscard]] VOXELPIPE_HD static constexpr int list_of(unsigned long long length) {
+        return length > most_of_block || length <= most_of_window ? -1
+               : length > most_below(2)                           ? 2
+               : length > most_below(1)                           ? 1
+                                                                  : 0;
+    }
+    // Puts a voxel at a place that was taken for it in list_of(length).
+    __device__ VOXELPIPE_INLINE void put(unsigned at, unsigned long long begin, unsigned long long length) const {
+#pragma unroll
+        for (int k = 0; k <= block_list; ++k) // an index that is no constant would put the pointers in local memory
+            if (list_of(length) == k) voxels[k][at] = {begin, length};
+    }
+    // A voxel that begins at `begin`. By one thread.
+    __device__ void push(unsigned long long begin, unsigned long long length) const {
+        const bool is_dense = length > most_of_block && num_primitives != 0 && length >= num_primitives / least_dense;
+        if (is_dense) {
+            atomicMax(longest_run, static_cast<unsigned long long>(only_dense));
+            voxels[dense_list][atomicAdd(&counts[dense_list], 1u)] = {begin, length};
+            return;
+        }
+        if (length > most_of_block) {
+            atomicMax(longest_run, length > only_dense ? length : only_dense + 1);
+            const auto entries = static_cast<unsigned>((length + most_of_block - 1) / most_of_block);
+            const unsigned at = atomicAdd(&counts[run_list], entries);
+            for (unsigned k = 0; k < entries; ++k) {
+                const unsigned long long from = std::uint64_t{k} * most_of_block, rest = length - from;
+                runs[at + k] = {{begin + from, rest < most_of_block ? rest : most_of_block}, {begin, length}};
+            }
+            return;
+        }
+        static_assert(block_list == 2);
+        put(atomicAdd(&counts[list_of(length)], 1u), begin, length);
+    }
+};
+
+// Arrays for lists: the voxels, ascending, in one of two, where their fragments begin, and one place more that says how
+// many fragments there are; voxels beyond the room are counted, not written. The primitives by voxel, and payloads.
+struct list_places {
+    std::uint64_t* voxels = nullptr; // or
+    std::uint32_t* narrow_voxels = nullptr;
+    std::uint64_t* offsets = nullptr;
+    std::uint64_t room = 0;
+    std::uint32_t* primitives = nullptr;
+    void* payloads = nullptr;
+};
+
+// Where the lists are to go: null where they come to lie. With a page, which the device can read, what it says when the
+// call runs, so that a call that is kept as a graph finds new arrays.
+struct asked_places {
+    list_places value;
+    const list_places* page = nullptr;
+};
+
+// How many voxels begin in each tile of windows, passed on from tile to tile: one word each, zeroed before.
+struct tile_counts {
+    static constexpr std::uint32_t length = order_warps * window_length; // fragments of a tile
+    static constexpr unsigned long long own = 1ull << 62, all = 2ull << 62, value = own - 1;
+    unsigned long long* words;
+
+    [[nodiscard]] VOXELPIPE_HD static std::uint64_t num(std::uint64_t capacity) {
+        return (capacity + length - 1) / length;
+    }
+
+    using word = ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device>;
+
+    // Says how many voxels begin in this tile, for those behind. By one thread.
+    __device__ void publish(std::uint32_t tile, unsigned long long count) const {
+        if (tile != 0) word(words[tile]).store(own | count, ::cuda::memory_order_relaxed);
+    }
+    // How many voxels begin in the tiles before this one, in which `count` do, as has been published. By all lanes of
+    // one warp. Blocks begin in the order of their tiles, so those before are under way.
+    [[nodiscard]] __device__ unsigned long long before(std::uint32_t tile, unsigned long long count) const {
+        const auto lane = threadIdx.x % 32;
+        unsigned long long sum = 0;
+        if (tile != 0) {
+            for (std::int64_t last = std::int64_t{tile} - 1;; last -= 32) { // lane k looks at tile last - k
+                const std::int64_t mine = last - lane;
+                unsigned long long w = all; // before the first tile
+                if (mine >= 0) do
+                        w = word(words[mine]).load(::cuda::memory_order_relaxed);
+                    while ((w & ~value) == 0);
+                const unsigned with_all = __ballot_sync(0xffffffffu, (w & all) != 0);
+                const unsigned nearest =
+                    with_all == 0 ? 31 : static_cast<unsigned>(__ffs(static_cast<int>(with_all))) - 1;
+                unsigned part = lane <= nearest ? static_cast<unsigned>(w & value) : 0; // fewer than 2^32 fragments
+                part = __reduce_add_sync(0xffffffffu, part);
+                sum += part;
+                if (with_all != 0) break;
+            }
+        }
+        if (lane == 0) word(words[tile]).store(all | (sum + count), ::cuda::memory_order_relaxed);
+        return sum;
+    }
+};
+
+// Memory of a counting sort (fragments/counting_sort.cuh), in place of a sort_memory.
+struct counting_memory {
+    static constexpr std::uint32_t tile = 16384;                         // voxels
+    static constexpr std::uint64_t most_voxels = std::uint64_t{1} << 21; // of a grid: the counters fit the cache
+
+    std::uint64_t num_voxels = 0;        // of the grid, up to whole tiles; 0 where there is no counting sort
+    std::uint64_t capacity = 0;          // fragments
+    std::uint32_t* counts = nullptr;     // of each voxel; then where its first fragment goes. Zeroed
+    std::uint32_t* numbers = nullptr;    // of each fragment within its voxel
+    std::uint32_t* starts = nullptr;     // a bit for each place where a voxel begins, and behind the last one. Zeroed
+    unsigned long long* tiles = nullptr; // what tiles of voxels tell one another. Zeroed
+
+    // Whether a grid's fragments, so many at most, can be sorted by counting, with counters that are few beside them.
+    [[nodiscard]] static bool suits(std::uint64_t num_voxels, std::uint64_t capacity) {
+        return num_voxels <= most_voxels && num_voxels <= 8 * capacity && capacity < most_sorted;
+    }
+    [[nodiscard]] static counting_memory take(arena& memory, std::uint64_t capacity, std::uint64_t num_voxels) {
+        counting_memory m{};
+        m.num_voxels = (num_voxels + tile - 1) / tile * tile;
+        m.capacity = capacity;
+        m.counts = memory.take<std::uint32_t>(m.num_voxels);
+        m.numbers = memory.take<std::uint32_t>(capacity);
+        m.starts = memory.take<std::uint32_t>(m.num_starts());
+        m.tiles = memory.take<unsigned long long>(m.num_tiles());
+        return m;
+    }
+    [[nodiscard]] VOXELPIPE_HD bool is_used() const { return num_voxels != 0; }
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_tiles() const { return num_voxels / tile; }
+    // Words of `starts`: windows look beyond the last fragment.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_starts() const { return (capacity / 1024 + 3) * 32; }
+    // What has to be zero before. By all threads of a grid.
+    __device__ void zero(std::uint64_t thread, std::uint64_t threads) const {
+        for (std::uint64_t i = thread; i < num_voxels / 4; i += threads) reinterpret_cast<uint4*>(counts)[i] = {};
+        for (std::uint64_t i = thread; i < num_starts() / 4; i += threads) reinterpret_cast<uint4*>(starts)[i] = {};
+        for (std::uint64_t i = thread; i < num_tiles(); i += threads) tiles[i] = 0;
+    }
+};
+
+// What the sort and the order of a call's fragments want before they begin, which the raster that lists them does on
+// its way: zeros, and the page's word of where the lists are to go.
+struct sort_preparation {
+    bool is_wanted = false;
+    bool sorts = false;         // by sort_fragments, or,
+    counting_memory counting{}; // where it is in use, by counting
+    sort_memory sort{};
+    std::uint64_t capacity = 0;    // fragments
+    tile_counts tiles{};           // or none
+    list_places* places = nullptr; // or none
+    asked_places asked;
+
+    // By all threads of a grid.
+    __device__ VOXELPIPE_INLINE void run(std::uint64_t thread, std::uint64_t threads) const {
+        if (places != nullptr && thread == 0) *places = asked.page != nullptr ? *asked.page : asked.value;
+        if (tiles.words != nullptr)
+            for (std::uint64_t i = thread; i < tile_counts::num(capacity); i += threads) tiles.words[i] = 0;
+        if (counting.is_used())
+            counting.zero(thread, threads);
+        else if (sorts)
+            sort.zero(capacity, thread, threads);
+    }
+};
+
+// Memory for the order of so many fragments.
+struct order_memory {
+    tile_counts tiles;
+    order_lists lists;
+
+    [[nodiscard]] static order_memory take(arena& memory, std::uint64_t capacity) {
+        order_memory m{};
+        m.tiles.words = memory.take<unsigned long long>(tile_counts::num(capacity));
+        m.lists = order_lists::take(memory, capacity);
+        return m;
+    }
+};
+
+// keys: the voxels of the fragments, ascending, or null where a counting sort has listed the voxels, and `starts` is
+// its own; from: their primitives, in any order within a voxel, overwritten; spare: room for as many, which may be
+// where the keys are. The lists go where `asked` says, in device memory, or `here` where that has no voxels.
+struct order_buffers {
+    const std::uint32_t* keys;
+    std::uint32_t* from;
+    std::uint32_t* spare;
+    const list_places* asked;
+    list_places here;
+    tile_counts tiles;
+    order_lists lists;
+    int primitive_bits = 32; // of the largest primitive
+    const std::uint32_t* starts = nullptr;
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE const list_places& places() const {
+        return asked->voxels != nullptr ? *asked : here;
+    }
+};
+
+} // namespace voxelpipe::device

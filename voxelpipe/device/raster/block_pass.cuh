@@ -1,0 +1,216 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Direct raster for targets that hold values. Where bits are tested before they are written, and mostly are set
+// already, a value takes an atomic for every fragment: neighbouring triangles have to be drawn at about the same time,
+// while their voxels are in the cache. So one kernel does all small triangles, and those of a kind wait within the
+// block until there is a full warp of them; only what is more than one thread's work is handed on
+// (raster/deferred_triangles.cuh).
+
+#include <voxelpipe/device/raster/deferred_triangles.cuh>
+#include <voxelpipe/device/raster/small_triangles.cuh>
+#include <voxelpipe/device/raster/split_triangles.cuh>
+
+namespace voxelpipe::device {
+
+inline constexpr int block_min_blocks = 5; // per multiprocessor: registers for that many
+
+// Triangles by their vertices, each in a column of words.
+struct triangle_queue {
+    std::int32_t q[9][queue_places];
+};
+
+// What one warp keeps in shared memory.
+struct warp_queues {
+    triangle_queue tinies, smalls;      // bounding boxes as for raster_tiny; other small ones
+    std::uint32_t larges[queue_places]; // numbers of triangles that are loaded again
+};
+
+// The work of a warp, from the mesh to a sink. Every warp has its own queues: no thread waits for another warp, and the
+// numbers that wait are registers that all lanes agree on.
+template <class Call>
+struct block_warp {
+    static constexpr bool thin = Call::rule == coverage::thin;
+    using triangle_class = core::triangle_class;
+    using sink_type = typename Call::sink;
+
+    const Call& call;
+    warp_queues& queues;
+    kept_rows& kept; // of the warp
+    coming_corners<typename Call::source_type>& corners;
+    sink_type& sink;
+    std::uint32_t* big; // for big triangles, of the block
+    unsigned& num_big;
+    int lane = static_cast<int>(threadIdx.x) % 32;
+    int num_tinies = 0, num_smalls = 0, num_larges = 0;
+
+    __device__ VOXELPIPE_INLINE static void put(triangle_queue& queue, int at, const near_triangle& r) {
+        for (int k = 0; k < 9; ++k) queue.q[k][at] = r.q[k / 3][k % 3];
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle take(const triangle_queue& queue, int at) const {
+        near_triangle r;
+        for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = queue.q[k][at];
+        r.is_near = true;
+        r.find_box(call.in.fraction);
+        return r;
+    }
+    // The lane's triangle i, where there is one, whose corners have been fetched. Then those of the next are, which has
+    // these vertices.
+    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, bool has_next, const glm::uvec3& next) {
+        bool waits = false, is_big = false;
+        int inside = 0, most = 0;
+        bool is_done = false;
+        near_triangle r;
+        r = corners.take(call.in);
+        if (has_next) corners.fetch(call.in.source, next);
+        if (valid) {
+            most = r.most();
+            is_big = !r.is_near || most > most_medium_side(call.in.fraction);
+            inside = r.inside(call.in.extent);
+            if (!is_big && inside < 0 && r.template is_outside<Call::rule>(call.in.extent))
+                sink.drop(triangle_class::outside);
+            else
+                waits = !is_big;
+        }
+        sink.mark_boxes(waits, r);
+        if constexpr (thin) {
+            const bool is_cube = waits && most <= 2;
+            if (__popc(__ballot_sync(0xffffffffu, is_cube)) >= least_thin_cubes && is_cube) {
+                const core::thin_cube cube = core::thin_cube_by_signs(r.q, r.lo, r.last, call.in.fraction, is_done);
+                if (is_done) give_thin_cube(call.in, r, cube, sink);
+            }
+        } else {
+            const word bits = find_cube(call.in, waits && most <= 2, r, inside);
+            is_done = bits != 0;
+            if (is_done) give_cube(r, bits, sink);
+        }
+        waits = waits && !is_done;
+        if (__any_sync(0xffffffffu, waits || is_big)) {
+            const int kind = waits ? kind_of<Call::rule>(r, most) : -1;
+            const int tiny_at = take_place(kind == tiny_triangles, num_tinies);
+            if (kind == tiny_triangles) put(queues.tinies, tiny_at, r);
+            const int small_at = take_place(kind == small_triangles, num_smalls);
+            if (kind == small_triangles) put(queues.smalls, small_at, r);
+            // Of a mesh with a round for each block at most, which may leave multiprocessors without one, these are
+            // for the whole device.
+            const bool is_spread = kind == large_triangles && call.in.num_triangles <= gridDim.x * raster_threads;
+            const bool is_large = kind == large_triangles && !is_spread;
+            const int large_at = take_place(is_large, num_larges);
+            if (is_large) queues.larges[large_at] = i;
+            call.lists.push(medium_triangles, is_spread || kind == medium_triangles, i);
+            if (is_big) big[atomicAdd(&num_big, 1u)] = i; // no call of a function here: its registers would spill
+        }
+        __syncwarp();
+    }
+
+    // All batches of this warp, the lane's first with this index, then what is left in the queues of the block's warps,
+    // together. All threads of the block take part. Returns how many triangles the warp looked at.
+    template <int Warps>
+    __device__ VOXELPIPE_INLINE unsigned run(glm::uvec3 index, const warp_queues (&all)[Warps], int (&left)[3][Warps]) {
+        const std::uint32_t step = gridDim.x * Warps * 32;
+        const std::uint32_t begin = blockIdx.x * Warps * 32 + threadIdx.x / 32 * 32;
+        // One loop for what waits while the mesh is read and what is left then: twice the code, with that of the sink
+        // in every place, and warps wait for instructions.
+        const int own = static_cast<int>(warp_in_block());
+        int ended = 0; // kinds of which the rest is done
+        const auto triangle = [&](std::uint32_t first)
+                                  VOXELPIPE_INLINE_LAMBDA { return first + static_cast<unsigned>(lane); };
+        const std::uint32_t num_triangles = call.in.num_triangles;
+        if (triangle(begin) < num_triangles) corners.fetch(call.in.source, index);
+        index = load_index(call.in, triangle(begin + step));
+        for (std::uint32_t first = begin;;) {
+            int w = own, at = 0;
+            bool is_tiny = false, is_large = false;
+            if (num_tinies >= 32) {
+                at = (num_tinies -= 32) + lane;
+                is_tiny = true;
+            } else if (num_smalls >= 32) {
+                at = (num_smalls -= 32) + lane;
+            } else if (num_larges >= 32) {
+                at = (num_larges -= 32) + lane;
+                is_large = true;
+            } else if (first < num_triangles) {
+                // While a batch is worked on, the corners of the next one are on their way, and the indices of the one
+                // after that.
+                const glm::uvec3 second = load_index(call.in, triangle(first + 2 * step));
+                batch(triangle(first), triangle(first) < num_triangles, triangle(first + step) < num_triangles, index);
+                index = second;
+                first += step;
+                continue;
+            } else {
+                if (ended == 0) {
+                    if (lane == 0) {
+                        left[0][own] = num_tinies;
+                        left[1][own] = num_smalls;
+                        left[2][own] = num_larges;
+                    }
+                    __syncthreads();
+                }
+                if (ended == 2) break;
+                is_tiny = ended == 0;
+                at = static_cast<int>(threadIdx.x); // fewer than 32 a warp are left
+                for (w = 0; w < Warps && at >= left[ended][w];) at -= left[ended][w++];
+                ++ended;
+            }
+            __syncwarp();
+            if (w < Warps) {
+                if (is_tiny) {
+                    raster_tiny<Call::rule>(call.in, take(all[w].tinies, at), sink);
+                } else {
+                    const near_triangle r = is_large ? load_near(call.in, call.in.source.triangle(all[w].larges[at]))
+                                                     : take(all[w].smalls, at);
+                    raster_small<Call::rule, false>(call.in, r, lane_rows(kept), sink);
+                }
+            }
+            __syncwarp();
+        }
+        // A lane each, the larger ones would keep a few lanes busy long after all others.
+        int num = 0;
+        for (const int n : left[2]) num += n;
+        for (int start = 0; start < num; start += Warps * 32 / medium_lanes) {
+            int at = start + static_cast<int>(threadIdx.x) / medium_lanes, w = 0;
+            while (w < Warps && at >= left[2][w]) at -= left[2][w++];
+            raster_medium<Call::rule>(call.in, w < Warps, w < Warps ? all[w].larges[at] : 0, lane_rows(kept), sink);
+        }
+
+        cut_big(call, sink, big, num_big);
+        if (begin >= call.in.num_triangles) return 0;
+        const std::uint32_t batches = (call.in.num_triangles - begin - 1) / step + 1;
+        const std::uint32_t of_last = call.in.num_triangles - (begin + (batches - 1) * step);
+        return (batches - 1) * 32 + (of_last < 32 ? of_last : 32);
+    }
+};
+
+template <class Call>
+__global__ __launch_bounds__(raster_threads,
+                             block_min_blocks) void block_raster_kernel(const __grid_constant__ Call call,
+                                                                        pipeline_state* state) {
+    using sink_type = typename Call::sink;
+    __shared__ warp_queues queues[raster_warps];
+    __shared__ kept_rows rows_of_warps[raster_warps];
+    __shared__ coming_corners<typename Call::source_type> corners[raster_warps];
+    __shared__ typename sink_type::memory memories[raster_warps];
+    __shared__ int left[3][raster_warps];
+    __shared__ unsigned dropped[num_triangle_classes], num_big;
+    const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
+    await_stream();
+    if (state->index_error != 0) return;
+    if (threadIdx.x == 0) num_big = 0;
+    if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
+    __syncthreads();
+    sink_type sink(call, dropped, memories[threadIdx.x / 32]);
+    const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
+    block_warp<Call> warp{call,
+                          queues[threadIdx.x / 32],
+                          rows_of_warps[threadIdx.x / 32],
+                          corners[threadIdx.x / 32],
+                          sink,
+                          call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads,
+                          num_big};
+    const unsigned looked_at = warp.run(index, queues, left);
+    sink.finish(state);
+    count_looked_at(looked_at, dropped, state);
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,193 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The second kernel of direct raster: what the first left (raster/raster.cuh), in warps of 32 triangles of a kind each,
+// and large triangles piece by piece.
+
+#include <voxelpipe/device/raster/blend_sink.cuh>
+#include <voxelpipe/device/raster/deferred_triangles.cuh>
+#include <voxelpipe/device/raster/list_walk.hpp>
+#include <voxelpipe/device/raster/small_triangles.cuh>
+#include <voxelpipe/device/raster/split_triangles.cuh>
+#include <voxelpipe/device/raster/warp_combine.cuh>
+
+namespace voxelpipe::device {
+
+// Blocks per multiprocessor that registers are kept for.
+template <class Call>
+inline constexpr int rest_min_blocks = Call::sink::buffers            ? 4
+                                       : Call::rule == coverage::thin ? 6
+                                                                      : 5;
+
+// All records, in registers of their own: what they need is not kept for the other triangles. Nobody waits for the
+// block's other warps at its end.
+template <class Call>
+__device__ __noinline__ typename Call::rest_sink::totals
+raster_all_records(const Call& call, unsigned* dropped, brick_memory<Call::rule>& bricks,
+                   typename Call::rest_sink::memory& memory, unsigned warp, unsigned warps) {
+    typename Call::rest_sink sink(call, dropped, memory);
+    raster_records(call, sink, bricks, warp, warps);
+    __syncwarp();
+    return sink.end();
+}
+
+// The warp's share of what records need (raster/split_triangles.cuh).
+template <class Call>
+__device__ __noinline__ void keep_setups(const Call& call, unsigned warp, unsigned warps) {
+    const large_records all(call.lists);
+    if (all.want_setups(call.lists, warps))
+        large_setup<Call::rule>::keep(call, warp, warps, static_cast<std::uint32_t>(all.triangles));
+}
+
+// What a warp of the second kernel knows of its place.
+struct warp_place {
+    unsigned warp, warps; // of the grid
+    unsigned lane;
+};
+
+// The triangles of a list from number `first` on, by medium_lanes lanes each.
+template <class Call, class Sink>
+__device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std::uint32_t first,
+                                                 const warp_place& place, const lane_rows& kept, Sink& sink) {
+    constexpr unsigned at_once = 32 / medium_lanes;
+    const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[kind]));
+    const unsigned chunks = (length - first + at_once - 1) / at_once;
+    for (unsigned chunk = place.warp; chunk < chunks; chunk += place.warps) {
+        const std::uint32_t i = first + chunk * at_once + place.lane / medium_lanes;
+        const bool wanted = i < length;
+        __syncwarp();
+        raster_medium<Call::rule>(call.in, wanted, wanted ? call.lists.at(kind, i) : 0, kept, sink);
+        __syncwarp();
+    }
+}
+
+// The lists of large, small and tiny triangles by a thread each, neighbours, which are alike, in neighbouring lanes;
+// but what does not fill a warp, and whole lists that would not fill the device, by medium_lanes lanes each. All lists
+// advance together, part by part (list_walk): they are in the order of the mesh, nearly, so that voxels are in the
+// cache while triangles of all kinds meet them.
+template <class Call, class Rows, class Sink>
+__device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place& place, const lane_rows& kept,
+                                              Rows& rows, Sink& sink) {
+    constexpr int kinds = medium_triangles; // what comes before
+    std::uint32_t chunks[kinds];
+    for (int k = 0; k < kinds; ++k) {
+        const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[k]));
+        const bool few = k != tiny_triangles && length / 64 * medium_lanes < place.warps;
+        chunks[k] = few ? 0 : length / 32;
+        const unsigned from_last = place.warps - 1 - place.warp; // the first ones have whole chunks to do
+        raster_by_lanes(call, k, chunks[k] * 32, {few ? place.warp : from_last, place.warps, place.lane}, kept, sink);
+    }
+    // Of a chunk that comes next, the triangles' numbers are loaded while the one before the last is worked on, and
+    // their vertices' while the last one is.
+    using walk_type = core::list_walk<kinds>;
+    using chunk = typename walk_type::chunk;
+    walk_type walk(chunks, place.warp, place.warps);
+    const auto number = [&](const chunk& c) VOXELPIPE_INLINE_LAMBDA {
+        return c.list < 0 ? 0 : call.lists.at(c.list, 32 * c.number + place.lane);
+    };
+    const auto vertices = [&](const chunk& c, std::uint32_t triangle) VOXELPIPE_INLINE_LAMBDA {
+        return c.list < 0 ? glm::uvec3(0) : call.in.source.triangle(triangle);
+    };
+    chunk here = walk.next(), next = walk.next();
+    std::uint32_t triangle = number(here), triangle_of_next = number(next);
+    glm::uvec3 index = vertices(here, triangle);
+    while (here.list >= 0) {
+        const near_triangle r = load_near(call.in, index);
+        const chunk after = walk.next();
+        const glm::uvec3 index_of_next = vertices(next, triangle_of_next);
+        const std::uint32_t triangle_of_after = number(after);
+        __syncwarp();
+        if constexpr (Call::rule == coverage::conservative && Sink::has_rounds) {
+            sink.begin(triangle);
+            raster_rows_by_rounds(call.in, r, here.list == tiny_triangles, kept, sink);
+        } else {
+            bool is_done = false;
+            if constexpr (Sink::has_rounds) {
+                sink.begin(triangle);
+                is_done = here.list != tiny_triangles && raster_thin_by_rounds(call.in, r, kept, sink);
+            }
+            if (!is_done)
+                feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                    sink.begin(triangle);
+                    if (here.list == tiny_triangles)
+                        raster_tiny<Call::rule>(call.in, r, sink);
+                    else
+                        raster_small<Call::rule, true>(call.in, r, kept, rows);
+                });
+        }
+        __syncwarp();
+        if constexpr (combines_words<Call>)
+            if (here.list != tiny_triangles) rows.flush();
+        here = next;
+        next = after;
+        triangle = triangle_of_next;
+        triangle_of_next = triangle_of_after;
+        index = index_of_next;
+    }
+}
+
+template <class Call>
+__global__ __launch_bounds__(raster_threads,
+                             rest_min_blocks<Call>) void direct_rest_kernel(const __grid_constant__ Call call,
+                                                                            pipeline_state* state) {
+    using sink_type = typename Call::rest_sink;
+    constexpr bool thin = Call::rule == coverage::thin;
+    // Of a warp: what its large triangles want, or the rest. More shared memory would leave less to the cache of
+    // vertices.
+    __shared__ union {
+        brick_memory<Call::rule> bricks;
+        kept_rows rows;
+    } memory_of_warps[raster_warps];
+    __shared__ warp_words<Call> words[raster_warps];
+    __shared__ typename sink_type::memory memories[raster_warps];
+    __shared__ unsigned dropped[num_triangle_classes];
+    await_stream();
+    call.out.prepare(std::uint64_t{blockIdx.x} * raster_threads + threadIdx.x,
+                     std::uint64_t{gridDim.x} * raster_threads);
+    if (state->index_error != 0) return;
+    if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
+    __syncthreads();
+    const unsigned in_block = warp_in_block();
+    const lane_rows kept(memory_of_warps[in_block].rows);
+    const warp_place place{blockIdx.x * raster_warps + in_block, gridDim.x * raster_warps, threadIdx.x % 32};
+    typename sink_type::memory& memory = memories[in_block];
+    const bool has_records = uniform(*call.lists.next) != 0;
+    // Parts of few large triangles go to different multiprocessors.
+    const unsigned warp_of_records = thin ? place.warp : in_block * gridDim.x + blockIdx.x;
+    const auto draw_records = [&]() VOXELPIPE_INLINE_LAMBDA {
+        return raster_all_records(call, dropped, memory_of_warps[in_block].bricks, memory, warp_of_records,
+                                  place.warps);
+    };
+    // Thin records come last: what they need is there when all else is drawn. Conservative ones take longest, and other
+    // warps had better have the rest.
+    typename sink_type::totals of_records{};
+    if (has_records) {
+        keep_setups(call, warp_of_records, place.warps);
+        if constexpr (!thin) of_records = draw_records();
+    }
+    sink_type sink(call, dropped, memory);
+    sink.take_over(of_records);
+    raster_by_lanes(call, medium_triangles, 0, place, kept, sink);
+    if constexpr (combines_words<Call>) {
+        combining_sink<Call> rows(sink, words[in_block]);
+        raster_lists(call, place, kept, rows, sink);
+        sink.take_over(rows.end());
+    } else {
+        raster_lists(call, place, kept, sink, sink);
+    }
+    if constexpr (thin) {
+        if (has_records) {
+            (void)sink.end(); // the memory is another sink's
+            sink.take_over(draw_records());
+        }
+    }
+    sink.finish(state);
+    __syncthreads();
+    if (threadIdx.x == 0) { // the first kernel took them for drawn
+        const unsigned none = count_dropped(dropped, state);
+        if (none != 0) atomicAdd(&state->drawn, 0ull - none);
+    }
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The sink of the occupancy mask: sets a bit for each voxel that has a fragment, whatever the targets are.
+
+#include <voxelpipe/device/raster/blend_sink.cuh>
+
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+template <class Call>
+struct touching_sink : blending_sink<Call> {
+    using blending_sink<Call>::blending_sink;
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(const glm::uvec3& index) const {
+        return this->call.out.checked || this->call.out.check(index);
+    }
+};
+
+struct touched_output : framebuffer_output<framebuffer_view<touched_target>, core::pack<bool>> {
+    template <class Call>
+    using sink = touching_sink<Call>;
+    template <class Call>
+    using rest_sink = sink<Call>;
+    static constexpr bool only_sets = true;
+
+    std::uint32_t num_vertices;
+    pipeline_state* state;
+    bool checked; // whether check_indices has run
+
+    touched_output(word* words, const glm::ivec3& extent, std::uint32_t num_vertices_, pipeline_state* state_,
+                   bool checked_)
+        : framebuffer_output{{extent, {}}, core::make_pack(true), {}, {}}, num_vertices(num_vertices_), state(state_),
+          checked(checked_) {
+        auto& t = voxelpipe::get<0>(fb.targets);
+        t.elements = words;
+        t.extent = extent;
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_checked() const { return checked; }
+    // Whether all three are vertices; says so where they are not.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(const glm::uvec3& index) const {
+        const bool ok = index.x < num_vertices && index.y < num_vertices && index.z < num_vertices;
+        if (!ok) atomicOr(&state->index_error, 1u);
+        return ok;
+    }
+};
+
+// A framebuffer of one target that is laid out as they are, and takes true as they do.
+template <class Framebuffer>
+inline constexpr bool is_touched_itself = false;
+template <class Target>
+inline constexpr bool is_touched_itself<framebuffer_view<Target>> =
+    std::is_same_v<typename Target::blend_type, blend::bit_or> && !Target::map::bricks && Target::map::is_bit;
+
+} // namespace voxelpipe::device

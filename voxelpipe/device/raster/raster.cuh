@@ -1,0 +1,379 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Direct raster: fragments go straight from their triangle into the render targets, without tiles, where the shader is
+// constant and every target takes a fragment by one atomic (targets/global_target.cuh). Coarse raster, sort and tile
+// images cost a small triangle more than the few voxels that it touches. A first kernel reads the mesh once, does at
+// once what costs next to nothing, and hands the rest on by what it costs (raster/deferred_triangles.cuh), so that the
+// second kernel's warps have 32 triangles of a kind each.
+
+#include <voxelpipe/device/raster/blend_sink.cuh>
+#include <voxelpipe/device/raster/block_pass.cuh>
+#include <voxelpipe/device/raster/deferred_pass.cuh>
+#include <voxelpipe/device/raster/deferred_triangles.cuh>
+#include <voxelpipe/device/raster/small_triangles.cuh>
+#include <voxelpipe/device/raster/split_triangles.cuh>
+#include <voxelpipe/device/raster/warp_combine.cuh>
+
+namespace voxelpipe::device {
+
+// ---- the first kernel: every triangle -------------------------------------------------------------------------------
+
+// Blocks per multiprocessor that registers are kept for.
+template <class Call>
+inline constexpr int first_min_blocks = Call::rule == coverage::thin || Call::sink::buffers ? 6 : 8;
+
+// Thin triangles of up to 2 x 2 x 2 voxels that wait for integers, each in a column of words: those that floats are not
+// sure of, and those of warps that have few.
+struct cube_queue {
+    std::int32_t q[9][queue_places];
+    std::uint32_t triangle[queue_places]; // by warp_triangles
+};
+struct no_queue {};
+// Of thin coverage: the cubes, and when none waits any more, what draw_left wants.
+union cubes_or_rows {
+    cube_queue cubes;
+    kept_rows rows;
+};
+
+// Of a warp's 32 triangles, so many whose boxes are three voxels long at least are drawn where they are read, with all
+// smaller ones, by instructions that cost half as much again as without them; fewer are handed on.
+inline constexpr int least_slim = 3;
+// Of a mesh that is finer than the grid few triangles are handed on: where there were so many on average for each of
+// the first kernel's blocks, each can draw its own at its end, and takes no more than a second kernel does to begin.
+inline constexpr std::uint64_t most_left_of_block = 14, most_left_blocks = 6; // a multiprocessor
+inline constexpr int big_side = 64; // of what is cut into pieces: beyond most_medium_side
+
+// What one warp of the first kernel keeps in shared memory.
+template <class Call>
+struct first_memory {
+    kind_queues kinds;
+    std::conditional_t<Call::rule == coverage::thin, cubes_or_rows, no_queue> thin;
+    typename Call::sink::memory sink;
+};
+
+// Whether a first kernel can set close cubes together (raster/warp_combine.cuh).
+template <class Call>
+inline constexpr bool has_close_cubes = Call::output::only_sets && (Call::rule == coverage::conservative);
+
+// A warp of the first kernel. Every warp has its own queues: no thread waits for another warp. Alone: whether there is
+// no second kernel (raster_first). Close: whether batches are looked at for close cubes.
+template <class Call, bool Alone, bool Close>
+struct first_warp {
+    static constexpr bool thin = Call::rule == coverage::thin;
+    using triangle_class = core::triangle_class;
+    using sink_type = typename Call::sink;
+    using corners_type = loaded_corners<typename Call::source_type>;
+    // Whether a batch's vertices are loaded before the fragments of the batch before it are blended. Where conservative
+    // coverage looks at words of bits, those wait behind the vertices: 5 % slower.
+    static constexpr bool loads_ahead = thin || sink_type::buffers;
+
+    const Call& call;
+    first_memory<Call>& memory;
+    sink_type& sink;
+    kind_writer& writer;
+    std::uint32_t* big; // triangles, of the block
+    unsigned& num_big;
+    int num_cubes = 0;                                   // that wait, of thin ones
+    static constexpr std::uint32_t not_close = 1u << 31; // of a code, which has 16 bits: the batch before was not
+
+    // The lane's triangle i, where there is one, of this code, maybe with its mark: near() gives it. load_next() is
+    // called between coverage and blending, where few registers are in use.
+    template <class Near, class LoadNext>
+    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, std::uint32_t& code, bool valid, const Near& near,
+                                           const LoadNext& load_next) {
+        // Of what is left to do, the longest side of the bounding box, or big_side. Not a few bools (see inside()).
+        int side = 0, inside = 0;
+        near_triangle r;
+        if (valid) {
+            r = near();
+            side = r.most();
+            inside = r.inside(call.in.extent);
+            if (!r.is_near || side > most_medium_side(call.in.fraction)) {
+                side = big_side;
+            } else if (inside < 0 && r.template is_outside<Call::rule>(call.in.extent)) {
+                sink.drop(triangle_class::outside);
+                side = 0;
+            }
+        }
+        if constexpr (!thin) {
+            if (!draws_slim(i, r, inside, side, load_next)) {
+                const word bits = find_cube(call.in, side != 0 && side <= 2, r, inside);
+                load_next();
+                bool is_done = false;
+                if constexpr (Close) is_done = sets_close_cubes(code, r, bits);
+                if (!is_done)
+                    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                        if (bits == 0) return;
+                        sink.begin(i);
+                        give_cube(r, bits, sink);
+                    });
+                side = bits != 0 ? 0 : side;
+            }
+        } else {
+            const bool is_cube = side != 0 && side <= 2;
+            const bool at_once = __popc(__ballot_sync(0xffffffffu, is_cube)) >= least_thin_cubes;
+            bool sure = false;
+            core::thin_cube cube{};
+            if (at_once && is_cube) cube = core::thin_cube_by_signs(r.q, r.lo, r.last, call.in.fraction, sure);
+            if (__any_sync(0xffffffffu, is_cube && !sure)) {
+                const int at = take_place(is_cube && !sure, num_cubes);
+                if (is_cube && !sure) {
+                    for (int k = 0; k < 9; ++k) memory.thin.cubes.q[k][at] = r.q[k / 3][k % 3];
+                    memory.thin.cubes.triangle[at] = code;
+                }
+            }
+            load_next();
+            if (at_once)
+                feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                    if (!sure) return;
+                    sink.begin(i);
+                    give_thin_cube(call.in, r, cube, sink);
+                });
+            side = is_cube ? 0 : side;
+        }
+        if (__any_sync(0xffffffffu, side != 0)) {
+            writer.push(side != 0 && side != big_side ? kind_of<Call::rule>(r, side) : -1, code);
+            // No call of a function here: its registers would spill.
+            if (side == big_side) big[atomicAdd(&num_big, 1u)] = i;
+        }
+        __syncwarp();
+        if constexpr (thin)
+            if (num_cubes >= 32) drain_cubes<true>();
+    }
+
+    // Whether this warp has set what find_cube has found. Where one batch does not lie close together, 15 after it are
+    // not looked at.
+    __device__ VOXELPIPE_INLINE bool sets_close_cubes(std::uint32_t& code, const near_triangle& r, word bits) {
+        const bool looks = (code & not_close) == 0 || code / 32 % 16 == 0;
+        if (looks && set_close_cubes(voxelpipe::get<0>(call.out.fb.targets), r.lo, bits)) {
+            code &= ~not_close;
+            sink.count(bits);
+            return true;
+        }
+        code |= not_close;
+        return false;
+    }
+
+    // Whether this warp has drawn what has slim boxes: conservative triangles, where it has some of three voxels.
+    template <class LoadNext>
+    __device__ VOXELPIPE_INLINE bool draws_slim(std::uint32_t i, const near_triangle& r, int inside, int& side,
+                                                const LoadNext& load_next) {
+        if (__popc(__ballot_sync(0xffffffffu, side == 3)) < least_slim) return false;
+        core::slim_rows rows{};
+        if (side != 0 && side <= 3 && inside >= 0 && core::is_slim(r.last))
+            rows = core::slim_rows_by_signs(r.q, r.lo, r.last, call.in.fraction);
+        load_next();
+        feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+            if (rows.bits == 0) return;
+            sink.begin(i);
+            sink.slim(r.lo[0], r.lo[1], r.lo[2], rows);
+        });
+        side = rows.bits != 0 ? 0 : side;
+        return true;
+    }
+
+    // The last 32 cubes that wait; where these may be fewer, and are all, not AllLanes.
+    template <bool AllLanes>
+    __device__ VOXELPIPE_INLINE void drain_cubes() {
+        const int lane = static_cast<int>(threadIdx.x) % 32;
+        const bool wanted = AllLanes || lane < num_cubes;
+        num_cubes = AllLanes ? num_cubes - 32 : 0;
+        const int at = wanted ? num_cubes + lane : 0;
+        near_triangle r;
+        for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = memory.thin.cubes.q[k][at];
+        r.is_near = true;
+        r.find_box(call.in.fraction);
+        feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+            if (!wanted) return;
+            sink.begin(warp_triangles::of(memory.thin.cubes.triangle[at]));
+            raster_tiny<Call::rule>(call.in, r, sink);
+        });
+        __syncwarp();
+    }
+
+    // All batches of this warp, the lane's first with this index. Returns how many triangles it looked at.
+    __device__ VOXELPIPE_INLINE unsigned run(glm::uvec3 index) {
+        const unsigned lane = threadIdx.x % 32;
+        const std::uint32_t step = gridDim.x * raster_threads, num = call.in.num_triangles;
+        const std::uint32_t begin = blockIdx.x * raster_threads + warp_in_block() * 32;
+        // The indices of a batch are loaded a batch ahead, or two, where vertices are loaded ahead too.
+        if constexpr (loads_ahead) {
+            bool valid = begin + lane < num && sink.check(index);
+            corners_type corners;
+            if (valid) corners = load_corners(call.in, index);
+            index = load_index(call.in, begin + step + lane);
+            for (std::uint32_t first = begin, code = lane; first < num; first += step, code += 32) {
+                const std::uint32_t next = first + step + lane;
+                const glm::uvec3 index_of_second = load_index(call.in, next + step);
+                const auto near = [&]() VOXELPIPE_INLINE_LAMBDA { return make_near(call.in, corners); };
+                batch(first + lane, code, valid, near, [&]() VOXELPIPE_INLINE_LAMBDA {
+                    valid = next < num && sink.check(index);
+                    if (valid) corners = load_corners(call.in, index);
+                });
+                index = index_of_second;
+            }
+        } else {
+            for (std::uint32_t first = begin, code = lane; first < num; first += step, code += 32) {
+                const glm::uvec3 next = load_index(call.in, first + step + lane);
+                const auto near = [&]() VOXELPIPE_INLINE_LAMBDA { return load_near(call.in, index); };
+                batch(first + lane, code, first + lane < num && sink.check(index), near,
+                      []() VOXELPIPE_INLINE_LAMBDA {});
+                index = next;
+            }
+        }
+        if constexpr (thin && Alone) {
+            if (num_cubes != 0) drain_cubes<false>();
+        } else if constexpr (thin) { // the rest of the cubes is handed on
+            const int at = static_cast<int>(lane);
+            writer.push(at < num_cubes ? static_cast<int>(tiny_triangles) : -1, memory.thin.cubes.triangle[at]);
+        }
+        if (begin >= num) return 0;
+        const std::uint32_t batches = (num - begin - 1) / step + 1, of_last = num - (begin + (batches - 1) * step);
+        return (batches - 1) * 32 + (of_last < 32 ? of_last : 32);
+    }
+};
+
+// The n triangles that wait in a block's queues, up to 32, none of which is large, by one warp, a thread each.
+template <class Call>
+__device__ __noinline__ typename Call::sink::totals
+draw_left(const Call& call, unsigned* dropped, first_memory<Call> (&memories)[raster_warps],
+          const unsigned (&waiting)[num_triangle_kinds][raster_warps], unsigned n) {
+    first_memory<Call>& memory = memories[warp_in_block()];
+    typename Call::sink sink(call, dropped, memory.sink);
+    unsigned at = threadIdx.x % 32;
+    const bool wanted = at < n;
+    int kind = 0;
+    std::uint32_t triangle = 0;
+    near_triangle r{};
+    if (wanted) {
+        unsigned warp = 0;
+        while (at >= waiting[kind][warp]) {
+            at -= waiting[kind][warp];
+            warp = (warp + 1) % raster_warps;
+            kind += warp == 0 ? 1 : 0;
+        }
+        triangle = warp_triangles::of(memories[warp].kinds.triangles[kind][at], warp);
+        r = load_near(call.in, call.in.source.triangle(triangle));
+    }
+    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+        if (!wanted) return;
+        sink.begin(triangle);
+        if (kind == tiny_triangles)
+            raster_tiny<Call::rule>(call.in, r, sink);
+        else if constexpr (Call::rule == coverage::thin)
+            raster_small<Call::rule, true>(call.in, r, lane_rows(memory.thin.rows), sink);
+        else
+            raster_small<Call::rule, true>(call.in, r, no_rows{}, sink);
+    });
+    return sink.end();
+}
+
+// The first kernel. Alone: there is no second one, since nothing is handed on for all that is known. What a block would
+// hand on at its end is drawn there then, where it is little; what is handed on all the same is not drawn. `again` is
+// the call once more, for functions that are called: what has its address taken is read anew behind each reduction.
+template <class Call, bool Alone, bool Close>
+__device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& again, pipeline_state* state) {
+    using sink_type = typename Call::sink;
+    __shared__ first_memory<Call> memories[raster_warps];
+    __shared__ unsigned places[num_triangle_kinds][raster_warps];
+    __shared__ unsigned dropped[num_triangle_classes], num_big;
+    const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
+    await_stream();
+    if constexpr (Alone)
+        call.out.prepare(std::uint64_t{blockIdx.x} * raster_threads + threadIdx.x,
+                         std::uint64_t{gridDim.x} * raster_threads);
+    if (call.out.is_checked() && state->index_error != 0) return;
+    if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
+    if (threadIdx.x == 0) num_big = 0;
+    __syncthreads();
+    first_memory<Call>& memory = memories[warp_in_block()];
+    sink_type sink(call, dropped, memory.sink);
+    kind_writer writer{call.lists, memory.kinds};
+    const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
+    first_warp<Call, Alone, Close> warp{
+        call, memory, sink, writer, call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads, num_big};
+    const unsigned looked_at = warp.run(index);
+    __syncthreads();
+    cut_big(call, sink, warp.big, num_big);
+    writer.note(places);
+    int left = kind_writer::many;
+    if constexpr (Alone)
+        left = writer.count();
+    else
+        __syncthreads();
+    if (left >= kind_writer::many) {
+        writer.finish(places);
+    } else if (left != 0 && threadIdx.x < 32) {
+        (void)sink.end(); // the memory is another sink's
+        sink.take_over(draw_left(again, dropped, memories, places, static_cast<unsigned>(left)));
+    }
+    sink.finish(state);
+    count_looked_at(looked_at, dropped, state);
+}
+
+template <class Call, bool Close>
+__global__ __launch_bounds__(raster_threads,
+                             first_min_blocks<Call>) void direct_raster_kernel(const __grid_constant__ Call call,
+                                                                               pipeline_state* state) {
+    raster_first<Call, false, Close>(call, call, state);
+}
+template <class Call, bool Close>
+__global__ __launch_bounds__(raster_threads,
+                             first_min_blocks<Call>) void direct_alone_kernel(const __grid_constant__ Call call,
+                                                                              const __grid_constant__ Call again,
+                                                                              pipeline_state* state) {
+    raster_first<Call, true, Close>(call, again, state);
+}
+
+// ---- host -----------------------------------------------------------------------------------------------------------
+
+// Blocks of the first kernel: what fits the device at once, but more where it is so small that there would be more
+// rounds of them than warp_triangles can number.
+[[nodiscard]] inline unsigned raster_blocks(std::uint32_t num_triangles, int per_multiprocessor) {
+    const std::uint32_t batches = core::blocks_for_each(num_triangles, raster_threads);
+    const auto at_once = static_cast<std::uint32_t>(num_multiprocessors() * per_multiprocessor);
+    return std::min(batches, std::max(at_once, core::blocks_for_each(batches, warp_triangles::most_rounds)));
+}
+
+// Whether a call of one draw may be launched without its second kernel, where others like it left_alone so many
+// triangles.
+[[nodiscard]] inline bool may_be_alone(std::size_t num_triangles, std::uint64_t left) {
+    const std::uint64_t batches = core::blocks_for_each(num_triangles, raster_threads);
+    const auto at_once = static_cast<std::uint64_t>(num_multiprocessors()) * most_left_blocks;
+    return left <= std::min(batches, at_once) * most_left_of_block;
+}
+
+// is_first: whether these are a call's first kernels. They read indices before they await the stream, which the
+// caller's own kernel in front of them may still write. leaves_none: whether the first kernel does it all, for all that
+// is known; what it hands on all the same is not drawn.
+template <class Call>
+void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
+                   bool leaves_none = false) {
+    const unsigned triangles = call.in.num_triangles;
+    if constexpr (Call::output::hands_on) {
+        bool are_close = false;
+        if constexpr (has_close_cubes<Call>) are_close = may_be_close(triangles, call.in.extent);
+        const unsigned blocks = raster_blocks(triangles, first_min_blocks<Call>);
+        const auto launch = [&](auto* raster, auto* alone) {
+            if (leaves_none)
+                launch_kernel(!is_first, alone, blocks, raster_threads, 0, stream, where, call, call, state);
+            else
+                launch_kernel(!is_first, raster, blocks, raster_threads, 0, stream, where, call, state);
+        };
+        if (are_close)
+            launch(direct_raster_kernel<Call, has_close_cubes<Call>>, direct_alone_kernel<Call, has_close_cubes<Call>>);
+        else
+            launch(direct_raster_kernel<Call, false>, direct_alone_kernel<Call, false>);
+    } else {
+        launch_kernel(!is_first, block_raster_kernel<Call>, raster_blocks(triangles, block_min_blocks), raster_threads,
+                      0, stream, where, call, state);
+    }
+    if (leaves_none) return;
+    const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
+    launch_behind(direct_rest_kernel<Call>, multiprocessors * rest_min_blocks<Call>, raster_threads, stream, where,
+                  call, state);
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,541 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Raster of large triangles without tiles: each is cut into pieces that warps share out, whatever triangles they belong
+// to. Conservative coverage finds the bricks (core/brick_triangle.hpp) that a triangle meets, then the voxels of each;
+// thin coverage takes rows of 16 columns. What all pieces of a triangle need of it is found once where there are many
+// (large_setup). A triangle that the 64-bit path cannot hold goes through 128 bits.
+
+#include <voxelpipe/device/raster/deferred_triangles.cuh>
+#include <voxelpipe/device/raster/small_triangles.cuh>
+#include <voxelpipe/device/scene/count_and_emit.cuh>
+#include <voxelpipe/device/scene/int128_coverage.cuh>
+
+#include <cuda/atomic>
+
+#include <algorithm>
+
+namespace voxelpipe::device {
+
+inline constexpr int most_direct_extent = 1 << 16; // bricks are numbered with 16 bits, voxels with 32
+static_assert((std::int64_t{most_direct_extent} / core::brick_size + 1) * (most_direct_extent + 1) < 1u << 31);
+
+// How a large triangle's box of voxels is cut into pieces, a lane each, some to a record, which is a warp's.
+// Conservative: columns of bricks along the dominant axis, few, for the bricks of a column keep eight lanes busy, and
+// the last warp to end is one with a floor or a wall. Thin: rows of 16 columns of voxels, along that axis of the other
+// two which makes fewer of them.
+template <coverage Rule>
+struct large_pieces {
+    static constexpr int across = Rule == coverage::thin ? 1 : core::brick_size; // voxels along v
+    static constexpr int per_record = Rule == coverage::thin ? 32 : 8;
+    core::row_axes axes;
+    core::triple<std::int64_t> lo, hi;            // uvw by these axes, the box
+    std::int64_t first_u, first_v, per_row, rows; // 32 bits number pieces (most_direct_extent)
+
+    large_pieces() = default;
+    VOXELPIPE_HD large_pieces(const core::voxel_box& box, int dominant)
+        : large_pieces(box, core::row_axes{dominant, false}) {
+        if constexpr (Rule == coverage::thin) {
+            const large_pieces by_v(box, core::row_axes{dominant, true});
+            // Columns along x may be set by one word.
+            const std::int64_t mine = count() * (axes.are_along_x() ? 3 : 4),
+                               other = by_v.count() * (by_v.axes.are_along_x() ? 3 : 4);
+            if (other < mine) *this = by_v;
+        }
+    }
+    [[nodiscard]] VOXELPIPE_HD std::int64_t count() const { return per_row * rows; }
+    [[nodiscard]] VOXELPIPE_HD std::int64_t records() const { return (count() + per_record - 1) / per_record; }
+    // The lowest voxel of piece i along u and v, maybe outside the box.
+    [[nodiscard]] VOXELPIPE_HD std::int64_t u(std::int64_t i) const {
+        return (first_u + static_cast<std::uint32_t>(i) % static_cast<std::uint32_t>(per_row)) << core::log2_brick;
+    }
+    [[nodiscard]] VOXELPIPE_HD std::int64_t v(std::int64_t i) const {
+        return (first_v + static_cast<std::uint32_t>(i) / static_cast<std::uint32_t>(per_row)) * across;
+    }
+    // A piece by several lanes: whether part `part` of lanes_each has rows within the box, and these as a box of
+    // voxels.
+    static constexpr int lanes_each = 32 / per_record;
+    [[nodiscard]] VOXELPIPE_HD bool has_rows(std::int64_t i, unsigned part) const {
+        return first_row(i, part) <= hi[1] && first_row(i, part + 1) > lo[1];
+    }
+    [[nodiscard]] VOXELPIPE_HD core::voxel_box piece(std::int64_t i, unsigned part) const {
+        const std::int64_t u0 = u(i), u1 = u0 + core::brick_size - 1;
+        const std::int64_t v0 = first_row(i, part), v1 = first_row(i, part + 1) - 1;
+        const auto inside = [&](std::int64_t at, int k) { return at < lo[k] ? lo[k] : at > hi[k] ? hi[k] : at; };
+        return {axes.from_rows(inside(u0, 0), inside(v0, 1), lo[2]),
+                axes.from_rows(inside(u1, 0), inside(v1, 1), hi[2])};
+    }
+    // The most records that a triangle can have in a grid.
+    [[nodiscard]] static std::uint64_t most_records(glm::ivec3 extent) {
+        const auto of = [](std::int64_t along, std::int64_t rest) {
+            const std::int64_t pieces = (along / core::brick_size + 1) * (rest / across + 1);
+            return static_cast<std::uint64_t>((pieces + per_record - 1) / per_record);
+        };
+        return std::max(core::max3(of(extent.y, extent.z), of(extent.z, extent.x), of(extent.x, extent.y)),
+                        core::max3(of(extent.z, extent.y), of(extent.x, extent.z), of(extent.y, extent.x)));
+    }
+
+private:
+    VOXELPIPE_HD large_pieces(const core::voxel_box& box, const core::row_axes& axes_)
+        : axes(axes_), lo(axes_.to_rows(box.lo[0], box.lo[1], box.lo[2])),
+          hi(axes_.to_rows(box.hi[0], box.hi[1], box.hi[2])), first_u(lo[0] >> core::log2_brick),
+          first_v(lo[1] / across), per_row((hi[0] >> core::log2_brick) - first_u + 1),
+          rows(hi[1] / across - first_v + 1) {}
+    [[nodiscard]] VOXELPIPE_HD std::int64_t first_row(std::int64_t i, unsigned part) const {
+        return v(i) + part * (across / lanes_each);
+    }
+};
+// Whichever rule.
+[[nodiscard]] inline std::uint64_t most_large_records(glm::ivec3 extent) {
+    return std::max(large_pieces<coverage::thin>::most_records(extent),
+                    large_pieces<coverage::conservative>::most_records(extent));
+}
+
+// A triangle in full width, and what it may touch.
+template <class Call>
+struct located_triangle {
+    core::snapped_position a, b, c;
+    core::voxel_box reach{}; // what of the grid, where it is drawn
+    core::triangle_class kind;
+
+    __device__ VOXELPIPE_INLINE located_triangle(const Call& call, std::uint32_t triangle) {
+        const glm::uvec3 index = call.in.source.triangle(triangle);
+        a = call.in.source.position(index.x);
+        b = call.in.source.position(index.y);
+        c = call.in.source.position(index.z);
+        const core::voxel_box grid{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
+        kind = core::classify<Call::rule>(a, b, c, call.in.fraction, grid, reach);
+    }
+    // How it is cut, where it is drawn.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE large_pieces<Call::rule> pieces(int fraction) const {
+        return {reach, core::dominant_axis(a, b, c, fraction)};
+    }
+};
+
+// Decides about a triangle; records: how many it has, where it is drawn.
+template <class Call>
+__device__ inline core::triangle_class find_records(const Call& call, std::uint32_t triangle,
+                                                    unsigned long long& records) {
+    const located_triangle<Call> t(call, triangle);
+    if (t.kind != core::triangle_class::drawn) return t.kind;
+    if (Call::rule == coverage::thin && core::has_zero_area(t.a, t.b, t.c)) return core::triangle_class::zero_area;
+    records = static_cast<unsigned long long>(t.pieces(call.in.fraction).records());
+    return t.kind;
+}
+
+// The big triangles that a block left until its end, by all its threads.
+template <class Call, class Sink>
+__device__ VOXELPIPE_INLINE void cut_big(const Call& call, Sink& sink, const std::uint32_t* big, unsigned num_big) {
+    for (unsigned first = 0; first < num_big; first += blockDim.x) {
+        const unsigned at = first + threadIdx.x;
+        unsigned long long records = 0;
+        const std::uint32_t triangle = at < num_big ? big[at] : 0;
+        if (at < num_big) {
+            const core::triangle_class kind = find_records(call, triangle, records);
+            if (kind != core::triangle_class::drawn) sink.drop(kind);
+        }
+        __syncwarp();
+        call.lists.push_cut(triangle, records);
+    }
+}
+
+// What all records of a large triangle need of it.
+template <coverage Rule>
+struct alignas(16) large_setup {
+    std::conditional_t<Rule == coverage::thin, core::brick_thin, core::brick_triangle> bricks; // where is_narrow
+    core::voxel_box box, reach; // of the triangle; what of it lies in the grid
+    large_pieces<Rule> pieces;
+    unsigned long long first_record; // of all, the triangle's first one
+    std::uint32_t triangle;
+    std::uint32_t is_narrow; // or the 64-bit path cannot hold it
+
+    // Of a triangle that has records, this one of those. By one thread.
+    template <class Call>
+    __device__ VOXELPIPE_INLINE void find(const Call& call, std::uint32_t number) {
+        const int fraction = call.in.fraction;
+        first_record = call.lists.first_records[number];
+        triangle = call.lists.cut[number];
+        const located_triangle<Call> t(call, triangle);
+        const core::voxel_box whole = core::bounds(t.a, t.b, t.c, fraction);
+        const large_pieces<Rule> cut = t.pieces(fraction);
+        const bool narrow = core::fits_narrow(t.a, t.b, t.c, fraction);
+        reach = t.reach;
+        box = whole;
+        pieces = cut;
+        is_narrow = narrow;
+        if (!narrow) return;
+        if constexpr (Rule == coverage::thin)
+            bricks = core::brick_thin(t.a, t.b, t.c, whole, cut.axes, fraction);
+        else
+            bricks = core::brick_triangle(t.a, t.b, t.c, whole, fraction);
+    }
+    // Those that this warp keeps for all warps, a lane each, so that all warps have one to do before any has two; and
+    // for each of their records, whose it is.
+    template <class Call>
+    __device__ VOXELPIPE_INLINE static void keep(const Call& call, unsigned warp, unsigned warps, std::uint32_t num) {
+        const unsigned lane = threadIdx.x % 32;
+        unsigned kept = 0;
+        for (std::uint32_t first = warp; first < num; first += 32 * warps) {
+            const std::uint32_t mine = first + lane * warps;
+            unsigned record = 0, records = 0;
+            if (mine < num) {
+                large_setup& setup = kept_of(call.lists)[mine];
+                setup.find(call, mine);
+                record = static_cast<unsigned>(setup.first_record);
+                records = static_cast<unsigned>(setup.pieces.records());
+            }
+            const unsigned lanes = __ballot_sync(0xffffffffu, mine < num);
+            kept += static_cast<unsigned>(__popc(lanes));
+            for (unsigned left = lanes; left != 0; left &= left - 1) {
+                const int of = __ffs(static_cast<int>(left)) - 1;
+                const unsigned begin = __shfl_sync(0xffffffffu, record, of),
+                               count = __shfl_sync(0xffffffffu, records, of);
+                for (unsigned i = lane; i < count; i += 32)
+                    call.lists.big[begin + i] = first + static_cast<unsigned>(of) * warps;
+            }
+        }
+        __threadfence();
+        __syncwarp();
+        if (lane == 0 && kept != 0) atomicAdd(call.lists.set_up, static_cast<unsigned long long>(kept));
+    }
+    // Whether all `num` are there, soon: nobody waits long, for there may be blocks that have not begun. All lanes take
+    // part.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool are_kept(const triangle_lists& lists, std::uint32_t num) {
+        ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device> kept(*lists.set_up);
+        bool all = false;
+        for (int look = 0; look < 256 && !all; ++look) {
+            if (threadIdx.x % 32 == 0) all = kept.load(::cuda::memory_order_relaxed) == num;
+            all = __shfl_sync(0xffffffffu, static_cast<int>(all), 0) != 0;
+        }
+        __syncwarp();
+        __threadfence();
+        return all;
+    }
+    // Begins to bring one of those to this place in shared memory; to wait for it is the caller's. All lanes take part.
+    __device__ VOXELPIPE_INLINE void fetch(const triangle_lists& lists, std::uint32_t number) {
+        constexpr unsigned parts = sizeof(large_setup) / sizeof(uint4);
+        static_assert(parts <= 32 && sizeof(large_setup) <= triangle_lists::setup_bytes);
+        const unsigned lane = threadIdx.x % 32;
+        if (lane < parts)
+            copy_four_words(static_cast<std::uint32_t>(__cvta_generic_to_shared(this)) + 16 * lane,
+                            reinterpret_cast<const uint4*>(kept_of(lists) + number) + lane);
+    }
+
+private:
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static large_setup* kept_of(const triangle_lists& lists) {
+        return reinterpret_cast<large_setup*>(lists.setups);
+    }
+};
+
+// Rows of bits along x from spans of columns: columns next to each other with one voxel at the same depth become one.
+template <class Sink>
+struct span_writer {
+    Sink& sink;
+    int x = 0, y = 0, z = 0; // of the row that waits
+    word mask = 0;
+
+    __device__ VOXELPIPE_INLINE void flush() {
+        if (mask != 0) {
+            sink.mark_row(x, x + 31 - __clz(static_cast<int>(mask)), y, z);
+            sink.row(x, y, z, mask);
+        }
+        mask = 0;
+    }
+    __device__ VOXELPIPE_INLINE void span(int axis, int u, int v, int w0, int w1) {
+        if (axis == 0) {
+            for (int at = w0; at <= w1; at += 32) {
+                const int n = w1 - at + 1;
+                sink.mark_row(at, n >= 32 ? at + 31 : w1, u, v);
+                sink.row(at, u, v, n >= 32 ? ~0u : (1u << n) - 1);
+            }
+            return;
+        }
+        for (int w = w0; w <= w1; ++w) {
+            const auto p = core::to_xyz(axis, u, v, w);
+            if (mask != 0 && p[1] == y && p[2] == z && p[0] - x < 32) {
+                mask |= 1u << (p[0] - x);
+            } else {
+                flush();
+                x = p[0];
+                y = p[1];
+                z = p[2];
+                mask = 1;
+            }
+        }
+    }
+};
+
+// The last of n ascending numbers, n > 0, that is at most `number`; the first is. All lanes of a warp take part, with
+// the same arguments: each probes a place, so that few loads wait for one another.
+[[nodiscard]] __device__ VOXELPIPE_INLINE unsigned find_last(const unsigned long long* numbers, unsigned n,
+                                                             unsigned long long number) {
+    const unsigned lane = threadIdx.x % 32;
+    unsigned first = 0;
+    while (n > 1) {
+        const unsigned step = (n + 31) / 32, place = step * lane;
+        const bool below = place < n && numbers[first + place] <= number;
+        const unsigned skipped = (static_cast<unsigned>(__popc(__ballot_sync(0xffffffffu, below))) - 1) * step;
+        first += skipped;
+        n = n - skipped < step ? n - skipped : step;
+    }
+    return uniform(first);
+}
+
+inline constexpr int most_bricks = 64;
+
+// What one warp keeps in shared memory for a large triangle.
+template <coverage Rule>
+struct brick_memory {
+    large_setup<Rule> setups[2]; // of a record and of the next one
+    std::uint32_t next;          // the number of the next one's, or of the one after that
+    // Those that wait, in bricks of the grid.
+    std::int16_t bricks[Rule == coverage::thin ? 1 : 3][most_bricks];
+};
+
+// Into how many parts, a power of two, a record is cut. A warp goes through the bricks of its columns four at a time:
+// where there are few records, more warps with less each end sooner. Thin pieces are a lane's own.
+template <coverage Rule>
+[[nodiscard]] VOXELPIPE_HD inline unsigned parts_of_record(unsigned long long records, unsigned warps) {
+    unsigned parts = 1;
+    if (Rule == coverage::conservative)
+        while (parts < large_pieces<Rule>::per_record && records * parts * 2 <= warps) parts *= 2;
+    return parts;
+}
+
+// A lane's piece of a large thin triangle: a row of columns, and where its voxels lie (see thin_columns).
+template <class Place>
+struct thin_piece {
+    core::brick_row row;
+    core::row_axes axes;
+    int u, v;            // of the row's first column; its depths count from
+    std::int32_t w;      // this one
+    std::int32_t lo, hi; // depths of the grid that the triangle can have, from the same
+    Place origin, by_u, by_w;
+
+    // No columns where it is not `wanted`.
+    template <class Sink>
+    __device__ VOXELPIPE_INLINE thin_piece(const large_setup<coverage::thin>& t, std::int64_t piece, bool wanted,
+                                           const Sink& sink)
+        : axes(t.pieces.axes), u(static_cast<int>(t.pieces.u(piece))), v(static_cast<int>(t.pieces.v(piece))) {
+        const auto& first = t.bricks.first;
+        const auto& last = t.bricks.last;
+        const auto low = [&](int k) { return static_cast<std::int32_t>(t.pieces.lo[k]); };
+        const auto high = [&](int k) { return static_cast<std::int32_t>(t.pieces.hi[k]); };
+        wanted = wanted && v >= first[1] && v <= last[1]; // the box within the grid is a voxel wider
+        if (wanted && t.bricks.meets_row(u - first[0], v - first[1]))
+            row = core::brick_row(t.bricks, u - first[0], v - first[1],
+                                  core::max3(u, first[0], low(0)) - u, // columns of the bounding box, within the grid
+                                  core::min3(u + core::brick_size - 1, last[0], high(0)) - u);
+        w = first[2] + row.base;
+        lo = low(2) - w;
+        hi = high(2) - w;
+        const auto place = [&](int along_u, int along_v, int along_w) {
+            const auto p = axes.from_rows(along_u, along_v, along_w);
+            return sink.place(p[0], p[1], p[2]);
+        };
+        origin = place(u, v, w);
+        by_u = place(1, 0, 0);
+        by_w = place(0, 0, 1);
+    }
+
+    // To a sink that shares out what all lanes have, 32 columns at a time whosever row they are in; false where that
+    // cannot be, for some may lie outside of the grid. All lanes take part, with rows of one triangle.
+    template <class Sink>
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool give_by_all(const large_setup<coverage::thin>& t, Sink& sink) const {
+        constexpr int most = core::brick_size + 1; // slopes are at most one
+        if (!__all_sync(0xffffffffu, row.columns == 0 || (lo <= -most && hi >= most))) return false;
+        const int first = row.columns != 0 ? row.first_column() : 0; // of no lane that has none is anything asked
+        sink.share(__popc(row.columns), [&](unsigned lane, unsigned i) VOXELPIPE_INLINE_LAMBDA {
+            constexpr unsigned all = 0xffffffffu;
+            core::brick_row of_lane;
+            of_lane.plane = __shfl_sync(all, row.plane, lane);
+            of_lane.by_u = __shfl_sync(all, row.by_u, lane);
+            of_lane.first = __shfl_sync(all, row.first, lane);
+            const int column = __shfl_sync(all, first, lane) + static_cast<int>(i);
+            const std::int32_t depth = of_lane.depth(t.bricks, column);
+            return __shfl_sync(all, origin, lane) + by_u * column + by_w * depth;
+        });
+        return true;
+    }
+    // Run by run of columns that have one depth. ByPlace: those that do not lie along x go to where they lie; otherwise
+    // all are rows, of which the sink is told.
+    template <bool ByPlace, class Sink>
+    __device__ VOXELPIPE_INLINE void give(const large_setup<coverage::thin>& t, Sink& sink) const {
+        if (row.columns == 0) return;
+        const int last = row.last_column();
+        for (int from = row.first_column(), to = 0; from <= last; from = to + 1) {
+            const std::int32_t depth = row.depth(t.bricks, from);
+            to = row.last_of_depth(t.bricks, depth, from, last);
+            if (depth < lo || depth > hi) continue;
+            if (axes.are_along_x()) {
+                const auto p = axes.from_rows(u, v, w + depth);
+                sink.mark_row(p[0] + from, p[0] + to, p[1], p[2]);
+                sink.row(p[0], p[1], p[2], (2u << to) - (1u << from));
+                continue;
+            }
+            if constexpr (ByPlace) {
+                sink.put_line(origin + by_u * from + by_w * depth, by_u, static_cast<unsigned>(to - from + 1));
+            } else {
+                for (int column = from; column <= to; ++column) {
+                    const auto p = axes.from_rows(u + column, v, w + depth);
+                    sink.mark_row(p[0], p[0], p[1], p[2]);
+                    sink.row(p[0], p[1], p[2], 1u);
+                }
+            }
+        }
+    }
+};
+
+// How many records there are, and triangles that have some.
+struct large_records {
+    unsigned long long records, triangles;
+
+    __device__ VOXELPIPE_INLINE explicit large_records(const triangle_lists& lists) {
+        const unsigned long long packed = uniform(*lists.next);
+        records = packed & ((1ull << triangle_lists::record_bits) - 1);
+        triangles = packed >> triangle_lists::record_bits;
+    }
+    // Whether all triangles are set up first, for whoever has one of their records: where warps have several.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool want_setups(const triangle_lists& lists, unsigned warps) const {
+        return triangles <= lists.num_setups && records >= 3 * warps && records <= lists.big_room;
+    }
+};
+
+// The pieces of all triangles in call.lists.cut, a lane each; parts warp, warp + warps, ... of the
+// records are this warp's. Conservative: the lanes find the bricks that the triangle meets in their columns, and
+// medium_lanes of them then take a brick each.
+template <class Call, class Sink>
+__device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, brick_memory<Call::rule>& memory,
+                                                unsigned warp, unsigned warps) {
+    constexpr bool thin = Call::rule == coverage::thin;
+    constexpr auto rule = core::to_rule(Call::rule);
+    constexpr int per_record = large_pieces<Call::rule>::per_record;
+    using sink_type = Sink;
+    const unsigned lane = threadIdx.x % 32;
+    const large_records all(call.lists);
+    const unsigned long long records = all.records;
+    const unsigned parts = parts_of_record<Call::rule>(records, warps);
+    using setup_type = large_setup<Call::rule>;
+    // What is kept comes while the record before is drawn, and the number of a record's, while the one before that is;
+    // in registers they would be waited for.
+    const bool are_kept = all.want_setups(call.lists, warps) &&
+                          setup_type::are_kept(call.lists, static_cast<std::uint32_t>(all.triangles));
+    const auto fetch_number = [&](unsigned long long record) VOXELPIPE_INLINE_LAMBDA {
+        if (lane == 0 && record < records)
+            copy_word(static_cast<std::uint32_t>(__cvta_generic_to_shared(&memory.next)), call.lists.big + record);
+    };
+    if (are_kept) {
+        memory.setups[0].fetch(call.lists, call.lists.big[warp]);
+        fetch_number(std::uint64_t{warp} + warps);
+    }
+    unsigned which = 0;
+    for (unsigned long long i = uniform(warp); i < records * parts; i += warps, which ^= are_kept ? 1u : 0u) {
+        const unsigned long long r = i / parts;
+        __syncwarp(); // lanes that the last pieces kept apart come together; nobody reads the last setup any more
+        // Records whose triangles are kept have one part.
+        if (are_kept) {
+            await_copies();
+            __syncwarp();
+            const std::uint32_t next = memory.next;
+            __syncwarp();
+            if (r + warps < records) memory.setups[which ^ 1].fetch(call.lists, next);
+            fetch_number(r + 2ull * warps);
+        } else {
+            const unsigned number = find_last(call.lists.first_records, static_cast<unsigned>(all.triangles), r);
+            if (lane == 0) memory.setups[0].find(call, number);
+            __syncwarp();
+        }
+        const setup_type& setup = memory.setups[which];
+        const large_pieces<Call::rule>& pieces = setup.pieces;
+        const unsigned of_record = lane % per_record, of_piece = lane / per_record;
+        const auto piece = static_cast<std::int64_t>((r - setup.first_record) * per_record + of_record);
+        sink.begin(setup.triangle);
+        const bool valid = piece < pieces.count() && of_record * parts / per_record == static_cast<unsigned>(i % parts);
+        if (setup.is_narrow == 0) {
+            const glm::uvec3 index = call.in.source.triangle(setup.triangle);
+            const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
+                                         c = call.in.source.position(index.z);
+            const bool wanted = valid && pieces.has_rows(piece, of_piece);
+            feed(sink, [&] {
+                if (!wanted) return;
+                span_writer<sink_type> writer{sink};
+                for_each_wide_span<rule>(
+                    a, b, c, call.in.fraction, pieces.piece(piece, of_piece),
+                    [&](const wide_span& s) { writer.span(pieces.axes.dominant, s.u, s.v, s.w_first, s.w_last); });
+                writer.flush();
+            });
+            continue;
+        }
+        if constexpr (thin) {
+            const thin_piece<place_of_sink<Sink>> found(setup, piece, valid, sink);
+            if constexpr (Sink::has_rounds)
+                if (found.give_by_all(setup, sink)) continue;
+            feed(sink, [&] { found.template give<Call::output::only_sets || Sink::buffers>(setup, sink); });
+        } else {
+            const core::brick_triangle& t = setup.bricks;
+            const core::voxel_box &box = setup.box, &reach = setup.reach;
+            const int axis = pieces.axes.dominant;
+            const auto raster_bricks = [&](int n) {
+                __syncwarp();
+                for (int first = 0; first < n; first += 32 / medium_lanes) {
+                    const int at = first + static_cast<int>(lane) / medium_lanes;
+                    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                        if (at >= n) return;
+                        std::int32_t corner[3]; // in the grid
+                        int from[3];            // the same from the bounding box
+                        core::small_box part;
+                        for (int k = 0; k < 3; ++k) {
+                            corner[k] = memory.bricks[k][at] * core::brick_size;
+                            from[k] = corner[k] - static_cast<int>(box.lo[k]);
+                            part.lo[k] = reach.lo[k] > corner[k] ? static_cast<int>(reach.lo[k]) - corner[k] : 0;
+                            part.hi[k] = reach.hi[k] - corner[k] < core::brick_size - 1
+                                             ? static_cast<int>(reach.hi[k]) - corner[k]
+                                             : core::brick_size - 1;
+                        }
+                        sink.mark_brick(corner, lane % medium_lanes);
+                        raster_lanes(t.at(from[0], from[1], from[2]), corner, part, sink);
+                    });
+                }
+                __syncwarp();
+            };
+            int w = 0, w_end = -1; // bricks, of which each of a piece's lanes has some
+            const std::int64_t u0 = pieces.u(piece), v0 = pieces.v(piece);
+            if (valid) {
+                const auto origin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);
+                double first = 0, last = 0;
+                t.depths(axis, static_cast<int>(u0 - origin[0]), static_cast<int>(v0 - origin[1]), first, last);
+                const auto low = static_cast<double>(pieces.lo[2]), high = static_cast<double>(pieces.hi[2]);
+                first += static_cast<double>(origin[2]);
+                last += static_cast<double>(origin[2]);
+                if (first <= high && last >= low) {
+                    w = (static_cast<int>(first > low ? first : low) >> core::log2_brick) + static_cast<int>(of_piece);
+                    w_end = static_cast<int>(last < high ? last : high) >> core::log2_brick;
+                }
+            }
+            int waiting = 0;
+            while (__any_sync(0xffffffffu, w <= w_end)) {
+                bool hit = false;
+                core::triple<int> brick{};
+                if (w <= w_end) {
+                    brick = core::to_xyz(axis, static_cast<int>(u0 >> core::log2_brick),
+                                         static_cast<int>(v0 >> core::log2_brick), w);
+                    hit = t.meets(brick[0] * core::brick_size - static_cast<int>(box.lo[0]),
+                                  brick[1] * core::brick_size - static_cast<int>(box.lo[1]),
+                                  brick[2] * core::brick_size - static_cast<int>(box.lo[2]));
+                }
+                w += pieces.lanes_each;
+                const int place = take_place(hit, waiting);
+                if (hit)
+                    for (int k = 0; k < 3; ++k) memory.bricks[k][place] = static_cast<std::int16_t>(brick[k]);
+                if (waiting > most_bricks - 32) {
+                    raster_bricks(waiting);
+                    waiting = 0;
+                }
+            }
+            raster_bricks(waiting);
+        }
+    }
+}
+
+} // namespace voxelpipe::device

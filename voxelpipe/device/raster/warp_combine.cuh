@@ -1,0 +1,132 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Words of bits that a warp sets together. Neighbouring triangles, which are a warp's, touch the same words again and
+// again: of hairball's thin fragments in 1024^3, 76 in 100 are the first of their triangle in a word, but 17 in 100 the
+// first of 32 triangles. So a warp gathers bits in shared memory, by the number of their word, and each word takes one
+// reduction in L2. For thin coverage only: conservative rows, of 1.8 bits on average there, have gathered some already,
+// and to gather more takes more instructions than it saves.
+
+#include <voxelpipe/core/triangle_setup.hpp>
+#include <voxelpipe/device/targets/global_target.cuh>
+
+#include <cstdint>
+#include <type_traits>
+
+namespace voxelpipe::device {
+
+// What one warp keeps: places by a hash of a word's number. What finds its place taken by another word goes to memory
+// at once.
+struct word_places {
+    static constexpr int log2_count = 8, count = 1 << log2_count;
+    static constexpr std::uint32_t none = ~0u; // no target that is blended by 32-bit numbers has that word
+    uint2 places[count];                       // the number of a word, its bits
+
+    // All lanes take part, here and below; nothing waits.
+    __device__ VOXELPIPE_INLINE void start() {
+        for (int i = static_cast<int>(threadIdx.x) % 32; i < count; i += 32) places[i] = uint2{none, 0};
+        __syncwarp();
+    }
+    // By any lanes. In assembly, so that no compiler provides for memory that is not shared.
+    __device__ VOXELPIPE_INLINE void set(word* words, std::uint32_t number, word bits) {
+        const std::uint32_t place = number * 0x9e3779b1u >> (32 - log2_count);
+        const auto at = static_cast<std::uint32_t>(__cvta_generic_to_shared(places + place));
+        std::uint32_t seen = 0;
+        asm volatile("atom.relaxed.cta.shared.cas.b32 %0, [%1], %2, %3;"
+                     : "=r"(seen)
+                     : "r"(at), "r"(none), "r"(number)
+                     : "memory");
+        if (seen == none || seen == number)
+            asm volatile("red.relaxed.cta.shared.or.b32 [%0 + 4], %1;" ::"r"(at), "r"(bits) : "memory");
+        else
+            reduce_or(words + number, bits);
+    }
+    __device__ VOXELPIPE_INLINE void flush(word* words) {
+        __syncwarp();
+        for (int i = static_cast<int>(threadIdx.x) % 32; i < count; i += 32) {
+            const uint2 place = places[i];
+            if (place.x == none) continue;
+            reduce_or(words + place.x, place.y);
+            places[i] = uint2{none, 0};
+        }
+        __syncwarp();
+    }
+};
+
+struct no_words {};
+
+// Whether a call gathers its thin fragments so: those of one target of bits that true sets, by 32-bit numbers.
+template <class Call>
+inline constexpr bool combines_words = Call::output::only_sets && (Call::rule == coverage::thin);
+template <class Call>
+using warp_words = std::conditional_t<combines_words<Call>, word_places, no_words>;
+
+// Takes the place of the sink that it is made from, for fragments one by one.
+template <class Call>
+struct combining_sink : Call::sink {
+    word_places& words;
+
+    __device__ VOXELPIPE_INLINE combining_sink(const typename Call::sink& sink, word_places& words_)
+        : Call::sink(sink), words(words_) {
+        this->mine = {};
+        words.start();
+    }
+    __device__ VOXELPIPE_INLINE void put(const word_place& at, bool wanted) {
+        if (!wanted) return;
+        ++this->mine.fragments;
+        words.set(voxelpipe::get<0>(this->call.out.fb.targets).elements, at.number(), at.bit());
+    }
+    __device__ VOXELPIPE_INLINE void flush() { words.flush(voxelpipe::get<0>(this->call.out.fb.targets).elements); }
+};
+
+// ---- close cubes
+// -----------------------------------------------------------------------------------------------------
+
+// Bits of a batch of triangles that all lie within a few voxels, by their warp at once. Of the finest meshes 32
+// neighbours touch two words or three, all over again, and warps that look at those one by one wait for one another.
+
+// Whether batches of a mesh are likely to lie within 4 x 4 x 4 voxels, as far as the host knows: otherwise to ask costs
+// more than it gains. Of a surface as large as three of the grid's faces 32 triangles then cover five voxels or fewer.
+[[nodiscard]] inline bool may_be_close(std::uint32_t num_triangles, const glm::ivec3& extent) {
+    constexpr std::uint64_t least = 6; // triangles for each voxel of those faces
+    const std::uint64_t x = static_cast<std::uint32_t>(extent.x), y = static_cast<std::uint32_t>(extent.y),
+                        z = static_cast<std::uint32_t>(extent.z);
+    return num_triangles >= least * (x * y + y * z + z * x);
+}
+
+// Sets the cubes of 2 x 2 x 2 voxels of a warp's lanes, where they lie within 4 x 4 x 4: two numbers hold all of them.
+// Of each lane the voxels x + 2 y + 4 z from lo on, which is anything where there are none; none lies outside of the
+// target. Returns whether they lie so; otherwise nothing is done. All lanes take part.
+template <class Target>
+[[nodiscard]] __device__ VOXELPIPE_INLINE bool set_close_cubes(const target_view<Target>& t,
+                                                               const std::int32_t (&lo)[3], word voxels) {
+    constexpr unsigned all = 0xffffffffu;
+    constexpr int middle_lane = 16; // its cube is to be in the middle
+    const auto lane = static_cast<int>(threadIdx.x) % 32;
+    std::int32_t begin[3]; // maybe outside of the grid
+    std::uint32_t from[3];
+    for (int k = 0; k < 3; ++k) {
+        const auto mine = static_cast<std::uint32_t>(lo[k]), first = __shfl_sync(all, mine, middle_lane) - 1;
+        begin[k] = static_cast<std::int32_t>(first);
+        from[k] = mine - first;
+    }
+    if (!__all_sync(all, voxels != 0 ? core::max3(from[0], from[1], from[2]) <= 2 : lane != middle_lane)) return false;
+    const word by_z = (voxels & 0xfu) | (voxels & 0xf0u) << 12;
+    const word by_y = ((by_z & 0x30003u) | (by_z << 2 & 0x300030u)) << ((from[0] + 4 * from[1]) & 31); // x + 4 y + 16 z
+    const std::uint64_t mine = std::uint64_t{by_y} << (16 * from[2] & 63);
+    const word low = __reduce_or_sync(all, static_cast<word>(mine)),
+               high = __reduce_or_sync(all, static_cast<word>(mine >> 32));
+    const word row = (lane < 8 ? low : high) >> (4 * lane & 31) & 15u;
+    if (lane < 16 && row != 0) {
+        const auto shift = static_cast<unsigned>(begin[0] & 31);
+        const std::uint32_t number = word_of(t, begin[0], begin[1] + lane % 4, begin[2] + lane / 4);
+        word missing = row << shift;
+        if (missing != 0) missing &= ~__ldca(word_at(t, number)); // maybe an old word: what has changed stays so
+        reduce_word<Target>(word_at(t, number), missing);
+        if (shift > 28) reduce_word<Target>(word_at(t, number + 1), row >> (32 - shift));
+    }
+    return true;
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,288 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Sharing out triangles of very different size. A triangle that may touch few cells (tiles or voxels) is one thread's
+// work. A larger one is cut into chunks, sub-boxes of its box of cells, which a warp takes 32 at a time: coverage is
+// exact within any box, so the pieces give exactly the whole. Every stage that turns triangles into cells is two
+// passes, count and emit, with a prefix sum between: cells come out by ascending primitive, whatever the launch order.
+
+#include <voxelpipe/device/scene/scene.cuh>
+
+#include <cub/device/device_scan.cuh>
+#include <cuda/std/functional>
+
+namespace voxelpipe::device {
+
+inline constexpr int chunk_columns = 16;     // of a large triangle's chunk: a row of so many
+inline constexpr int share_min_blocks = 3;   // per multiprocessor: registers for that many
+inline constexpr int chunks_per_record = 32; // one a lane
+
+// 32 chunks of a large triangle.
+struct chunk_record {
+    std::uint32_t primitive;
+    std::uint32_t first; // 32nd chunks: chunk number / 32
+};
+
+// Whether a box of cells is one thread's work: at most so many columns, whichever the dominant axis.
+[[nodiscard]] VOXELPIPE_HD inline bool is_small(const core::voxel_box& box, std::int64_t most_columns) {
+    const std::int64_t x = box.hi[0] - box.lo[0] + 1, y = box.hi[1] - box.lo[1] + 1, z = box.hi[2] - box.lo[2] + 1;
+    return core::max3(x * y, y * z, z * x) <= most_columns;
+}
+
+// The chunks of a box of cells: rows of up to 16 columns in the plane of u and v, all of w.
+struct chunk_grid {
+    int axis;
+    core::triple<std::int64_t> lo, hi; // uvw
+    std::int64_t per_row;
+
+    VOXELPIPE_HD chunk_grid(const core::voxel_box& box, int axis_)
+        : axis(axis_), lo(core::to_uvw(axis_, box.lo[0], box.lo[1], box.lo[2])),
+          hi(core::to_uvw(axis_, box.hi[0], box.hi[1], box.hi[2])),
+          per_row((hi[0] - lo[0] + chunk_columns) / chunk_columns) {}
+
+    [[nodiscard]] VOXELPIPE_HD std::int64_t count() const { return per_row * (hi[1] - lo[1] + 1); }
+    [[nodiscard]] VOXELPIPE_HD std::int64_t records() const {
+        return (count() + chunks_per_record - 1) / chunks_per_record;
+    }
+    [[nodiscard]] VOXELPIPE_HD core::voxel_box chunk(std::int64_t i) const {
+        const std::int64_t v = lo[1] + i / per_row, u = lo[0] + i % per_row * chunk_columns;
+        const std::int64_t u_end = u + chunk_columns - 1 < hi[0] ? u + chunk_columns - 1 : hi[0];
+        return {core::to_xyz(axis, u, v, lo[2]), core::to_xyz(axis, u_end, v, hi[2])};
+    }
+};
+
+// Where the passes keep their numbers. counts and offsets have an element per primitive.
+struct share_buffers {
+    std::uint32_t* counts;
+    unsigned long long* offsets;
+    chunk_record* records;
+    unsigned long long record_capacity;
+    unsigned long long* num_records; // in pipeline_state
+    unsigned long long* num_cells;
+};
+
+// All but the counters.
+[[nodiscard]] inline share_buffers take_share(arena& memory, std::uint32_t num_primitives,
+                                              unsigned long long record_capacity) {
+    share_buffers b{};
+    b.counts = memory.take<std::uint32_t>(num_primitives);
+    b.offsets = memory.take<unsigned long long>(num_primitives);
+    b.records = memory.take<chunk_record>(record_capacity);
+    b.record_capacity = record_capacity;
+    return b;
+}
+
+// All threads of the block take part.
+__device__ inline void count_discarded(std::uint64_t discarded, pipeline_state* state) {
+    if (__syncthreads_or(static_cast<int>(discarded != 0)) == 0) return;
+    const unsigned long long sum = block_sum(discarded);
+    if (threadIdx.x == 0) atomicAdd(&state->discarded, sum);
+}
+
+// Op is the stage:
+//   static constexpr coverage rule;   std::int64_t small_columns (what one thread takes)
+//     bool counts_triangles (whether this stage fills the triangle counters)
+//   voxel_box cells(voxel_box reach)                          voxels to cells
+//   enumerate(geometry, triangle, primitive, box, whole, visit)   calls visit(cell) for every cell within the box;
+//                                                                 whole: the box is all of the triangle's
+//   keep(cell)                                                whether it is stored, or only counted as discarded
+//   store(position, primitive, cell)
+template <class Op>
+__global__ __launch_bounds__(threads_per_block,
+                             share_min_blocks) void share_count_small(const __grid_constant__ geometry geo,
+                                                                      const __grid_constant__ Op op, share_buffers b,
+                                                                      pipeline_state* state) {
+    using core::triangle_class;
+    const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    const bool valid = i < geo.num_primitives;
+    triangle_class kind = triangle_class::drawn;
+    std::uint32_t n = 0;
+    bool bad = false;
+    std::uint32_t discarded = 0;
+    if (valid) {
+        const auto id = static_cast<std::uint32_t>(i);
+        const loaded_triangle t = geo.load(id);
+        bad = !t.index_ok;
+        if (!bad) {
+            core::voxel_box reach{};
+            kind = core::classify<Op::rule>(t.a, t.b, t.c, geo.snap.fraction, geo.whole_box(), reach);
+            if (Op::rule == coverage::thin && kind == triangle_class::drawn && core::has_zero_area(t.a, t.b, t.c))
+                kind = triangle_class::zero_area;
+            if (kind == triangle_class::drawn) {
+                const core::voxel_box box = op.cells(reach);
+                if (is_small(box, Op::small_columns)) {
+                    op.enumerate(geo, t, id, box, true, [&](const auto& cell) { ++(Op::keep(cell) ? n : discarded); });
+                } else {
+                    const chunk_grid chunks(box, core::dominant_axis(t.a, t.b, t.c, geo.snap.fraction));
+                    const auto records = static_cast<unsigned long long>(chunks.records());
+                    const unsigned long long first = atomicAdd(b.num_records, records);
+                    for (unsigned long long r = 0; r < records && first + r < b.record_capacity; ++r)
+                        b.records[first + r] = {id, static_cast<std::uint32_t>(r)};
+                }
+            }
+        }
+        b.counts[i] = n;
+    }
+    if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, 1u);
+    if (op.counts_triangles) {
+        const bool dropped = valid && !bad && kind != triangle_class::drawn;
+        const int drawn = __syncthreads_count(static_cast<int>(valid && !bad && !dropped));
+        if (threadIdx.x == 0 && drawn != 0) atomicAdd(&state->drawn, static_cast<unsigned long long>(drawn));
+        if (__syncthreads_or(static_cast<int>(dropped)) != 0) {
+            const auto add = [&](triangle_class which, unsigned long long* total) {
+                const int count = __syncthreads_count(static_cast<int>(dropped && kind == which));
+                if (threadIdx.x == 0 && count != 0) atomicAdd(total, static_cast<unsigned long long>(count));
+            };
+            add(triangle_class::nonfinite, &state->nonfinite);
+            add(triangle_class::too_far, &state->too_far);
+            add(triangle_class::zero_area, &state->zero_area);
+            add(triangle_class::outside, &state->outside);
+        }
+    }
+    const unsigned long long sum = block_sum(n);
+    if (threadIdx.x == 0 && sum != 0) atomicAdd(b.num_cells, sum);
+    count_discarded(discarded, state);
+}
+
+// A warp takes a record, a lane a chunk of it.
+template <class Op, class Visit>
+__device__ void for_each_record(const geometry& geo, const Op& op, const share_buffers& b, Visit&& visit) {
+    const unsigned long long num = *b.num_records < b.record_capacity ? *b.num_records : b.record_capacity;
+    const unsigned long long warps = std::uint64_t{gridDim.x} * blockDim.x / 32;
+    const unsigned lane = threadIdx.x % 32;
+    for (unsigned long long r = (std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x) / 32; r < num; r += warps) {
+        const chunk_record record = b.records[r];
+        const loaded_triangle t = geo.load(record.primitive);
+        core::voxel_box reach{};
+        (void)core::classify<Op::rule>(t.a, t.b, t.c, geo.snap.fraction, geo.whole_box(), reach);
+        const chunk_grid chunks(op.cells(reach), core::dominant_axis(t.a, t.b, t.c, geo.snap.fraction));
+        const std::int64_t chunk = std::int64_t{record.first} * chunks_per_record + lane;
+        visit(record.primitive, t, chunk < chunks.count(), chunks.chunk(chunk));
+    }
+}
+
+template <class Op>
+__global__ __launch_bounds__(threads_per_block,
+                             share_min_blocks) void share_count_large(const __grid_constant__ geometry geo,
+                                                                      const __grid_constant__ Op op, share_buffers b,
+                                                                      pipeline_state* state) {
+    unsigned long long all = 0, discarded = 0;
+    if (state->index_error == 0) {
+        for_each_record(geo, op, b,
+                        [&](std::uint32_t id, const loaded_triangle& t, bool valid, const core::voxel_box& box) {
+                            std::uint32_t n = 0;
+                            if (valid)
+                                op.enumerate(geo, t, id, box, false, [&](const auto& cell) {
+                                    if (Op::keep(cell))
+                                        ++n;
+                                    else
+                                        ++discarded;
+                                });
+                            const std::uint32_t sum = __reduce_add_sync(0xffffffffu, n);
+                            if (threadIdx.x % 32 == 0 && sum != 0) atomicAdd(&b.counts[id], sum);
+                            all += n;
+                        });
+    }
+    const unsigned long long sum = block_sum(all);
+    if (threadIdx.x == 0 && sum != 0) atomicAdd(b.num_cells, sum);
+    count_discarded(discarded, state);
+}
+
+template <class Op>
+__global__ __launch_bounds__(threads_per_block,
+                             share_min_blocks) void share_emit_small(const __grid_constant__ geometry geo,
+                                                                     const __grid_constant__ Op op, share_buffers b,
+                                                                     const pipeline_state* state, capacities limits) {
+    const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    if (i >= geo.num_primitives || has_failed(*state, limits) || b.counts[i] == 0) return;
+    const auto id = static_cast<std::uint32_t>(i);
+    const loaded_triangle t = geo.load(id);
+    core::voxel_box reach{};
+    (void)core::classify<Op::rule>(t.a, t.b, t.c, geo.snap.fraction, geo.whole_box(), reach);
+    const core::voxel_box box = op.cells(reach);
+    if (!is_small(box, Op::small_columns)) return;
+    unsigned long long at = b.offsets[i];
+    op.enumerate(geo, t, id, box, true, [&](const auto& cell) {
+        if (Op::keep(cell)) op.store(at++, id, cell);
+    });
+}
+
+// counts become what of a primitive is not yet placed: its records take their places in any order, which a later stable
+// sort by cell does not show, because a primitive meets a cell once.
+template <class Op>
+__global__ __launch_bounds__(threads_per_block,
+                             share_min_blocks) void share_emit_large(const __grid_constant__ geometry geo,
+                                                                     const __grid_constant__ Op op, share_buffers b,
+                                                                     const pipeline_state* state, capacities limits) {
+    if (has_failed(*state, limits)) return;
+    for_each_record(geo, op, b,
+                    [&](std::uint32_t id, const loaded_triangle& t, bool valid, const core::voxel_box& box) {
+                        std::uint32_t n = 0;
+                        if (valid)
+                            op.enumerate(geo, t, id, box, false, [&](const auto& cell) {
+                                if (Op::keep(cell)) ++n;
+                            });
+                        const unsigned lane = threadIdx.x % 32;
+                        std::uint32_t before = n; // inclusive sum over the lanes
+                        for (unsigned step = 1; step < 32; step *= 2) {
+                            const std::uint32_t other = __shfl_up_sync(0xffffffffu, before, step);
+                            if (lane >= step) before += other;
+                        }
+                        const std::uint32_t sum = __shfl_sync(0xffffffffu, before, 31);
+                        if (sum == 0) return;
+                        std::uint32_t left = 0;
+                        if (lane == 0) left = atomicSub(&b.counts[id], sum);
+                        left = __shfl_sync(0xffffffffu, left, 0);
+                        unsigned long long at = b.offsets[id] + (left - sum) + (before - n);
+                        if (n != 0)
+                            op.enumerate(geo, t, id, box, false, [&](const auto& cell) {
+                                if (Op::keep(cell)) op.store(at++, id, cell);
+                            });
+                    });
+}
+
+[[nodiscard]] inline std::size_t share_scan_bytes(std::uint32_t num_primitives) {
+    std::size_t bytes = 0;
+    check(cub::DeviceScan::ExclusiveScan(nullptr, bytes, static_cast<const std::uint32_t*>(nullptr),
+                                         static_cast<unsigned long long*>(nullptr), ::cuda::std::plus<>{}, 0ull,
+                                         num_primitives));
+    return bytes;
+}
+
+// Counts the cells of the large primitives, then where every primitive's cells begin.
+template <class Op>
+void share_count_rest(const geometry& geo, const Op& op, const share_buffers& b, pipeline_state* state,
+                      void* scan_storage, std::size_t scan_bytes, stage where, cudaStream_t stream) {
+    share_count_large<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state);
+    check(cudaGetLastError(), where);
+    check(cub::DeviceScan::ExclusiveScan(scan_storage, scan_bytes, static_cast<const std::uint32_t*>(b.counts),
+                                         b.offsets, ::cuda::std::plus<>{}, 0ull, geo.num_primitives, stream),
+          where);
+}
+
+// Counts the cells of every primitive and where each one's begin.
+template <class Op>
+void share_count(const geometry& geo, const Op& op, const share_buffers& b, pipeline_state* state, void* scan_storage,
+                 std::size_t scan_bytes, stage where, cudaStream_t stream) {
+    share_count_small<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state);
+    check(cudaGetLastError(), where);
+    share_count_rest(geo, op, b, state, scan_storage, scan_bytes, where, stream);
+}
+
+template <class Op>
+void share_emit_rest(const geometry& geo, const Op& op, const share_buffers& b, const pipeline_state* state,
+                     const capacities& limits, stage where, cudaStream_t stream) {
+    share_emit_large<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
+    check(cudaGetLastError(), where);
+}
+
+template <class Op>
+void share_emit(const geometry& geo, const Op& op, const share_buffers& b, const pipeline_state* state,
+                const capacities& limits, stage where, cudaStream_t stream) {
+    share_emit_small<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
+    check(cudaGetLastError(), where);
+    share_emit_rest(geo, op, b, state, limits, where, stream);
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,136 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the kernels know of a call: geometry (triangles and snapped positions, all that the coarse stages read), scene
+// (geometry with the draws' shaders and varyings), and pipeline_state, the counters and flags of a call in progress.
+
+#include <voxelpipe/core/primitive.hpp>
+#include <voxelpipe/device/base/call_state.cuh>
+#include <voxelpipe/device/base/launch.cuh>
+#include <voxelpipe/device/base/memory.cuh>
+#include <voxelpipe/device/base/warp.cuh>
+#include <voxelpipe/voxelize.hpp>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+// A snapped position in 32 bits, where it is no further than 2^30 units from the first voxel of what is rasterised. One
+// load of 16 bytes, where the position has three of 8.
+struct __align__(16) near_position {
+    std::int32_t q[3];
+    std::uint32_t is_near; // or 0, and then q holds nothing
+
+    [[nodiscard]] VOXELPIPE_HD static near_position of(const core::snapped_position& p) {
+        constexpr std::int64_t limit = std::int64_t{1} << 30;
+        const bool near =
+            p.x <= limit && p.x >= -limit && p.y <= limit && p.y >= -limit && p.z <= limit && p.z >= -limit;
+        return {{static_cast<std::int32_t>(p.x), static_cast<std::int32_t>(p.y), static_cast<std::int32_t>(p.z)}, near};
+    }
+};
+// The positions that vertex_shade leaves, in both forms.
+struct vertex_positions {
+    core::snapped_position* exact;
+    near_position* near;
+
+    [[nodiscard]] static vertex_positions take(arena& memory, std::size_t num_vertices) {
+        core::snapped_position* const exact = memory.take<core::snapped_position>(num_vertices);
+        return {exact, memory.take<near_position>(num_vertices)};
+    }
+    // Those of a mesh whose first vertex is this one of all. With an arena that only adds up, nothing.
+    [[nodiscard]] vertex_positions from(std::size_t vertex) const {
+        return exact == nullptr ? *this : vertex_positions{exact + vertex, near + vertex};
+    }
+};
+
+struct draw_geometry {
+    const glm::uvec3* triangles;
+    vertex_positions positions;
+    std::uint32_t first_primitive, num_vertices;
+};
+
+struct loaded_triangle {
+    std::uint32_t draw, triangle;
+    glm::uvec3 index;
+    bool index_ok;
+    core::snapped_position a, b, c; // unset where the index is not ok
+};
+
+struct geometry {
+    draw_geometry one;         // the draw, where there is only one
+    const draw_geometry* many; // otherwise all of them
+    std::uint32_t num_draws, num_primitives;
+    core::snap_transform snap;
+    glm::ivec3 extent;
+
+    [[nodiscard]] VOXELPIPE_HD const draw_geometry& draw(std::uint32_t d) const {
+        return many != nullptr ? many[d] : one;
+    }
+
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t find_draw(std::uint32_t primitive) const {
+        std::uint32_t lo = 0,
+                      hi = num_draws; // the last draw that begins at or before the primitive; empty draws precede
+        while (hi - lo > 1) {
+            const std::uint32_t middle = lo + (hi - lo) / 2;
+            if (draw(middle).first_primitive <= primitive)
+                lo = middle;
+            else
+                hi = middle;
+        }
+        return lo;
+    }
+
+    [[nodiscard]] VOXELPIPE_HD loaded_triangle load(std::uint32_t primitive) const {
+        loaded_triangle t;
+        t.draw = find_draw(primitive);
+        const draw_geometry& d = draw(t.draw);
+        t.triangle = primitive - d.first_primitive;
+        t.index = d.triangles[t.triangle];
+        t.index_ok = t.index.x < d.num_vertices && t.index.y < d.num_vertices && t.index.z < d.num_vertices;
+        if (t.index_ok) {
+            t.a = d.positions.exact[t.index.x];
+            t.b = d.positions.exact[t.index.y];
+            t.c = d.positions.exact[t.index.z];
+        }
+        return t;
+    }
+
+    [[nodiscard]] VOXELPIPE_HD core::voxel_box whole_box() const {
+        return {{{0, 0, 0}}, {{extent.x - 1, extent.y - 1, extent.z - 1}}};
+    }
+};
+
+template <class FragmentShader, class Varyings>
+struct draw_shading {
+    FragmentShader fragment_shader;
+    const Varyings* varyings; // per vertex; null where there are none
+};
+
+template <class FragmentShader, class Varyings>
+struct scene {
+    using varyings = Varyings;
+    using fragment_output = std::remove_cvref_t<std::invoke_result_t<const FragmentShader&, const fragment<Varyings>&>>;
+    using shading = draw_shading<FragmentShader, Varyings>;
+
+    geometry geo;
+    shading one;
+    const shading* many;
+    core::triple<double> normal_factors;
+    glm::ivec3 offset; // of the computed part in the whole grid
+
+    [[nodiscard]] VOXELPIPE_HD const shading& draw(std::uint32_t d) const { return many != nullptr ? many[d] : one; }
+};
+
+// A voxel of the computed part, and which one has a number: x first, then y, then z.
+struct voxel_place {
+    int x, y, z;
+};
+[[nodiscard]] VOXELPIPE_HD inline voxel_place place_of(std::uint32_t voxel, const glm::ivec3& extent) {
+    const auto nx = static_cast<std::uint32_t>(extent.x), ny = static_cast<std::uint32_t>(extent.y);
+    const std::uint32_t row = voxel / nx, z = row / ny;
+    return {static_cast<int>(voxel - row * nx), static_cast<int>(row - z * ny), static_cast<int>(z)};
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,217 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Triangles on their way from the mesh to a raster without tiles: where their vertices come from, as numbers of 32 bits
+// where they are near enough, with their bounding box; and how the next ones are fetched while others are drawn.
+
+#include <voxelpipe/core/small_triangle.hpp>
+#include <voxelpipe/device/scene/scene.cuh>
+#include <voxelpipe/device/scene/vertex_shade.cuh>
+
+#include <cstdint>
+#include <cstring>
+
+namespace voxelpipe::device {
+
+// ---- where they come from -------------------------------------------------------------------------------------------
+
+// The mesh, shaded on the spot: for vertex shaders that are cheap and make no varyings.
+template <class Mesh, class VertexShader>
+struct shading_source {
+    Mesh mesh;
+    VertexShader shader;
+    core::snap_transform snap;
+    std::uint32_t draw;
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE glm::vec3 shade(std::uint32_t vertex) const {
+        const auto result = shader(core::fetch_vertex(mesh, vertex, draw));
+        return core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result).position;
+    }
+    using loaded = glm::vec3; // a vertex on its way from memory
+    [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(std::uint32_t vertex) const { return shade(vertex); }
+    // The same in two steps, for shaders that look at positions alone, as all do that are cheap.
+    using stored = glm::vec3;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE const stored* address(std::uint32_t vertex) const {
+        return mesh.positions.data() + vertex;
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(const stored& position) const {
+        const auto result = shader(voxelpipe::vertex<>{0, draw, position, {}});
+        return core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result).position;
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(const loaded& p, std::int32_t (&q)[3]) const {
+        return core::snap_near(snap, p.x, p.y, p.z, q);
+    }
+    [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
+        const glm::vec3 p = shade(vertex);
+        return core::snap(snap, p.x, p.y, p.z);
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const { return mesh.triangles[i]; }
+};
+
+// The positions that vertex_shade left.
+struct stored_source {
+    draw_geometry geometry;
+
+    using loaded = device::near_position;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(std::uint32_t vertex) const {
+        return geometry.positions.near[vertex];
+    }
+    using stored = loaded;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE const stored* address(std::uint32_t vertex) const {
+        return geometry.positions.near + vertex;
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static loaded load(const stored& position) { return position; }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(const loaded& p, std::int32_t (&q)[3]) const {
+        for (int k = 0; k < 3; ++k) q[k] = p.q[k];
+        return p.is_near != 0;
+    }
+    [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
+        return geometry.positions.exact[vertex];
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const {
+        return geometry.triangles[i];
+    }
+};
+
+// What a kernel is given of one draw.
+template <class Source>
+struct raster_input {
+    Source source;
+    std::uint32_t num_triangles;
+    int fraction;
+    glm::ivec3 extent;
+};
+// The vertices of triangle i; any where there is none.
+template <class Source>
+[[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 load_index(const raster_input<Source>& in, std::uint32_t i) {
+    return i < in.num_triangles ? in.source.triangle(i) : glm::uvec3(0);
+}
+
+// ---- near ones ------------------------------------------------------------------------------------------------------
+
+// A triangle whose vertices are less than 2^30 units from the grid's origin, and its bounding box.
+struct near_triangle {
+    std::int32_t q[3][3]; // [vertex][axis], in units of 2^-F voxel from the first voxel of what is rasterised
+    std::int32_t lo[3];   // lowest voxel of the bounding box
+    std::int32_t hi[3];   // its highest voxel
+    int last[3];          // the same, counted from the lowest
+    bool is_near;         // otherwise nothing above holds
+
+    __device__ VOXELPIPE_INLINE void find_box(int fraction) {
+        for (int k = 0; k < 3; ++k) {
+            const std::int32_t low = core::min3(q[0][k], q[1][k], q[2][k]),
+                               high = core::max3(q[0][k], q[1][k], q[2][k]);
+            // ceil - 1: a face touches both sides. Unsigned, for whatever is not near.
+            lo[k] = static_cast<std::int32_t>(static_cast<std::uint32_t>(low) - 1u) >> fraction;
+            hi[k] = high >> fraction;
+            last[k] = hi[k] - lo[k];
+        }
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE int most() const { return core::max3(last[0], last[1], last[2]) + 1; }
+    // Negative where some of the box lies outside of the grid. Not a bool, which a register would be filled from and
+    // compared with zero, too, as often as it is asked for.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE int inside(const glm::ivec3& extent) const {
+        return lo[0] | lo[1] | lo[2] | (extent.x - 1 - hi[0]) | (extent.y - 1 - hi[1]) | (extent.z - 1 - hi[2]);
+    }
+    // Whether no voxel of the grid can be covered; a thin fragment may lie one voxel beyond the triangle's own depths.
+    template <coverage Rule>
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_outside(const glm::ivec3& extent) const {
+        constexpr int beyond = Rule == coverage::thin ? 1 : 0;
+        return lo[0] - beyond >= extent.x || lo[1] - beyond >= extent.y || lo[2] - beyond >= extent.z ||
+               hi[0] + beyond < 0 || hi[1] + beyond < 0 || hi[2] + beyond < 0;
+    }
+    // What of the box lies in the grid; 1 > 0 along an axis where nothing does.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE core::small_box part(const glm::ivec3& extent) const {
+        core::small_box box;
+        for (int k = 0; k < 3; ++k) {
+            const int end = (k == 0 ? extent.x : k == 1 ? extent.y : extent.z) - 1 - lo[k];
+            box.lo[k] = lo[k] < 0 ? -lo[k] : 0;
+            box.hi[k] = last[k] < end ? last[k] : end;
+            if (box.lo[k] > box.hi[k]) {
+                box.lo[k] = 1;
+                box.hi[k] = 0;
+            }
+        }
+        return box;
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE core::small_triangle relative(int fraction) const {
+        core::small_triangle t;
+        for (int k = 0; k < 3; ++k)
+            for (int v = 0; v < 3; ++v) t.p[v][k] = q[v][k] - (lo[k] << fraction);
+        return t;
+    }
+};
+
+template <class Source>
+struct loaded_corners {
+    typename Source::loaded of[3];
+};
+template <class Source>
+[[nodiscard]] __device__ VOXELPIPE_INLINE loaded_corners<Source> load_corners(const raster_input<Source>& call,
+                                                                              const glm::uvec3& index) {
+    return {{call.source.load(index.x), call.source.load(index.y), call.source.load(index.z)}};
+}
+template <class Source>
+[[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle make_near(const raster_input<Source>& call,
+                                                                  const loaded_corners<Source>& corners) {
+    near_triangle r;
+    r.is_near = call.source.near_position(corners.of[0], r.q[0]) & call.source.near_position(corners.of[1], r.q[1]) &
+                call.source.near_position(corners.of[2], r.q[2]);
+    r.find_box(call.fraction);
+    return r;
+}
+template <class Source>
+[[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle load_near(const raster_input<Source>& call,
+                                                                  const glm::uvec3& index) {
+    return make_near(call, load_corners(call, index));
+}
+
+// A word, or four where both places are multiples of 16 bytes, on its way to shared memory, by an address there: no
+// register holds it meanwhile. await_copies: the thread's own are there.
+__device__ VOXELPIPE_INLINE void copy_word(std::uint32_t to, const std::uint32_t* from) {
+    asm volatile("cp.async.ca.shared.global [%0], [%1], 4;" ::"r"(to), "l"(__cvta_generic_to_global(from)) : "memory");
+}
+__device__ VOXELPIPE_INLINE void copy_four_words(std::uint32_t to, const uint4* from) {
+    asm volatile("cp.async.cg.shared.global [%0], [%1], 16;" ::"r"(to), "l"(__cvta_generic_to_global(from)) : "memory");
+}
+__device__ VOXELPIPE_INLINE void await_copies() { asm volatile("cp.async.wait_all;" ::: "memory"); }
+
+// The corners of a warp's next triangles, on their way from memory while the ones before are drawn: registers would not
+// hold them that long. A lane's column of words is its own, so that no lane waits for another.
+template <class Source>
+struct coming_corners {
+    using stored = typename Source::stored;
+    static constexpr std::uint32_t words_each = sizeof(stored) / sizeof(std::uint32_t);
+    static_assert(sizeof(stored) % sizeof(std::uint32_t) == 0);
+    std::uint32_t words[3 * words_each][32];
+
+    __device__ VOXELPIPE_INLINE void fetch(const Source& source, const glm::uvec3& index) {
+        const auto to = static_cast<std::uint32_t>(__cvta_generic_to_shared(words[0] + threadIdx.x % 32));
+#pragma unroll
+        for (std::uint32_t v = 0; v < 3; ++v) {
+            const auto* const from = reinterpret_cast<const std::uint32_t*>(source.address(v == 0   ? index.x
+                                                                                           : v == 1 ? index.y
+                                                                                                    : index.z));
+#pragma unroll
+            for (std::uint32_t k = 0; k < words_each; ++k) copy_word(to + 128 * (v * words_each + k), from + k);
+        }
+    }
+    // Those that were fetched last.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle take(const raster_input<Source>& call) const {
+        await_copies();
+        loaded_corners<Source> corners;
+#pragma unroll
+        for (std::uint32_t v = 0; v < 3; ++v) {
+            std::uint32_t mine[words_each];
+#pragma unroll
+            for (std::uint32_t k = 0; k < words_each; ++k) mine[k] = words[v * words_each + k][threadIdx.x % 32];
+            stored position;
+            memcpy(&position, mine, sizeof(position));
+            corners.of[v] = call.source.load(position);
+        }
+        return make_near(call, corners);
+    }
+};
+
+} // namespace voxelpipe::device

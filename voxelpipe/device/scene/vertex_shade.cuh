@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Vertex shade: runs the vertex shader once a vertex and snaps its position. Takes one draw's mesh and shader; gives
+// snapped positions and, where the shader makes any, varyings, in the mesh's order (paper section 3, vertex shader).
+
+#include <voxelpipe/device/scene/scene.cuh>
+
+#include <type_traits>
+
+namespace voxelpipe::device {
+
+template <class Mesh, class VertexShader, class Varyings>
+__global__ void vertex_shade_kernel(const __grid_constant__ Mesh mesh, const __grid_constant__ VertexShader shader,
+                                    const __grid_constant__ core::snap_transform snap, std::uint32_t draw,
+                                    core::snapped_position* positions, near_position* near_positions,
+                                    Varyings* varyings) {
+    const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    if (i >= mesh.positions.size()) return;
+    const auto v = core::fetch_vertex(mesh, static_cast<std::uint32_t>(i), draw);
+    const auto result = shader(v);
+    const auto& o = core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result);
+    const core::snapped_position p = core::snap(snap, o.position.x, o.position.y, o.position.z);
+    positions[i] = p;
+    near_positions[i] = near_position::of(p);
+    if constexpr (!std::is_empty_v<Varyings>) varyings[i] = o.varyings;
+}
+
+// positions and varyings have one element per vertex of the mesh; varyings may be null where the type is empty.
+template <class Mesh, class VertexShader, class Varyings>
+void vertex_shade(const Mesh& mesh, const VertexShader& shader, const core::snap_transform& snap, std::uint32_t draw,
+                  const vertex_positions& positions, Varyings* varyings, cudaStream_t stream) {
+    if (mesh.positions.size() == 0) return;
+    vertex_shade_kernel<Mesh, VertexShader, Varyings>
+        <<<num_blocks(mesh.positions.size()), threads_per_block, 0, stream>>>(mesh, shader, snap, draw, positions.exact,
+                                                                              positions.near, varyings);
+    check(cudaGetLastError(), stage::vertex_shade);
+}
+
+} // namespace voxelpipe::device

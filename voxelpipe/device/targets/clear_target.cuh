@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Clears render targets, padding included (padding bits become 0), unless the call has failed: then nothing is written.
+
+#include <voxelpipe/device/scene/scene.cuh>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+
+namespace voxelpipe::device {
+
+template <class Element>
+struct fill_pattern {
+    Element value;
+};
+
+// A block fills 16 KB and ends: 4 GiB take 0.92 ms so, and 1.0 by blocks that go on as long as there is something left.
+inline constexpr unsigned fill_stores = 4; // of 16 bytes a thread, a block's width apart
+
+// Bits that are longer than the cache go past it (Streams), so that it keeps what it has of the mesh: calls at 1024^3
+// took 0.3 to 2 % less on average. Values are written as they come: with 512 MB it was the same, with 4 GiB 1 % more.
+inline constexpr std::uint64_t least_streamed = std::uint64_t{64} << 20, most_streamed = std::uint64_t{256} << 20;
+
+// Elements of 1, 2, 4, 8 or 16 bytes go out 16 bytes at a time.
+template <bool Streams, class Element>
+__global__ void fill_kernel(Element* to, std::uint64_t count, const __grid_constant__ fill_pattern<Element> pattern,
+                            const pipeline_state* state, capacities limits) {
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    if constexpr (sizeof(Element) <= 16 && (sizeof(Element) & (sizeof(Element) - 1)) == 0) {
+        constexpr unsigned per_store = 16 / sizeof(Element);
+        if (reinterpret_cast<std::uintptr_t>(to) % 16 == 0) {
+            Element lanes[per_store];
+            for (unsigned i = 0; i < per_store; ++i) lanes[i] = pattern.value;
+            uint4 wide;
+            memcpy(&wide, lanes, 16);
+            const std::uint64_t stores = count / per_store, per_block = std::uint64_t{fill_stores} * blockDim.x;
+            for (std::uint64_t first = blockIdx.x * per_block; first < stores; first += gridDim.x * per_block)
+                for (unsigned k = 0; k < fill_stores; ++k) {
+                    const std::uint64_t i = first + k * blockDim.x + threadIdx.x;
+                    if (i >= stores) continue;
+                    if constexpr (Streams)
+                        __stcs(reinterpret_cast<uint4*>(to) + i, wide);
+                    else
+                        reinterpret_cast<uint4*>(to)[i] = wide;
+                }
+            if (blockIdx.x == 0)
+                for (std::uint64_t i = stores * per_store + threadIdx.x; i < count; i += blockDim.x)
+                    to[i] = pattern.value;
+            return;
+        }
+    }
+    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < count; i += threads)
+        to[i] = pattern.value;
+}
+
+// Rows of set bits end within a word; bricks too.
+template <class Target>
+__global__ void fill_bits_kernel(const __grid_constant__ target_view<Target> t, const pipeline_state* state,
+                                 capacities limits) {
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const auto words_x = static_cast<std::uint64_t>((t.extent.x + 31) / 32);
+    const std::uint64_t count =
+        words_x * static_cast<std::uint64_t>(t.extent.y) * static_cast<std::uint64_t>(t.extent.z);
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < count;
+         i += std::uint64_t{gridDim.x} * blockDim.x) {
+        const int x = static_cast<int>(i % words_x) * 32, y = static_cast<int>(i / words_x % t.extent.y),
+                  z = static_cast<int>(i / words_x / t.extent.y);
+        const int left = t.extent.x - x;
+        t.elements[Target::map::cell(t.extent, x, y, z)] = left >= 32 ? ~0u : (1u << left) - 1;
+    }
+}
+
+template <class Target>
+void clear_target(const target_view<Target>& t, const pipeline_state* state, const capacities& limits,
+                  cudaStream_t stream) {
+    using map = typename Target::map;
+    using element = typename Target::element_type;
+    const auto fill = [&](element* to, std::size_t count, const element& value) {
+        constexpr std::uint64_t bytes_per_block = std::uint64_t{16} * fill_stores * threads_per_block;
+        const std::uint64_t bytes = count * sizeof(element), blocks = bytes / bytes_per_block + 1;
+        auto* kernel = fill_kernel<false, element>;
+        if constexpr (map::is_bit)
+            if (bytes >= least_streamed && bytes <= most_streamed) kernel = fill_kernel<true, element>;
+        launch_behind(kernel, static_cast<unsigned>(std::min(blocks, core::most_blocks)), threads_per_block, stream,
+                      stage::fine_raster, to, count, fill_pattern<element>{value}, state, limits);
+    };
+    if constexpr (map::is_bit) {
+        fill(t.elements, map::elements(t.extent), 0u);
+        if (t.clear_value) {
+            launch_behind(fill_bits_kernel<Target>, fill_device(map::elements(t.extent), 16), threads_per_block, stream,
+                          stage::fine_raster, t, state, limits);
+        }
+    } else if constexpr (map::planes) {
+        const std::size_t plane = map::cells(t.extent);
+        for (int c = 0; c < map::components; ++c)
+            fill(t.elements + static_cast<std::size_t>(c) * plane, plane, t.clear_value[c]);
+    } else {
+        fill(t.elements, map::elements(t.extent), t.clear_value);
+    }
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,207 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Counted targets of a call without tiles: cleared ones whose fragments all have one value. During the raster the
+// target's own memory holds how many fragments each voxel has got; a last pass makes the values of these numbers. So a
+// sum of floats need not be exact in its type, and voxels are counted where no atomic tells first touches. Here: which
+// targets of a call are counted (plan_direct), and the last pass (end_counts).
+
+#include <voxelpipe/device/scene/count_and_emit.cuh>
+#include <voxelpipe/device/targets/dirty_chunks.cuh>
+#include <voxelpipe/device/targets/global_target.cuh>
+
+#include <bit>
+#include <cstring>
+#include <span>
+
+namespace voxelpipe::device {
+
+// ---- which targets --------------------------------------------------------------------------------------------------
+
+template <std::size_t N>
+struct direct_plan {
+    bool possible = true;
+    direct_modes<N> modes;
+    int voxels_of = -1; // which counted target tells at the end how many voxels are touched
+    int bits_of = -1;   // which target of bits does
+
+    [[nodiscard]] bool counts(std::size_t k) const { return modes.of[k] == direct_mode::count; }
+    [[nodiscard]] bool any_counted() const { return first_counted() >= 0; }
+    [[nodiscard]] bool has_last_pass() const { return any_counted() || bits_of >= 0; }
+    [[nodiscard]] bool only_blends() const {
+        for (const direct_mode mode : modes.of)
+            if (mode != direct_mode::blend) return false;
+        return true;
+    }
+    [[nodiscard]] int first_counted() const {
+        for (std::size_t k = 0; k < N; ++k)
+            if (counts(k)) return static_cast<int>(k);
+        return -1;
+    }
+};
+
+// A target of so many bytes is worth marks: reading it takes longer than they do.
+inline constexpr std::uint64_t marked_bytes = std::uint64_t{32} << 20;
+
+// Whether the last pass of a target goes by marks, which then are wanted: where it is large, and what is not touched
+// has the bits of a number of none already.
+template <class Target>
+[[nodiscard]] bool ends_by_marks(const target_view<Target>& t) {
+    using map = typename Target::map;
+    if constexpr (is_countable<Target> && !map::bricks) {
+        constexpr typename Target::value_type none{};
+        return map::elements(t.extent) * sizeof(none) >= marked_bytes &&
+               std::memcmp(&t.clear_value, &none, sizeof(none)) == 0;
+    } else {
+        return false;
+    }
+}
+
+// ---- the last pass --------------------------------------------------------------------------------------------------
+
+// Rare numbers: out of line, for the registers.
+template <class Fold>
+__device__ __noinline__ auto fold_many(const Fold& fold, std::uint32_t n) {
+    return fold(n);
+}
+
+// What numbers of fragments become.
+template <class Fold, class T>
+struct count_values {
+    using number = unsigned_word<T>;
+    static constexpr int per_load = 16 / sizeof(T);
+    const Fold& fold;
+    const number* known;            // for small numbers, of the block
+    unsigned long long touched = 0; // voxels so far that have fragments
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE number of(number n) {
+        touched += static_cast<unsigned>(n != 0);
+        return n < threads_per_block ? known[n]
+                                     : core::bit_cast<number>(fold_many<Fold>(fold, static_cast<std::uint32_t>(n)));
+    }
+    // Nothing is written where voxels without fragments have the bits that they should end with.
+    __device__ VOXELPIPE_INLINE void end(uint4* at, const uint4& v) {
+        if ((v.x | v.y | v.z | v.w) == 0 && known[0] == 0) return;
+        number numbers[per_load];
+        memcpy(numbers, &v, 16);
+        for (int k = 0; k < per_load; ++k) numbers[k] = of(numbers[k]);
+        uint4 made;
+        memcpy(&made, numbers, 16);
+        *at = made;
+    }
+};
+
+// Numbers of fragments become values, padding included; with marks, of what is marked. Not where the call has failed.
+template <class Fold, class T>
+__global__ __launch_bounds__(threads_per_block) void end_counts_kernel(unsigned_word<T>* at, std::uint64_t num_elements,
+                                                                       const __grid_constant__ chunk_marks marks,
+                                                                       const __grid_constant__ Fold fold,
+                                                                       bool count_voxels, pipeline_state* state,
+                                                                       capacities limits) {
+    using number = unsigned_word<T>;
+    constexpr int per_load = 16 / sizeof(T), batch = 4; // loads that go out together
+    __shared__ number known[threads_per_block];
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    known[threadIdx.x] = core::bit_cast<number>(fold(threadIdx.x));
+    __syncthreads();
+    count_values<Fold, T> values{fold, known};
+    // place(i) for i = 0, 1, ... below `count`
+    const auto end_all = [&](std::uint64_t count, const auto& place) {
+        for (std::uint64_t first = 0; first < count; first += batch) {
+            uint4 loaded[batch];
+            for (unsigned b = 0; b < batch; ++b) loaded[b] = first + b < count ? *place(first + b) : uint4{0, 0, 0, 0};
+            for (unsigned b = 0; b < batch; ++b)
+                if (first + b < count) values.end(place(first + b), loaded[b]);
+        }
+    };
+    if (marks.words == nullptr) {
+        const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+        const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
+        std::uint64_t done = 0;
+        if (reinterpret_cast<std::uintptr_t>(at) % 16 == 0) {
+            auto* const wide = reinterpret_cast<uint4*>(at);
+            const std::uint64_t loads = num_elements / per_load;
+            if (thread < loads)
+                end_all((loads - thread - 1) / threads + 1,
+                        [&](std::uint64_t i) { return wide + thread + i * threads; });
+            done = loads * per_load;
+        }
+        for (std::uint64_t i = done + thread; i < num_elements; i += threads) at[i] = values.of(at[i]);
+    } else if (has_wide_rows(at, marks)) {
+        for_each_marked<uint4>(at, marks, [&](const column_of_places<uint4>& c) {
+            end_all(static_cast<unsigned>(c.rows), [&](std::uint64_t i) { return c.first + c.step * i; });
+        });
+    } else {
+        for_each_marked<number>(at, marks, [&](const column_of_places<number>& c) {
+            for (int i = 0; i < c.rows; ++i) {
+                number& n = c.first[c.step * static_cast<unsigned>(i)];
+                if (n != 0) n = values.of(n);
+            }
+        });
+    }
+    if (count_voxels) {
+        const unsigned long long sum = block_sum(values.touched);
+        if (threadIdx.x == 0 && sum != 0) atomicAdd(&state->voxels, sum);
+    }
+}
+
+// Counts the voxels of a target whose bits are no longer its clear value. Padding is zero.
+template <class Target>
+__global__ __launch_bounds__(threads_per_block) void count_bits_kernel(const __grid_constant__ target_view<Target> t,
+                                                                       pipeline_state* state, capacities limits) {
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const std::uint64_t num = Target::map::elements(t.extent);
+    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
+    std::uint64_t done = 0, set = 0;
+    if (reinterpret_cast<std::uintptr_t>(t.elements) % 16 == 0) {
+        const auto* const wide = reinterpret_cast<const uint4*>(t.elements);
+#pragma unroll 4
+        for (std::uint64_t i = thread; i < num / 4; i += threads) {
+            const uint4 v = wide[i];
+            set += static_cast<unsigned>(__popc(v.x) + __popc(v.y) + __popc(v.z) + __popc(v.w));
+        }
+        done = num / 4 * 4;
+    }
+    for (std::uint64_t i = done + thread; i < num; i += threads) set += static_cast<unsigned>(__popc(t.elements[i]));
+    const unsigned long long sum = block_sum(set);
+    if (threadIdx.x != 0) return;
+    const auto of_grid = static_cast<unsigned long long>(t.extent.x) * static_cast<unsigned>(t.extent.y) *
+                         static_cast<unsigned>(t.extent.z);
+    const unsigned long long all = t.clear_value && blockIdx.x == 0 ? of_grid : 0;
+    atomicAdd(&state->voxels, t.clear_value ? all - sum : sum);
+}
+
+// Ends the counted targets of a call, whose draws give these values, by marks where there are any, and counts voxels.
+template <class... Targets, class Values>
+void end_counts(const direct_plan<sizeof...(Targets)>& plan, const framebuffer_view<Targets...>& fb,
+                const Values& values, const chunk_marks& marks, pipeline_state* state, const capacities& limits,
+                cudaStream_t stream) {
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
+        using target = typename core::pack_element<K, Targets...>::type;
+        if constexpr (target::map::is_bit) {
+            if (plan.bits_of != static_cast<int>(K)) return;
+            const auto& t = voxelpipe::get<K>(fb.targets);
+            launch_behind(count_bits_kernel<target>, fill_device(target::map::elements(t.extent) / 16 + 1),
+                          threads_per_block, stream, stage::tile_resolve, t, state, limits);
+        } else if constexpr (is_countable<target>) {
+            if (!plan.counts(K)) return;
+            using value_type = typename target::value_type;
+            using fold_type = core::repeated_fold<typename target::blend_type, value_type>;
+            const auto& t = voxelpipe::get<K>(fb.targets);
+            value_type value{}; // count has none
+            if constexpr (!std::is_same_v<typename target::blend_type, blend::count>) value = voxelpipe::get<K>(values);
+            const std::uint64_t count = target::map::elements(t.extent);
+            launch_behind(end_counts_kernel<fold_type, value_type>, fill_device(count / (16 / sizeof(value_type)) + 1),
+                          threads_per_block, stream, stage::tile_resolve,
+                          reinterpret_cast<unsigned_word<value_type>*>(t.elements), count,
+                          ends_by_marks(t) ? marks : chunk_marks{}, fold_type(t.clear_value, value),
+                          plan.voxels_of == static_cast<int>(K), state, limits);
+        }
+    });
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,249 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Clears of targets whose framebuffer tracks its changes (framebuffer::track_changes): where a target is known to hold
+// the value that it is cleared to but for some chunks (core/change_log.hpp), those alone are written. What is known
+// lies on the device, so that a call that failed, or was captured in a graph and launched again, leaves it right.
+
+#include <voxelpipe/device/targets/clear_target.cuh>
+#include <voxelpipe/device/targets/finalize_counts.cuh>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+
+namespace voxelpipe::device {
+
+// Whether a log says of such a target what it was cleared to. Smaller ones are cleared sooner than chunks are found.
+template <class Target>
+[[nodiscard]] bool can_be_known(const target_view<Target>& t) {
+    using map = typename Target::map;
+    if constexpr (map::is_bit || map::bricks || sizeof(typename Target::value_type) > core::change_log::most_bytes)
+        return false;
+    else
+        return map::elements(t.extent) * sizeof(typename Target::element_type) >= marked_bytes;
+}
+
+// Whether a log can say anything of a framebuffer.
+template <class... Targets>
+[[nodiscard]] bool can_be_known(const framebuffer_view<Targets...>& fb) {
+    bool any = false;
+    core::for_each_index<sizeof...(Targets)>(
+        [&]<std::size_t K>() { any = any || can_be_known(voxelpipe::get<K>(fb.targets)); });
+    return fb.changes != nullptr && any;
+}
+
+// What a call does with the log of its framebuffer.
+template <class Framebuffer>
+struct change_tracking;
+template <class... Targets>
+struct change_tracking<framebuffer_view<Targets...>> {
+    static constexpr std::size_t count = sizeof...(Targets);
+    using known = core::change_log::known;
+
+    word* log = nullptr; // null: nothing
+    glm::ivec3 extent{};
+    bool by_chunks[count] = {}; // which targets are cleared so
+    int last_by_chunks = -1;
+    bool changes_known = false; // whether any target is cleared of which the log may know what it was
+    known after[count];         // what is known of each target when all are cleared
+
+    change_tracking() = default; // of a call that does not mark what it draws
+    // Of a call that marks all that it draws, where it is_tracked. may_end(t, k): whether what the call does not draw
+    // ends with the bits that target k is cleared to.
+    template <class MayEnd>
+    change_tracking(const framebuffer_view<Targets...>& fb, bool is_tracked, const MayEnd& may_end)
+        : log(is_tracked ? fb.changes : nullptr), extent(fb.extent) {
+        if (log == nullptr) return;
+        core::for_each_index<count>([&]<std::size_t K>() {
+            const auto& t = voxelpipe::get<K>(fb.targets);
+            if (t.load != load_operation::clear || !can_be_known(t)) return;
+            changes_known = true;
+            if (!may_end(t, K)) return;
+            if constexpr (sizeof(t.clear_value) <= core::change_log::most_bytes) {
+                by_chunks[K] = true;
+                last_by_chunks = static_cast<int>(K);
+                after[K] = known(t.clear_value);
+            }
+        });
+    }
+    // With words where the call has to mark what it draws.
+    [[nodiscard]] chunk_marks marks() const {
+        return log == nullptr ? chunk_marks{} : chunk_marks{log + core::change_log::header_words, extent};
+    }
+    [[nodiscard]] word* known_of(std::size_t k) const { return log + k * core::change_log::known_words; }
+};
+
+// Whether this is what a log knows. All lanes of a warp take part.
+[[nodiscard]] __device__ VOXELPIPE_INLINE bool is_known_as(const word* known, const core::change_log::known& wanted) {
+    constexpr int known_words = core::change_log::known_words;
+    static_assert(known_words <= 32);
+    const int lane = static_cast<int>(threadIdx.x) % 32;
+    return __all_sync(0xffffffffu,
+                      lane >= known_words || known[lane % known_words] == wanted.words[lane % known_words]);
+}
+
+// Writes chunks of a target in rows along x. `Place`: one element, or as many as fill 16 bytes.
+template <class Element, class Place>
+struct chunk_filler {
+    static constexpr int per_place = static_cast<int>(sizeof(Place) / sizeof(Element));
+    static constexpr int lanes_of_row = chunk_x / per_place, rows_at_once = 32 / lanes_of_row; // of a chunk
+    static_assert(per_place <= chunk_x && 32 % lanes_of_row == 0);
+
+    Place* to;
+    glm::ivec3 extent;
+
+    // What lies at this z of the chunks that a word marks: by one warp, whose lanes write a place each. (x0, y0): the
+    // lowest voxel of the word's first chunk; place_at(x, row) gives what begins at x of the row y0 + row.
+    template <class PlaceAt>
+    __device__ VOXELPIPE_INLINE void fill(int x0, int y0, int z, word marked, PlaceAt&& place_at) const {
+        const int lane = static_cast<int>(threadIdx.x) % 32, rows = min(chunk_yz, extent.y - y0);
+        const std::size_t first_row =
+            static_cast<std::size_t>(z) * static_cast<unsigned>(extent.y) + static_cast<unsigned>(y0);
+        const auto put = [&](int x, int row) VOXELPIPE_INLINE_LAMBDA {
+            to[((first_row + static_cast<unsigned>(row)) * static_cast<unsigned>(extent.x) + static_cast<unsigned>(x)) /
+               per_place] = place_at(x, row);
+        };
+        if (marked == ~0u) { // in the order of memory
+            const int end = min(x0 + 32 * chunk_x, extent.x);
+            for (int row = 0; row < rows; ++row)
+                for (int x = x0 + lane * per_place; x < end; x += 32 * per_place) put(x, row);
+            return;
+        }
+        for (; marked != 0; marked &= marked - 1) {
+            const int x = x0 + (__ffs(static_cast<int>(marked)) - 1) * chunk_x + lane % lanes_of_row * per_place;
+            if (x >= extent.x) continue;
+            for (int row = lane / lanes_of_row; row < rows; row += rows_at_once) put(x, row);
+        }
+    }
+};
+// f(filler), 16 bytes at a time where rows allow that.
+template <class Element, class F>
+__device__ VOXELPIPE_INLINE void with_chunk_filler(Element* elements, const chunk_marks& marks, F&& f) {
+    if constexpr (sizeof(Element) <= 16 && 16 % sizeof(Element) == 0) {
+        if (has_wide_rows(elements, marks)) {
+            f(chunk_filler<Element, uint4>{reinterpret_cast<uint4*>(elements), marks.extent});
+            return;
+        }
+    }
+    f(chunk_filler<Element, Element>{elements, marks.extent});
+}
+
+// One target, to the value that the log may know.
+template <class Element>
+__global__ __launch_bounds__(threads_per_block) void clear_chunks_kernel(
+    Element* elements, const __grid_constant__ chunk_marks marks, const word* known,
+    const __grid_constant__ core::change_log::known wanted, const __grid_constant__ fill_pattern<Element> pattern,
+    const pipeline_state* state, capacities limits) {
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const bool is_known = is_known_as(known, wanted);
+    with_chunk_filler(
+        elements, marks, [&]<class Place>(const chunk_filler<Element, Place>& filler) VOXELPIPE_INLINE_LAMBDA {
+            Element lanes[sizeof(Place) / sizeof(Element)];
+            for (Element& e : lanes) e = pattern.value;
+            Place place;
+            memcpy(&place, lanes, sizeof(place));
+            // A warp takes what lies at one z of a row of chunks.
+            const unsigned warps = gridDim.x * (blockDim.x / 32);
+            const auto rows_y = static_cast<unsigned>(marks.rows.y);
+            const std::size_t slices = std::size_t{rows_y} * static_cast<unsigned>(marks.extent.z);
+            for (std::size_t i = blockIdx.x * (blockDim.x / 32) + threadIdx.x / 32; i < slices; i += warps) {
+                const auto y = static_cast<int>(i % rows_y), z = static_cast<int>(i / rows_y);
+                const word* const row = marks.row(y, z >> log2_chunk_yz);
+                for (int w = 0; w < marks.rows.words; ++w)
+                    filler.fill(w * 32 * chunk_x, y * chunk_yz, z, is_known ? row[w] : ~0u,
+                                [&](int, int) VOXELPIPE_INLINE_LAMBDA { return place; });
+            }
+        });
+}
+
+// What is known from now on; with `wipes`, nothing is marked.
+template <std::size_t N>
+struct known_targets {
+    core::change_log::known of[N];
+};
+template <std::size_t N>
+__global__ void note_clears_kernel(word* log, const __grid_constant__ known_targets<N> after,
+                                   const __grid_constant__ chunk_marks marks, bool wipes, const pipeline_state* state,
+                                   capacities limits) {
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const std::size_t first = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x,
+                      threads = std::size_t{gridDim.x} * blockDim.x;
+    for (std::size_t i = first; i < N * core::change_log::known_words; i += threads)
+        log[i] = after.of[i / core::change_log::known_words].words[i % core::change_log::known_words];
+    if (!wipes) return;
+    for (std::size_t i = first; i < marks.rows.num_words(); i += threads) marks.words[i] = 0;
+}
+// When all targets are cleared. The log knows nothing of those that the call does not clear by chunks: the marks are
+// those of all.
+template <class... Targets>
+void note_clears(const change_tracking<framebuffer_view<Targets...>>& tracking, bool wipes, const pipeline_state* state,
+                 const capacities& limits, cudaStream_t stream) {
+    constexpr std::size_t count = sizeof...(Targets);
+    if (!tracking.changes_known) return;
+    known_targets<count> after;
+    std::copy_n(tracking.after, count, after.of);
+    const chunk_marks marks = tracking.marks();
+    launch_behind(note_clears_kernel<count>, wipes ? fill_device(marks.rows.num_words()) : 1, threads_per_block, stream,
+                  stage::fine_raster, tracking.log, after, marks, wipes, state, limits);
+}
+
+// Clears what the tracking says, by chunks, and notes that.
+template <class... Targets>
+void clear_by_chunks(const change_tracking<framebuffer_view<Targets...>>& tracking,
+                     const framebuffer_view<Targets...>& fb, const pipeline_state* state, const capacities& limits,
+                     cudaStream_t stream) {
+    if (!tracking.changes_known) return;
+    const chunk_marks marks = tracking.marks();
+    const std::size_t slices = static_cast<std::size_t>(marks.rows.y) * static_cast<unsigned>(fb.extent.z),
+                      blocks = std::min<std::size_t>(slices / (threads_per_block / 32) + 1, core::most_blocks);
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
+        using target = typename core::pack_element<K, Targets...>::type;
+        using map = typename target::map;
+        using element = typename target::element_type;
+        if (!tracking.by_chunks[K]) return;
+        const auto& t = voxelpipe::get<K>(fb.targets);
+        const auto clear = [&](element* to, const element& value) {
+            launch_behind(clear_chunks_kernel<element>, static_cast<unsigned>(blocks), threads_per_block, stream,
+                          stage::fine_raster, to, marks, tracking.known_of(K), tracking.after[K],
+                          fill_pattern<element>{value}, state, limits);
+        };
+        if constexpr (map::planes) {
+            for (int c = 0; c < map::components; ++c)
+                clear(t.elements + static_cast<std::size_t>(c) * map::cells(t.extent), t.clear_value[c]);
+        } else if constexpr (!map::is_bit && !map::bricks) {
+            clear(t.elements, t.clear_value);
+        }
+    });
+    note_clears(tracking, true, state, limits, stream);
+}
+
+// Marks the chunks of voxels that are listed, neighbours mostly in one.
+template <class Voxel>
+__global__
+__launch_bounds__(threads_per_block) void mark_voxels_kernel(const Voxel* voxels, const unsigned long long* num,
+                                                             const __grid_constant__ chunk_marks marks,
+                                                             const pipeline_state* state, capacities limits) {
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const std::uint64_t n = *num, threads = std::uint64_t{gridDim.x} * blockDim.x;
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < n; i += threads) {
+        const Voxel voxel = voxels[i];
+        if (i != 0 && voxels[i - 1] == voxel) continue;
+        const voxel_place at = place_of(voxel, marks.extent);
+        marks.mark_row(at.x, at.x, at.y, at.z);
+    }
+}
+// Where the call has to: `num` of the state's counters says how many there are, room is no less.
+template <class Tracking, class Voxel>
+void mark_voxels(const Tracking& tracking, const Voxel* voxels, const unsigned long long* num, std::uint64_t room,
+                 const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+    if (tracking.log == nullptr) return;
+    launch_behind(mark_voxels_kernel<Voxel>, fill_device(room), threads_per_block, stream, stage::tile_resolve, voxels,
+                  num, tracking.marks(), state, limits);
+}
+
+} // namespace voxelpipe::device

@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Coarse raster: triangles -> (tile, primitive) pairs, by ascending primitive; counts triangles and why any is dropped
+// (paper section 4, coarse raster). A tile is a voxel of a coarser grid, so the same exact coverage decides.
+
+#include <voxelpipe/device/scene/count_and_emit.cuh>
+#include <voxelpipe/device/scene/int128_coverage.cuh>
+
+namespace voxelpipe::device {
+
+template <coverage Rule>
+struct tile_cells {
+    static constexpr coverage rule = Rule;
+    static constexpr std::int64_t small_columns = 16;
+    core::tile_grid tiles;
+    std::uint32_t* keys;       // tile numbers
+    std::uint32_t* primitives; // as long as keys
+    bool counts_triangles = true;
+
+    [[nodiscard]] __device__ core::voxel_box cells(const core::voxel_box& reach) const {
+        return core::coarsen(reach, tiles.log2_size);
+    }
+    template <class Visit>
+    __device__ void enumerate(const geometry& geo, const loaded_triangle& t, std::uint32_t, const core::voxel_box& box,
+                              bool whole, Visit&& visit) const {
+        // A triangle that lies in one tile needs no test; a chunk of a larger one does.
+        if (whole && box.lo[0] == box.hi[0] && box.lo[1] == box.hi[1] && box.lo[2] == box.hi[2])
+            visit(tiles.index(box.lo[0], box.lo[1], box.lo[2]));
+        else
+            enumerate_within(geo.snap.fraction + tiles.log2_size, t, box, visit);
+    }
+    [[nodiscard]] __device__ static bool keep(std::uint64_t) { return true; }
+    __device__ void store(unsigned long long at, std::uint32_t primitive, std::uint64_t tile) const {
+        keys[at] = static_cast<std::uint32_t>(tile);
+        primitives[at] = primitive;
+    }
+
+private:
+    template <class Visit>
+    __device__ void enumerate_within(int fraction, const loaded_triangle& t, const core::voxel_box& box,
+                                     Visit&& visit) const {
+        constexpr auto cells_rule = Rule == coverage::thin ? core::span_rule::columns : core::span_rule::conservative;
+        const auto column = [&](int axis, std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
+            for (std::int64_t w = w0; w <= w1; ++w) {
+                const auto p = core::to_xyz(axis, u, v, w);
+                visit(tiles.index(p[0], p[1], p[2]));
+            }
+        };
+        if (core::fits_narrow(t.a, t.b, t.c, fraction)) {
+            const auto setup = core::setup_triangle<cells_rule, std::int64_t>(t.a, t.b, t.c, fraction);
+            core::for_each_span<cells_rule>(setup, box,
+                                            [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
+                                                column(setup.axis, u, v, w0, w1);
+                                            });
+        } else {
+            const int axis = core::dominant_axis(t.a, t.b, t.c, fraction);
+            for_each_wide_span<cells_rule>(t.a, t.b, t.c, fraction, box,
+                                           [&](const wide_span& s) { column(axis, s.u, s.v, s.w_first, s.w_last); });
+        }
+    }
+};
+
+} // namespace voxelpipe::device

@@ -1,0 +1,192 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Tile resolve: merges the images of every split tile, before any rounding, and stores the tile. A block takes 32
+// voxels of a tile; its warps share out the images, so that a tile of a thousand images is no more than a few reads a
+// thread.
+
+#include <voxelpipe/device/base/stage_clock.cuh>
+#include <voxelpipe/device/tiles/fine_raster.cuh>
+
+namespace voxelpipe::device {
+
+// The images of one split tile, as 32 voxels of it see them: those of one word of the touched bits.
+template <class Image>
+struct image_column {
+    const word* images;
+    std::uint32_t count;
+    int group; // voxels 32 * group and on
+
+    [[nodiscard]] __device__ const word* image(std::uint32_t k) const { return images + std::size_t{k} * Image::words; }
+
+    // The lane's voxel merged over the images first, first + step, ... that touched it; false where none did.
+    template <class Blend>
+    __device__ bool cell(int offset, unsigned first, unsigned step, typename Blend::cell& merged) const {
+        const int i = 32 * group + static_cast<int>(threadIdx.x % 32);
+        bool found = false;
+#pragma unroll 4
+        for (std::uint32_t k = first; k < count; k += step) {
+            if ((image(k)[Image::touched_at + group] >> (threadIdx.x % 32) & 1u) == 0) continue;
+            const auto other = Blend::load(image(k) + offset, i, Image::voxels);
+            if (found)
+                Blend::merge(merged, other);
+            else
+                merged = other;
+            found = true;
+        }
+        return found;
+    }
+};
+
+inline constexpr int resolve_warps = threads_per_block / 32;
+inline constexpr int resolve_bytes = 16 * 1024; // shared memory for partial cells, one target after the other
+
+// Combines one word of every thread of the block into a word that all of them get.
+template <class Combine>
+__device__ word combine_block(word v, const Combine& combine) {
+    __shared__ word partial[resolve_warps];
+    for (unsigned step = 16; step > 0; step /= 2) combine(v, __shfl_xor_sync(0xffffffffu, v, step));
+    __syncthreads(); // the last use of `partial` is over
+    if (threadIdx.x % 32 == 0) partial[threadIdx.x / 32] = v;
+    __syncthreads();
+    v = partial[0];
+    for (int w = 1; w < resolve_warps; ++w) combine(v, partial[w]);
+    return v;
+}
+
+// The 32 voxels from all images: gives `store` the merged cell of each voxel that is touched, in warp 0. All threads of
+// the block take part.
+template <class Blend, class Image, class Store>
+__device__ void merge_cells(const image_column<Image>& column, int offset, unsigned char* memory, Store&& store) {
+    using cell = typename Blend::cell;
+    constexpr int fit = resolve_bytes / static_cast<int>(32 * sizeof(cell));
+    static_assert(fit >= 1);
+    constexpr unsigned ways = fit < resolve_warps ? fit : resolve_warps; // warps that read
+    __shared__ unsigned founds[resolve_warps];
+    cell* const cells = reinterpret_cast<cell*>(memory);
+    const unsigned warp = warp_in_block(), lane = threadIdx.x % 32;
+    __syncthreads(); // the last use of the memory is over
+    cell merged{};
+    if (warp < ways) {
+        const bool found = column.template cell<Blend>(offset, warp, ways, merged);
+        const unsigned all = __ballot_sync(0xffffffffu, found);
+        if (found) cells[warp * 32 + lane] = merged;
+        if (lane == 0) founds[warp] = all;
+    }
+    __syncthreads();
+    if (warp != 0) return;
+    bool found = (founds[0] >> lane & 1u) != 0;
+    for (unsigned w = 1; w < ways; ++w) {
+        if ((founds[w] >> lane & 1u) == 0) continue;
+        if (found)
+            Blend::merge(merged, cells[w * 32 + lane]);
+        else
+            merged = cells[w * 32 + lane];
+        found = true;
+    }
+    if (found) store(merged);
+}
+
+// The highest primitive + 1 of a voxel, among a tile's images.
+struct winner_merge {
+    using cell = word;
+    __device__ static cell load(const word* plane, int i, int) { return plane[i]; }
+    __device__ static void merge(cell& a, cell b) { a = b > a ? b : a; }
+};
+
+template <class Image, class Scene, class Framebuffer>
+__global__ __launch_bounds__(threads_per_block) void tile_resolve_kernel(const __grid_constant__ Scene s,
+                                                                         const __grid_constant__ Framebuffer fb,
+                                                                         const __grid_constant__ fine_raster_input in,
+                                                                         const split_tile* splits,
+                                                                         pipeline_state* state, capacities limits) {
+    if (has_failed(*state, limits)) return;
+    constexpr unsigned groups = Image::voxels / 32;
+    __shared__ __align__(16) unsigned char memory[resolve_bytes];
+    const unsigned lane = threadIdx.x % 32;
+    const std::uint64_t work = std::uint64_t{state->num_splits} * groups;
+    std::uint64_t touched = 0; // thread 0's
+    for (std::uint64_t job = blockIdx.x; job < work; job += gridDim.x) {
+        const split_tile split = splits[job / groups];
+        const auto group = static_cast<int>(job % groups);
+        const core::voxel_box box = core::tile_box(in.tiles, split.tile, s.geo.extent);
+        const image_column<Image> column{in.images + std::size_t{split.first_image} * Image::words, split.num_images,
+                                         group};
+        if (in.track) {
+            word mine = 0;
+            for (std::uint32_t k = threadIdx.x; k < split.num_images; k += blockDim.x)
+                mine |= column.image(k)[Image::touched_at + group];
+            mine = combine_block(mine, [](word& a, word b) { a |= b; });
+            if (mine == 0) continue;
+            if (threadIdx.x == 0) touched += static_cast<unsigned>(__popc(mine));
+        }
+        if constexpr (Image::has_bits) {
+            Image::for_each_target([&]<std::size_t K>() {
+                using t = typename Image::template target<K>;
+                if constexpr (method_of<t>() == blend_method::bits) {
+                    using blend_type = bit_blend<typename t::blend_type>;
+                    word mine = blend_type::neutral;
+                    for (std::uint32_t k = threadIdx.x; k < split.num_images; k += blockDim.x)
+                        blend_type::merge(mine, column.image(k)[Image::template offset<K>() + group]);
+                    mine = combine_block(mine, [](word& a, word b) { blend_type::merge(a, b); });
+                    if (static_cast<int>(threadIdx.x) < rows_per_word<Image>)
+                        store_bit_row<Image, K>(fb, box, group * rows_per_word<Image> + static_cast<int>(threadIdx.x),
+                                                mine);
+                }
+            });
+        }
+        const int i = 32 * group + static_cast<int>(lane);
+        const voxel_place at = place_in_tile<Image>(box, i);
+        if constexpr (Image::has_atomic) {
+            Image::for_each_target([&]<std::size_t K>() {
+                using t = typename Image::template target<K>;
+                if constexpr (method_of<t>() == blend_method::atomic) {
+                    using blend_type = value_blend<typename t::blend_type, typename t::value_type>;
+                    merge_cells<blend_type>(column, Image::template offset<K>(), memory, [&](const auto& cell) {
+                        store_cell(voxelpipe::get<K>(fb.targets), at, cell);
+                    });
+                }
+            });
+        }
+        if constexpr (Image::has_winner)
+            merge_cells<winner_merge>(column, Image::winner_at, memory,
+                                      [&](word winner) { store_winners<Image>(s, fb, at, winner); });
+    }
+    if (in.count_voxels) {
+        const unsigned long long sum = block_sum(touched);
+        if (threadIdx.x == 0 && sum != 0) atomicAdd(&state->voxels, sum);
+    }
+}
+
+// Makes the fine raster of another group of targets start again.
+template <class State>
+__global__ void restart_items(State* state) {
+    state->next_item = 0;
+}
+
+// One fine pass over the work items for the targets of one image type. blocks_per_sm: see fine_raster_policy.
+template <coverage Rule, class Image, int Threads, int MinBlocks, class Scene, class Framebuffer>
+void draw_tiles(const Scene& s, const Framebuffer& fb, const fine_raster_input& in, const split_tile* splits,
+                pipeline_state* state, const capacities& limits, int blocks_per_sm, cudaStream_t stream,
+                stage_clock* clock = nullptr) {
+    const auto kernel = fine_raster_kernel<Rule, Image, Threads, MinBlocks, Scene, Framebuffer>;
+    if (Image::bytes > 16 * 1024) // static shared memory counts too, and 48 KB need no asking
+        check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(Image::bytes)),
+              stage::fine_raster);
+    int blocks = 0;
+    check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, Threads, Image::bytes), stage::fine_raster);
+    if (blocks_per_sm != 0 && blocks_per_sm < blocks) blocks = blocks_per_sm;
+    restart_items<<<1, 1, 0, stream>>>(state);
+    check(cudaGetLastError(), stage::fine_raster);
+    kernel<<<static_cast<unsigned>((blocks < 1 ? 1 : blocks) * num_multiprocessors()), Threads, Image::bytes, stream>>>(
+        s, fb, in, state, limits);
+    check(cudaGetLastError(), stage::fine_raster);
+    end_stage(clock, &stage_times::fine_raster);
+    tile_resolve_kernel<Image, Scene, Framebuffer>
+        <<<fill_device(std::uint64_t{1} << 40, 4), threads_per_block, 0, stream>>>(s, fb, in, splits, state, limits);
+    check(cudaGetLastError(), stage::tile_resolve);
+    end_stage(clock, &stage_times::tile_resolve);
+}
+
+} // namespace voxelpipe::device
