@@ -8,10 +8,9 @@
 // voxels and leave zeros for the next call. Nothing of a target is written before all triangles have been seen, so that
 // no index need be checked before that: to read them all once more took a fifth of the time of a mesh of 7 million
 // triangles.
-//
-// Values of targets from bits that say which voxels are touched (targets/fill_from_mask.cuh).
 
 #include <voxelpipe/device/targets/clear_target.cuh>
+#include <voxelpipe/device/targets/target_traits.cuh>
 #include <voxelpipe/device/targets/tracked_clear.cuh>
 
 #include <algorithm>
