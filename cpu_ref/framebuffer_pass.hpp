@@ -4,7 +4,7 @@
 
 // Fine raster into render targets: every tile's triangles in order, each fragment shaded and folded into its targets.
 // Blends that accumulate in their own format (reproducible sums) keep a tile of accumulators; all others work in place.
-// A shader that gives every fragment the same values takes the way of solid_tile.hpp.
+// A shader that gives every fragment the same values takes the way of constant_tile.hpp.
 
 #include <cpu_ref/constant_tile.hpp>
 
