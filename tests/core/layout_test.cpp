@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// core/tile.hpp: every layout stores each voxel in places of its own, at the documented address; tiles cover the
-// extent.
+// core/layout.hpp and core/tile_grid.hpp: every layout stores each voxel in places of its own, at the documented
+// address; tiles cover the extent.
 
 #include "test_support.hpp"
 
+#include <voxelpipe/core/tile_grid.hpp>
 #include <voxelpipe/framebuffer.hpp>
 
 #include <gtest/gtest.h>
