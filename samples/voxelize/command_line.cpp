@@ -180,6 +180,11 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->option_text("NX,NY,NZ")
         ->group("Grid");
 
+    app.add_flag("--lenient", options.load.gltf.lenient,
+                 "Go on with a warning where a file breaks the specification in a way that can be put right: unaligned "
+                 "data, a node in the scene twice")
+        ->group("Model");
+
     using voxelpipe::coverage;
     const std::map<std::string, coverage> coverages{{"conservative", coverage::conservative}, {"thin", coverage::thin}};
     app.add_option("--coverage", options.voxelize.coverage,

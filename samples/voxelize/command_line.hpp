@@ -4,6 +4,7 @@
 // argv -> options, checked as far as that goes without reading the model.
 
 #include "formats/formats.hpp"
+#include "model_file.hpp"
 #include "placement.hpp"
 #include "voxelizer.hpp"
 
@@ -19,6 +20,7 @@ enum class stats_format : std::uint8_t { none, text, json };
 struct command_line {
     std::filesystem::path input;
     std::vector<std::filesystem::path> outputs;
+    load_options load;
     grid_request grid;
     voxelize_request voxelize; // all but its grid and progress
     // Targets that only some outputs ask for: those that show the voxels' shape or colours. Formats that hold every

@@ -32,42 +32,51 @@ tinygltf::Model parse(const gltf::checked_document& document) {
     return model;
 }
 
-scene load(std::span<const std::byte> bytes, const gltf_file_reader& read_file, const gltf_limits& limits) {
-    scene result;
+void load(scene& result, std::span<const std::byte> bytes, const gltf_file_reader& read_file, const gltf_limits& limits,
+          const gltf_options& options) {
+    gltf::leniency tolerance{options.lenient, result.warnings};
     gltf::budget memory{limits};
     memory.grant_input(bytes.size());
-    const gltf::container parts = gltf::split_container(bytes, result.warnings);
-    const gltf::checked_document document = gltf::check_document(parts.json, parts.has_binary, memory, result.warnings);
-    const gltf::resources resources{document, parts.binary, parts.has_binary, read_file, memory};
+    const gltf::container parts = gltf::split_container(bytes, tolerance);
+    const gltf::checked_document document = gltf::check_document(parts.json, parts.has_binary, memory, tolerance);
+    const gltf::resources resources{document, parts.binary, parts.has_binary, read_file, memory, tolerance};
     const tinygltf::Model model = parse(document);
     const gltf::accessor_reader accessors{model, document, resources, memory};
     gltf::material_reader materials{model, accessors, resources, result};
     materials.read_factors();
     gltf::primitive_reader primitives{model, accessors, materials, memory, result};
-    for (const gltf::shown_mesh& shown : gltf::shown_meshes(model, result.warnings))
+    const gltf::shown_scene shown_scene = gltf::shown_meshes(model, accessors, tolerance);
+    for (const gltf::shown_mesh& shown : shown_scene.meshes)
         for (std::size_t part = 0; part < model.meshes[shown.mesh].primitives.size(); ++part)
             primitives.show(shown.mesh, part, shown.to_world);
     primitives.finish();
-    return result;
+    tolerance.finish();
 }
 
 } // namespace
 
-scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_file, const gltf_limits& limits) {
+scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_file, const gltf_limits& limits,
+                const gltf_options& options) {
+    scene result;
+    const auto fail = [&](gltf_error error) {
+        error.warnings = std::move(result.warnings);
+        throw error;
+    };
     try {
-        return load(bytes, read_file, limits);
-    } catch (const gltf_error&) {
-        throw;
+        load(result, bytes, read_file, limits, options);
+    } catch (const gltf_error& error) {
+        fail(error);
     } catch (const std::bad_alloc&) {
-        throw gltf_error("not enough memory to load the file");
+        fail(gltf_error("not enough memory to load the file"));
     } catch (const std::exception& error) { // nothing of the libraries underneath gets past
-        throw gltf_error(gltf::printable(error.what(), 200));
+        fail(gltf_error(gltf::printable(error.what(), 200)));
     }
+    return result;
 }
 
-scene load_gltf(const std::filesystem::path& file, const gltf_limits& limits) {
+scene load_gltf(const std::filesystem::path& file, const gltf_limits& limits, const gltf_options& options) {
     const std::vector<std::byte> bytes = gltf::read_whole_file(file, limits.max_file_bytes);
-    return load_gltf(bytes, gltf::folder_reader(file.parent_path()), limits);
+    return load_gltf(bytes, gltf::folder_reader(file.parent_path()), limits, options);
 }
 
 } // namespace voxelize

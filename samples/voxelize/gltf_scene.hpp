@@ -13,6 +13,7 @@
 // in their bind pose under their node's transform, morph targets at their base shape, animations at rest; points and
 // lines have no surface and are left out.
 
+#include "model_error.hpp"
 #include "scene.hpp"
 
 #include <cstddef>
@@ -20,15 +21,14 @@
 #include <filesystem>
 #include <functional>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace voxelize {
 
-// Why a file cannot be loaded: one line without control characters, for a person.
-struct gltf_error : std::runtime_error {
-    using std::runtime_error::runtime_error;
+// Why a file cannot be loaded.
+struct gltf_error : model_error {
+    using model_error::model_error;
 };
 
 // Bounds on what a file may make the loader do. Memory for decoded data (vertices, triangles, pictures) may reach
@@ -41,16 +41,23 @@ struct gltf_limits {
     std::uint32_t max_image_side = 16384; // pixels
 };
 
+// What a caller may choose.
+struct gltf_options {
+    // Faults that can be put right (unaligned strides, a node in the scene twice, ...) become warnings.
+    bool lenient = false;
+};
+
 // Gives the bytes of a file that a .gltf names. The path is relative, normalised, percent-decoded and never leaves
 // the folder of the .gltf. Throws gltf_error with the bare reason where the file cannot be had.
 using gltf_file_reader =
     std::function<std::vector<std::byte>(const std::filesystem::path& relative, std::uint64_t max_bytes)>;
 
 // Loads FILE; a .gltf finds its buffers and images in its own folder or below it. Throws gltf_error.
-[[nodiscard]] scene load_gltf(const std::filesystem::path& file, const gltf_limits& limits = {});
+[[nodiscard]] scene load_gltf(const std::filesystem::path& file, const gltf_limits& limits = {},
+                              const gltf_options& options = {});
 
 // The same from memory. Without a reader a file that names other files is refused. Throws gltf_error.
 [[nodiscard]] scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_file = {},
-                              const gltf_limits& limits = {});
+                              const gltf_limits& limits = {}, const gltf_options& options = {});
 
 } // namespace voxelize

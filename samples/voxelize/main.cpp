@@ -3,7 +3,7 @@
 // voxelize INPUT.glb -o OUT... [options]: turns a glTF model into voxels. See --help.
 #include "command_line.hpp"
 #include "exit_code.hpp"
-#include "gltf_scene.hpp"
+#include "model_file.hpp"
 #include "report.hpp"
 
 #include <chrono>
@@ -32,6 +32,10 @@ std::vector<std::filesystem::path> write_output(volume& voxels, const command_li
     return files;
 }
 
+void print_warnings(const std::vector<std::string>& warnings) {
+    for (const std::string& warning : warnings) std::cerr << "voxelize: warning: " << warning << '\n';
+}
+
 // What comes after the command line; every way to fail is an exception.
 void run(const command_line& options) {
     const auto milliseconds_since = [](std::chrono::steady_clock::time_point start) {
@@ -43,13 +47,18 @@ void run(const command_line& options) {
     progress_bar bar{!options.quiet};
 
     auto start = std::chrono::steady_clock::now();
-    scene model = load_gltf(options.input);
+    scene model = load_model(options.input, options.load);
     report.warnings = std::move(model.warnings);
     report.vertices = model.vertex_count();
     for (const material& m : model.materials) report.materials.push_back(m.name);
-    if (model.triangle_count() == 0) throw gltf_error("there are no triangles to voxelize");
+    const auto refuse = [&report](const char* why) {
+        model_error error(why);
+        error.warnings = report.warnings;
+        throw error;
+    };
+    if (model.triangle_count() == 0) refuse("there are no triangles to voxelize");
     const bounding_box bounds = bounds_of(model, options.voxelize.threads);
-    if (bounds.empty) throw gltf_error("no triangle has a corner at a finite position");
+    if (bounds.empty) refuse("no triangle has a corner at a finite position");
     report.request.grid = place_grid(options.grid, bounds);
     report.request.padding = options.grid.padding;
     if (std::string warning = precision_warning(model, report.request.grid); !warning.empty())
@@ -78,7 +87,7 @@ void run(const command_line& options) {
     report.peak_memory = peak_memory_bytes();
 
     if (!options.quiet) {
-        for (const std::string& warning : report.warnings) std::cerr << "voxelize: warning: " << warning << '\n';
+        print_warnings(report.warnings);
         // Standard output belongs to the object where one is asked for.
         std::ostream& stream = options.stats == stats_format::json ? std::cerr : std::cout;
         const glm::ivec3 extent = report.request.grid.extent;
@@ -102,8 +111,10 @@ int run_main(int argc, char** argv) {
     }
     try {
         run(options);
-    } catch (const gltf_error& error) {
-        return fail(exit_input, options.input.string() + ": " + error.what());
+    } catch (const model_error& error) {
+        if (!options.quiet) print_warnings(error.warnings);
+        return fail(exit_input, options.input.string() + ": " + error.what() +
+                                    (error.lenient_helps ? " (--lenient goes on all the same)" : ""));
     } catch (const grid_error& error) {
         return fail(exit_usage, error.what());
     } catch (const memory_error& error) {

@@ -32,6 +32,7 @@ std::set<std::string> all_options() {
             "-s,--voxel-size S[,SY,SZ]",
             "--origin X,Y,Z",
             "--extent NX,NY,NZ",
+            "--lenient",
             "--coverage RULE",
             "--depth-axis AXIS",
             "--backend NAME",

@@ -67,7 +67,7 @@ std::vector<std::byte> accessor_reader::packed(std::size_t index, std::size_t el
     if (!document_.zero_base[index]) {
         const auto view_index = static_cast<std::size_t>(accessor.bufferView);
         const std::size_t stride =
-            model_.bufferViews[view_index].byteStride != 0 ? model_.bufferViews[view_index].byteStride : element_bytes;
+            document_.view_strides[view_index] != 0 ? document_.view_strides[view_index] : element_bytes;
         const std::span<const std::byte> source = view(view_index).subspan(accessor.byteOffset);
         for (std::size_t i = 0; i < accessor.count; ++i)
             std::memcpy(&elements[i * element_bytes], &source[i * stride], element_bytes);

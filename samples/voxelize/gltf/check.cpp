@@ -113,7 +113,6 @@ void checker::check_extensions() {
             break;
         case extension_effect::fallback:
             throw gltf_error("geometry is compressed with " + printable(name) + ", which is not supported");
-        case extension_effect::lost:
         case extension_effect::unknown:
             throw gltf_error("the file requires the extension " + printable(name) + ", which is not supported");
         }
@@ -123,13 +122,14 @@ void checker::check_extensions() {
     for (const std::string& name : used) {
         const extension_effect effect = effect_of(name);
         if (effect == extension_effect::appearance)
-            warnings_.push_back("extension " + printable(name) +
-                                " is not supported: only base colour, texture and alpha of materials are used");
+            tolerance_.warnings().push_back(
+                "extension " + printable(name) +
+                " is not supported: only base colour, texture and alpha of materials are used");
         if (effect == extension_effect::unknown)
-            warnings_.push_back("extension " + printable(name) + " is not known and ignored");
+            tolerance_.warnings().push_back("extension " + printable(name) + " is not known and ignored");
         if (effect == extension_effect::fallback)
-            warnings_.push_back("extension " + printable(name) +
-                                " is not supported: the file's uncompressed copy of the geometry is used");
+            tolerance_.warnings().push_back("extension " + printable(name) +
+                                            " is not supported: the file's uncompressed copy of the geometry is used");
     }
 }
 
@@ -152,13 +152,16 @@ void checker::check_buffer_views() {
         view checked;
         const std::uint32_t buffer = entry.required("buffer", entry.index("buffer", "buffers", num_buffers_));
         const std::uint64_t offset = entry.integer("byteOffset", 0, largest_integer).value_or(0);
+        checked.byte_offset = offset;
         checked.byte_length = entry.required("byteLength", entry.integer("byteLength", 1, largest_integer));
         const std::uint64_t has = document_.buffers[buffer].byte_length;
         if (offset + checked.byte_length > has)
             entry.fail("ends at byte " + std::to_string(offset + checked.byte_length) + " of a buffer with " +
                        std::to_string(has));
-        if (const auto stride = entry.integer("byteStride", 4, 252)) {
-            if (*stride % 4 != 0) entry.fail("byteStride " + std::to_string(*stride) + " is not a multiple of 4");
+        if (const auto stride = entry.integer("byteStride", tolerance_.lenient() ? 1 : 4, 252)) {
+            if (*stride % 4 != 0)
+                tolerance_.accept(entry.path() + ": byteStride " + std::to_string(*stride) + " is not a multiple of 4",
+                                  "it is used as it is");
             checked.byte_stride = *stride;
         }
         if (const auto extensions = entry.object("extensions"))
@@ -166,7 +169,8 @@ void checker::check_buffer_views() {
                 if (extensions->member(name) && is_placeholder(buffer))
                     entry.fail("geometry is compressed with " + std::string(name) + ", which is not supported");
         views_.push_back(checked);
-        entry.keep_only({"buffer", "byteOffset", "byteLength", "byteStride"});
+        document_.view_strides.push_back(checked.byte_stride.value_or(0));
+        entry.keep_only({"buffer", "byteOffset", "byteLength"});
     });
 }
 
@@ -195,6 +199,10 @@ void checker::check_accessors() {
         const auto view_index = accessor.index("bufferView", "bufferViews", num_views_);
         document_.zero_base.push_back(!view_index);
         if (view_index) {
+            if (tolerance_.lenient() && (views_[*view_index].byte_offset + offset) % component != 0)
+                tolerance_.accept(accessor.path() + ": is not aligned to its components of " +
+                                      std::to_string(component) + " bytes",
+                                  "it is read where it lies");
             const std::uint64_t stride = views_[*view_index].byte_stride.value_or(element);
             if (stride < element)
                 accessor.fail("its elements of " + std::to_string(element) + " bytes overlap at byteStride " +
@@ -228,7 +236,7 @@ void checker::check_sparse(const json_at& sparse, std::uint64_t accessor_count, 
 }
 
 checked_document check_document(std::string_view json_text, bool has_binary_chunk, budget& memory,
-                                std::vector<std::string>& warnings) {
+                                leniency& tolerance) {
     check_json_text(json_text, memory.limits());
     json root;
     try {
@@ -240,7 +248,7 @@ checked_document check_document(std::string_view json_text, bool has_binary_chun
         throw gltf_error("invalid JSON: " +
                          printable(bracket == std::string_view::npos ? what : what.substr(bracket + 2), 200));
     }
-    return checker{root, has_binary_chunk, memory, warnings}.run();
+    return checker{root, has_binary_chunk, memory, tolerance}.run();
 }
 
 } // namespace voxelize::gltf

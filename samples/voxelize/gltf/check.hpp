@@ -6,6 +6,7 @@
 // reduced text that this leaves, in which all of that has been settled, and never the file itself.
 
 #include "budget.hpp"
+#include "leniency.hpp"
 
 #include <cstdint>
 #include <optional>
@@ -30,6 +31,7 @@ struct image_source {
 struct checked_document {
     std::string json; // for tinygltf: without buffers, images, animations, skins, cameras, extras
     std::vector<buffer_source> buffers;
+    std::vector<std::uint64_t> view_strides; // per buffer view, 0: packed. tinygltf insists on multiples of 4
     std::vector<image_source> images;
     // Per texture: indices into images that show the same thing, the one to try first in front. Empty: none is named.
     std::vector<std::vector<std::uint32_t>> texture_images;
@@ -38,8 +40,8 @@ struct checked_document {
     std::vector<bool> zero_base;
 };
 
-// Throws gltf_error with the path of the first thing that is wrong; appends to warnings what is left out.
+// Throws gltf_error with the path of the first thing that is wrong; what is left out becomes a warning.
 [[nodiscard]] checked_document check_document(std::string_view json_text, bool has_binary_chunk, budget& memory,
-                                              std::vector<std::string>& warnings);
+                                              leniency& tolerance);
 
 } // namespace voxelize::gltf

@@ -15,8 +15,8 @@ void checker::check_meshes() {
         mesh.keep_only({"name", "primitives"});
     });
     if (with_targets != 0)
-        warnings_.push_back("morph targets are not supported: " + std::to_string(with_targets) +
-                            " primitive(s) taken at their base shape");
+        tolerance_.warnings().push_back("morph targets are not supported: " + std::to_string(with_targets) +
+                                        " primitive(s) taken at their base shape");
 }
 
 void checker::check_primitive(const json_at& primitive, std::size_t& with_targets) {
@@ -47,7 +47,7 @@ void checker::check_index_accessor(const json_at& primitive, std::uint32_t index
         accessor["bufferView"] = num_views_; // tinygltf insists on one: the placeholder of run()
         placeholder_view_ = true;
     } else if (views_[accessor["bufferView"].get<std::size_t>()].byte_stride) {
-        primitive.fail("indices lie in a buffer view with a byteStride");
+        tolerance_.accept(primitive.path() + ": indices lie in a buffer view with a byteStride", "it is followed");
     }
 }
 
@@ -64,17 +64,16 @@ void checker::check_nodes_and_scenes() {
         parts = node.check_numbers("translation", 3) || parts;
         if (matrix && parts) ++with_matrix_and_parts;
         if (node.member("skin")) ++with_skin;
-        if (const auto extensions = node.object("extensions"))
-            if (extensions->member("EXT_mesh_gpu_instancing"))
-                node.fail("is repeated by EXT_mesh_gpu_instancing, which is not supported");
-        node.keep_only({"name", "mesh", "children", "matrix", "rotation", "scale", "translation"});
+        if (const auto extensions = node.object("extensions")) check_node_extensions(*extensions);
+        node.keep_only({"name", "mesh", "children", "matrix", "rotation", "scale", "translation", "extensions"});
     });
     if (with_skin != 0)
-        warnings_.push_back("skins are not supported: " + std::to_string(with_skin) +
-                            " node(s) show their mesh in its bind pose");
+        tolerance_.warnings().push_back("skins are not supported: " + std::to_string(with_skin) +
+                                        " node(s) show their mesh in its bind pose");
     if (with_matrix_and_parts != 0)
-        warnings_.push_back(std::to_string(with_matrix_and_parts) +
-                            " node(s) with a matrix beside translation, rotation or scale: the matrix is used");
+        tolerance_.warnings().push_back(
+            std::to_string(with_matrix_and_parts) +
+            " node(s) with a matrix beside translation, rotation or scale: the matrix is used");
     root_.each_object("scenes", [&](const json_at& scene) {
         scene.each("nodes", [&](const json_at& node) { (void)node.as_index("nodes", num_nodes_); });
         scene.keep_only({"nodes"});
@@ -82,9 +81,44 @@ void checker::check_nodes_and_scenes() {
     (void)root_.index("scene", "scenes", num_scenes_);
 }
 
+void checker::check_node_extensions(const json_at& extensions) const {
+    if (const auto visibility = extensions.object("KHR_node_visibility")) {
+        (void)visibility->boolean("visible");
+        visibility->keep_only({"visible"});
+    }
+    if (const auto instancing = extensions.object("EXT_mesh_gpu_instancing")) {
+        const json_at attributes = instancing->required("attributes", instancing->object("attributes"));
+        std::optional<std::uint64_t> count;
+        const auto check = [&](const char* name, std::string_view type, bool may_be_integer) {
+            const auto index = attributes.index(name, "accessors", num_accessors_);
+            if (!index) return;
+            const json& accessor = root_.value()["accessors"][*index];
+            const auto component = accessor["componentType"].get<std::uint64_t>();
+            const bool integer =
+                component == TINYGLTF_COMPONENT_TYPE_BYTE || component == TINYGLTF_COMPONENT_TYPE_SHORT;
+            if (accessor["type"] != type ||
+                !(component == TINYGLTF_COMPONENT_TYPE_FLOAT || (may_be_integer && integer)))
+                attributes.fail(std::string(name) + " is not a " + std::string(type) + " of floats" +
+                                (may_be_integer ? " or of signed 8 or 16 bit integers" : ""));
+            const auto has = accessor["count"].get<std::uint64_t>();
+            if (count.value_or(has) != has)
+                attributes.fail(std::string(name) + " has " + std::to_string(has) + " elements, another has " +
+                                std::to_string(*count));
+            count = has;
+        };
+        check("TRANSLATION", "VEC3", false);
+        check("ROTATION", "VEC4", true);
+        check("SCALE", "VEC3", false);
+        if (!count) attributes.fail("has none of TRANSLATION, ROTATION and SCALE");
+        attributes.keep_only({"TRANSLATION", "ROTATION", "SCALE"});
+        instancing->keep_only({"attributes"});
+    }
+    extensions.keep_only({"KHR_node_visibility", "EXT_mesh_gpu_instancing"});
+}
+
 void checker::warn_of_what_is_left_out() {
     if (const auto animations = root_.member("animations"); animations && !animations->value().empty())
-        warnings_.push_back("animations are not supported: nodes stand as the file places them");
+        tolerance_.warnings().push_back("animations are not supported: nodes stand as the file places them");
 }
 
 } // namespace voxelize::gltf

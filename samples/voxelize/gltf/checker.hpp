@@ -21,8 +21,8 @@ inline constexpr std::uint64_t largest_integer = std::uint64_t{1} << 53;
 class checker {
 public:
     // All of them must outlive this. ROOT is reduced in place.
-    checker(json& root, bool has_binary_chunk, budget& memory, std::vector<std::string>& warnings)
-        : root_{root}, has_binary_chunk_{has_binary_chunk}, memory_{memory}, warnings_{warnings} {}
+    checker(json& root, bool has_binary_chunk, budget& memory, leniency& tolerance)
+        : root_{root}, has_binary_chunk_{has_binary_chunk}, memory_{memory}, tolerance_{tolerance} {}
 
     // Call once.
     [[nodiscard]] checked_document run();
@@ -30,6 +30,7 @@ public:
 private:
     // What the bounds checks need of a buffer view.
     struct view {
+        std::uint64_t byte_offset = 0;
         std::uint64_t byte_length = 0;
         std::optional<std::uint64_t> byte_stride;
     };
@@ -59,12 +60,13 @@ private:
     void check_primitive(const json_at& primitive, std::size_t& with_targets);
     void check_index_accessor(const json_at& primitive, std::uint32_t index);
     void check_nodes_and_scenes();
+    void check_node_extensions(const json_at& extensions) const;
     void warn_of_what_is_left_out();
 
     json_at root_;
     bool has_binary_chunk_;
     budget& memory_;
-    std::vector<std::string>& warnings_;
+    leniency& tolerance_;
     checked_document document_;
     std::vector<view> views_;
     bool placeholder_view_ = false;

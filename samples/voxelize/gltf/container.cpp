@@ -22,7 +22,7 @@ std::uint32_t little_endian_u32(std::span<const std::byte> bytes, std::size_t of
     return value;
 }
 
-container split_glb(std::span<const std::byte> bytes, std::vector<std::string>& warnings) {
+container split_glb(std::span<const std::byte> bytes, leniency& tolerance) {
     if (bytes.size() < header_bytes) throw gltf_error("the GLB header is cut short");
     const std::uint32_t version = little_endian_u32(bytes, 4);
     if (version != 2) throw gltf_error("GLB version " + std::to_string(version) + " is not supported, only 2");
@@ -32,7 +32,8 @@ container split_glb(std::span<const std::byte> bytes, std::vector<std::string>& 
                          std::to_string(bytes.size()));
     if (length < header_bytes) throw gltf_error("the GLB header says a length of " + std::to_string(length));
     if (length < bytes.size())
-        warnings.push_back(std::to_string(bytes.size() - length) + " bytes after the end of the GLB are ignored");
+        tolerance.warnings().push_back(std::to_string(bytes.size() - length) +
+                                       " bytes after the end of the GLB are ignored");
     bytes = bytes.first(length);
 
     container parts;
@@ -47,7 +48,8 @@ container split_glb(std::span<const std::byte> bytes, std::vector<std::string>& 
         if (chunk_length > bytes.size() - offset)
             throw gltf_error(name + ": says " + std::to_string(chunk_length) + " bytes, " +
                              std::to_string(bytes.size() - offset) + " are left");
-        if (chunk_length % 4 != 0) throw gltf_error(name + ": its length is not a multiple of 4");
+        if (chunk_length % 4 != 0)
+            tolerance.accept(name + ": its length is not a multiple of 4", "the next chunk follows at once");
         const std::span<const std::byte> data = bytes.subspan(offset, chunk_length);
         offset += chunk_length;
 
@@ -61,7 +63,7 @@ container split_glb(std::span<const std::byte> bytes, std::vector<std::string>& 
             parts.binary = data;
             parts.has_binary = true;
         } else {
-            warnings.push_back(name + " is of an unknown type and ignored");
+            tolerance.warnings().push_back(name + " is of an unknown type and ignored");
         }
     }
     if (!has_json) throw gltf_error("the GLB has no JSON chunk");
@@ -70,9 +72,9 @@ container split_glb(std::span<const std::byte> bytes, std::vector<std::string>& 
 
 } // namespace
 
-container split_container(std::span<const std::byte> bytes, std::vector<std::string>& warnings) {
+container split_container(std::span<const std::byte> bytes, leniency& tolerance) {
     if (bytes.empty()) throw gltf_error("the file is empty");
-    if (bytes.size() >= 4 && little_endian_u32(bytes, 0) == glb_magic) return split_glb(bytes, warnings);
+    if (bytes.size() >= 4 && little_endian_u32(bytes, 0) == glb_magic) return split_glb(bytes, tolerance);
     container parts;
     parts.json = {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
     const std::size_t start = parts.json.find_first_not_of(" \t\r\n\xEF\xBB\xBF");

@@ -4,13 +4,11 @@
 // The outermost layer: a .glb is split into its JSON text and binary chunk, a .gltf is JSON text as it stands. Which of
 // the two a file is, its first four bytes say, not its name.
 
-#include "../gltf_scene.hpp"
+#include "leniency.hpp"
 
 #include <cstddef>
 #include <span>
-#include <string>
 #include <string_view>
-#include <vector>
 
 namespace voxelize::gltf {
 
@@ -21,8 +19,8 @@ struct container {
     bool has_binary = false;
 };
 
-// Every length is checked against the bytes that are there. Throws gltf_error; appends to warnings what is harmless.
-[[nodiscard]] container split_container(std::span<const std::byte> bytes, std::vector<std::string>& warnings);
+// Every length is checked against the bytes that are there. Throws gltf_error; what is harmless becomes a warning.
+[[nodiscard]] container split_container(std::span<const std::byte> bytes, leniency& tolerance);
 
 // Refuses text that no sane file holds before a parser sees it: longer than limits.max_json_bytes, or nested deeper
 // than 128 levels.

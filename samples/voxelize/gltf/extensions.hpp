@@ -12,7 +12,6 @@ enum class extension_effect {
     honoured,   // implemented here, or without any effect on geometry and base colour
     appearance, // changes how the surface looks: a warning
     fallback,   // other geometry data, but a file may bring a plain copy: an error only where it is required
-    lost,       // geometry would be missing: an error wherever it is used
     unknown     // not in the table: a warning, an error where it is required
 };
 
@@ -34,7 +33,8 @@ enum class extension_effect {
         rule{"EXT_meshopt_compression", extension_effect::fallback},
         rule{"KHR_meshopt_compression", extension_effect::fallback},
         rule{"MESHOPT_compression", extension_effect::fallback},
-        rule{"EXT_mesh_gpu_instancing", extension_effect::lost},
+        rule{"EXT_mesh_gpu_instancing", extension_effect::honoured},
+        rule{"KHR_node_visibility", extension_effect::honoured},
         // A picture that cannot be decoded is named when it is needed.
         rule{"KHR_texture_basisu", extension_effect::honoured},
         rule{"EXT_texture_webp", extension_effect::honoured},

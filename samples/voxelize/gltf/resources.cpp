@@ -68,7 +68,7 @@ std::filesystem::path local_path(const std::string& uri) {
 } // namespace
 
 resources::resources(const checked_document& document, std::span<const std::byte> binary, bool has_binary,
-                     const gltf_file_reader& read_file, budget& memory)
+                     const gltf_file_reader& read_file, budget& memory, leniency& tolerance)
     : document_{document}, read_file_{read_file}, memory_{memory} {
     owned_.reserve(document.buffers.size());
     for (std::size_t index = 0; index < document.buffers.size(); ++index) {
@@ -88,9 +88,17 @@ resources::resources(const checked_document& document, std::span<const std::byte
             buffers_.emplace_back();
             continue;
         }
-        if (bytes.size() < source.byte_length)
-            throw gltf_error("buffers[" + std::to_string(index) + "]: byteLength says " +
-                             std::to_string(source.byte_length) + ", the data has " + std::to_string(bytes.size()));
+        if (bytes.size() < source.byte_length) {
+            const std::string what = "buffers[" + std::to_string(index) + "]: byteLength says " +
+                                     std::to_string(source.byte_length) + ", the data has " +
+                                     std::to_string(bytes.size());
+            // Padding that was counted and not written.
+            if (source.byte_length - bytes.size() >= 4) throw gltf_error(what);
+            tolerance.accept(what, "the rest is taken as zero");
+            memory_.charge(source.byte_length, 1, "buffers");
+            owned_.emplace_back(bytes.begin(), bytes.end()).resize(source.byte_length);
+            bytes = owned_.back();
+        }
         buffers_.push_back(bytes.first(source.byte_length));
     }
 }

@@ -21,10 +21,10 @@ namespace voxelize::gltf {
 
 class resources {
 public:
-    // Loads every buffer; a buffer that is missing or shorter than declared is a gltf_error. BINARY is a view into the
-    // caller's bytes and must outlive this; DOCUMENT too.
+    // Loads every buffer; a buffer that is missing or shorter than declared is a gltf_error (up to 3 bytes of padding
+    // may be missing in lenient loading). BINARY is a view into the caller's bytes and must outlive this; DOCUMENT too.
     resources(const checked_document& document, std::span<const std::byte> binary, bool has_binary,
-              const gltf_file_reader& read_file, budget& memory);
+              const gltf_file_reader& read_file, budget& memory, leniency& tolerance);
 
     // Bytes of buffer INDEX, byte_length of them as declared; throws gltf_error for a placeholder without data.
     [[nodiscard]] std::span<const std::byte> buffer(std::size_t index) const;

@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Why a model cannot be used, whatever its format.
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace voxelize {
+
+// One line without control characters, for a person.
+struct model_error : std::runtime_error {
+    using std::runtime_error::runtime_error;
+
+    std::vector<std::string> warnings; // what was found before it came to that; one line each
+    bool lenient_helps = false;        // load_options::lenient would have gone on
+};
+
+} // namespace voxelize
