@@ -117,8 +117,8 @@ build_suite() {
 
 run_suite() {
     local part=$1 folder=$2 source program
-    for source in tests/device/*_test.cu api_test.cu; do
-        program="build/$folder/tests/device/device_$(basename "$source" .cu)"
+    for source in tests/{stages,strategies,robustness}/*_test.cu api_test.cu; do
+        program="build/$folder/tests/strategies/device_$(basename "$source" .cu)"
         [[ $part != default && $program == *scenes_test ]] && continue
         run_program "$part" "$(basename "$program")" "$program"
     done
@@ -142,7 +142,7 @@ for part in "${parts[@]}"; do
         ;;
     plain_constexpr)
         target=plain_constexpr_test build_suite gpu-plain-constexpr
-        run_program plain_constexpr plain_constexpr_test build/gpu-plain-constexpr/tests/device/plain_constexpr_test
+        run_program plain_constexpr plain_constexpr_test build/gpu-plain-constexpr/tests/strategies/plain_constexpr_test
         ;;
     tool)
         samples=ON target=voxelize_gpu_files_test build_suite gpu-tool
@@ -163,7 +163,7 @@ for part in "${parts[@]}"; do
                 [[ $program != tracked ]] || filter='*SequencesByTouchedVoxels:*Clears*'
                 [[ $program != repeated_calls ]] || filter='*AFewLargerTriangles*'
                 run_program sanitizer "$tool, $program" compute-sanitizer --tool "$tool" --error-exitcode 9 \
-                    "build/gpu/tests/device/device_${program}_test" --gtest_filter="$filter"
+                    "build/gpu/tests/strategies/device_${program}_test" --gtest_filter="$filter"
             done
         done
         ;;

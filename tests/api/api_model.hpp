@@ -6,7 +6,7 @@
 // primitive order, and values that depend on primitive and voxel, so that a fragment in the wrong place or order shows.
 //
 // The same test files are compiled twice: by the C++ compiler for cpu_backend, and by nvcc for cuda_backend
-// (tests/device).
+// (tests/strategies).
 
 #include "oracle.hpp"
 #include "test_support.hpp"

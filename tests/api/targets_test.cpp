@@ -218,7 +218,7 @@ TEST(LoadOperation, UntouchedVoxelsKeepTheirBits) {
     }
 }
 
-// A framebuffer that tracks its changes holds what one that does not holds. tests/device/tracked_test.cu has targets
+// A framebuffer that tracks its changes holds what one that does not holds. tests/strategies/tracked_test.cu has targets
 // large enough for clears to go by what was drawn.
 TEST(LoadOperation, TrackedChangesMakeNoDifference) {
     backend_type backend = unit::make_backend();
