@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// blend.hpp: every blend mode on every value type that it takes, against plain folds written here; the total order of
-// the floats; vectors; blends of a user's own.
+// blend.hpp: every blend mode on every value type that it accepts, against plain folds that are written here. Also the
+// total order of the floats, vectors, and blends that a user defines.
 
 #include "test_support.hpp"
 
@@ -220,7 +220,8 @@ TEST(BitBlend, IsThePlainFold) {
     }
 }
 
-// What every blend promises, whatever its type: the identity changes nothing, and one that calls itself order-free is.
+// Two promises of every blend: its identity changes nothing, and a blend that is declared order-free does not depend on
+// the order.
 template <class Blend, class T>
 void check_laws() {
     using traits = vp::core::blend_traits<Blend, T>;
@@ -315,7 +316,7 @@ TYPED_TEST(EveryBlend, TreatsVectorsComponentByComponent) {
     }
 }
 
-// The closed forms of one value many times; those of reproducible sums are in reproducible_sum_test.cpp.
+// Closed forms for one value that is folded many times; those of reproducible sums are in reproducible_sum_test.cpp.
 template <class T>
 class RepeatedFold : public ::testing::Test {};
 using Integers = ::testing::Types<std::uint8_t, std::int16_t, std::uint32_t, std::int32_t, std::uint64_t, std::int64_t>;
@@ -349,7 +350,7 @@ void check_unordered() {
         return vp::core::repeated_fold<blend::add_unordered, T>(clear, value)(n);
     };
     for (std::int64_t i = 0; i < unit::cases(1000); ++i) {
-        // Within the bound of any order of additions; the same where all of them are exact.
+        // Within the error bound of any order of additions; equal if all additions are exact.
         const auto n = static_cast<std::uint32_t>(random.below(300));
         const T clear = static_cast<T>(unit::spread_double(random, -9, 9));
         const T value = static_cast<T>(unit::spread_double(random, -9, 9));
@@ -373,7 +374,7 @@ TEST(RepeatedFoldUnordered, StaysWithinTheBound) {
     check_unordered<double>();
 }
 
-// Blends of a user's own.
+// Blends that a user defines.
 struct color {
     float r, g, b, alpha;
 };

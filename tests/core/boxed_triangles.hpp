@@ -13,13 +13,13 @@
 
 namespace unit {
 
-// q: vertices in units of 2^-fraction voxel, lo: the box's lowest voxel, last: its highest, counted from that.
+// q: vertices in units of 2^-fraction voxel. lo: lowest voxel of the box. last: highest voxel, relative to lo.
 struct boxed_triangle {
     std::int32_t q[3][3], lo[3];
     int last[3];
 
     [[nodiscard]] int wide() const { return (last[0] != 0) + (last[1] != 0) + (last[2] != 0); }
-    // Along one axis; false where it is more than `most` voxels.
+    // Along one axis. False if the box is longer than `most` voxels.
     bool find_box(int k, int fraction, int most = 2) {
         lo[k] = (voxelpipe::core::min3(q[0][k], q[1][k], q[2][k]) - 1) >> fraction;
         last[k] = (voxelpipe::core::max3(q[0][k], q[1][k], q[2][k]) >> fraction) - lo[k];
@@ -40,7 +40,7 @@ struct boxed_triangles {
     std::int32_t number(std::int64_t lo, std::int64_t hi) {
         return static_cast<std::int32_t>(std::uniform_int_distribution(lo, hi)(random));
     }
-    // A triangle of at most `most` voxels a side; false where this one is larger.
+    // Makes a triangle of at most `most` voxels a side. False if it turned out larger.
     bool triangle(int most, boxed_triangle& t) {
         const std::int64_t one = std::int64_t{1} << fraction;
         const std::int64_t sizes[] = {most * one, (most - 1) * one, one / 2, one / 20 + 4, one / 500 + 4};

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// How much room a call gets for what only the device finds out: calls that come again fit at once, and not by far.
+// Capacities of arrays whose size only the device finds out: a repeated call fits at once, with little to spare.
 
 #include <voxelpipe/device/call/capacity_history.hpp>
 
@@ -17,7 +17,7 @@ using lengths = room::lengths;
 
 room make_room() { return room({true, false}); }
 
-// Runs a call that needs so much; returns how often.
+// Runs a call that needs these sizes. Returns the number of attempts.
 int run(room& r, int key, const lengths& needed, const lengths& first, lengths* given = nullptr) {
     lengths there = r.guess(key, first);
     for (int tries = 1;; ++tries) {
@@ -42,7 +42,7 @@ TEST(CallRoom, WhatDoesNotFitIsRunOnceMore) {
     room r = make_room();
     EXPECT_EQ(run(r, 1, {1000000, 60}, {100, 200}), 2);
     EXPECT_EQ(run(r, 1, {1000000, 60}, {100, 200}), 1);
-    EXPECT_EQ(run(r, 2, {1000000, 60}, {100, 200}), 1); // another call does not start from nothing
+    EXPECT_EQ(run(r, 2, {1000000, 60}, {100, 200}), 1); // a second call starts from the first one's sizes
 }
 
 TEST(CallRoom, TheSameCallGetsLittleMoreThanItNeeds) {
@@ -59,7 +59,7 @@ TEST(CallRoom, TheSameCallGetsLittleMoreThanItNeeds) {
     EXPECT_EQ(run(r, 1, {needed[0] + needed[0] / 17, needed[1]}, first), 1);
 }
 
-// The key does not say everything: two calls in turn that it takes for one, of which the other needs twice as much.
+// Two calls with the same key alternate, and one needs twice as much as the other.
 TEST(CallRoom, CallsInTurnFitAfterOnce) {
     room r = make_room();
     const lengths small{100000, 1000}, large{200000, 900000}, first{150000, 50000};
@@ -96,7 +96,7 @@ TEST(CallRoom, SaysWhatCallsLikeTheLastNeeded) {
     EXPECT_EQ(r.most_needed(1, 0), 7u);
     EXPECT_EQ(r.most_needed(1, 1), 0u);
     EXPECT_FALSE(r.most_needed(2, 0).has_value());
-    EXPECT_EQ(run(r, 1, {3, 9}, {100, 100}), 1); // the most
+    EXPECT_EQ(run(r, 1, {3, 9}, {100, 100}), 1); // the larger of the two
     EXPECT_EQ(r.most_needed(1, 0), 7u);
     EXPECT_EQ(r.most_needed(1, 1), 9u);
     EXPECT_EQ(run(r, 2, {1, 1}, {100, 100}), 1);

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Coverage by the signs at a box's inner corners against coverage in integers (small_triangle.hpp, which its own test
-// compares with the general path): boxes of up to 2 and up to 3 voxels a side, vertices on voxel faces and edges,
-// repeated vertices, triangles without area, and how often the signs are sure.
+// Coverage by the signs at a box's inner corners against coverage in integers (small_triangle.hpp, which
+// small_triangle_test compares with the general path). Boxes of up to 3 voxels a side, vertices on voxel faces and
+// edges, repeated vertices, triangles without area. Also how often the signs are certain.
 
 #include "boxed_triangles.hpp"
 #include "test_support.hpp"
@@ -34,7 +34,7 @@ rows by_integers(const boxed_triangle& t, int fraction, const small_box& box) {
     return out;
 }
 
-TEST(CornerSigns, TwoVoxelsASide) {
+TEST(CornerSigns, OfTwoVoxelsASideAreTheGeneralSet) {
     boxed_triangles g;
     int compared = 0, sure = 0, cubes = 0, sure_cubes = 0, quads = 0, partly = 0;
     for (const int fraction : {12, 13, 14, 15, 16}) {
@@ -77,7 +77,7 @@ TEST(CornerSigns, TwoVoxelsASide) {
     EXPECT_GT(cubes, compared / 20);
 }
 
-TEST(CornerSigns, ThreeVoxelsASide) {
+TEST(CornerSigns, OfThreeVoxelsASideAreTheGeneralSet) {
     boxed_triangles g;
     int compared = 0, sure = 0, full = 0;
     for (const int fraction : {12, 13, 14, 15, 16}) {
@@ -90,7 +90,7 @@ TEST(CornerSigns, ThreeVoxelsASide) {
             if (!out.sure) continue;
             ++sure;
             if (t.last[0] == 2 && t.last[1] == 2 && t.last[2] == 2) ++full;
-            small_box box{{0, 0, 0}, {t.last[0], t.last[1], t.last[2]}}; // or a part of it
+            small_box box{{0, 0, 0}, {t.last[0], t.last[1], t.last[2]}}; // sometimes only a part of it
             if (g.number(0, 3) == 0)
                 for (int k = 0; k < 3; ++k) {
                     box.lo[k] = g.number(0, t.last[k]);
@@ -106,7 +106,7 @@ TEST(CornerSigns, ThreeVoxelsASide) {
     EXPECT_GT(full, compared / 100);
 }
 
-TEST(CornerSigns, ThreeVoxelsAlongOneAxis) {
+TEST(CornerSigns, OfThreeVoxelsAlongOneAxisAreTheGeneralSet) {
     boxed_triangles g;
     int compared = 0, sure = 0, partly = 0, lines = 0, flat[3] = {}, full[3] = {};
     for (const int fraction : {12, 13, 14, 15, 16}) {
@@ -144,8 +144,8 @@ TEST(CornerSigns, ThreeVoxelsAlongOneAxis) {
     }
 }
 
-// What rounding decides is not decided: every vertex and edge on the grid.
-TEST(CornerSigns, NotSureWhereAnEdgeMeetsACorner) {
+// All vertices and edges lie on the grid, so rounding would decide. The signs must say that they are not certain.
+TEST(CornerSigns, AreUncertainIfAnEdgeMeetsACorner) {
     constexpr int fraction = 14;
     constexpr std::int32_t one = 1 << fraction;
     const int last[3] = {1, 1, 1};

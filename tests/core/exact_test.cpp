@@ -21,7 +21,7 @@ using unit::splitmix64;
 using vp::int128;
 using vp::uint128;
 
-// A number of any length up to `bits`, with runs of ones and zeros, which is where roundings carry.
+// A number of any length up to `bits`, often with runs of ones, because these make roundings carry.
 uint128 any_magnitude(splitmix64& random, int bits) {
     const int length = static_cast<int>(random.between(1, bits));
     uint128 a = (static_cast<uint128>(random.next()) << 64) | random.next();
@@ -47,7 +47,7 @@ TEST(RoundToBinary, IsTheCompilersConversionOfWideIntegers) {
         const uint128 a = any_magnitude(random, 128);
         const double d = static_cast<double>(a);
         ASSERT_EQ(ex::round_to_binary(a, 0, 52, 11), std::bit_cast<std::uint64_t>(d));
-        const uint128 b = any_magnitude(random, 127); // nothing that a float would call infinite
+        const uint128 b = any_magnitude(random, 127); // below the range that rounds to infinity
         const float f = static_cast<float>(b);
         ASSERT_EQ(ex::round_to_binary(b, 0, 23, 8), std::bit_cast<std::uint32_t>(f));
     }
@@ -56,13 +56,13 @@ TEST(RoundToBinary, IsTheCompilersConversionOfWideIntegers) {
 TEST(RoundToBinary, ScalesAsLdexpDoesIntoSubnormalsAndInfinity) {
     splitmix64 random(2);
     for (std::int64_t i = 0; i < unit::cases(2'000'000); ++i) {
-        // 53 bits are a double exactly, so ldexp rounds once.
+        // A double holds 53 bits exactly, so ldexp rounds once.
         const auto a = static_cast<std::uint64_t>(any_magnitude(random, 53));
         const int e = static_cast<int>(random.between(-1200, 1100));
         ASSERT_EQ(ex::round_to_binary(a, e, 52, 11),
                   std::bit_cast<std::uint64_t>(std::ldexp(static_cast<double>(a), e)))
             << a << " * 2^" << e;
-        // A double holds every float's neighbourhood exactly, so the conversion is the only rounding.
+        // The double is exact, so the conversion to float is the only rounding.
         const int fe = static_cast<int>(random.between(-210, 90));
         const double exact = std::ldexp(static_cast<double>(a), fe);
         ASSERT_EQ(ex::round_to_binary(a, fe, 23, 8), std::bit_cast<std::uint32_t>(static_cast<float>(exact)))
@@ -149,7 +149,7 @@ TEST(RoundToInt64, TakesTiesToEven) {
 
 template <class Int>
 void check_divisions(Int a, Int b) {
-    const int128 floor = ex::floor_div(a, b), ceil = ex::ceil_div(a, b); // the products below may pass 64 bits
+    const int128 floor = ex::floor_div(a, b), ceil = ex::ceil_div(a, b); // the products below may exceed 64 bits
     ASSERT_TRUE(floor * b <= a && a - floor * b < b);
     ASSERT_TRUE(ceil * b >= a && ceil * b - a < b);
 }

@@ -27,7 +27,7 @@ TEST(FractionBits, AreWhatAFloatHasLeft) {
     }
 }
 
-// The formula in exact rationals, each of its steps rounded to double by hand.
+// The formula in exact rationals. Each step is rounded to double explicitly.
 std::optional<std::int64_t> snap_model(double p, double origin, double scale) {
     const unit::rational a = unit::exact(p), b = unit::exact(origin);
     const unit::rational difference{a.numerator * b.denominator - b.numerator * a.denominator,

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// core/half.hpp, exhaustively: all 65,536 halves, and the floats at and round every point where the rounding changes.
+// core/half.hpp, exhaustively: all 65,536 halves, and the floats next to every point where the rounding changes.
 
 #include "test_support.hpp"
 
@@ -16,7 +16,7 @@ namespace {
 
 using voxelpipe::half;
 
-// The value that the standard gives the pattern; not for exponent 31.
+// The value of the pattern by IEEE 754; not for exponent 31.
 double value_of(std::uint16_t bits) {
     const int exponent = (bits >> 10) & 31, mantissa = bits & 0x3ff;
     const double magnitude = exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(1024 + mantissa, exponent - 25);
@@ -49,12 +49,12 @@ TEST(Half, EveryPatternSurvivesTheWayThroughFloat) {
     }
 }
 
-// The nearest half by comparing distances, ties to the even pattern.
+// The nearest half, found by comparing distances; ties go to the even pattern.
 std::uint16_t nearest(float f) {
     static const std::vector<double> positive = [] {
         std::vector<double> v;
         for (std::uint16_t bits = 0; bits < 0x7c00; ++bits) v.push_back(value_of(bits));
-        v.push_back(65536.0); // what follows the largest half, were the exponent wider: stands for infinity
+        v.push_back(65536.0); // the successor of the largest half if the exponent were wider; it stands for infinity
         return v;
     }();
     const double a = std::fabs(double{f});
@@ -62,7 +62,8 @@ std::uint16_t nearest(float f) {
     if (a >= 65536.0) return static_cast<std::uint16_t>(sign | 0x7c00);
     const auto above = std::upper_bound(positive.begin(), positive.end(), a);
     const auto low = static_cast<std::size_t>(above - positive.begin()) - 1;
-    const double down = a - positive[low], up = positive[low + 1] - a; // exact: the numbers are close
+    const double down = a - positive[low],
+                 up = positive[low + 1] - a; // exact, because the numbers are close to each other
     const std::size_t chosen = down < up ? low : up < down ? low + 1 : low + (low & 1);
     return static_cast<std::uint16_t>(sign | chosen);
 }

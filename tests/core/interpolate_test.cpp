@@ -40,7 +40,7 @@ triangle random_triangle(splitmix64& random, int bits) {
     return t;
 }
 
-// All of it once more with wide integers: normal, dominant axis, barycentric numerators over twice the projected area.
+// The same in wide integers: normal, dominant axis, barycentric numerators over twice the projected area.
 struct model {
     unit::wide normal[3]; // x y z
     int axis;             // -1: zero area
@@ -123,7 +123,7 @@ void check_barycentrics(splitmix64& random, int bits) {
     const auto exact = m.weights(t, u, v);
     for (int i = 0; i < 3; ++i) {
         const unit::rational& w = exact[static_cast<std::size_t>(i)];
-        // Numerator and denominator are rounded to double (where they do not fit), then the quotient, then to float.
+        // Numerator and denominator are rounded to double if they do not fit, then the quotient, then the float.
         const double n = unit::nearest_double({w.numerator + w.numerator}),
                      d = unit::nearest_double({w.denominator + w.denominator});
         ASSERT_EQ(b[i], static_cast<float>(n / d));
@@ -142,7 +142,7 @@ TEST(Barycentric, IsTheExactRatioRounded) {
     }
 }
 
-// A small triangle's frame, in 32 bits, against the one in 64: weights, axis and normal, to the bit.
+// The 32-bit frame of a small triangle gives the same bits as the 64-bit one: weights, axis and normal.
 TEST(Barycentric, OfASmallTriangleIsTheSame) {
     splitmix64 random(5);
     int zero_areas = 0;
@@ -238,7 +238,7 @@ TEST(Barycentric, ClampedLiesOnTheTriangle) {
     for (std::int64_t i = 0; i < unit::cases(100'000); ++i) {
         const auto f = [&] { return static_cast<float>(unit::spread_double(random, -5, 5)); };
         glm::vec3 b{f(), f(), 0};
-        b.z = 1.0f - b.x - b.y; // what is left, as for a point of the plane
+        b.z = 1.0f - b.x - b.y; // so that the weights sum to 1, as for a point of the plane
         const glm::vec3 c = vp::core::clamp_barycentric(b);
         for (int k = 0; k < 3; ++k) {
             ASSERT_GE(c[k], 0.0f);
@@ -443,7 +443,7 @@ TEST(Varyings, TwelveMembersComeOutInOrder) {
     const twelve m = vp::core::mix(a, b, c, 0.5f, 0.25f);
     EXPECT_EQ(m.d, 52.0f);
     EXPECT_EQ(m.l, 59.0f);
-    EXPECT_EQ(m.a, 1.0f); // where the vertices agree the value is exact whatever the weights
+    EXPECT_EQ(m.a, 1.0f); // all vertices agree, so the value is exact for any weights
     EXPECT_EQ(m.k, 11.0f);
     EXPECT_EQ(vp::core::mix(one{1}, one{3}, one{9}, 0.5f, 0.0f).a, 2.0f);
     static_assert(std::is_empty_v<decltype(vp::core::mix(nothing{}, nothing{}, nothing{}, 0.f, 0.f))>);

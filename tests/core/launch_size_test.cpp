@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Numbers of blocks for any number of items: a count that is cut to 32 bits leaves a device idle, or work undone.
+// The number of blocks for any number of items. A count that is truncated to 32 bits would leave the device idle, or
+// work undone.
 
 #include <voxelpipe/device/base/launch_size.hpp>
 
@@ -15,7 +16,7 @@ namespace {
 
 namespace core = voxelpipe::core;
 
-// Around every power of two, 2^63 and the largest number included.
+// Numbers around every power of two, including 2^63 and the largest number.
 std::vector<std::uint64_t> numbers(int most_bits) {
     std::vector<std::uint64_t> all{0};
     for (int bit = 0; bit < most_bits; ++bit) {
@@ -36,10 +37,11 @@ TEST(LaunchSize, LoopingKernelsFillTheDeviceAndNoMore) {
                     ASSERT_LE(blocks, core::most_blocks);
                     const auto room = std::uint64_t{multiprocessors} * each;
                     const auto reached = blocks * threads;
-                    // Every item has a thread, or the device is full, or the grid is.
+                    // Every item has a thread, or the device is full, or the grid has its largest size.
                     ASSERT_TRUE(reached >= items || blocks >= room || blocks == core::most_blocks)
                         << items << ' ' << threads << ' ' << multiprocessors << ' ' << each << ": " << blocks;
-                    // No block without an item but the one that there must be, and none beyond what fits the device.
+                    // No block is without an item, except the one that a launch needs, and no more blocks than fit the
+                    // device.
                     if (blocks > 1) {
                         ASSERT_LT(reached - threads, items);
                         ASSERT_LE(blocks, room);
@@ -55,7 +57,7 @@ TEST(LaunchSize, TwoToTheFortyItemsFillTheDevice) {
     EXPECT_EQ(core::blocks_to_fill(257, 256, 132, 8), 2u);
 }
 
-TEST(LaunchSize, AThreadAnItem) {
+TEST(LaunchSize, EveryItemHasAThread) {
     for (const std::uint64_t n : numbers(32)) {
         const auto items = static_cast<std::uint32_t>(n);
         for (const std::uint32_t threads : {32u, 128u, 256u, 1024u}) {

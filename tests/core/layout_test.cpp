@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// core/layout.hpp and core/tile_grid.hpp: every layout stores each voxel in places of its own, at the documented
-// address; tiles cover the extent.
+// core/layout.hpp and core/tile_grid.hpp: every layout stores each voxel at the documented address, and no two voxels
+// share one; tiles cover the extent.
 
 #include "test_support.hpp"
 
@@ -30,7 +30,7 @@ void for_each_voxel(glm::ivec3 e, F&& f) {
             for (int x = 0; x < e.x; ++x) f(x, y, z);
 }
 
-// Storing one voxel changes that voxel and no other, and what was stored is what is loaded.
+// Storing one voxel changes that voxel and no other, and loading returns the stored value.
 template <class T, class Layout>
 void check_bijection() {
     using map = vp::core::storage_map<T, Layout>;
@@ -44,7 +44,7 @@ void check_bijection() {
             } else if constexpr (map::components > 1) {
                 typename map::value v;
                 for (int c = 0; c < map::components; ++c)
-                    // Small enough for every element type.
+                    // a value that every element type can hold
                     v[c] = static_cast<typename vp::core::vector_traits<T>::element>(
                         static_cast<float>((i * 4 + static_cast<std::uint32_t>(c)) % 251));
                 return v;
@@ -61,7 +61,7 @@ void check_bijection() {
     }
 }
 
-TEST(StorageMap, EveryVoxelHasAPlaceOfItsOwn) {
+TEST(StorageMap, NoTwoVoxelsShareAnAddress) {
     check_bijection<std::uint32_t, layout::linear>();
     check_bijection<std::uint32_t, layout::tiled>();
     check_bijection<std::uint32_t, layout::planar>();
@@ -129,8 +129,8 @@ TEST(StorageMap, TiledIsBricksOfEight) {
     EXPECT_EQ(bits::cell({33, 9, 8}, 32, 8, 7), 3u * 64 + 56);
 }
 
-// A slice of a grid that passes 2^32 voxels is addressed beyond 32 bits.
-TEST(StorageMap, AddressesPass32Bits) {
+// In a grid of more than 2^32 voxels, addresses exceed 32 bits.
+TEST(StorageMap, AddressesMayExceed32Bits) {
     const glm::ivec3 e{4096, 4096, 4096};
     using bytes = vp::core::storage_map<std::uint8_t, layout::linear>;
     EXPECT_EQ(bytes::elements(e), std::size_t{1} << 36);
@@ -188,12 +188,12 @@ TEST(ChangeLog, KnowsValuesByTheirBytes) {
     };
     EXPECT_TRUE(same(known(1.5f), known(1.5f)));
     EXPECT_FALSE(same(known(0.0f), known(-0.0f)));
-    EXPECT_FALSE(same(known(0.0f), known())); // something, though all its bytes are zeros
+    EXPECT_FALSE(same(known(0.0f), known())); // a known value, though all its bytes are zero
     EXPECT_FALSE(same(known(glm::dvec4(1, 2, 3, 4)), known(glm::dvec4(1, 2, 3, 5))));
     std::vector<std::uint32_t> words(vp::change_words({40, 9, 9}), ~0u);
     vp::core::change_log::forget(words.data());
     EXPECT_EQ(words[vp::core::change_log::header_words - 1], 0u);
-    EXPECT_EQ(words[vp::core::change_log::header_words], ~0u); // marks stay: they say less without the rest
+    EXPECT_EQ(words[vp::core::change_log::header_words], ~0u); // the marks stay; without a header they are not used
 }
 
 } // namespace

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The way of many workers through several lists: every chunk once, all lists at the same pace.
+// How many workers walk several lists: every chunk once, all lists at the same pace.
 
 #include <voxelpipe/device/raster/list_walk.hpp>
 
@@ -16,7 +16,7 @@ namespace {
 
 using walk = voxelpipe::core::list_walk<3>;
 
-// All chunks of all workers as they come: the first of each worker, the second of each, and so on.
+// All chunks in the order in which workers reach them: the first of each worker, the second of each, and so on.
 std::vector<walk::chunk> all_chunks(const std::uint32_t (&chunks)[3], std::uint32_t workers) {
     std::vector<walk> walks;
     for (std::uint32_t w = 0; w < workers; ++w) walks.emplace_back(chunks, w, workers);
@@ -26,7 +26,7 @@ std::vector<walk::chunk> all_chunks(const std::uint32_t (&chunks)[3], std::uint3
         for (walk& w : walks) {
             const walk::chunk c = w.next();
             if (c.list < 0) continue;
-            EXPECT_TRUE(any || &w == walks.data()); // no worker has more than one before it
+            EXPECT_TRUE(any || &w == walks.data()); // no worker has more chunks than the one before it
             any = true;
             all.push_back(c);
         }
@@ -49,7 +49,7 @@ const std::array<std::array<std::uint32_t, 3>, 12> cases{{{0, 0, 0},
                                                           {64, 64, 64},
                                                           {9999, 9999, 9999}}};
 
-TEST(ListWalk, EveryChunkOnce) {
+TEST(ListWalk, VisitsEveryChunkOnce) {
     for (const auto& c : cases)
         for (const std::uint32_t workers : {1u, 2u, 7u, 64u, 1000u}) {
             const std::uint32_t chunks[3] = {c[0], c[1], c[2]};
@@ -63,9 +63,9 @@ TEST(ListWalk, EveryChunkOnce) {
         }
 }
 
-// Where there is much, lists are never apart by more than a 64th of each and a chunk; where there is little, they come
-// one after the other, the last one first.
-TEST(ListWalk, AllAtTheSamePace) {
+// In long lists, progress differs by at most 1/64 of each list and one chunk. Short lists come one after the other,
+// the last one first.
+TEST(ListWalk, AdvancesAllListsAtTheSamePace) {
     const std::uint32_t chunks[3] = {20000, 900, 5000}, workers = 20;
     std::uint32_t done[3]{};
     for (const walk::chunk& chunk : all_chunks(chunks, workers)) {
@@ -86,8 +86,8 @@ TEST(ListWalk, AllAtTheSamePace) {
     EXPECT_EQ(last, 0);
 }
 
-// Numbers as large as a mesh of 2^32 triangles has.
-TEST(ListWalk, ManyChunks) {
+// Lists as long as those of a mesh with 2^32 triangles.
+TEST(ListWalk, HoldsForListsOf2To32Entries) {
     const std::uint32_t chunks[3] = {1u << 27, 3, 1u << 26};
     walk w(chunks, 5, 1u << 22);
     std::uint64_t num = 0;

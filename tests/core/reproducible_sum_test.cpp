@@ -20,7 +20,7 @@ namespace vp = voxelpipe;
 using unit::splitmix64;
 using unit::wide;
 
-// The contract, in exact arithmetic: terms become multiples of 2^quantum, the sum is rounded once.
+// The contract in exact arithmetic: terms are rounded to multiples of 2^quantum, and their sum is rounded once.
 template <class T>
 struct format;
 template <>
@@ -42,7 +42,7 @@ struct format<double> {
     static double widen(double v) { return v; }
 };
 
-// Units of 2^quantum, to nearest, ties to even.
+// In units of 2^quantum, rounded to nearest, ties to even.
 wide to_units(double v, int quantum) {
     unit::rational r = unit::exact(v);
     if (quantum < 0)
@@ -179,7 +179,7 @@ TYPED_TEST(ReproducibleSum, DoesNotDependOnTheOrder) {
 TYPED_TEST(ReproducibleSum, HoldsAMillionTerms) {
     splitmix64 random(4);
     const auto count = static_cast<std::size_t>(unit::cases(1'000'000));
-    // Drawn from two thousand different ones, so that the model can multiply.
+    // Only two thousand different terms, so that the model can multiply.
     std::vector<repeated<TypeParam>> pool(2000);
     for (auto& p : pool) p = {random_term<TypeParam>(random), 0};
     std::vector<TypeParam> terms(count);
@@ -189,7 +189,7 @@ TYPED_TEST(ReproducibleSum, HoldsAMillionTerms) {
         t = p.term;
     }
     EXPECT_EQ(library(terms), model(pool));
-    // The largest terms, all of one sign: every carry there is.
+    // The largest terms, all of one sign, cause every possible carry.
     for (const double sign : {1.0, -1.0}) {
         TypeParam largest;
         if constexpr (std::is_same_v<TypeParam, vp::half>)
@@ -210,7 +210,7 @@ TYPED_TEST(ReproducibleSum, MarksNanAndInfinity) {
     const std::vector<std::vector<TypeParam>> table{
         {nan}, {inf}, {minus}, {inf, minus}, {minus, inf}, {nan, inf}, {inf, one}, {one, minus}, {minus, nan, inf}, {}};
     for (const auto& terms : table) EXPECT_EQ(library(terms), model(terms));
-    // What the marks of the model are worth: a NaN is the one positive quiet NaN.
+    // Any NaN becomes the one positive quiet NaN.
     using bits = typename vp::core::float_bits<TypeParam>::type;
     EXPECT_EQ(library(std::vector<TypeParam>{nan}), vp::core::float_bits<TypeParam>::nan);
     EXPECT_EQ(library(std::vector<TypeParam>{inf, minus}), vp::core::float_bits<TypeParam>::nan);
@@ -224,7 +224,7 @@ std::uint64_t repeat(T clear, T value, std::uint32_t n) {
     return std::bit_cast<typename vp::core::float_bits<T>::type>(vp::core::repeated_fold<Blend, T>(clear, value)(n));
 }
 
-// Up to the most fragments that a voxel can have; 1 to 3 are folded one by one as well.
+// Up to the largest number of fragments that a voxel can have. For 1 to 3, also compared with folding one by one.
 TYPED_TEST(ReproducibleSum, OfOneTermManyTimesIsAProduct) {
     splitmix64 random(6);
     const auto any_term = [&] {
@@ -262,7 +262,7 @@ TYPED_TEST(ReproducibleSum, OfOneTermManyTimesIsAProduct) {
     }
 }
 
-TEST(ReproducibleSumFloat, EndsOfTheRange) {
+TEST(ReproducibleSumFloat, RoundsToEvenAtTheSmallEndAndToInfinityAtTheLarge) {
     using v = std::vector<float>;
     const float below = std::nextafterf(0x1p31f, 0.0f);
     EXPECT_EQ(library(v{below}), std::bit_cast<std::uint32_t>(below));
@@ -270,8 +270,8 @@ TEST(ReproducibleSumFloat, EndsOfTheRange) {
     EXPECT_EQ(library(v{-0x1p31f}), 0xff800000u);
     EXPECT_EQ(library(v{-below}), std::bit_cast<std::uint32_t>(-below));
     EXPECT_EQ(library(v{0x1p-32f}), std::bit_cast<std::uint32_t>(0x1p-32f));
-    EXPECT_EQ(library(v{0x1p-33f}), 0u);                                       // a tie goes to the even zero
-    EXPECT_EQ(library(v{0x1.8p-32f}), std::bit_cast<std::uint32_t>(0x1p-31f)); // and this one up to two
+    EXPECT_EQ(library(v{0x1p-33f}), 0u);                                       // a tie: zero is even
+    EXPECT_EQ(library(v{0x1.8p-32f}), std::bit_cast<std::uint32_t>(0x1p-31f)); // a tie: two quanta are even
     EXPECT_EQ(library(v{std::nextafterf(0x1p-33f, 1.0f)}), std::bit_cast<std::uint32_t>(0x1p-32f));
     EXPECT_EQ(library(v{1e9f, -1e9f, 0.1f}), std::bit_cast<std::uint32_t>(0.1f));
 }
@@ -317,7 +317,7 @@ TEST(ReproducibleSumQuantum, MovesTheWindow) {
     check.operator()<64>();
 }
 
-// The words themselves: every pattern of carries and borrows, against one wide number.
+// The accumulator's words: every pattern of carries and borrows, against one wide number.
 template <int Limbs>
 wide value_of(const vp::core::wide_sum<Limbs>& s) {
     wide v = wide(std::int64_t{s.top});
@@ -381,7 +381,7 @@ TEST(WideSum, RoundsWhatNeedsMoreThan128Bits) {
             }
 }
 
-// A sum of 64 bits becomes a float by one conversion; every other one, and all of them, by round_sum.
+// A 64-bit sum becomes a float by one conversion. round_sum, which handles every sum, gives the same.
 TEST(RoundSum, ToFloatByOneConversionIsTheSame) {
     splitmix64 random(9);
     const auto check = [&]<int Quantum>(std::integral_constant<int, Quantum>, const vp::core::wide_sum<1>& s) {

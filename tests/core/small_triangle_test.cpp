@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Coverage of small triangles in 32 bits against the general path of coverage.hpp (which the oracle decides about),
-// over triangles of every size that the small path takes: random, on voxel faces and edges, thin needles, without area.
+// Coverage of small triangles in 32 bits against the general path of coverage.hpp, which the oracle checks. Triangles
+// of every size that the small path accepts: random, on voxel faces and edges, thin needles, without area.
 
 #include "test_support.hpp"
 
@@ -124,7 +124,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
             const small_conservative s(t, fraction);
             voxels rows;
             const int last = static_cast<int>(box.hi[0] - box.lo[0]);
-            const int from = static_cast<int>(g.number(0, last)); // a part of a row is that part of the row
+            const int from = static_cast<int>(g.number(0, last)); // a query for a part of a row returns that part
             for (int z = 0; z <= box.hi[2] - box.lo[2]; ++z)
                 for (int y = 0; y <= box.hi[1] - box.lo[1]; ++y) {
                     const std::uint32_t whole = s.row(0, last, y, z);
@@ -175,7 +175,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
                                           static_cast<int>(box.lo[2]) + z});
                 });
                 ASSERT_EQ(again, expected) << "fraction " << fraction << ", triangle " << i;
-                // A part of the box is that part of the set.
+                // A query for a part of the box returns that part of the set.
                 const small_box part{{static_cast<int>(g.number(0, all.hi[0])),
                                       static_cast<int>(g.number(0, all.hi[1])),
                                       static_cast<int>(g.number(0, all.hi[2]))},
@@ -209,7 +209,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
                     ASSERT_EQ(by_rows, wanted) << "fraction " << fraction << ", triangle " << i;
                 }
             }
-            // Nothing of a box that the grid leaves nothing of.
+            // A box outside the grid gives nothing.
             const small_box none{{1, 0, 0}, {0, all.hi[1], all.hi[2]}};
             s.rows<true>(none, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
             s.rows_of_16<true>(none, limits, [&](int, int, std::uint32_t) { ADD_FAILURE(); });
@@ -221,7 +221,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
                     const std::uint32_t limit = s.limit_at_y(from, last, y) & s.limit_at_z(from, last, z);
                     ASSERT_EQ(s.meets_row(y, z) ? s.plane_bits(from, y, z, limit) : 0u, s.row(from, last, y, z));
                     if (limit == 0) continue;
-                    // What floats are sure of is so, and they mostly are.
+                    // Floats that say they are certain are right, and they mostly are certain.
                     const std::uint32_t left = s.plane_bits(from, y, z, limit);
                     const int begin = voxelpipe::exact::lowest_one(limit), end = voxelpipe::exact::highest_one(limit);
                     bool sure = false;
@@ -272,7 +272,7 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
             const auto last = to_uvw(s.axis, box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
             const auto origin = to_uvw(s.axis, box.lo[0], box.lo[1], box.lo[2]);
             const int from = static_cast<int>(g.number(0, last[0]));
-            voxel_box wide = box; // the depth may leave the bounding box
+            voxel_box wide = box; // the depth may lie outside the bounding box
             for (int k = 0; k < 3; ++k) {
                 wide.lo[k] -= 2;
                 wide.hi[k] += 2;
@@ -307,7 +307,7 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
             kept_rows kept;
             (void)s.find_columns(0, width - 1, 0, height - 1, 1, kept, count);
             ASSERT_EQ(count, rows.size()) << "fraction " << fraction << ", triangle " << i;
-            ASSERT_TRUE(by_columns(false, width, 1).empty()); // a part of the box that has no columns
+            ASSERT_TRUE(by_columns(false, width, 1).empty()); // a part of the box without columns
             voxels part = rows;
             std::erase_if(part, [&](const auto& p) {
                 return to_uvw<std::int64_t>(s.axis, std::get<0>(p), std::get<1>(p), std::get<2>(p))[0] <
@@ -410,7 +410,8 @@ TEST(BrickTriangle, BricksMakeTheGeneralSet) {
                 const auto last = axes.to_rows(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
                 const auto origin = axes.to_rows(box.lo[0], box.lo[1], box.lo[2]);
                 voxels columns;
-                const auto before = static_cast<int>(g.number(0, brick_size - 1)); // the box, where a brick begins
+                const auto before =
+                    static_cast<int>(g.number(0, brick_size - 1)); // distance of the box from the brick's begin
                 for (int at_v = 0; at_v <= last[1]; ++at_v)
                     for (int at_u = -before; at_u <= last[0]; at_u += brick_size) {
                         const int end = static_cast<int>(last[0]) - at_u;
@@ -443,9 +444,9 @@ TEST(BrickTriangle, BricksMakeTheGeneralSet) {
     EXPECT_GT(runs, 2 * long_runs);
 }
 
-// Rows of triangles as large as the 64-bit path holds, some thousand voxels, where depths in floats count from a place
-// of the row's own.
-TEST(BrickTriangle, RowsOfTheLargestTriangles) {
+// Rows of triangles as large as the 64-bit path allows, some thousand voxels. There, depths in floats are relative to a
+// base per row.
+TEST(BrickTriangle, RowsOfTheLargestTrianglesAreTheGeneralSet) {
     generator g;
     std::uint64_t rows = 0, far_rows = 0;
     for (const int fraction : {12, 13, 14, 15, 16})

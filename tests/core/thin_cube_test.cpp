@@ -1,9 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Thin coverage of boxes of up to two voxels a side in floats against the same in integers (which small_triangle_test
-// compares with the general path), and how often the floats are sure: of triangles made to be difficult, and of those
-// that a mesh has.
+// Thin coverage of boxes of up to two voxels a side in floats against the same in integers, which small_triangle_test
+// compares with the general path. Also how often the floats are certain, for difficult triangles and for a mesh's.
 
 #include "boxed_triangles.hpp"
 #include "test_support.hpp"
@@ -47,7 +46,7 @@ struct seen {
     }
 };
 
-TEST(ThinCube, FloatsThatAreSureSayWhatIntegersSay) {
+TEST(ThinCube, CertainFloatsAgreeWithIntegers) {
     boxed_triangles g;
     seen s;
     for (const int fraction : {12, 13, 14, 15, 16, 18, 19}) {
@@ -65,8 +64,8 @@ TEST(ThinCube, FloatsThatAreSureSayWhatIntegersSay) {
     for (const int n : s.by_axis) EXPECT_GT(n, s.sure / 4);
 }
 
-// Sides of a voxel and of a tenth of one, anywhere: what is not sure takes the integers of a whole warp.
-TEST(ThinCube, FloatsAreSureOfAMeshsTriangles) {
+// Triangles of about one voxel and of a tenth, anywhere. An uncertain one costs a whole warp the integer path.
+TEST(ThinCube, FloatsAreCertainForNearlyAllTrianglesOfAMesh) {
     boxed_triangles g;
     for (const int fraction : {12, 14, 16, 19})
         for (const int parts : {1, 10}) {

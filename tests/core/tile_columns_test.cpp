@@ -32,7 +32,7 @@ struct snapped_triangle {
     int fraction;
 };
 
-// A triangle of any class on any of the oracle's test grids; nothing where it would be dropped.
+// A triangle of any class on any of the oracle's test grids; nothing if it would be dropped.
 bool make_snapped(splitmix64& random, snapped_triangle& out) {
     const auto& grids = oracle::test_grids();
     const oracle::test_grid& where = grids[random.below(grids.size())];
@@ -61,7 +61,7 @@ core::voxel_box make_box(splitmix64& random, const snapped_triangle& t) {
     for (int a = 0; a < 3; ++a) {
         const std::int64_t size = random.one_in(2) ? 32 : random.between(1, 32);
         box.lo[a] = random.between(all.lo[a] - size, all.hi[a] + 1);
-        // Near a corner more often than not: large triangles have most of their area elsewhere.
+        // Mostly near a corner, because large triangles have most of their area elsewhere.
         if (random.one_in(2)) box.lo[a] = all.lo[a] - random.between(0, size - 1);
         box.hi[a] = box.lo[a] + size - 1;
     }
@@ -117,7 +117,7 @@ voxel_list by_slab_rows(const snapped_triangle& t, int axis, const core::voxel_b
     return out;
 }
 
-// Empty where the function declines; `declined` says so.
+// Empty, with `declined` set, if the function declines the triangle.
 template <int Size, class Lanes, class WideLanes>
 voxel_list by_small_rows(const snapped_triangle& t, const core::voxel_box& box, bool& declined) {
     voxel_list out;
@@ -131,8 +131,8 @@ voxel_list by_small_rows(const snapped_triangle& t, const core::voxel_box& box, 
     return out;
 }
 
-// A triangle in a box of `size` voxels a side somewhere near the grid's origin: anywhere in it, with coordinates at its
-// ends or on voxel faces, or flat in an axis.
+// A triangle in a box of `size` voxels a side near the grid's origin: anywhere in the box, with coordinates at its
+// ends or on voxel faces, or flat along an axis.
 snapped_triangle make_boxed(splitmix64& random, std::int64_t size) {
     const auto fraction = static_cast<int>(random.one_in(3) ? 16 : random.between(1, 16));
     const std::int64_t unit = std::int64_t{1} << fraction, end = size * unit - 1;
@@ -238,7 +238,7 @@ TEST(SmallBox, RowsAreTheSpans) {
     for (std::int64_t i = 0; i < unit::cases(200'000); ++i) {
         const snapped_triangle t = make_boxed(random, random.between(1, 8));
         const core::voxel_box all = core::bounds(t.a, t.b, t.c, t.fraction);
-        if (!core::is_within(all, 8)) continue; // a coordinate on a face touches one voxel more
+        if (!core::is_within(all, 8)) continue; // a coordinate on a face touches one more voxel
         const core::voxel_box box = make_box(random, t);
         const auto normal = core::setup_triangle<core::span_rule::thin, vp::int128>(t.a, t.b, t.c, t.fraction).normal;
         const bool flat = normal[0] == 0 || normal[1] == 0 || normal[2] == 0;

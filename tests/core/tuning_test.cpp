@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Policies of the fine raster: legal on every architecture for every set of targets, and chosen by the architecture
-// whose code a device runs.
+// Policies of the fine raster are legal on every architecture for every set of targets, and are chosen by the
+// architecture whose code the device runs.
 
 #include <voxelpipe/tuning/tuning_fine_raster.hpp>
 
@@ -36,12 +36,12 @@ TEST(Tuning, PoliciesAreLegalWhereverTheyAreUsed) {
         }
 }
 
-// The winners of the sweep on an NVIDIA H200, a bit that says whether a voxel is touched among the voxel's.
-TEST(Tuning, NumbersOfTheH200) {
+// The fastest policies of the sweep on an NVIDIA H200. One bit of each voxel is the occupancy mask.
+TEST(Tuning, PoliciesForTheH200AreThoseOfTheSweep) {
     constexpr tuning::fine_raster_selector select;
     EXPECT_EQ(select(1 + 1, 90), (tuning::fine_raster_policy{256, 4, 4}));  // a target of bits
     EXPECT_EQ(select(96 + 1, 90), (tuning::fine_raster_policy{256, 4, 2})); // a sum of floats
-    EXPECT_EQ(select(2 + 1, 90), (tuning::fine_raster_policy{256, 5, 2}));  // not swept: the largest tile
+    EXPECT_EQ(select(2 + 1, 90), (tuning::fine_raster_policy{256, 5, 2}));  // not in the sweep: the largest tile
 }
 
 TEST(Tuning, ADeviceRunsTheNewestArchitectureThatIsNotNewer) {
@@ -75,11 +75,11 @@ tuning::fine_raster_policy chosen(int capability) {
     return tuning::with_policy<Selector, Bits>(capability, return_it{});
 }
 
-TEST(Tuning, SelectorsOfTheUsersMayLookAtTheArchitectureOrNot) {
+TEST(Tuning, UserSelectorsMayUseTheArchitectureOrIgnoreIt) {
     EXPECT_EQ((chosen<one_for_all, 8>(90)), (tuning::fine_raster_policy{64, 3, 4}));
     EXPECT_EQ((chosen<by_architecture, 8>(80)), (tuning::fine_raster_policy{128, 4, 1}));
     EXPECT_EQ((chosen<by_architecture, 64>(80)), (tuning::fine_raster_policy{128, 3, 1}));
-    // The program decides what runs: where only 8.0 is compiled, a newer device takes 8.0's.
+    // A newer device uses the policy of 8.0 if only 8.0 is compiled.
     const tuning::fine_raster_policy newest = chosen<by_architecture, 8>(90);
     EXPECT_EQ(newest.threads_per_block, tuning::compiled_for(90) >= 90 ? 512 : 128);
 }
