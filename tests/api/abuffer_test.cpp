@@ -29,7 +29,7 @@ struct payload_shader {
     }
 };
 
-// The oracle's fragments within a part of the grid, ordered as the A-buffer orders them.
+// The oracle's fragments in a part of the grid, in the order of an A-buffer.
 std::vector<unit::model_fragment> expected_lists(const vp::grid& grid, vp::coverage rule,
                                                  const std::vector<unit::small_mesh>& draws, bool discards) {
     std::vector<unit::model_fragment> inside;
@@ -99,7 +99,7 @@ TEST_P(AbufferLists, AreTheOraclesFragmentsByVoxelAndPrimitive) {
         }
 }
 
-TEST_P(AbufferLists, WithoutPayloadHoldTheNumbersAlone) {
+TEST_P(AbufferLists, WithoutPayloadHoldOnlyPrimitiveNumbers) {
     const unit::small_mesh mesh = unit::make_mesh(3, 150, extent);
     backend_type backend = unit::make_backend();
     vp::abuffer<backend_type> lists{backend};
@@ -139,7 +139,7 @@ TEST(Abuffer, FoldedWithABlendIsTheFramebuffer) {
     }
 }
 
-TEST(Abuffer, IsEmptyWhereNothingIsCovered) {
+TEST(Abuffer, IsEmptyIfNothingIsCovered) {
     unit::small_mesh far;
     far.positions = {{1000, 0, 0}, {1001, 0, 0}, {1000, 1, 0}};
     far.triangles = {{0, 1, 2}};
@@ -157,7 +157,6 @@ TEST(Abuffer, IsEmptyWhereNothingIsCovered) {
     EXPECT_EQ(voxels, 0);
 }
 
-// Whatever it finds out on the way.
 TEST(Abuffer, ACallThatFailsLeavesEarlierListsAsTheyWere) {
     const unit::small_mesh good = unit::make_mesh(5, 100, extent);
     unit::small_mesh bad = unit::make_mesh(6, 100, extent);
@@ -169,7 +168,7 @@ TEST(Abuffer, ACallThatFailsLeavesEarlierListsAsTheyWere) {
     vp::voxelize(backend, good.on(backend), unit::unit_grid(extent), vp::passthrough{}, sum_shader{}, lists).or_throw();
     const auto before = lists.to_host(backend);
     ASSERT_GT(before.primitives.size(), 0u);
-    // Of another extent, with a shader and with constant fragments, and refused before it starts.
+    // Another extent; computed and constant fragments; and a call that is refused before it starts.
     const vp::grid other = unit::unit_grid({60, 30, 31});
     EXPECT_EQ(vp::voxelize(backend, bad.on(backend), other, vp::passthrough{}, sum_shader{}, lists).code,
               vp::status_code::index_out_of_range);
@@ -185,7 +184,7 @@ TEST(Abuffer, ACallThatFailsLeavesEarlierListsAsTheyWere) {
     EXPECT_TRUE(unit::same_bytes(after.payloads, before.payloads));
 }
 
-// A million fragments in one voxel: counts beyond 16 bits.
+// A million fragments in one voxel, so that its count exceeds 16 bits.
 TEST(Abuffer, HoldsManyFragmentsOfOneVoxel) {
     unit::small_mesh m;
     m.positions = {{1.25f, 1.25f, 1.25f}, {1.75f, 1.25f, 1.25f}, {1.25f, 1.75f, 1.25f}};

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the API tests share: the backend that they run on, small meshes, the fragments that the oracle gives for them in
-// primitive order, and values that depend on primitive and voxel, so that a fragment in the wrong place or order shows.
+// Shared by the API tests: the backend, small meshes, their fragments by the oracle in primitive order, and values that
+// depend on primitive and voxel, so that a fragment in a wrong voxel or order changes the result.
 //
 // The same test files are compiled twice: by the C++ compiler for cpu_backend, and by nvcc for cuda_backend
 // (tests/strategies).
@@ -24,7 +24,7 @@ namespace vp = voxelpipe;
 
 #if defined(__CUDACC__)
 using backend_type = vp::cuda_backend;
-inline constexpr unsigned thread_numbers[] = {0}; // not the caller's to choose
+inline constexpr unsigned thread_numbers[] = {0}; // the caller cannot choose
 [[nodiscard]] inline backend_type make_backend(unsigned = 0) { return backend_type{}; }
 #else
 using backend_type = vp::cpu_backend;
@@ -41,7 +41,7 @@ struct small_mesh {
     [[nodiscard]] vp::mesh<backend_type> on(backend_type& backend) const { return {backend, positions, triangles}; }
 };
 
-// `count` triangles of all sizes in and round a grid of `extent` unit voxels at the origin.
+// `count` triangles of all sizes in and around a grid of `extent` unit voxels at the origin.
 inline small_mesh make_mesh(std::uint64_t seed, int count, glm::ivec3 extent) {
     splitmix64 random(seed);
     small_mesh m;
@@ -94,7 +94,7 @@ inline std::vector<model_fragment> fragments_of(const vp::grid& g, vp::coverage 
     return out;
 }
 
-// A number that depends on all of them.
+// A hash of primitive and voxel.
 VOXELPIPE_HD inline std::uint64_t mark(std::uint32_t primitive, glm::ivec3 voxel) {
     std::uint64_t z = primitive * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(voxel.x) * 0xbf58476d1ce4e5b9u +
                       static_cast<std::uint64_t>(voxel.y) * 0x94d049bb133111ebu +
@@ -103,7 +103,7 @@ VOXELPIPE_HD inline std::uint64_t mark(std::uint32_t primitive, glm::ivec3 voxel
     return z ^ (z >> 29);
 }
 
-// The place of each fragment on its triangle, or one number for all, of which the library cannot know.
+// A barycentric of each fragment, or one constant that the library cannot know to be constant.
 struct float_shader {
     float constant = 0;
     bool varies = true;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// cpu_backend itself: the number of threads never shows, progress, stage times, exceptions, status texts.
+// cpu_backend itself: results for any number of threads, progress, stage times, exceptions, status texts.
 
 #include "api_model.hpp"
 
@@ -80,7 +80,7 @@ TEST_P(Threads, GiveTheSameBytesWhateverTheirNumber) {
 INSTANTIATE_TEST_SUITE_P(Both, Threads, ::testing::Values(vp::coverage::conservative, vp::coverage::thin),
                          [](const auto& p) { return p.param == vp::coverage::thin ? "thin" : "conservative"; });
 
-TEST(Threads, MoreThanThereIsWorkForAreHarmless) {
+TEST(Threads, MayOutnumberTheWorkItems) {
     unit::small_mesh one;
     one.positions = {{1, 1, 1}, {3, 1, 1}, {1, 3, 1}};
     one.triangles = {{0, 1, 2}};
@@ -95,8 +95,8 @@ TEST(Threads, MoreThanThereIsWorkForAreHarmless) {
     }
 }
 
-// Backends are independent: two calls at once from two threads.
-TEST(Threads, TwoCallsAtOnceDoNotMeet) {
+// Two backends, each called from a thread of its own at the same time.
+TEST(Threads, TwoConcurrentCallsAreIndependent) {
     const unit::small_mesh mesh = unit::make_mesh(2, static_cast<int>(unit::cases(3000)), extent);
     const vp::grid grid = unit::unit_grid(extent);
     std::vector<std::uint32_t> results[2];
@@ -192,7 +192,7 @@ TEST(Exceptions, OfAShaderOrProgressFunctionPassThrough) {
     }
 }
 
-TEST(Status, EveryCodeAndStageHasATextOfItsOwn) {
+TEST(Status, EveryCodeAndStageHasItsOwnText) {
     std::set<std::string> texts;
     int codes = 0;
     for (int c = 0; c <= static_cast<int>(vp::status_code::device_error); ++c, ++codes)

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Shaders that give every fragment the same values take ways of their own (cpu_ref/constant_tile.hpp,
-// device/raster/raster.cuh): the same bytes and counters as a shader of the user's that returns these values, which is
-// shaded fragment by fragment.
+// Shaders that give every fragment the same values have code paths of their own (cpu_ref/constant_tile.hpp,
+// device/raster/raster.cuh). Bytes and counters must equal those of a user's shader that returns the same values and is
+// run for each fragment.
 
 #include "api_model.hpp"
 
@@ -31,8 +31,8 @@ struct chain {
     }
 };
 
-// On a GPU a target that depends on the order is made from lists, as for any other shader (Targets in
-// api_targets_test.cpp): no need to compile two more of these.
+// On a GPU, a target that depends on the order is made from lists for every shader, which targets_test.cpp covers. Two
+// more pipelines need not be compiled here.
 #if defined(__CUDACC__)
 using ordered = vp::target<double, blend::max>;
 double ordered_value(record r) { return static_cast<double>(r.chain); }
@@ -41,14 +41,14 @@ using ordered = vp::target<record, chain>;
 record ordered_value(record r) { return r; }
 #endif
 
-// What vp::constant returns, by a shader that the library cannot know to be constant.
+// The values of vp::constant, from a shader that the library cannot know to be constant.
 template <class... Ts>
 struct opaque {
     vp::core::pack<Ts...> values;
     VOXELPIPE_HD vp::output<Ts...> operator()(const vp::fragment<>&) const { return {values}; }
 };
 
-// Shaders for several draws: those at odd places differ in all values, or in none.
+// Shaders for several draws: those of odd draws differ in all values, or in none.
 template <template <class...> class Shader, class... Ts>
 std::vector<Shader<Ts...>> shaders(std::size_t count, const vp::core::pack<Ts...>& a, const vp::core::pack<Ts...>& b) {
     std::vector<Shader<Ts...>> out;
@@ -56,7 +56,7 @@ std::vector<Shader<Ts...>> shaders(std::size_t count, const vp::core::pack<Ts...
     return out;
 }
 
-// Two passes: onto cleared targets, and onto what these hold. The last target is off in the second.
+// Two passes: one clears the targets, one loads them. The last target is off in the second.
 template <class Framebuffer, class Shader>
 std::vector<vp::counters> draw_twice(backend_type& backend, Framebuffer& fb,
                                      const std::vector<unit::small_mesh>& meshes,
@@ -154,7 +154,7 @@ TEST(ConstantShader, NumbersThatOneAtomicBlendsAreAsShaded) {
 }
 
 TEST(ConstantShader, FloatsAndStructsAreAsShaded) {
-    // A GPU adds unordered terms in any order: there, such that every sum is exact.
+    // A GPU adds unordered terms in any order, so there the terms are chosen such that every sum is exact.
     constexpr bool any_order = !std::is_same_v<backend_type, vp::cpu_backend>;
     constexpr float small = any_order ? 0.125f : 1e-3f, large = any_order ? -7.0f : -7.1f;
     expect_same<vp::target<float, blend::add>, vp::target<vp::half, blend::add>, vp::target<double, blend::add>,

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Draws on a backend: transforms, attributes and varyings, order across draws, crops, counters, what a fragment
-// shader is told.
+// Draws on a backend: transforms, attributes and varyings, order across draws, crops, counters, the inputs of a
+// fragment shader.
 
 #include "api_model.hpp"
 
@@ -75,7 +75,7 @@ struct crop_shader {
     }
 };
 
-// A part of the grid gives the crop of the whole, with voxels and counts of its own.
+// A part of the grid gives the crop of the whole, and counts its own voxels.
 TEST(Crop, IsTheCropOfTheWhole) {
     const unit::small_mesh mesh = unit::make_mesh(4, 150, extent);
     vp::grid grid = unit::unit_grid(extent);
@@ -108,7 +108,7 @@ TEST(Crop, IsTheCropOfTheWhole) {
     }
 }
 
-// Eight slabs together are the whole, fragment for fragment.
+// The fragments and voxels of all slabs add up to those of the whole.
 TEST(Crop, SlabsAddUp) {
     const unit::small_mesh mesh = unit::make_mesh(5, 100, extent);
     const vp::grid grid = unit::unit_grid(extent);
@@ -168,7 +168,7 @@ TEST(Counters, SayWhatBecameOfEveryTriangle) {
     EXPECT_GE(thin.triangles_zero_area, 2u);
 }
 
-// ---- what shaders are told ------------------------------------------------------------------------------------------
+// ---- inputs of shaders ----------------------------------------------------------------------------------------------
 
 struct surface {
     glm::vec2 uv;

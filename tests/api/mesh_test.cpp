@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// What a mesh knows of its indices, and what a view is still told by it when it is about something else.
+// A mesh remembers the largest of its indices. A view that is changed afterwards must not use that number.
 
 #include <cpu_ref/backend.hpp>
 
@@ -17,7 +17,7 @@ namespace {
 const std::vector<glm::vec3> positions(6);
 const std::vector<glm::uvec3> triangles{{0, 1, 2}, {3, 5, 1}, {2, 2, 4}};
 
-TEST(Mesh, KnowsItsIndices) {
+TEST(Mesh, KnowsItsLargestIndex) {
     vp::cpu_backend be;
     vp::mesh<vp::cpu_backend> m(be, positions, triangles);
     EXPECT_TRUE(m.view().has_checked_indices());
@@ -38,7 +38,7 @@ TEST(Mesh, KnowsNothingOfOtherTriangles) {
     v.triangles = same.view().triangles;
     EXPECT_FALSE(v.has_checked_indices());
     v = m.view();
-    v.triangles.count = 2; // a part that begins where they do
+    v.triangles.count = 2; // a part with the same begin
     EXPECT_TRUE(v.has_checked_indices());
     v = m.view();
     v.triangles = {v.triangles.data() + 1, 2};
@@ -50,7 +50,7 @@ TEST(Mesh, KnowsNothingOfOtherTriangles) {
     EXPECT_FALSE(of_vectors.has_checked_indices());
 }
 
-TEST(Mesh, AnIndexThatNamesNoVertexIsTheCallsError) {
+TEST(Mesh, AnIndexOutOfRangeIsAnErrorOfTheCall) {
     vp::cpu_backend be;
     for (const std::uint32_t index : {6u, 0x80000000u, 0xffffffffu})
         for (int corner = 0; corner < 3; ++corner) {
@@ -67,11 +67,11 @@ TEST(Mesh, AnIndexThatNamesNoVertexIsTheCallsError) {
         }
     const vp::mesh<vp::cpu_backend> m(be, positions, triangles);
     vp::mesh_view<> v = m.view();
-    v.positions.count = 5; // the last vertex, which a triangle has, is gone
+    v.positions.count = 5; // the last vertex, which a triangle uses, is gone
     EXPECT_FALSE(v.has_checked_indices());
 }
 
-TEST(Mesh, IndicesOfMemoryThatAnotherOwns) {
+TEST(Mesh, KnowsNothingOfIndicesInForeignMemory) {
     vp::cpu_backend be;
     vp::mesh_view<> v{positions, triangles};
     v.checked = vp::check_indices(be, v.triangles);

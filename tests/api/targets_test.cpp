@@ -19,9 +19,9 @@ using unit::mark;
 
 const glm::ivec3 extent{45, 34, 37};
 
-// ---- values of a fragment, by shader and by model -------------------------------------------------------------------
+// ---- a fragment's values, by shader and by model --------------------------------------------------------------------
 
-struct record { // a user's struct, with a hash chain that shows every change of order
+struct record { // a user's struct whose hash chain changes with the order
     std::uint64_t chain;
     std::uint32_t fragments;
     std::uint32_t last;
@@ -54,7 +54,7 @@ using framebuffer =
                     vp::target<std::int16_t, blend::min, vp::layout::tiled>, vp::target<vp::half, blend::add>,
                     vp::target<std::uint64_t, blend::count>, vp::target<record, chain>>;
 
-// The same, voxel by voxel, without the library's folds.
+// The expected values, voxel by voxel, without the library's folds.
 struct model_voxel {
     bool odd = false;
     std::uint32_t last = 0;
@@ -164,7 +164,7 @@ TEST(LoadOperation, ClearSetsEveryVoxelAndCountsAsAFirstTerm) {
     EXPECT_TRUE(unit::same_bytes(vp::get<0>(fb).to_host(backend), sums));
     EXPECT_TRUE(unit::same_bytes(vp::get<1>(fb).to_host(backend), floats));
 
-    // Load blends onto what is there: the same triangles once more.
+    // Load blends onto the stored values: the same triangles once more.
     vp::get<0>(fb).load();
     vp::get<1>(fb).load();
     vp::voxelize(backend, mesh.on(backend), grid, vp::passthrough{}, two_values{}, fb).or_throw();
@@ -196,7 +196,7 @@ TEST(LoadOperation, DisabledTargetsNeedNoMemory) {
 }
 
 TEST(LoadOperation, UntouchedVoxelsKeepTheirBits) {
-    // A NaN that is not the canonical one and -0 survive where no fragment falls, under clear and under load.
+    // A non-canonical NaN and -0 keep their bits in voxels without fragments, under clear and under load.
     const float odd_nan = std::bit_cast<float>(0xffc12345u);
     backend_type backend = unit::make_backend();
     vp::framebuffer<backend_type, vp::target<float, blend::add>> fb{backend, extent};
@@ -218,8 +218,8 @@ TEST(LoadOperation, UntouchedVoxelsKeepTheirBits) {
     }
 }
 
-// A framebuffer that tracks its changes holds what one that does not holds. tests/strategies/tracked_test.cu has targets
-// large enough for clears to go by what was drawn.
+// A framebuffer that tracks its changes holds the same values. tests/strategies/tracked_test.cu has targets that are
+// large enough for partial clears.
 TEST(LoadOperation, TrackedChangesMakeNoDifference) {
     backend_type backend = unit::make_backend();
     two plain{backend, extent}, tracked{backend, extent};
@@ -299,7 +299,7 @@ TEST(Layouts, HoldTheSameValues) {
     EXPECT_GT(set, 100);
 }
 
-TEST(FramebufferView, WritesIntoMemoryOfTheCallers) {
+TEST(FramebufferView, WritesIntoTheCallersMemory) {
     const unit::small_mesh mesh = unit::make_mesh(5, 30, extent);
     using target = vp::target<std::uint32_t, blend::add>;
     const std::size_t n = target::map::elements(extent);
@@ -315,7 +315,7 @@ TEST(FramebufferView, WritesIntoMemoryOfTheCallers) {
     std::uint64_t sum = 0;
     for (std::size_t i = 1; i <= n; ++i) sum += memory[i];
     EXPECT_EQ(sum, s.counts.fragments);
-    EXPECT_EQ(memory.front(), 0xababababu); // nothing beside it
+    EXPECT_EQ(memory.front(), 0xababababu); // memory beside the target is unchanged
     EXPECT_EQ(memory.back(), 0xababababu);
 }
 

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Eight more types of render target in one pass of cpu_backend, beside those of api_targets_test: narrow and wide
-// integers, doubles, and vectors of every layout, against folds over the oracle's fragments. What a target's blend
-// gives for a type alone is blend_test's; here they go through the pipeline together.
+// Eight more types of render target in one pass of cpu_backend, beside those of targets_test: narrow and wide integers,
+// doubles, and vectors of every layout, against folds over the oracle's fragments. tests/core/blend_test.cpp checks
+// each blend alone; here they go through the pipeline together.
 
 #include "api_model.hpp"
 
@@ -32,7 +32,7 @@ const glm::ivec3 extent{45, 34, 37};
 double double_of(std::uint64_t m) {
     return std::ldexp(static_cast<double>(static_cast<std::int64_t>(m)), -60 - static_cast<int>(m & 15u));
 }
-// Now and then no number, which min takes only where there is nothing else.
+// Sometimes NaN, which min keeps only if there is no number.
 glm::dvec2 pair_of(std::uint64_t m) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     return {m % 3 == 0 ? -nan : double_of(m), static_cast<double>(static_cast<std::int8_t>(m >> 8))};
@@ -43,7 +43,7 @@ u8vec4 bytes_of(std::uint64_t m) {
 }
 i64vec2 signed_of(std::uint64_t m) { return {static_cast<std::int64_t>(m), -static_cast<std::int64_t>(m >> 5)}; }
 u64vec2 unsigned_of(std::uint64_t m) { return {m, m * m}; }
-// The greatest of the last component is no number as soon as one is.
+// The maximum of the last component is NaN if any term is.
 hvec3 halves_of(std::uint64_t m) {
     const auto of = [](std::uint64_t bits) {
         return vp::half(static_cast<float>(static_cast<std::int16_t>(bits)) * 0x1p-7f);
@@ -66,7 +66,7 @@ using framebuffer =
                     vp::target<u8vec4, blend::replace>, vp::target<i64vec2, blend::add, vp::layout::planar>,
                     vp::target<hvec3, blend::max>, vp::target<u64vec2, blend::add, vp::layout::tiled>>;
 
-// The same, voxel by voxel, without the library's folds. Sums of integers are those of the exact ones, cut to size.
+// The expected values, voxel by voxel, without the library's folds. Sums of integers are exact, then truncated.
 struct model_voxel {
     unsigned sum = 0;
     std::uint16_t common = 0xffff;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A hash of which voxels of a bit grid are set, and picks from it.
+// A hash of the set voxels of a bit grid, and random picks from it.
 
 #include <bit>
 #include <cstddef>

@@ -3,7 +3,7 @@
 
 #pragma once
 
-// What the cases share: meshes, grids, and how results enter a digest.
+// Shared by the cases: meshes, grids, and functions that add results to a digest.
 
 #include "golden.hpp"
 #include "meshes.hpp"
@@ -24,7 +24,7 @@ inline vp::grid unit_grid(glm::ivec3 extent) {
     return g;
 }
 
-// Odd extents, a voxel size of its own along every axis, an origin off every power of two.
+// Odd extents, three different voxel sizes, an origin that is no power of two.
 inline vp::grid odd_grid() {
     vp::grid g;
     g.extent = {97, 61, 83};
@@ -46,7 +46,7 @@ inline const mesh_data& box() {
     return m;
 }
 
-// What a status counts is part of the contract too.
+// The counters of a status are part of the contract too.
 inline void add_counts(digest& digest, const vp::status& s) {
     s.or_throw();
     const vp::counters& c = s.counts;

@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Golden hashes: a case computes bytes, tests/golden/golden.txt holds the hash that they had when they were confirmed.
-// Every build (compiler, -march=native, contraction on or off, any number of threads) has to give those bytes.
+// Golden hashes: a case computes bytes, and tests/golden/golden.txt holds their confirmed hash. Every build (compiler,
+// -march=native, contraction on or off, any number of threads) must give those bytes.
 //
 //   GOLDEN_CASE("soup.count.thin") { digest.add(counts); }
 //
-// A case runs once with 1 thread and once with several; `threads` says how many. After a deliberate change of the bits,
-// VOXELPIPE_UPDATE_GOLDEN=1 golden_test writes golden.txt anew: then the difference is reviewed like code.
+// A case runs once with 1 thread and once with several; `threads` is that number. After a deliberate change of bits,
+// VOXELPIPE_UPDATE_GOLDEN=1 golden_test rewrites golden.txt, and the difference is reviewed like code.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,7 +19,7 @@
 
 namespace golden {
 
-// FNV-1a over the raw bytes of everything added, 64 bits. Lengths are part of it.
+// 64-bit FNV-1a over the raw bytes and the lengths of everything that is added.
 class digest {
 public:
     template <class T>

@@ -66,7 +66,7 @@ TEST_P(GoldenHash, IsTheRecordedOneForAnyNumberOfThreads) {
 
 INSTANTIATE_TEST_SUITE_P(Cases, GoldenHash, ::testing::ValuesIn(registry()));
 
-// A hash without its case would never be compared again.
+// A recorded hash whose case is gone would never be compared again.
 TEST(GoldenFile, HasACaseForEveryHash) {
     for (const auto& recorded : read_golden())
         EXPECT_TRUE(std::any_of(registry().begin(), registry().end(),
@@ -92,7 +92,7 @@ TEST(GoldenDigest, DependsOnEveryByteAndOnLengths) {
 
 } // namespace
 
-// Writes golden.txt from what the cases give now; hashes with 1 and with 3 threads must agree.
+// Writes golden.txt from the current results. The hashes for 1 and for 3 threads must agree.
 int update_golden() {
     std::ostringstream text;
     text << "# SPDX-FileCopyrightText: 2026 The VoxelPipe authors\n"

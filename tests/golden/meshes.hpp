@@ -3,7 +3,7 @@
 #pragma once
 
 // Meshes for the golden hashes. They are made with integers only (a coordinate is an integer times a power of two), so
-// that no compiler flag and no library changes the input. Never change one: its hashes would lose their history.
+// that no compiler flag and no library changes the input. Never change one: its hashes could not be compared any more.
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -49,7 +49,7 @@ inline void push_vertex(mesh_data& m, const glm::vec3& position, generator& rand
     m.texcoords.push_back({random.coordinate(0, 4), random.coordinate(-4, 4)});
 }
 
-// `count` triangles without any connection, each within a box of `size`, somewhere in [lo, hi]^3.
+// `count` unconnected triangles, each within a box of `size`, somewhere in [lo, hi]^3.
 inline mesh_data soup(std::uint64_t seed, int count, int size, int lo, int hi) {
     generator random(seed);
     mesh_data m;
@@ -95,7 +95,7 @@ inline mesh_data bumpy_box(std::uint64_t seed, int side, int bump) {
     return m;
 }
 
-// Points, segments, slivers, triangles on voxel faces, far away ones, NaN: what a careless exporter writes.
+// Points, segments, slivers, triangles on voxel faces or far away, NaN: the output of a careless exporter.
 inline mesh_data odd_shapes() {
     generator random(99);
     mesh_data m;

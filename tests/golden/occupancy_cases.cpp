@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Coverage alone.
+// Coverage only: bits and counts.
 
 #include "case_support.hpp"
 

@@ -18,7 +18,7 @@ namespace {
 struct sample {
     std::array<int, 3> at;
     bool set;     // in the bit grid
-    bool covered; // by a triangle, says the oracle
+    bool covered; // by a triangle, according to the oracle
 };
 
 class bit_grid {
@@ -47,7 +47,7 @@ private:
     std::size_t row_;
 };
 
-// `count` set voxels chosen evenly at random by rank.
+// `count` set voxels, each chosen with the same probability.
 std::vector<std::array<int, 3>> pick_set(const std::vector<std::uint32_t>& words, const bit_grid& bits, int count,
                                          bench::random_numbers& random) {
     std::vector<std::array<int, 3>> picks;
@@ -75,7 +75,7 @@ std::vector<sample> pick_samples(const std::vector<std::uint32_t>& words, const 
                                  bench::random_numbers& random) {
     std::vector<sample> samples;
     for (const auto& v : pick_set(words, bits, count, random)) samples.push_back({v, true, false});
-    // Empty voxels are looked for next to set ones, where mistakes would be.
+    // Empty voxels are sampled next to set ones, where mistakes are likely.
     for (const auto& v : pick_set(words, bits, count, random))
         for (int attempt = 0; attempt < 12; ++attempt) {
             std::array<int, 3> n = v;
@@ -94,11 +94,12 @@ bool covers_thin(const oracle::grid& g, int fraction, const oracle::snapped_tria
     const int axis = oracle::dominant_axis(t);
     if (axis < 0) return false;
     const auto w = static_cast<std::size_t>(axis);
-    // Beyond the triangle only along that axis: across it a voxel apart from the bounds need not be asked exactly.
+    // The search extends beyond the triangle only along that axis. Across it, a voxel outside the bounds is not
+    // covered.
     for (std::size_t a = 0; a < 3; ++a)
         if (a != w && (v[a] < lo[a] || v[a] > hi[a])) return false;
     std::array<int, 3> from = v, to = {v[0] + 1, v[1] + 1, v[2] + 1};
-    from[w] = lo[w]; // all of the triangle along the dominant axis
+    from[w] = lo[w]; // the whole triangle along the dominant axis
     to[w] = hi[w] + 1;
     if (!oracle::box_meets_triangle(fraction, t, from, to)) return false;
     const oracle::ratio depth = oracle::depth(g, t, {v[0], v[1], v[2]});
@@ -121,7 +122,8 @@ sample_result check_with_oracle(const bench::mesh_data& mesh, const voxelpipe::g
     }
     const int fraction = oracle::fraction_bits(g);
 
-    // Samples by cells of 4^3 voxels, larger ones in large grids, so that a triangle meets only those near it.
+    // Samples are sorted into cells of 4^3 voxels, larger in large grids, so that a triangle is compared only with near
+    // ones.
     const auto cells_of = [&](int log2) { return (grid.extent + ((1 << log2) - 1)) >> log2; };
     int log2_cell = 2;
     for (glm::ivec3 n = cells_of(log2_cell); n.x * n.y > (1 << 18) / n.z; n = cells_of(log2_cell)) ++log2_cell;
@@ -141,9 +143,9 @@ sample_result check_with_oracle(const bench::mesh_data& mesh, const voxelpipe::g
             for (int a = 0; a < 3; ++a) p[k][a] = mesh.positions[triangle[k]][a];
         const oracle::snapped_triangle t = oracle::snap(g, p);
         if (t.dropped) continue;
-        // The voxels whose closed boxes touch the triangle's closed bounds: any other is apart from it. Where a mesh
-        // has hundreds of triangles in a voxel, a voxel's neighbours have many times as many, none of which need be
-        // asked exactly. A thin fragment may lie beyond the bounds, by a voxel at most: two are looked at.
+        // Only voxels whose closed boxes touch the triangle's closed bounds can be covered. This test saves most exact
+        // ones in a mesh with hundreds of triangles in a voxel. A thin fragment may lie at most one voxel beyond the
+        // bounds; two are searched.
         const int margin = rule == voxelpipe::coverage::thin ? 2 : 0;
         std::array<int, 3> lo{}, hi{};
         bool outside = false;

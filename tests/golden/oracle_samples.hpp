@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Checks picks of a bit grid with the oracle (tests/oracle), which decides coverage a second way and shares nothing
-// with voxelpipe/: set voxels must be covered by a triangle of the mesh, empty neighbours of set voxels by none.
+// Checks random voxels of a bit grid with the oracle (tests/oracle), which decides coverage independently and shares
+// nothing with voxelpipe/. Set voxels must be covered by a triangle of the mesh, empty neighbours of set voxels by
+// none.
 
 #include "mesh_data.hpp"
 
@@ -17,7 +18,7 @@
 namespace scenes {
 
 struct sample_result {
-    int set = 0, empty = 0;            // voxels looked at
+    int set = 0, empty = 0;            // voxels that were checked
     std::vector<std::string> mistakes; // one line each, at most 20
 };
 

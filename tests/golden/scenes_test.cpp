@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Exact voxel counts and hashes of the bit grids of large meshes, against golden.txt, and picks of them against the
-// oracle. Two programs are made of this file: the one of all_scenes.cpp has the benchmark scenes that are there and
-// large grids, that of small_scenes.cpp small grids of generated meshes.
+// Exact voxel counts and hashes of the bit grids of large meshes, against scenes.txt, and random voxels against the
+// oracle. Two programs contain this file. The one with all_scenes.cpp has large grids and those benchmark scenes that
+// are present, the one with small_scenes.cpp has small grids of generated meshes.
 
 #include "all_scenes.hpp"
 #include "bit_digest.hpp"
@@ -147,7 +147,7 @@ TEST_P(Scenes, HaveTheRecordedVoxelsAndTheOracleAgrees) {
     }
 
     const int count = std::max(50, static_cast<int>(1000 * test_scale()));
-    const unsigned seed = std::random_device{}(); // other picks in every run
+    const unsigned seed = std::random_device{}(); // other voxels in every run
     SCOPED_TRACE("seed of the picks: " + std::to_string(seed));
     const sample_result samples = check_with_oracle(mesh, r.grid, GetParam().rule, r.words, count, seed);
     EXPECT_GT(samples.set, 0);
@@ -182,7 +182,7 @@ TEST(ScenesGolden, AgreesWithPublishedCounts) {
     }
 }
 
-// Replaces the lines of this program's cases; nothing is written where the oracle disagrees with one of many samples.
+// Replaces the lines of this program's cases. Writes nothing if the oracle disagrees with a sample.
 int update_golden() {
     auto golden = read_golden();
     for (const scene_case& c : make_cases()) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The A-buffer holds every fragment once, in order; folding a voxel's list with a blend gives that voxel of a
-// framebuffer. The folds here are written from the definition of each blend, not with the library's.
+// The A-buffer holds every fragment once, in order. Folding a voxel's list with a blend gives that voxel of a
+// framebuffer. The folds here follow each blend's definition and use nothing of the library.
 
 #include "properties.hpp"
 
@@ -16,7 +16,7 @@
 namespace properties {
 namespace {
 
-// What the fragment shader gives; every bit of it depends on triangle, voxel and sample point.
+// The fragment shader's values. Every bit depends on triangle, voxel and sample point.
 struct payload {
     float level;
     std::uint32_t word;
@@ -24,7 +24,7 @@ struct payload {
     friend bool operator==(const payload&, const payload&) = default;
 };
 
-// `primitive`: the fragment's, or 0 to leave it out.
+// `primitive`: that of the fragment, or 0 to ignore it.
 payload value_of(const vp::fragment<>& f, std::uint32_t primitive) {
     const auto mix = [](std::uint32_t h) {
         h = (h ^ (h >> 16)) * 0x7feb352du;
@@ -79,8 +79,8 @@ struct to_targets {
 // -0 < +0 and otherwise as numbers; the payloads hold no NaN.
 bool below(float a, float b) { return a < b || (a == b && std::signbit(a) && !std::signbit(b)); }
 
-// The reproducible sum by its definition: terms to multiples of 2^-32, those from 2^31 on infinite, an exact sum, one
-// rounding.
+// The reproducible sum by its definition: terms are rounded to multiples of 2^-32 (from 2^31 on they are infinite), the
+// sum is exact, and it is rounded once.
 float exact_sum(const std::vector<float>& terms) {
     oracle::wide sum = 0;
     bool up = false, down = false;
@@ -203,7 +203,7 @@ TEST_P(ABuffer, FoldedWithABlendIsTheFramebuffer) {
                     }
                     deepest = std::max<std::uint64_t>(deepest, list.size());
                     std::uint32_t last = 123, sum = 0, parity = 0, chained = 17;
-                    float lowest = std::numeric_limits<float>::quiet_NaN(); // the greatest of the order
+                    float lowest = std::numeric_limits<float>::quiet_NaN(); // the greatest in the total order
                     std::int64_t highest = std::numeric_limits<std::int64_t>::min();
                     std::vector<float> terms = {0.5f};
                     for (const payload& p : list) {
@@ -227,13 +227,13 @@ TEST_P(ABuffer, FoldedWithABlendIsTheFramebuffer) {
                 }
         ASSERT_EQ(next, h.voxels.size());
     }
-    EXPECT_GT(deepest, 20u); // lists that are long enough to be in a wrong order
+    EXPECT_GT(deepest, 20u); // lists long enough for a wrong order to show
 }
 
-// Two draws of one call, and two calls of which the second loads, are the whole mesh in one.
+// The whole mesh in one draw equals two draws in one call, and two calls of which the second loads.
 TEST_P(ABuffer, TwoDrawsAndTwoCallsAreOne) {
     splitmix64 random(84);
-    // Nothing of the primitive's number, which starts again with each call.
+    // The primitive number is not used, because it starts again with each call.
     const to_targets shader{false};
     for (const test_grid& where : oracle::test_grids()) {
         if (!where.dense) continue;

@@ -14,8 +14,8 @@ namespace {
 double length(const point& p) { return std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z); }
 point scaled(const point& p, double s) { return {p.x * s, p.y * s, p.z * s}; }
 
-// Twice the signed area of (a, b, p + (e, e^2)) for an infinitely small e > 0: never zero where a != b, and the same
-// p + (e, e^2) for every edge, so that each p lies on exactly one side of a closed polygon.
+// Twice the signed area of (a, b, p + (e, e^2)) for an infinitely small e > 0. It is never zero for a != b. The point
+// p + (e, e^2) is the same for every edge, so that each p lies on exactly one side of a closed polygon.
 int side_of_moved_point(const std::int64_t (&a)[2], const std::int64_t (&b)[2], const std::int64_t (&p)[2]) {
     const oracle::int128 dx = b[0] - a[0], dy = b[1] - a[1];
     const oracle::int128 area = dx * (p[1] - a[1]) - dy * (p[0] - a[0]);

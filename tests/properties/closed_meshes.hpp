@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Closed triangle meshes of several shells, in voxel units round the origin, for the separation theorems: every edge of
-// a shell is shared by exactly two of its triangles, so it stays closed however its vertices are rounded. inside_of()
-// says exactly on which side of each snapped shell the centre of a voxel lies, by counting crossings in integers.
+// Closed triangle meshes of several shells, in voxel units around the origin, for the separation tests. Every edge of a
+// shell is shared by exactly two of its triangles, so the shell stays closed however its vertices are rounded.
+// inside_of() says exactly on which side of each snapped shell a voxel's centre lies, by counting crossings in
+// integers.
 
 #include "library.hpp"
 
@@ -25,22 +26,22 @@ struct closed_mesh {
     std::vector<std::array<std::uint32_t, 3>> triangles;
     std::vector<std::size_t> shells; // first triangle of each shell
 
-    void add_shell(const closed_mesh& other); // the other's triangles as one shell more
+    void add_shell(const closed_mesh& other); // the other's triangles become one more shell
 };
 
 closed_mesh box(point half_size);
 closed_mesh tetrahedron(double radius);
 closed_mesh sphere(double radius, int subdivisions); // 20 * 4^subdivisions triangles
 closed_mesh torus(double radius, double tube, int around, int across);
-// A sphere whose vertices are moved along their rays to anywhere between the two radii: star-shaped, very spiky.
+// A sphere whose vertices are moved along their rays to random places between the two radii: star-shaped, spiky.
 closed_mesh star(oracle::splitmix64& random, double inner, double outer, int subdivisions);
-// A sphere within a sphere, the hull `thickness` voxels thick.
+// A sphere within a sphere, `thickness` voxels apart.
 closed_mesh hull(double radius, double thickness, int subdivisions);
 
-void turn(closed_mesh& m, oracle::splitmix64& random); // by a random rotation
+void turn(closed_mesh& m, oracle::splitmix64& random); // a random rotation
 void move(closed_mesh& m, point by);
 
-// Every edge of every shell in exactly two triangles, once each way.
+// True if every edge of every shell is in exactly two triangles, once in each direction.
 bool is_closed(const closed_mesh& m);
 
 // As floats in the grid's world space, centred in the grid.

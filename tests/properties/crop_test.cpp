@@ -86,7 +86,7 @@ TEST_P(Crop, SlabsPutTogetherAreTheWhole) {
     }
 }
 
-// Crops of grids that are too large to hold: against the crop of another crop that overlaps it.
+// Crops of grids that are too large for memory, against another crop that overlaps.
 TEST_P(Crop, PartsOfAHugeGridAgreeWhereTheyOverlap) {
     const grid g = {{-3, 4, 5}, {0.25, 0.5, 0.125}, {1 << 20, 1 << 19, 70000}};
     splitmix64 random(74);
@@ -119,7 +119,7 @@ TEST_P(Crop, PartsOfAHugeGridAgreeWhereTheyOverlap) {
                     }
         }
         EXPECT_GT(in_both.counts.fragments, 0u);
-        // And the oracle, which takes such a grid as well.
+        // The oracle handles such a grid as well.
         std::vector<voxel> expected;
         for (const world_triangle& t : triangles) {
             const auto voxels = oracle::expected_voxels(g, oracle::snap(g, t.v), GetParam(), both);

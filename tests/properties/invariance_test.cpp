@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// What may not change the result: the order of triangles and of a triangle's vertices, its winding, moving grid and
-// mesh together, renaming axes, mirroring. Two rules are not symmetric, on purpose, and the tests say so exactly: thin
-// coverage floors a depth that is exactly an integer (its mirror image goes to the voxel on the other side), and gives
-// ties of the dominant axis to x before y before z (so renaming axes may choose another axis).
+// The result does not depend on the order of triangles or of a triangle's vertices, its winding, moving grid and mesh
+// together, renaming axes, or mirroring. Two rules are asymmetric on purpose, and the tests state them exactly. Thin
+// coverage floors a depth that is exactly an integer, so its mirror image is in the voxel on the other side. Ties of
+// the dominant axis go to x before y before z, so renaming axes may choose another axis.
 
 #include "properties.hpp"
 
@@ -113,7 +113,7 @@ TEST_P(Invariance, OrderOfTrianglesNumbersThemAnew) {
     }
 }
 
-// Whatever order the triangles come in, targets with order-free blends hold the same bytes.
+// Targets with order-free blends hold the same bytes for any order of the triangles.
 TEST_P(Invariance, OrderOfTrianglesKeepsOrderFreeTargets) {
     splitmix64 random(64);
     for (const test_grid& where : oracle::test_grids()) {
@@ -139,7 +139,7 @@ TEST_P(Invariance, SharedAndShuffledVerticesChangeNothing) {
         std::vector<std::uint32_t> place(plain.positions.size());
         for (std::uint32_t n = 0; n < place.size(); ++n) place[n] = n;
         for (std::size_t n = place.size(); n > 1; --n) std::swap(place[n - 1], place[random.below(n)]);
-        std::vector<glm::vec3> positions(plain.positions.size() + 1, glm::vec3(0.0f)); // one that nothing uses
+        std::vector<glm::vec3> positions(plain.positions.size() + 1, glm::vec3(0.0f)); // one unused vertex
         for (std::size_t n = 0; n < place.size(); ++n) positions[place[n]] = plain.positions[n];
         std::vector<glm::uvec3> indices;
         for (const glm::uvec3& t : plain.triangles) {
@@ -206,7 +206,7 @@ TEST_P(Invariance, MovingByWholeVoxelsMovesTheVoxels) {
                    v.k < where.g.extent[2];
         };
         for (std::size_t n = 0; n < here.size(); ++n) {
-            voxels expected, found; // those that are in the grid before and after
+            voxels expected, found; // voxels inside the grid before and after
             for (voxel v : before[n]) {
                 v = {v.i + steps[n][0], v.j + steps[n][1], v.k + steps[n][2]};
                 if (inside(v)) expected.push_back(v);
@@ -238,7 +238,7 @@ TEST_P(Invariance, RenamingAxesRenamesTheVoxels) {
                     for (std::size_t axis = 0; axis < 3; ++axis) turned[n].v[v][to[axis]] = triangles[n].v[v][axis];
             const auto after = library_sets(renamed, turned, GetParam());
             for (std::size_t n = 0; n < triangles.size(); ++n) {
-                if (GetParam() == vp::coverage::thin) { // a tie of the dominant axis may go to another axis
+                if (GetParam() == vp::coverage::thin) { // a tie of the dominant axis may choose another axis
                     const snapped_triangle t = oracle::snap(where.g, triangles[n].v);
                     if (!t.dropped && ties_dominant_axis(t)) {
                         ++ties;
@@ -302,7 +302,7 @@ TEST_P(Invariance, MirroringMirrorsTheVoxels) {
                     w = last - w;
                     if (w <= last) expected.push_back(v); // d = 0 goes to n, outside
                 }
-                if (along_depth) // and the other way round: a depth of n, outside before, is 0 in the mirror
+                if (along_depth) // conversely, a depth of n is outside before and 0 in the mirror
                     std::erase_if(found, [&](const voxel& v) {
                         const oracle::ratio d = oracle::depth(where.g, oracle::snap(where.g, there[n].v), v);
                         return d.numerator.sign() == 0;

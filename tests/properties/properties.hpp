@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What these tests share: triangles with exact positions, and the library's voxel set of each triangle.
+// Shared by these tests: triangles with exact positions, and the library's voxels for each triangle.
 
 #include "library.hpp"
 
@@ -34,8 +34,8 @@ inline std::string rule_of(const ::testing::TestParamInfo<vp::coverage>& info) {
 std::vector<voxels> library_sets(const grid& g, const std::vector<world_triangle>& triangles, vp::coverage rule,
                                  unsigned threads = 2);
 
-// A framebuffer of occupancy, the last primitive, a sum of floats and what the shader saw of its place, so that a
-// fragment that is lost, doubled or shaded otherwise shows.
+// A framebuffer of occupancy, the last primitive, a sum of floats and the voxel that the shader was given. A fragment
+// that is lost, doubled or shaded differently changes it.
 using occupancy_target = vp::target<vp::bit, vp::blend::bit_or>;
 using last_target = vp::target<std::uint32_t, vp::blend::replace>;
 using sum_target = vp::target<glm::vec3, vp::blend::add>;
@@ -67,7 +67,7 @@ inline bool same_units(const snapped_triangle& t, const std::int64_t (&v)[3][3])
 }
 
 // Moves every position to the nearest multiple of `multiple` units in the (exact) grid's fixed point, so that it snaps
-// to just that. False where a float cannot hold it, which far outside the grid happens.
+// to exactly that. False if a float cannot hold it, as happens far outside the grid.
 inline bool make_exact(const grid& g, std::int64_t multiple, world_triangle& w) {
     const snapped_triangle t = oracle::snap(g, w.v);
     if (t.dropped) return false;
@@ -81,12 +81,12 @@ inline bool make_exact(const grid& g, std::int64_t multiple, world_triangle& w) 
     return same_units(oracle::snap(g, w.v), v);
 }
 
-// `count` by the test scale, but never so few that a test means nothing.
+// `count` times the test scale, but at least 4.
 inline int scaled(int count) {
     return std::max(4, static_cast<int>(count * std::min(1.0, 4.0 * oracle::test_scale())));
 }
 
-// Random triangles of every class for a grid; on grids that are not dense without those that cover much.
+// Random triangles of every class for a grid. Classes that cover many voxels are left out if the grid is not dense.
 std::vector<world_triangle> all_kinds(splitmix64& random, const test_grid& where, int of_each);
 
 } // namespace properties

@@ -6,7 +6,7 @@
 //
 // The two grids of a refinement have to snap alike. F falls by one where the extent doubles beyond 256, so there
 // scale = 2^F / voxel_size is the same number at N and 2N and the fixed-point positions are equal, whatever they are.
-// Up to 256 voxels F stays 16 and positions at 2N have one bit more: there the theorem is tested on positions that lie
+// Up to 256 voxels F stays 16 and positions at 2N have one bit more: there the property is tested on positions that lie
 // on the lattice of N.
 
 #include "properties.hpp"
@@ -72,7 +72,7 @@ TEST(Refinement, ConservativeIsTheOrOfEightOnTheLatticeOfSmallGrids) {
         for (world_triangle t : all_kinds(random, where, scaled(200))) {
             if (!make_exact(where.g, 1, t)) continue;
             const snapped_triangle coarse = oracle::snap(where.g, t.v), fine = oracle::snap(doubled(where.g), t.v);
-            if (fine.dropped) continue; // 2^40 units are half as far
+            if (fine.dropped) continue; // the limit of 2^40 units is half as far away
             for (int n = 0; n < 3; ++n)
                 for (int axis = 0; axis < 3; ++axis) ASSERT_EQ(fine.v[n][axis], 2 * coarse.v[n][axis]);
             exact.push_back(t);
@@ -94,7 +94,8 @@ std::vector<world_triangle> split(const world_triangle& t) {
     return {make(t.v[0], m[0], m[2]), make(m[0], t.v[1], m[1]), make(m[2], m[1], t.v[2]), make(m[0], m[1], m[2])};
 }
 
-// Thin as well: the four lie in one plane with one normal direction, so axis and depths are the same.
+// Holds for thin coverage as well: the four triangles have one plane and one normal direction, hence the same axis and
+// depths.
 TEST_P(Subdivision, AtExactMidpointsKeepsTheVoxels) {
     splitmix64 random(53);
     for (const test_grid& where : oracle::test_grids()) {

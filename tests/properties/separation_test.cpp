@@ -100,7 +100,7 @@ std::vector<closed_mesh> meshes() {
         list.push_back(std::move(m));
     };
     for (int n = 0; n < (oracle::test_scale() < 1 ? 1 : 4); ++n) {
-        add(box({7, 5, 9}));       // faces on voxel faces where neither turned nor moved
+        add(box({7, 5, 9}));       // faces on voxel faces if neither turned nor moved
         add(box({6.5, 7.5, 5.5})); // faces through voxel centres
         add(box({10, 10, 0.05}));  // a plate, thinner than a voxel
         add(box({12, 0.3, 0.2}));  // a rod
@@ -118,7 +118,7 @@ std::vector<closed_mesh> meshes() {
         add(hull(10, 2.5, 2));
         add(hull(9, 0.7, 2)); // two surfaces within a voxel
         add(hull(9.5, 0.01, 3));
-        closed_mesh two = box({5, 5, 5}); // two bodies that share a face plane and pass into each other
+        closed_mesh two = box({5, 5, 5}); // two bodies that share a face plane and overlap
         two.name = "two_boxes";
         closed_mesh other = box({5, 3, 3});
         move(other, {4, 2, 1});
@@ -148,10 +148,10 @@ TEST_P(Separation, NoPathOfEmptyVoxelsCrossesAClosedSurface) {
         }
     }
     EXPECT_GT(bodies,
-              oracle::test_scale() < 1 ? 25u : 100u); // bodies with empty voxels inside, where a leak could have shown
+              oracle::test_scale() < 1 ? 25u : 100u); // bodies with empty voxels inside, so that a leak could show
 }
 
-// A surface that leaves the grid separates what is left of it.
+// A surface that leaves the grid separates the voxels inside the grid.
 TEST_P(Separation, HoldsWhereTheGridCutsTheSurface) {
     splitmix64 random(42);
     std::size_t bodies = 0;
@@ -161,7 +161,7 @@ TEST_P(Separation, HoldsWhereTheGridCutsTheSurface) {
         move(m, {random.uniform(-15, 15), random.uniform(-15, 15), random.uniform(-15, 15)});
         const grid& g = grids()[static_cast<std::size_t>(n) % grids().size()];
         const auto placed = place(m, g);
-        // Crossings below the grid count as well: inside_of looks at whole columns.
+        // inside_of counts crossings in whole columns, also below the grid.
         const flood_result r = flood(g, occupancy(placed, g, GetParam()), inside_of(m, g, placed),
                                      GetParam() == vp::coverage::conservative);
         ASSERT_EQ(r.leaks, 0u);
@@ -173,7 +173,7 @@ TEST_P(Separation, HoldsWhereTheGridCutsTheSurface) {
 INSTANTIATE_TEST_SUITE_P(BothRules, Separation, ::testing::Values(vp::coverage::thin, vp::coverage::conservative),
                          rule_of);
 
-// The flood fill does find leaks: through a hole in the mesh, and through the corners of thin surfaces.
+// Controls: the flood fill finds leaks through a hole in the mesh, and through the corners of thin surfaces.
 TEST(SeparationControl, AHoleLeaks) {
     const grid& g = grids()[0];
     const closed_mesh m = sphere(10, 1);
@@ -191,7 +191,7 @@ TEST(SeparationControl, ThinIsNot26Separating) {
     EXPECT_GT(flood(g, occupancy(placed, g, vp::coverage::thin), inside_of(m, g, placed), true).leaks, 0u);
 }
 
-TEST(SeparationControl, SidesAreTheBallsOwn) {
+TEST(SeparationControl, InsideOfABallIsWithinItsRadius) {
     const grid g = {{0, 0, 0}, {1, 1, 1}, {40, 40, 40}};
     const closed_mesh m = sphere(12, 4);
     const auto side = inside_of(m, g, place(m, g));
