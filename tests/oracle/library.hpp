@@ -2,10 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The bridge between the oracle and the library for tests that compare the two: grids and triangles as the library
-// takes them, its results as voxel sets per triangle, the number of triangles a run is worth, messages that let a
-// disagreement be replayed. The only file of the oracle's folder, beside the tests named library_*, that knows the
-// library.
+// Connects oracle and library for tests that compare the two: grids and triangles in the library's types, its results
+// as voxel sets per triangle, the number of triangles of a run, and messages from which a disagreement can be replayed.
+// Of the oracle's folder, only this file and the tests library_* use the library.
 
 #include "oracle.hpp"
 #include "triangles.hpp"
@@ -48,7 +47,7 @@ inline vp::grid as_library(const grid& g) {
     return r;
 }
 
-// Three vertices of its own for every triangle, as the vertices come.
+// Three vertices for every triangle, none shared.
 struct soup {
     std::vector<glm::vec3> positions;
     std::vector<glm::uvec3> triangles;
@@ -90,12 +89,12 @@ inline vp::grid as_library(const grid& g, const part& p) {
     return as_library(g).crop({p.begin[0], p.begin[1], p.begin[2]}, {p.size[0], p.size[1], p.size[2]});
 }
 
-// What the oracle says the library has to give.
+// The library's expected voxels according to the oracle.
 inline std::vector<voxel> expected_voxels(const grid& g, const snapped_triangle& t, vp::coverage rule, const part& p) {
     return rule == vp::coverage::thin ? thin(g, t, p.as_region()) : conservative(g, t, p.as_region());
 }
 
-// The library's A-buffer turned round: for each of `triangles` its voxels, ascending, as indices of the whole grid.
+// The library's A-buffer by triangle: for each of `triangles` its voxels, ascending, as indices of the whole grid.
 template <class Payload>
 std::vector<std::vector<voxel>> voxels_by_triangle(const vp::host_abuffer<Payload>& lists, std::size_t triangles,
                                                    const part& p) {
@@ -122,13 +121,13 @@ inline std::string describe(const grid& g, const world_triangle& t) {
     return text.str();
 }
 
-// `usual`, or another one for every VOXELPIPE_ORACLE_SEED, so that a longer run can look elsewhere.
+// `usual`, or another seed for each VOXELPIPE_ORACLE_SEED, so that a longer run tests other triangles.
 inline std::uint64_t seed(std::uint64_t usual) {
     const char* const offset = std::getenv("VOXELPIPE_ORACLE_SEED");
     return offset == nullptr ? usual : usual + 1000003 * std::strtoull(offset, nullptr, 10);
 }
 
-// How many triangles all classes together are tested with: VOXELPIPE_ORACLE_TRIANGLES, or `usual` by the test scale.
+// The number of triangles over all classes: VOXELPIPE_ORACLE_TRIANGLES, or `usual` times the test scale.
 inline std::uint64_t triangle_budget(std::uint64_t usual) {
     if (const char* const count = std::getenv("VOXELPIPE_ORACLE_TRIANGLES")) return std::strtoull(count, nullptr, 10);
     return static_cast<std::uint64_t>(static_cast<double>(usual) * test_scale());

@@ -3,7 +3,7 @@
 
 // The library's coverage against the oracle: every class of triangle, every test grid, both rules, whole grids and
 // crops. The voxel set of each single triangle must be the same to the voxel; counters, A-buffer and framebuffer too.
-// VOXELPIPE_ORACLE_TRIANGLES sets how many triangles there are in all, VOXELPIPE_ORACLE_SEED which.
+// VOXELPIPE_ORACLE_TRIANGLES sets their number, VOXELPIPE_ORACLE_SEED chooses them.
 
 #include "library.hpp"
 
@@ -18,7 +18,7 @@
 namespace oracle {
 namespace {
 
-// What one class gets of the whole: a triangle of `large` costs as much as ten thousand small ones.
+// The share of one class. A triangle of `large` costs as much as ten thousand small ones.
 double share(triangle_class kind) {
     switch (kind) {
     case triangle_class::large:
@@ -104,7 +104,7 @@ void compare(const test_grid& where, const std::vector<world_triangle>& triangle
         EXPECT_EQ(s.counts.triangles_zero_area, 0u);
     }
 
-    // The framebuffer goes another way through the library: the same voxels, each as often as it has triangles.
+    // The framebuffer has another code path: the same voxels, each counted once for each of its triangles.
     if (std::int64_t{p.size[0]} * p.size[1] * p.size[2] <= 64 * 64 * 64) {
         using occupancy = vp::target<vp::bit, vp::blend::bit_or>;
         using count = vp::target<std::uint32_t, vp::blend::count>;
@@ -143,7 +143,7 @@ TEST_P(LibraryCoverage, IsTheOraclesToTheVoxel) {
     for (std::uint64_t round = 0; sums.triangles < 2 * wanted; ++round) {
         test_grid where = test_grids()[round % test_grids().size()];
         part p = random.one_in(3) ? random_part(random, where.g, 4096) : whole_of(where.g);
-        if (covers_much(kind) && !where.dense) { // a part that is little enough work, anywhere in the large grid
+        if (covers_much(kind) && !where.dense) { // a small part anywhere in the large grid
             p = random_part(random, where.g, 40);
             where = focused(where, p.as_region());
         }
@@ -172,7 +172,7 @@ TEST_P(LibraryCoverage, IsTheOraclesToTheVoxel) {
 INSTANTIATE_TEST_SUITE_P(EveryClass, LibraryCoverage, ::testing::ValuesIn(all_triangle_classes),
                          [](const auto& info) { return std::string(name(info.param)); });
 
-// One mesh that has them all, shuffled, so that classes share tiles.
+// One mesh of all classes, shuffled, so that they share tiles.
 TEST(LibraryCoverage, HoldsForAllClassesInOneMesh) {
     splitmix64 random(seed(77));
     totals sums;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// What the library's fragment shader is given, against the oracle's exact rationals: barycentrics, dominant axis,
+// The inputs of the library's fragment shader against the oracle's exact rationals: barycentrics, dominant axis,
 // facing, normal, voxel and triangle, interpolated varyings, in whole grids and in crops.
 
 #include "library.hpp"
@@ -25,7 +25,7 @@ struct varyings {
     vp::flat<std::uint32_t> vertex;
 };
 
-// One attribute: the number of the vertex, so that the varyings below can be made again from it.
+// One attribute: the number of the vertex, from which the test can compute the varyings below.
 struct name_vertices {
     vp::vertex_output<varyings> operator()(const vp::vertex<std::uint32_t>& v) const {
         const std::uint32_t n = vp::get<0>(v);

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Random numbers, case counts and exact roundings that the unit tests share. The roundings are written with the
-// oracle's checked wide integers and share nothing with core/.
+// Shared by the tests of core/ and of the API: random numbers, numbers of cases, exact roundings. The roundings use the
+// oracle's checked wide integers and nothing of core/.
 
 #include "triangles.hpp"
 #include "wide_int.hpp"
@@ -19,7 +19,7 @@ namespace unit {
 using oracle::splitmix64;
 using wide = oracle::wide_int<8>; // 512 bits
 
-// Random cases to try: `count`, times VOXELPIPE_TEST_SCALE where that is set, at least 100.
+// Number of random cases: `count` times VOXELPIPE_TEST_SCALE (1 if unset), at least 100.
 inline std::int64_t cases(std::int64_t count) {
     const char* const text = std::getenv("VOXELPIPE_TEST_SCALE");
     const double scale = text == nullptr ? 1.0 : std::strtod(text, nullptr);
@@ -86,7 +86,7 @@ inline float nearest_float(const rational& a) {
     return std::bit_cast<float>(static_cast<std::uint32_t>(nearest_bits(a, 23, 8)));
 }
 
-// Any bit pattern that is a finite number.
+// A random bit pattern that is a finite number.
 inline float any_finite_float(splitmix64& random) {
     for (;;) {
         const float f = std::bit_cast<float>(static_cast<std::uint32_t>(random.next()));
@@ -94,7 +94,7 @@ inline float any_finite_float(splitmix64& random) {
     }
 }
 
-// significand * 2^exponent with an exponent evenly chosen.
+// significand * 2^exponent; every exponent of the range has the same probability.
 inline double spread_double(splitmix64& random, int lowest_exponent, int highest_exponent) {
     const double s = static_cast<double>(static_cast<std::int64_t>(random.next()) >> 11); // 53 bits
     return std::ldexp(s, static_cast<int>(random.between(lowest_exponent, highest_exponent)) - 52);

@@ -89,7 +89,7 @@ public:
 private:
     double first_unit(std::size_t axis) const { return unit_ * begin_[axis]; }
     double last_unit(std::size_t axis) const { return unit_ * (begin_[axis] + size_[axis]); }
-    // The longest that a triangle should be, in voxels, so that it is not too much work.
+    // The largest size of a triangle in voxels, which limits the work.
     double reach() const {
         const double longest = std::max({size_[0], size_[1], size_[2]});
         return dense_ ? longest : std::min(longest, 64.0);
@@ -129,7 +129,7 @@ private:
     corners around(const position& centre, double size) {
         corners c;
         for (position& p : c) p = centre + size * direction();
-        // Now and then the snap must decide between neighbours, so leave most of them off the lattice.
+        // Most positions are off the lattice, so that snapping must sometimes decide between neighbours.
         if (random_.one_in(4))
             for (position& p : c) p = rounded(p);
         return c;

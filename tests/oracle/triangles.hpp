@@ -81,7 +81,7 @@ inline constexpr std::array all_triangle_classes = {
     triangle_class::dropped,
 };
 
-// Whether its triangles usually cross the whole grid: few of them are a lot of work, on large grids too many.
+// True if its triangles usually cross the whole grid. A few are much work, and too much on large grids.
 constexpr bool covers_much(triangle_class kind) {
     return kind == triangle_class::large || kind == triangle_class::powers_of_two || kind == triangle_class::far_away;
 }
@@ -97,10 +97,10 @@ struct test_grid {
     std::string_view name;
     bool exact; // dyadic origin and voxel size: every lattice position inside the grid is a float and snaps to itself
     bool dense; // small enough for triangles that cover a large part of it
-    region focus = {{0, 0, 0}, {0, 0, 0}}; // where triangles are put: the whole grid where empty
+    region focus = {{0, 0, 0}, {0, 0, 0}}; // where triangles are placed; the whole grid if empty
 };
 
-// The same grid with the triangles put into a part of it, which may be small enough to count as dense.
+// The same grid with the triangles placed in a part of it, which may be small enough to count as dense.
 test_grid focused(const test_grid& where, const region& part);
 
 // Cubic, non-cubic, odd, flat, one voxel, anisotropic, far from the world origin, and up to 4096 voxels an axis.
@@ -119,7 +119,7 @@ inline double test_scale() {
     return scale == nullptr ? 1.0 : std::strtod(scale, nullptr);
 }
 
-// How often the oracle's own tests repeat what they do `usual` times: by the test scale, no less than a tenth.
+// Repetitions in the oracle's own tests: `usual` times the test scale, at least a tenth.
 inline int repeats(int usual) { return static_cast<int>(usual * std::clamp(test_scale(), 0.1, 1.0)); }
 
 } // namespace oracle

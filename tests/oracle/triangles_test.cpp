@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The generator: every class is what its name says, so that "all classes agree" means something.
+// The generator: triangles of every class have the property of its name.
 
 #include "triangles.hpp"
 
@@ -59,7 +59,7 @@ TEST(Triangles, SameSeedSameTriangles) {
     EXPECT_GT(differ, 150);
 }
 
-TEST(Triangles, OnlyTheirClassIsDropped) {
+TEST(Triangles, OnlyThoseOfTheDroppedClassAreDropped) {
     for (const triangle_class kind : all_triangle_classes)
         for_each(kind, false, [&](const sample& s) {
             ASSERT_EQ(s.t.dropped, kind == triangle_class::dropped) << name(kind) << " in " << s.where.name;
@@ -94,7 +94,7 @@ TEST(Triangles, ZeroAreaClassesHaveNoArea) {
         ASSERT_TRUE(equal(s.t, 0, 1) || equal(s.t, 1, 2) || equal(s.t, 0, 2));
         ASSERT_FALSE(has_area(s.t));
     });
-    int all = 0, flat = 0; // a few reach outside, where floats are coarser than the lattice
+    int all = 0, flat = 0; // a few lie outside, where floats are coarser than the lattice
     for_each(triangle_class::collinear, true, [&](const sample& s) {
         ++all;
         flat += !has_area(s.t) && !equal(s.t, 0, 1);
@@ -213,7 +213,7 @@ TEST(Triangles, ScalesRunFromAThousandthVoxelToAThousandGrids) {
     EXPECT_GT(farthest, 0x1p39);
 }
 
-TEST(Triangles, PowersOfTwoAreJustThat) {
+TEST(Triangles, PowersOfTwoHaveBoundingBoxesOfPowersOfTwo) {
     int powers = 0, all = 0;
     for_each(triangle_class::powers_of_two, true, [&](const sample& s) {
         for (int axis = 0; axis < 3; ++axis) {
@@ -228,7 +228,7 @@ TEST(Triangles, PowersOfTwoAreJustThat) {
     EXPECT_GT(powers, all / 2); // beyond the grid floats are coarser
 }
 
-TEST(Triangles, FocusPutsThemInAPart) {
+TEST(Triangles, OfAFocusLieInThatPart) {
     splitmix64 random(13);
     const test_grid where = focused(test_grids()[8], {{600, 10, 300}, {640, 30, 340}});
     EXPECT_TRUE(where.dense);
@@ -240,7 +240,7 @@ TEST(Triangles, FocusPutsThemInAPart) {
     EXPECT_GT(hits, 250);
 }
 
-TEST(Triangles, PlacesAreWhatTheyAreCalled) {
+TEST(Triangles, OutsideClassesLieOutside) {
     int inside_and_out = 0, all = 0, far_hits = 0;
     for_each(triangle_class::partly_outside, false, [&](const sample& s) {
         bool in = false, out = false;

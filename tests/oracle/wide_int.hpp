@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A signed integer of Limbs * 64 bits that cannot be wrong quietly: an operation whose exact result needs more bits
-// throws std::overflow_error. Sign and magnitude, schoolbook arithmetic: written to be read and checked, not to be
-// fast. The oracle decides with it what does not provably fit in 64 or 128 bits; nothing of voxelpipe/ is included.
+// A signed integer of Limbs * 64 bits that never overflows silently: an operation whose exact result needs more bits
+// throws std::overflow_error. Sign and magnitude with schoolbook arithmetic, written to be checked by reading. The
+// oracle uses it for expressions that do not provably fit in 64 or 128 bits. Nothing of voxelpipe/ is included.
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// wide_int against the compiler's own 128-bit integers where those reach, against algebra where they do not.
+// wide_int against the compiler's 128-bit integers, and beyond their range against the laws of arithmetic.
 
 #include "triangles.hpp"
 #include "wide_int.hpp"
@@ -16,7 +16,7 @@ using oracle::int128;
 using oracle::splitmix64;
 using wide = oracle::wide_int<4>;
 
-// Of every length, so that carries, borrows and limb borders are met.
+// Numbers of every length, so that carries, borrows and limb borders occur.
 int128 any_int128(splitmix64& random, int most_bits) {
     const auto high = static_cast<int128>(random.next() >> 1);
     int128 value = (high << 64) | static_cast<int128>(random.next());
@@ -32,7 +32,7 @@ wide any_wide(splitmix64& random, int limbs) {
     return random.one_in(2) ? -value : value;
 }
 
-TEST(WideInt, AgreesWith128BitsWhereThoseReach) {
+TEST(WideInt, AgreesWithTheCompilers128Bits) {
     splitmix64 random(1);
     for (int n = 0; n < oracle::repeats(200000); ++n) {
         const int128 a = any_int128(random, 125);

@@ -4,10 +4,9 @@
 // Refinement and subdivision: a voxel's closed box is the union of the eight half as large, and a triangle the union of
 // the four between the midpoints of its edges, so coverage may not change.
 //
-// The two grids of a refinement have to snap alike. F falls by one where the extent doubles beyond 256, so there
-// scale = 2^F / voxel_size is the same number at N and 2N and the fixed-point positions are equal, whatever they are.
-// Up to 256 voxels F stays 16 and positions at 2N have one bit more: there the property is tested on positions that lie
-// on the lattice of N.
+// Both grids of a refinement must snap positions alike. Beyond 256 voxels, F falls by one when the extent doubles. Then
+// scale = 2^F / voxel_size is the same number at N and 2N, and all fixed-point positions are equal. Up to 256 voxels, F
+// stays 16 and positions at 2N have one more bit, so there the property is tested on positions on the lattice of N.
 
 #include "properties.hpp"
 

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Bad input to the API: every refusal has the code that says what is wrong, has written nothing to the caller's memory
-// and has left no allocation behind; so has a call that memory was refused to, at whatever allocation. What is odd but
-// defined (positions that are no numbers, a mesh far away) works.
+// Bad input to the API. Every refused call returns the code that says what is wrong, writes nothing to the caller's
+// memory and leaves no allocation behind. The same holds for a call that runs out of memory, at every allocation. Input
+// that is odd but defined (positions that are NaN, a mesh far away) works.
 
 #include "breakable_call.hpp"
 #include "counted_allocations.hpp"
@@ -31,13 +31,13 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr double dnan = std::numeric_limits<double>::quiet_NaN();
 constexpr double dinfinity = std::numeric_limits<double>::infinity();
 
-// Indices are looked at where triangles are; all else is refused before any stage has run.
+// Indices are checked by the coarse raster; everything else is refused before any stage runs.
 vp::stage refusing_stage(status_code code) {
     return code == status_code::index_out_of_range ? vp::stage::coarse_raster : vp::stage::validate;
 }
 
-// The call must be refused with `expected` by framebuffer and A-buffer alike, for both rules and any number of threads.
-// `into_lists`: whether what is wrong concerns an A-buffer too.
+// Framebuffer and A-buffer must refuse the call with `expected`, for both rules and any number of threads.
+// `into_lists`: whether the mistake concerns an A-buffer too.
 void expect_refused(const call& c, status_code expected, bool into_lists = true) {
     for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin}) {
         for (const unsigned threads : {1u, 3u}) {
@@ -68,7 +68,7 @@ void expect_refused(const call& c, status_code expected, bool into_lists = true)
     }
 }
 
-TEST(BadInput, TheCallThatTheTestsBreakIsGood) {
+TEST(BadInput, TheUnchangedCallSucceeds) {
     call c;
     vp::cpu_backend be(1);
     const vp::status s = vp::voxelize(be, c.mesh, c.grid, by_weight{}, shader, c.view);
@@ -79,7 +79,7 @@ TEST(BadInput, TheCallThatTheTestsBreakIsGood) {
 
 // ---- mesh ----
 
-TEST(BadInput, MeshWithoutTriangles) {
+TEST(BadInput, AMeshWithoutTrianglesIsRefused) {
     call c;
     c.triangles.clear();
     c.look();
@@ -91,41 +91,41 @@ TEST(BadInput, MeshWithoutTriangles) {
     expect_refused(c, status_code::empty_mesh);
 }
 
-TEST(BadInput, NoDraws) {
+TEST(BadInput, ACallWithoutDrawsIsRefused) {
     call c;
     vp::cpu_backend be(1);
     EXPECT_EQ(vp::voxelize(be, std::span<const draw>{}, c.grid, c.view).code, status_code::empty_mesh);
     EXPECT_TRUE(c.untouched());
     const draw empty{{}, {}, shader}, full{c.mesh, {}, shader};
-    const draw both[] = {empty, full}; // an empty draw among others is no error
+    const draw both[] = {empty, full}; // an empty draw beside a full one is allowed
     EXPECT_TRUE(vp::voxelize(be, std::span<const draw>(both), c.grid, c.view).ok());
 }
 
-TEST(BadInput, IndexOutOfRange) {
+TEST(BadInput, AnIndexOutOfRangeIsRefused) {
     for (const std::uint32_t index : {3u, 4u, 0x7fffffffu, 0x80000000u, 0xffffffffu})
         for (int corner = 0; corner < 3; ++corner) {
             call c;
             c.triangles[1][corner] = index;
             expect_refused(c, status_code::index_out_of_range);
         }
-    call c; // no vertex at all
+    call c; // a mesh without vertices
     c.positions.clear();
     c.look();
     expect_refused(c, status_code::index_out_of_range);
 }
 
-TEST(BadInput, IndexOutOfRangeInTheLastOfManyTriangles) {
-    call c; // far enough from the start that other threads have done work by then
+TEST(BadInput, AnIndexOutOfRangeIsFoundInTheLastOfManyTriangles) {
+    call c; // far from the start, so that other threads have done work before
     c.triangles.assign(50000, {0, 1, 2});
     c.triangles.back().y = 3;
     c.look();
     expect_refused(c, status_code::index_out_of_range);
 }
 
-TEST(BadInput, IndexOutOfRangeOfItsOwnMeshInALaterDraw) {
+TEST(BadInput, AnIndexIsComparedWithTheVerticesOfItsOwnMesh) {
     call c;
     vp::cpu_backend be(2);
-    const std::vector<glm::vec3> few(c.positions.begin(), c.positions.begin() + 2); // index 2 is one too many here
+    const std::vector<glm::vec3> few(c.positions.begin(), c.positions.begin() + 2); // index 2 is out of range here
     const draw draws[] = {
         {c.mesh, {}, shader},
         {{few, c.triangles, vp::core::make_pack(vp::array_view<const float>(c.weights.data(), 2))}, {}, shader}};
@@ -133,7 +133,7 @@ TEST(BadInput, IndexOutOfRangeOfItsOwnMeshInALaterDraw) {
     EXPECT_TRUE(c.untouched());
 }
 
-TEST(BadInput, NullArrays) {
+TEST(BadInput, NullArraysAreRefused) {
     {
         call c;
         c.mesh.positions = {nullptr, 3};
@@ -144,14 +144,14 @@ TEST(BadInput, NullArrays) {
         c.mesh.triangles = {nullptr, 1};
         expect_refused(c, status_code::null_view);
     }
-    call c; // a null array of no elements is an empty array
+    call c; // a null array without elements is an empty array
     c.mesh.positions = {nullptr, 0};
     vp::get<0>(c.mesh.attributes) = {nullptr, 0};
     expect_refused(c, status_code::index_out_of_range);
 }
 
-TEST(BadInput, MoreElementsThanNumbers) {
-    call c; // only the lengths are looked at
+TEST(BadInput, MoreElementsThan32BitsCanNumberAreRefused) {
+    call c; // only the lengths are read
     c.mesh.triangles = {c.triangles.data(), std::size_t{1} << 32};
     expect_refused(c, status_code::too_many_triangles);
     c.mesh.triangles = {c.triangles.data(), std::numeric_limits<std::size_t>::max()};
@@ -162,14 +162,14 @@ TEST(BadInput, MoreElementsThanNumbers) {
 
     c.look();
     vp::cpu_backend be(1);
-    draw half{c.mesh, {}, shader}; // two draws that are too many only together
+    draw half{c.mesh, {}, shader}; // two draws that exceed the limit only together
     half.mesh.triangles = {c.triangles.data(), std::size_t{1} << 31};
     const draw draws[] = {half, half};
     EXPECT_EQ(vp::voxelize(be, std::span<const draw>(draws), c.grid, c.view).code, status_code::too_many_triangles);
     EXPECT_TRUE(c.untouched());
 }
 
-TEST(BadInput, AttributesOfAnotherLength) {
+TEST(BadInput, AttributesOfAnotherLengthAreRefused) {
     call c;
     vp::cpu_backend be(2);
     const std::vector<float> weights(4, 1.0f);
@@ -190,7 +190,7 @@ TEST(BadInput, AttributesOfAnotherLength) {
 
 // ---- positions: not an error, but counted ----
 
-TEST(BadInput, PositionsThatAreNoNumbersDropTheirTriangle) {
+TEST(BadInput, PositionsThatAreNotFiniteDropTheirTriangle) {
     for (const float bad : {nan, -nan, infinity, -infinity})
         for (int corner = 0; corner < 3; ++corner)
             for (int axis = 0; axis < 3; ++axis) {
@@ -210,7 +210,7 @@ TEST(BadInput, PositionsThatAreNoNumbersDropTheirTriangle) {
             }
 }
 
-TEST(BadInput, AMeshOfNothingButBadPositionsIsAnEmptyResult) {
+TEST(BadInput, AMeshOfBadPositionsOnlyGivesAnEmptyResult) {
     for (const float bad : {nan, infinity, std::numeric_limits<float>::max()}) {
         call c;
         for (glm::vec3& p : c.positions) p = glm::vec3(bad);
@@ -223,7 +223,7 @@ TEST(BadInput, AMeshOfNothingButBadPositionsIsAnEmptyResult) {
     }
 }
 
-TEST(BadInput, AnOriginTooFarToReachDropsEverything) {
+TEST(BadInput, AnOriginTooFarAwayDropsEverything) {
     call c;
     for (const double far : {1e30, -1e300, std::numeric_limits<double>::max()}) {
         c.grid.origin = {far, 0, 0};
@@ -236,7 +236,7 @@ TEST(BadInput, AnOriginTooFarToReachDropsEverything) {
 
 // ---- grid ----
 
-TEST(BadInput, ExtentsOfZeroOrLess) {
+TEST(BadInput, ExtentsOfZeroOrLessAreRefused) {
     for (const int bad : {0, -1, INT_MIN})
         for (int axis = 0; axis < 3; ++axis) {
             call c;
@@ -249,7 +249,7 @@ TEST(BadInput, ExtentsOfZeroOrLess) {
     expect_refused(c, status_code::bad_extent);
 }
 
-TEST(BadInput, ExtentsBeyondTheLimit) {
+TEST(BadInput, ExtentsBeyondTheLimitAreRefused) {
     for (const int bad : {vp::grid::max_extent + 1, INT_MAX})
         for (int axis = 0; axis < 3; ++axis) {
             call c;
@@ -257,12 +257,12 @@ TEST(BadInput, ExtentsBeyondTheLimit) {
             c.view.extent = c.grid.extent;
             expect_refused(c, status_code::extent_too_large);
         }
-    call c; // as the whole of a crop
+    call c; // as the whole grid of a crop
     c.grid.whole = {vp::grid::max_extent + 1, 8, 8};
     expect_refused(c, status_code::extent_too_large);
 }
 
-TEST(BadInput, CropsThatLeaveTheGrid) {
+TEST(BadInput, CropsThatLeaveTheGridAreRefused) {
     call c;
     const vp::grid whole = c.grid;
     for (const glm::ivec3 begin : {glm::ivec3(1, 0, 0), glm::ivec3(0, -1, 0), glm::ivec3(0, 0, 8),
@@ -278,7 +278,7 @@ TEST(BadInput, CropsThatLeaveTheGrid) {
     expect_refused(c, status_code::bad_extent);
 }
 
-TEST(BadInput, VoxelSizesThatAreNone) {
+TEST(BadInput, VoxelSizesThatAreNotPositiveAndFiniteAreRefused) {
     for (const double bad : {0.0, -0.0, -1.0, dnan, dinfinity, -dinfinity, 5e-324, 1e-308, 1e-305, 1e308,
                              std::numeric_limits<double>::max()})
         for (int axis = 0; axis < 3; ++axis) {
@@ -288,7 +288,7 @@ TEST(BadInput, VoxelSizesThatAreNone) {
         }
 }
 
-TEST(BadInput, OriginsThatAreNoNumbers) {
+TEST(BadInput, OriginsThatAreNotFiniteAreRefused) {
     for (const double bad : {dnan, dinfinity, -dinfinity})
         for (int axis = 0; axis < 3; ++axis) {
             call c;
@@ -303,12 +303,12 @@ TEST(BadInput, ValidateSaysTheSameWithoutAMesh) {
     c.grid.voxel_size.y = 0;
     EXPECT_EQ(vp::validate(c.grid).code, status_code::bad_voxel_size);
     c.grid.extent.z = -3;
-    EXPECT_EQ(vp::validate(c.grid).code, status_code::bad_voxel_size); // the first axis that is wrong
+    EXPECT_EQ(vp::validate(c.grid).code, status_code::bad_voxel_size); // the first wrong axis decides
 }
 
 // ---- framebuffer ----
 
-TEST(BadInput, FramebufferOfAnotherExtent) {
+TEST(BadInput, AFramebufferOfAnotherExtentIsRefused) {
     {
         call c;
         c.view.extent = {8, 8, 7};
@@ -324,21 +324,21 @@ TEST(BadInput, FramebufferOfAnotherExtent) {
     expect_refused(c, status_code::extent_mismatch, false);
 }
 
-TEST(BadInput, TargetsWithoutMemory) {
+TEST(BadInput, EnabledTargetsWithoutMemoryAreRefused) {
     for (const vp::load_operation how : {vp::load_operation::clear, vp::load_operation::load}) {
         call c;
         vp::get<1>(c.view.targets).elements = nullptr;
         vp::get<1>(c.view.targets).load = how;
         expect_refused(c, status_code::null_view, false);
     }
-    call c; // one that is off needs none
+    call c; // a target that is off needs no memory
     vp::get<1>(c.view.targets).elements = nullptr;
     vp::get<1>(c.view.targets).load = vp::load_operation::off;
     vp::cpu_backend be(1);
     EXPECT_TRUE(vp::voxelize(be, c.mesh, c.grid, by_weight{}, shader, c.view).ok());
 }
 
-TEST(BadInput, SizesThatCannotBeAddressed) {
+TEST(BadInput, SizesThatCannotBeAddressedAreRefused) {
     const glm::ivec3 extent(vp::grid::max_extent); // 2^60 voxels of 32 bytes
     vp::cpu_backend be(1);
     call c;
@@ -353,9 +353,9 @@ TEST(BadInput, SizesThatCannotBeAddressed) {
     const std::int64_t before = live_allocations;
     using owner = vp::framebuffer<vp::cpu_backend, large>;
     EXPECT_THROW(owner(be, extent), std::length_error);
-    // 2^57 bytes can be addressed on paper, but no machine has them.
+    // 2^57 bytes are a valid size, but no machine has that much memory.
     using bit_owner = vp::framebuffer<vp::cpu_backend, bits>;
-    static const void* volatile seen = nullptr; // or a compiler that sees no use leaves the allocation out
+    static const void* volatile seen = nullptr; // otherwise a compiler may remove the unused allocation
     const auto allocate = [&] {
         const bit_owner fb(be, extent);
         seen = vp::get<0>(fb.view().targets).elements;
@@ -365,7 +365,7 @@ TEST(BadInput, SizesThatCannotBeAddressed) {
     EXPECT_EQ(live_allocations, before);
 }
 
-TEST(BadInput, AFramebufferWithMoreTilesThanNumbersIsRefused) {
+TEST(BadInput, AFramebufferWithMoreTilesThan32BitsCanNumberIsRefused) {
     call c; // 2^45 tiles; no memory, because the targets are off
     c.grid.extent = glm::ivec3(vp::grid::max_extent);
     c.view.extent = c.grid.extent;
@@ -389,7 +389,7 @@ TEST(BadInput, AFramebufferOfABadExtentOwnsNothingAndIsRefused) {
 
 // ---- A-buffer ----
 
-// Nothing is written: not the lists of an earlier call either.
+// Nothing is written, not even to the lists of an earlier call.
 TEST(BadInput, ARefusedCallLeavesEarlierListsAsTheyWere) {
     call c;
     vp::cpu_backend be(2);
@@ -416,8 +416,8 @@ TEST(BadInput, ARefusedCallLeavesEarlierListsAsTheyWere) {
 
 // ---- memory ----
 
-// Calls attempt() with 0, 1, 2, ... allocations granted until it needs no more; look(status) after each. Gives how many
-// attempts went well although they were refused an allocation.
+// Calls attempt() with 0, 1, 2, ... allocations granted until no allocation fails, and look(status) after each. Returns
+// the number of attempts that succeeded although an allocation failed.
 template <class Attempt, class Look>
 int refuse_each_allocation(const Attempt& attempt, const Look& look) {
     int well_in_spite = 0;
@@ -447,7 +447,7 @@ int refuse_each_allocation(const Attempt& attempt, const Look& look) {
     return well_in_spite;
 }
 
-// The stages of failed calls, each once, as they came. With several threads their order may depend on who came first.
+// The stages of failed calls, each once, in the order of their appearance, which may vary with several threads.
 struct failed_stages {
     std::vector<vp::stage> list;
     void note(const vp::status& s) {
@@ -455,10 +455,10 @@ struct failed_stages {
     }
 };
 
-TEST(OutOfMemory, OfAFramebufferLeavesTheTargetsAlone) {
+TEST(OutOfMemory, DuringAFramebufferCallLeavesTheTargetsUnchanged) {
     for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
         for (const unsigned threads : {1u, 3u})
-            for (const bool same_values : {true, false}) { // two ways through cpu_backend
+            for (const bool same_values : {true, false}) { // two code paths of cpu_backend
                 large_call c;
                 vp::cpu_backend be(threads);
                 draw draws[] = {{c.mesh, {}, shader}, {c.mesh, {}, shader}};
@@ -485,12 +485,12 @@ TEST(OutOfMemory, OfAFramebufferLeavesTheTargetsAlone) {
                 if (threads == 1) {
                     EXPECT_EQ(failed.list, expected);
                 }
-                // A thread that cannot be had is done without, above all once the targets are being written.
+                // A call does without a thread that cannot be started, above all once it writes targets.
                 EXPECT_EQ(well_in_spite > 0, threads > 1);
             }
 }
 
-TEST(OutOfMemory, OfAnAbufferLeavesEarlierListsAlone) {
+TEST(OutOfMemory, DuringAnAbufferCallLeavesEarlierListsUnchanged) {
     for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
         for (const unsigned threads : {1u, 3u}) {
             const call earlier;
@@ -528,7 +528,7 @@ TEST(OutOfMemory, OfAnAbufferLeavesEarlierListsAlone) {
         }
 }
 
-TEST(OutOfMemory, OfBuffersIsAnException) {
+TEST(OutOfMemory, InAConstructorIsAnException) {
     call c;
     vp::cpu_backend be(1);
     const std::int64_t live = live_allocations;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Valid calls of the API, with all that they take, for bad_input_test to break one part of.
+// Valid calls of the API with all their arguments. bad_input_test breaks one argument at a time.
 
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/voxelpipe.hpp>
@@ -17,7 +17,7 @@ namespace unit {
 
 namespace vp = voxelpipe;
 
-// One pipeline for all tests, because compiling it is what they cost most: the third target is off but where one needs
+// One pipeline for all tests, because compiling it is their main cost. The third target is on only in tests that need
 // large values.
 using floats = vp::target<float, vp::blend::max>;
 using bits = vp::target<vp::bit, vp::blend::bit_or>;
@@ -30,7 +30,7 @@ struct by_weight {
 using mesh_type = vp::mesh_view<float>;
 using draw = vp::draw<mesh_type, by_weight, std::remove_const_t<decltype(shader)>>;
 
-// A valid call into memory that shows every write: what a test then breaks one part of.
+// A valid call into memory that shows every write.
 struct call {
     static constexpr float mark = -12345.0f;
     static constexpr std::uint32_t bit_mark = 0x5a5a5a5au;
@@ -57,7 +57,7 @@ struct call {
     call(const call&) = delete; // the views point into it
     call& operator=(const call&) = delete;
 
-    void look() { // after the arrays have changed
+    void look() { // call after a change of the arrays
         weights.assign(positions.size(), 1.0f);
         mesh = {positions, triangles, vp::core::make_pack(vp::array_view<const float>(weights))};
     }
@@ -67,7 +67,7 @@ struct call {
     }
 };
 
-// Several tiles, and so many triangles (nearly all of them outside) that every stage shares its work among threads.
+// Several tiles, and enough triangles (nearly all outside) that every stage divides its work among threads.
 struct large_call : call {
     large_call() {
         grid.extent = {70, 8, 8};

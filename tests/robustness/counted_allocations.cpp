@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Replaces the global operators, in a file of its own, so that no compiler inlines one half of a pair into a test and
-// then misses the other. aligned_alloc and free are wrapped by the linker: replacing them outright would take the place
-// of a sanitizer's.
+// Replaces the global operators new and delete. They are in a separate file, so that no compiler inlines one of a pair
+// and misses the other. aligned_alloc and free are wrapped by the linker, because replacing them would disable a
+// sanitizer's.
 
 #include "counted_allocations.hpp"
 
@@ -51,13 +51,13 @@ void* __wrap_aligned_alloc(std::size_t alignment, std::size_t size) {
     return p;
 }
 
-// Of memory from aligned_alloc, as far as tests look: what others free they have got from malloc between two looks.
+// Counts memory from aligned_alloc only: other code frees between two checks what it got from malloc between them.
 void __wrap_free(void* p) {
     if (p != nullptr) --unit::live_allocations;
     __real_free(p);
 }
 
-// Sanitizers end the program at an allocation that cannot be had, unless told to fail it as the system would.
+// By default, sanitizers end the program if an allocation fails. This option makes them return null instead.
 extern "C" const char* __asan_default_options() { return "allocator_may_return_null=1"; }
 extern "C" const char* __tsan_default_options() { return "allocator_may_return_null=1"; }
 // NOLINTEND(bugprone-reserved-identifier)

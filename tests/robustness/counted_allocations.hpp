@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Counts what the program that links counted_allocations.cpp has got from operator new and std::aligned_alloc (what
-// cpu_backend::buffer allocates with) and not yet given back, and refuses allocations on demand. malloc called by
-// others is not counted. Needs the linker options --wrap=aligned_alloc and --wrap=free.
+// Counts live allocations by operator new and std::aligned_alloc (which cpu_backend::buffer uses), and lets allocations
+// fail on demand. Direct calls of malloc are not counted. Needs the linker options --wrap=aligned_alloc and
+// --wrap=free.
 
 #include <atomic>
 #include <cstdint>
@@ -14,8 +14,8 @@ namespace unit {
 
 extern std::atomic<std::int64_t> live_allocations;
 
-// How many more allocations succeed, of all threads together: each one takes 1, and is refused where none is left.
-// Below zero if one has been refused.
+// Number of allocations that may still succeed, over all threads. Each one subtracts 1 and fails if the result is
+// negative, so a negative value means that one failed.
 inline constexpr std::int64_t no_end_of_allocations = std::numeric_limits<std::int64_t>::max();
 extern std::atomic<std::int64_t> allocations_left;
 

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Memory follows the work: peak resident memory of whole calls, measured by the process itself. ctest runs each test in
-// a process of its own; the peak is reset where a test starts, so that they can also run in one.
+// Memory is proportional to the work: peak resident memory of whole calls, measured by the process itself. ctest runs
+// each test in a separate process. The peak is reset at the start of a test, so they can also run in one process.
 
 #include "generated_meshes.hpp"
 
@@ -19,7 +19,7 @@ namespace vp = voxelpipe;
 
 constexpr std::uint64_t MiB = std::uint64_t{1} << 20;
 
-// A field of /proc/self/status in bytes; 0 where there is none.
+// A field of /proc/self/status in bytes; 0 if there is none.
 std::uint64_t own_memory(const std::string& field) {
     std::ifstream in("/proc/self/status");
     for (std::string line; std::getline(in, line);)
@@ -30,7 +30,7 @@ std::uint64_t own_memory(const std::string& field) {
 class Memory : public ::testing::Test {
 protected:
     void SetUp() override {
-        std::ofstream("/proc/self/clear_refs") << "5"; // VmHWM starts again from what is resident now
+        std::ofstream("/proc/self/clear_refs") << "5"; // VmHWM restarts from the memory that is resident now
         ASSERT_GT(own_memory("VmHWM"), 0u) << "this system does not say how much memory a process takes";
     }
 };
@@ -44,7 +44,7 @@ TEST_F(Memory, BitGridOf2048CubedAndAMillionTrianglesFitsIn1536MiB) {
     const vp::mesh_view<> view{mesh.positions, mesh.triangles};
     const vp::status s = vp::voxelize(backend, view, grid, vp::passthrough{}, vp::constant(true), fb);
     ASSERT_TRUE(s.ok()) << s.message();
-    EXPECT_GT(s.counts.voxels, 19'000'000u); // the grid is really there
+    EXPECT_GT(s.counts.voxels, 19'000'000u); // the grid is in memory
     const std::uint64_t peak = own_memory("VmHWM");
     EXPECT_GT(peak, 1024 * MiB);
     EXPECT_LT(peak, 1536 * MiB);
@@ -52,7 +52,7 @@ TEST_F(Memory, BitGridOf2048CubedAndAMillionTrianglesFitsIn1536MiB) {
 }
 
 struct abuffer_use {
-    std::uint64_t fragments, voxels, bytes; // bytes: peak above what was resident before the call
+    std::uint64_t fragments, voxels, bytes; // bytes: peak minus the memory that was resident before the call
 };
 
 template <class Payload, class Shader>
@@ -67,8 +67,8 @@ abuffer_use draw_abuffer(const bench::mesh_data& mesh, int extent, const Shader&
     return {s.counts.fragments, s.counts.voxels, own_memory("VmHWM") - before};
 }
 
-// The result takes 4 bytes a fragment and 16 a voxel; while it is made, as much again in buckets and in rows to put in
-// order. A dense 2048^3 grid of counts alone would be 32 GiB.
+// The result takes 4 bytes a fragment and 16 a voxel. During the call, buckets and rows to sort take as much again. A
+// dense 2048^3 grid of counts alone would take 32 GiB.
 constexpr std::uint64_t bytes_per_fragment = 64;
 
 TEST_F(Memory, AbufferIsInProportionToItsFragments) {

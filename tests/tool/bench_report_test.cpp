@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The arithmetic between a measured time and the table that shows it: wrong ratios are worse than slow code.
+// The arithmetic between a measured time and the table that shows it.
 
 #include "gpu_report.hpp"
 #include "machine.hpp"
@@ -58,7 +58,7 @@ TEST(Statistics, GeometricMeanLeavesOutWhatIsMissing) {
     EXPECT_EQ(geometric_mean({}), 0);
 }
 
-TEST(GpuCells, NamesAreReadBack) {
+TEST(GpuCells, NamesParseToTheirCells) {
     std::set<std::string_view> names;
     for (const gpu_cell cell : gpu_cells) {
         gpu_cell back{};
@@ -71,7 +71,7 @@ TEST(GpuCells, NamesAreReadBack) {
     EXPECT_FALSE(parse("bit", cell));
 }
 
-TEST(GpuCells, FramebufferBytes) {
+TEST(GpuCells, FramebufferBytesIncludePadding) {
     EXPECT_EQ(framebuffer_bytes(gpu_cell::bit_conservative, 128), 128u * 128 * 128 / 8);
     EXPECT_EQ(framebuffer_bytes(gpu_cell::bit_thin, 33), 8u * 33 * 33); // rows are padded to words
     EXPECT_EQ(framebuffer_bytes(gpu_cell::float_add_conservative, 1024), std::uint64_t{4} << 30);
@@ -79,7 +79,7 @@ TEST(GpuCells, FramebufferBytes) {
     EXPECT_EQ(framebuffer_bytes(gpu_cell::float_add_tracked_conservative, 1024), 0u);
 }
 
-// The quoted targets follow from the quoted anchors by the rule that stands beside them; a slip of a digit breaks it.
+// The quoted targets follow from the quoted anchors by the documented rule, so a wrong digit fails the test.
 TEST(PublishedGpuFigures, TargetsFollowFromTheAnchors) {
     std::set<std::pair<std::string_view, int>> cells;
     for (const published_gpu_scene& s : published_gpu_scenes) {
@@ -121,7 +121,7 @@ TEST(PublishedGpuFigures, NoTargetUnderOnePointThreeTimesTheFloor) {
     EXPECT_EQ(published_anchor("dragon", 256, gpu_cell::bit_thin).fastest(), 0);
 }
 
-TEST(GpuReport, Ratios) {
+TEST(GpuReport, RatiosFollowFromTheTimes) {
     gpu_row r = row("dragon", 512, gpu_cell::bit_conservative, 0.055);
     r.baseline = of(0.22);
     r.floor_ms = 0.0275;
@@ -141,7 +141,7 @@ TEST(GpuReport, MeansCountTheCellsThatReachTheirGoals) {
     rows.push_back(row("dragon", 1024, gpu_cell::bit_conservative, 1));
     rows.back().whole = {};
     rows.back().failure = "out of memory";
-    rows[0].async = of(0.110 / 9); // the other has none
+    rows[0].async = of(0.110 / 9); // the other row has no time
     const std::string text = gpu_means(rows).csv();
     // number, mean of 8 and 2, least, at 1.5 or more, at the target; async: mean, least, at 1.5 or more
     EXPECT_NE(text.find("bit_conservative,3,4.00 ×,2.00 ×,2,1,9.00 ×,9.00 ×,1,"), std::string::npos) << text;
@@ -171,7 +171,7 @@ TEST(GpuReport, EveryRowHasEveryColumn) {
     EXPECT_NE(gpu_table_short(rows).markdown().find("0.267"), std::string::npos) << "the 2011 figure";
 }
 
-TEST(GpuReport, StagesOfTheRowsThatHaveThem) {
+TEST(GpuReport, ListsStagesOfTheRowsThatHaveThem) {
     std::vector<gpu_row> rows{row("dragon", 512, gpu_cell::bit_thin, 0.5), row("room", 512, gpu_cell::bit_thin, 0.5)};
     EXPECT_TRUE(gpu_stage_table(rows).empty());
     rows[1].stages.clear = 0.25;
@@ -201,7 +201,7 @@ TEST(MachineRecord, CommitIsWhatTheCallerSays) {
     EXPECT_FALSE(describe_machine().commit.empty());
 }
 
-TEST(Output, FilesAndTheCommand) {
+TEST(Output, WritesItsFilesAndRecordsTheCommand) {
     const std::filesystem::path folder =
         std::filesystem::temp_directory_path() / ("voxelpipe_bench_report_test_" + std::to_string(getpid()));
     std::filesystem::remove_all(folder);

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Fuzzing the API: bytes become a grid, a crop of it, a mesh and a coverage rule; the library's A-buffer and
-// framebuffer must be the oracle's voxels, and bad input must be refused with the right code. A libFuzzer target, or,
-// built with VOXELPIPE_FUZZ_REPLAY by any compiler, a program that runs the files and folders it is given (and fails
-// where there are none in them), and without arguments pseudo-random inputs (VOXELPIPE_FUZZ_INPUTS of them, 15000 if
+// Fuzzing the API: bytes become a grid, a crop of it, a mesh and a coverage rule. The library's A-buffer and
+// framebuffer must hold the oracle's voxels, and bad input must be refused with the right code. This is a libFuzzer
+// target. Built with VOXELPIPE_FUZZ_REPLAY by any compiler, it is a program that runs the given files and folders, and
+// fails if they are empty. Without arguments it runs pseudo-random inputs (VOXELPIPE_FUZZ_INPUTS of them, 15000 if
 // unset).
 
 #include "library.hpp"
@@ -35,7 +35,7 @@ void require(bool condition, const char* what) {
     if (!condition) fail(what);
 }
 
-// Reads numbers off the input; zeros once it is used up.
+// Reads numbers from the input; zeros after its end.
 class reader {
 public:
     reader(const std::uint8_t* data, std::size_t size) : data_(data), left_(size) {}
@@ -103,7 +103,7 @@ float to_float(double x) {
     return static_cast<float>(x);
 }
 
-// Most often near the part, on and off the lattice; now and then any float at all.
+// Mostly near the part, on and off the lattice; sometimes any float.
 float coordinate(reader& in, const input& of, int axis) {
     const double size = of.g.voxel_size[axis];
     const double corner = of.g.origin[axis] + of.p.begin[axis] * size;
@@ -147,7 +147,7 @@ input parse(const std::uint8_t* data, std::size_t size) {
     for (int n = 0; n < vertices; ++n)
         r.positions.emplace_back(coordinate(in, r, 0), coordinate(in, r, 1), coordinate(in, r, 2));
     while (!in.empty() && r.triangles.size() < 16) {
-        // One index in 256 may be anything.
+        // One index in 256 may be out of range.
         const auto index = [&] {
             const auto byte = in.raw<std::uint8_t>();
             return byte == 255 ? in.raw<std::uint32_t>() : byte % static_cast<std::uint32_t>(vertices);
@@ -158,7 +158,7 @@ input parse(const std::uint8_t* data, std::size_t size) {
     return r;
 }
 
-// Which refusals this input allows; ok among them where it may be drawn.
+// The status codes that this input allows, including ok if it may be drawn.
 bool may_be(vp::status_code code, const input& in) {
     bool bad_index = false, bad_origin = false, bad_size = false, odd_size = false;
     for (const glm::uvec3& t : in.triangles)
@@ -167,7 +167,7 @@ bool may_be(vp::status_code code, const input& in) {
         const double size = in.g.voxel_size[axis];
         bad_origin = bad_origin || !std::isfinite(in.g.origin[axis]);
         bad_size = bad_size || !(size > 0.0) || !std::isfinite(size);
-        odd_size = odd_size || size < 1e-290 || size > 1e290; // too extreme to divide by, allowed to be refused
+        odd_size = odd_size || size < 1e-290 || size > 1e290; // too extreme to divide by; it may be refused
     }
     const bool bad = bad_index || bad_origin || bad_size || in.triangles.empty();
     switch (code) {
@@ -249,7 +249,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 namespace {
 
-// Gives the number of files.
+// Returns the number of files.
 std::size_t replay(const std::filesystem::path& path) {
     if (std::filesystem::is_directory(path)) {
         std::size_t count = 0;
@@ -260,12 +260,12 @@ std::size_t replay(const std::filesystem::path& path) {
     if (!file) fail("cannot read " + path.string());
     const std::vector<char> bytes(std::istreambuf_iterator<char>(file), {});
     std::printf("%s, %zu bytes\n", path.string().c_str(), bytes.size());
-    std::fflush(stdout); // before a crash
+    std::fflush(stdout); // so that the name is printed before a crash
     LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
     return 1;
 }
 
-// Many bytes of zero and of small numbers among random ones: without a fuzzer's feedback, what hits ties and corners.
+// Many zeros and small numbers among random bytes, which hit ties and corners without a fuzzer's feedback.
 void random_inputs(std::uint64_t count) {
     oracle::splitmix64 random(20110801);
     std::uint64_t drawn = 0;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// libFuzzer target over the whole glTF loader, from memory. Whatever the bytes are, the loader gives a valid scene or
-// throws gltf_error with one printable line; anything else (crash, sanitizer report, other exception, time, memory) is
-// a finding. Compiled with VOXELPIPE_FUZZ_REPLAY it is a plain program that runs the files and folders it is given.
+// libFuzzer target for the glTF loader, from memory. For any bytes, the loader returns a valid scene or throws
+// gltf_error with one printable line. Anything else (crash, sanitizer report, other exception, time, memory) is a
+// finding. Compiled with VOXELPIPE_FUZZ_REPLAY, it is a plain program that runs the given files and folders.
 #include <gltf_scene.hpp>
 
 #include <cstdint>
@@ -18,7 +18,7 @@ void require(bool holds, const char* what) {
     std::abort();
 }
 
-// What scene.hpp promises to everyone behind the loader.
+// The promises of scene.hpp to code that uses a loaded scene.
 void check(const voxelize::scene& scene) {
     for (const voxelize::primitive& part : scene.primitives) {
         require(part.material < scene.materials.size(), "material out of range");
