@@ -180,6 +180,18 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->option_text("NX,NY,NZ")
         ->group("Grid");
 
+    auto* const animation =
+        app.add_option(
+               "--animation", options.load.gltf.animation,
+               "Pose a glTF model as this animation of the file (by name, or by number from 0) has it at --time")
+            ->option_text("NAME")
+            ->group("Model");
+    app.add_option("--time", options.load.gltf.seconds,
+                   "Moment of the animation in seconds; before its start and behind its end those hold. Default: 0")
+        ->check(CLI::Number.description(""))
+        ->needs(animation)
+        ->option_text("T")
+        ->group("Model");
     app.add_flag("--lenient", options.load.gltf.lenient,
                  "Go on with a warning where a file breaks the specification in a way that can be put right: unaligned "
                  "data, a node in the scene twice")

@@ -3,11 +3,13 @@
 #include "gltf_scene.hpp"
 
 #include "gltf/accessor.hpp"
+#include "gltf/animation.hpp"
 #include "gltf/budget.hpp"
 #include "gltf/check.hpp"
 #include "gltf/container.hpp"
 #include "gltf/materials.hpp"
 #include "gltf/nodes.hpp"
+#include "gltf/pose.hpp"
 #include "gltf/primitives.hpp"
 #include "gltf/resources.hpp"
 #include "gltf/text.hpp"
@@ -38,17 +40,20 @@ void load(scene& result, std::span<const std::byte> bytes, const gltf_file_reade
     gltf::budget memory{limits};
     memory.grant_input(bytes.size());
     const gltf::container parts = gltf::split_container(bytes, tolerance);
-    const gltf::checked_document document = gltf::check_document(parts.json, parts.has_binary, memory, tolerance);
+    const gltf::checked_document document =
+        gltf::check_document(parts.json, parts.has_binary, memory, tolerance, options);
     const gltf::resources resources{document, parts.binary, parts.has_binary, read_file, memory, tolerance};
-    const tinygltf::Model model = parse(document);
+    tinygltf::Model model = parse(document);
     const gltf::accessor_reader accessors{model, document, resources, memory};
     gltf::material_reader materials{model, accessors, resources, result};
     materials.read_factors();
-    gltf::primitive_reader primitives{model, accessors, materials, memory, result};
+    if (options.animation) gltf::apply_animation(model, accessors, options.seconds, result.warnings);
     const gltf::shown_scene shown_scene = gltf::shown_meshes(model, accessors, tolerance);
+    const gltf::pose_reader poses{model, accessors, shown_scene.node_to_world, memory};
+    gltf::primitive_reader primitives{model, accessors, materials, poses, memory, result};
     for (const gltf::shown_mesh& shown : shown_scene.meshes)
         for (std::size_t part = 0; part < model.meshes[shown.mesh].primitives.size(); ++part)
-            primitives.show(shown.mesh, part, shown.to_world);
+            primitives.show(shown, part);
     primitives.finish();
     tolerance.finish();
 }

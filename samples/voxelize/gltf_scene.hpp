@@ -8,10 +8,12 @@
 // stay apart from the positions, with every operation written out, so the same file gives the same bits whatever the
 // compiler's floating-point flags. A mesh that many nodes show is kept once.
 //
-// What is not supported: where geometry would be lost (Draco or meshopt compression, GPU instancing, required
-// extensions that are not known) the load fails and says so; otherwise scene::warnings names it. Skinned meshes stand
-// in their bind pose under their node's transform, morph targets at their base shape, animations at rest; points and
-// lines have no surface and are left out.
+// Skins, morph targets and instances of EXT_mesh_gpu_instancing stand in the pose that the file states, or in that of
+// one animation at one time.
+//
+// What is not supported: where geometry would be lost (Draco or meshopt compression, required extensions that are not
+// known) the load fails and says so; otherwise scene::warnings names it. Points and lines have no surface and are left
+// out.
 
 #include "model_error.hpp"
 #include "scene.hpp"
@@ -20,6 +22,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -45,6 +48,10 @@ struct gltf_limits {
 struct gltf_options {
     // Faults that can be put right (unaligned strides, a node in the scene twice, ...) become warnings.
     bool lenient = false;
+    // Nodes stand as this animation (its name, or its number from 0) has them at this time. None: as the file places
+    // them.
+    std::optional<std::string> animation;
+    double seconds = 0;
 };
 
 // Gives the bytes of a file that a .gltf names. The path is relative, normalised, percent-decoded and never leaves

@@ -32,6 +32,8 @@ std::set<std::string> all_options() {
             "-s,--voxel-size S[,SY,SZ]",
             "--origin X,Y,Z",
             "--extent NX,NY,NZ",
+            "--animation NAME",
+            "--time T",
             "--lenient",
             "--coverage RULE",
             "--depth-axis AXIS",

@@ -59,9 +59,10 @@ checked_document checker::run() {
     check_materials();
     check_meshes();
     check_nodes_and_scenes();
-    warn_of_what_is_left_out();
+    check_skins();
+    choose_animation();
     root_.keep_only({"asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews", "materials", "textures",
-                     "samplers"});
+                     "samplers", "skins", "animations"});
     if (placeholder_view_) root_.value()["bufferViews"].push_back({{"buffer", 0}, {"byteLength", 1}});
     document_.json = root_.value().dump();
     return std::move(document_);
@@ -94,6 +95,7 @@ void checker::count_lists() {
     num_meshes_ = count("meshes", sizeof(tinygltf::Mesh));
     num_nodes_ = count("nodes", sizeof(tinygltf::Node));
     num_scenes_ = count("scenes", sizeof(tinygltf::Scene));
+    num_skins_ = count("skins", sizeof(tinygltf::Skin));
 }
 
 void checker::check_extensions() {
@@ -235,8 +237,8 @@ void checker::check_sparse(const json_at& sparse, std::uint64_t accessor_count, 
     sparse.keep_only({"count", "indices", "values"});
 }
 
-checked_document check_document(std::string_view json_text, bool has_binary_chunk, budget& memory,
-                                leniency& tolerance) {
+checked_document check_document(std::string_view json_text, bool has_binary_chunk, budget& memory, leniency& tolerance,
+                                const gltf_options& options) {
     check_json_text(json_text, memory.limits());
     json root;
     try {
@@ -248,7 +250,7 @@ checked_document check_document(std::string_view json_text, bool has_binary_chun
         throw gltf_error("invalid JSON: " +
                          printable(bracket == std::string_view::npos ? what : what.substr(bracket + 2), 200));
     }
-    return checker{root, has_binary_chunk, memory, tolerance}.run();
+    return checker{root, has_binary_chunk, memory, tolerance, options}.run();
 }
 
 } // namespace voxelize::gltf

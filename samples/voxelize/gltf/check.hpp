@@ -29,7 +29,7 @@ struct image_source {
 };
 
 struct checked_document {
-    std::string json; // for tinygltf: without buffers, images, animations, skins, cameras, extras
+    std::string json; // for tinygltf: without buffers, images, cameras, extras, other animations
     std::vector<buffer_source> buffers;
     std::vector<std::uint64_t> view_strides; // per buffer view, 0: packed. tinygltf insists on multiples of 4
     std::vector<image_source> images;
@@ -42,6 +42,6 @@ struct checked_document {
 
 // Throws gltf_error with the path of the first thing that is wrong; what is left out becomes a warning.
 [[nodiscard]] checked_document check_document(std::string_view json_text, bool has_binary_chunk, budget& memory,
-                                              leniency& tolerance);
+                                              leniency& tolerance, const gltf_options& options);
 
 } // namespace voxelize::gltf

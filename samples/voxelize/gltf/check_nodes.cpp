@@ -7,19 +7,16 @@
 namespace voxelize::gltf {
 
 void checker::check_meshes() {
-    std::size_t with_targets = 0;
     root_.each_object("meshes", [&](const json_at& mesh) {
         (void)mesh.string("name");
         memory_.charge(mesh.array_size("primitives"), sizeof(tinygltf::Primitive), "meshes");
-        mesh.each_object("primitives", [&](const json_at& primitive) { check_primitive(primitive, with_targets); });
-        mesh.keep_only({"name", "primitives"});
+        mesh.each_object("primitives", [&](const json_at& primitive) { check_primitive(primitive); });
+        check_numbers_list(mesh, "weights");
+        mesh.keep_only({"name", "primitives", "weights"});
     });
-    if (with_targets != 0)
-        tolerance_.warnings().push_back("morph targets are not supported: " + std::to_string(with_targets) +
-                                        " primitive(s) taken at their base shape");
 }
 
-void checker::check_primitive(const json_at& primitive, std::size_t& with_targets) {
+void checker::check_primitive(const json_at& primitive) {
     const json_at attributes = primitive.required("attributes", primitive.object("attributes"));
     for (const auto& entry : attributes.value().items())
         (void)attributes.index(entry.key(), "accessors", num_accessors_);
@@ -27,13 +24,13 @@ void checker::check_primitive(const json_at& primitive, std::size_t& with_target
     (void)primitive.index("material", "materials", num_materials_);
     if (const auto indices = primitive.index("indices", "accessors", num_accessors_))
         check_index_accessor(primitive, *indices);
-    if (primitive.array_size("targets") != 0) ++with_targets;
+    check_targets(primitive);
     if (const auto extensions = primitive.object("extensions")) {
         const auto position = attributes.index("POSITION", "accessors", num_accessors_);
         if (extensions->member("KHR_draco_mesh_compression") && (!position || document_.zero_base[*position]))
             primitive.fail("geometry is compressed with KHR_draco_mesh_compression, which is not supported");
     }
-    primitive.keep_only({"attributes", "mode", "material", "indices"});
+    primitive.keep_only({"attributes", "mode", "material", "indices", "targets"});
 }
 
 void checker::check_index_accessor(const json_at& primitive, std::uint32_t index) {
@@ -52,7 +49,6 @@ void checker::check_index_accessor(const json_at& primitive, std::uint32_t index
 }
 
 void checker::check_nodes_and_scenes() {
-    std::size_t with_skin = 0;
     std::size_t with_matrix_and_parts = 0;
     root_.each_object("nodes", [&](const json_at& node) {
         (void)node.string("name");
@@ -63,13 +59,12 @@ void checker::check_nodes_and_scenes() {
         parts = node.check_numbers("scale", 3) || parts;
         parts = node.check_numbers("translation", 3) || parts;
         if (matrix && parts) ++with_matrix_and_parts;
-        if (node.member("skin")) ++with_skin;
+        (void)node.index("skin", "skins", num_skins_);
+        check_numbers_list(node, "weights");
         if (const auto extensions = node.object("extensions")) check_node_extensions(*extensions);
-        node.keep_only({"name", "mesh", "children", "matrix", "rotation", "scale", "translation", "extensions"});
+        node.keep_only({"name", "mesh", "children", "matrix", "rotation", "scale", "translation", "skin", "weights",
+                        "extensions"});
     });
-    if (with_skin != 0)
-        tolerance_.warnings().push_back("skins are not supported: " + std::to_string(with_skin) +
-                                        " node(s) show their mesh in its bind pose");
     if (with_matrix_and_parts != 0)
         tolerance_.warnings().push_back(
             std::to_string(with_matrix_and_parts) +
@@ -114,11 +109,6 @@ void checker::check_node_extensions(const json_at& extensions) const {
         instancing->keep_only({"attributes"});
     }
     extensions.keep_only({"KHR_node_visibility", "EXT_mesh_gpu_instancing"});
-}
-
-void checker::warn_of_what_is_left_out() {
-    if (const auto animations = root_.member("animations"); animations && !animations->value().empty())
-        tolerance_.warnings().push_back("animations are not supported: nodes stand as the file places them");
 }
 
 } // namespace voxelize::gltf

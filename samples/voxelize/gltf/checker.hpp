@@ -21,8 +21,8 @@ inline constexpr std::uint64_t largest_integer = std::uint64_t{1} << 53;
 class checker {
 public:
     // All of them must outlive this. ROOT is reduced in place.
-    checker(json& root, bool has_binary_chunk, budget& memory, leniency& tolerance)
-        : root_{root}, has_binary_chunk_{has_binary_chunk}, memory_{memory}, tolerance_{tolerance} {}
+    checker(json& root, bool has_binary_chunk, budget& memory, leniency& tolerance, const gltf_options& options)
+        : root_{root}, has_binary_chunk_{has_binary_chunk}, memory_{memory}, tolerance_{tolerance}, options_{options} {}
 
     // Call once.
     [[nodiscard]] checked_document run();
@@ -57,21 +57,28 @@ private:
 
     // check_nodes.cpp: what is shown, and where.
     void check_meshes();
-    void check_primitive(const json_at& primitive, std::size_t& with_targets);
+    void check_primitive(const json_at& primitive);
     void check_index_accessor(const json_at& primitive, std::uint32_t index);
     void check_nodes_and_scenes();
     void check_node_extensions(const json_at& extensions) const;
-    void warn_of_what_is_left_out();
+
+    // check_pose.cpp: how it is bent.
+    void check_numbers_list(const json_at& at, std::string_view key) const;
+    void check_targets(const json_at& primitive) const;
+    void check_skins();
+    void choose_animation();
+    void check_animation(const json_at& animation) const;
 
     json_at root_;
     bool has_binary_chunk_;
     budget& memory_;
     leniency& tolerance_;
+    const gltf_options& options_;
     checked_document document_;
     std::vector<view> views_;
     bool placeholder_view_ = false;
     std::size_t num_buffers_ = 0, num_views_ = 0, num_accessors_ = 0, num_images_ = 0, num_samplers_ = 0;
-    std::size_t num_textures_ = 0, num_materials_ = 0, num_meshes_ = 0, num_nodes_ = 0, num_scenes_ = 0;
+    std::size_t num_textures_ = 0, num_materials_ = 0, num_meshes_ = 0, num_nodes_ = 0, num_scenes_ = 0, num_skins_ = 0;
 };
 
 } // namespace voxelize::gltf

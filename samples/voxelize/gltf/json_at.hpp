@@ -31,6 +31,9 @@ public:
 
     [[nodiscard]] json& value() const { return *value_; }
 
+    // Of an array's element: its place in there.
+    [[nodiscard]] std::size_t index_in_list() const { return index_; }
+
     [[nodiscard]] std::string path() const {
         if (parent_ == nullptr) return "";
         if (key_.empty()) return parent_->path() + '[' + std::to_string(index_) + ']';

@@ -40,18 +40,39 @@ std::vector<glm::uvec3> unrolled(int mode, const std::vector<std::uint32_t>& ind
     return triangles;
 }
 
-void primitive_reader::show(std::size_t mesh, std::size_t part, const affine& to_world) {
-    auto found = known_.find({mesh, part});
-    if (found == known_.end()) found = known_.emplace(std::pair{mesh, part}, read(mesh, part)).first;
-    const read_part& shown = found->second;
-    if (!shown.primitive) return;
-    memory_.charge(1, sizeof(instance), "nodes");
-    // A unit of 1 must leave every bit of the transform, even that of -0.
-    scene_.instances.push_back(
-        {*shown.primitive, shown.unit == 1 ? to_world : to_world.after(affine::scaling(shown.unit))});
+namespace {
+
+void check_position_type(const tinygltf::Accessor& accessor, const std::string& where) {
+    if (accessor.type != TINYGLTF_TYPE_VEC3 || accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
+        throw gltf_error(where + ": POSITION is not a VEC3 of floats or of 8 or 16 bit integers");
 }
 
-primitive_reader::read_part primitive_reader::read(std::size_t mesh, std::size_t part) {
+} // namespace
+
+void primitive_reader::show(const shown_mesh& shown, std::size_t part) {
+    const tinygltf::Primitive& source = model_.meshes[shown.mesh].primitives[part];
+    const bool posed = source.mode >= TINYGLTF_MODE_TRIANGLES && poses_.is_posed(shown, source);
+    const std::tuple key{shown.mesh, part, posed ? shown.node : -1};
+    auto found = known_.find(key);
+    if (found == known_.end()) found = known_.emplace(key, read(shown, part, posed)).first;
+    const read_part& known = found->second;
+    if (!known.primitive) return;
+    memory_.charge(1, sizeof(instance), "nodes");
+    // A unit of 1 must leave every bit of the transform, even that of -0.
+    affine to_world = known.unit == 1 ? shown.to_world : shown.to_world.after(affine::scaling(known.unit));
+    if (known.origin) {
+        to_world = affine{};
+        for (std::size_t axis = 0; axis < 3; ++axis) to_world.m[axis][3] = (*known.origin)[static_cast<int>(axis)];
+    }
+    if (!to_world.is_finite()) {
+        ++counted_["node(s) with a transform that is not finite are left out"];
+        return;
+    }
+    scene_.instances.push_back({*known.primitive, to_world});
+}
+
+primitive_reader::read_part primitive_reader::read(const shown_mesh& shown, std::size_t part, bool posed) {
+    const std::size_t mesh = shown.mesh;
     const tinygltf::Primitive& source = model_.meshes[mesh].primitives[part];
     const std::string where = "meshes[" + std::to_string(mesh) + "].primitives[" + std::to_string(part) + "]";
     if (source.mode < TINYGLTF_MODE_TRIANGLES) {
@@ -76,7 +97,10 @@ primitive_reader::read_part primitive_reader::read(std::size_t mesh, std::size_t
     result.name = model_.meshes[mesh].name.empty() ? where : printable(model_.meshes[mesh].name);
     result.material = material_index(source);
     read_part known;
-    known.unit = read_positions(result, source, where);
+    if (posed)
+        known = read_posed(result, source, shown, where);
+    else
+        known.unit = read_positions(result, source, where);
     {
         const budget::scope temporary{memory_};
         std::vector<std::uint32_t> indices;
@@ -86,6 +110,8 @@ primitive_reader::read_part primitive_reader::read(std::size_t mesh, std::size_t
                 throw gltf_error(where + ": index " + std::to_string(indices[i]) + " at place " + std::to_string(i) +
                                  " is out of range, there are " + std::to_string(vertices) + " vertices");
         result.triangles = unrolled(source.mode, indices, count);
+        if (known.mirrored)
+            for (glm::uvec3& triangle : result.triangles) std::swap(triangle.y, triangle.z);
     }
     read_texcoords(result, source, where);
     read_colors(result, source, where);
@@ -95,12 +121,54 @@ primitive_reader::read_part primitive_reader::read(std::size_t mesh, std::size_t
     return known;
 }
 
+// Positions that a node bends. Those of a skin are in the world; far from its origin they are kept relative to a place
+// among them, since a float would round them.
+primitive_reader::read_part primitive_reader::read_posed(primitive& result, const tinygltf::Primitive& source,
+                                                         const shown_mesh& shown, const std::string& where) {
+    const auto index = static_cast<std::size_t>(source.attributes.at("POSITION"));
+    const tinygltf::Accessor& accessor = model_.accessors[index];
+    check_position_type(accessor, where);
+    memory_.charge(accessor.count, sizeof(glm::vec3), where);
+    const budget::scope temporary{memory_};
+    memory_.charge(accessor.count, 2 * sizeof(glm::dvec3), where);
+    const posed_positions posed =
+        poses_.positions(shown, source, accessors_.numbers(index, accessor.normalized, where), where);
+    glm::dvec3 low(std::numeric_limits<double>::infinity());
+    glm::dvec3 high(-low);
+    const auto at = [&](std::size_t i) {
+        return glm::dvec3(posed.xyz[3 * i], posed.xyz[3 * i + 1], posed.xyz[3 * i + 2]);
+    };
+    for (std::size_t i = 0; i < accessor.count; ++i) {
+        low = glm::min(low, at(i));
+        high = glm::max(high, at(i));
+    }
+    read_part known;
+    known.mirrored = posed.mirrored;
+    glm::dvec3 origin(0);
+    if (posed.in_world) {
+        constexpr double far = 1024; // sides of the box: ten bits of the float
+        const glm::dvec3 side = high - low;
+        const glm::dvec3 reach = glm::max(glm::abs(low), glm::abs(high));
+        if (std::max({reach.x, reach.y, reach.z}) > far * std::max({side.x, side.y, side.z})) origin = low;
+        known.origin = origin;
+    }
+    std::uint64_t unusable = 0;
+    result.positions.reserve(accessor.count);
+    for (std::size_t i = 0; i < accessor.count; ++i) {
+        const glm::vec3 p(at(i) - origin);
+        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) ++unusable;
+        result.positions.push_back(p);
+    }
+    if (unusable != 0)
+        counted_["vertices at positions that are not finite: their triangles will be dropped"] += unusable;
+    return known;
+}
+
 double primitive_reader::read_positions(primitive& result, const tinygltf::Primitive& source,
                                         const std::string& where) {
     const auto index = static_cast<std::size_t>(source.attributes.at("POSITION"));
     const tinygltf::Accessor& accessor = model_.accessors[index];
-    if (accessor.type != TINYGLTF_TYPE_VEC3 || accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
-        throw gltf_error(where + ": POSITION is not a VEC3 of floats or of 8 or 16 bit integers");
+    check_position_type(accessor, where);
     memory_.charge(accessor.count, sizeof(glm::vec3), where);
     const budget::scope temporary{memory_};
     // Integers of at most 16 bits are floats as they stand. Their fractions are not: the transform divides.

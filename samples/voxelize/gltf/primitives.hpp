@@ -6,6 +6,7 @@
 
 #include "accessor.hpp"
 #include "materials.hpp"
+#include "pose.hpp"
 
 #include "../affine.hpp"
 #include "../scene.hpp"
@@ -17,7 +18,7 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <utility>
+#include <tuple>
 #include <vector>
 
 namespace voxelize::gltf {
@@ -34,12 +35,12 @@ namespace voxelize::gltf {
 class primitive_reader {
 public:
     primitive_reader(const tinygltf::Model& model, const accessor_reader& accessors, material_reader& materials,
-                     budget& memory, scene& result)
-        : model_{model}, accessors_{accessors}, materials_{materials}, memory_{memory}, scene_{result} {}
+                     const pose_reader& poses, budget& memory, scene& result)
+        : model_{model}, accessors_{accessors}, materials_{materials}, poses_{poses}, memory_{memory}, scene_{result} {}
 
-    // Shows primitive PART of mesh MESH once more, at TO_WORLD. The first call for it appends it to the scene, or warns
-    // where it has no triangles.
-    void show(std::size_t mesh, std::size_t part, const affine& to_world);
+    // Shows primitive PART of the mesh of SHOWN once more. The first call for it (where a node poses it: for it and the
+    // node) appends it to the scene, or warns where it has no triangles.
+    void show(const shown_mesh& shown, std::size_t part);
 
     // Appends the warnings that are counted over the whole file.
     void finish();
@@ -48,9 +49,13 @@ private:
     // What reading a primitive gives: nothing where it has no triangles.
     struct read_part {
         std::optional<std::uint32_t> primitive;
-        double unit = 1; // of its positions: those of normalised integers stay integers
+        double unit = 1;                  // of its positions: those of normalised integers stay integers
+        std::optional<glm::dvec3> origin; // of its positions in the world, where a skin has put them there
+        bool mirrored = false;            // the skin exchanges front and back
     };
-    [[nodiscard]] read_part read(std::size_t mesh, std::size_t part);
+    [[nodiscard]] read_part read(const shown_mesh& shown, std::size_t part, bool posed);
+    [[nodiscard]] read_part read_posed(primitive& result, const tinygltf::Primitive& source, const shown_mesh& shown,
+                                       const std::string& where);
     [[nodiscard]] const tinygltf::Accessor* attribute(const tinygltf::Primitive& source, const std::string& name,
                                                       std::size_t vertices, const std::string& where) const;
     // Gives the unit.
@@ -62,10 +67,12 @@ private:
     const tinygltf::Model& model_;
     const accessor_reader& accessors_;
     material_reader& materials_;
+    const pose_reader& poses_;
     budget& memory_;
     scene& scene_;
-    std::map<std::pair<std::size_t, std::size_t>, read_part> known_; // by mesh and part
-    std::map<std::string, std::uint64_t> counted_;                   // warning -> how often
+    // By mesh, part, and the node that poses it or -1.
+    std::map<std::tuple<std::size_t, std::size_t, std::int32_t>, read_part> known_;
+    std::map<std::string, std::uint64_t> counted_; // warning -> how often
 };
 
 } // namespace voxelize::gltf
