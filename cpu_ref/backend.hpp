@@ -66,8 +66,8 @@ public:
     std::function<void(std::uint64_t done, std::uint64_t total)> progress; // called from any thread, one call at a time
 
     // What check_indices calls.
-    [[nodiscard]] std::uint32_t most_index(array_view<const glm::uvec3> triangles) const {
-        return core::most_index(triangles);
+    [[nodiscard]] std::uint32_t max_index(array_view<const glm::uvec3> triangles) const {
+        return core::max_index(triangles);
     }
 
     // What voxelize calls; arguments are validated. Exceptions of a user's shader or progress function pass through.

@@ -14,7 +14,7 @@ namespace voxelpipe::cpu {
 
 // The same bytes; padding within a value, if it has any, may then say no.
 template <class... Ts>
-[[nodiscard]] bool same_values(const solid<Ts...>& a, const solid<Ts...>& b) {
+[[nodiscard]] bool same_values(const constant_output<Ts...>& a, const constant_output<Ts...>& b) {
     bool same = true;
     core::for_each_index<sizeof...(Ts)>([&]<std::size_t I>() {
         const auto &x = get<I>(a.values), &y = get<I>(b.values);
@@ -43,7 +43,7 @@ template <class Target>
 inline constexpr bool target_folds_once = folds_once<typename Target::blend_type, typename Target::value_type>;
 
 // What one thread keeps for the tile that it is at.
-struct solid_scratch {
+struct constant_scratch {
     std::array<std::uint32_t, tile_rows> touched{};
     std::unique_ptr<std::uint32_t[]> repeats; // fragments of each voxel; where a target needs them
     counters counts{};
@@ -51,7 +51,7 @@ struct solid_scratch {
 
 template <coverage Rule, bool Repeats>
 void cover_tile(const geometry& s, const core::voxel_box& tile, const std::uint32_t* primitives, std::size_t stride,
-                std::size_t count, solid_scratch& scratch) {
+                std::size_t count, constant_scratch& scratch) {
     std::uint32_t* const touched = scratch.touched.data();
     [[maybe_unused]] std::uint32_t* const repeats = scratch.repeats.get();
     std::uint64_t fragments = 0;
@@ -82,8 +82,8 @@ void cover_tile(const geometry& s, const core::voxel_box& tile, const std::uint3
 }
 
 template <class Target>
-void resolve_solid_target(const core::voxel_box& tile, const target_view<Target>& t,
-                          const typename Target::value_type& value, const solid_scratch& scratch) {
+void resolve_constant_target(const core::voxel_box& tile, const target_view<Target>& t,
+                             const typename Target::value_type& value, const constant_scratch& scratch) {
     using map = typename Target::map;
     using traits = typename Target::traits;
     const auto x0 = static_cast<int>(tile.lo[0]), y0 = static_cast<int>(tile.lo[1]), z0 = static_cast<int>(tile.lo[2]);
@@ -132,15 +132,15 @@ void resolve_solid_target(const core::voxel_box& tile, const target_view<Target>
 
 // Ends the tile: the targets get their values, voxels are counted, the marks are wiped.
 template <class Values, class... Targets>
-void resolve_solid_tile(const core::voxel_box& tile, const framebuffer_view<Targets...>& fb, const Values& values,
-                        solid_scratch& scratch) {
+void resolve_constant_tile(const core::voxel_box& tile, const framebuffer_view<Targets...>& fb, const Values& values,
+                           constant_scratch& scratch) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
         const auto& t = get<I>(fb.targets);
         using target_type = typename core::pack_element<I, Targets...>::type;
         // A count target ignores the value, whatever its type.
         typename target_type::value_type value{};
         if constexpr (!std::is_same_v<typename target_type::blend_type, blend::count>) value = get<I>(values);
-        if (t.load != load_operation::off) resolve_solid_target<target_type>(tile, t, value, scratch);
+        if (t.load != load_operation::off) resolve_constant_target<target_type>(tile, t, value, scratch);
     });
     for (std::size_t row = 0; row < tile_rows; ++row) {
         std::uint32_t word = scratch.touched[row];

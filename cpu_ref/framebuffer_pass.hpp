@@ -214,17 +214,17 @@ void raster_tiles(const execution& how, const Scene& s, const core::tile_grid& t
 }
 
 template <coverage Rule, class Key, class Scene, class... Targets>
-void raster_solid_tiles(const execution& how, const Scene& s, const core::tile_grid& tiles,
-                        const std::vector<tile_range>& ranges, const raw_array<tile_pair<Key>>& pairs, unsigned workers,
-                        const framebuffer_view<Targets...>& fb, counters& counts) {
+void raster_constant_tiles(const execution& how, const Scene& s, const core::tile_grid& tiles,
+                           const std::vector<tile_range>& ranges, const raw_array<tile_pair<Key>>& pairs,
+                           unsigned workers, const framebuffer_view<Targets...>& fb, counters& counts) {
     bool repeats = false;
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
         using target_type = typename core::pack_element<I, Targets...>::type;
         if (!target_folds_once<target_type> && get<I>(fb.targets).load != load_operation::off) repeats = true;
     });
-    std::vector<std::unique_ptr<solid_scratch>> scratch;
+    std::vector<std::unique_ptr<constant_scratch>> scratch;
     for (unsigned w = 0; w < workers; ++w) {
-        scratch.push_back(std::make_unique<solid_scratch>());
+        scratch.push_back(std::make_unique<constant_scratch>());
         if (repeats) scratch.back()->repeats = std::make_unique<std::uint32_t[]>(tile_voxels);
     }
     clear_targets(how, fb);
@@ -241,7 +241,7 @@ void raster_solid_tiles(const execution& how, const Scene& s, const core::tile_g
             cover_tile<Rule, true>(s, box, primitives, stride, count, mine);
         else
             cover_tile<Rule, false>(s, box, primitives, stride, count, mine);
-        resolve_solid_tile(box, fb, s.draws[0].fragment_shader.values, mine);
+        resolve_constant_tile(box, fb, s.draws[0].fragment_shader.values, mine);
         meter.advance();
     });
     for (const auto& w : scratch) {
@@ -268,12 +268,14 @@ template <coverage Rule, class Key, class Scene, class... Targets>
     if (fb.changes != nullptr) core::change_log::forget(fb.changes); // all is cleared, and nothing is marked
     const unsigned workers =
         static_cast<unsigned>(std::max<std::size_t>(1, std::min<std::size_t>(how.threads, ranges.size())));
-    bool solid = false;
-    if constexpr (core::is_solid<typename Scene::fragment_shader>) {
-        solid = same_values(s);
-        if (solid) raster_solid_tiles<Rule>(how, s, tiles, ranges, coarse.pairs, workers, fb, result.counts);
+    bool constant_output = false;
+    if constexpr (core::is_constant<typename Scene::fragment_shader>) {
+        constant_output = same_values(s);
+        if (constant_output)
+            raster_constant_tiles<Rule>(how, s, tiles, ranges, coarse.pairs, workers, fb, result.counts);
     }
-    if (!solid) raster_tiles<Rule>(how, s, tiles, ranges, coarse.pairs, workers, fb, count_voxels, result.counts);
+    if (!constant_output)
+        raster_tiles<Rule>(how, s, tiles, ranges, coarse.pairs, workers, fb, count_voxels, result.counts);
     if (!count_voxels) result.counts.voxels = 0;
     return result;
 }

@@ -97,7 +97,7 @@ template <coverage Rule, class Scene, class Visit>
 VOXELPIPE_INLINE void shade_in_tile(const Scene& s, std::uint32_t id, const core::voxel_box& tile, Visit&& visit) {
     const gathered_triangle tri(s, id);
     const auto& d = s.draws[tri.where.draw];
-    if constexpr (core::is_solid<typename Scene::fragment_shader>) {
+    if constexpr (core::is_constant<typename Scene::fragment_shader>) {
         const auto out = d.fragment_shader(tri); // which reads nothing of what it is given
         cover_in_tile<Rule>(
             tri, s.snap.fraction, tile,

@@ -52,13 +52,13 @@ struct mesh_view {
 template <class Backend>
 [[nodiscard]] checked_indices check_indices(Backend& backend, array_view<const glm::uvec3> triangles) {
     return {triangles.data(), triangles.size(),
-            triangles.size() == 0 ? 0 : std::uint64_t{backend.most_index(triangles)} + 1};
+            triangles.size() == 0 ? 0 : std::uint64_t{backend.max_index(triangles)} + 1};
 }
 
 namespace core {
 
 // Of triangles in host memory; 0 where there are none.
-[[nodiscard]] inline std::uint32_t most_index(array_view<const glm::uvec3> triangles) {
+[[nodiscard]] inline std::uint32_t max_index(array_view<const glm::uvec3> triangles) {
     std::uint32_t most = 0;
     for (const glm::uvec3& t : triangles) most = std::max({most, t.x, t.y, t.z});
     return most;
@@ -76,7 +76,7 @@ public:
          array_view<const Attributes>... attributes)
         : positions_(backend, positions),
           triangles_(backend, triangles), attributes_{core::make_pack(buffer<Attributes>(backend, attributes)...)},
-          index_bound_(triangles.size() == 0 ? 0 : std::uint64_t{core::most_index(triangles)} + 1) {}
+          index_bound_(triangles.size() == 0 ? 0 : std::uint64_t{core::max_index(triangles)} + 1) {}
 
     [[nodiscard]] mesh_view<Attributes...> view() const {
         return [this]<std::size_t... I>(std::index_sequence<I...>) {

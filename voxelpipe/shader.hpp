@@ -117,9 +117,9 @@ template <class... Ts>
     return {core::make_pack(values...)};
 }
 
-// Fragment shader that gives every fragment the same values: solid<bool>{true}, or constant(1.0f, 1u).
+// Fragment shader that gives every fragment the same values: constant_output<bool>{true}, or constant(1.0f, 1u).
 template <class... Ts>
-struct solid {
+struct constant_output {
     core::pack<Ts...> values;
     template <class Fragment>
     VOXELPIPE_HD output<Ts...> operator()(const Fragment&) const {
@@ -127,7 +127,7 @@ struct solid {
     }
 };
 template <class... Ts>
-[[nodiscard]] constexpr solid<Ts...> constant(Ts... values) {
+[[nodiscard]] constexpr constant_output<Ts...> constant(Ts... values) {
     return {core::make_pack(values...)};
 }
 
@@ -161,9 +161,9 @@ template <class... Ts>
 inline constexpr bool is_output<output<Ts...>> = true;
 
 template <class T>
-inline constexpr bool is_solid = false;
+inline constexpr bool is_constant = false;
 template <class... Ts>
-inline constexpr bool is_solid<solid<Ts...>> = true;
+inline constexpr bool is_constant<constant_output<Ts...>> = true;
 
 template <class Mesh>
 struct mesh_vertex;

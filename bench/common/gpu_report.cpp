@@ -32,7 +32,7 @@ std::string short_ms(double value) { return value > 0 ? significant(value, 3) : 
 std::string times(double value) { return value > 0 ? significant(value, 3) + " ×" : "-"; }
 
 // Of the values above 0, which is no figure; 0 where there are none.
-double least_of(const std::vector<double>& values) {
+double min_of(const std::vector<double>& values) {
     double least = 0;
     for (const double v : values)
         if (v > 0 && (least == 0 || v < least)) least = v;
@@ -234,13 +234,13 @@ table gpu_means(const std::vector<gpu_row>& rows) {
         }
         if (cells == 0) return;
         const auto at_least_goal = [](const std::vector<double>& ahead) {
-            return least_of(ahead) > 0
+            return min_of(ahead) > 0
                        ? std::to_string(std::count_if(ahead.begin(), ahead.end(), [](double a) { return a >= 1.5; }))
                        : "-";
         };
-        t.add_row({name, std::to_string(cells), times(geometric_mean(fastest)), times(least_of(fastest)),
-                   at_least_goal(fastest), least_of(fastest) > 0 ? std::to_string(target) : "-",
-                   times(geometric_mean(async)), times(least_of(async)), at_least_goal(async),
+        t.add_row({name, std::to_string(cells), times(geometric_mean(fastest)), times(min_of(fastest)),
+                   at_least_goal(fastest), min_of(fastest) > 0 ? std::to_string(target) : "-",
+                   times(geometric_mean(async)), times(min_of(async)), at_least_goal(async),
                    times(geometric_mean(baseline)), times(geometric_mean(floors))});
     };
     for (const gpu_cell cell : gpu_cells)

@@ -26,7 +26,7 @@ public:
         const std::uint64_t fragments = lists_.num_fragments();
         vp::workspace_limits limits = vp::workspace_limits::for_triangles(draw_.mesh.triangles.size());
         limits.fragments = fragments + fragments / 16 + 1024;
-        limits.orders_long_voxels = limits.hands_on_triangles = false; // unless there are some
+        limits.orders_long_voxels = limits.expects_deferred = false; // unless there are some
         for (int tries = 0; tries < 5; ++tries) {
             workspace_memory_ = {};
             session_.trim();

@@ -9,7 +9,7 @@ namespace bench::gpu {
 // Sums of ones: exact in the baseline too, in whatever order it adds.
 cell_pointer make_float_add(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule,
                             bool tracks) {
-    using cell = framebuffer_cell<vp::target<float, vp::blend::add>, vp::passthrough, vp::solid<float>>;
+    using cell = framebuffer_cell<vp::target<float, vp::blend::add>, vp::passthrough, vp::constant_output<float>>;
     return std::make_unique<cell>(s, mesh, grid, rule, vp::constant(1.0f), baseline_output::sums, false, tracks);
 }
 

@@ -51,7 +51,7 @@ public:
     bool prepare_async() override {
         vp::workspace_limits limits = vp::workspace_limits::for_triangles(draw_.mesh.triangles.size());
         limits.lists_fragments = true;
-        limits.hands_on_triangles = false; // unless there are some
+        limits.expects_deferred = false; // unless there are some
         for (int tries = 0; tries < 5; ++tries) {
             workspace_memory_ = {};
             session_.trim();

@@ -31,8 +31,8 @@ struct options {
     std::vector<std::string> series{"triangles", "grid", "size", "depth"};
     std::string scenes = VOXELPIPE_SCENES_DIR, mesh; // empty: dragon, or what stands in for it
     std::uint64_t fragments = std::uint64_t{1} << 22;
-    std::uint64_t most_triangles = 100'000'000;
-    int resolution = 512, most_resolution = 2048;
+    std::uint64_t max_triangles = 100'000'000;
+    int resolution = 512, max_resolution = 2048;
     gpu::cell_choice choice{{2, 10, 3, 2}, 0.5, true, true, 0}; // no stage times
     std::string out = VOXELPIPE_BENCH_OUTPUT_DIR;
 };
@@ -114,7 +114,7 @@ void scaling::triangles() {
     const vp::grid g = gpu::unit_grid(how_.resolution);
     for (const std::uint64_t decade : {1'000u, 10'000u, 100'000u, 1'000'000u, 10'000'000u, 100'000'000u})
         for (const std::uint64_t wanted : {decade, decade * 3}) {
-            if (wanted > how_.most_triangles) break;
+            if (wanted > how_.max_triangles) break;
             try_mesh(std::to_string(wanted) + " triangles", [&] {
                 const gpu::resident_mesh mesh = gpu::sphere_of_quads(gpu::quads_for(wanted), how_.resolution);
                 point("triangles", "sphere", static_cast<double>(mesh.triangles.size()), mesh, g,
@@ -132,7 +132,7 @@ void scaling::grid() {
     notes_.push_back("grid: " + data.name + ", " + std::to_string(data.triangles.size()) + " triangles" +
                      (data.note.empty() ? "" : ", " + data.note));
     const gpu::resident_mesh mesh = gpu::upload(data);
-    for (int n = 64; n <= how_.most_resolution; n *= 2)
+    for (int n = 64; n <= how_.max_resolution; n *= 2)
         point("grid", data.name, n, mesh, vp::fit(data.positions, glm::ivec3(n)),
               {gpu_cell::bit_conservative, gpu_cell::bit_thin});
 }
@@ -204,11 +204,11 @@ int main(int argc, char** argv) {
     app.add_option("--scenes", how.scenes, "Folder of the benchmark scenes (.vpm or .vpz)")->capture_default_str();
     app.add_option("--mesh", how.mesh, "The mesh of the series grid. Default: dragon, or a generated mesh");
     app.add_option("--fragments", how.fragments, "Fragments in all, for size and depth")->capture_default_str();
-    app.add_option("--most-triangles", how.most_triangles, "Where the series triangles ends")->capture_default_str();
+    app.add_option("--most-triangles", how.max_triangles, "Where the series triangles ends")->capture_default_str();
     app.add_option("--resolution", how.resolution, "Grid of triangles, size and depth")
         ->capture_default_str()
         ->check(CLI::Range(64, 2048));
-    app.add_option("--most-resolution", how.most_resolution, "Where the series grid ends")->capture_default_str();
+    app.add_option("--most-resolution", how.max_resolution, "Where the series grid ends")->capture_default_str();
     app.add_option("--runs", how.choice.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
     app.add_option("--seconds", how.choice.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
     app.add_flag("!--no-baseline", how.choice.baseline, "Leave out the baseline");

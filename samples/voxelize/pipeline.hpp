@@ -121,7 +121,7 @@ private:
     using buffer = typename Backend::template buffer<T>;
     using mesh_view = vp::mesh_view<>;
     using surface_draw = vp::draw<mesh_view, surface_vertex_shader, surface_fragment_shader>;
-    using bits_draw = vp::draw<mesh_view, placed_vertex_shader, vp::solid<bool, std::uint32_t>>;
+    using bits_draw = vp::draw<mesh_view, placed_vertex_shader, vp::constant_output<bool, std::uint32_t>>;
 
     // In the order of surface_fragment_shader's outputs.
     enum : std::size_t { occupancy, count, color_sum, color_max, color_last, normal_sum, triangle, depth, num_targets };

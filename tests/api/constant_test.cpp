@@ -94,14 +94,14 @@ void expect_same(const vp::core::pack<typename Targets::value_type...>& clear, c
                              << (several_values ? "two values" : "one value") << ", " << threads << " threads");
                 backend_type backend = unit::make_backend(threads);
                 using framebuffer = vp::framebuffer<backend_type, Targets...>;
-                framebuffer solid(backend, extent), shaded(backend, extent);
+                framebuffer constant_output(backend, extent), shaded(backend, extent);
                 vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-                    vp::get<I>(solid).clear(vp::get<I>(clear));
+                    vp::get<I>(constant_output).clear(vp::get<I>(clear));
                     vp::get<I>(shaded).clear(vp::get<I>(clear));
                 });
                 const vp::voxelize_options options(rule);
-                const auto one =
-                    draw_twice(backend, solid, meshes, shaders<vp::solid>(3, a, several_values ? b : a), options);
+                const auto one = draw_twice(backend, constant_output, meshes,
+                                            shaders<vp::constant_output>(3, a, several_values ? b : a), options);
                 const auto two =
                     draw_twice(backend, shaded, meshes, shaders<opaque>(3, a, several_values ? b : a), options);
                 for (std::size_t pass = 0; pass < 2; ++pass) {
@@ -112,8 +112,8 @@ void expect_same(const vp::core::pack<typename Targets::value_type...>& clear, c
                     EXPECT_EQ(one[pass].triangles_drawn, two[pass].triangles_drawn);
                 }
                 vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-                    EXPECT_TRUE(
-                        unit::same_bytes(vp::get<I>(solid).to_host(backend), vp::get<I>(shaded).to_host(backend)))
+                    EXPECT_TRUE(unit::same_bytes(vp::get<I>(constant_output).to_host(backend),
+                                                 vp::get<I>(shaded).to_host(backend)))
                         << "target " << I;
                 });
             }
@@ -173,17 +173,17 @@ TEST(ConstantShader, AbufferIsAsShaded) {
     backend_type backend = unit::make_backend();
     const auto on_backend = mesh.on(backend);
     for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin}) {
-        vp::abuffer<backend_type, float> solid{backend}, shaded{backend};
+        vp::abuffer<backend_type, float> constant_output{backend}, shaded{backend};
         const unit::float_shader shader{2.5f, false};
         const auto one = vp::voxelize(backend, on_backend, unit::unit_grid(extent), vp::passthrough{},
-                                      vp::constant(2.5f), solid, rule);
+                                      vp::constant(2.5f), constant_output, rule);
         const auto two =
             vp::voxelize(backend, on_backend, unit::unit_grid(extent), vp::passthrough{}, shader, shaded, rule);
         ASSERT_TRUE(one.ok() && two.ok());
         EXPECT_GT(one.counts.fragments, 1000u);
         EXPECT_EQ(one.counts.fragments, two.counts.fragments);
         EXPECT_EQ(one.counts.voxels, two.counts.voxels);
-        const auto a = solid.to_host(backend), b = shaded.to_host(backend);
+        const auto a = constant_output.to_host(backend), b = shaded.to_host(backend);
         EXPECT_EQ(a.voxels, b.voxels);
         EXPECT_EQ(a.offsets, b.offsets);
         EXPECT_EQ(a.primitives, b.primitives);

@@ -91,27 +91,27 @@ TEST(CallRoom, AnArrayThatTheLastCallDidNotUseGetsTheFirstGuess) {
 
 TEST(CallRoom, SaysWhatCallsLikeTheLastNeeded) {
     room r = make_room();
-    EXPECT_FALSE(r.most_needed(1, 0).has_value());
+    EXPECT_FALSE(r.max_needed(1, 0).has_value());
     EXPECT_EQ(run(r, 1, {7, 0}, {100, 100}), 1);
-    EXPECT_EQ(r.most_needed(1, 0), 7u);
-    EXPECT_EQ(r.most_needed(1, 1), 0u);
-    EXPECT_FALSE(r.most_needed(2, 0).has_value());
+    EXPECT_EQ(r.max_needed(1, 0), 7u);
+    EXPECT_EQ(r.max_needed(1, 1), 0u);
+    EXPECT_FALSE(r.max_needed(2, 0).has_value());
     EXPECT_EQ(run(r, 1, {3, 9}, {100, 100}), 1); // the larger of the two
-    EXPECT_EQ(r.most_needed(1, 0), 7u);
-    EXPECT_EQ(r.most_needed(1, 1), 9u);
+    EXPECT_EQ(r.max_needed(1, 0), 7u);
+    EXPECT_EQ(r.max_needed(1, 1), 9u);
     EXPECT_EQ(run(r, 2, {1, 1}, {100, 100}), 1);
-    EXPECT_EQ(r.most_needed(2, 0), 1u);
-    EXPECT_FALSE(r.most_needed(1, 0).has_value());
+    EXPECT_EQ(r.max_needed(2, 0), 1u);
+    EXPECT_FALSE(r.max_needed(1, 0).has_value());
 }
 
 TEST(CallRoom, NumberedArraysStayWithin32Bits) {
     room r = make_room();
-    lengths there = r.guess(1, {core::most_numbered + 5, core::most_numbered + 5});
-    EXPECT_EQ(there, (lengths{core::most_numbered, core::most_numbered + 5}));
+    lengths there = r.guess(1, {core::max_numbered + 5, core::max_numbered + 5});
+    EXPECT_EQ(there, (lengths{core::max_numbered, core::max_numbered + 5}));
     there = {10, 10};
-    r.raise(there, {core::most_numbered - 1, core::most_numbered});
-    EXPECT_EQ(there[0], core::most_numbered);
-    EXPECT_GT(there[1], core::most_numbered);
+    r.raise(there, {core::max_numbered - 1, core::max_numbered});
+    EXPECT_EQ(there[0], core::max_numbered);
+    EXPECT_GT(there[1], core::max_numbered);
 }
 
 } // namespace

@@ -17,13 +17,13 @@ namespace {
 namespace core = voxelpipe::core;
 
 // Numbers around every power of two, including 2^63 and the largest number.
-std::vector<std::uint64_t> numbers(int most_bits) {
+std::vector<std::uint64_t> numbers(int max_bits) {
     std::vector<std::uint64_t> all{0};
-    for (int bit = 0; bit < most_bits; ++bit) {
+    for (int bit = 0; bit < max_bits; ++bit) {
         const std::uint64_t power = std::uint64_t{1} << bit;
         for (const std::uint64_t n : {power - 1, power, power + 1, power + power / 3}) all.push_back(n);
     }
-    all.push_back(most_bits == 64 ? std::numeric_limits<std::uint64_t>::max() : (std::uint64_t{1} << most_bits) - 1);
+    all.push_back(max_bits == 64 ? std::numeric_limits<std::uint64_t>::max() : (std::uint64_t{1} << max_bits) - 1);
     return all;
 }
 
@@ -34,11 +34,11 @@ TEST(LaunchSize, LoopingKernelsFillTheDeviceAndNoMore) {
                 for (const std::uint32_t each : {0u, 1u, 4u, 8u, 16u, 0xffffffffu}) {
                     const std::uint64_t blocks = core::blocks_to_fill(items, threads, multiprocessors, each);
                     ASSERT_GE(blocks, 1u);
-                    ASSERT_LE(blocks, core::most_blocks);
+                    ASSERT_LE(blocks, core::max_blocks);
                     const auto room = std::uint64_t{multiprocessors} * each;
                     const auto reached = blocks * threads;
                     // Every item has a thread, or the device is full, or the grid has its largest size.
-                    ASSERT_TRUE(reached >= items || blocks >= room || blocks == core::most_blocks)
+                    ASSERT_TRUE(reached >= items || blocks >= room || blocks == core::max_blocks)
                         << items << ' ' << threads << ' ' << multiprocessors << ' ' << each << ": " << blocks;
                     // No block is without an item, except the one that a launch needs, and no more blocks than fit the
                     // device.
@@ -63,7 +63,7 @@ TEST(LaunchSize, EveryItemHasAThread) {
         for (const std::uint32_t threads : {32u, 128u, 256u, 1024u}) {
             const std::uint64_t blocks = core::blocks_for_each(items, threads);
             ASSERT_GE(blocks, 1u);
-            ASSERT_LE(blocks, core::most_blocks);
+            ASSERT_LE(blocks, core::max_blocks);
             ASSERT_GE(blocks * threads, items);
             ASSERT_TRUE(blocks == 1 || (blocks - 1) * threads < items);
         }

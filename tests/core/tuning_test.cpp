@@ -23,7 +23,7 @@ TEST(Tuning, TablesAscendAndNameTheSameArchitectures) {
 
 TEST(Tuning, PoliciesAreLegalWhereverTheyAreUsed) {
     for (const tuning::architecture& a : tuning::architectures)
-        for (int bits = 1; bits <= tuning::most_bits_per_voxel; ++bits) {
+        for (int bits = 1; bits <= tuning::max_bits_per_voxel; ++bits) {
             const tuning::fine_raster_policy p = tuning::fine_raster_selector{}(bits, a.capability);
             ASSERT_EQ(p.threads_per_block % 32, 0);
             ASSERT_TRUE(p.threads_per_block >= 32 && p.threads_per_block <= 1024);

@@ -19,10 +19,10 @@ namespace emulation {
 
 namespace {
 
-constexpr unsigned warp_size = 32, most_threads = 1024;
+constexpr unsigned warp_size = 32, max_threads = 1024;
 constexpr std::size_t stack_bytes = std::size_t{1} << 20; // of address space; pages come as they are touched
-constexpr std::size_t most_shared_bytes = 227 * 1024;
-alignas(1024) unsigned char shared_bytes_of_block[most_shared_bytes];
+constexpr std::size_t max_shared_bytes = 227 * 1024;
+alignas(1024) unsigned char shared_bytes_of_block[max_shared_bytes];
 
 [[noreturn]] void fail(const char* what) {
     std::fprintf(stderr, "emulated block %u of %u, thread %u: %s\n", blockIdx.x, gridDim.x, threadIdx.x, what);
@@ -64,15 +64,15 @@ struct warp {
 
 class block {
 public:
-    block() : fibers_(most_threads), warps_(most_threads / warp_size), random_(seed()) {
-        void* const p = mmap(nullptr, stack_bytes * most_threads, PROT_READ | PROT_WRITE,
+    block() : fibers_(max_threads), warps_(max_threads / warp_size), random_(seed()) {
+        void* const p = mmap(nullptr, stack_bytes * max_threads, PROT_READ | PROT_WRITE,
                              MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_STACK, -1, 0);
         if (p == MAP_FAILED) fail("no room for stacks");
         stacks_ = static_cast<unsigned char*>(p);
     }
     block(const block&) = delete;
     block& operator=(const block&) = delete;
-    ~block() { munmap(stacks_, stack_bytes * most_threads); }
+    ~block() { munmap(stacks_, stack_bytes * max_threads); }
 
     // By blockDim.x threads.
     void run(const std::function<void()>& body) {
@@ -266,8 +266,8 @@ block& the_block() {
 } // namespace
 
 void run_grid(dim3 blocks, dim3 threads, std::size_t shared_bytes, const std::function<void()>& body) {
-    if (threads.x > most_threads || threads.y * threads.z * blocks.y * blocks.z != 1) fail("grids along x only");
-    if (shared_bytes > most_shared_bytes) fail("more shared memory than a block has");
+    if (threads.x > max_threads || threads.y * threads.z * blocks.y * blocks.z != 1) fail("grids along x only");
+    if (shared_bytes > max_shared_bytes) fail("more shared memory than a block has");
     blockDim = threads;
     gridDim = blocks;
     for (unsigned i = 0; i < blocks.x; ++i) {

@@ -17,11 +17,11 @@ using oracle::splitmix64;
 using wide = oracle::wide_int<4>;
 
 // Numbers of every length, so that carries, borrows and limb borders occur.
-int128 any_int128(splitmix64& random, int most_bits) {
+int128 any_int128(splitmix64& random, int max_bits) {
     const auto high = static_cast<int128>(random.next() >> 1);
     int128 value = (high << 64) | static_cast<int128>(random.next());
     if (random.one_in(4)) value = (int128{1} << 126) - 1 + static_cast<int128>(random.below(3)); // runs of ones
-    value >>= 127 - static_cast<int>(random.below(static_cast<std::uint64_t>(most_bits) + 1));
+    value >>= 127 - static_cast<int>(random.below(static_cast<std::uint64_t>(max_bits) + 1));
     return random.one_in(2) ? -value : value;
 }
 

@@ -150,8 +150,8 @@ TEST(CountingSort, GridsOfEverySize) {
 
 TEST(CountingSort, VoxelsOfEveryLength) {
     std::vector<std::uint32_t> lengths;
-    for (const std::uint32_t limit : {device::window_length, device::most_of_window, 512u, device::most_of_warp,
-                                      device::most_of_block, 2 * device::most_of_block})
+    for (const std::uint32_t limit : {device::window_length, device::max_of_window, 512u, device::max_of_warp,
+                                      device::max_of_block, 2 * device::max_of_block})
         for (const std::uint32_t length : {limit - 1, limit, limit + 1}) lengths.insert(lengths.end(), 3, length);
     for (std::uint32_t length = 1; length < 300; ++length) lengths.push_back(length);
     for (const bool shuffled : {false, true}) {

@@ -118,8 +118,8 @@ TEST(FragmentOrder, EveryLengthOfAWindowAndAWarp) {
 TEST(FragmentOrder, AtTheLimits) {
     std::vector<std::uint64_t> lengths;
     for (const std::uint32_t limit :
-         {device::window_length, device::most_of_window, 512u, device::most_of_warp, device::most_of_block,
-          device::tile_counts::length, 2 * device::most_of_block, 32 * 32 * 32u})
+         {device::window_length, device::max_of_window, 512u, device::max_of_warp, device::max_of_block,
+          device::tile_counts::length, 2 * device::max_of_block, 32 * 32 * 32u})
         for (const std::uint32_t length : {limit - 1, limit, limit + 1}) lengths.insert(lengths.end(), 3, length);
     expect_ordered(lengths, 3);
     expect_ordered(lengths, 4, few_primitives - 1);
@@ -133,15 +133,15 @@ TEST(FragmentOrder, AtTheLimits) {
 }
 
 TEST(FragmentOrder, DenseVoxels) {
-    const std::uint32_t part = device::dense_part, most = part * device::most_dense_parts;
-    const std::uint64_t block = device::most_of_block;
+    const std::uint32_t part = device::dense_part, most = part * device::max_dense_parts;
+    const std::uint64_t block = device::max_of_block;
     // Nearly all primitives, the fewest that are more than a block's, and what lies at a part's border.
     for (const std::uint32_t num : {std::uint32_t{block} + 1, part - 1, part, part + 1, 3 * part + 17})
         for (const std::uint32_t seed : {1u, 2u})
             expect_ordered({7, num, block + 1, 300, num - 1, 2, num}, seed, num - 1);
     // As many as are just dense, and one fewer: those are cut into runs.
     for (const std::uint32_t num : {most, most - 1, most + 1}) {
-        const std::uint64_t least = num / device::least_dense;
+        const std::uint64_t least = num / device::min_dense;
         expect_ordered({least - 1, least, 1, least + 1, 3 * least}, num, num - 1);
     }
     expect_ordered(std::vector<std::uint64_t>(70, 5000), 5, 100000); // more parts than blocks
@@ -149,8 +149,8 @@ TEST(FragmentOrder, DenseVoxels) {
 
 // One voxel, of far apart primitives, that fills the room to its end.
 TEST(FragmentOrder, NoMoreRoomThanFragments) {
-    for (const std::uint32_t n : {device::most_of_window + 1, device::most_of_block, device::most_of_block + 1,
-                                  device::most_of_block + 2, 2 * device::most_of_block + 1}) {
+    for (const std::uint32_t n : {device::max_of_window + 1, device::max_of_block, device::max_of_block + 1,
+                                  device::max_of_block + 2, 2 * device::max_of_block + 1}) {
         std::vector<std::uint32_t> primitives(n);
         for (std::uint32_t i = 0; i < n; ++i) primitives[i] = 1000 * (n - i);
         const ordered result(std::vector<std::uint32_t>(n, 3), primitives, n, 1000 * std::uint64_t{n} + 1, false, 1);
@@ -166,7 +166,7 @@ TEST(FragmentOrder, FewAndMany) {
     for (std::uint64_t& length : lengths) length = 1 + random() % (random() % 50 == 0 ? 3000 : 10);
     expect_ordered(lengths, 5);
     // Windows that only just have room for what begins in them.
-    for (std::uint64_t& length : lengths) length = 1 + random() % (random() % 8 == 0 ? device::most_of_window : 60);
+    for (std::uint64_t& length : lengths) length = 1 + random() % (random() % 8 == 0 ? device::max_of_window : 60);
     expect_ordered(lengths, 6);
     expect_ordered(lengths, 7, few_primitives - 1);
     // Many tiles.

@@ -74,7 +74,7 @@ TEST(Stages, VertexShade) {
     const auto snap = vp::core::make_snap_transform(s.g);
     const auto expected = vp::cpu::vertex_shade(s.how, s.on_host(), snap);
     vp::cuda_backend::buffer<vp::core::snapped_position> positions(s.gpu, s.data.positions.size());
-    vp::cuda_backend::buffer<device::near_position> near(s.gpu, s.data.positions.size());
+    vp::cuda_backend::buffer<device::int32_position> near(s.gpu, s.data.positions.size());
     device::vertex_shade<vp::mesh_view<>, vp::passthrough, vp::no_varyings>(
         s.d_draw.mesh, {}, snap, 0, device::vertex_positions{positions.data(), near.data()}, nullptr, s.gpu.stream);
     const auto actual = positions.to_host(s.gpu);
@@ -99,7 +99,7 @@ TEST(Stages, VertexShade) {
 }
 
 template <vp::coverage Rule>
-void compare_tiles(stages<vp::solid<bool>>& s, int log2_size) {
+void compare_tiles(stages<vp::constant_output<bool>>& s, int log2_size) {
     const vp::core::tile_grid tiles(s.g.extent, log2_size);
     const auto h_scene = vp::cpu::make_scene(s.how, s.on_host(), s.g);
     auto coarse = vp::cpu::coarse_raster<Rule, std::uint32_t>(s.how, h_scene, tiles);
@@ -110,7 +110,7 @@ void compare_tiles(stages<vp::solid<bool>>& s, int log2_size) {
     const device::capacities limits{coarse.pairs.size() + 100, 100000, 0, 0};
     const std::uint32_t per_item = 64;
     stage_memory m(s.gpu, {});
-    const stages<vp::solid<bool>>::scene_memory buffers(m.memory, s.on_device());
+    const stages<vp::constant_output<bool>>::scene_memory buffers(m.memory, s.on_device());
     const auto scene = buffers.shade(s.on_device(), s.g, s.gpu.stream);
     device::share_buffers share = device::take_share(m.memory, n, limits.tile_records);
     share.num_records = &m.state->tile_records;
@@ -126,8 +126,8 @@ void compare_tiles(stages<vp::solid<bool>>& s, int log2_size) {
     void* const storage = m.memory.take<std::byte>(bytes);
     device::split_buffers<> split{};
     split.pairs_per_item = per_item;
-    split.items = m.memory.take<device::work_item>(device::most_items(limits.tile_pairs, tiles.count(), per_item));
-    split.splits = m.memory.take<device::split_tile>(device::most_images(limits.tile_pairs, per_item));
+    split.items = m.memory.take<device::work_item>(device::max_items(limits.tile_pairs, tiles.count(), per_item));
+    split.splits = m.memory.take<device::split_tile>(device::max_images(limits.tile_pairs, per_item));
     ASSERT_LT(m.memory.used(), m.block.size());
 
     const device::tile_cells<Rule> op{tiles, keys[0], primitives[0]};
@@ -290,7 +290,7 @@ void compare_fine_raster(stages<marked>& s) {
     const auto d_splits = to_device(s.gpu, splits);
     auto* const images = m.memory.take<device::word>(
         std::size_t{start.num_images} *
-        static_cast<std::size_t>(device::most_image_words<policy.log2_tile_size, framebuffer::view_type>()));
+        static_cast<std::size_t>(device::max_image_words<policy.log2_tile_size, framebuffer::view_type>()));
     const auto scene = buffers.shade(s.on_device(), s.g, s.gpu.stream);
     clear_targets(fb.view(), m.state, limits, s.gpu.stream);
     device::tile_work work;
@@ -407,8 +407,8 @@ void compare_passes(stages<marked>& s) {
     const stages<marked>::scene_memory buffers(m.memory, s.on_device());
     const device::tile_memory tiles(m.memory, vp::core::tile_grid(s.g.extent, policy.log2_tile_size), s.num_triangles(),
                                     limits,
-                                    std::max(device::most_image_words<policy.log2_tile_size, view_type>(),
-                                             device::most_image_words<policy.log2_tile_size, extremes::view_type>()),
+                                    std::max(device::max_image_words<policy.log2_tile_size, view_type>(),
+                                             device::max_image_words<policy.log2_tile_size, extremes::view_type>()),
                                     16);
     ASSERT_LT(m.memory.used(), m.block.size());
     cudaStream_t const stream = s.gpu.stream;

@@ -20,7 +20,7 @@ void compare_two_passes() {
     static_assert(tile_bytes<Targets...> > 75 * 1024 && tile_bytes<Targets...> <= 95 * 1024);
     using groups = device::target_groups<vp::framebuffer_view<Targets...>>;
     static_assert(groups::num_groups() == 2);
-    static_assert(groups::most_bits() * 512 / 8 > 48 * 1024);
+    static_assert(groups::max_bits() * 512 / 8 > 48 * 1024);
     compare_cells<Targets...>();
 }
 

@@ -19,10 +19,10 @@ namespace {
 
 using namespace device_test;
 namespace blend = voxelpipe::blend;
-using vp::device::direct_mode;
+using vp::device::immediate_mode;
 
 template <class... Ts>
-using solid_draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<Ts...>>;
+using constant_draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<Ts...>>;
 
 // Triangles of all sizes; voxels of 1 to 40 fragments, and of more than a last pass has in its table.
 mesh_data crowded(float size, std::uint32_t seed) {
@@ -41,21 +41,22 @@ mesh_data crowded(float size, std::uint32_t seed) {
 
 // One call onto cleared targets: a mesh for each shader.
 template <class Backend, class... Targets, class... Ts>
-vp::status draw_solid(Backend& be, vp::framebuffer<Backend, Targets...>& fb, const vp::grid& g,
-                      const std::vector<mesh_data>& meshes, const std::vector<vp::solid<Ts...>>& shaders,
-                      const vp::core::pack<typename Targets::value_type...>& clear,
-                      const vp::voxelize_options& options) {
+vp::status draw_constant(Backend& be, vp::framebuffer<Backend, Targets...>& fb, const vp::grid& g,
+                         const std::vector<mesh_data>& meshes, const std::vector<vp::constant_output<Ts...>>& shaders,
+                         const vp::core::pack<typename Targets::value_type...>& clear,
+                         const vp::voxelize_options& options) {
     std::vector<vp::mesh<Backend>> on_backend;
-    std::vector<solid_draw<Ts...>> draws;
+    std::vector<constant_draw<Ts...>> draws;
     for (const mesh_data& m : meshes) on_backend.emplace_back(be, m.positions, m.triangles);
     for (std::size_t i = 0; i < meshes.size(); ++i)
         draws.push_back({on_backend[i].view(), vp::passthrough{}, shaders[i]});
     vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() { vp::get<I>(fb).clear(vp::get<I>(clear)); });
-    return vp::voxelize(be, std::span<const solid_draw<Ts...>>(draws), g, fb, options);
+    return vp::voxelize(be, std::span<const constant_draw<Ts...>>(draws), g, fb, options);
 }
 
 template <class... Targets, class... Ts>
-void compare(const std::vector<mesh_data>& meshes, glm::ivec3 extent, const std::vector<vp::solid<Ts...>>& shaders,
+void compare(const std::vector<mesh_data>& meshes, glm::ivec3 extent,
+             const std::vector<vp::constant_output<Ts...>>& shaders,
              const vp::core::pack<typename Targets::value_type...>& clear) {
     vp::cpu_backend cpu;
     vp::cuda_backend gpu;
@@ -64,8 +65,8 @@ void compare(const std::vector<mesh_data>& meshes, glm::ivec3 extent, const std:
             vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, extent};
             vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, extent};
             const vp::voxelize_options options{rule, count_voxels};
-            const vp::status sa = draw_solid(cpu, a, box_grid(extent), meshes, shaders, clear, options);
-            const vp::status sb = draw_solid(gpu, b, box_grid(extent), meshes, shaders, clear, options);
+            const vp::status sa = draw_constant(cpu, a, box_grid(extent), meshes, shaders, clear, options);
+            const vp::status sb = draw_constant(gpu, b, box_grid(extent), meshes, shaders, clear, options);
             ASSERT_TRUE(sa.ok() && sb.ok()) << sa.message() << sb.message();
             EXPECT_EQ(sa.counts.voxels != 0, count_voxels);
             expect_same_counts(sa.counts, sb.counts);
@@ -86,11 +87,11 @@ void compare_sums(const mesh_data& m, glm::ivec3 extent, float value, double wid
 
 // How a call would go, which needs no device.
 template <class... Targets, class... Ts>
-auto plan(const std::vector<vp::solid<Ts...>>& shaders, const vp::framebuffer_view<Targets...>& fb,
+auto plan(const std::vector<vp::constant_output<Ts...>>& shaders, const vp::framebuffer_view<Targets...>& fb,
           std::uint64_t num_primitives, bool count_voxels) {
-    std::vector<solid_draw<Ts...>> draws;
+    std::vector<constant_draw<Ts...>> draws;
     for (const auto& s : shaders) draws.push_back({{}, vp::passthrough{}, s});
-    return vp::device::plan_direct(std::span<const solid_draw<Ts...>>(draws), fb, num_primitives, count_voxels);
+    return vp::device::plan_immediate(std::span<const constant_draw<Ts...>>(draws), fb, num_primitives, count_voxels);
 }
 
 using float_sum = vp::target<float, blend::add>;
@@ -282,17 +283,17 @@ vp::framebuffer_view<Targets...> view_of(glm::ivec3 extent) {
 
 TEST(CountedPlan, OnlyWhereItIsNeeded) {
     const auto of_sum = [](std::vector<float> values, std::uint64_t n, bool count_voxels) {
-        std::vector<vp::solid<float>> shaders;
+        std::vector<vp::constant_output<float>> shaders;
         for (const float v : values) shaders.push_back(vp::constant(v));
         return plan(shaders, view_of<float_sum>({32, 32, 32}), n, count_voxels);
     };
     const auto exact = of_sum({1.0f}, 1000, false);
     EXPECT_TRUE(exact.possible);
-    EXPECT_EQ(exact.modes.of[0], direct_mode::blend);
+    EXPECT_EQ(exact.modes.of[0], immediate_mode::blend);
     for (const auto& counted : {of_sum({1.0f}, 1000, true), of_sum({1.0f}, std::uint64_t{1} << 24, false),
                                 of_sum({0.1f}, 1000, false), of_sum({0.1f, 0.1f}, 1000, true)}) {
         EXPECT_TRUE(counted.possible);
-        EXPECT_EQ(counted.modes.of[0], direct_mode::count);
+        EXPECT_EQ(counted.modes.of[0], immediate_mode::count);
         EXPECT_FALSE(counted.modes.counts_first);
     }
     EXPECT_EQ(of_sum({0.1f}, 1000, false).voxels_of, -1);
@@ -308,35 +309,35 @@ TEST(CountedPlan, BesideATargetThatTellsFirstTouches) {
     const auto beside = [&](float value) { return plan(std::vector{vp::constant(true, value)}, fb, 1000, true); };
     // Bits tell the voxels when all is drawn,
     EXPECT_TRUE(beside(1.0f).possible);
-    EXPECT_EQ(beside(1.0f).modes.of[0], direct_mode::blend);
-    EXPECT_EQ(beside(1.0f).modes.of[1], direct_mode::blend);
+    EXPECT_EQ(beside(1.0f).modes.of[0], immediate_mode::blend);
+    EXPECT_EQ(beside(1.0f).modes.of[1], immediate_mode::blend);
     EXPECT_FALSE(beside(1.0f).modes.counts_first);
     EXPECT_EQ(beside(1.0f).bits_of, 0);
     EXPECT_EQ(beside(1.0f).voxels_of, -1);
     // many of them while it is.
     fb = view_of<bits, float_sum>({2048, 2048, 1024});
     EXPECT_TRUE(beside(1.0f).possible);
-    EXPECT_EQ(beside(1.0f).modes.of[0], direct_mode::count_first);
-    EXPECT_EQ(beside(1.0f).modes.of[1], direct_mode::blend);
+    EXPECT_EQ(beside(1.0f).modes.of[0], immediate_mode::count_first);
+    EXPECT_EQ(beside(1.0f).modes.of[1], immediate_mode::blend);
     EXPECT_TRUE(beside(1.0f).modes.counts_first);
     EXPECT_EQ(beside(1.0f).bits_of, -1);
     EXPECT_EQ(beside(1.0f).voxels_of, -1);
     // Words beyond 2^30 want wider numbers: their places in bytes are beyond 2^32.
     fb = view_of<bits, float_sum>({32, 1 << 15, (1 << 15) - 1});
-    EXPECT_EQ(plan(std::vector{vp::constant(true, 1.0f)}, fb, 1000, false).modes.of[0], direct_mode::blend);
+    EXPECT_EQ(plan(std::vector{vp::constant(true, 1.0f)}, fb, 1000, false).modes.of[0], immediate_mode::blend);
     fb = view_of<bits, float_sum>({32, 1 << 15, 1 << 15});
-    EXPECT_EQ(plan(std::vector{vp::constant(true, 1.0f)}, fb, 1000, false).modes.of[0], direct_mode::blend_far);
+    EXPECT_EQ(plan(std::vector{vp::constant(true, 1.0f)}, fb, 1000, false).modes.of[0], immediate_mode::blend_far);
     fb = view_of<bits, float_sum>({32, 32, 32});
     // What is counted anyway tells the voxels too.
-    EXPECT_EQ(beside(0.1f).modes.of[0], direct_mode::blend);
-    EXPECT_EQ(beside(0.1f).modes.of[1], direct_mode::count);
+    EXPECT_EQ(beside(0.1f).modes.of[0], immediate_mode::blend);
+    EXPECT_EQ(beside(0.1f).modes.of[1], immediate_mode::count);
     EXPECT_FALSE(beside(0.1f).modes.counts_first);
     EXPECT_EQ(beside(0.1f).voxels_of, 1);
     vp::get<1>(fb.targets).load = vp::load_operation::load;
     EXPECT_FALSE(beside(1.0f).possible);
     vp::get<1>(fb.targets).load = vp::load_operation::off;
     EXPECT_TRUE(beside(0.1f).possible);
-    EXPECT_EQ(beside(0.1f).modes.of[1], direct_mode::blend);
+    EXPECT_EQ(beside(0.1f).modes.of[1], immediate_mode::blend);
 }
 
 // A few triangles in a large grid are drawn sooner than the grid is read, where that is not spared by marks.

@@ -252,7 +252,7 @@ void expect_same(const mesh_data& m, const vp::grid& g, const VertexShader& vs, 
     vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
     const vp::status sa = draw_framebuffer(cpu, a, m, g, vs, fs, options, how);
     // Constants are drawn without lists and tiles, mostly, but by other ways where indices have to be looked at.
-    constexpr bool constant = vp::core::is_solid<FragmentShader>;
+    constexpr bool constant = vp::core::is_constant<FragmentShader>;
     for (const bool first : {true, false}) {
         SCOPED_TRACE(constant ? first ? "indices checked" : "indices unknown"
                      : first  ? "fragments listed, where they can be"

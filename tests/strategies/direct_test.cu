@@ -53,7 +53,7 @@ mesh_data middling_triangles(glm::ivec3 extent, std::uint32_t seed, int count = 
 
 // Cleared and loaded, with and without the voxel counter, a grid that cuts triangles off at every side.
 template <class Targets, class... Values>
-void compare_constants(Targets targets, const vp::solid<Values...>& shader) {
+void compare_constants(Targets targets, const vp::constant_output<Values...>& shader) {
     for (const vp::coverage rule : both_rules) {
         const mesh_data m = mixed_triangles(3000, 60.0f, 81);
         expect_same(targets, m, box_grid({60, 47, 71}), vp::passthrough{}, shader, rule);
@@ -158,7 +158,7 @@ TEST(Direct, ManyRecordsOfLargeTriangles) {
 // As many as there is room to keep set-ups for, of which some are not cut, and more, with room to spare: then none is
 // kept, and each record finds out what it needs for itself.
 TEST(Direct, MoreLargeTrianglesThanAreSetUp) {
-    constexpr auto most = static_cast<int>(vp::device::triangle_lists::most_setups);
+    constexpr auto most = static_cast<int>(vp::device::deferred_triangles::max_setups);
     const glm::ivec3 extent(150, 160, 140);
     for (const int count : {most, most + most / 4}) {
         const mesh_data m = long_triangles(extent, count, 88);
@@ -264,7 +264,7 @@ std::vector<std::uint32_t> draw_several(const std::vector<mesh_data>& meshes, co
     vp::framebuffer<Backend, target> fb{be, g.extent};
     std::vector<vp::mesh<Backend>> on_backend;
     for (const mesh_data& m : meshes) on_backend.emplace_back(be, m.positions, m.triangles);
-    using draw = vp::draw<vp::mesh_view<>, VertexShader, vp::solid<std::uint32_t>>;
+    using draw = vp::draw<vp::mesh_view<>, VertexShader, vp::constant_output<std::uint32_t>>;
     std::vector<draw> draws;
     for (std::size_t i = 0; i < meshes.size(); ++i)
         draws.push_back({on_backend[i].view(), shaders[i], vp::constant(static_cast<std::uint32_t>(3 * i + 1))});
@@ -293,7 +293,7 @@ TEST(Direct, ManyCallsOfOneBackend) {
     const vp::grid g = box_grid({60, 47, 71});
     for (const bool locks : {true, false}) {
         vp::cuda_backend gpu;
-        gpu.locks_memory = locks;
+        gpu.use_pinned_memory = locks;
         vp::cpu_backend cpu;
         for (int call = 0; call < 8; ++call) {
             const mesh_data m = mixed_triangles(call == 5 ? 1 : 500 * (call + 1), 40.0f, static_cast<unsigned>(call));

@@ -68,14 +68,14 @@ struct moving_mesh {
 using bits = vp::target<vp::bit, blend::bit_or>;
 using hits = vp::target<std::uint32_t, blend::count>;
 using sums = vp::target<float, blend::add>;
-using direct_draw = vp::draw<vp::mesh_view<>, vp::passthrough, decltype(vp::constant(true, 1u, 1.0f))>;
+using raster_draw_call = vp::draw<vp::mesh_view<>, vp::passthrough, decltype(vp::constant(true, 1u, 1.0f))>;
 template <class Backend>
-using direct_framebuffer = vp::framebuffer<Backend, bits, hits, sums>;
+using immediate_framebuffer = vp::framebuffer<Backend, bits, hits, sums>;
 
 void expect_direct(const mesh_data& m, const vp::grid& g, const vp::voxelize_options& options, vp::cuda_backend& be,
-                   direct_framebuffer<vp::cuda_backend>& fb, const vp::status& s, float value) {
+                   immediate_framebuffer<vp::cuda_backend>& fb, const vp::status& s, float value) {
     vp::cpu_backend cpu;
-    direct_framebuffer<vp::cpu_backend> expected{cpu, g.extent};
+    immediate_framebuffer<vp::cpu_backend> expected{cpu, g.extent};
     vp::mesh<vp::cpu_backend> mesh(cpu, m.positions, m.triangles);
     const vp::status reference =
         vp::voxelize(cpu, mesh, g, vp::passthrough{}, vp::constant(true, 1u, value), expected, options);
@@ -96,9 +96,9 @@ void replay_without_tiles(float value) {
         vp::stage_times times;
         be.times = &times; // for voxelize: a call that never waits has none to give, and captures no events
         moving_mesh mesh(be, 3000, 60.0f, 91);
-        direct_framebuffer<vp::cuda_backend> fb{be, g.extent};
-        const direct_draw d{mesh.view(), {}, vp::constant(true, 1u, value)};
-        const std::span<const direct_draw> draws(&d, 1);
+        immediate_framebuffer<vp::cuda_backend> fb{be, g.extent};
+        const raster_draw_call d{mesh.view(), {}, vp::constant(true, 1u, value)};
+        const std::span<const raster_draw_call> draws(&d, 1);
         const vp::workspace_limits limits{}; // this way has no lists that could overflow
         const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), rule, limits);
         ASSERT_GT(bytes, 0u);
@@ -126,23 +126,23 @@ TEST(Graph, TwoStreamsAtOnceWithoutTiles) {
     vp::cuda_backend first{streams[0].stream}, second{streams[1].stream};
     vp::cuda_backend* const backends[2] = {&first, &second};
     std::vector<moving_mesh> meshes;
-    std::vector<direct_framebuffer<vp::cuda_backend>> fbs;
+    std::vector<immediate_framebuffer<vp::cuda_backend>> fbs;
     std::vector<vp::cuda_backend::buffer<std::byte>> memory;
     std::vector<vp::workspace_view> views;
-    std::vector<direct_draw> draws;
+    std::vector<raster_draw_call> draws;
     for (std::uint32_t k = 0; k < 2; ++k) {
         meshes.emplace_back(*backends[k], 4000, 60.0f, 93 + 2 * k);
         fbs.emplace_back(*backends[k], g.extent);
         draws.push_back({meshes[k].view(), {}, vp::constant(true, 1u, 0.1f)});
         const std::size_t bytes =
-            vp::workspace_bytes(std::span<const direct_draw>(&draws[k], 1), g, fbs[k].view(), {}, {});
+            vp::workspace_bytes(std::span<const raster_draw_call>(&draws[k], 1), g, fbs[k].view(), {}, {});
         ASSERT_GT(bytes, 0u);
         memory.emplace_back(*backends[k], bytes);
         views.push_back({memory[k].data(), bytes, {}});
     }
     for (int round = 0; round < 5; ++round)
         for (std::size_t k = 0; k < 2; ++k) {
-            const vp::status s = vp::voxelize_async(*backends[k], std::span<const direct_draw>(&draws[k], 1), g,
+            const vp::status s = vp::voxelize_async(*backends[k], std::span<const raster_draw_call>(&draws[k], 1), g,
                                                     fbs[k].view(), {}, views[k]);
             ASSERT_TRUE(s.ok()) << s.message();
         }
@@ -290,11 +290,11 @@ TEST(Graph, ListsLaunchWhatTheyNeed) {
             .num_nodes();
     };
     const vp::grid g = box_grid({10, 10, 10});
-    const std::uint64_t counted = 2 * m.triangles.size(), block = vp::device::most_of_block;
+    const std::uint64_t counted = 2 * m.triangles.size(), block = vp::device::max_of_block;
     EXPECT_EQ(num_nodes(g, counted, false), num_nodes(g, counted + 1, false) + 1);
     EXPECT_EQ(num_nodes(g, block, true), num_nodes(g, block, false) + 1);
     EXPECT_EQ(num_nodes(g, block + 1, true), num_nodes(g, block + 1, false) + 3);
-    EXPECT_EQ(num_nodes(g, vp::device::most_of_window, true), num_nodes(g, vp::device::most_of_window, false));
+    EXPECT_EQ(num_nodes(g, vp::device::max_of_window, true), num_nodes(g, vp::device::max_of_window, false));
 }
 
 // Without the kernel for larger triangles: the same voxels by a launch less where there are few of these; otherwise,
@@ -333,8 +333,8 @@ void compare_without_larger(const Shader& shader, bool fails, int num_draws, boo
             vp::workspace_limits limits = vp::workspace_limits::for_triangles(draws.size() * m.triangles.size());
             limits.lists_fragments = true;
             std::size_t nodes[2] = {};
-            for (const bool hands_on : {false, true}) {
-                limits.hands_on_triangles = hands_on;
+            for (const bool defers : {false, true}) {
+                limits.expects_deferred = defers;
                 start(fb);
                 const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), options, limits);
                 ASSERT_GT(bytes, 0u);
@@ -345,15 +345,15 @@ void compare_without_larger(const Shader& shader, bool fails, int num_draws, boo
                 graph.launch(be.stream);
                 vp::workspace_limits need = limits;
                 const vp::status s = vp::read_status(be, workspace, &need);
-                nodes[hands_on ? 1 : 0] = graph.num_nodes();
-                if (fails && is_large && !hands_on) {
+                nodes[defers ? 1 : 0] = graph.num_nodes();
+                if (fails && is_large && !defers) {
                     EXPECT_EQ(s.code, vp::status_code::capacity_exceeded);
                     EXPECT_EQ(s.where, vp::stage::fine_raster);
-                    EXPECT_TRUE(need.hands_on_triangles);
+                    EXPECT_TRUE(need.expects_deferred);
                     if (loads) expect_same_bytes(untouched, vp::get<0>(fb).to_host(be), "as it was");
                 } else {
                     ASSERT_TRUE(s.ok()) << s.message();
-                    EXPECT_EQ(need.hands_on_triangles, hands_on);
+                    EXPECT_EQ(need.expects_deferred, defers);
                     expect_same_bytes(vp::get<0>(expected).to_host(be), vp::get<0>(fb).to_host(be), "target");
                 }
             }
@@ -399,7 +399,7 @@ void compare_lists_without_larger(const Shader& shader) {
                 for (int round = 0; round < 2; ++round)
                     ASSERT_TRUE(vp::voxelize_async(be, draws, g, lists, rule, workspace).ok());
                 const vp::status s = vp::read_status(be, workspace, &limits);
-                EXPECT_EQ(limits.hands_on_triangles, longest > 3.0f);
+                EXPECT_EQ(limits.expects_deferred, longest > 3.0f);
                 memory.expect_untouched_behind(be);
                 if (!fails) {
                     expect_lists<Payload>({m}, g, shader, rule, lists.to_host(be), s);

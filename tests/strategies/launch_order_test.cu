@@ -172,8 +172,8 @@ TEST(LaunchOrder, OfListsDoesNotShow) {
     vp::cpu_backend cpu;
     const auto shader = vp::constant(true);
     const auto compare_lists = [&](const std::vector<mesh_data>& parts) {
-        const model<vp::cpu_backend, vp::solid<bool>> on_cpu(cpu, parts, shader);
-        const model<vp::cuda_backend, vp::solid<bool>> on_gpu(gpu, parts, shader);
+        const model<vp::cpu_backend, vp::constant_output<bool>> on_cpu(cpu, parts, shader);
+        const model<vp::cuda_backend, vp::constant_output<bool>> on_gpu(gpu, parts, shader);
         vp::abuffer<vp::cpu_backend> a{cpu};
         vp::abuffer<vp::cuda_backend> b{gpu};
         const vp::status sa = vp::voxelize(cpu, on_cpu.all(), whole, a);

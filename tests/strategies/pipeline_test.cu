@@ -428,7 +428,7 @@ TEST(Pipeline, LaunchesFillTheDevice) {
         const std::uint64_t blocks = vp::device::raster_blocks(items, 8);
         const std::uint64_t in_round = blocks * vp::device::raster_threads;
         const std::uint64_t rounds = (items + in_round - 1) / in_round;
-        EXPECT_LE(rounds, vp::device::warp_triangles::most_rounds) << bit;
+        EXPECT_LE(rounds, vp::device::warp_triangles::max_rounds) << bit;
         EXPECT_GE(blocks, std::min<std::uint64_t>(multiprocessors, (items + 127) / 128)) << bit;
         EXPECT_LT((blocks - 1) * vp::device::raster_threads, items) << bit; // none without a triangle
         EXPECT_LE(blocks, static_cast<unsigned>(properties.maxGridSize[0])) << bit;
@@ -437,28 +437,28 @@ TEST(Pipeline, LaunchesFillTheDevice) {
 
 // When a call's first kernel is launched alone: which results are right either way, so no comparison would tell.
 TEST(Pipeline, OfFineMeshesTheFirstKernelIsAlone) {
-    using handed_on = decltype(vp::device::pipeline_state::handed_on);
+    using deferred = decltype(vp::device::pipeline_state::deferred);
     const std::uint64_t much = ~std::uint64_t{0};
     for (const vp::coverage rule : both_rules) {
         const bool thin = rule == vp::coverage::thin;
-        EXPECT_EQ(handed_on{}.left_alone(rule), 0u);
-        EXPECT_EQ((handed_on{0, {5, 3, 0, 0}, 0}.left_alone(rule)), thin ? 3u : 8u);
-        EXPECT_EQ((handed_on{1, {5, 3, 0, 0}, 1}.left_alone(rule)), much);
-        EXPECT_EQ((handed_on{0, {5, 3, 1, 0}, 0}.left_alone(rule)), much);
-        EXPECT_EQ((handed_on{0, {0, 0, 0, 1}, 0}.left_alone(rule)), much);
+        EXPECT_EQ(deferred{}.num_deferred(rule), 0u);
+        EXPECT_EQ((deferred{0, {5, 3, 0, 0}, 0}.num_deferred(rule)), thin ? 3u : 8u);
+        EXPECT_EQ((deferred{1, {5, 3, 0, 0}, 1}.num_deferred(rule)), much);
+        EXPECT_EQ((deferred{0, {5, 3, 1, 0}, 0}.num_deferred(rule)), much);
+        EXPECT_EQ((deferred{0, {0, 0, 0, 1}, 0}.num_deferred(rule)), much);
     }
-    const std::uint64_t each = vp::device::most_left_of_block;
+    const std::uint64_t each = vp::device::max_left_of_block;
     for (const std::size_t triangles : {1u, 128u, 129u, 1u << 30}) {
         SCOPED_TRACE(triangles);
-        EXPECT_TRUE(vp::device::may_be_alone(triangles, 0));
-        EXPECT_TRUE(vp::device::may_be_alone(triangles, each));
-        EXPECT_FALSE(vp::device::may_be_alone(triangles, much));
+        EXPECT_TRUE(vp::device::leaves_few(triangles, 0));
+        EXPECT_TRUE(vp::device::leaves_few(triangles, each));
+        EXPECT_FALSE(vp::device::leaves_few(triangles, much));
     }
-    EXPECT_FALSE(vp::device::may_be_alone(128, each + 1)); // a block's
-    EXPECT_TRUE(vp::device::may_be_alone(129, each + 1));
-    const auto at_once = static_cast<std::uint64_t>(vp::device::num_multiprocessors()) * vp::device::most_left_blocks;
-    EXPECT_TRUE(vp::device::may_be_alone(1u << 30, each * at_once));
-    EXPECT_FALSE(vp::device::may_be_alone(1u << 30, each * at_once + 1));
+    EXPECT_FALSE(vp::device::leaves_few(128, each + 1)); // a block's
+    EXPECT_TRUE(vp::device::leaves_few(129, each + 1));
+    const auto at_once = static_cast<std::uint64_t>(vp::device::num_multiprocessors()) * vp::device::max_left_blocks;
+    EXPECT_TRUE(vp::device::leaves_few(1u << 30, each * at_once));
+    EXPECT_FALSE(vp::device::leaves_few(1u << 30, each * at_once + 1));
 }
 
 // add_unordered is not the same bits: it stays within the rounding of its additions.

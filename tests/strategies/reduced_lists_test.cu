@@ -98,7 +98,7 @@ TEST(ReducedLists, WithoutAWait) {
 
 // One draw of a constant shader is listed on the spot; several have their vertices shaded first.
 TEST(ReducedLists, StageTimes) {
-    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<bool>>;
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<bool>>;
     const mesh_data m = mixed_triangles(300, 30.0f, 65);
     const vp::grid g = box_grid({30, 21, 33});
     vp::cuda_backend be;

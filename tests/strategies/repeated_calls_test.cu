@@ -117,11 +117,11 @@ void repeat_everywhere(const Shader& shader) {
     for (const bool keeps : {true, false}) {
         SCOPED_TRACE(keeps);
         vp::cuda_backend on_default;
-        on_default.keeps_graphs = keeps;
+        on_default.use_graphs = keeps;
         repeat<Targets...>(on_default, shader);
         const stream_owner s;
         vp::cuda_backend on_own{s.stream};
-        on_own.keeps_graphs = keeps;
+        on_own.use_graphs = keeps;
         repeat<Targets...>(on_own, shader);
     }
 }
@@ -152,12 +152,12 @@ TEST(RepeatedCalls, OfLists) {
     for (const bool keeps : {true, false}) {
         SCOPED_TRACE(keeps);
         vp::cuda_backend on_default;
-        on_default.keeps_graphs = keeps;
+        on_default.use_graphs = keeps;
         repeat_lists<void>(on_default, vp::constant(true));
         repeat_lists<float>(on_default, vp::constant(0.5f));
         const stream_owner s;
         vp::cuda_backend on_own{s.stream};
-        on_own.keeps_graphs = keeps;
+        on_own.use_graphs = keeps;
         repeat_lists<float>(on_own, vp::constant(0.5f));
         repeat_lists<double>(on_own, any_double{});
     }

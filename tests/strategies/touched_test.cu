@@ -116,11 +116,11 @@ TEST(Touched, ShadedVertices) {
 // The same call by voxelize, in what other calls have left, and by voxelize_async.
 TEST(Touched, CallsOfOneBackendInTurn) {
     using single = target_list<bits<blend::bit_or>>;
-    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<bool>>;
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<bool>>;
     vp::cpu_backend cpu;
     for (const bool locks : {true, false}) {
         vp::cuda_backend gpu;
-        gpu.locks_memory = locks;
+        gpu.use_pinned_memory = locks;
         const auto expect_bits = [&](const mesh_data& m, glm::ivec3 extent, const vp::voxelize_options& options) {
             single::framebuffer<vp::cuda_backend> on_gpu{gpu, extent};
             single::framebuffer<vp::cpu_backend> on_cpu{cpu, extent};
@@ -216,7 +216,7 @@ TEST(Touched, SeveralDraws) {
     };
     compare_parts(target_list<bits<blend::bit_or>, vp::target<float, blend::replace>>{}, parts, list(0.5f));
     compare_parts(target_list<bits<blend::bit_or>, vp::target<float, blend::replace>>{}, parts, list(-1.5f));
-    using bit_value = vp::solid<bool>;
+    using bit_value = vp::constant_output<bool>;
     compare_parts(target_list<bits<blend::bit_or>>{}, parts,
                   std::vector<bit_value>{vp::constant(true), vp::constant(false), vp::constant(true)});
 }

@@ -239,12 +239,12 @@ TEST(Tracked, ClearsOnlyWhatWasDrawn) {
     draw();
     EXPECT_FALSE(has(63, 16, 24)); // nothing was known
     EXPECT_FALSE(has(64, 16, 24));
-    const auto put_all = [&] {
+    const auto emit_all = [&] {
         for (const glm::ivec3 v : {glm::ivec3(32, 16, 24), glm::ivec3(63, 31, 39), glm::ivec3(31, 20, 30),
                                    glm::ivec3(64, 20, 30), glm::ivec3(40, 15, 30), glm::ivec3(40, 20, 23)})
             put(v.x, v.y, v.z);
     };
-    put_all();
+    emit_all();
     draw();
     EXPECT_FALSE(has(32, 16, 24)); // the ends of what was drawn into
     EXPECT_FALSE(has(63, 31, 39));
@@ -326,7 +326,7 @@ TEST(Tracked, ClearsChunksInOrder) { expect_chunks_cleared_of_all<in_order>(fals
 // Calls that never wait, captured in a graph, which knows on the device what the launches before it left.
 TEST(Tracked, GraphLaunchedAgain) {
     using target = vp::target<float, blend::add>;
-    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::solid<float>>;
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<float>>;
     const glm::ivec3 extent(256, 160, 206);
     const vp::grid g = box_grid(extent);
     const stream_owner owner;

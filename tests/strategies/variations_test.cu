@@ -32,7 +32,7 @@ struct account {
         ++calls;
         return p;
     }
-    void give(void* p, std::size_t bytes, cudaStream_t stream) {
+    void emit(void* p, std::size_t bytes, cudaStream_t stream) {
         cudaFreeAsync(p, stream);
         live -= bytes;
     }
@@ -44,7 +44,7 @@ struct async_form : account {
         EXPECT_LE(alignment, 256u);
         return take(bytes, stream);
     }
-    void deallocate_async(void* p, std::size_t bytes, std::size_t, cudaStream_t stream) { give(p, bytes, stream); }
+    void deallocate_async(void* p, std::size_t bytes, std::size_t, cudaStream_t stream) { emit(p, bytes, stream); }
 };
 
 // As later ones do.
@@ -53,7 +53,7 @@ struct stream_first_form : account {
         EXPECT_LE(alignment, 256u);
         return take(bytes, stream);
     }
-    void deallocate(cudaStream_t stream, void* p, std::size_t bytes, std::size_t) noexcept { give(p, bytes, stream); }
+    void deallocate(cudaStream_t stream, void* p, std::size_t bytes, std::size_t) noexcept { emit(p, bytes, stream); }
 };
 
 // A resource by the concepts of the toolkit's own library; tests hand it over through its type-erased reference.
@@ -63,13 +63,13 @@ struct library_form : account {
         cudaStreamSynchronize(nullptr);
         return p;
     }
-    void deallocate(void* p, std::size_t bytes, std::size_t = 256) noexcept { give(p, bytes, nullptr); }
+    void deallocate(void* p, std::size_t bytes, std::size_t = 256) noexcept { emit(p, bytes, nullptr); }
     void* allocate_async(std::size_t bytes, std::size_t, cuda::stream_ref stream) { return take(bytes, stream.get()); }
     void* allocate_async(std::size_t bytes, cuda::stream_ref stream) { return take(bytes, stream.get()); }
     void deallocate_async(void* p, std::size_t bytes, std::size_t, cuda::stream_ref stream) {
-        give(p, bytes, stream.get());
+        emit(p, bytes, stream.get());
     }
-    void deallocate_async(void* p, std::size_t bytes, cuda::stream_ref stream) { give(p, bytes, stream.get()); }
+    void deallocate_async(void* p, std::size_t bytes, cuda::stream_ref stream) { emit(p, bytes, stream.get()); }
     bool operator==(const library_form& other) const { return this == &other; }
     bool operator!=(const library_form& other) const { return this != &other; }
     friend void get_property(const library_form&, cuda::mr::device_accessible) noexcept {}

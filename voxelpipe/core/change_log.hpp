@@ -45,9 +45,9 @@ private:
 // have been drawn into since. Of a target that is known to hold its clear value, voxels in chunks without a bit do. All
 // zeros: nothing is known.
 struct change_log {
-    static constexpr std::size_t most_targets = 8, most_bytes = 32; // of a value
+    static constexpr std::size_t max_targets = 8, most_bytes = 32; // of a value
     static constexpr std::size_t known_words = 1 + most_bytes / sizeof(std::uint32_t);
-    static constexpr std::size_t header_words = most_targets * known_words;
+    static constexpr std::size_t header_words = max_targets * known_words;
 
     // What a target was cleared to: 1 and the bytes of the value, or zeros.
     struct known {

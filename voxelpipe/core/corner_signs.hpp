@@ -44,7 +44,7 @@ namespace voxelpipe::core {
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t sign_word(float a) {
     return static_cast<std::uint32_t>(core::bit_cast<std::int32_t>(a) >> 31);
 }
-[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float least_magnitude(float a, float b) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float min_magnitude(float a, float b) {
 #if defined(__CUDA_ARCH__)
     return fminf(fabsf(a), fabsf(b));
 #else
@@ -81,7 +81,7 @@ struct corner_edges {
         turned = sign_word(normal);
     }
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float least() const {
-        return least_magnitude(least_magnitude(at_corner[0], at_corner[1]), least_magnitude(at_corner[2], normal));
+        return min_magnitude(min_magnitude(at_corner[0], at_corner[1]), min_magnitude(at_corner[2], normal));
     }
     // A byte of ones for each edge that has the corner outside; whose cell behind it is the lower one along a; the
     // upper one along b. Inside is to the left: an edge along -b has it at +a, so that behind it is the lower cell.
@@ -145,7 +145,7 @@ inline constexpr std::uint32_t lower_x = 0x55555555u, lower_y = 0x33333333u, low
     const float plane =
         exact::fma(yz.normal, v.d[0][0], exact::fma(zx.normal, v.d[1][0], exact::mul(xy.normal, v.d[2][0])));
     const bool wanted = (last[0] & last[1] & last[2]) != 0;
-    sure = sure && (!wanted || least_magnitude(plane, plane) > power_of_two(3 * fraction - 17));
+    sure = sure && (!wanted || min_magnitude(plane, plane) > power_of_two(3 * fraction - 17));
     const std::uint32_t above = sign_word(plane); // the centre: then the voxel behind is the upper one
     out |= (yz.turned ^ above ^ lower_x) & (zx.turned ^ above ^ lower_y) & (xy.turned ^ above ^ lower_z) &
            (wanted ? 0xffu : 0u);
@@ -200,7 +200,7 @@ template <bool Swapped>
         next_a[v] = exact::fma(-one, e.along_b[v], e.at_corner[v]);
         next_b[v] = exact::fma(one, e.along_a[v], e.at_corner[v]);
         next_both[v] = exact::fma(one, e.along_a[v], next_a[v]);
-        least = least_magnitude(least, least_magnitude(next_a[v], least_magnitude(next_b[v], next_both[v])));
+        least = min_magnitude(least, min_magnitude(next_a[v], min_magnitude(next_b[v], next_both[v])));
     }
     // Bits of a byte for each edge: the corners, where the lower cell of an axis behind a corner is the one at the same
     // place. The bit of axis `near` is moved within a byte, that of axis `far` when the bytes are one.
@@ -247,10 +247,10 @@ template <bool Swapped>
     at[1] = exact::fma(-one, yz.normal, at[0]);
     for (int i = 0; i < 2; ++i) at[2 + i] = exact::fma(-one, zx.normal, at[i]);
     for (int i = 0; i < 4; ++i) at[4 + i] = exact::fma(-one, xy.normal, at[i]);
-    float least_plane = at[0];
+    float min_plane = at[0];
     std::uint32_t above = 0; // corners
     for (int i = 0; i < 8; ++i) {
-        least_plane = least_magnitude(least_plane, at[i]);
+        min_plane = min_magnitude(min_plane, at[i]);
         above |= sign_word(at[i]) & (1u << (i % 2 + i / 2 % 2 * 3 + i / 4 * 9));
     }
     constexpr std::uint32_t corners = 033033;
@@ -258,7 +258,7 @@ template <bool Swapped>
     // The voxel behind a corner that is below the plane is the lower one along an axis where the normal is positive.
     const std::uint32_t behind = (yz.turned & 1u) + (zx.turned & 3u) + (xy.turned & 9u);
     const bool has_corners = last[0] != 0 && last[1] != 0 && last[2] != 0;
-    out.sure = out.sure && (!has_corners || least_plane > power_of_two(3 * fraction - 12));
+    out.sure = out.sure && (!has_corners || min_plane > power_of_two(3 * fraction - 12));
     out.plane = has_corners ? (corners & ~above) << behind | above << (13 - behind) : 0;
     return out;
 }

@@ -57,12 +57,12 @@ struct slim_rows {
                has_abc = has_ab & (side[2] != 0);
     const float one = power_of_two(fraction), limit = power_of_two(2 * fraction - 16),
                 plane_limit = power_of_two(3 * fraction - 12);
-    float least = 2 * limit, least_plane = 2 * plane_limit; // of what signs depend on
+    float least = 2 * limit, min_plane = 2 * plane_limit; // of what signs depend on
     // What is ruled out behind the first corner and behind the next one, a + 2 b + 4 c from each, in every byte.
     std::uint32_t first = 0, next = 0;
     const auto rule_out = [&](const corner_edges& e, bool wanted, std::uint32_t lower_of_first,
                               std::uint32_t lower_of_second) VOXELPIPE_INLINE_LAMBDA {
-        least = least_magnitude(least, wanted ? e.least() : 2 * limit);
+        least = min_magnitude(least, wanted ? e.least() : 2 * limit);
         first |= behind_centre(e, lower_of_first, lower_of_second) & (wanted ? ~0u : 0u);
     };
     // The edges at the next corner are `step` times `along` more than at the first.
@@ -71,7 +71,7 @@ struct slim_rows {
                                    std::uint32_t lower_of_second) VOXELPIPE_INLINE_LAMBDA {
         float at[3];
         for (int v = 0; v < 3; ++v) at[v] = exact::fma(step, along[v], e.at_corner[v]);
-        least = least_magnitude(least, wanted ? least_magnitude(at[0], least_magnitude(at[1], at[2])) : 2 * limit);
+        least = min_magnitude(least, wanted ? min_magnitude(at[0], min_magnitude(at[1], at[2])) : 2 * limit);
         next |= (sign_bytes(at[0], at[1], at[2]) ^ e.turned) & (e.lower_a() ^ ~lower_of_first) &
                 (e.upper_b() ^ lower_of_second) & (wanted ? ~0u : 0u);
     };
@@ -84,14 +84,14 @@ struct slim_rows {
     rule_out_next(ca, has_ca & is_long, one, ca.along_a, lower_z, lower_x);
     const auto rule_out_by_plane = [&](float at, bool wanted, std::uint32_t& out) VOXELPIPE_INLINE_LAMBDA {
         const std::uint32_t above = sign_word(at); // the corner: then the voxel behind is the upper one
-        least_plane = least_magnitude(least_plane, wanted ? at : 2 * plane_limit);
+        min_plane = min_magnitude(min_plane, wanted ? at : 2 * plane_limit);
         out |= (bc.turned ^ above ^ lower_x) & (ca.turned ^ above ^ lower_y) & (ab.turned ^ above ^ lower_z) &
                (wanted ? 0xffu : 0u);
     };
     const float plane = exact::fma(bc.normal, d[0][0], exact::fma(ca.normal, d[1][0], exact::mul(ab.normal, d[2][0])));
     rule_out_by_plane(plane, has_abc, first);
     rule_out_by_plane(exact::fma(-one, bc.normal, plane), has_abc & is_long, next);
-    const bool sure = least > limit && least_plane > plane_limit;
+    const bool sure = least > limit && min_plane > plane_limit;
 
     // Both as a + 4 b + 8 c, each in 16 bits, then together.
     std::uint32_t w = ((first | first >> 16) & 0xffffu) | ((next | next << 16) & 0xffff0000u);

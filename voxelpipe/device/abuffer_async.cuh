@@ -71,7 +71,7 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
         arena start = memory;
         auto* const state = start.take<pipeline_state>(1); // what `go` takes first
         zero_memory(state, start.used() - memory.used(), stream);
-        asked_places asked;
+        output_pointers asked;
         asked.value.voxels = voxels;
         asked.value.offsets = offsets;
         asked.value.room = room;
@@ -133,7 +133,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
                                           const grid& g, const abuffer_view<Payload>& lists,
                                           const voxelize_options& options, const workspace_limits& limits) {
     const status s = core::validate_draws(draws);
-    if (!s.ok() || !validate(g).ok() || limits.fragments > core::most_numbered) return 0;
+    if (!s.ok() || !validate(g).ok() || limits.fragments > core::max_numbered) return 0;
     try {
         const auto call = device::make_list_call<draw<Mesh, VertexShader, FragmentShader>, Payload>(
             draws, g, s.counts.triangles_in, limits);
@@ -154,7 +154,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         if (const status s = validate(g); !s.ok()) return s;
         status s = core::validate_draws(draws);
         if (!s.ok()) return s;
-        if (workspace.limits.fragments > core::most_numbered) return core::failure(status_code::size_overflow);
+        if (workspace.limits.fragments > core::max_numbered) return core::failure(status_code::size_overflow);
         try {
             const auto call = device::make_list_call<draw<Mesh, VertexShader, FragmentShader>, Payload>(
                 draws, g, s.counts.triangles_in, workspace.limits);

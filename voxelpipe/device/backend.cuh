@@ -44,7 +44,7 @@ namespace device {
 // Where a call that has_failed for a capacity met it.
 [[nodiscard]] inline stage find_overflow(const pipeline_state& s, const capacities& c) {
     return s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ? stage::coarse_raster
-           : misses_triangles(s, c)                                       ? stage::fine_raster
+           : misses_deferred(s, c)                                        ? stage::fine_raster
                                                                           : stage::abuffer_emit;
 }
 
@@ -175,13 +175,13 @@ public:
     // Whether a backend that is used more than once may keep a page of locked host memory for the counters of its
     // calls, which takes 10 us off each. To give it back, release and the destructor wait for the device; without it
     // they do not.
-    bool locks_memory = true;
+    bool use_pinned_memory = true;
 
     // Whether a call with the same arguments as those before it, the third on a row, is kept as a CUDA graph, which
-    // saves the host and the device some 10 us each time from then on. Where locks_memory holds; the arrays of an
+    // saves the host and the device some 10 us each time from then on. Where use_pinned_memory holds; the arrays of an
     // A-buffer may be others each time.
     // The driver has memory of its own for it, until a call with other arguments, release or the destructor.
-    bool keeps_graphs = true;
+    bool use_graphs = true;
 
     // Whether voxelize may list the fragments of a framebuffer's shaders that compute, sort them by voxel and blend
     // them then: mostly 2 to 4 times as fast as in tiles, for 17 bytes of device memory a fragment, and more where a
@@ -190,7 +190,7 @@ public:
     bool lists_fragments = true;
 
     // What check_indices calls.
-    [[nodiscard]] std::uint32_t most_index(array_view<const glm::uvec3> triangles) {
+    [[nodiscard]] std::uint32_t max_index(array_view<const glm::uvec3> triangles) {
         buffer<std::uint32_t> most(*this, std::size_t{1});
         buffer<std::uint32_t>::translate([&] {
             device::check(cudaMemsetAsync(most.data(), 0, sizeof(std::uint32_t), stream));
@@ -214,7 +214,8 @@ public:
                                draws, g, fb, options, triangles_in, limits, [&](auto call) {
                                    call.clock = clock;
                                    call.may_list = lists_fragments;
-                                   limits.leaves_none = call.limits.leaves_none = call.may_leave_none(left) ? 1 : 0;
+                                   limits.skips_deferred_pass = call.limits.skips_deferred_pass =
+                                       call.can_skip_deferred_pass(left) ? 1 : 0;
                                    launch_where_it_fits(call, state);
                                    return call.is_listed_call();
                                });
@@ -232,8 +233,9 @@ public:
                     [&](device::capacities& limits, std::uint64_t voxel_room, std::uint64_t left,
                         device::pipeline_state& state, device::stage_clock* clock) {
                         call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
-                        limits.leaves_none = call.limits.leaves_none = call.may_leave_none(left) ? 1 : 0;
-                        call.has_few_a_voxel = limits.fragments < device::least_counted * voxel_room;
+                        limits.skips_deferred_pass = call.limits.skips_deferred_pass =
+                            call.can_skip_deferred_pass(left) ? 1 : 0;
+                        call.has_few_a_voxel = limits.fragments < device::min_counted * voxel_room;
                         if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
                             fill<std::uint64_t>(options.rule, call, voxel_room, made, state);
                             return false;
@@ -275,11 +277,11 @@ private:
         friend bool operator==(const call_key&, const call_key&) = default;
     };
     // Of tile pairs, tile records, fragments, fragment records, lists of voxels; and what calls may not need kernels
-    // for: fragments of a voxel that the windows leave, triangles that the first kernel does (left_alone).
-    using room = core::call_room<call_key, 7>;
+    // for: fragments of a voxel that the windows leave, triangles that the first kernel does (num_deferred).
+    using room = core::capacity_history<call_key, 7>;
 
     // Runs the stages with capacities that should do, waits, and once more where something did not fit. launch_stages
-    // takes back of the capacities what does not hold for its call, is told what calls like it left_alone, and says
+    // takes back of the capacities what does not hold for its call, is told what calls like it num_deferred, and says
     // whether fragments were listed that need not be, where they are too many.
     template <class Launch>
     [[nodiscard]] status attempt(room& memory, const call_key& key, Launch&& launch_stages) {
@@ -290,10 +292,10 @@ private:
             const std::uint64_t n = key.triangles;
             // No room for the lists of voxels where nothing is known of the call: they are copied when all is.
             // Tiny triangles have few fragments: those of a framebuffer are not taken for too many beforehand.
-            const std::uint64_t most = &memory == &framebuffer_room_ ? device::most_resolved : core::most_numbered;
+            const std::uint64_t most = &memory == &framebuffer_room_ ? device::max_resolved : core::max_numbered;
             room::lengths there = memory.guess(
                 key, {n + n / 4 + 16384, n / 16 + 4096, std::min(4 * n + 65536, most), n / 16 + 4096, 0, 0, 0});
-            const auto longest = memory.most_needed(key, 5), left = memory.most_needed(key, 6);
+            const auto longest = memory.max_needed(key, 5), left = memory.max_needed(key, 6);
             bool left_some = false; // where that was taken for little
             for (int tries = 0;; ++tries) {
                 device::capacities limits{there[0], there[1], there[2], there[3]};
@@ -301,7 +303,7 @@ private:
                 device::pipeline_state state{};
                 const bool need_not_list = launch_stages(
                     limits, there[4], tries == 0 && left ? *left : ~std::uint64_t{0}, state, clock ? &*clock : nullptr);
-                left_some = left_some || device::misses_triangles(state, limits);
+                left_some = left_some || device::misses_deferred(state, limits);
                 if (state.index_error != 0) {
                     s = core::failure(status_code::index_out_of_range, stage::coarse_raster);
                     break;
@@ -312,15 +314,15 @@ private:
                                            state.fragment_records,
                                            state.list_voxels,
                                            state.longest_ordered(),
-                                           left_some ? ~std::uint64_t{0} : state.handed_on.left_alone(key.rule)};
+                                           left_some ? ~std::uint64_t{0} : state.deferred.num_deferred(key.rule)};
                 if (!device::has_failed(state, limits)) {
                     s = device::to_status(state);
                     memory.fitted(key, needed);
                     break;
                 }
                 // A pass that overflowed its records did not count all of its cells: the next try may need a third.
-                if (tries == 4 || needed[0] > core::most_numbered ||
-                    (needed[2] > core::most_numbered && !need_not_list)) {
+                if (tries == 4 || needed[0] > core::max_numbered ||
+                    (needed[2] > core::max_numbered && !need_not_list)) {
                     s = core::failure(status_code::out_of_memory, device::find_overflow(state, limits));
                     s.required = {state.tile_pairs, state.list_fragments, 0};
                     break;
@@ -348,7 +350,7 @@ private:
     }
 
     [[nodiscard]] bool may_keep_graph(const device::stage_clock* clock) const {
-        return keeps_graphs && clock == nullptr && state_reader_.page() != nullptr;
+        return use_graphs && clock == nullptr && state_reader_.page() != nullptr;
     }
     // Puts launch_all(stream), which works in the workspace, on the stream, as a graph where `bytes`, if there are any,
     // have come before; waits. The state comes first in the workspace, of which so many bytes are to be zero before,
@@ -407,7 +409,7 @@ private:
         device::arena plan;
         call.template go<Rule, false>(plan, stream);
         void* const workspace = reserve(plan.used());
-        state_reader_.prepare(locks_memory);
+        state_reader_.prepare(use_pinned_memory);
         device::launch_until(call.last_stage(), [&] {
             std::optional<device::call_bytes> bytes;
             if constexpr (Call::has_bytes)
@@ -454,7 +456,7 @@ private:
             copy_one(primitives, to.primitives);
             copy_one(payloads, to.payloads);
         }
-        void give(abuffer<cuda_backend, Payload>& lists, std::uint64_t num_voxels, std::uint64_t num_fragments) {
+        void move_into(abuffer<cuda_backend, Payload>& lists, std::uint64_t num_voxels, std::uint64_t num_fragments) {
             voxels.count_ = num_voxels;
             offsets.count_ = num_voxels == 0 ? 0 : num_voxels + 1;
             primitives.count_ = num_fragments;
@@ -497,7 +499,7 @@ private:
         device::arena plan;
         (void)call.template go<Rule, false, Key>(plan, stream);
         void* const workspace = reserve(plan.used());
-        state_reader_.prepare(locks_memory);
+        state_reader_.prepare(use_pinned_memory);
         list_arrays<Payload> arrays = make_beforehand<Payload>(voxel_room, call.limits.fragments);
         if (voxel_room == 0) {
             fill_exactly<Rule, Key>(call, workspace, lists, state);
@@ -507,7 +509,7 @@ private:
             std::optional<device::call_bytes> bytes;
             if constexpr (Call::has_bytes)
                 if (may_keep_graph(call.clock)) bytes = call.template bytes<Rule, Key>(workspace, state_reader_.page());
-            const device::asked_places asked = state_reader_.ask(arrays.places(voxel_room));
+            const device::output_pointers asked = state_reader_.ask(arrays.places(voxel_room));
             state = run_stages(call.clock, bytes, sizeof(device::pipeline_state), [&](cudaStream_t on) {
                 device::arena memory(workspace);
                 const auto sorted = call.template go<Rule, true, Key>(memory, on, asked);
@@ -520,11 +522,11 @@ private:
         if (num_voxels > voxel_room) { // more than the last time: once more
             fill<Rule, Key>(call, 0, lists, state);
         } else if (num_fragments >= call.limits.fragments / 4 * 3 || num_fragments == 0) {
-            arrays.give(lists, num_voxels, num_fragments);
+            arrays.move_into(lists, num_voxels, num_fragments);
         } else {
             list_arrays<Payload> exact(*this, num_voxels, num_fragments);
             arrays.copy(exact, stream);
-            exact.give(lists, num_voxels, num_fragments);
+            exact.move_into(lists, num_voxels, num_fragments);
         }
     }
 
@@ -551,12 +553,12 @@ private:
             device::check(cudaGetLastError(), where);
             device::end_stage(call.clock, &stage_times::abuffer_emit);
         }
-        exact.give(lists, num_voxels, num_fragments);
+        exact.move_into(lists, num_voxels, num_fragments);
     }
 
     room framebuffer_room_{{true, false, true}}, list_room_{{true, false, true}};
     device_block workspace_;
-    device::state_reader state_reader_;
+    device::readback state_reader_;
     device::call_graph call_graph_;
     std::size_t zeroed_bytes_ = 0;        // of the workspace, from its start
     std::vector<const void*> discarding_; // kinds of lists' calls that were shaded late and discarded fragments

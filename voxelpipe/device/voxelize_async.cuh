@@ -4,7 +4,7 @@
 
 // voxelize_async: a framebuffer call that never waits and never allocates. It works in the caller's memory, so a CUDA
 // graph can capture it and replay it with changed vertices. Capacities are fixed beforehand; what does not fit leaves
-// every target as it was (but see workspace_limits::hands_on_triangles), and read_status says what would have been
+// every target as it was (but see workspace_limits::expects_deferred), and read_status says what would have been
 // needed.
 
 #include <voxelpipe/device/backend.cuh>
@@ -31,7 +31,7 @@ struct workspace_limits {
     // some 3 to 6 us off the call of a mesh that is finer than the grid; a few in a hundred may be larger, but none by
     // much. A call that meets more all the same fails for its capacity, and targets that it clears may have been
     // written to. Calls of several draws, and ones that blend into targets as they lie, keep the kernel.
-    bool hands_on_triangles = true;
+    bool expects_deferred = true;
 
     // A start for a mesh whose triangles are mostly smaller than a tile.
     [[nodiscard]] static workspace_limits for_triangles(std::uint64_t triangles) {
@@ -61,12 +61,12 @@ template <class Call>
 
 // Pairs and fragments are numbered with 32 bits.
 [[nodiscard]] inline bool are_numbered(const workspace_limits& l) {
-    return l.tile_pairs <= core::most_numbered && l.fragments <= core::most_numbered;
+    return l.tile_pairs <= core::max_numbered && l.fragments <= core::max_numbered;
 }
 [[nodiscard]] inline capacities to_capacities(const workspace_limits& l) {
     capacities c{l.tile_pairs, l.tile_records, l.fragments, l.fragment_records};
     if (!l.orders_long_voxels) c.longest_ordered = 0;
-    c.leaves_none = l.hands_on_triangles ? 0 : 1;
+    c.skips_deferred_pass = l.expects_deferred ? 0 : 1;
     return c;
 }
 
@@ -76,7 +76,7 @@ auto with_call(std::span<const Draw> draws, const grid& g, const Framebuffer& fb
     return with_framebuffer_call<tuning::fine_raster_selector>(
         draws, g, fb, options, triangles, to_capacities(limits), [&](auto call) {
             call.may_list = limits.lists_fragments;
-            if (!limits.hands_on_triangles && !call.may_leave_none(0)) call.limits.leaves_none = 0;
+            if (!limits.expects_deferred && !call.can_skip_deferred_pass(0)) call.limits.skips_deferred_pass = 0;
             return f(call);
         });
 }
@@ -126,9 +126,9 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
                         call.template go<coverage::thin, true>(memory, backend.stream);
                     else
                         call.template go<coverage::conservative, true>(memory, backend.stream);
-                    if (!workspace.limits.hands_on_triangles && call.limits.leaves_none == 0) { // none is missing
+                    if (!workspace.limits.expects_deferred && call.limits.skips_deferred_pass == 0) { // none is missing
                         auto* const state = static_cast<device::pipeline_state*>(workspace.memory);
-                        device::check(cudaMemsetAsync(&state->handed_on, 0, sizeof(state->handed_on), backend.stream));
+                        device::check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), backend.stream));
                     }
                 });
             };
@@ -168,7 +168,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
                      larger(workspace.limits.fragment_records, state.fragment_records),
                      workspace.limits.lists_fragments,
                      workspace.limits.orders_long_voxels || state.longest_ordered() != 0,
-                     workspace.limits.hands_on_triangles || !state.handed_on.are_none()};
+                     workspace.limits.expects_deferred || !state.deferred.are_none()};
         }
         return s;
     }

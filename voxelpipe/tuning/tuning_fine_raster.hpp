@@ -62,9 +62,9 @@ inline constexpr std::array fine_raster_table{
 
 // Targets that need more than this together are drawn in several fine passes over the same tiles: 8^3 voxels of 150
 // bytes are 75 KB, which a block can have on every architecture beside what it needs for a batch of triangles.
-inline constexpr int most_bits_per_voxel = 150 * 8;
+inline constexpr int max_bits_per_voxel = 150 * 8;
 inline constexpr int batch_bytes = 22 * 1024; // of shared memory, at 256 threads a block
-static_assert(most_bits_per_voxel / 8 * 512 <= portable_shared_per_block() - batch_bytes);
+static_assert(max_bits_per_voxel / 8 * 512 <= portable_shared_per_block() - batch_bytes);
 
 struct fine_raster_selector {
     constexpr fine_raster_policy operator()(int bits_per_voxel, int capability = architectures[0].capability) const {

@@ -25,18 +25,18 @@ struct pipeline_state {
     unsigned int num_ordered[5];                    // fragment order: order_lists
     unsigned long long longest_run;                 // of those, fragments of a voxel that no block takes
     struct {
-        unsigned long long cut, lengths[4];
-        unsigned long long set_up; // of what is cut, what all its pieces need
+        unsigned long long split, lengths[4];
+        unsigned long long set_up; // of what is split, what all its pieces need
         [[nodiscard]] VOXELPIPE_HD bool are_none() const {
-            return (cut | lengths[0] | lengths[1] | lengths[2] | lengths[3]) == 0;
+            return (split | lengths[0] | lengths[1] | lengths[2] | lengths[3]) == 0;
         }
         // How many there are that a first kernel by itself would be left with at its end, or ~0 where some are more
         // than little work for one thread. Thin tiny ones wait for others of their warp only.
-        [[nodiscard]] VOXELPIPE_HD unsigned long long left_alone(coverage rule) const {
-            if ((cut | lengths[2] | lengths[3]) != 0) return ~0ull;
+        [[nodiscard]] VOXELPIPE_HD unsigned long long num_deferred(coverage rule) const {
+            if ((split | lengths[2] | lengths[3]) != 0) return ~0ull;
             return rule == coverage::thin ? lengths[1] : lengths[0] + lengths[1];
         }
-    } handed_on; // direct raster, of one draw: triangle_lists
+    } deferred; // direct raster, of one draw: deferred_triangles
 
     // See capacities: 0 where the windows put all voxels in order, 1 where a block takes the longest that they leave.
     [[nodiscard]] VOXELPIPE_HD unsigned long long longest_ordered() const {
@@ -50,18 +50,19 @@ struct capacities {
     // What a call is launched without, for the one before it hardly needed that: kernels for voxels of more fragments,
     // and a second kernel of a draw.
     unsigned long long longest_ordered = ~0ull;
-    unsigned long long leaves_none = 0; // or 1: the first kernel does it all. As wide as the rest, see call_bytes
+    unsigned long long skips_deferred_pass =
+        0; // or 1: the first kernel does it all. As wide as the rest, see call_bytes
 };
 
 // Whether triangles were handed on to a kernel that has not been launched.
-[[nodiscard]] VOXELPIPE_HD inline bool misses_triangles(const pipeline_state& s, const capacities& c) {
-    return c.leaves_none != 0 && !s.handed_on.are_none();
+[[nodiscard]] VOXELPIPE_HD inline bool misses_deferred(const pipeline_state& s, const capacities& c) {
+    return c.skips_deferred_pass != 0 && !s.deferred.are_none();
 }
 // Whether the call must not write anything: a bad index, or something that did not fit.
 [[nodiscard]] VOXELPIPE_HD inline bool has_failed(const pipeline_state& s, const capacities& c) {
     return s.index_error != 0 || s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ||
            s.list_fragments > c.fragments || s.fragment_records > c.fragment_records ||
-           s.longest_ordered() > c.longest_ordered || misses_triangles(s, c);
+           s.longest_ordered() > c.longest_ordered || misses_deferred(s, c);
 }
 
 } // namespace voxelpipe::device

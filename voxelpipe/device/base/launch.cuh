@@ -75,7 +75,7 @@ inline constexpr int threads_per_block = 256; // of kernels that have no tuning 
 
 // Of a kernel with a thread an item.
 [[nodiscard]] inline unsigned num_blocks(std::uint64_t items) {
-    VOXELPIPE_ASSERT(items <= std::numeric_limits<std::uint32_t>::max()); // validated: see core::most_numbered
+    VOXELPIPE_ASSERT(items <= std::numeric_limits<std::uint32_t>::max()); // validated: see core::max_numbered
     return core::blocks_for_each(static_cast<std::uint32_t>(items), threads_per_block);
 }
 

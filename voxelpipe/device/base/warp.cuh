@@ -12,10 +12,10 @@ namespace voxelpipe::device {
 
 using word = std::uint32_t;
 
-inline constexpr int medium_lanes = 8; // of a warp, for one larger triangle
-// The bits of a row that are a lane's where medium_lanes share it: neighbours have neighbouring voxels.
+inline constexpr int group_lanes = 8; // of a warp, for one larger triangle
+// The bits of a row that are a lane's where group_lanes share it: neighbours have neighbouring voxels.
 [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t bits_of_lane() {
-    return ~0u / ((1u << medium_lanes) - 1) << threadIdx.x % medium_lanes;
+    return ~0u / ((1u << group_lanes) - 1) << threadIdx.x % group_lanes;
 }
 
 // A value that all lanes of a warp have, in a way that the compiler knows it: what is read from memory, or follows from

@@ -19,7 +19,7 @@ namespace voxelpipe::device {
 
 // Fragments a voxel, on average, from which on they are sorted by counting: with 16 and 21, as on hairball, that took
 // 1 to 3 % longer than the radix sort, and with 35 and more 9 to 19 % less (whole calls at 128^3 on an H200).
-inline constexpr std::uint64_t least_counted = 24;
+inline constexpr std::uint64_t min_counted = 24;
 
 template <class Draw, class Payload>
 struct abuffer_call;
@@ -37,7 +37,7 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     // Whether fragments may be shaded when they are listed: in the finished lists, and then these are not what is
     // wanted if any was discarded; with `filters`, before that as well.
     bool may_shade_late = false, filters = false;
-    bool has_few_a_voxel = false; // fragments: see least_counted
+    bool has_few_a_voxel = false; // fragments: see min_counted
 
     // All that the launches of this call depend on, where it is plain bytes.
     static constexpr bool has_bytes = std::is_trivially_copyable_v<draw_type>;
@@ -57,14 +57,14 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     // Whether fragments are listed by the raster, and shaded afterwards where the shader is not constant.
     template <class Key>
     [[nodiscard]] bool is_listed_call() const {
-        return sizeof(Key) == sizeof(std::uint32_t) && (core::is_solid<FragmentShader> || may_shade_late) &&
+        return sizeof(Key) == sizeof(std::uint32_t) && (core::is_constant<FragmentShader> || may_shade_late) &&
                draws.size() == 1 && is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
     }
     // As framebuffer_call's.
-    [[nodiscard]] bool may_leave_none(std::uint64_t left) const { return may_be_alone(num_primitives, left); }
+    [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t left) const { return leaves_few(num_primitives, left); }
     template <class Key>
     [[nodiscard]] bool shades_late() const {
-        return !core::is_solid<FragmentShader> && is_listed_call<Key>();
+        return !core::is_constant<FragmentShader> && is_listed_call<Key>();
     }
 
     // Carves the memory and, with Run, launches the stages up to the sorted lists, which may be where they are asked
@@ -72,12 +72,12 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     // is zeroed before.
     template <coverage Rule, bool Run, class Key>
     [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, cudaStream_t stream,
-                                                  const asked_places& asked = {}) const {
+                                                  const output_pointers& asked = {}) const {
         pipeline_state* const state = memory.take<pipeline_state>(1);
         if constexpr (sizeof(Key) == sizeof(std::uint32_t)) {
             if (is_listed_call<Key>()) {
-                if constexpr (core::is_solid<FragmentShader>)
-                    return go_direct<Rule, Run>(memory, state, stream, asked);
+                if constexpr (core::is_constant<FragmentShader>)
+                    return launch_immediate<Rule, Run>(memory, state, stream, asked);
                 else
                     return go_shaded<Rule, Run>(memory, state, stream, asked);
             }
@@ -99,19 +99,19 @@ private:
     // By counting, but not where voxels are known to have so many fragments that atomics wait for one another, or so
     // few that each is by itself.
     [[nodiscard]] bool may_count() const {
-        return !has_few_a_voxel && (limits.longest_ordered <= most_of_block || limits.longest_ordered == ~0ull);
+        return !has_few_a_voxel && (limits.longest_ordered <= max_of_block || limits.longest_ordered == ~0ull);
     }
 
     // One draw of a constant shader.
     template <coverage Rule, bool Run>
     [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-    go_direct(arena& memory, pipeline_state* state, cudaStream_t stream, const asked_places& asked) const {
+    launch_immediate(arena& memory, pipeline_state* state, cudaStream_t stream, const output_pointers& asked) const {
         constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
         const draw_type& d = draws[0];
         const auto lists =
             take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true, may_count());
         const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : d.mesh.positions.size());
-        const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
+        const deferred_triangles deferred = deferred_triangles::take(memory, num_primitives);
         const order_memory order = order_memory::take(memory, limits.fragments);
         if constexpr (Run) {
             const core::snap_transform snap = core::make_snap_transform(g);
@@ -119,7 +119,7 @@ private:
             const auto raster = [&](const auto& source) {
                 const raster_input<std::remove_cvref_t<decltype(source)>> in{source, num_primitives, snap.fraction,
                                                                              g.extent};
-                list_raster<Rule>(in, num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0],
+                list_raster<Rule>(in, num_vertices, 0, deferred.with(state), lists.keys[0], lists.values[0],
                                   prepare_lists(lists, asked, order.tiles, limits), state, limits, stream);
             };
             if constexpr (on_the_spot) {
@@ -143,11 +143,11 @@ private:
     // One draw of any other shader.
     template <coverage Rule, bool Run>
     [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-    go_shaded(arena& memory, pipeline_state* state, cudaStream_t stream, const asked_places& asked) const {
+    go_shaded(arena& memory, pipeline_state* state, cudaStream_t stream, const output_pointers& asked) const {
         constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
         auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
         const scene_buffers buffers(memory, draws);
-        const triangle_lists handed_on = triangle_lists::take(memory, num_primitives);
+        const deferred_triangles deferred = deferred_triangles::take(memory, num_primitives);
         const order_memory order = order_memory::take(memory, limits.fragments);
         auto* const spare = memory.take<std::uint32_t>(limits.fragments);
         auto* const payloads = memory.take<Payload>(has_payload ? limits.fragments : 0);
@@ -155,7 +155,7 @@ private:
             const scene_type s = buffers.shade(draws, g, stream);
             end_stage(clock, &stage_times::vertex_shade);
             const raster_input<stored_source> in{{s.geo.one}, num_primitives, s.geo.snap.fraction, g.extent};
-            list_raster<Rule>(in, s.geo.one.num_vertices, 0, handed_on.with(state), lists.keys[0], lists.values[0],
+            list_raster<Rule>(in, s.geo.one.num_vertices, 0, deferred.with(state), lists.keys[0], lists.values[0],
                               prepare_lists(lists, asked, order.tiles, limits), state, limits, stream);
             if (filters) filter_lists(s, lists, state, limits, stream);
             end_stage(clock, &stage_times::fine_raster);

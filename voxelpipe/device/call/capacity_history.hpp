@@ -17,11 +17,11 @@ namespace voxelpipe::core {
 
 // Key: what the host knows of a call, compared by ==. N arrays, numbered with 32 bits where `is_numbered` says so.
 template <class Key, std::size_t N>
-class call_room {
+class capacity_history {
 public:
     using lengths = std::array<std::uint64_t, N>;
 
-    explicit call_room(const std::array<bool, N>& is_numbered) : is_numbered_(is_numbered) {}
+    explicit capacity_history(const std::array<bool, N>& is_numbered) : is_numbered_(is_numbered) {}
 
     // For a call. One like the last gets a little more than such calls have needed so far; any other gets `first`, what
     // a call needs of which nothing is known, or more where an earlier one did not fit.
@@ -47,13 +47,13 @@ public:
     }
 
     // The most of array k that calls like the last one have needed, where this is one of them.
-    [[nodiscard]] std::optional<std::uint64_t> most_needed(const Key& key, std::size_t k) const {
+    [[nodiscard]] std::optional<std::uint64_t> max_needed(const Key& key, std::size_t k) const {
         return last_ == key ? std::optional(needed_[k]) : std::nullopt;
     }
 
 private:
     [[nodiscard]] std::uint64_t limited(std::size_t k, std::uint64_t length) const {
-        return is_numbered_[k] ? std::min(length, most_numbered) : length;
+        return is_numbered_[k] ? std::min(length, max_numbered) : length;
     }
     std::array<bool, N> is_numbered_;
     lengths most_{}, needed_{};

@@ -29,12 +29,13 @@ namespace voxelpipe::device {
 
 // Whether a constant shader and its targets need no tiles.
 template <class FragmentShader, class Framebuffer>
-inline constexpr bool can_be_direct = false;
+inline constexpr bool can_draw_immediately = false;
 template <class FragmentShader, class... Targets>
-inline constexpr bool can_be_direct<FragmentShader, framebuffer_view<Targets...>> = core::is_solid<FragmentShader> &&
-                                                                                    (is_direct<Targets>() && ...);
+inline constexpr bool
+    can_draw_immediately<FragmentShader, framebuffer_view<Targets...>> = core::is_constant<FragmentShader> &&
+                                                                         (is_immediate<Targets>() && ...);
 
-inline constexpr std::size_t most_direct_draws = 16; // each has launches of its own
+inline constexpr std::size_t max_immediate_draws = 16; // each has launches of its own
 
 template <class Draw, class Framebuffer, tuning::fine_raster_policy Policy>
 struct framebuffer_call;
@@ -67,32 +68,32 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         if constexpr (Run)
             if (can_be_known(fb) && !is_tracked_call())
                 check(cudaMemsetAsync(fb.changes, 0, core::change_log::header_words * sizeof(word), stream));
-        if constexpr (can_be_touched) {
-            if (is_touched_call()) {
-                go_touched<Rule, Run>(memory, state, stream);
+        if constexpr (can_use_mask) {
+            if (uses_mask()) {
+                launch_mask<Rule, Run>(memory, state, stream);
                 return;
             }
         }
-        if constexpr (can_be_direct<FragmentShader, Framebuffer>) {
-            if (is_direct_call()) {
-                go_direct<Rule, Run>(memory, state, stream);
+        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>) {
+            if (is_immediate_call()) {
+                launch_immediate<Rule, Run>(memory, state, stream);
                 return;
             }
         }
         if constexpr (can_be_listed) {
             if (is_listed_call()) {
                 if constexpr (groups::has_ordered)
-                    go_folded<Rule, Run>(memory, state, stream);
+                    launch_folded<Rule, Run>(memory, state, stream);
                 else
-                    go_listed<Rule, Run>(memory, state, stream);
+                    launch_listed<Rule, Run>(memory, state, stream);
                 return;
             }
         }
         // Voxel ids of 32 bits keep the lists of the ordered targets small wherever the grid allows.
         if (!groups::has_ordered || num_voxels(g) < std::numeric_limits<std::uint32_t>::max())
-            go_with<Rule, Run, std::uint32_t>(memory, state, stream);
+            launch_tiles<Rule, Run, std::uint32_t>(memory, state, stream);
         else if constexpr (groups::has_ordered)
-            go_with<Rule, Run, std::uint64_t>(memory, state, stream);
+            launch_tiles<Rule, Run, std::uint64_t>(memory, state, stream);
     }
 
     // All that the launches of this call depend on, where it is plain bytes.
@@ -115,56 +116,56 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     [[nodiscard]] std::size_t zeroed_bytes() const {
         arena memory;
         (void)memory.take<pipeline_state>(1);
-        if (is_touched_call()) (void)memory.take<word>(touched_target::map::elements(g.extent));
+        if (uses_mask()) (void)memory.take<word>(mask_target::map::elements(g.extent));
         return memory.used();
     }
     // Whether the call lists its fragments: its memory grows with them.
     [[nodiscard]] bool is_listed_call() const {
-        if (is_touched_call()) return false;
-        if constexpr (can_be_direct<FragmentShader, Framebuffer>)
-            if (is_direct_call()) return false;
-        if (!can_be_listed || !may_list || draws.size() > most_direct_draws) return false;
-        if (num_voxels(g) >= std::numeric_limits<std::uint32_t>::max() || limits.fragments > most_resolved)
-            return false;
+        if (uses_mask()) return false;
+        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>)
+            if (is_immediate_call()) return false;
+        if (!can_be_listed || !may_list || draws.size() > max_immediate_draws) return false;
+        if (num_voxels(g) >= std::numeric_limits<std::uint32_t>::max() || limits.fragments > max_resolved) return false;
         return is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
     }
 
     // Of this call: what a failure that shows only at its end is put down to.
     [[nodiscard]] stage last_stage() const {
-        if (is_touched_call()) return stage::fine_raster;
-        if constexpr (can_be_direct<FragmentShader, Framebuffer>) {
-            if (is_direct_call())
-                return plan_direct(draws, fb, num_primitives, options.count_voxels).any_counted() ? stage::tile_resolve
-                                                                                                  : stage::fine_raster;
+        if (uses_mask()) return stage::fine_raster;
+        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>) {
+            if (is_immediate_call())
+                return plan_immediate(draws, fb, num_primitives, options.count_voxels).any_counted()
+                           ? stage::tile_resolve
+                           : stage::fine_raster;
         }
         return groups::has_ordered ? stage::fine_raster : stage::tile_resolve;
     }
 
-    // Whether limits.leaves_none may hold, where calls like this one left_alone so many triangles: it can be made once
-    // more, since it writes nothing where that was wrong, or clears all that it draws into.
-    [[nodiscard]] bool may_leave_none(std::uint64_t left) const {
-        if (draws.size() != 1 || !may_be_alone(most_triangles(), left)) return false;
-        if (is_touched_call() || is_listed_call()) return true;
-        if constexpr (can_be_direct<FragmentShader, Framebuffer>)
+    // Whether limits.skips_deferred_pass may hold, where calls like this one num_deferred so many triangles: it can be
+    // made once more, since it writes nothing where that was wrong, or clears all that it draws into.
+    [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t left) const {
+        if (draws.size() != 1 || !leaves_few(max_triangles(), left)) return false;
+        if (uses_mask() || is_listed_call()) return true;
+        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>)
             // Sums' first kernel (raster/block_pass.cuh) draws nothing at its end for the second.
-            return is_direct_call() && clears_all_in_use(fb) && (has_only_bits<Framebuffer> || left == 0);
+            return is_immediate_call() && clears_all_in_use(fb) && (has_only_bits<Framebuffer> || left == 0);
         return false;
     }
 
 private:
-    static constexpr bool can_be_touched = core::is_solid<FragmentShader> && depends_on_touched<Framebuffer>;
-    [[nodiscard]] bool is_touched_call() const {
-        if (!can_be_touched || draws.size() > most_direct_draws || !have_one_value() ||
+    static constexpr bool can_use_mask = core::is_constant<FragmentShader> && depends_on_mask<Framebuffer>;
+    [[nodiscard]] bool uses_mask() const {
+        if (!can_use_mask || draws.size() > max_immediate_draws || !have_one_value() ||
             !is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent))
             return false;
-        const std::uint64_t bytes = touched_target::map::elements(g.extent) * sizeof(word);
-        bool may_be_direct = false;
-        if constexpr (can_be_direct<FragmentShader, Framebuffer>)
-            may_be_direct = plan_direct(draws, fb, num_primitives, options.count_voxels).possible;
-        if (!may_be_direct) return bytes <= most_touched_bytes;
-        if (bytes > most_touched_bytes_of_direct) return false;
+        const std::uint64_t bytes = mask_target::map::elements(g.extent) * sizeof(word);
+        bool can_be_immediate = false;
+        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>)
+            can_be_immediate = plan_immediate(draws, fb, num_primitives, options.count_voxels).possible;
+        if (!can_be_immediate) return bytes <= max_mask_bytes;
+        if (bytes > max_mask_bytes_of_immediate) return false;
         return options.count_voxels || clears_values(fb) ||
-               (!have_checked_indices() && bytes <= least_touched_bytes + num_primitives * touched_bytes_per_triangle);
+               (!have_checked_indices() && bytes <= min_mask_bytes + num_primitives * mask_bytes_per_triangle);
     }
     // Whether no call need look at any draw's indices.
     [[nodiscard]] bool have_checked_indices() const {
@@ -174,26 +175,26 @@ private:
     }
     // Whether all draws give the same bytes.
     [[nodiscard]] bool have_one_value() const {
-        if constexpr (core::is_solid<FragmentShader>) {
+        if constexpr (core::is_constant<FragmentShader>) {
             const auto& first = draws[0].fragment_shader.values;
             for (const draw_type& d : draws)
                 if (std::memcmp(&first, &d.fragment_shader.values, sizeof(first)) != 0) return false;
         }
         return true;
     }
-    [[nodiscard]] bool is_direct_call() const {
-        if (draws.size() > most_direct_draws ||
+    [[nodiscard]] bool is_immediate_call() const {
+        if (draws.size() > max_immediate_draws ||
             !is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent))
             return false;
-        return plan_direct(draws, fb, num_primitives, options.count_voxels).possible;
+        return plan_immediate(draws, fb, num_primitives, options.count_voxels).possible;
     }
 
     // Whether all that the call draws is marked, since the framebuffer tracks its changes.
     [[nodiscard]] bool is_tracked_call() const {
         if (!can_be_known(fb)) return false;
-        if constexpr (can_be_direct<FragmentShader, Framebuffer>)
-            if (is_direct_call()) return true;
-        return is_touched_call() || is_listed_call();
+        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>)
+            if (is_immediate_call()) return true;
+        return uses_mask() || is_listed_call();
     }
     // Of calls that know what a voxel ends with when it is drawn.
     [[nodiscard]] tracking_type track() const {
@@ -204,10 +205,10 @@ private:
     static constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
 
     template <coverage Rule, bool Run>
-    void go_touched(arena& memory, pipeline_state* state, cudaStream_t stream) const {
-        word* const touched = memory.take<word>(touched_target::map::elements(g.extent));
-        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : most_vertices());
-        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles());
+    void launch_mask(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+        word* const touched = memory.take<word>(mask_target::map::elements(g.extent));
+        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : max_vertices());
+        const deferred_triangles deferred = deferred_triangles::take(memory, max_triangles());
         if constexpr (Run) {
             const core::snap_transform snap = core::make_snap_transform(g);
             for (std::size_t i = 0; i < draws.size(); ++i) {
@@ -215,21 +216,21 @@ private:
                 const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
                 const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
                 if (num_triangles == 0) continue;
-                if (i != 0) check(cudaMemsetAsync(&state->handed_on, 0, sizeof(state->handed_on), stream));
+                if (i != 0) check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
                 const auto raster = [&](const auto& source) {
                     using source_type = std::remove_cvref_t<decltype(source)>;
-                    const direct_call<Rule, source_type, touched_output> call{
+                    const raster_call<Rule, source_type, mask_output> call{
                         {source, num_triangles, snap.fraction, g.extent},
                         {touched, g.extent, num_vertices, state, false},
-                        handed_on.with(state)};
-                    direct_raster(call, state, stage::fine_raster, stream, on_the_spot && i == 0,
-                                  limits.leaves_none != 0);
+                        deferred.with(state)};
+                    launch_raster(call, state, stage::fine_raster, stream, on_the_spot && i == 0,
+                                  limits.skips_deferred_pass != 0);
                     end_stage(clock, &stage_times::fine_raster);
                 };
                 raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);
             }
-            end_touched(touched, fb, track(), draws[0].fragment_shader.values, options.count_voxels, state, limits,
-                        stream);
+            fill_from_mask(touched, fb, track(), draws[0].fragment_shader.values, options.count_voxels, state, limits,
+                           stream);
             end_stage(clock, &stage_times::tile_resolve);
         }
     }
@@ -250,8 +251,8 @@ private:
     }
 
     template <coverage Rule, bool Run>
-    void go_direct(arena& memory, pipeline_state* state, cudaStream_t stream) const {
-        const auto plan = plan_direct(draws, fb, num_primitives, options.count_voxels);
+    void launch_immediate(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+        const auto plan = plan_immediate(draws, fb, num_primitives, options.count_voxels);
         bool has_marks = false; // of this call alone
         core::for_each_index<groups::count>([&]<std::size_t K>() {
             has_marks = has_marks || (plan.counts(K) && ends_by_marks(voxelpipe::get<K>(fb.targets)));
@@ -262,8 +263,8 @@ private:
         const bool is_tracked = marks.words != nullptr; // those hold what the call's own would, and more
         has_marks = has_marks && !is_tracked;
         if (has_marks) marks = chunk_marks::take(memory, g.extent);
-        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : most_vertices());
-        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles());
+        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : max_vertices());
+        const deferred_triangles deferred = deferred_triangles::take(memory, max_triangles());
         if constexpr (Run) {
             if (has_marks) check(cudaMemsetAsync(marks.words, 0, marks.rows.num_words() * sizeof(word), stream));
             for (const draw_type& d : draws)
@@ -283,25 +284,25 @@ private:
                 const draw_type& d = draws[i];
                 const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
                 if (num_triangles == 0) continue;
-                if (i != 0) check(cudaMemsetAsync(&state->handed_on, 0, sizeof(state->handed_on), stream));
+                if (i != 0) check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
                 const auto raster = [&](const auto& source) {
                     using source_type = std::remove_cvref_t<decltype(source)>;
                     using values_type = decltype(d.fragment_shader.values);
                     const auto draw_into = [&](const auto& output) {
-                        const direct_call<Rule, source_type, std::remove_cvref_t<decltype(output)>> call{
-                            {source, num_triangles, snap.fraction, g.extent}, output, handed_on.with(state)};
+                        const raster_call<Rule, source_type, std::remove_cvref_t<decltype(output)>> call{
+                            {source, num_triangles, snap.fraction, g.extent}, output, deferred.with(state)};
                         // Without a check and a clear these may be the first kernels, but then nobody writes to
                         // the indices (mesh_view::checked).
-                        direct_raster(call, state, stage::fine_raster, stream, false, limits.leaves_none != 0);
+                        launch_raster(call, state, stage::fine_raster, stream, false, limits.skips_deferred_pass != 0);
                         end_stage(clock, &stage_times::fine_raster);
                     };
                     // The kernels that know that they only set bits.
-                    if constexpr (is_touched_itself<Framebuffer>) {
+                    if constexpr (is_mask_itself<Framebuffer>) {
                         const auto& t = voxelpipe::get<0>(fb.targets);
-                        if (plan.modes.of[0] == direct_mode::blend && t.load != load_operation::off &&
+                        if (plan.modes.of[0] == immediate_mode::blend && t.load != load_operation::off &&
                             voxelpipe::get<0>(d.fragment_shader.values)) {
-                            draw_into(touched_output{t.elements, g.extent,
-                                                     static_cast<std::uint32_t>(d.mesh.positions.size()), state, true});
+                            draw_into(mask_output{t.elements, g.extent,
+                                                  static_cast<std::uint32_t>(d.mesh.positions.size()), state, true});
                             return;
                         }
                     }
@@ -321,7 +322,7 @@ private:
                 raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);
             }
             if (plan.has_last_pass()) {
-                end_counts(plan, fb, draws[0].fragment_shader.values, marks, state, limits, stream);
+                finalize_counts(plan, fb, draws[0].fragment_shader.values, marks, state, limits, stream);
                 end_stage(clock, &stage_times::tile_resolve);
             }
         }
@@ -329,7 +330,7 @@ private:
 
     // Appends the fragments of all draws to two arrays.
     template <coverage Rule>
-    void list_draws(const scene_type& s, const vertex_positions& positions, const triangle_lists& handed_on,
+    void list_draws(const scene_type& s, const vertex_positions& positions, const deferred_triangles& deferred,
                     std::uint32_t* voxels, std::uint32_t* primitives, sort_preparation preparation,
                     pipeline_state* state, cudaStream_t stream) const {
         draw_geometry of_draw{draws[0].mesh.triangles.data(), positions, 0, 0};
@@ -339,9 +340,9 @@ private:
             of_draw.num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
             if (num_triangles != 0) {
                 if (of_draw.first_primitive != 0)
-                    check(cudaMemsetAsync(&state->handed_on, 0, sizeof(state->handed_on), stream));
+                    check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
                 const raster_input<stored_source> in{{of_draw}, num_triangles, s.geo.snap.fraction, g.extent};
-                list_raster<Rule>(in, of_draw.num_vertices, of_draw.first_primitive, handed_on.with(state), voxels,
+                list_raster<Rule>(in, of_draw.num_vertices, of_draw.first_primitive, deferred.with(state), voxels,
                                   primitives, preparation, state, limits, stream);
                 preparation.is_wanted = false;
             }
@@ -350,25 +351,25 @@ private:
         }
     }
     // Of a draw.
-    [[nodiscard]] std::size_t most_triangles() const {
+    [[nodiscard]] std::size_t max_triangles() const {
         std::size_t most = 0;
         for (const draw_type& d : draws) most = std::max(most, d.mesh.triangles.size());
         return most;
     }
-    [[nodiscard]] std::size_t most_vertices() const {
+    [[nodiscard]] std::size_t max_vertices() const {
         std::size_t most = 0;
         for (const draw_type& d : draws) most = std::max(most, d.mesh.positions.size());
         return most;
     }
 
     template <coverage Rule, bool Run>
-    void go_listed(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+    void launch_listed(arena& memory, pipeline_state* state, cudaStream_t stream) const {
         using ends_type = run_ends<voxel_cells<Framebuffer>>;
         const scene_buffers buffers(memory, draws);
         const sort_pairs pairs = sort_pairs::take(memory, limits.fragments);
         const sort_memory sort =
             sort_memory::take(memory, limits.fragments, static_cast<int>(std::bit_width(num_voxels(g) - 1)));
-        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles());
+        const deferred_triangles deferred = deferred_triangles::take(memory, max_triangles());
         const ends_type ends = ends_type::take(memory, limits.fragments);
         if constexpr (Run) {
             const scene_type s = buffers.shade(draws, g, stream);
@@ -377,7 +378,7 @@ private:
             preparation.is_wanted = preparation.sorts = true;
             preparation.sort = sort;
             preparation.capacity = limits.fragments;
-            list_draws<Rule>(s, buffers.positions, handed_on, pairs.keys[0], pairs.values[0], preparation, state,
+            list_draws<Rule>(s, buffers.positions, deferred, pairs.keys[0], pairs.values[0], preparation, state,
                              stream);
             end_stage(clock, &stage_times::fine_raster);
             const int at = sort_fragments(pairs, sort_count{state, limits}, limits.fragments, sort, stream);
@@ -393,17 +394,17 @@ private:
 
     // The same for blends that need an order: lists that are in it are folded.
     template <coverage Rule, bool Run>
-    void go_folded(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+    void launch_folded(arena& memory, pipeline_state* state, cudaStream_t stream) const {
         auto lists = take_lists<std::uint32_t, values>(memory, num_voxels(g), limits.fragments, true);
         const scene_buffers buffers(memory, draws);
-        const triangle_lists handed_on = triangle_lists::take(memory, most_triangles());
+        const deferred_triangles deferred = deferred_triangles::take(memory, max_triangles());
         const order_memory order = order_memory::take(memory, limits.fragments);
         auto* const spare = memory.take<std::uint32_t>(limits.fragments);
         auto* const payloads = memory.take<values>(limits.fragments);
         if constexpr (Run) {
             const scene_type s = buffers.shade(draws, g, stream);
             end_stage(clock, &stage_times::vertex_shade);
-            list_draws<Rule>(s, buffers.positions, handed_on, lists.keys[0], lists.values[0],
+            list_draws<Rule>(s, buffers.positions, deferred, lists.keys[0], lists.values[0],
                              prepare_lists(lists, {}, order.tiles, limits), state, stream);
             filter_lists(s, lists, state, limits, stream);
             end_stage(clock, &stage_times::fine_raster);
@@ -432,7 +433,7 @@ private:
     }
 
     template <coverage Rule, bool Run, class Key>
-    void go_with(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+    void launch_tiles(arena& memory, pipeline_state* state, cudaStream_t stream) const {
         const scene_buffers buffers(memory, draws);
         scene_type s{};
         if constexpr (Run) {
@@ -442,7 +443,7 @@ private:
         tile_work work;
         if constexpr (in_tiles) {
             const tile_memory m(memory, tiles, num_primitives, limits,
-                                most_image_words<Policy.log2_tile_size, Framebuffer>(),
+                                max_image_words<Policy.log2_tile_size, Framebuffer>(),
                                 default_pairs_per_item(limits.tile_pairs));
             if constexpr (Run) work = coarse_pass<Rule>(s.geo, m, state, limits, stream, clock);
         }
@@ -477,7 +478,7 @@ template <class Selector, class Draw, class Framebuffer, class F>
 auto with_framebuffer_call(std::span<const Draw> draws, const grid& g, const Framebuffer& fb,
                            const voxelize_options& options, std::uint64_t triangles, const capacities& limits,
                            const F& f) {
-    return tuning::with_policy<Selector, target_groups<Framebuffer>::most_bits()>(
+    return tuning::with_policy<Selector, target_groups<Framebuffer>::max_bits()>(
         compute_capability(), [&]<tuning::fine_raster_policy Policy>() {
             return f(framebuffer_call<Draw, Framebuffer, Policy>{draws, g, fb, options,
                                                                  static_cast<std::uint32_t>(triangles), limits});

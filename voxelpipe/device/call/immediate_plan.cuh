@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Which targets of a call of constant shaders are blended in place, and which count their fragments (plan_direct).
+// Which targets of a call of constant shaders are blended in place, and which count their fragments (plan_immediate).
 
 #include <voxelpipe/device/targets/finalize_counts.cuh>
 
@@ -19,7 +19,7 @@ inline constexpr std::uint64_t counted_bytes_per_triangle = 16384, counted_bytes
 
 // Bits are counted when all is drawn, which takes as long as the clear did: the atomics that tell first touches make
 // every warp wait for them. Beyond so many bytes they tell it in less time.
-inline constexpr std::uint64_t most_counted_bits = std::uint64_t{256} << 20;
+inline constexpr std::uint64_t max_counted_bits = std::uint64_t{256} << 20;
 
 template <std::size_t K, class Target, class Draw>
 [[nodiscard]] bool may_be_counted(std::span<const Draw> draws, const target_view<Target>& t) {
@@ -56,10 +56,10 @@ template <class... Targets>
 // How a call of constant shaders can do without tiles. A target is counted only where blending it in place would not
 // give its blend's bits, or where nothing else tells how many voxels are touched.
 template <class Draw, class... Targets>
-[[nodiscard]] direct_plan<sizeof...(Targets)> plan_direct(std::span<const Draw> draws,
-                                                          const framebuffer_view<Targets...>& fb,
-                                                          std::uint64_t num_primitives, bool count_voxels) {
-    direct_plan<sizeof...(Targets)> plan;
+[[nodiscard]] immediate_plan<sizeof...(Targets)> plan_immediate(std::span<const Draw> draws,
+                                                                const framebuffer_view<Targets...>& fb,
+                                                                std::uint64_t num_primitives, bool count_voxels) {
+    immediate_plan<sizeof...(Targets)> plan;
     int telling = -1, countable = -1; // the first target that tells first touches, that may be counted
     int telling_bits = -1;            // that tells them by its bits when all is drawn
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
@@ -67,19 +67,19 @@ template <class Draw, class... Targets>
         bool in_place = true, tells = true;
         for (const Draw& d : draws) {
             const auto& value = voxelpipe::get<K>(d.fragment_shader.values);
-            in_place = in_place && may_be_direct(t, value, num_primitives);
+            in_place = in_place && can_be_immediate(t, value, num_primitives);
             tells = tells && tells_first(t, value, num_primitives);
         }
         const bool may_count = may_be_counted<K>(draws, t);
         if (tells && telling < 0) telling = static_cast<int>(K);
         using map = typename core::pack_element<K, Targets...>::type::map;
-        if (tells && telling_bits < 0 && map::is_bit && map::elements(fb.extent) * sizeof(word) <= most_counted_bits)
+        if (tells && telling_bits < 0 && map::is_bit && map::elements(fb.extent) * sizeof(word) <= max_counted_bits)
             telling_bits = static_cast<int>(K);
         if (may_count && countable < 0) countable = static_cast<int>(K);
-        if (map::is_bit && map::elements(fb.extent) >> 30 != 0) plan.modes.of[K] = direct_mode::blend_far;
+        if (map::is_bit && map::elements(fb.extent) >> 30 != 0) plan.modes.of[K] = immediate_mode::blend_far;
         if (in_place) return;
         if (may_count)
-            plan.modes.of[K] = direct_mode::count;
+            plan.modes.of[K] = immediate_mode::count;
         else
             plan.possible = false;
     });
@@ -87,10 +87,10 @@ template <class Draw, class... Targets>
         if (telling_bits >= 0) {
             plan.bits_of = telling_bits;
         } else if (telling >= 0) {
-            plan.modes.of[telling] = direct_mode::count_first;
+            plan.modes.of[telling] = immediate_mode::count_first;
             plan.modes.counts_first = true;
         } else if (countable >= 0) {
-            plan.modes.of[countable] = direct_mode::count;
+            plan.modes.of[countable] = immediate_mode::count;
         } else {
             plan.possible = false;
         }

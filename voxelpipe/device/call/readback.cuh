@@ -53,15 +53,15 @@ __global__ void send_state_kernel(State* state, sent_state<State>* to) {
 // host memory is locked, which a kernel writes in less time: 10 us of a call that takes 60. The host looks at the page
 // then instead of waiting for the stream, which takes 2 us more. Unlocking waits for the whole device, so what is used
 // once locks nothing. The page also says where the call's lists are to go.
-class state_reader {
+class readback {
 public:
-    state_reader() = default;
-    state_reader(state_reader&& other) noexcept { swap(other); }
-    state_reader& operator=(state_reader&& other) noexcept {
-        state_reader(std::move(other)).swap(*this);
+    readback() = default;
+    readback(readback&& other) noexcept { swap(other); }
+    readback& operator=(readback&& other) noexcept {
+        readback(std::move(other)).swap(*this);
         return *this;
     }
-    ~state_reader() {
+    ~readback() {
         if (on_device_ != nullptr) cudaHostUnregister(page_);
         ::operator delete(page_, page_bytes);
     }
@@ -78,7 +78,7 @@ public:
         if (page_ != nullptr) page_->state = {};
     }
     // Before the launches of a call: where its lists are to go.
-    [[nodiscard]] asked_places ask(const list_places& places) const {
+    [[nodiscard]] output_pointers ask(const list_places& places) const {
         if (on_device_ == nullptr) return {places, nullptr};
         std::memcpy(&page_->places, &places, sizeof(places));
         return {places, &on_device_->places};
@@ -99,7 +99,7 @@ public:
         // What has failed never arrives: the stream is asked now and then, and at once, for drivers that keep launches
         // back until they are asked. A call of milliseconds is waited for.
         if (may_spin_)
-            for (unsigned i = 0; i < most_looks; ++i) {
+            for (unsigned i = 0; i < max_looks; ++i) {
                 if (arrives(copy)) return copy;
                 if (i % looks_between == 0)
                     if (const cudaError_t error = cudaStreamQuery(stream); error != cudaErrorNotReady) break;
@@ -111,7 +111,7 @@ public:
 
 private:
     static constexpr std::align_val_t page_bytes{4096};
-    static constexpr unsigned most_looks = 1u << 20, looks_between = 1u << 14; // a look takes a nanosecond or two
+    static constexpr unsigned max_looks = 1u << 20, looks_between = 1u << 14; // a look takes a nanosecond or two
     using sent = sent_state<pipeline_state>;
     struct contents {
         sent state;
@@ -149,7 +149,7 @@ private:
         }
         cudaGetLastError();
     }
-    void swap(state_reader& other) noexcept {
+    void swap(readback& other) noexcept {
         std::swap(page_, other.page_);
         std::swap(on_device_, other.on_device_);
         std::swap(was_used_, other.was_used_);

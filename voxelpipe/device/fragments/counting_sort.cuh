@@ -127,7 +127,7 @@ __global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __
         const uint4 c = four[r];
         const unsigned voxels = (c.x != 0) + (c.y != 0) + (c.z != 0) + (c.w != 0);
         const std::uint32_t fragments = c.x + c.y + c.z + c.w;
-        if (fragments > most_of_window)
+        if (fragments > max_of_window)
             for (const std::uint32_t one : {c.x, c.y, c.z, c.w})
                 if (const int list = order_lists::list_of(one); list >= 0) atomicAdd(&num_long[list], 1u);
         unsigned long long all = 0;
@@ -168,8 +168,8 @@ __global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __
             places[k] = place;
             if (c[k] == 0) continue;
             if (const int list = order_lists::list_of(c[k]); list >= 0)
-                b.lists.put(atomicAdd(&next_long[list], 1u), place, c[k]);
-            else if (c[k] > most_of_block)
+                b.lists.add(atomicAdd(&next_long[list], 1u), place, c[k]);
+            else if (c[k] > max_of_block)
                 b.lists.push(place, c[k]);
             const std::uint32_t voxel = 4 * (first_four + 32 * r) + k;
             if (number < to.room) {
@@ -230,7 +230,7 @@ inline void order_by_counting(order_buffers b, const counted_pairs& pairs, const
     constexpr stage where = stage::abuffer_emit;
     const unsigned blocks = fill_device(limits.fragments / counting_items + 1);
     b.starts = m.starts;
-    if (num_primitives <= std::uint64_t{dense_part} * most_dense_parts)
+    if (num_primitives <= std::uint64_t{dense_part} * max_dense_parts)
         b.lists.num_primitives = static_cast<std::uint32_t>(num_primitives);
     capacities of_lists = limits;
     of_lists.longest_ordered = ~0ull; // what is found out about voxels must not stop these

@@ -15,15 +15,15 @@
 
 namespace voxelpipe::device {
 
-inline constexpr std::uint32_t most_folded_alone = 1024; // fragments of a voxel that a thread takes
-inline constexpr unsigned most_long_in_order = 32;       // voxels of a block beyond that; more are quicker side by side
-inline constexpr int fold_bytes = 8 * 1024;              // of shared memory, for values of fragments
+inline constexpr std::uint32_t max_folded_alone = 1024; // fragments of a voxel that a thread takes
+inline constexpr unsigned max_long_in_order = 32;       // voxels of a block beyond that; more are quicker side by side
+inline constexpr int fold_bytes = 8 * 1024;             // of shared memory, for values of fragments
 
 // The fragments of a voxel.
 struct voxel_fragments {
     std::uint64_t first = 0, last = 0;
     int x = 0, y = 0, z = 0;
-    [[nodiscard]] VOXELPIPE_HD bool is_long() const { return last - first > most_folded_alone; }
+    [[nodiscard]] VOXELPIPE_HD bool is_long() const { return last - first > max_folded_alone; }
 };
 
 // Voxel number v of the lists.
@@ -133,7 +133,7 @@ __global__ void fold_kernel(const __grid_constant__ fragment_lists<Key, Values> 
             using fold_type = target_fold<K, Key, Values, Framebuffer>;
             const fold_type target{lists, voxelpipe::get<K>(fb.targets)};
             if (target.view.load == load_operation::off) return;
-            const bool together = fold_type::places != 0 && (fold_type::any_order || n <= most_long_in_order);
+            const bool together = fold_type::places != 0 && (fold_type::any_order || n <= max_long_in_order);
             if (valid && !(together && mine.is_long())) target.alone(mine);
             if constexpr (fold_type::places != 0) {
                 for (unsigned k = 0; together && k < n; ++k)

@@ -126,7 +126,7 @@ struct list_buffers {
 // Whether keys of this type, so many at most, are sorted by fragments/radix_sort.cuh: what is longer goes to cub.
 template <class Key>
 [[nodiscard]] VOXELPIPE_HD constexpr bool are_sorted_here(std::uint64_t capacity) {
-    return sizeof(Key) == sizeof(std::uint32_t) && capacity < most_sorted;
+    return sizeof(Key) == sizeof(std::uint32_t) && capacity < max_sorted;
 }
 
 // Arrays for counting and writing fragments.
@@ -186,7 +186,7 @@ __global__ void prepare_sort_kernel(Key* keys, std::uint32_t* values, std::uint6
 
 // What has to be done for the lists of a call before they are sorted.
 template <class Key, class Payload>
-[[nodiscard]] sort_preparation prepare_lists(const list_buffers<Key, Payload>& b, const asked_places& asked,
+[[nodiscard]] sort_preparation prepare_lists(const list_buffers<Key, Payload>& b, const output_pointers& asked,
                                              const tile_counts& tiles, const capacities& limits) {
     sort_preparation p;
     p.is_wanted = true;
@@ -230,7 +230,7 @@ template <class Key, class Payload>
 
 // What was listed, sorted by voxel, and the first fragment of each.
 template <class Key, class Payload>
-[[nodiscard]] fragment_lists<Key, Payload> sort_lists(const list_buffers<Key, Payload>& b, const asked_places& asked,
+[[nodiscard]] fragment_lists<Key, Payload> sort_lists(const list_buffers<Key, Payload>& b, const output_pointers& asked,
                                                       pipeline_state* state, const capacities& limits,
                                                       cudaStream_t stream, stage_clock* clock) {
     const sorted_pairs<Key> sorted =
@@ -256,7 +256,7 @@ template <class Key, class Payload>
 // afterwards; otherwise null.
 template <class Payload>
 [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const asked_places& asked,
+sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const output_pointers& asked,
                std::uint32_t num_primitives, std::uint32_t* spare, pipeline_state* state, const capacities& limits,
                cudaStream_t stream, stage_clock* clock) {
     list_places here;
@@ -302,7 +302,7 @@ __global__ __launch_bounds__(threads_per_block, 4) void filter_lists_kernel(cons
     constexpr int rounds = 4; // of a warp, for one atomic
     await_stream();
     if (has_failed(*state, limits)) return;
-    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::most_numbered
+    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::max_numbered
     const std::uint32_t lane = threadIdx.x % 32;
     std::uint32_t discarded = 0;
     for (std::uint64_t start = std::uint64_t{blockIdx.x} * threads_per_block * rounds + warp_in_block() * 32 * rounds;
@@ -367,7 +367,7 @@ __global__ __launch_bounds__(threads_per_block, 4) void shade_lists_kernel(
     Payload* payloads, pipeline_state* state, capacities limits) {
     await_stream();
     if (has_failed(*state, limits)) return;
-    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::most_numbered
+    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::max_numbered
     const std::uint32_t* const primitives = lists.are_placed ? lists.places->primitives : lists.values;
     std::uint32_t discarded = 0;
     for (std::uint64_t i = std::uint64_t{blockIdx.x} * threads_per_block + threadIdx.x; i < n;
@@ -384,7 +384,7 @@ template <coverage Rule, class MakePayload, class Scene, class Key, class Payloa
 [[nodiscard]] fragment_lists<Key, Payload>
 build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const list_memory& m, pipeline_state* state,
             const capacities& limits, bool counts_triangles, cudaStream_t stream, stage_clock* clock,
-            const asked_places& asked = {}) {
+            const output_pointers& asked = {}) {
     const fragment_cells<Rule, Scene, Key, Payload, MakePayload> op{
         s, b.keys[0], b.values[0], b.primitives, b.payloads, counts_triangles};
     share_count(s.geo, op, m.share, state, m.storage, m.storage_bytes, stage::abuffer_emit, stream);

@@ -12,14 +12,14 @@
 namespace voxelpipe::device {
 
 // Room: fragments that may wait in a warp's shared memory. FlushAt: from how many on they go to the list, by an atomic
-// on the same word for all warps of the device (see kind_queues), so that there should be many; what 32 triangles bring
-// should fit behind what is less, or they have to come twice.
+// on the same word for all warps of the device (see class_queues), so that there should be many; what 32 triangles
+// bring should fit behind what is less, or they have to come twice.
 template <class Call, unsigned Room, unsigned FlushAt>
-struct listing_sink : direct_sink<Call> {
-    static constexpr bool buffers = true;
-    static constexpr bool shares = false;
-    static constexpr bool spreads = false; // a lane's row is written by itself, whatever its length
-    static constexpr bool has_rounds = true;
+struct listing_sink : sink_base<Call> {
+    static constexpr bool stages_in_shared = true;
+    static constexpr bool merges_equal_voxels = false;
+    static constexpr bool splits_long_rows = false; // a lane's row is written by itself, whatever its length
+    static constexpr bool takes_warp_rounds = true;
     static constexpr unsigned room = Room;
     static constexpr unsigned flush_at = FlushAt;
     struct memory {
@@ -28,7 +28,7 @@ struct listing_sink : direct_sink<Call> {
     };
 
     __device__ VOXELPIPE_INLINE listing_sink(const Call& call, unsigned* dropped, memory& m)
-        : direct_sink<Call>{call, dropped}, m_(m) {
+        : sink_base<Call>{call, dropped}, m_(m) {
         if (threadIdx.x % 32 == 0) m_.n = 0;
         __syncwarp();
     }
@@ -42,7 +42,7 @@ struct listing_sink : direct_sink<Call> {
         primitive_ = this->call.out.first_primitive + triangle;
     }
     __device__ VOXELPIPE_INLINE void drop(core::triangle_class kind) {
-        if (!straight_) direct_sink<Call>::drop(kind); // once, where a triangle comes twice
+        if (!bypasses_staging_) sink_base<Call>::drop(kind); // once, where a triangle comes twice
     }
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
@@ -55,10 +55,10 @@ struct listing_sink : direct_sink<Call> {
             write(at++, place_of(__ffs(static_cast<int>(bits)) - 1));
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t place(int x, int y, int z) const { return voxel(x, y, z); }
-    __device__ VOXELPIPE_INLINE void put(std::uint32_t voxel, bool wanted) {
+    __device__ VOXELPIPE_INLINE void emit(std::uint32_t voxel, bool wanted) {
         if (wanted) write(atomicAdd(&m_.n, 1u), voxel);
     }
-    __device__ VOXELPIPE_INLINE void put_line(std::uint32_t first, std::uint32_t step, unsigned count) {
+    __device__ VOXELPIPE_INLINE void emit_line(std::uint32_t first, std::uint32_t step, unsigned count) {
         for (unsigned at = atomicAdd(&m_.n, count), end = at + count; at < end; ++at, first += step) write(at, first);
     }
     // They go to the list at once: neighbours, as the lanes that give one.
@@ -108,7 +108,7 @@ struct listing_sink : direct_sink<Call> {
     // They wait with what waits already; where there is no room for a round, that goes to the list first.
     template <class IsDone, class Next>
     __device__ VOXELPIPE_INLINE void row_rounds(IsDone&& is_done, Next&& next) {
-        static_assert(room >= 32 * most_long_side);
+        static_assert(room >= 32 * max_long_side);
         for (bool more = !is_done(); __any_sync(0xffffffffu, more); more = !is_done()) {
             word mask = 0;
             std::uint32_t first = 0;
@@ -158,11 +158,11 @@ struct listing_sink : direct_sink<Call> {
     }
     // Between triangles, by all lanes. True: the shared memory was too small for what came since the last time; it has
     // been counted and has to come once more, to be written to the list at once.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool settle() {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool commit() {
         const unsigned n = m_.n;
         __syncwarp();
-        if (straight_) {
-            straight_ = false;
+        if (bypasses_staging_) {
+            bypasses_staging_ = false;
             restart();
             return false;
         }
@@ -170,7 +170,7 @@ struct listing_sink : direct_sink<Call> {
             flush(kept_);
             base_ = take(n - kept_);
             kept_ = 0;
-            straight_ = true;
+            bypasses_staging_ = true;
             restart();
             return true;
         }
@@ -205,7 +205,7 @@ private:
         return at;
     }
     __device__ VOXELPIPE_INLINE void write(unsigned at, std::uint32_t voxel) {
-        if (!straight_) {
+        if (!bypasses_staging_) {
             if (at >= room) return;
             m_.voxels[at] = voxel;
             m_.primitives[at] = primitive_;
@@ -251,9 +251,9 @@ private:
     }
 
     memory& m_;
-    unsigned kept_ = 0;           // of the memory; what lies behind belongs to this round
-    bool straight_ = false;       // this round goes to the list at once,
-    unsigned long long base_ = 0; // from here on
+    unsigned kept_ = 0;             // of the memory; what lies behind belongs to this round
+    bool bypasses_staging_ = false; // this round goes to the list at once,
+    unsigned long long base_ = 0;   // from here on
     std::uint32_t primitive_ = 0;
 };
 
@@ -262,8 +262,8 @@ struct list_output {
     template <class Call>
     using sink = listing_sink<Call, 448, Call::rule == coverage::thin ? 448 - 32 * 4 : 448 - 32 * 8>;
     template <class Call>
-    using rest_sink = listing_sink<Call, 960, 192>; // fewer blocks, and triangles of many rows
-    static constexpr bool hands_on = true;
+    using deferred_sink = listing_sink<Call, 960, 192>; // fewer blocks, and triangles of many rows
+    static constexpr bool defers = true;
     static constexpr bool only_sets = false;
     static constexpr bool only_blends = false;
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return false; }
@@ -282,20 +282,20 @@ struct list_output {
 
 // Whether the fragments of a draw can be listed this way.
 [[nodiscard]] inline bool is_listable(std::uint64_t num_triangles, int fraction, glm::ivec3 extent) {
-    return core::small_voxels(fraction) > 0 && std::max({extent.x, extent.y, extent.z}) <= most_direct_extent &&
-           triangle_lists::holds(num_triangles, most_large_records(extent));
+    return core::small_voxels(fraction) > 0 && std::max({extent.x, extent.y, extent.z}) <= max_immediate_extent &&
+           deferred_triangles::holds(num_triangles, max_work_items(extent));
 }
 
 // Appends the fragments of a draw to two arrays of limits.fragments elements each; counts them in the state.
 // first_primitive: of the draw. Does what `preparation` says, if that is wanted.
 template <coverage Rule, class Source>
 void list_raster(const raster_input<Source>& in, std::uint32_t num_vertices, std::uint32_t first_primitive,
-                 const triangle_lists& handed_on, std::uint32_t* voxels, std::uint32_t* primitives,
+                 const deferred_triangles& deferred, std::uint32_t* voxels, std::uint32_t* primitives,
                  const sort_preparation& preparation, pipeline_state* state, const capacities& limits,
                  cudaStream_t stream) {
-    const direct_call<Rule, Source, list_output> call{
-        in, {voxels, primitives, limits.fragments, num_vertices, first_primitive, state, preparation}, handed_on};
-    direct_raster(call, state, stage::abuffer_emit, stream, false, limits.leaves_none != 0);
+    const raster_call<Rule, Source, list_output> call{
+        in, {voxels, primitives, limits.fragments, num_vertices, first_primitive, state, preparation}, deferred};
+    launch_raster(call, state, stage::abuffer_emit, stream, false, limits.skips_deferred_pass != 0);
 }
 
 } // namespace voxelpipe::device

@@ -17,9 +17,9 @@ namespace voxelpipe::device {
 // Numbers of a block, on their way from one lane to another. Those of a warp lie apart; a word more for 32, so that
 // lanes meet no bank twice.
 struct sort_exchange {
-    static constexpr std::uint32_t of_warp = most_of_warp + most_of_warp / 32;
+    static constexpr std::uint32_t of_warp = max_of_warp + max_of_warp / 32;
     std::uint32_t numbers[block_sort_threads / 32 * of_warp];
-    static_assert(block_sort_threads / 32 * of_warp >= most_of_block);
+    static_assert(block_sort_threads / 32 * of_warp >= max_of_block);
 };
 
 // Writes the first n numbers of a warp, of which a lane has Items neighbours.
@@ -42,7 +42,7 @@ __device__ VOXELPIPE_INLINE void store_warp(const std::uint32_t (&w)[Items], sor
 template <int List>
 __device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uint32_t* to, sort_exchange& exchange,
                                                 unsigned start) {
-    constexpr int items = static_cast<int>(order_lists::most_below(List + 1) / 32);
+    constexpr int items = static_cast<int>(order_lists::max_below(List + 1) / 32);
     constexpr std::uint32_t warps = block_sort_threads / 32;
     const std::uint32_t n = uniform(b.lists.counts[List]), lane = threadIdx.x % 32;
     const std::uint32_t block = blockIdx.x >= start ? blockIdx.x - start : blockIdx.x + gridDim.x - start;
@@ -107,7 +107,7 @@ __device__ VOXELPIPE_INLINE void order_run(const std::uint32_t* from, std::uint3
 // By a block each: voxels, and runs of one, which go back to where they were.
 __device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::uint32_t* primitives,
                                                  sort_exchange& exchange) {
-    constexpr int most_items = most_of_block / block_sort_threads;
+    constexpr int max_items = max_of_block / block_sort_threads;
     using lists = order_lists;
     const std::uint32_t whole = b.lists.counts[lists::block_list], all = whole + b.lists.counts[lists::run_list];
     for (std::uint32_t r = blockIdx.x; r < all; r += gridDim.x) {
@@ -115,10 +115,10 @@ __device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::ui
         const std::uint32_t* const from = b.from + run.begin;
         std::uint32_t* const to = (r < whole ? primitives : b.from) + run.begin;
         const auto length = static_cast<std::uint32_t>(run.length);
-        if (length <= most_of_block / 2)
-            order_run<most_items / 2>(from, to, length, exchange);
+        if (length <= max_of_block / 2)
+            order_run<max_items / 2>(from, to, length, exchange);
         else
-            order_run<most_items>(from, to, length, exchange);
+            order_run<max_items>(from, to, length, exchange);
     }
 }
 
@@ -223,7 +223,7 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
 template <class Buffers>
 __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::uint32_t* from, std::uint32_t* to,
                                   std::uint64_t length, bool last) {
-    constexpr std::uint32_t parts = most_of_block / threads_per_block;
+    constexpr std::uint32_t parts = max_of_block / threads_per_block;
     await_stream();
     const std::uint32_t lane = threadIdx.x % 32;
     const std::uint64_t n = std::uint64_t{b.lists.counts[order_lists::run_list]} * parts;

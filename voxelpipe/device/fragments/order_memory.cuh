@@ -15,28 +15,28 @@
 
 namespace voxelpipe::device {
 
-inline constexpr std::uint32_t window_length = 192;  // a warp takes the voxels that begin in so many fragments
-inline constexpr std::uint32_t most_of_window = 256; // fragments of a voxel
-inline constexpr int num_warp_sorts = 2;             // with 16 or 32 fragments a lane
-inline constexpr std::uint32_t most_of_warp = 32 * 32;
-inline constexpr std::uint32_t most_of_block = 4096;
+inline constexpr std::uint32_t window_length = 192; // a warp takes the voxels that begin in so many fragments
+inline constexpr std::uint32_t max_of_window = 256; // fragments of a voxel
+inline constexpr int num_warp_sorts = 2;            // with 16 or 32 fragments a lane
+inline constexpr std::uint32_t max_of_warp = 32 * 32;
+inline constexpr std::uint32_t max_of_block = 4096;
 inline constexpr int narrow_primitive_bits = 24; // beside the rank of a voxel in its window, in 32
 inline constexpr int order_warps = 4;            // of a block that takes windows
 inline constexpr int order_blocks = 8;           // on a multiprocessor
 inline constexpr int block_sort_threads = 256;
 inline constexpr int dense_threads = 1024;
 inline constexpr std::uint32_t merge_ways = 64; // runs that one merge takes
-// A voxel of more than most_of_block fragments whose primitives are dense among all: a bit for each of those, by blocks
+// A voxel of more than max_of_block fragments whose primitives are dense among all: a bit for each of those, by blocks
 // for so many bits each, all of which read the whole voxel. At least one bit in 64 is set then, so that all bits of a
 // call are a few words a fragment.
-inline constexpr std::uint32_t dense_part = 1u << 15, most_dense_parts = 64, least_dense = 64;
-inline constexpr std::uint64_t only_dense = most_of_block + 1; // as the longest: there are such voxels, but no runs
+inline constexpr std::uint32_t dense_part = 1u << 15, max_dense_parts = 64, min_dense = 64;
+inline constexpr std::uint64_t only_dense = max_of_block + 1; // as the longest: there are such voxels, but no runs
 
 // A stretch of fragments.
 struct fragment_run {
     unsigned long long begin, length;
 };
-// A run of at most most_of_block fragments, of a voxel that has more.
+// A run of at most max_of_block fragments, of a voxel that has more.
 struct voxel_run {
     fragment_run run, voxel;
 };
@@ -54,8 +54,8 @@ struct order_lists {
 
     [[nodiscard]] static order_lists take(arena& memory, std::uint64_t capacity) {
         order_lists w{};
-        for (int k = 0; k < num_lists - 1; ++k) w.voxels[k] = memory.take<fragment_run>(capacity / (most_below(k) + 1));
-        w.runs = memory.take<voxel_run>(2 * (capacity / most_of_block)); // each voxel's last may be short
+        for (int k = 0; k < num_lists - 1; ++k) w.voxels[k] = memory.take<fragment_run>(capacity / (max_below(k) + 1));
+        w.runs = memory.take<voxel_run>(2 * (capacity / max_of_block)); // each voxel's last may be short
         return w;
     }
     // With its counters.
@@ -67,45 +67,45 @@ struct order_lists {
         return w;
     }
     // The most fragments of a voxel that is too small for list k.
-    [[nodiscard]] VOXELPIPE_HD static constexpr std::uint32_t most_below(int k) {
-        return k == 0 ? most_of_window : k == 1 ? 32 * 16 : k == 2 ? most_of_warp : most_of_block;
+    [[nodiscard]] VOXELPIPE_HD static constexpr std::uint32_t max_below(int k) {
+        return k == 0 ? max_of_window : k == 1 ? 32 * 16 : k == 2 ? max_of_warp : max_of_block;
     }
     [[nodiscard]] VOXELPIPE_HD std::uint32_t dense_parts() const { // of a voxel
         return (num_primitives + dense_part - 1) / dense_part;
     }
     // The list of a voxel that is neither run nor dense, or -1.
     [[nodiscard]] VOXELPIPE_HD static constexpr int list_of(unsigned long long length) {
-        return length > most_of_block || length <= most_of_window ? -1
-               : length > most_below(2)                           ? 2
-               : length > most_below(1)                           ? 1
-                                                                  : 0;
+        return length > max_of_block || length <= max_of_window ? -1
+               : length > max_below(2)                          ? 2
+               : length > max_below(1)                          ? 1
+                                                                : 0;
     }
     // Puts a voxel at a place that was taken for it in list_of(length).
-    __device__ VOXELPIPE_INLINE void put(unsigned at, unsigned long long begin, unsigned long long length) const {
+    __device__ VOXELPIPE_INLINE void add(unsigned at, unsigned long long begin, unsigned long long length) const {
 #pragma unroll
         for (int k = 0; k <= block_list; ++k) // an index that is no constant would put the pointers in local memory
             if (list_of(length) == k) voxels[k][at] = {begin, length};
     }
     // A voxel that begins at `begin`. By one thread.
     __device__ void push(unsigned long long begin, unsigned long long length) const {
-        const bool is_dense = length > most_of_block && num_primitives != 0 && length >= num_primitives / least_dense;
+        const bool is_dense = length > max_of_block && num_primitives != 0 && length >= num_primitives / min_dense;
         if (is_dense) {
             atomicMax(longest_run, static_cast<unsigned long long>(only_dense));
             voxels[dense_list][atomicAdd(&counts[dense_list], 1u)] = {begin, length};
             return;
         }
-        if (length > most_of_block) {
+        if (length > max_of_block) {
             atomicMax(longest_run, length > only_dense ? length : only_dense + 1);
-            const auto entries = static_cast<unsigned>((length + most_of_block - 1) / most_of_block);
+            const auto entries = static_cast<unsigned>((length + max_of_block - 1) / max_of_block);
             const unsigned at = atomicAdd(&counts[run_list], entries);
             for (unsigned k = 0; k < entries; ++k) {
-                const unsigned long long from = std::uint64_t{k} * most_of_block, rest = length - from;
-                runs[at + k] = {{begin + from, rest < most_of_block ? rest : most_of_block}, {begin, length}};
+                const unsigned long long from = std::uint64_t{k} * max_of_block, rest = length - from;
+                runs[at + k] = {{begin + from, rest < max_of_block ? rest : max_of_block}, {begin, length}};
             }
             return;
         }
         static_assert(block_list == 2);
-        put(atomicAdd(&counts[list_of(length)], 1u), begin, length);
+        add(atomicAdd(&counts[list_of(length)], 1u), begin, length);
     }
 };
 
@@ -122,7 +122,7 @@ struct list_places {
 
 // Where the lists are to go: null where they come to lie. With a page, which the device can read, what it says when the
 // call runs, so that a call that is kept as a graph finds new arrays.
-struct asked_places {
+struct output_pointers {
     list_places value;
     const list_places* page = nullptr;
 };
@@ -171,8 +171,8 @@ struct tile_counts {
 
 // Memory of a counting sort (fragments/counting_sort.cuh), in place of a sort_memory.
 struct counting_memory {
-    static constexpr std::uint32_t tile = 16384;                         // voxels
-    static constexpr std::uint64_t most_voxels = std::uint64_t{1} << 21; // of a grid: the counters fit the cache
+    static constexpr std::uint32_t tile = 16384;                        // voxels
+    static constexpr std::uint64_t max_voxels = std::uint64_t{1} << 21; // of a grid: the counters fit the cache
 
     std::uint64_t num_voxels = 0;        // of the grid, up to whole tiles; 0 where there is no counting sort
     std::uint64_t capacity = 0;          // fragments
@@ -183,7 +183,7 @@ struct counting_memory {
 
     // Whether a grid's fragments, so many at most, can be sorted by counting, with counters that are few beside them.
     [[nodiscard]] static bool suits(std::uint64_t num_voxels, std::uint64_t capacity) {
-        return num_voxels <= most_voxels && num_voxels <= 8 * capacity && capacity < most_sorted;
+        return num_voxels <= max_voxels && num_voxels <= 8 * capacity && capacity < max_sorted;
     }
     [[nodiscard]] static counting_memory take(arena& memory, std::uint64_t capacity, std::uint64_t num_voxels) {
         counting_memory m{};
@@ -217,7 +217,7 @@ struct sort_preparation {
     std::uint64_t capacity = 0;    // fragments
     tile_counts tiles{};           // or none
     list_places* places = nullptr; // or none
-    asked_places asked;
+    output_pointers asked;
 
     // By all threads of a grid.
     __device__ VOXELPIPE_INLINE void run(std::uint64_t thread, std::uint64_t threads) const {

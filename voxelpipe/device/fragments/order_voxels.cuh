@@ -154,7 +154,7 @@ struct order_of_window {
     static constexpr int items = 8, wide_items = 16;
     using voxels_type = window_voxels<items>;
     using wide_type = window_voxels<wide_items>;
-    static_assert(voxels_type::places >= window_length && wide_type::places >= window_length - 1 + most_of_window);
+    static_assert(voxels_type::places >= window_length && wide_type::places >= window_length - 1 + max_of_window);
 
     const order_buffers& b;
     std::uint32_t begin, n, before; // n counts from the window's first, as all places do; the voxel before it
@@ -234,7 +234,7 @@ private:
                 const int nearest = __ffs(static_cast<int>(lanes)) - 1;
                 end += static_cast<std::uint32_t>(32 * nearest +
                                                   __ffs(static_cast<int>(__shfl_sync(0xffffffffu, word, nearest))) - 1);
-                if (end - last <= most_of_window) return 0;
+                if (end - last <= max_of_window) return 0;
             }
             end = last;
             return 1;
@@ -248,8 +248,8 @@ private:
                 break;
             }
             end += 32;
-        } while (end - last <= most_of_window);
-        if (end - last <= most_of_window) return 0;
+        } while (end - last <= max_of_window);
+        if (end - last <= max_of_window) return 0;
         end = find_end(keys, n, voxel, end);
         if (lane == 0) b.lists.push(begin + last, end - last);
         end = last;
@@ -267,7 +267,7 @@ __global__ __launch_bounds__(32 * order_warps,
     __shared__ unsigned long long before;
     await_stream();
     if (has_failed(*state, limits)) return;
-    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::most_numbered
+    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::max_numbered
     const std::uint32_t warp = warp_in_block(), lane = threadIdx.x % 32;
     const list_places to = b.places();
     const std::uint32_t tile = blockIdx.x; // see count_before
@@ -325,7 +325,7 @@ __global__ __launch_bounds__(32 * order_warps,
 // What capacities::longest_ordered is to be for calls like one with this pipeline_state::longest_ordered(): the most
 // that the same kernels do.
 [[nodiscard]] inline std::uint64_t longest_like(std::uint64_t longest) {
-    constexpr std::uint64_t block = most_of_block, ways = merge_ways;
+    constexpr std::uint64_t block = max_of_block, ways = merge_ways;
     for (const std::uint64_t most : {std::uint64_t{0}, block, only_dense, block * ways, block * ways * ways})
         if (longest <= most) return most;
     return ~std::uint64_t{0};
@@ -341,7 +341,7 @@ inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipel
     const bool by_starts = b.starts != nullptr;
     for (const std::uint32_t* numbers : {b.keys, static_cast<const std::uint32_t*>(b.from)})
         VOXELPIPE_ASSERT(reinterpret_cast<std::uintptr_t>(numbers) % 16 == 0); // load_neighbours
-    if (num_primitives <= std::uint64_t{dense_part} * most_dense_parts)
+    if (num_primitives <= std::uint64_t{dense_part} * max_dense_parts)
         b.lists.num_primitives = static_cast<std::uint32_t>(num_primitives);
     b.primitive_bits = num_primitives < 2 ? 1 : static_cast<int>(std::bit_width(num_primitives - 1));
     const auto windows =
@@ -354,14 +354,14 @@ inline void order_fragments(order_buffers b, std::uint64_t num_primitives, pipel
                       blocks, 32 * order_warps, stream, where, b, state, limits);
     else
         launch_behind(windows, blocks, 32 * order_warps, stream, where, b, state, limits);
-    if (capacity > most_of_window && longest != 0)
-        launch_behind(order_long_kernel<order_buffers>, fill_device(capacity / (most_of_window + 1) * 32, 4),
+    if (capacity > max_of_window && longest != 0)
+        launch_behind(order_long_kernel<order_buffers>, fill_device(capacity / (max_of_window + 1) * 32, 4),
                       block_sort_threads, stream, where, b);
-    if (capacity > most_of_block && longest > most_of_block && b.lists.num_primitives != 0)
+    if (capacity > max_of_block && longest > max_of_block && b.lists.num_primitives != 0)
         launch_behind(order_dense_kernel<order_buffers>, static_cast<unsigned>(num_multiprocessors()), dense_threads,
                       stream, where, b);
     // Runs of 2^12, 2^18 and 2^24 fragments; the last merge takes all that there are.
-    std::uint64_t length = most_of_block;
+    std::uint64_t length = max_of_block;
     for (int level = 0; level < 3 && capacity > length && longest > std::max(length, only_dense);
          ++level, length *= merge_ways)
         launch_behind(merge_runs_kernel<order_buffers>, fill_device(capacity), threads_per_block, stream, where, b,

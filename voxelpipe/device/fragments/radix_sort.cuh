@@ -31,8 +31,8 @@ inline constexpr int few_sort_items = 8; // where the device takes all tiles at 
 }
 inline constexpr int digit_count_threads = 1024;
 inline constexpr int most_digit_bits = 10;
-inline constexpr int most_digit_passes = 4;
-inline constexpr std::uint64_t most_sorted = std::uint64_t{1} << 30; // pairs: two bits of a tile's words are flags
+inline constexpr int max_digit_passes = 4;
+inline constexpr std::uint64_t max_sorted = std::uint64_t{1} << 30; // pairs: two bits of a tile's words are flags
 
 // How keys of so many bits are cut into digits, lowest first: as few as can be, all of one size.
 struct digit_plan {
@@ -108,7 +108,7 @@ struct sort_memory {
     // A tile's word for a digit: how many pairs have it, in the tile, or in all up to it.
     static constexpr std::uint32_t own = 1u << 30, all = 2u << 30, value = own - 1;
     struct totals {
-        std::uint32_t digits[most_digit_passes][1 << most_digit_bits]; // how many; then where the first one goes
+        std::uint32_t digits[max_digit_passes][1 << most_digit_bits]; // how many; then where the first one goes
         std::uint32_t blocks_done;
         std::uint32_t num; // pairs
     };
@@ -163,7 +163,7 @@ __global__ __launch_bounds__(digit_count_threads) void count_digits_kernel(const
     using scan = cub::BlockScan<std::uint32_t, digit_count_threads>;
     constexpr int at_once = 4; // loads that do not wait for one another
     static_assert(digit_count_threads >= 1 << most_digit_bits);
-    __shared__ std::uint32_t digits[most_digit_passes][1 << most_digit_bits];
+    __shared__ std::uint32_t digits[max_digit_passes][1 << most_digit_bits];
     __shared__ typename scan::TempStorage storage;
     __shared__ bool is_last;
     const std::uint32_t num_digits = m.plan.num_digits();
@@ -403,16 +403,16 @@ void launch_sort_pass(const pair_array& from, const pair_array& to, unsigned til
     launch_behind(kernel, tiles, sort_threads, shared_bytes, stream, where, from, to, m, pass);
 }
 
-// Sorts the pairs in keys[0] and values[0]; at most `capacity`, which is below most_sorted and for which both were
+// Sorts the pairs in keys[0] and values[0]; at most `capacity`, which is below max_sorted and for which both were
 // taken. The memory's zeros are there (sort_memory::zero). Returns where the sorted pairs are: 0 or 1.
 template <class Count>
 [[nodiscard]] int sort_fragments(const sort_pairs& pairs, const Count& count, std::uint64_t capacity,
                                  const sort_memory& m, cudaStream_t stream) {
     constexpr stage where = stage::abuffer_emit;
     constexpr std::uint64_t pairs_of_block = 8 * digit_count_threads;
-    const auto most_blocks = static_cast<std::uint64_t>(num_multiprocessors());
+    const auto max_blocks = static_cast<std::uint64_t>(num_multiprocessors());
     launch_behind(count_digits_kernel<Count>,
-                  static_cast<unsigned>(std::min(capacity / pairs_of_block + 1, most_blocks)), digit_count_threads,
+                  static_cast<unsigned>(std::min(capacity / pairs_of_block + 1, max_blocks)), digit_count_threads,
                   stream, where, pairs.keys[0], count, m);
     const auto tiles = static_cast<unsigned>(m.num_tiles(capacity));
     const bool few = m.items == few_sort_items;

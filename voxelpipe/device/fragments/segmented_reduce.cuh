@@ -19,8 +19,8 @@
 namespace voxelpipe::device {
 
 inline constexpr std::uint32_t resolve_run = 256; // fragments
-inline constexpr std::size_t most_cell_bytes = 128;
-inline constexpr std::uint64_t most_resolved = std::uint64_t{1} << 28; // fragments of a call: 16 bytes each
+inline constexpr std::size_t max_cell_bytes = 128;
+inline constexpr std::uint64_t max_resolved = std::uint64_t{1} << 28; // fragments of a call: 16 bytes each
 
 // ---- what the fragments of a voxel come to --------------------------------------------------------------------------
 
@@ -122,7 +122,7 @@ inline constexpr bool is_resolvable = false;
 template <class... Targets>
 requires((method_of<Targets>() != blend_method::ordered) &&
          ...) inline constexpr bool is_resolvable<framebuffer_view<Targets...>> =
-    sizeof(voxel_cells<framebuffer_view<Targets...>>) <= most_cell_bytes;
+    sizeof(voxel_cells<framebuffer_view<Targets...>>) <= max_cell_bytes;
 
 // Cells that a lane has, or none where no fragment was kept.
 template <class Cells>
@@ -189,7 +189,7 @@ __global__ __launch_bounds__(threads_per_block, 4) void resolve_runs_kernel(
     constexpr unsigned whole_warp = 0xffffffffu;
     await_stream();
     if (has_failed(*state, limits)) return;
-    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::most_numbered
+    const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::max_numbered
     const std::uint32_t lane = threadIdx.x % 32, warps = gridDim.x * (threads_per_block / 32);
     const std::uint32_t runs = (n + resolve_run - 1) / resolve_run;
     std::uint32_t kept = 0, discarded = 0, touched = 0;
@@ -232,8 +232,8 @@ __global__ __launch_bounds__(threads_per_block, 4) void resolve_runs_kernel(
             // Lanes from the first of the voxel to this one.
             const std::uint32_t apart =
                 upto == 0 ? lane : lane - (31 - static_cast<std::uint32_t>(__clz(static_cast<int>(upto))));
-            const std::uint32_t most_apart = __reduce_max_sync(whole_warp, apart);
-            for (std::uint32_t step = 1; step <= most_apart; step *= 2) {
+            const std::uint32_t max_apart = __reduce_max_sync(whole_warp, apart);
+            for (std::uint32_t step = 1; step <= max_apart; step *= 2) {
                 const auto other = mine.from([&](word w) { return __shfl_up_sync(whole_warp, w, step); });
                 if (apart >= step) mine.merge(other);
             }

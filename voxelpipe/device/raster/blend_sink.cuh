@@ -20,10 +20,10 @@ namespace voxelpipe::device {
 
 // Fragments go into the targets.
 template <class Call>
-struct blending_sink : direct_sink<Call> {
-    static constexpr bool buffers = false;
-    static constexpr bool shares = !Call::output::hands_on; // one() wants to be told apart
-    static constexpr bool spreads = shares;
+struct blending_sink : sink_base<Call> {
+    static constexpr bool stages_in_shared = false;
+    static constexpr bool merges_equal_voxels = !Call::output::defers; // one() wants to be told apart
+    static constexpr bool splits_long_rows = merges_equal_voxels;
     struct memory {};
 
     // Fragments and first touches of one thread, which cannot write 2^32 before the largest list ends.
@@ -33,27 +33,27 @@ struct blending_sink : direct_sink<Call> {
     totals mine;
 
     __device__ VOXELPIPE_INLINE blending_sink(const Call& call, unsigned* dropped, memory&)
-        : direct_sink<Call>{call, dropped} {}
+        : sink_base<Call>{call, dropped} {}
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool check(const glm::uvec3&) { return true; }
     __device__ VOXELPIPE_INLINE static void begin(std::uint32_t) {}
     // Where there are marks: what a triangle may touch that is not large, what is touched of one that is.
-    __device__ VOXELPIPE_INLINE void mark_boxes(bool wanted, const near_triangle& r) const {
+    __device__ VOXELPIPE_INLINE void mark_boxes(bool wanted, const int32_triangle& r) const {
         if constexpr (Call::output::has_marks)
             if (this->call.out.marks.words != nullptr) device::mark_boxes<Call::rule>(this->call.out.marks, wanted, r);
     }
     __device__ VOXELPIPE_INLINE void mark_row(int x0, int x1, int y, int z) const {
-        if constexpr (shares && Call::output::has_marks)
+        if constexpr (merges_equal_voxels && Call::output::has_marks)
             if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_row(x0, x1, y, z);
     }
     __device__ VOXELPIPE_INLINE void mark_brick(const std::int32_t (&corner)[3], unsigned lane) const {
-        if constexpr (shares && Call::output::has_marks)
+        if constexpr (merges_equal_voxels && Call::output::has_marks)
             if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_brick(corner, lane);
     }
     // In the voxels x0 + i of a row, for the bits i of the mask.
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
         mine.fragments += static_cast<unsigned>(__popc(mask));
-        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
+        each_target([&]<std::size_t K>(const auto& t, immediate_mode mode) VOXELPIPE_INLINE_LAMBDA {
             if constexpr (Call::output::only_blends)
                 add_row(t, x0, y, z, mask, value_of<K>());
             else
@@ -63,7 +63,7 @@ struct blending_sink : direct_sink<Call> {
     __device__ VOXELPIPE_INLINE void row_by_all(unsigned, int x0, int y, int z, word mask) {
         const word own = mask & bits_of_lane();
         mine.fragments += static_cast<unsigned>(__popc(own));
-        each_target([&]<std::size_t K>(const auto& t, direct_mode mode)
+        each_target([&]<std::size_t K>(const auto& t, immediate_mode mode)
                         VOXELPIPE_INLINE_LAMBDA { mine.touched += blend_row(t, x0, y, z, own, value_of<K>(), mode); });
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE auto place(int x, int y, int z) const {
@@ -72,15 +72,15 @@ struct blending_sink : direct_sink<Call> {
         else
             return glm::ivec3(x, y, z);
     }
-    __device__ VOXELPIPE_INLINE void put(const glm::ivec3& at, bool wanted) {
+    __device__ VOXELPIPE_INLINE void emit(const glm::ivec3& at, bool wanted) {
         if (wanted) row(at.x, at.y, at.z, 1u);
     }
-    __device__ VOXELPIPE_INLINE void put(const word_place& at, bool wanted) {
+    __device__ VOXELPIPE_INLINE void emit(const word_place& at, bool wanted) {
         if (!wanted) return;
         ++mine.fragments;
         reduce_or(voxelpipe::get<0>(this->call.out.fb.targets).elements + at.number(), at.bit());
     }
-    __device__ VOXELPIPE_INLINE void put_line(word_place first, const word_place& step, unsigned count) {
+    __device__ VOXELPIPE_INLINE void emit_line(word_place first, const word_place& step, unsigned count) {
         mine.fragments += count;
         // Read once: behind each reduction, what is not in a register may have changed.
         word* const words = voxelpipe::get<0>(this->call.out.fb.targets).elements;
@@ -89,7 +89,7 @@ struct blending_sink : direct_sink<Call> {
     // As in blend_cube.
     __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word voxels) {
         mine.fragments += static_cast<unsigned>(__popc(voxels));
-        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
+        each_target([&]<std::size_t K>(const auto& t, immediate_mode mode) VOXELPIPE_INLINE_LAMBDA {
             if constexpr (Call::output::only_blends)
                 add_cube(t, x, y, z, voxels, value_of<K>());
             else
@@ -101,13 +101,13 @@ struct blending_sink : direct_sink<Call> {
     // As in blend_slim.
     __device__ VOXELPIPE_INLINE void slim(int x, int y, int z, const core::slim_rows& rows) {
         mine.fragments += static_cast<unsigned>(__popc(rows.bits));
-        each_target([&]<std::size_t K>(const auto& t, direct_mode mode)
+        each_target([&]<std::size_t K>(const auto& t, immediate_mode mode)
                         VOXELPIPE_INLINE_LAMBDA { mine.touched += blend_slim(t, x, y, z, rows, value_of<K>(), mode); });
     }
     // One voxel. Lanes that come here together may have the same.
     __device__ VOXELPIPE_INLINE void one(int x, int y, int z) {
         ++mine.fragments;
-        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
+        each_target([&]<std::size_t K>(const auto& t, immediate_mode mode) VOXELPIPE_INLINE_LAMBDA {
             const auto& value = value_of<K>();
             if constexpr (std::remove_cvref_t<decltype(t)>::map::is_bit)
                 mine.touched += blend_row(t, x, y, z, 1u, value, mode);
@@ -119,7 +119,7 @@ struct blending_sink : direct_sink<Call> {
     template <class Place>
     __device__ VOXELPIPE_INLINE void voxels(word bits, const Place& place_of) {
         mine.fragments += static_cast<unsigned>(__popc(bits));
-        each_target([&]<std::size_t K>(const auto& t, direct_mode mode) VOXELPIPE_INLINE_LAMBDA {
+        each_target([&]<std::size_t K>(const auto& t, immediate_mode mode) VOXELPIPE_INLINE_LAMBDA {
             mine.touched += blend_voxels(t, bits, place_of, value_of<K>(), mode);
         });
     }
@@ -152,7 +152,7 @@ private:
         core::for_each_index<targets_of<decltype(this->call.out.fb)>::count>([&]<std::size_t K>() {
             const auto& t = voxelpipe::get<K>(this->call.out.fb.targets);
             if constexpr (Call::output::only_sets || Call::output::only_blends)
-                f.template operator()<K>(t, direct_mode::blend);
+                f.template operator()<K>(t, immediate_mode::blend);
             else if (t.load != load_operation::off)
                 f.template operator()<K>(t, this->call.out.modes.of[K]);
         });
@@ -169,15 +169,15 @@ struct framebuffer_output {
     template <class Call>
     using sink = blending_sink<Call>;
     template <class Call>
-    using rest_sink = sink<Call>;
-    static constexpr bool hands_on = has_only_bits<Framebuffer>; // otherwise raster/block_pass.cuh
+    using deferred_sink = sink<Call>;
+    static constexpr bool defers = has_only_bits<Framebuffer>; // otherwise raster/block_pass.cuh
     // Known to the compiler: all targets are in use, and all values true, or the mode of all is to blend.
     static constexpr bool only_sets = false;
     static constexpr bool only_blends = false;
     static constexpr bool has_marks = true; // or may have
     Framebuffer fb;
     Values values;
-    direct_modes<targets_of<Framebuffer>::count> modes;
+    immediate_modes<targets_of<Framebuffer>::count> modes;
     chunk_marks marks; // of targets that hold values
 
     __device__ VOXELPIPE_INLINE static void prepare(std::uint64_t, std::uint64_t) {} // for what comes afterwards
@@ -195,7 +195,7 @@ struct blended_output : framebuffer_output<Framebuffer, Values> {
     template <class Call>
     using sink = blending_sink<Call>;
     template <class Call>
-    using rest_sink = sink<Call>;
+    using deferred_sink = sink<Call>;
     static constexpr bool only_blends = true;
     static constexpr bool has_marks = HasMarks;
 };

@@ -23,8 +23,8 @@ struct triangle_queue {
 
 // What one warp keeps in shared memory.
 struct warp_queues {
-    triangle_queue tinies, smalls;      // bounding boxes as for raster_tiny; other small ones
-    std::uint32_t larges[queue_places]; // numbers of triangles that are loaded again
+    triangle_queue tiny_queue, small_queue;  // bounding boxes as for raster_tiny; other small ones
+    std::uint32_t large_queue[queue_places]; // numbers of triangles that are loaded again
 };
 
 // The work of a warp, from the mesh to a sink. Every warp has its own queues: no thread waits for another warp, and the
@@ -40,16 +40,16 @@ struct block_warp {
     kept_rows& kept; // of the warp
     coming_corners<typename Call::source_type>& corners;
     sink_type& sink;
-    std::uint32_t* big; // for big triangles, of the block
-    unsigned& num_big;
+    std::uint32_t* oversized; // for oversized triangles, of the block
+    unsigned& num_oversized;
     int lane = static_cast<int>(threadIdx.x) % 32;
     int num_tinies = 0, num_smalls = 0, num_larges = 0;
 
-    __device__ VOXELPIPE_INLINE static void put(triangle_queue& queue, int at, const near_triangle& r) {
+    __device__ VOXELPIPE_INLINE static void push(triangle_queue& queue, int at, const int32_triangle& r) {
         for (int k = 0; k < 9; ++k) queue.q[k][at] = r.q[k / 3][k % 3];
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle take(const triangle_queue& queue, int at) const {
-        near_triangle r;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE int32_triangle take(const triangle_queue& queue, int at) const {
+        int32_triangle r;
         for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = queue.q[k][at];
         r.is_near = true;
         r.find_box(call.in.fraction);
@@ -58,48 +58,50 @@ struct block_warp {
     // The lane's triangle i, where there is one, whose corners have been fetched. Then those of the next are, which has
     // these vertices.
     __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, bool has_next, const glm::uvec3& next) {
-        bool waits = false, is_big = false;
+        bool waits = false, is_oversized = false;
         int inside = 0, most = 0;
         bool is_done = false;
-        near_triangle r;
+        int32_triangle r;
         r = corners.take(call.in);
         if (has_next) corners.fetch(call.in.source, next);
         if (valid) {
             most = r.most();
-            is_big = !r.is_near || most > most_medium_side(call.in.fraction);
+            is_oversized = !r.is_near || most > max_group_side(call.in.fraction);
             inside = r.inside(call.in.extent);
-            if (!is_big && inside < 0 && r.template is_outside<Call::rule>(call.in.extent))
+            if (!is_oversized && inside < 0 && r.template is_outside<Call::rule>(call.in.extent))
                 sink.drop(triangle_class::outside);
             else
-                waits = !is_big;
+                waits = !is_oversized;
         }
         sink.mark_boxes(waits, r);
         if constexpr (thin) {
             const bool is_cube = waits && most <= 2;
-            if (__popc(__ballot_sync(0xffffffffu, is_cube)) >= least_thin_cubes && is_cube) {
+            if (__popc(__ballot_sync(0xffffffffu, is_cube)) >= min_thin_cubes && is_cube) {
                 const core::thin_cube cube = core::thin_cube_by_signs(r.q, r.lo, r.last, call.in.fraction, is_done);
-                if (is_done) give_thin_cube(call.in, r, cube, sink);
+                if (is_done) emit_thin_cube(call.in, r, cube, sink);
             }
         } else {
             const word bits = find_cube(call.in, waits && most <= 2, r, inside);
             is_done = bits != 0;
-            if (is_done) give_cube(r, bits, sink);
+            if (is_done) emit_cube(r, bits, sink);
         }
         waits = waits && !is_done;
-        if (__any_sync(0xffffffffu, waits || is_big)) {
-            const int kind = waits ? kind_of<Call::rule>(r, most) : -1;
-            const int tiny_at = take_place(kind == tiny_triangles, num_tinies);
-            if (kind == tiny_triangles) put(queues.tinies, tiny_at, r);
-            const int small_at = take_place(kind == small_triangles, num_smalls);
-            if (kind == small_triangles) put(queues.smalls, small_at, r);
+        if (__any_sync(0xffffffffu, waits || is_oversized)) {
+            const int kind = waits ? size_class_of<Call::rule>(r, most) : -1;
+            const int tiny_at = take_place(kind == size_class::tiny, num_tinies);
+            if (kind == size_class::tiny) push(queues.tiny_queue, tiny_at, r);
+            const int small_at = take_place(kind == size_class::thread, num_smalls);
+            if (kind == size_class::thread) push(queues.small_queue, small_at, r);
             // Of a mesh with a round for each block at most, which may leave multiprocessors without one, these are
             // for the whole device.
-            const bool is_spread = kind == large_triangles && call.in.num_triangles <= gridDim.x * raster_threads;
-            const bool is_large = kind == large_triangles && !is_spread;
+            const bool is_spread =
+                kind == size_class::thread_heavy && call.in.num_triangles <= gridDim.x * raster_threads;
+            const bool is_large = kind == size_class::thread_heavy && !is_spread;
             const int large_at = take_place(is_large, num_larges);
-            if (is_large) queues.larges[large_at] = i;
-            call.lists.push(medium_triangles, is_spread || kind == medium_triangles, i);
-            if (is_big) big[atomicAdd(&num_big, 1u)] = i; // no call of a function here: its registers would spill
+            if (is_large) queues.large_queue[large_at] = i;
+            call.lists.push(size_class::warp_group, is_spread || kind == size_class::warp_group, i);
+            if (is_oversized)
+                oversized[atomicAdd(&num_oversized, 1u)] = i; // no call of a function here: its registers would spill
         }
         __syncwarp();
     }
@@ -156,10 +158,11 @@ struct block_warp {
             __syncwarp();
             if (w < Warps) {
                 if (is_tiny) {
-                    raster_tiny<Call::rule>(call.in, take(all[w].tinies, at), sink);
+                    raster_tiny<Call::rule>(call.in, take(all[w].tiny_queue, at), sink);
                 } else {
-                    const near_triangle r = is_large ? load_near(call.in, call.in.source.triangle(all[w].larges[at]))
-                                                     : take(all[w].smalls, at);
+                    const int32_triangle r = is_large
+                                                 ? load_int32(call.in, call.in.source.triangle(all[w].large_queue[at]))
+                                                 : take(all[w].small_queue, at);
                     raster_small<Call::rule, false>(call.in, r, lane_rows(kept), sink);
                 }
             }
@@ -168,13 +171,14 @@ struct block_warp {
         // A lane each, the larger ones would keep a few lanes busy long after all others.
         int num = 0;
         for (const int n : left[2]) num += n;
-        for (int start = 0; start < num; start += Warps * 32 / medium_lanes) {
-            int at = start + static_cast<int>(threadIdx.x) / medium_lanes, w = 0;
+        for (int start = 0; start < num; start += Warps * 32 / group_lanes) {
+            int at = start + static_cast<int>(threadIdx.x) / group_lanes, w = 0;
             while (w < Warps && at >= left[2][w]) at -= left[2][w++];
-            raster_medium<Call::rule>(call.in, w < Warps, w < Warps ? all[w].larges[at] : 0, lane_rows(kept), sink);
+            raster_by_group<Call::rule>(call.in, w < Warps, w < Warps ? all[w].large_queue[at] : 0, lane_rows(kept),
+                                        sink);
         }
 
-        cut_big(call, sink, big, num_big);
+        split_oversized(call, sink, oversized, num_oversized);
         if (begin >= call.in.num_triangles) return 0;
         const std::uint32_t batches = (call.in.num_triangles - begin - 1) / step + 1;
         const std::uint32_t of_last = call.in.num_triangles - (begin + (batches - 1) * step);
@@ -192,11 +196,11 @@ __global__ __launch_bounds__(raster_threads,
     __shared__ coming_corners<typename Call::source_type> corners[raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ int left[3][raster_warps];
-    __shared__ unsigned dropped[num_triangle_classes], num_big;
+    __shared__ unsigned dropped[num_triangle_classes], num_oversized;
     const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
     await_stream();
     if (state->index_error != 0) return;
-    if (threadIdx.x == 0) num_big = 0;
+    if (threadIdx.x == 0) num_oversized = 0;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();
     sink_type sink(call, dropped, memories[threadIdx.x / 32]);
@@ -206,8 +210,8 @@ __global__ __launch_bounds__(raster_threads,
                           rows_of_warps[threadIdx.x / 32],
                           corners[threadIdx.x / 32],
                           sink,
-                          call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads,
-                          num_big};
+                          call.lists.oversized + std::size_t{blockIdx.x} * batches * raster_threads,
+                          num_oversized};
     const unsigned looked_at = warp.run(index, queues, left);
     sink.finish(state);
     count_looked_at(looked_at, dropped, state);

@@ -16,18 +16,18 @@ namespace voxelpipe::device {
 
 // Blocks per multiprocessor that registers are kept for.
 template <class Call>
-inline constexpr int rest_min_blocks = Call::sink::buffers            ? 4
-                                       : Call::rule == coverage::thin ? 6
-                                                                      : 5;
+inline constexpr int deferred_min_blocks = Call::sink::stages_in_shared   ? 4
+                                           : Call::rule == coverage::thin ? 6
+                                                                          : 5;
 
 // All records, in registers of their own: what they need is not kept for the other triangles. Nobody waits for the
 // block's other warps at its end.
 template <class Call>
-__device__ __noinline__ typename Call::rest_sink::totals
-raster_all_records(const Call& call, unsigned* dropped, brick_memory<Call::rule>& bricks,
-                   typename Call::rest_sink::memory& memory, unsigned warp, unsigned warps) {
-    typename Call::rest_sink sink(call, dropped, memory);
-    raster_records(call, sink, bricks, warp, warps);
+__device__ __noinline__ typename Call::deferred_sink::totals
+raster_all_work_items(const Call& call, unsigned* dropped, brick_memory<Call::rule>& bricks,
+                      typename Call::deferred_sink::memory& memory, unsigned warp, unsigned warps) {
+    typename Call::deferred_sink sink(call, dropped, memory);
+    raster_work_items(call, sink, bricks, warp, warps);
     __syncwarp();
     return sink.end();
 }
@@ -35,9 +35,9 @@ raster_all_records(const Call& call, unsigned* dropped, brick_memory<Call::rule>
 // The warp's share of what records need (raster/split_triangles.cuh).
 template <class Call>
 __device__ __noinline__ void keep_setups(const Call& call, unsigned warp, unsigned warps) {
-    const large_records all(call.lists);
+    const split_work_items all(call.lists);
     if (all.want_setups(call.lists, warps))
-        large_setup<Call::rule>::keep(call, warp, warps, static_cast<std::uint32_t>(all.triangles));
+        split_setup<Call::rule>::keep(call, warp, warps, static_cast<std::uint32_t>(all.triangles));
 }
 
 // What a warp of the second kernel knows of its place.
@@ -46,34 +46,34 @@ struct warp_place {
     unsigned lane;
 };
 
-// The triangles of a list from number `first` on, by medium_lanes lanes each.
+// The triangles of a list from number `first` on, by group_lanes lanes each.
 template <class Call, class Sink>
 __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std::uint32_t first,
                                                  const warp_place& place, const lane_rows& kept, Sink& sink) {
-    constexpr unsigned at_once = 32 / medium_lanes;
+    constexpr unsigned at_once = 32 / group_lanes;
     const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[kind]));
     const unsigned chunks = (length - first + at_once - 1) / at_once;
     for (unsigned chunk = place.warp; chunk < chunks; chunk += place.warps) {
-        const std::uint32_t i = first + chunk * at_once + place.lane / medium_lanes;
+        const std::uint32_t i = first + chunk * at_once + place.lane / group_lanes;
         const bool wanted = i < length;
         __syncwarp();
-        raster_medium<Call::rule>(call.in, wanted, wanted ? call.lists.at(kind, i) : 0, kept, sink);
+        raster_by_group<Call::rule>(call.in, wanted, wanted ? call.lists.at(kind, i) : 0, kept, sink);
         __syncwarp();
     }
 }
 
 // The lists of large, small and tiny triangles by a thread each, neighbours, which are alike, in neighbouring lanes;
-// but what does not fill a warp, and whole lists that would not fill the device, by medium_lanes lanes each. All lists
+// but what does not fill a warp, and whole lists that would not fill the device, by group_lanes lanes each. All lists
 // advance together, part by part (list_walk): they are in the order of the mesh, nearly, so that voxels are in the
 // cache while triangles of all kinds meet them.
 template <class Call, class Rows, class Sink>
 __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place& place, const lane_rows& kept,
                                               Rows& rows, Sink& sink) {
-    constexpr int kinds = medium_triangles; // what comes before
+    constexpr int kinds = size_class::warp_group; // what comes before
     std::uint32_t chunks[kinds];
     for (int k = 0; k < kinds; ++k) {
         const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[k]));
-        const bool few = k != tiny_triangles && length / 64 * medium_lanes < place.warps;
+        const bool few = k != size_class::tiny && length / 64 * group_lanes < place.warps;
         chunks[k] = few ? 0 : length / 32;
         const unsigned from_last = place.warps - 1 - place.warp; // the first ones have whole chunks to do
         raster_by_lanes(call, k, chunks[k] * 32, {few ? place.warp : from_last, place.warps, place.lane}, kept, sink);
@@ -93,24 +93,24 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place
     std::uint32_t triangle = number(here), triangle_of_next = number(next);
     glm::uvec3 index = vertices(here, triangle);
     while (here.list >= 0) {
-        const near_triangle r = load_near(call.in, index);
+        const int32_triangle r = load_int32(call.in, index);
         const chunk after = walk.next();
         const glm::uvec3 index_of_next = vertices(next, triangle_of_next);
         const std::uint32_t triangle_of_after = number(after);
         __syncwarp();
-        if constexpr (Call::rule == coverage::conservative && Sink::has_rounds) {
+        if constexpr (Call::rule == coverage::conservative && Sink::takes_warp_rounds) {
             sink.begin(triangle);
-            raster_rows_by_rounds(call.in, r, here.list == tiny_triangles, kept, sink);
+            raster_rows_by_rounds(call.in, r, here.list == size_class::tiny, kept, sink);
         } else {
             bool is_done = false;
-            if constexpr (Sink::has_rounds) {
+            if constexpr (Sink::takes_warp_rounds) {
                 sink.begin(triangle);
-                is_done = here.list != tiny_triangles && raster_thin_by_rounds(call.in, r, kept, sink);
+                is_done = here.list != size_class::tiny && raster_thin_by_rounds(call.in, r, kept, sink);
             }
             if (!is_done)
-                feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
                     sink.begin(triangle);
-                    if (here.list == tiny_triangles)
+                    if (here.list == size_class::tiny)
                         raster_tiny<Call::rule>(call.in, r, sink);
                     else
                         raster_small<Call::rule, true>(call.in, r, kept, rows);
@@ -118,7 +118,7 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place
         }
         __syncwarp();
         if constexpr (combines_words<Call>)
-            if (here.list != tiny_triangles) rows.flush();
+            if (here.list != size_class::tiny) rows.flush();
         here = next;
         next = after;
         triangle = triangle_of_next;
@@ -129,9 +129,9 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place
 
 template <class Call>
 __global__ __launch_bounds__(raster_threads,
-                             rest_min_blocks<Call>) void direct_rest_kernel(const __grid_constant__ Call call,
-                                                                            pipeline_state* state) {
-    using sink_type = typename Call::rest_sink;
+                             deferred_min_blocks<Call>) void deferred_pass_kernel(const __grid_constant__ Call call,
+                                                                                  pipeline_state* state) {
+    using sink_type = typename Call::deferred_sink;
     constexpr bool thin = Call::rule == coverage::thin;
     // Of a warp: what its large triangles want, or the rest. More shared memory would leave less to the cache of
     // vertices.
@@ -156,8 +156,8 @@ __global__ __launch_bounds__(raster_threads,
     // Parts of few large triangles go to different multiprocessors.
     const unsigned warp_of_records = thin ? place.warp : in_block * gridDim.x + blockIdx.x;
     const auto draw_records = [&]() VOXELPIPE_INLINE_LAMBDA {
-        return raster_all_records(call, dropped, memory_of_warps[in_block].bricks, memory, warp_of_records,
-                                  place.warps);
+        return raster_all_work_items(call, dropped, memory_of_warps[in_block].bricks, memory, warp_of_records,
+                                     place.warps);
     };
     // Thin records come last: what they need is there when all else is drawn. Conservative ones take longest, and other
     // warps had better have the rest.
@@ -168,7 +168,7 @@ __global__ __launch_bounds__(raster_threads,
     }
     sink_type sink(call, dropped, memory);
     sink.take_over(of_records);
-    raster_by_lanes(call, medium_triangles, 0, place, kept, sink);
+    raster_by_lanes(call, size_class::warp_group, 0, place, kept, sink);
     if constexpr (combines_words<Call>) {
         combining_sink<Call> rows(sink, words[in_block]);
         raster_lists(call, place, kept, rows, sink);

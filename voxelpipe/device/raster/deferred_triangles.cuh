@@ -40,7 +40,7 @@ __device__ inline void count_looked_at(unsigned looked_at, const unsigned (&drop
 // The triangles of a warp whose blocks of raster_threads go through the mesh one after the other, round by round. In
 // 16 bits: 32 times the number of the round, and the lane. What it takes is there anyway, and in no register meanwhile.
 struct warp_triangles {
-    static constexpr std::uint32_t most_rounds = 1u << 11;
+    static constexpr std::uint32_t max_rounds = 1u << 11;
     [[nodiscard]] __device__ VOXELPIPE_INLINE static std::uint32_t of(std::uint32_t code) {
         return of(code, threadIdx.x / 32);
     }
@@ -50,58 +50,58 @@ struct warp_triangles {
     }
 };
 
-struct triangle_lists {
+struct deferred_triangles {
     // Two lists share an array, from both ends: a triangle is in one list only.
-    std::uint32_t* arrays[num_triangle_kinds / 2];
-    unsigned long long* lengths; // [num_triangle_kinds]
+    std::uint32_t* arrays[size_class::count / 2];
+    unsigned long long* lengths; // [size_class::count]
     std::uint32_t capacity;      // of an array
 
-    // Triangles that are cut into pieces, each with the number of its first record of them: a warp finds the
+    // Triangles that are split into pieces, each with the number of its first record of them: a warp finds the
     // triangle of a record by bisection. `next` packs how many triangles and records there are, so that one atomic
     // places both.
-    static constexpr int record_bits = 36;
-    std::uint32_t* cut;
-    unsigned long long* first_records;
+    static constexpr int work_item_bits = 36;
+    std::uint32_t* split;
+    unsigned long long* first_work_items;
     unsigned long long* next;
 
     // What the records of a triangle need of it (raster/split_triangles.cuh), where that is kept for all: room for so
     // many, and how many are there.
-    static constexpr std::size_t most_setups = 1u << 14, setup_bytes = 384;
+    static constexpr std::size_t max_setups = 1u << 14, setup_bytes = 384;
     std::byte* setups;
     unsigned long long* set_up;
     std::uint32_t num_setups;
 
     // Those that a block of the first kernel leaves until its end; each has a part of its own. Then, where set-ups are
     // kept, for each record whose it is.
-    std::uint32_t* big;
-    std::uint64_t big_room;
+    std::uint32_t* oversized;
+    std::uint64_t oversized_capacity;
 
-    [[nodiscard]] static triangle_lists take(arena& memory, std::size_t num_triangles) {
-        triangle_lists l{};
+    [[nodiscard]] static deferred_triangles take(arena& memory, std::size_t num_triangles) {
+        deferred_triangles l{};
         // Parts are whole batches of all threads of a persistent kernel.
         const std::size_t threads = std::max(static_cast<std::size_t>(num_multiprocessors()) * 2048,
-                                             num_triangles / warp_triangles::most_rounds + raster_threads);
-        l.big_room = num_triangles + std::min(threads, num_triangles + 2048);
-        l.big = memory.take<std::uint32_t>(l.big_room);
+                                             num_triangles / warp_triangles::max_rounds + raster_threads);
+        l.oversized_capacity = num_triangles + std::min(threads, num_triangles + 2048);
+        l.oversized = memory.take<std::uint32_t>(l.oversized_capacity);
         for (auto& array : l.arrays) array = memory.take<std::uint32_t>(num_triangles);
         l.capacity = static_cast<std::uint32_t>(num_triangles);
-        l.cut = memory.take<std::uint32_t>(num_triangles);
-        l.first_records = memory.take<unsigned long long>(num_triangles);
-        l.num_setups = static_cast<std::uint32_t>(std::min(num_triangles, most_setups));
+        l.split = memory.take<std::uint32_t>(num_triangles);
+        l.first_work_items = memory.take<unsigned long long>(num_triangles);
+        l.num_setups = static_cast<std::uint32_t>(std::min(num_triangles, max_setups));
         l.setups = memory.take<std::byte>(l.num_setups * setup_bytes);
         return l;
     }
     // With its counters, which are zeroed.
-    [[nodiscard]] triangle_lists with(pipeline_state* state) const {
-        triangle_lists l = *this;
-        l.lengths = state->handed_on.lengths;
-        l.next = &state->handed_on.cut;
-        l.set_up = &state->handed_on.set_up;
+    [[nodiscard]] deferred_triangles with(pipeline_state* state) const {
+        deferred_triangles l = *this;
+        l.lengths = state->deferred.lengths;
+        l.next = &state->deferred.split;
+        l.set_up = &state->deferred.set_up;
         return l;
     }
-    [[nodiscard]] static constexpr bool holds(std::uint64_t triangles, std::uint64_t records_each) {
-        return triangles < (std::uint64_t{1} << (64 - record_bits)) &&
-               triangles * records_each < (std::uint64_t{1} << record_bits);
+    [[nodiscard]] static constexpr bool holds(std::uint64_t triangles, std::uint64_t work_items_each) {
+        return triangles < (std::uint64_t{1} << (64 - work_item_bits)) &&
+               triangles * work_items_each < (std::uint64_t{1} << work_item_bits);
     }
     __device__ std::uint32_t& at(int kind, unsigned long long i) const {
         std::uint32_t* const array = arrays[kind / 2];
@@ -118,9 +118,9 @@ struct triangle_lists {
         if (wanted) at(kind, first + static_cast<unsigned>(__popc(who & ((1u << lane) - 1)))) = triangle;
     }
     // The triangle of each lane that has records for it. All lanes take part.
-    __device__ void push_cut(std::uint32_t triangle, unsigned long long records) const {
+    __device__ void push_split(std::uint32_t triangle, unsigned long long records) const {
         const unsigned lane = threadIdx.x % 32;
-        const unsigned long long mine = (records != 0 ? 1ull << record_bits : 0) + records;
+        const unsigned long long mine = (records != 0 ? 1ull << work_item_bits : 0) + records;
         unsigned long long sum = mine;
         for (unsigned d = 1; d < 32; d *= 2) {
             const unsigned long long other = __shfl_up_sync(0xffffffffu, sum, d);
@@ -130,9 +130,9 @@ struct triangle_lists {
         if (lane == 31 && sum != 0) first = atomicAdd(next, sum);
         const unsigned long long place = __shfl_sync(0xffffffffu, first, 31) + sum - mine;
         if (records == 0) return;
-        const unsigned long long number = place >> record_bits;
-        cut[number] = triangle;
-        first_records[number] = place & ((1ull << record_bits) - 1);
+        const unsigned long long number = place >> work_item_bits;
+        split[number] = triangle;
+        first_work_items[number] = place & ((1ull << work_item_bits) - 1);
     }
 };
 
@@ -150,50 +150,50 @@ __device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
 // The lengths of the lists are the same words for all warps of the device, and an atomic that brings them back keeps
 // that part of L2 from what else lies there: with one for 32 triangles, first kernels waited for it, and took some 20 %
 // more or less by where the state and the target lay.
-struct kind_queues {
+struct class_queues {
     static constexpr int places = 128, at_once = places - 32;
-    std::uint16_t triangles[num_triangle_kinds][places];
+    std::uint16_t triangles[size_class::count][places];
 };
 
-struct kind_writer {
-    const triangle_lists& lists;
-    kind_queues& queues;
-    int waiting[num_triangle_kinds] = {};
+struct class_writer {
+    const deferred_triangles& lists;
+    class_queues& queues;
+    int waiting[size_class::count] = {};
 
     // Every lane with a kind from 0 on adds its triangle. All lanes take part.
     __device__ VOXELPIPE_INLINE void push(int kind, std::uint32_t code) {
         const unsigned kinds = __reduce_or_sync(0xffffffffu, kind < 0 ? 0 : 1u << kind); // one or two, mostly
-        for (int k = 0; k < num_triangle_kinds; ++k) {
+        for (int k = 0; k < size_class::count; ++k) {
             if ((kinds >> k & 1u) == 0) continue;
             const int place = take_place(kind == k, waiting[k]);
             if (kind == k) queues.triangles[k][place] = static_cast<std::uint16_t>(code);
-            if (waiting[k] < kind_queues::at_once) continue;
+            if (waiting[k] < class_queues::at_once) continue;
             __syncwarp();
-            waiting[k] -= kind_queues::at_once;
-            write(k, take(k, kind_queues::at_once), waiting[k], kind_queues::at_once);
+            waiting[k] -= class_queues::at_once;
+            write(k, take(k, class_queues::at_once), waiting[k], class_queues::at_once);
             __syncwarp();
         }
     }
     // How much waits in the queues of all warps of a block: noted in shared memory for each. All threads take part;
     // then the block has to meet.
     template <int Warps>
-    __device__ VOXELPIPE_INLINE void note(unsigned (&places)[num_triangle_kinds][Warps]) const {
+    __device__ VOXELPIPE_INLINE void note(unsigned (&places)[size_class::count][Warps]) const {
         if (threadIdx.x % 32 == 0)
-            for (int k = 0; k < num_triangle_kinds; ++k)
-                places[k][threadIdx.x / 32] = static_cast<unsigned>(waiting[k]);
+            for (int k = 0; k < size_class::count; ++k) places[k][threadIdx.x / 32] = static_cast<unsigned>(waiting[k]);
     }
     // The same as a number, or `many` or more, as where some of it is large. All threads meet.
     static constexpr int many = 32;
     [[nodiscard]] __device__ VOXELPIPE_INLINE int count() const {
-        const bool has_large = (waiting[large_triangles] | waiting[medium_triangles]) != 0;
-        const int lane = static_cast<int>(threadIdx.x) % 32, small = waiting[tiny_triangles] + waiting[small_triangles];
+        const bool has_large = (waiting[size_class::thread_heavy] | waiting[size_class::warp_group]) != 0;
+        const int lane = static_cast<int>(threadIdx.x) % 32,
+                  small = waiting[size_class::tiny] + waiting[size_class::thread];
         return __syncthreads_count(has_large || lane < small);
     }
     // Hands on what has been noted, for which the block takes room together. All threads take part.
     template <int Warps>
-    __device__ VOXELPIPE_INLINE void finish(unsigned (&places)[num_triangle_kinds][Warps]) {
+    __device__ VOXELPIPE_INLINE void finish(unsigned (&places)[size_class::count][Warps]) {
         const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32;
-        for (int k = static_cast<int>(warp); k < num_triangle_kinds; k += Warps) {
+        for (int k = static_cast<int>(warp); k < size_class::count; k += Warps) {
             unsigned n = 0, before = 0;
             for (unsigned w = 0; w < Warps; ++w) {
                 before += w < lane ? places[k][w] : 0;
@@ -205,7 +205,7 @@ struct kind_writer {
             if (lane < Warps) places[k][lane] = first + before;
         }
         __syncthreads();
-        for (int k = 0; k < num_triangle_kinds; ++k)
+        for (int k = 0; k < size_class::count; ++k)
             if (waiting[k] != 0) write(k, places[k][warp], 0, waiting[k]);
     }
 

@@ -28,7 +28,7 @@ public:
             chunks_[k] = chunks[k];
             all += chunks[k];
         }
-        while (part_bits_ < most_part_bits && all >> part_bits_ >= 8 * num_workers) ++part_bits_;
+        while (part_bits_ < max_part_bits && all >> part_bits_ >= 8 * num_workers) ++part_bits_;
     }
     // This worker's next one; none ever after where there is none.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE chunk next() {
@@ -51,7 +51,7 @@ public:
     }
 
 private:
-    static constexpr int most_part_bits = 6; // of how many parts there are, each of four chunks or more for a worker
+    static constexpr int max_part_bits = 6; // of how many parts there are, each of four chunks or more for a worker
 
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t begin_of(std::uint32_t part, std::uint32_t chunks) const {
         return static_cast<std::uint32_t>(static_cast<std::uint64_t>(chunks) * part >> part_bits_);

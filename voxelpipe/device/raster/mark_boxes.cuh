@@ -13,7 +13,7 @@ namespace voxelpipe::device {
 // grid. All lanes take part. Triangles next to each other mostly lie within two chunks along each axis, all of which
 // are marked then, and otherwise mostly share a word, which is written once; without a look, that all would wait for.
 template <coverage Rule>
-__device__ VOXELPIPE_INLINE void mark_boxes(const chunk_marks& marks, bool wanted, const near_triangle& r) {
+__device__ VOXELPIPE_INLINE void mark_boxes(const chunk_marks& marks, bool wanted, const int32_triangle& r) {
     constexpr int beyond = Rule == coverage::thin ? 1 : 0; // a thin fragment may lie one voxel beyond the triangle
     if (!__any_sync(0xffffffffu, wanted)) return;
     int lo[3] = {}, hi[3] = {};

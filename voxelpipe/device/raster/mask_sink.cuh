@@ -11,7 +11,7 @@
 namespace voxelpipe::device {
 
 template <class Call>
-struct touching_sink : blending_sink<Call> {
+struct mask_sink : blending_sink<Call> {
     using blending_sink<Call>::blending_sink;
 
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(const glm::uvec3& index) const {
@@ -19,19 +19,19 @@ struct touching_sink : blending_sink<Call> {
     }
 };
 
-struct touched_output : framebuffer_output<framebuffer_view<touched_target>, core::pack<bool>> {
+struct mask_output : framebuffer_output<framebuffer_view<mask_target>, core::pack<bool>> {
     template <class Call>
-    using sink = touching_sink<Call>;
+    using sink = mask_sink<Call>;
     template <class Call>
-    using rest_sink = sink<Call>;
+    using deferred_sink = sink<Call>;
     static constexpr bool only_sets = true;
 
     std::uint32_t num_vertices;
     pipeline_state* state;
     bool checked; // whether check_indices has run
 
-    touched_output(word* words, const glm::ivec3& extent, std::uint32_t num_vertices_, pipeline_state* state_,
-                   bool checked_)
+    mask_output(word* words, const glm::ivec3& extent, std::uint32_t num_vertices_, pipeline_state* state_,
+                bool checked_)
         : framebuffer_output{{extent, {}}, core::make_pack(true), {}, {}}, num_vertices(num_vertices_), state(state_),
           checked(checked_) {
         auto& t = voxelpipe::get<0>(fb.targets);
@@ -49,9 +49,9 @@ struct touched_output : framebuffer_output<framebuffer_view<touched_target>, cor
 
 // A framebuffer of one target that is laid out as they are, and takes true as they do.
 template <class Framebuffer>
-inline constexpr bool is_touched_itself = false;
+inline constexpr bool is_mask_itself = false;
 template <class Target>
-inline constexpr bool is_touched_itself<framebuffer_view<Target>> =
+inline constexpr bool is_mask_itself<framebuffer_view<Target>> =
     std::is_same_v<typename Target::blend_type, blend::bit_or> && !Target::map::bricks && Target::map::is_bit;
 
 } // namespace voxelpipe::device

@@ -22,7 +22,7 @@ namespace voxelpipe::device {
 
 // Blocks per multiprocessor that registers are kept for.
 template <class Call>
-inline constexpr int first_min_blocks = Call::rule == coverage::thin || Call::sink::buffers ? 6 : 8;
+inline constexpr int first_min_blocks = Call::rule == coverage::thin || Call::sink::stages_in_shared ? 6 : 8;
 
 // Thin triangles of up to 2 x 2 x 2 voxels that wait for integers, each in a column of words: those that floats are not
 // sure of, and those of warps that have few.
@@ -39,16 +39,16 @@ union cubes_or_rows {
 
 // Of a warp's 32 triangles, so many whose boxes are three voxels long at least are drawn where they are read, with all
 // smaller ones, by instructions that cost half as much again as without them; fewer are handed on.
-inline constexpr int least_slim = 3;
+inline constexpr int min_slim = 3;
 // Of a mesh that is finer than the grid few triangles are handed on: where there were so many on average for each of
 // the first kernel's blocks, each can draw its own at its end, and takes no more than a second kernel does to begin.
-inline constexpr std::uint64_t most_left_of_block = 14, most_left_blocks = 6; // a multiprocessor
-inline constexpr int big_side = 64; // of what is cut into pieces: beyond most_medium_side
+inline constexpr std::uint64_t max_left_of_block = 14, max_left_blocks = 6; // a multiprocessor
+inline constexpr int oversized_side = 64; // of what is split into pieces: beyond max_group_side
 
 // What one warp of the first kernel keeps in shared memory.
 template <class Call>
 struct first_memory {
-    kind_queues kinds;
+    class_queues kinds;
     std::conditional_t<Call::rule == coverage::thin, cubes_or_rows, no_queue> thin;
     typename Call::sink::memory sink;
 };
@@ -67,14 +67,14 @@ struct first_warp {
     using corners_type = loaded_corners<typename Call::source_type>;
     // Whether a batch's vertices are loaded before the fragments of the batch before it are blended. Where conservative
     // coverage looks at words of bits, those wait behind the vertices: 5 % slower.
-    static constexpr bool loads_ahead = thin || sink_type::buffers;
+    static constexpr bool loads_ahead = thin || sink_type::stages_in_shared;
 
     const Call& call;
     first_memory<Call>& memory;
     sink_type& sink;
-    kind_writer& writer;
-    std::uint32_t* big; // triangles, of the block
-    unsigned& num_big;
+    class_writer& writer;
+    std::uint32_t* oversized; // triangles, of the block
+    unsigned& num_oversized;
     int num_cubes = 0;                                   // that wait, of thin ones
     static constexpr std::uint32_t not_close = 1u << 31; // of a code, which has 16 bits: the batch before was not
 
@@ -83,15 +83,16 @@ struct first_warp {
     template <class Near, class LoadNext>
     __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, std::uint32_t& code, bool valid, const Near& near,
                                            const LoadNext& load_next) {
-        // Of what is left to do, the longest side of the bounding box, or big_side. Not a few bools (see inside()).
+        // Of what is left to do, the longest side of the bounding box, or oversized_side. Not a few bools (see
+        // inside()).
         int side = 0, inside = 0;
-        near_triangle r;
+        int32_triangle r;
         if (valid) {
             r = near();
             side = r.most();
             inside = r.inside(call.in.extent);
-            if (!r.is_near || side > most_medium_side(call.in.fraction)) {
-                side = big_side;
+            if (!r.is_near || side > max_group_side(call.in.fraction)) {
+                side = oversized_side;
             } else if (inside < 0 && r.template is_outside<Call::rule>(call.in.extent)) {
                 sink.drop(triangle_class::outside);
                 side = 0;
@@ -104,16 +105,16 @@ struct first_warp {
                 bool is_done = false;
                 if constexpr (Close) is_done = sets_close_cubes(code, r, bits);
                 if (!is_done)
-                    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                    emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
                         if (bits == 0) return;
                         sink.begin(i);
-                        give_cube(r, bits, sink);
+                        emit_cube(r, bits, sink);
                     });
                 side = bits != 0 ? 0 : side;
             }
         } else {
             const bool is_cube = side != 0 && side <= 2;
-            const bool at_once = __popc(__ballot_sync(0xffffffffu, is_cube)) >= least_thin_cubes;
+            const bool at_once = __popc(__ballot_sync(0xffffffffu, is_cube)) >= min_thin_cubes;
             bool sure = false;
             core::thin_cube cube{};
             if (at_once && is_cube) cube = core::thin_cube_by_signs(r.q, r.lo, r.last, call.in.fraction, sure);
@@ -126,17 +127,17 @@ struct first_warp {
             }
             load_next();
             if (at_once)
-                feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
                     if (!sure) return;
                     sink.begin(i);
-                    give_thin_cube(call.in, r, cube, sink);
+                    emit_thin_cube(call.in, r, cube, sink);
                 });
             side = is_cube ? 0 : side;
         }
         if (__any_sync(0xffffffffu, side != 0)) {
-            writer.push(side != 0 && side != big_side ? kind_of<Call::rule>(r, side) : -1, code);
+            writer.push(side != 0 && side != oversized_side ? size_class_of<Call::rule>(r, side) : -1, code);
             // No call of a function here: its registers would spill.
-            if (side == big_side) big[atomicAdd(&num_big, 1u)] = i;
+            if (side == oversized_side) oversized[atomicAdd(&num_oversized, 1u)] = i;
         }
         __syncwarp();
         if constexpr (thin)
@@ -145,7 +146,7 @@ struct first_warp {
 
     // Whether this warp has set what find_cube has found. Where one batch does not lie close together, 15 after it are
     // not looked at.
-    __device__ VOXELPIPE_INLINE bool sets_close_cubes(std::uint32_t& code, const near_triangle& r, word bits) {
+    __device__ VOXELPIPE_INLINE bool sets_close_cubes(std::uint32_t& code, const int32_triangle& r, word bits) {
         const bool looks = (code & not_close) == 0 || code / 32 % 16 == 0;
         if (looks && set_close_cubes(voxelpipe::get<0>(call.out.fb.targets), r.lo, bits)) {
             code &= ~not_close;
@@ -158,14 +159,14 @@ struct first_warp {
 
     // Whether this warp has drawn what has slim boxes: conservative triangles, where it has some of three voxels.
     template <class LoadNext>
-    __device__ VOXELPIPE_INLINE bool draws_slim(std::uint32_t i, const near_triangle& r, int inside, int& side,
+    __device__ VOXELPIPE_INLINE bool draws_slim(std::uint32_t i, const int32_triangle& r, int inside, int& side,
                                                 const LoadNext& load_next) {
-        if (__popc(__ballot_sync(0xffffffffu, side == 3)) < least_slim) return false;
+        if (__popc(__ballot_sync(0xffffffffu, side == 3)) < min_slim) return false;
         core::slim_rows rows{};
         if (side != 0 && side <= 3 && inside >= 0 && core::is_slim(r.last))
             rows = core::slim_rows_by_signs(r.q, r.lo, r.last, call.in.fraction);
         load_next();
-        feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+        emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
             if (rows.bits == 0) return;
             sink.begin(i);
             sink.slim(r.lo[0], r.lo[1], r.lo[2], rows);
@@ -181,11 +182,11 @@ struct first_warp {
         const bool wanted = AllLanes || lane < num_cubes;
         num_cubes = AllLanes ? num_cubes - 32 : 0;
         const int at = wanted ? num_cubes + lane : 0;
-        near_triangle r;
+        int32_triangle r;
         for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = memory.thin.cubes.q[k][at];
         r.is_near = true;
         r.find_box(call.in.fraction);
-        feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+        emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
             if (!wanted) return;
             sink.begin(warp_triangles::of(memory.thin.cubes.triangle[at]));
             raster_tiny<Call::rule>(call.in, r, sink);
@@ -217,7 +218,7 @@ struct first_warp {
         } else {
             for (std::uint32_t first = begin, code = lane; first < num; first += step, code += 32) {
                 const glm::uvec3 next = load_index(call.in, first + step + lane);
-                const auto near = [&]() VOXELPIPE_INLINE_LAMBDA { return load_near(call.in, index); };
+                const auto near = [&]() VOXELPIPE_INLINE_LAMBDA { return load_int32(call.in, index); };
                 batch(first + lane, code, first + lane < num && sink.check(index), near,
                       []() VOXELPIPE_INLINE_LAMBDA {});
                 index = next;
@@ -227,7 +228,7 @@ struct first_warp {
             if (num_cubes != 0) drain_cubes<false>();
         } else if constexpr (thin) { // the rest of the cubes is handed on
             const int at = static_cast<int>(lane);
-            writer.push(at < num_cubes ? static_cast<int>(tiny_triangles) : -1, memory.thin.cubes.triangle[at]);
+            writer.push(at < num_cubes ? static_cast<int>(size_class::tiny) : -1, memory.thin.cubes.triangle[at]);
         }
         if (begin >= num) return 0;
         const std::uint32_t batches = (num - begin - 1) / step + 1, of_last = num - (begin + (batches - 1) * step);
@@ -239,14 +240,14 @@ struct first_warp {
 template <class Call>
 __device__ __noinline__ typename Call::sink::totals
 draw_left(const Call& call, unsigned* dropped, first_memory<Call> (&memories)[raster_warps],
-          const unsigned (&waiting)[num_triangle_kinds][raster_warps], unsigned n) {
+          const unsigned (&waiting)[size_class::count][raster_warps], unsigned n) {
     first_memory<Call>& memory = memories[warp_in_block()];
     typename Call::sink sink(call, dropped, memory.sink);
     unsigned at = threadIdx.x % 32;
     const bool wanted = at < n;
     int kind = 0;
     std::uint32_t triangle = 0;
-    near_triangle r{};
+    int32_triangle r{};
     if (wanted) {
         unsigned warp = 0;
         while (at >= waiting[kind][warp]) {
@@ -255,12 +256,12 @@ draw_left(const Call& call, unsigned* dropped, first_memory<Call> (&memories)[ra
             kind += warp == 0 ? 1 : 0;
         }
         triangle = warp_triangles::of(memories[warp].kinds.triangles[kind][at], warp);
-        r = load_near(call.in, call.in.source.triangle(triangle));
+        r = load_int32(call.in, call.in.source.triangle(triangle));
     }
-    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+    emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
         if (!wanted) return;
         sink.begin(triangle);
-        if (kind == tiny_triangles)
+        if (kind == size_class::tiny)
             raster_tiny<Call::rule>(call.in, r, sink);
         else if constexpr (Call::rule == coverage::thin)
             raster_small<Call::rule, true>(call.in, r, lane_rows(memory.thin.rows), sink);
@@ -277,8 +278,8 @@ template <class Call, bool Alone, bool Close>
 __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& again, pipeline_state* state) {
     using sink_type = typename Call::sink;
     __shared__ first_memory<Call> memories[raster_warps];
-    __shared__ unsigned places[num_triangle_kinds][raster_warps];
-    __shared__ unsigned dropped[num_triangle_classes], num_big;
+    __shared__ unsigned places[size_class::count][raster_warps];
+    __shared__ unsigned dropped[num_triangle_classes], num_oversized;
     const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
     await_stream();
     if constexpr (Alone)
@@ -286,24 +287,25 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
                          std::uint64_t{gridDim.x} * raster_threads);
     if (call.out.is_checked() && state->index_error != 0) return;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
-    if (threadIdx.x == 0) num_big = 0;
+    if (threadIdx.x == 0) num_oversized = 0;
     __syncthreads();
     first_memory<Call>& memory = memories[warp_in_block()];
     sink_type sink(call, dropped, memory.sink);
-    kind_writer writer{call.lists, memory.kinds};
+    class_writer writer{call.lists, memory.kinds};
     const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
     first_warp<Call, Alone, Close> warp{
-        call, memory, sink, writer, call.lists.big + std::size_t{blockIdx.x} * batches * raster_threads, num_big};
+        call,         memory, sink, writer, call.lists.oversized + std::size_t{blockIdx.x} * batches * raster_threads,
+        num_oversized};
     const unsigned looked_at = warp.run(index);
     __syncthreads();
-    cut_big(call, sink, warp.big, num_big);
+    split_oversized(call, sink, warp.oversized, num_oversized);
     writer.note(places);
-    int left = kind_writer::many;
+    int left = class_writer::many;
     if constexpr (Alone)
         left = writer.count();
     else
         __syncthreads();
-    if (left >= kind_writer::many) {
+    if (left >= class_writer::many) {
         writer.finish(places);
     } else if (left != 0 && threadIdx.x < 32) {
         (void)sink.end(); // the memory is another sink's
@@ -315,15 +317,15 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
 
 template <class Call, bool Close>
 __global__ __launch_bounds__(raster_threads,
-                             first_min_blocks<Call>) void direct_raster_kernel(const __grid_constant__ Call call,
-                                                                               pipeline_state* state) {
+                             first_min_blocks<Call>) void first_pass_kernel(const __grid_constant__ Call call,
+                                                                            pipeline_state* state) {
     raster_first<Call, false, Close>(call, call, state);
 }
 template <class Call, bool Close>
 __global__ __launch_bounds__(raster_threads,
-                             first_min_blocks<Call>) void direct_alone_kernel(const __grid_constant__ Call call,
-                                                                              const __grid_constant__ Call again,
-                                                                              pipeline_state* state) {
+                             first_min_blocks<Call>) void only_pass_kernel(const __grid_constant__ Call call,
+                                                                           const __grid_constant__ Call again,
+                                                                           pipeline_state* state) {
     raster_first<Call, true, Close>(call, again, state);
 }
 
@@ -334,46 +336,46 @@ __global__ __launch_bounds__(raster_threads,
 [[nodiscard]] inline unsigned raster_blocks(std::uint32_t num_triangles, int per_multiprocessor) {
     const std::uint32_t batches = core::blocks_for_each(num_triangles, raster_threads);
     const auto at_once = static_cast<std::uint32_t>(num_multiprocessors() * per_multiprocessor);
-    return std::min(batches, std::max(at_once, core::blocks_for_each(batches, warp_triangles::most_rounds)));
+    return std::min(batches, std::max(at_once, core::blocks_for_each(batches, warp_triangles::max_rounds)));
 }
 
-// Whether a call of one draw may be launched without its second kernel, where others like it left_alone so many
+// Whether a call of one draw may be launched without its second kernel, where others like it num_deferred so many
 // triangles.
-[[nodiscard]] inline bool may_be_alone(std::size_t num_triangles, std::uint64_t left) {
+[[nodiscard]] inline bool leaves_few(std::size_t num_triangles, std::uint64_t left) {
     const std::uint64_t batches = core::blocks_for_each(num_triangles, raster_threads);
-    const auto at_once = static_cast<std::uint64_t>(num_multiprocessors()) * most_left_blocks;
-    return left <= std::min(batches, at_once) * most_left_of_block;
+    const auto at_once = static_cast<std::uint64_t>(num_multiprocessors()) * max_left_blocks;
+    return left <= std::min(batches, at_once) * max_left_of_block;
 }
 
 // is_first: whether these are a call's first kernels. They read indices before they await the stream, which the
-// caller's own kernel in front of them may still write. leaves_none: whether the first kernel does it all, for all that
-// is known; what it hands on all the same is not drawn.
+// caller's own kernel in front of them may still write. skips_deferred_pass: whether the first kernel does it all, for
+// all that is known; what it hands on all the same is not drawn.
 template <class Call>
-void direct_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
-                   bool leaves_none = false) {
+void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
+                   bool skips_deferred_pass = false) {
     const unsigned triangles = call.in.num_triangles;
-    if constexpr (Call::output::hands_on) {
+    if constexpr (Call::output::defers) {
         bool are_close = false;
         if constexpr (has_close_cubes<Call>) are_close = may_be_close(triangles, call.in.extent);
         const unsigned blocks = raster_blocks(triangles, first_min_blocks<Call>);
         const auto launch = [&](auto* raster, auto* alone) {
-            if (leaves_none)
+            if (skips_deferred_pass)
                 launch_kernel(!is_first, alone, blocks, raster_threads, 0, stream, where, call, call, state);
             else
                 launch_kernel(!is_first, raster, blocks, raster_threads, 0, stream, where, call, state);
         };
         if (are_close)
-            launch(direct_raster_kernel<Call, has_close_cubes<Call>>, direct_alone_kernel<Call, has_close_cubes<Call>>);
+            launch(first_pass_kernel<Call, has_close_cubes<Call>>, only_pass_kernel<Call, has_close_cubes<Call>>);
         else
-            launch(direct_raster_kernel<Call, false>, direct_alone_kernel<Call, false>);
+            launch(first_pass_kernel<Call, false>, only_pass_kernel<Call, false>);
     } else {
         launch_kernel(!is_first, block_raster_kernel<Call>, raster_blocks(triangles, block_min_blocks), raster_threads,
                       0, stream, where, call, state);
     }
-    if (leaves_none) return;
+    if (skips_deferred_pass) return;
     const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
-    launch_behind(direct_rest_kernel<Call>, multiprocessors * rest_min_blocks<Call>, raster_threads, stream, where,
-                  call, state);
+    launch_behind(deferred_pass_kernel<Call>, multiprocessors * deferred_min_blocks<Call>, raster_threads, stream,
+                  where, call, state);
 }
 
 } // namespace voxelpipe::device

@@ -4,18 +4,18 @@
 
 // One draw of the raster, and the sink that takes its fragments: blending (raster/blend_sink.cuh), a mask of voxels
 // (raster/mask_sink.cuh) or lists (fragments/list_sink.cuh). A sink has
-//   buffers           whether settle(), which all lanes call between triangles, is wanted (feed)
+//   stages_in_shared         whether settle(), which all lanes call between triangles, is wanted (feed)
 //   place(x, y, z)    where a voxel lies, as something linear: ivec3, or numbers modulo 2^32
-//   begin(triangle), row(x0, y, z, mask), cube(x, y, z, bits), voxels(bits, place), put(place, wanted):
+//   begin(triangle), row(x0, y, z, mask), cube(x, y, z, bits), voxels(bits, place), emit(place, wanted):
 //                     the fragments of one triangle, as a row of bits along x, as 2 x 2 x 2 (blend_cube) or one by one
 //   shares            whether one(x, y, z), a fragment of a triangle that has no other, is more than a row of one
-//   put_line(place, step, count): count fragments from a place on, step apart
+//   emit_line(place, step, count): count fragments from a place on, step apart
 //   spreads           whether a row costs by its voxels, so that lanes had better share long ones:
-//   row_by_all(group, x0, y, z, mask): a row by medium_lanes neighbours, all with the same arguments
+//   row_by_all(group, x0, y, z, mask): a row by group_lanes neighbours, all with the same arguments
 //   mark_boxes(wanted, triangle), mark_row(x0, x1, y, z), mark_brick(corner, lane): told of what a triangle may touch
-//                     before it comes, of a brick by each of medium_lanes lanes
+//                     before it comes, of a brick by each of group_lanes lanes
 //   drop(class)       counts a triangle that is not drawn
-//   has_rounds        whether a warp had better give it fragments by
+//   takes_warp_rounds        whether a warp had better give it fragments by
 //   rounds(count, is_done, next): thin ones of all lanes, one of each lane at a time: next() is the place of the next
 //                     of this lane's `count`
 //   share(count, of): thin ones of all lanes, 32 at a time whoever's they are: of(lane, i) is the place of a lane's i
@@ -32,21 +32,21 @@ namespace voxelpipe::device {
 // One draw. Output says where its fragments go, and has the sink that takes them there: framebuffer_output, or
 // list_output (fragments/list_sink.cuh).
 template <coverage Rule, class Source, class Output>
-struct direct_call {
+struct raster_call {
     static constexpr coverage rule = Rule;
     using source_type = Source;
     using output = Output;
-    using sink = typename Output::template sink<direct_call>;
-    using rest_sink = typename Output::template rest_sink<direct_call>; // of the second kernel
+    using sink = typename Output::template sink<raster_call>;
+    using deferred_sink = typename Output::template deferred_sink<raster_call>; // of the second kernel
     raster_input<Source> in;
     Output out;
-    triangle_lists lists;
+    deferred_triangles lists;
 };
 
 // What every sink of a direct call does with triangles that are not drawn.
 template <class Call>
-struct direct_sink {
-    static constexpr bool has_rounds = false;
+struct sink_base {
+    static constexpr bool takes_warp_rounds = false;
     const Call& call;
     unsigned* dropped; // by triangle_class, of the block
 
@@ -60,12 +60,12 @@ struct direct_sink {
 // Runs f, which gives a sink fragments, on all lanes of a warp. A sink that buffers them may find that there were too
 // many, and then wants them once more.
 template <class Sink, class F>
-__device__ VOXELPIPE_INLINE void feed(Sink& sink, F&& f) {
-    if constexpr (Sink::buffers) {
+__device__ VOXELPIPE_INLINE void emit_with_retry(Sink& sink, F&& f) {
+    if constexpr (Sink::stages_in_shared) {
         do {
             f();
             __syncwarp();
-        } while (sink.settle());
+        } while (sink.commit());
     } else {
         f();
     }

@@ -20,13 +20,13 @@ namespace voxelpipe::device {
 // ---- small triangles ------------------------------------------------------------------------------------------------
 
 // The longest side of its bounding box, in voxels: what 32 bits hold.
-[[nodiscard]] __device__ VOXELPIPE_INLINE int most_medium_side(int fraction) { return fraction < 16 ? 32 : 16; }
+[[nodiscard]] __device__ VOXELPIPE_INLINE int max_group_side(int fraction) { return fraction < 16 ? 32 : 16; }
 static_assert(core::small_voxels(16) == 16 && core::small_voxels(15) == 32 && core::small_voxels(12) == 32);
 
 // What the threads of one warp keep of a triangle each (small_conservative::rows_of_16, small_thin::columns), a column
 // for each lane.
 struct kept_rows {
-    word words[most_long_side][32];
+    word words[max_long_side][32];
 };
 // The lane's, by an address that the compiler cannot see through: it would find it anew each time, in ten instructions.
 struct lane_rows {
@@ -47,9 +47,9 @@ struct lane_rows {
 };
 static_assert(sizeof(kept_rows::words[0]) == 128);
 struct no_rows {};
-// A part of at most 32 x 32 columns by medium_lanes lanes, or of most_columns by one, has so few rows along its shorter
+// A part of at most 32 x 32 columns by group_lanes lanes, or of max_columns by one, has so few rows along its shorter
 // side.
-static_assert(most_columns < most_long_side * most_long_side && 32 / medium_lanes <= most_long_side);
+static_assert(max_columns < max_long_side * max_long_side && 32 / group_lanes <= max_long_side);
 
 // The columns of a small triangle that thin coverage wants, rows along the longer side of what is wanted of its box,
 // and where their voxels lie, which is linear in u, v and w.
@@ -108,8 +108,8 @@ __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, c
         c.begin[0], c.end[0], c.begin[1] + first, c.end[1], step, kept,
         [&](int v) VOXELPIPE_INLINE_LAMBDA { row = c.origin + c.by_v * v; },
         [&](int u, int w) VOXELPIPE_INLINE_LAMBDA {
-            sink.put(row + c.by_u * u + c.by_w * w,
-                     static_cast<unsigned>(c.lowest + w) < static_cast<unsigned>(c.depth));
+            sink.emit(row + c.by_u * u + c.by_w * w,
+                      static_cast<unsigned>(c.lowest + w) < static_cast<unsigned>(c.depth));
         });
     return true;
 }
@@ -118,7 +118,7 @@ __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, c
 // to know how many they are. All lanes take part; false where that cannot be known: nothing has been done then.
 template <class Source, class Kept, class Sink>
 [[nodiscard]] __device__ VOXELPIPE_INLINE bool raster_thin_by_rounds(const raster_input<Source>& call,
-                                                                     const near_triangle& r, Kept&& kept, Sink& sink) {
+                                                                     const int32_triangle& r, Kept&& kept, Sink& sink) {
     thin_columns<place_of_sink<Sink>> c;
     const bool has_area = c.find(call, r.relative(call.fraction), r.lo, r.part(call.extent), sink);
     if (!__all_sync(0xffffffffu, !has_area || c.is_inside())) return false;
@@ -143,12 +143,12 @@ template <class Source, class Kept, class Sink>
 
 // Of a warp's 32 triangles, so many thin boxes of two voxels a side at least are done where they are read; fewer are
 // gathered, so that all lanes have one.
-inline constexpr int least_thin_cubes = 16;
+inline constexpr int min_thin_cubes = 16;
 
 // Thin fragments of a bounding box of at most two voxels a side, all columns at once. Most triangles of a fine mesh are
 // of this kind.
 template <class Source, class Sink>
-__device__ VOXELPIPE_INLINE void give_thin_cube(const raster_input<Source>& call, const near_triangle& r,
+__device__ VOXELPIPE_INLINE void emit_thin_cube(const raster_input<Source>& call, const int32_triangle& r,
                                                 const core::thin_cube& cube, Sink& sink) {
     const int axis = cube.axis;
     // A voxel beyond the box on both sides of it counts.
@@ -170,45 +170,45 @@ __device__ VOXELPIPE_INLINE void give_thin_cube(const raster_input<Source>& call
 }
 // False where the triangle has no area.
 template <class Source, class Sink>
-__device__ VOXELPIPE_INLINE bool raster_thin_cube(const raster_input<Source>& call, const near_triangle& r,
+__device__ VOXELPIPE_INLINE bool raster_thin_cube(const raster_input<Source>& call, const int32_triangle& r,
                                                   Sink& sink) {
     const core::thin_cube cube = core::thin_cube_by_integers(r.relative(call.fraction), r.last, call.fraction);
     if (cube.axis < 0) return false;
-    give_thin_cube(call, r, cube, sink);
+    emit_thin_cube(call, r, cube, sink);
     return true;
 }
 
-// Conservative fragments within a box of at most 32 voxels a side, by medium_lanes neighbouring lanes that all take
+// Conservative fragments within a box of at most 32 voxels a side, by group_lanes neighbouring lanes that all take
 // part. Of 8 x 8 rows along x, those of one y or of one z at a time, whichever of these have fewer that something is
 // left of: a floor has rows of one y, a wall may have rows of one z.
 template <class Sink>
 __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s, const std::int32_t (&lo)[3],
                                               const core::small_box& box, Sink& sink) {
-    const int lane = static_cast<int>(threadIdx.x) % medium_lanes;
-    const unsigned first_of_group = threadIdx.x % 32 / medium_lanes * medium_lanes;
-    const unsigned group = ((1u << medium_lanes) - 1) << first_of_group;
+    const int lane = static_cast<int>(threadIdx.x) % group_lanes;
+    const unsigned first_of_group = threadIdx.x % 32 / group_lanes * group_lanes;
+    const unsigned group = ((1u << group_lanes) - 1) << first_of_group;
     const int x0 = box.lo[0], x1 = box.hi[0];
-    for (int first_y = box.lo[1]; first_y <= box.hi[1]; first_y += medium_lanes) {
+    for (int first_y = box.lo[1]; first_y <= box.hi[1]; first_y += group_lanes) {
         const word at_y = first_y + lane <= box.hi[1] ? s.limit_at_y(x0, x1, first_y + lane) : 0;
         const unsigned ys = __ballot_sync(group, at_y != 0) >> first_of_group;
         if (ys == 0) continue;
-        for (int first_z = box.lo[2]; first_z <= box.hi[2]; first_z += medium_lanes) {
+        for (int first_z = box.lo[2]; first_z <= box.hi[2]; first_z += group_lanes) {
             const word at_z = first_z + lane <= box.hi[2] ? s.limit_at_z(x0, x1, first_z + lane) : 0;
             const unsigned zs = __ballot_sync(group, at_z != 0) >> first_of_group;
             const bool by_y = __popc(ys) <= __popc(zs);
             for (unsigned left = by_y ? ys : zs; left != 0; left &= left - 1) {
                 const int one = __ffs(static_cast<int>(left)) - 1;
-                const word limit = __shfl_sync(group, by_y ? at_y : at_z, one, medium_lanes) & (by_y ? at_z : at_y);
+                const word limit = __shfl_sync(group, by_y ? at_y : at_z, one, group_lanes) & (by_y ? at_z : at_y);
                 const int y = first_y + (by_y ? one : lane), z = first_z + (by_y ? lane : one);
                 const word bits = limit == 0 || !s.meets_row(y, z) ? 0 : s.plane_bits(x0, y, z, limit);
-                if constexpr (Sink::spreads) {
-                    if (by_y && __popc(ys) <= medium_lanes / 4) { // few long rows: each by all lanes
+                if constexpr (Sink::splits_long_rows) {
+                    if (by_y && __popc(ys) <= group_lanes / 4) { // few long rows: each by all lanes
                         word rows = __ballot_sync(group, bits != 0) >> first_of_group;
                         const unsigned longest = __reduce_max_sync(group, static_cast<unsigned>(__popc(bits)));
                         if (static_cast<unsigned>(__popc(rows)) * 5 <= longest * 3) {
                             for (; rows != 0; rows &= rows - 1) {
                                 const int of = __ffs(static_cast<int>(rows)) - 1;
-                                const word mask = __shfl_sync(group, bits, of, medium_lanes);
+                                const word mask = __shfl_sync(group, bits, of, group_lanes);
                                 sink.row_by_all(group, lo[0] + x0, lo[1] + y, lo[2] + first_z + of, mask);
                             }
                             continue;
@@ -227,11 +227,11 @@ __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s,
            (box.hi[1] == 1 ? 0xffu : 0x33u) & (box.lo[2] == 0 ? 0xffu : 0xf0u) & (box.hi[2] == 1 ? 0xffu : 0x0fu);
 }
 // Conservative fragments within a bounding box of at most two voxels a side, most triangles of a fine mesh, of each
-// lane that wants them, as give_cube takes them. None where telling them takes more bits than a float has, or where
-// none lie in the grid: then raster_tiny. `inside`: of near_triangle. All lanes take part.
+// lane that wants them, as emit_cube takes them. None where telling them takes more bits than a float has, or where
+// none lie in the grid: then raster_tiny. `inside`: of int32_triangle. All lanes take part.
 template <class Source>
 [[nodiscard]] __device__ VOXELPIPE_INLINE word find_cube(const raster_input<Source>& call, bool wanted,
-                                                         const near_triangle& r, int inside) {
+                                                         const int32_triangle& r, int inside) {
     word bits = 0;
     const int wide = wanted ? r.last[0] + r.last[1] + r.last[2] : 0; // along how many axes
     const bool all_ways = __any_sync(0xffffffffu, wide == 3);
@@ -248,8 +248,8 @@ template <class Source>
     return bits;
 }
 template <class Sink>
-__device__ VOXELPIPE_INLINE void give_cube(const near_triangle& r, word bits, Sink& sink) {
-    if constexpr (Sink::shares) {
+__device__ VOXELPIPE_INLINE void emit_cube(const int32_triangle& r, word bits, Sink& sink) {
+    if constexpr (Sink::merges_equal_voxels) {
         if ((r.last[0] | r.last[1] | r.last[2]) == 0) {
             if (bits != 0) sink.one(r.lo[0], r.lo[1], r.lo[2]);
             return;
@@ -258,19 +258,19 @@ __device__ VOXELPIPE_INLINE void give_cube(const near_triangle& r, word bits, Si
     sink.cube(r.lo[0], r.lo[1], r.lo[2], bits);
 }
 
-// A triangle by medium_lanes neighbouring lanes, where it is wanted. All lanes of the warp take part.
+// A triangle by group_lanes neighbouring lanes, where it is wanted. All lanes of the warp take part.
 template <coverage Rule, class Source, class Sink>
-__device__ VOXELPIPE_INLINE void raster_medium(const raster_input<Source>& call, bool wanted, std::uint32_t triangle,
-                                               const lane_rows& kept, Sink& sink) {
-    near_triangle r;
-    if (wanted) r = load_near(call, call.source.triangle(triangle));
-    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+__device__ VOXELPIPE_INLINE void raster_by_group(const raster_input<Source>& call, bool wanted, std::uint32_t triangle,
+                                                 const lane_rows& kept, Sink& sink) {
+    int32_triangle r;
+    if (wanted) r = load_int32(call, call.source.triangle(triangle));
+    emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
         if (!wanted) return;
         sink.begin(triangle);
         if constexpr (Rule == coverage::thin) {
-            const int lane = static_cast<int>(threadIdx.x) % medium_lanes;
+            const int lane = static_cast<int>(threadIdx.x) % group_lanes;
             const bool has_area =
-                raster_thin(call, r.relative(call.fraction), r.lo, r.part(call.extent), lane, medium_lanes, kept, sink);
+                raster_thin(call, r.relative(call.fraction), r.lo, r.part(call.extent), lane, group_lanes, kept, sink);
             if (!has_area && lane == 0) sink.drop(core::triangle_class::zero_area);
         } else {
             raster_lanes(core::small_conservative(r.relative(call.fraction), call.fraction), r.lo, r.part(call.extent),
@@ -281,7 +281,7 @@ __device__ VOXELPIPE_INLINE void raster_medium(const raster_input<Source>& call,
 
 // A bounding box of at most two voxels a side, or three for conservative coverage, by one thread.
 template <coverage Rule, class Source, class Sink>
-__device__ VOXELPIPE_INLINE void raster_tiny(const raster_input<Source>& call, const near_triangle& r, Sink& sink) {
+__device__ VOXELPIPE_INLINE void raster_tiny(const raster_input<Source>& call, const int32_triangle& r, Sink& sink) {
     if constexpr (Rule == coverage::thin) {
         if (!raster_thin_cube(call, r, sink)) sink.drop(core::triangle_class::zero_area);
     } else {
@@ -299,9 +299,9 @@ __device__ VOXELPIPE_INLINE void raster_tiny(const raster_input<Source>& call, c
 }
 
 // Conservative fragments of the triangles of one list by a warp whose lanes have one each and give their rows one at a
-// time. tiny: whether the boxes are of at most three voxels a side, or of at most most_long_side. All lanes take part.
+// time. tiny: whether the boxes are of at most three voxels a side, or of at most max_long_side. All lanes take part.
 template <class Source, class Kept, class Sink>
-__device__ VOXELPIPE_INLINE void raster_rows_by_rounds(const raster_input<Source>& call, const near_triangle& r,
+__device__ VOXELPIPE_INLINE void raster_rows_by_rounds(const raster_input<Source>& call, const int32_triangle& r,
                                                        bool tiny, Kept&& kept, Sink& sink) {
     core::small_box box = r.part(call.extent);
     const auto emit_to = [&](const auto& emit) VOXELPIPE_INLINE_LAMBDA {
@@ -335,7 +335,7 @@ __device__ VOXELPIPE_INLINE void raster_rows_by_rounds(const raster_input<Source
 // Any small triangle, by one thread. Apart: in a kernel that keeps nothing else in registers meanwhile. kept:
 // lane_rows, or no_rows for conservative boxes of at most most_side voxels a side.
 template <coverage Rule, bool Apart, class Source, class Kept, class Sink>
-__device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, const near_triangle& r,
+__device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, const int32_triangle& r,
                                               const Kept& kept, Sink& sink) {
     const core::small_box box = r.part(call.extent);
     if constexpr (Rule == coverage::thin) {

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Raster of large triangles without tiles: each is cut into pieces that warps share out, whatever triangles they belong
-// to. Conservative coverage finds the bricks (core/brick_triangle.hpp) that a triangle meets, then the voxels of each;
-// thin coverage takes rows of 16 columns. What all pieces of a triangle need of it is found once where there are many
-// (large_setup). A triangle that the 64-bit path cannot hold goes through 128 bits.
+// Raster of large triangles without tiles: each is split into pieces that warps share out, whatever triangles they
+// belong to. Conservative coverage finds the bricks (core/brick_triangle.hpp) that a triangle meets, then the voxels of
+// each; thin coverage takes rows of 16 columns. What all pieces of a triangle need of it is found once where there are
+// many (split_setup). A triangle that the 64-bit path cannot hold goes through 128 bits.
 
 #include <voxelpipe/device/raster/deferred_triangles.cuh>
 #include <voxelpipe/device/raster/small_triangles.cuh>
@@ -18,26 +18,26 @@
 
 namespace voxelpipe::device {
 
-inline constexpr int most_direct_extent = 1 << 16; // bricks are numbered with 16 bits, voxels with 32
-static_assert((std::int64_t{most_direct_extent} / core::brick_size + 1) * (most_direct_extent + 1) < 1u << 31);
+inline constexpr int max_immediate_extent = 1 << 16; // bricks are numbered with 16 bits, voxels with 32
+static_assert((std::int64_t{max_immediate_extent} / core::brick_size + 1) * (max_immediate_extent + 1) < 1u << 31);
 
-// How a large triangle's box of voxels is cut into pieces, a lane each, some to a record, which is a warp's.
+// How a large triangle's box of voxels is split into pieces, a lane each, some to a record, which is a warp's.
 // Conservative: columns of bricks along the dominant axis, few, for the bricks of a column keep eight lanes busy, and
 // the last warp to end is one with a floor or a wall. Thin: rows of 16 columns of voxels, along that axis of the other
 // two which makes fewer of them.
 template <coverage Rule>
-struct large_pieces {
+struct split_pieces {
     static constexpr int across = Rule == coverage::thin ? 1 : core::brick_size; // voxels along v
     static constexpr int per_record = Rule == coverage::thin ? 32 : 8;
     core::row_axes axes;
     core::triple<std::int64_t> lo, hi;            // uvw by these axes, the box
-    std::int64_t first_u, first_v, per_row, rows; // 32 bits number pieces (most_direct_extent)
+    std::int64_t first_u, first_v, per_row, rows; // 32 bits number pieces (max_immediate_extent)
 
-    large_pieces() = default;
-    VOXELPIPE_HD large_pieces(const core::voxel_box& box, int dominant)
-        : large_pieces(box, core::row_axes{dominant, false}) {
+    split_pieces() = default;
+    VOXELPIPE_HD split_pieces(const core::voxel_box& box, int dominant)
+        : split_pieces(box, core::row_axes{dominant, false}) {
         if constexpr (Rule == coverage::thin) {
-            const large_pieces by_v(box, core::row_axes{dominant, true});
+            const split_pieces by_v(box, core::row_axes{dominant, true});
             // Columns along x may be set by one word.
             const std::int64_t mine = count() * (axes.are_along_x() ? 3 : 4),
                                other = by_v.count() * (by_v.axes.are_along_x() ? 3 : 4);
@@ -67,7 +67,7 @@ struct large_pieces {
                 axes.from_rows(inside(u1, 0), inside(v1, 1), hi[2])};
     }
     // The most records that a triangle can have in a grid.
-    [[nodiscard]] static std::uint64_t most_records(glm::ivec3 extent) {
+    [[nodiscard]] static std::uint64_t max_records(glm::ivec3 extent) {
         const auto of = [](std::int64_t along, std::int64_t rest) {
             const std::int64_t pieces = (along / core::brick_size + 1) * (rest / across + 1);
             return static_cast<std::uint64_t>((pieces + per_record - 1) / per_record);
@@ -77,7 +77,7 @@ struct large_pieces {
     }
 
 private:
-    VOXELPIPE_HD large_pieces(const core::voxel_box& box, const core::row_axes& axes_)
+    VOXELPIPE_HD split_pieces(const core::voxel_box& box, const core::row_axes& axes_)
         : axes(axes_), lo(axes_.to_rows(box.lo[0], box.lo[1], box.lo[2])),
           hi(axes_.to_rows(box.hi[0], box.hi[1], box.hi[2])), first_u(lo[0] >> core::log2_brick),
           first_v(lo[1] / across), per_row((hi[0] >> core::log2_brick) - first_u + 1),
@@ -87,9 +87,9 @@ private:
     }
 };
 // Whichever rule.
-[[nodiscard]] inline std::uint64_t most_large_records(glm::ivec3 extent) {
-    return std::max(large_pieces<coverage::thin>::most_records(extent),
-                    large_pieces<coverage::conservative>::most_records(extent));
+[[nodiscard]] inline std::uint64_t max_work_items(glm::ivec3 extent) {
+    return std::max(split_pieces<coverage::thin>::max_records(extent),
+                    split_pieces<coverage::conservative>::max_records(extent));
 }
 
 // A triangle in full width, and what it may touch.
@@ -107,8 +107,8 @@ struct located_triangle {
         const core::voxel_box grid{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
         kind = core::classify<Call::rule>(a, b, c, call.in.fraction, grid, reach);
     }
-    // How it is cut, where it is drawn.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE large_pieces<Call::rule> pieces(int fraction) const {
+    // How it is split, where it is drawn.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE split_pieces<Call::rule> pieces(int fraction) const {
         return {reach, core::dominant_axis(a, b, c, fraction)};
     }
 };
@@ -124,28 +124,29 @@ __device__ inline core::triangle_class find_records(const Call& call, std::uint3
     return t.kind;
 }
 
-// The big triangles that a block left until its end, by all its threads.
+// The oversized triangles that a block left until its end, by all its threads.
 template <class Call, class Sink>
-__device__ VOXELPIPE_INLINE void cut_big(const Call& call, Sink& sink, const std::uint32_t* big, unsigned num_big) {
-    for (unsigned first = 0; first < num_big; first += blockDim.x) {
+__device__ VOXELPIPE_INLINE void split_oversized(const Call& call, Sink& sink, const std::uint32_t* oversized,
+                                                 unsigned num_oversized) {
+    for (unsigned first = 0; first < num_oversized; first += blockDim.x) {
         const unsigned at = first + threadIdx.x;
         unsigned long long records = 0;
-        const std::uint32_t triangle = at < num_big ? big[at] : 0;
-        if (at < num_big) {
+        const std::uint32_t triangle = at < num_oversized ? oversized[at] : 0;
+        if (at < num_oversized) {
             const core::triangle_class kind = find_records(call, triangle, records);
             if (kind != core::triangle_class::drawn) sink.drop(kind);
         }
         __syncwarp();
-        call.lists.push_cut(triangle, records);
+        call.lists.push_split(triangle, records);
     }
 }
 
 // What all records of a large triangle need of it.
 template <coverage Rule>
-struct alignas(16) large_setup {
+struct alignas(16) split_setup {
     std::conditional_t<Rule == coverage::thin, core::brick_thin, core::brick_triangle> bricks; // where is_narrow
     core::voxel_box box, reach; // of the triangle; what of it lies in the grid
-    large_pieces<Rule> pieces;
+    split_pieces<Rule> pieces;
     unsigned long long first_record; // of all, the triangle's first one
     std::uint32_t triangle;
     std::uint32_t is_narrow; // or the 64-bit path cannot hold it
@@ -154,19 +155,19 @@ struct alignas(16) large_setup {
     template <class Call>
     __device__ VOXELPIPE_INLINE void find(const Call& call, std::uint32_t number) {
         const int fraction = call.in.fraction;
-        first_record = call.lists.first_records[number];
-        triangle = call.lists.cut[number];
+        first_record = call.lists.first_work_items[number];
+        triangle = call.lists.split[number];
         const located_triangle<Call> t(call, triangle);
         const core::voxel_box whole = core::bounds(t.a, t.b, t.c, fraction);
-        const large_pieces<Rule> cut = t.pieces(fraction);
+        const split_pieces<Rule> split = t.pieces(fraction);
         const bool narrow = core::fits_narrow(t.a, t.b, t.c, fraction);
         reach = t.reach;
         box = whole;
-        pieces = cut;
+        pieces = split;
         is_narrow = narrow;
         if (!narrow) return;
         if constexpr (Rule == coverage::thin)
-            bricks = core::brick_thin(t.a, t.b, t.c, whole, cut.axes, fraction);
+            bricks = core::brick_thin(t.a, t.b, t.c, whole, split.axes, fraction);
         else
             bricks = core::brick_triangle(t.a, t.b, t.c, whole, fraction);
     }
@@ -180,7 +181,7 @@ struct alignas(16) large_setup {
             const std::uint32_t mine = first + lane * warps;
             unsigned record = 0, records = 0;
             if (mine < num) {
-                large_setup& setup = kept_of(call.lists)[mine];
+                split_setup& setup = kept_of(call.lists)[mine];
                 setup.find(call, mine);
                 record = static_cast<unsigned>(setup.first_record);
                 records = static_cast<unsigned>(setup.pieces.records());
@@ -192,7 +193,7 @@ struct alignas(16) large_setup {
                 const unsigned begin = __shfl_sync(0xffffffffu, record, of),
                                count = __shfl_sync(0xffffffffu, records, of);
                 for (unsigned i = lane; i < count; i += 32)
-                    call.lists.big[begin + i] = first + static_cast<unsigned>(of) * warps;
+                    call.lists.oversized[begin + i] = first + static_cast<unsigned>(of) * warps;
             }
         }
         __threadfence();
@@ -201,7 +202,7 @@ struct alignas(16) large_setup {
     }
     // Whether all `num` are there, soon: nobody waits long, for there may be blocks that have not begun. All lanes take
     // part.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool are_kept(const triangle_lists& lists, std::uint32_t num) {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool are_kept(const deferred_triangles& lists, std::uint32_t num) {
         ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device> kept(*lists.set_up);
         bool all = false;
         for (int look = 0; look < 256 && !all; ++look) {
@@ -213,9 +214,9 @@ struct alignas(16) large_setup {
         return all;
     }
     // Begins to bring one of those to this place in shared memory; to wait for it is the caller's. All lanes take part.
-    __device__ VOXELPIPE_INLINE void fetch(const triangle_lists& lists, std::uint32_t number) {
-        constexpr unsigned parts = sizeof(large_setup) / sizeof(uint4);
-        static_assert(parts <= 32 && sizeof(large_setup) <= triangle_lists::setup_bytes);
+    __device__ VOXELPIPE_INLINE void fetch(const deferred_triangles& lists, std::uint32_t number) {
+        constexpr unsigned parts = sizeof(split_setup) / sizeof(uint4);
+        static_assert(parts <= 32 && sizeof(split_setup) <= deferred_triangles::setup_bytes);
         const unsigned lane = threadIdx.x % 32;
         if (lane < parts)
             copy_four_words(static_cast<std::uint32_t>(__cvta_generic_to_shared(this)) + 16 * lane,
@@ -223,8 +224,8 @@ struct alignas(16) large_setup {
     }
 
 private:
-    [[nodiscard]] __device__ VOXELPIPE_INLINE static large_setup* kept_of(const triangle_lists& lists) {
-        return reinterpret_cast<large_setup*>(lists.setups);
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static split_setup* kept_of(const deferred_triangles& lists) {
+        return reinterpret_cast<split_setup*>(lists.setups);
     }
 };
 
@@ -282,24 +283,24 @@ struct span_writer {
     return uniform(first);
 }
 
-inline constexpr int most_bricks = 64;
+inline constexpr int max_bricks = 64;
 
 // What one warp keeps in shared memory for a large triangle.
 template <coverage Rule>
 struct brick_memory {
-    large_setup<Rule> setups[2]; // of a record and of the next one
+    split_setup<Rule> setups[2]; // of a record and of the next one
     std::uint32_t next;          // the number of the next one's, or of the one after that
     // Those that wait, in bricks of the grid.
-    std::int16_t bricks[Rule == coverage::thin ? 1 : 3][most_bricks];
+    std::int16_t bricks[Rule == coverage::thin ? 1 : 3][max_bricks];
 };
 
-// Into how many parts, a power of two, a record is cut. A warp goes through the bricks of its columns four at a time:
+// Into how many parts, a power of two, a record is split. A warp goes through the bricks of its columns four at a time:
 // where there are few records, more warps with less each end sooner. Thin pieces are a lane's own.
 template <coverage Rule>
 [[nodiscard]] VOXELPIPE_HD inline unsigned parts_of_record(unsigned long long records, unsigned warps) {
     unsigned parts = 1;
     if (Rule == coverage::conservative)
-        while (parts < large_pieces<Rule>::per_record && records * parts * 2 <= warps) parts *= 2;
+        while (parts < split_pieces<Rule>::per_record && records * parts * 2 <= warps) parts *= 2;
     return parts;
 }
 
@@ -315,7 +316,7 @@ struct thin_piece {
 
     // No columns where it is not `wanted`.
     template <class Sink>
-    __device__ VOXELPIPE_INLINE thin_piece(const large_setup<coverage::thin>& t, std::int64_t piece, bool wanted,
+    __device__ VOXELPIPE_INLINE thin_piece(const split_setup<coverage::thin>& t, std::int64_t piece, bool wanted,
                                            const Sink& sink)
         : axes(t.pieces.axes), u(static_cast<int>(t.pieces.u(piece))), v(static_cast<int>(t.pieces.v(piece))) {
         const auto& first = t.bricks.first;
@@ -342,7 +343,8 @@ struct thin_piece {
     // To a sink that shares out what all lanes have, 32 columns at a time whosever row they are in; false where that
     // cannot be, for some may lie outside of the grid. All lanes take part, with rows of one triangle.
     template <class Sink>
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool give_by_all(const large_setup<coverage::thin>& t, Sink& sink) const {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool emit_by_group(const split_setup<coverage::thin>& t,
+                                                                 Sink& sink) const {
         constexpr int most = core::brick_size + 1; // slopes are at most one
         if (!__all_sync(0xffffffffu, row.columns == 0 || (lo <= -most && hi >= most))) return false;
         const int first = row.columns != 0 ? row.first_column() : 0; // of no lane that has none is anything asked
@@ -361,7 +363,7 @@ struct thin_piece {
     // Run by run of columns that have one depth. ByPlace: those that do not lie along x go to where they lie; otherwise
     // all are rows, of which the sink is told.
     template <bool ByPlace, class Sink>
-    __device__ VOXELPIPE_INLINE void give(const large_setup<coverage::thin>& t, Sink& sink) const {
+    __device__ VOXELPIPE_INLINE void emit(const split_setup<coverage::thin>& t, Sink& sink) const {
         if (row.columns == 0) return;
         const int last = row.last_column();
         for (int from = row.first_column(), to = 0; from <= last; from = to + 1) {
@@ -375,7 +377,7 @@ struct thin_piece {
                 continue;
             }
             if constexpr (ByPlace) {
-                sink.put_line(origin + by_u * from + by_w * depth, by_u, static_cast<unsigned>(to - from + 1));
+                sink.emit_line(origin + by_u * from + by_w * depth, by_u, static_cast<unsigned>(to - from + 1));
             } else {
                 for (int column = from; column <= to; ++column) {
                     const auto p = axes.from_rows(u + column, v, w + depth);
@@ -388,45 +390,46 @@ struct thin_piece {
 };
 
 // How many records there are, and triangles that have some.
-struct large_records {
+struct split_work_items {
     unsigned long long records, triangles;
 
-    __device__ VOXELPIPE_INLINE explicit large_records(const triangle_lists& lists) {
+    __device__ VOXELPIPE_INLINE explicit split_work_items(const deferred_triangles& lists) {
         const unsigned long long packed = uniform(*lists.next);
-        records = packed & ((1ull << triangle_lists::record_bits) - 1);
-        triangles = packed >> triangle_lists::record_bits;
+        records = packed & ((1ull << deferred_triangles::work_item_bits) - 1);
+        triangles = packed >> deferred_triangles::work_item_bits;
     }
     // Whether all triangles are set up first, for whoever has one of their records: where warps have several.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool want_setups(const triangle_lists& lists, unsigned warps) const {
-        return triangles <= lists.num_setups && records >= 3 * warps && records <= lists.big_room;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool want_setups(const deferred_triangles& lists, unsigned warps) const {
+        return triangles <= lists.num_setups && records >= 3 * warps && records <= lists.oversized_capacity;
     }
 };
 
-// The pieces of all triangles in call.lists.cut, a lane each; parts warp, warp + warps, ... of the
+// The pieces of all triangles in call.lists.split, a lane each; parts warp, warp + warps, ... of the
 // records are this warp's. Conservative: the lanes find the bricks that the triangle meets in their columns, and
-// medium_lanes of them then take a brick each.
+// group_lanes of them then take a brick each.
 template <class Call, class Sink>
-__device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, brick_memory<Call::rule>& memory,
-                                                unsigned warp, unsigned warps) {
+__device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink, brick_memory<Call::rule>& memory,
+                                                   unsigned warp, unsigned warps) {
     constexpr bool thin = Call::rule == coverage::thin;
     constexpr auto rule = core::to_rule(Call::rule);
-    constexpr int per_record = large_pieces<Call::rule>::per_record;
+    constexpr int per_record = split_pieces<Call::rule>::per_record;
     using sink_type = Sink;
     const unsigned lane = threadIdx.x % 32;
-    const large_records all(call.lists);
+    const split_work_items all(call.lists);
     const unsigned long long records = all.records;
     const unsigned parts = parts_of_record<Call::rule>(records, warps);
-    using setup_type = large_setup<Call::rule>;
+    using setup_type = split_setup<Call::rule>;
     // What is kept comes while the record before is drawn, and the number of a record's, while the one before that is;
     // in registers they would be waited for.
     const bool are_kept = all.want_setups(call.lists, warps) &&
                           setup_type::are_kept(call.lists, static_cast<std::uint32_t>(all.triangles));
     const auto fetch_number = [&](unsigned long long record) VOXELPIPE_INLINE_LAMBDA {
         if (lane == 0 && record < records)
-            copy_word(static_cast<std::uint32_t>(__cvta_generic_to_shared(&memory.next)), call.lists.big + record);
+            copy_word(static_cast<std::uint32_t>(__cvta_generic_to_shared(&memory.next)),
+                      call.lists.oversized + record);
     };
     if (are_kept) {
-        memory.setups[0].fetch(call.lists, call.lists.big[warp]);
+        memory.setups[0].fetch(call.lists, call.lists.oversized[warp]);
         fetch_number(std::uint64_t{warp} + warps);
     }
     unsigned which = 0;
@@ -442,12 +445,12 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
             if (r + warps < records) memory.setups[which ^ 1].fetch(call.lists, next);
             fetch_number(r + 2ull * warps);
         } else {
-            const unsigned number = find_last(call.lists.first_records, static_cast<unsigned>(all.triangles), r);
+            const unsigned number = find_last(call.lists.first_work_items, static_cast<unsigned>(all.triangles), r);
             if (lane == 0) memory.setups[0].find(call, number);
             __syncwarp();
         }
         const setup_type& setup = memory.setups[which];
-        const large_pieces<Call::rule>& pieces = setup.pieces;
+        const split_pieces<Call::rule>& pieces = setup.pieces;
         const unsigned of_record = lane % per_record, of_piece = lane / per_record;
         const auto piece = static_cast<std::int64_t>((r - setup.first_record) * per_record + of_record);
         sink.begin(setup.triangle);
@@ -457,7 +460,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
             const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
                                          c = call.in.source.position(index.z);
             const bool wanted = valid && pieces.has_rows(piece, of_piece);
-            feed(sink, [&] {
+            emit_with_retry(sink, [&] {
                 if (!wanted) return;
                 span_writer<sink_type> writer{sink};
                 for_each_wide_span<rule>(
@@ -469,18 +472,19 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
         }
         if constexpr (thin) {
             const thin_piece<place_of_sink<Sink>> found(setup, piece, valid, sink);
-            if constexpr (Sink::has_rounds)
-                if (found.give_by_all(setup, sink)) continue;
-            feed(sink, [&] { found.template give<Call::output::only_sets || Sink::buffers>(setup, sink); });
+            if constexpr (Sink::takes_warp_rounds)
+                if (found.emit_by_group(setup, sink)) continue;
+            emit_with_retry(
+                sink, [&] { found.template emit<Call::output::only_sets || Sink::stages_in_shared>(setup, sink); });
         } else {
             const core::brick_triangle& t = setup.bricks;
             const core::voxel_box &box = setup.box, &reach = setup.reach;
             const int axis = pieces.axes.dominant;
             const auto raster_bricks = [&](int n) {
                 __syncwarp();
-                for (int first = 0; first < n; first += 32 / medium_lanes) {
-                    const int at = first + static_cast<int>(lane) / medium_lanes;
-                    feed(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
+                for (int first = 0; first < n; first += 32 / group_lanes) {
+                    const int at = first + static_cast<int>(lane) / group_lanes;
+                    emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
                         if (at >= n) return;
                         std::int32_t corner[3]; // in the grid
                         int from[3];            // the same from the bounding box
@@ -493,7 +497,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
                                              ? static_cast<int>(reach.hi[k]) - corner[k]
                                              : core::brick_size - 1;
                         }
-                        sink.mark_brick(corner, lane % medium_lanes);
+                        sink.mark_brick(corner, lane % group_lanes);
                         raster_lanes(t.at(from[0], from[1], from[2]), corner, part, sink);
                     });
                 }
@@ -528,7 +532,7 @@ __device__ VOXELPIPE_INLINE void raster_records(const Call& call, Sink& sink, br
                 const int place = take_place(hit, waiting);
                 if (hit)
                     for (int k = 0; k < 3; ++k) memory.bricks[k][place] = static_cast<std::int16_t>(brick[k]);
-                if (waiting > most_bricks - 32) {
+                if (waiting > max_bricks - 32) {
                     raster_bricks(waiting);
                     waiting = 0;
                 }

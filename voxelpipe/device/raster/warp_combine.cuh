@@ -72,7 +72,7 @@ struct combining_sink : Call::sink {
         this->mine = {};
         words.start();
     }
-    __device__ VOXELPIPE_INLINE void put(const word_place& at, bool wanted) {
+    __device__ VOXELPIPE_INLINE void emit(const word_place& at, bool wanted) {
         if (!wanted) return;
         ++this->mine.fragments;
         words.set(voxelpipe::get<0>(this->call.out.fb.targets).elements, at.number(), at.bit());

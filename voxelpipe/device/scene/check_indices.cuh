@@ -32,7 +32,7 @@ __global__ void check_indices_kernel(const Index* indices, std::uint64_t count, 
 
 // The greatest index, where `most` was 0.
 template <class Index>
-__global__ void most_index_kernel(const Index* indices, std::uint64_t count, Index* most) {
+__global__ void max_index_kernel(const Index* indices, std::uint64_t count, Index* most) {
     await_stream();
     const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
     Index mine = 0;
@@ -52,7 +52,7 @@ inline void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangl
 // Of some triangles, none of which there may be.
 inline void find_most_index(const array_view<const glm::uvec3>& triangles, std::uint32_t* most, cudaStream_t stream) {
     if (triangles.size() == 0) return;
-    launch_behind(most_index_kernel<std::uint32_t>, fill_device(triangles.size()), threads_per_block, stream,
+    launch_behind(max_index_kernel<std::uint32_t>, fill_device(triangles.size()), threads_per_block, stream,
                   stage::validate, reinterpret_cast<const std::uint32_t*>(triangles.data()),
                   std::uint64_t{3} * triangles.size(), most);
 }

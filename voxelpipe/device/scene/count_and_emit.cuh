@@ -25,9 +25,9 @@ struct chunk_record {
 };
 
 // Whether a box of cells is one thread's work: at most so many columns, whichever the dominant axis.
-[[nodiscard]] VOXELPIPE_HD inline bool is_small(const core::voxel_box& box, std::int64_t most_columns) {
+[[nodiscard]] VOXELPIPE_HD inline bool is_small(const core::voxel_box& box, std::int64_t max_columns) {
     const std::int64_t x = box.hi[0] - box.lo[0] + 1, y = box.hi[1] - box.lo[1] + 1, z = box.hi[2] - box.lo[2] + 1;
-    return core::max3(x * y, y * z, z * x) <= most_columns;
+    return core::max3(x * y, y * z, z * x) <= max_columns;
 }
 
 // The chunks of a box of cells: rows of up to 16 columns in the plane of u and v, all of w.

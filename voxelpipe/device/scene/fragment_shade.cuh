@@ -122,7 +122,7 @@ __device__ VOXELPIPE_INLINE auto shade_small_fragment(const Scene& s, std::uint3
     tri.triangle = id - d.first_primitive;
     tri.index = d.triangles[tri.triangle];
     const int fraction = s.geo.snap.fraction;
-    const near_triangle r = load_near(raster_input<stored_source>{{d}, 0, fraction, s.geo.extent}, tri.index);
+    const int32_triangle r = load_int32(raster_input<stored_source>{{d}, 0, fraction, s.geo.extent}, tri.index);
     if (!AllSmall && (!r.is_near || r.most() > core::small_voxels(fraction)))
         return shade_fragment_apart(s, id, x, y, z);
     const core::small_frame frame(r.relative(fraction), fraction);

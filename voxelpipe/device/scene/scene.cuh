@@ -19,11 +19,11 @@ namespace voxelpipe::device {
 
 // A snapped position in 32 bits, where it is no further than 2^30 units from the first voxel of what is rasterised. One
 // load of 16 bytes, where the position has three of 8.
-struct __align__(16) near_position {
+struct __align__(16) int32_position {
     std::int32_t q[3];
     std::uint32_t is_near; // or 0, and then q holds nothing
 
-    [[nodiscard]] VOXELPIPE_HD static near_position of(const core::snapped_position& p) {
+    [[nodiscard]] VOXELPIPE_HD static int32_position of(const core::snapped_position& p) {
         constexpr std::int64_t limit = std::int64_t{1} << 30;
         const bool near =
             p.x <= limit && p.x >= -limit && p.y <= limit && p.y >= -limit && p.z <= limit && p.z >= -limit;
@@ -33,11 +33,11 @@ struct __align__(16) near_position {
 // The positions that vertex_shade leaves, in both forms.
 struct vertex_positions {
     core::snapped_position* exact;
-    near_position* near;
+    int32_position* near;
 
     [[nodiscard]] static vertex_positions take(arena& memory, std::size_t num_vertices) {
         core::snapped_position* const exact = memory.take<core::snapped_position>(num_vertices);
-        return {exact, memory.take<near_position>(num_vertices)};
+        return {exact, memory.take<int32_position>(num_vertices)};
     }
     // Those of a mesh whose first vertex is this one of all. With an arena that only adds up, nothing.
     [[nodiscard]] vertex_positions from(std::size_t vertex) const {

@@ -39,7 +39,7 @@ struct shading_source {
         const auto result = shader(voxelpipe::vertex<>{0, draw, position, {}});
         return core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result).position;
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(const loaded& p, std::int32_t (&q)[3]) const {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool int32_position(const loaded& p, std::int32_t (&q)[3]) const {
         return core::snap_near(snap, p.x, p.y, p.z, q);
     }
     [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
@@ -53,7 +53,7 @@ struct shading_source {
 struct stored_source {
     draw_geometry geometry;
 
-    using loaded = device::near_position;
+    using loaded = device::int32_position;
     [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(std::uint32_t vertex) const {
         return geometry.positions.near[vertex];
     }
@@ -62,7 +62,7 @@ struct stored_source {
         return geometry.positions.near + vertex;
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE static loaded load(const stored& position) { return position; }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near_position(const loaded& p, std::int32_t (&q)[3]) const {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool int32_position(const loaded& p, std::int32_t (&q)[3]) const {
         for (int k = 0; k < 3; ++k) q[k] = p.q[k];
         return p.is_near != 0;
     }
@@ -91,7 +91,7 @@ template <class Source>
 // ---- near ones ------------------------------------------------------------------------------------------------------
 
 // A triangle whose vertices are less than 2^30 units from the grid's origin, and its bounding box.
-struct near_triangle {
+struct int32_triangle {
     std::int32_t q[3][3]; // [vertex][axis], in units of 2^-F voxel from the first voxel of what is rasterised
     std::int32_t lo[3];   // lowest voxel of the bounding box
     std::int32_t hi[3];   // its highest voxel
@@ -153,17 +153,17 @@ template <class Source>
     return {{call.source.load(index.x), call.source.load(index.y), call.source.load(index.z)}};
 }
 template <class Source>
-[[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle make_near(const raster_input<Source>& call,
-                                                                  const loaded_corners<Source>& corners) {
-    near_triangle r;
-    r.is_near = call.source.near_position(corners.of[0], r.q[0]) & call.source.near_position(corners.of[1], r.q[1]) &
-                call.source.near_position(corners.of[2], r.q[2]);
+[[nodiscard]] __device__ VOXELPIPE_INLINE int32_triangle make_near(const raster_input<Source>& call,
+                                                                   const loaded_corners<Source>& corners) {
+    int32_triangle r;
+    r.is_near = call.source.int32_position(corners.of[0], r.q[0]) & call.source.int32_position(corners.of[1], r.q[1]) &
+                call.source.int32_position(corners.of[2], r.q[2]);
     r.find_box(call.fraction);
     return r;
 }
 template <class Source>
-[[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle load_near(const raster_input<Source>& call,
-                                                                  const glm::uvec3& index) {
+[[nodiscard]] __device__ VOXELPIPE_INLINE int32_triangle load_int32(const raster_input<Source>& call,
+                                                                    const glm::uvec3& index) {
     return make_near(call, load_corners(call, index));
 }
 
@@ -198,7 +198,7 @@ struct coming_corners {
         }
     }
     // Those that were fetched last.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE near_triangle take(const raster_input<Source>& call) const {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE int32_triangle take(const raster_input<Source>& call) const {
         await_copies();
         loaded_corners<Source> corners;
 #pragma unroll

@@ -36,11 +36,11 @@ struct chunk_marks {
         return words + (static_cast<std::size_t>(z) * static_cast<unsigned>(rows.y) + static_cast<unsigned>(y)) *
                            static_cast<unsigned>(rows.words);
     }
-    // The brick (core/brick_triangle.hpp) whose lowest voxel this is, by medium_lanes lanes.
+    // The brick (core/brick_triangle.hpp) whose lowest voxel this is, by group_lanes lanes.
     __device__ VOXELPIPE_INLINE void mark_brick(const std::int32_t (&corner)[3], unsigned lane) const {
         constexpr unsigned across = core::brick_size / chunk_yz;
         static_assert(core::brick_size % chunk_yz == 0 && chunk_x % core::brick_size == 0 &&
-                      across * across <= static_cast<unsigned>(medium_lanes));
+                      across * across <= static_cast<unsigned>(group_lanes));
         const int y = corner[1] + static_cast<int>(lane % across) * chunk_yz,
                   z = corner[2] + static_cast<int>(lane / across) * chunk_yz;
         if (lane < across * across && y < extent.y && z < extent.z) mark_row(corner[0], corner[0], y, z);

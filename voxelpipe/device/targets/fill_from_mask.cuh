@@ -109,13 +109,13 @@ struct value_writer {
 };
 
 template <class Target>
-__global__ __launch_bounds__(threads_per_block) void end_values_kernel(
+__global__ __launch_bounds__(threads_per_block) void fill_values_kernel(
     const word* touched, const __grid_constant__ target_view<Target> t,
     const __grid_constant__ typename Target::value_type value, const __grid_constant__ chunk_marks marks,
     bool is_filled, const pipeline_state* state, capacities limits) {
     using writer = value_writer<Target>;
     await_stream();
-    if (state->index_error != 0 || misses_triangles(*state, limits)) return;
+    if (state->index_error != 0 || misses_deferred(*state, limits)) return;
     const writer w{touched, t, value};
     if constexpr (writer::goes_wide) {
         if (is_filled && static_cast<unsigned>(t.extent.x) * sizeof(value) % 16 == 0 &&
@@ -128,15 +128,15 @@ __global__ __launch_bounds__(threads_per_block) void end_values_kernel(
 }
 // Of a target that is not cleared by chunks; bricks that are cleared have been, with their padding.
 template <class Target, class Tracking>
-void end_values(const word* touched, const target_view<Target>& t, const typename Target::value_type& value,
-                const Tracking& tracking, const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+void fill_values(const word* touched, const target_view<Target>& t, const typename Target::value_type& value,
+                 const Tracking& tracking, const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
     // By blocks that end, as in clear_target.
     const std::uint64_t bytes = Target::map::elements(t.extent) * sizeof(typename Target::element_type),
-                        blocks = std::min(bytes / (16 * fill_stores * threads_per_block) + 1, core::most_blocks);
+                        blocks = std::min(bytes / (16 * fill_stores * threads_per_block) + 1, core::max_blocks);
     // Where other targets are cleared by chunks, the log will know nothing of this one.
     const bool fills = t.load == load_operation::clear && !Target::map::bricks,
                marks = !fills && !tracking.changes_known;
-    launch_behind(end_values_kernel<Target>, static_cast<unsigned>(blocks), threads_per_block, stream,
+    launch_behind(fill_values_kernel<Target>, static_cast<unsigned>(blocks), threads_per_block, stream,
                   stage::tile_resolve, touched, t, value, marks ? tracking.marks() : chunk_marks{}, fills, state,
                   limits);
 }
@@ -154,7 +154,7 @@ struct cleared_and_drawn {
 // at one z of it. The elements are those of one plane, or of all; with keeps_marks, what is touched is marked from then
 // on, and nothing else.
 template <class Element>
-__global__ __launch_bounds__(threads_per_block) void end_chunks_kernel(
+__global__ __launch_bounds__(threads_per_block) void fill_chunks_kernel(
     const word* touched, Element* to, cleared_and_drawn<Element> values, const __grid_constant__ chunk_marks marks,
     const word* known, const __grid_constant__ core::change_log::known wanted, bool keeps_marks,
     const pipeline_state* state, capacities limits) {
@@ -163,7 +163,7 @@ __global__ __launch_bounds__(threads_per_block) void end_chunks_kernel(
     __shared__ word bits[warps][rows][32];
     __shared__ word touched_by[warps], old; // chunks
     await_stream();
-    if (state->index_error != 0 || misses_triangles(*state, limits)) return;
+    if (state->index_error != 0 || misses_deferred(*state, limits)) return;
     const bool is_known = is_known_as(known, wanted);
     const int lane = static_cast<int>(threadIdx.x) % 32, warp = static_cast<int>(threadIdx.x) / 32;
     // As numbers, of which the touched bits choose by arithmetic.
@@ -219,14 +219,14 @@ __global__ __launch_bounds__(threads_per_block) void end_chunks_kernel(
 }
 // Of target K, which is cleared by chunks.
 template <std::size_t K, class Target, class Tracking>
-void end_chunks(const word* touched, const target_view<Target>& t, const typename Target::value_type& value,
-                const Tracking& tracking, const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+void fill_chunks(const word* touched, const target_view<Target>& t, const typename Target::value_type& value,
+                 const Tracking& tracking, const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
     using map = typename Target::map;
     using element = typename Target::element_type;
     const chunk_marks marks = tracking.marks();
-    const std::size_t blocks = std::min<std::size_t>(marks.rows.num_words(), core::most_blocks);
+    const std::size_t blocks = std::min<std::size_t>(marks.rows.num_words(), core::max_blocks);
     const auto end = [&](element* to, const element& cleared, const element& drawn, bool is_last) {
-        launch_behind(end_chunks_kernel<element>, static_cast<unsigned>(blocks), threads_per_block, stream,
+        launch_behind(fill_chunks_kernel<element>, static_cast<unsigned>(blocks), threads_per_block, stream,
                       stage::tile_resolve, touched, to, cleared_and_drawn<element>{cleared, drawn}, marks,
                       tracking.known_of(K), tracking.after[K],
                       is_last && tracking.last_by_chunks == static_cast<int>(K), state, limits);
@@ -242,12 +242,12 @@ void end_chunks(const word* touched, const target_view<Target>& t, const typenam
 }
 
 // Of the touched voxels' bits, which the last passes go through.
-inline constexpr std::uint64_t most_touched_bytes = std::uint64_t{512} << 20;
+inline constexpr std::uint64_t max_mask_bytes = std::uint64_t{512} << 20;
 // Where targets can be drawn into as they lie (raster/raster.cuh): what is in L2 then. Without voxels to count, nor
 // values to clear, those passes take longer than a clear, from more bytes than these on: 16 MB and the 871,000
 // triangles of the dragon 0.0976 instead of 0.0935 ms, 2.9 million the same, 7.2 million 0.173 instead of 0.193.
-inline constexpr std::uint64_t most_touched_bytes_of_direct = std::uint64_t{32} << 20;
-inline constexpr std::uint64_t least_touched_bytes = std::uint64_t{1} << 20, touched_bytes_per_triangle = 6;
+inline constexpr std::uint64_t max_mask_bytes_of_immediate = std::uint64_t{32} << 20;
+inline constexpr std::uint64_t min_mask_bytes = std::uint64_t{1} << 20, mask_bytes_per_triangle = 6;
 
 // ---- the last passes ------------------------------------------------------------------------------------------------
 
@@ -258,9 +258,9 @@ inline constexpr bool is_blended_once = std::is_same_v<typename Target::blend_ty
                                                                    bit_blend<typename Target::blend_type>::clears
                                                              : core::is_repeated_once<typename Target::blend_type>);
 template <class Framebuffer>
-inline constexpr bool depends_on_touched = false;
+inline constexpr bool depends_on_mask = false;
 template <class... Targets>
-inline constexpr bool depends_on_touched<framebuffer_view<Targets...>> = (is_blended_once<Targets> && ...);
+inline constexpr bool depends_on_mask<framebuffer_view<Targets...>> = (is_blended_once<Targets> && ...);
 
 // Whether some target is written from end to end anyway.
 template <class... Targets>
@@ -275,7 +275,7 @@ template <class... Targets>
 
 // What a word of a target becomes, of which these bits are touched by fragments of this value.
 template <class Target>
-__device__ VOXELPIPE_INLINE word end_word(word old, word touched, bool value) {
+__device__ VOXELPIPE_INLINE word fill_word(word old, word touched, bool value) {
     using blend_type = bit_blend<typename Target::blend_type>;
     if (value) return blend_type::clears ? old : old | touched;
     return blend_type::sets ? old : old & ~touched;
@@ -283,8 +283,8 @@ __device__ VOXELPIPE_INLINE word end_word(word old, word touched, bool value) {
 
 // The words of a target of bits at words `first` to first + 3 of the grid's, of which there are `num`.
 template <class Target>
-__device__ VOXELPIPE_INLINE void end_words(const target_view<Target>& t, std::uint64_t first, std::uint64_t num,
-                                           const uint4& touched, bool value) {
+__device__ VOXELPIPE_INLINE void fill_words(const target_view<Target>& t, std::uint64_t first, std::uint64_t num,
+                                            const uint4& touched, bool value) {
     using map = typename Target::map;
     const word bits[4] = {touched.x, touched.y, touched.z, touched.w};
     const bool is_cleared = t.load == load_operation::clear && !map::bricks; // those of bricks have been
@@ -293,10 +293,10 @@ __device__ VOXELPIPE_INLINE void end_words(const target_view<Target>& t, std::ui
         if (is_cleared && !t.clear_value && first + 4 <= num &&
             reinterpret_cast<std::uintptr_t>(t.elements) % 16 == 0) {
             uint4 made;
-            made.x = end_word<Target>(0, bits[0], value);
-            made.y = end_word<Target>(0, bits[1], value);
-            made.z = end_word<Target>(0, bits[2], value);
-            made.w = end_word<Target>(0, bits[3], value);
+            made.x = fill_word<Target>(0, bits[0], value);
+            made.y = fill_word<Target>(0, bits[1], value);
+            made.z = fill_word<Target>(0, bits[2], value);
+            made.w = fill_word<Target>(0, bits[3], value);
             *reinterpret_cast<uint4*>(t.elements + first) = made;
             return;
         }
@@ -313,19 +313,19 @@ __device__ VOXELPIPE_INLINE void end_words(const target_view<Target>& t, std::ui
         }
         const int left = t.extent.x - x;
         const word cleared = !t.clear_value ? 0 : left >= 32 ? ~0u : (1u << left) - 1;
-        t.elements[at] = end_word<Target>(is_cleared ? cleared : t.elements[at], bits[k], value);
+        t.elements[at] = fill_word<Target>(is_cleared ? cleared : t.elements[at], bits[k], value);
     }
 }
 
 template <class Framebuffer, class Values>
-__global__ __launch_bounds__(threads_per_block) void end_touched_kernel(uint4* touched, std::uint64_t num_words,
-                                                                        const __grid_constant__ Framebuffer fb,
-                                                                        const __grid_constant__ Values values,
-                                                                        bool count_voxels, pipeline_state* state,
-                                                                        capacities limits) {
+__global__ __launch_bounds__(threads_per_block) void fill_bits_kernel(uint4* touched, std::uint64_t num_words,
+                                                                      const __grid_constant__ Framebuffer fb,
+                                                                      const __grid_constant__ Values values,
+                                                                      bool count_voxels, pipeline_state* state,
+                                                                      capacities limits) {
     constexpr unsigned batch = 4; // loads that go out together
     await_stream();
-    const bool failed = state->index_error != 0 || misses_triangles(*state, limits);
+    const bool failed = state->index_error != 0 || misses_deferred(*state, limits);
     const std::uint64_t num = (num_words + 3) / 4, threads = std::uint64_t{gridDim.x} * blockDim.x;
     unsigned found = 0;
     for (std::uint64_t first = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; first < num;
@@ -346,7 +346,7 @@ __global__ __launch_bounds__(threads_per_block) void end_touched_kernel(uint4* t
                 if constexpr (targets_of<Framebuffer>::template at<K>::map::is_bit) {
                     const auto& target = voxelpipe::get<K>(fb.targets);
                     if (target.load != load_operation::off)
-                        end_words(target, 4 * i, num_words, t, voxelpipe::get<K>(values));
+                        fill_words(target, 4 * i, num_words, t, voxelpipe::get<K>(values));
                 }
             });
         }
@@ -358,9 +358,9 @@ __global__ __launch_bounds__(threads_per_block) void end_touched_kernel(uint4* t
 
 // Ends a call: touched voxels become values of the targets, and zeros.
 template <class... Targets, class Values>
-void end_touched(word* touched, const framebuffer_view<Targets...>& fb,
-                 const change_tracking<framebuffer_view<Targets...>>& tracking, const Values& values, bool count_voxels,
-                 pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+void fill_from_mask(word* touched, const framebuffer_view<Targets...>& fb,
+                    const change_tracking<framebuffer_view<Targets...>>& tracking, const Values& values,
+                    bool count_voxels, pipeline_state* state, const capacities& limits, cudaStream_t stream) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         using target = typename core::pack_element<K, Targets...>::type;
         using map = typename target::map;
@@ -370,16 +370,16 @@ void end_touched(word* touched, const framebuffer_view<Targets...>& fb,
         if constexpr (!map::is_bit) {
             const auto value = static_cast<typename target::value_type>(voxelpipe::get<K>(values));
             if constexpr (!map::bricks)
-                if (tracking.by_chunks[K]) end_chunks<K>(touched, t, value, tracking, state, limits, stream);
+                if (tracking.by_chunks[K]) fill_chunks<K>(touched, t, value, tracking, state, limits, stream);
             if (t.load != load_operation::off && !tracking.by_chunks[K])
-                end_values(touched, t, value, tracking, state, limits, stream);
+                fill_values(touched, t, value, tracking, state, limits, stream);
         }
     });
     note_clears(tracking, false, state, limits, stream);
-    const std::uint64_t num = touched_target::map::elements(fb.extent);
-    launch_behind(end_touched_kernel<framebuffer_view<Targets...>, Values>, fill_device(num / 16 + 1),
-                  threads_per_block, stream, stage::tile_resolve, reinterpret_cast<uint4*>(touched), num, fb, values,
-                  count_voxels, state, limits);
+    const std::uint64_t num = mask_target::map::elements(fb.extent);
+    launch_behind(fill_bits_kernel<framebuffer_view<Targets...>, Values>, fill_device(num / 16 + 1), threads_per_block,
+                  stream, stage::tile_resolve, reinterpret_cast<uint4*>(touched), num, fb, values, count_voxels, state,
+                  limits);
 }
 
 } // namespace voxelpipe::device

@@ -5,7 +5,7 @@
 // Counted targets of a call without tiles: cleared ones whose fragments all have one value. During the raster the
 // target's own memory holds how many fragments each voxel has got; a last pass makes the values of these numbers. So a
 // sum of floats need not be exact in its type, and voxels are counted where no atomic tells first touches. Here: which
-// targets of a call are counted (plan_direct), and the last pass (end_counts).
+// targets of a call are counted (plan_immediate), and the last pass (finalize_counts).
 
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/targets/dirty_chunks.cuh>
@@ -20,18 +20,18 @@ namespace voxelpipe::device {
 // ---- which targets --------------------------------------------------------------------------------------------------
 
 template <std::size_t N>
-struct direct_plan {
+struct immediate_plan {
     bool possible = true;
-    direct_modes<N> modes;
+    immediate_modes<N> modes;
     int voxels_of = -1; // which counted target tells at the end how many voxels are touched
     int bits_of = -1;   // which target of bits does
 
-    [[nodiscard]] bool counts(std::size_t k) const { return modes.of[k] == direct_mode::count; }
+    [[nodiscard]] bool counts(std::size_t k) const { return modes.of[k] == immediate_mode::count; }
     [[nodiscard]] bool any_counted() const { return first_counted() >= 0; }
     [[nodiscard]] bool has_last_pass() const { return any_counted() || bits_of >= 0; }
     [[nodiscard]] bool only_blends() const {
-        for (const direct_mode mode : modes.of)
-            if (mode != direct_mode::blend) return false;
+        for (const immediate_mode mode : modes.of)
+            if (mode != immediate_mode::blend) return false;
         return true;
     }
     [[nodiscard]] int first_counted() const {
@@ -94,11 +94,9 @@ struct count_values {
 
 // Numbers of fragments become values, padding included; with marks, of what is marked. Not where the call has failed.
 template <class Fold, class T>
-__global__ __launch_bounds__(threads_per_block) void end_counts_kernel(unsigned_word<T>* at, std::uint64_t num_elements,
-                                                                       const __grid_constant__ chunk_marks marks,
-                                                                       const __grid_constant__ Fold fold,
-                                                                       bool count_voxels, pipeline_state* state,
-                                                                       capacities limits) {
+__global__ __launch_bounds__(threads_per_block) void finalize_counts_kernel(
+    unsigned_word<T>* at, std::uint64_t num_elements, const __grid_constant__ chunk_marks marks,
+    const __grid_constant__ Fold fold, bool count_voxels, pipeline_state* state, capacities limits) {
     using number = unsigned_word<T>;
     constexpr int per_load = 16 / sizeof(T), batch = 4; // loads that go out together
     __shared__ number known[threads_per_block];
@@ -177,9 +175,9 @@ __global__ __launch_bounds__(threads_per_block) void count_bits_kernel(const __g
 
 // Ends the counted targets of a call, whose draws give these values, by marks where there are any, and counts voxels.
 template <class... Targets, class Values>
-void end_counts(const direct_plan<sizeof...(Targets)>& plan, const framebuffer_view<Targets...>& fb,
-                const Values& values, const chunk_marks& marks, pipeline_state* state, const capacities& limits,
-                cudaStream_t stream) {
+void finalize_counts(const immediate_plan<sizeof...(Targets)>& plan, const framebuffer_view<Targets...>& fb,
+                     const Values& values, const chunk_marks& marks, pipeline_state* state, const capacities& limits,
+                     cudaStream_t stream) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         using target = typename core::pack_element<K, Targets...>::type;
         if constexpr (target::map::is_bit) {
@@ -195,9 +193,9 @@ void end_counts(const direct_plan<sizeof...(Targets)>& plan, const framebuffer_v
             value_type value{}; // count has none
             if constexpr (!std::is_same_v<typename target::blend_type, blend::count>) value = voxelpipe::get<K>(values);
             const std::uint64_t count = target::map::elements(t.extent);
-            launch_behind(end_counts_kernel<fold_type, value_type>, fill_device(count / (16 / sizeof(value_type)) + 1),
-                          threads_per_block, stream, stage::tile_resolve,
-                          reinterpret_cast<unsigned_word<value_type>*>(t.elements), count,
+            launch_behind(finalize_counts_kernel<fold_type, value_type>,
+                          fill_device(count / (16 / sizeof(value_type)) + 1), threads_per_block, stream,
+                          stage::tile_resolve, reinterpret_cast<unsigned_word<value_type>*>(t.elements), count,
                           ends_by_marks(t) ? marks : chunk_marks{}, fold_type(t.clear_value, value),
                           plan.voxels_of == static_cast<int>(K), state, limits);
         }

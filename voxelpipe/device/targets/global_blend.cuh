@@ -50,12 +50,12 @@ __device__ VOXELPIPE_INLINE void reduce_add(unsigned long long* at, unsigned lon
     asm volatile("red.relaxed.gpu.global.add.u64 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "l"(n) : "memory");
 }
 
-// direct_value<Blend, T>: one fragment with value v into a stored T.
+// global_blend<Blend, T>: one fragment with value v into a stored T.
 //   available     allowed(value, target, most): whether up to `most` fragments of this value give the blend's bits
 //   apply(T*, v)  apply_first(T*, v): whether the voxel had no fragment yet; count has it, where tells_first holds
 //   apply_many(T*, v, n): n fragments at once, n > 0
 template <class Blend, class T>
-struct direct_value {
+struct global_blend {
     static constexpr bool available = false;
 };
 
@@ -71,7 +71,7 @@ using unsigned_word = std::conditional_t<sizeof(T) == 8, unsigned long long, uns
 
 template <class T>
 requires is_atomic_integer<T>
-struct direct_value<blend::count, T> {
+struct global_blend<blend::count, T> {
     static constexpr bool available = true;
     template <class V, class Target>
     [[nodiscard]] static bool allowed(const V&, const Target&, std::uint64_t) {
@@ -112,7 +112,7 @@ struct direct_value<blend::count, T> {
 
 // Blends that may always be done in place, and never tell.
 template <class T>
-struct always_direct {
+struct always_immediate {
     static constexpr bool available = true;
     template <class Target>
     [[nodiscard]] static bool allowed(T, const Target&, std::uint64_t) {
@@ -126,7 +126,7 @@ struct always_direct {
 
 // The integer blends that one atomic does.
 template <class Blend, class T>
-struct direct_integer : always_direct<T> {
+struct global_integer_blend : always_immediate<T> {
     __device__ static void apply(T* at, T v) {
         if constexpr (std::is_same_v<Blend, blend::add>)
             atomicAdd(reinterpret_cast<unsigned_word<T>*>(at), static_cast<unsigned_word<T>>(v));
@@ -150,27 +150,27 @@ struct direct_integer : always_direct<T> {
 };
 template <class T>
 requires is_atomic_integer<T>
-struct direct_value<blend::add, T> : direct_integer<blend::add, T> {
+struct global_blend<blend::add, T> : global_integer_blend<blend::add, T> {
 };
 template <class T>
 requires is_atomic_integer<T>
-struct direct_value<blend::min, T> : direct_integer<blend::min, T> {
+struct global_blend<blend::min, T> : global_integer_blend<blend::min, T> {
 };
 template <class T>
 requires is_atomic_integer<T>
-struct direct_value<blend::max, T> : direct_integer<blend::max, T> {
+struct global_blend<blend::max, T> : global_integer_blend<blend::max, T> {
 };
 template <class T>
 requires is_atomic_integer<T>
-struct direct_value<blend::bit_and, T> : direct_integer<blend::bit_and, T> {
+struct global_blend<blend::bit_and, T> : global_integer_blend<blend::bit_and, T> {
 };
 template <class T>
 requires is_atomic_integer<T>
-struct direct_value<blend::bit_or, T> : direct_integer<blend::bit_or, T> {
+struct global_blend<blend::bit_or, T> : global_integer_blend<blend::bit_or, T> {
 };
 template <class T>
 requires is_atomic_integer<T>
-struct direct_value<blend::bit_xor, T> : direct_integer<blend::bit_xor, T> {
+struct global_blend<blend::bit_xor, T> : global_integer_blend<blend::bit_xor, T> {
 };
 
 // Whether clear, clear + value, ..., clear + most * value are all exact in T and none of the terms is rounded by the
@@ -194,13 +194,13 @@ template <class T>
     // Terms count as infinite from here on.
     const int log2_limit = log2_quantum + (sizeof(T) == sizeof(float) ? 63 : 127);
     // In units of 2^unit: |clear| + most * |value| <= 2^digits. The doubles are exact below 2^53 and only grow beyond.
-    const double most_units = std::ldexp(std::abs(static_cast<double>(clear)), -unit) +
-                              static_cast<double>(most) * std::ldexp(std::abs(static_cast<double>(value)), -unit);
-    return most_units < std::ldexp(1.0, digits) && std::ldexp(most_units, unit) < std::ldexp(1.0, log2_limit);
+    const double max_units = std::ldexp(std::abs(static_cast<double>(clear)), -unit) +
+                             static_cast<double>(most) * std::ldexp(std::abs(static_cast<double>(value)), -unit);
+    return max_units < std::ldexp(1.0, digits) && std::ldexp(max_units, unit) < std::ldexp(1.0, log2_limit);
 }
 
 template <class T, int Log2Quantum>
-struct direct_sum {
+struct global_sum {
     static constexpr bool available = true;
     template <class Target>
     [[nodiscard]] static bool allowed(T v, const Target& t, std::uint64_t most) {
@@ -214,16 +214,16 @@ struct direct_sum {
     __device__ static void apply_many(T* at, T v, unsigned n) { reduce_add(at, v * static_cast<T>(n)); } // exact
 };
 template <class T>
-requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_value<blend::add, T>
-    : direct_sum<T, core::sum_format<T>::log2_quantum> {
+requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct global_blend<blend::add, T>
+    : global_sum<T, core::sum_format<T>::log2_quantum> {
 };
 template <int Log2Quantum>
-struct direct_value<blend::add_quantum<Log2Quantum>, float> : direct_sum<float, Log2Quantum> {};
+struct global_blend<blend::add_quantum<Log2Quantum>, float> : global_sum<float, Log2Quantum> {};
 
 // Order is free by definition.
 template <class T>
-requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct direct_value<blend::add_unordered, T>
-    : always_direct<T> {
+requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct global_blend<blend::add_unordered, T>
+    : always_immediate<T> {
     __device__ static void apply(T* at, T v) { reduce_add(at, v); }
     __device__ static void apply_many(T* at, T v, unsigned n) { reduce_add(at, v * static_cast<T>(n)); }
 };

@@ -21,27 +21,27 @@
 namespace voxelpipe::device {
 
 // How the fragments of a call go into one of its targets.
-enum class direct_mode : std::uint32_t {
+enum class immediate_mode : std::uint32_t {
     blend,       // where they lie; a target of bits in rows has fewer than 2^30 words then
     blend_far,   // where they lie, in any number of words
     count_first, // the same, and voxels that had no fragment yet are counted, where tells_first holds
     count        // the target holds a number of fragments for each voxel
 };
 template <std::size_t N>
-struct direct_modes {
-    direct_mode of[N] = {}; // by target
+struct immediate_modes {
+    immediate_mode of[N] = {}; // by target
     bool counts_first = false;
 };
 
 // ---- whole targets --------------------------------------------------------------------------------------------------
 
 template <class Target>
-[[nodiscard]] constexpr bool is_direct() {
+[[nodiscard]] constexpr bool is_immediate() {
     if constexpr (Target::map::is_bit)
         return method_of<Target>() == blend_method::bits;
     else
         return !Target::map::planes &&
-               direct_value<typename Target::blend_type, typename Target::value_type>::available;
+               global_blend<typename Target::blend_type, typename Target::value_type>::available;
 }
 
 // Whether a number of fragments fits a voxel's place, and says what the voxel becomes. A constant, not a function:
@@ -49,17 +49,17 @@ template <class Target>
 template <class Target>
 inline constexpr bool is_countable = false;
 template <class Target>
-requires(!Target::map::is_bit && is_direct<Target>()) inline constexpr bool is_countable<Target> =
+requires(!Target::map::is_bit && is_immediate<Target>()) inline constexpr bool is_countable<Target> =
     core::repeated_fold<typename Target::blend_type, typename Target::value_type>::available;
 
 // Whether this target, with up to `most` fragments of this value, may be blended in place.
 template <class Target, class Value>
-[[nodiscard]] bool may_be_direct(const target_view<Target>& t, const Value& value, std::uint64_t most) {
+[[nodiscard]] bool can_be_immediate(const target_view<Target>& t, const Value& value, std::uint64_t most) {
     if (t.load == load_operation::off) return true;
     if constexpr (Target::map::is_bit)
         return true;
     else
-        return direct_value<typename Target::blend_type, typename Target::value_type>::allowed(value, t, most);
+        return global_blend<typename Target::blend_type, typename Target::value_type>::allowed(value, t, most);
 }
 
 // Whether blending in place tells which voxels are touched for the first time.
@@ -76,18 +76,18 @@ template <class Target, class Value>
         else
             return false;
     } else {
-        return direct_value<typename Target::blend_type, typename Target::value_type>::tells_first(t, most);
+        return global_blend<typename Target::blend_type, typename Target::value_type>::tells_first(t, most);
     }
 }
 
 // n fragments of one value into the voxel at `at`, n > 0; with `One`, n is 1.
 template <class Target, bool One, class Value>
 __device__ VOXELPIPE_INLINE void blend_value(typename Target::element_type* at, const Value& value, unsigned n,
-                                             direct_mode mode) {
-    using method = direct_value<typename Target::blend_type, typename Target::value_type>;
+                                             immediate_mode mode) {
+    using method = global_blend<typename Target::blend_type, typename Target::value_type>;
     using number = unsigned_word<typename Target::value_type>;
     if constexpr (is_countable<Target>) {
-        if (mode == direct_mode::count) {
+        if (mode == immediate_mode::count) {
             reduce_add(reinterpret_cast<number*>(at), number{n});
             return;
         }
@@ -163,11 +163,11 @@ template <class Target>
 // Returns how many voxels were touched for the first time, where tells_first holds and the mode asks.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int x0, int y, int z, word mask,
-                                               const Value& value, direct_mode mode) {
+                                               const Value& value, immediate_mode mode) {
     using map = typename Target::map;
     unsigned first = 0;
     if constexpr (has_word_rows<Target>) {
-        if (mode == direct_mode::blend) {
+        if (mode == immediate_mode::blend) {
             if (!changes_bits<Target>(value)) return 0;
             word* const at = t.elements + word_of(t, x0, y, z);
             const int shift = x0 & 31;
@@ -184,7 +184,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
             word* const w = t.elements + map::cell(t.extent, x, y, z);
             if constexpr (blend_type::sets) {
                 if (!v) return;
-                if (mode != direct_mode::count_first) {
+                if (mode != immediate_mode::count_first) {
                     reduce_or(w, bits);
                     return;
                 }
@@ -192,7 +192,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
                 if ((bits & ~seen) != 0) first += static_cast<unsigned>(__popc(bits & ~atomicOr(w, bits)));
             } else if constexpr (blend_type::clears) {
                 if (v) return;
-                if (mode != direct_mode::count_first) {
+                if (mode != immediate_mode::count_first) {
                     reduce_and(w, ~bits);
                     return;
                 }
@@ -211,8 +211,8 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
             const int x = x0 + __ffs(static_cast<int>(mask)) - 1;
             auto* const at = t.elements + map::cell(t.extent, x, y, z);
             if constexpr (std::is_same_v<typename Target::blend_type, blend::count>) {
-                if (mode == direct_mode::count_first) {
-                    using method = direct_value<blend::count, typename Target::value_type>;
+                if (mode == immediate_mode::count_first) {
+                    using method = global_blend<blend::count, typename Target::value_type>;
                     first += static_cast<unsigned>(method::apply_first(at, value));
                     continue;
                 }
@@ -227,9 +227,9 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
 // which may lie outside of the extent. The rows' loads go out together.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, int x, int y, int z, word voxels,
-                                                const Value& value, direct_mode mode) {
+                                                const Value& value, immediate_mode mode) {
     if constexpr (has_word_rows<Target>) {
-        if (mode == direct_mode::blend) {
+        if (mode == immediate_mode::blend) {
             if (!changes_bits<Target>(value)) return 0;
             constexpr bool sets = bit_blend<typename Target::blend_type>::sets;
             const auto row = static_cast<std::uint32_t>((t.extent.x + 31) / 32);
@@ -275,10 +275,10 @@ __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, in
 // out together.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_slim(const target_view<Target>& t, int x, int y, int z,
-                                                const core::slim_rows& rows, const Value& value, direct_mode mode) {
+                                                const core::slim_rows& rows, const Value& value, immediate_mode mode) {
     constexpr int count = core::slim_rows::count;
     if constexpr (has_word_rows<Target>) {
-        if (mode == direct_mode::blend) {
+        if (mode == immediate_mode::blend) {
             if (!changes_bits<Target>(value)) return 0;
             constexpr bool sets = bit_blend<typename Target::blend_type>::sets;
             const auto by_y = static_cast<std::uint32_t>((t.extent.x + 31) / 32);
@@ -325,7 +325,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_slim(const target_view<Target>& t, in
 // Values that lie along x: those of a row are neighbours in memory. What follows is for calls whose modes are all to
 // blend (blended_output).
 template <class Target>
-inline constexpr bool has_value_rows = !Target::map::is_bit && !Target::map::bricks && is_direct<Target>();
+inline constexpr bool has_value_rows = !Target::map::is_bit && !Target::map::bricks && is_immediate<Target>();
 
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE void add_where(typename Target::element_type* at, const Value& value, bool wanted) {
@@ -333,7 +333,7 @@ __device__ VOXELPIPE_INLINE void add_where(typename Target::element_type* at, co
     if constexpr (std::is_floating_point_v<value_type>) { // all that is direct are sums
         reduce_add_where(at, value, wanted);
     } else if (wanted) {
-        direct_value<typename Target::blend_type, value_type>::apply(at, value);
+        global_blend<typename Target::blend_type, value_type>::apply(at, value);
     }
 }
 // As blend_row, for a mask whose bits are neighbours mostly.
@@ -362,9 +362,9 @@ __device__ VOXELPIPE_INLINE void add_cube(const target_view<Target>& t, int x, i
 // mesh often do, are counted and take one atomic together.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_shared(const target_view<Target>& t, int x, int y, int z, const Value& value,
-                                                  direct_mode mode) {
+                                                  immediate_mode mode) {
     using map = typename Target::map;
-    if (mode == direct_mode::count_first) return blend_row(t, x, y, z, 1u, value, mode);
+    if (mode == immediate_mode::count_first) return blend_row(t, x, y, z, 1u, value, mode);
     auto* const at = t.elements + map::cell(t.extent, x, y, z);
     const unsigned same = __match_any_sync(__activemask(), reinterpret_cast<unsigned long long>(at));
     if ((same & ((1u << threadIdx.x % 32) - 1)) == 0)
@@ -376,9 +376,9 @@ __device__ VOXELPIPE_INLINE unsigned blend_shared(const target_view<Target>& t, 
 // rows of bits, positions may be places of words.
 template <class Target, class Value, class Position>
 __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, word wanted, const Position& position,
-                                                  const Value& value, direct_mode mode) {
+                                                  const Value& value, immediate_mode mode) {
     if constexpr (has_word_rows<Target>) {
-        if (mode == direct_mode::blend) {
+        if (mode == immediate_mode::blend) {
             if (!changes_bits<Target>(value)) return 0;
             constexpr bool sets = bit_blend<typename Target::blend_type>::sets;
             word* at[4];

@@ -56,10 +56,10 @@ struct target_groups {
             if constexpr (method == blend_method::ordered) {
                 groups[K] = ordered;
             } else {
-                static_assert(bits_per_voxel<t>() + 1 <= tuning::most_bits_per_voxel,
+                static_assert(bits_per_voxel<t>() + 1 <= tuning::max_bits_per_voxel,
                               "voxelpipe: a render target needs more shared memory than a tile of 8^3 voxels can have");
                 const int more = method == blend_method::winner ? (winner ? 0 : 32) : bits_per_voxel<t>();
-                if (members > 0 && bits + more > tuning::most_bits_per_voxel) {
+                if (members > 0 && bits + more > tuning::max_bits_per_voxel) {
                     ++group;
                     bits = 1;
                     members = 0;
@@ -105,7 +105,7 @@ struct target_groups {
     using indices = decltype(sequence<Group>(std::make_index_sequence<size_of(Group)>{}));
 
     // Bits of a voxel in the largest group: what the tile size follows from, for all groups share one coarse pass.
-    static constexpr int most_bits() {
+    static constexpr int max_bits() {
         int most = 1;
         for (int g = 0; g < num_groups(); ++g) {
             int bits = 1;
@@ -156,6 +156,6 @@ __device__ void store_winner(const target_view<Target>& view, const voxel_place&
 }
 
 // The bits of an occupancy mask lie like those of this target.
-using touched_target = target<bit, blend::bit_or>;
+using mask_target = target<bit, blend::bit_or>;
 
 } // namespace voxelpipe::device

@@ -101,20 +101,20 @@ struct chunk_filler {
         const int lane = static_cast<int>(threadIdx.x) % 32, rows = min(chunk_yz, extent.y - y0);
         const std::size_t first_row =
             static_cast<std::size_t>(z) * static_cast<unsigned>(extent.y) + static_cast<unsigned>(y0);
-        const auto put = [&](int x, int row) VOXELPIPE_INLINE_LAMBDA {
+        const auto store = [&](int x, int row) VOXELPIPE_INLINE_LAMBDA {
             to[((first_row + static_cast<unsigned>(row)) * static_cast<unsigned>(extent.x) + static_cast<unsigned>(x)) /
                per_place] = place_at(x, row);
         };
         if (marked == ~0u) { // in the order of memory
             const int end = min(x0 + 32 * chunk_x, extent.x);
             for (int row = 0; row < rows; ++row)
-                for (int x = x0 + lane * per_place; x < end; x += 32 * per_place) put(x, row);
+                for (int x = x0 + lane * per_place; x < end; x += 32 * per_place) store(x, row);
             return;
         }
         for (; marked != 0; marked &= marked - 1) {
             const int x = x0 + (__ffs(static_cast<int>(marked)) - 1) * chunk_x + lane % lanes_of_row * per_place;
             if (x >= extent.x) continue;
-            for (int row = lane / lanes_of_row; row < rows; row += rows_at_once) put(x, row);
+            for (int row = lane / lanes_of_row; row < rows; row += rows_at_once) store(x, row);
         }
     }
 };
@@ -199,7 +199,7 @@ void clear_by_chunks(const change_tracking<framebuffer_view<Targets...>>& tracki
     if (!tracking.changes_known) return;
     const chunk_marks marks = tracking.marks();
     const std::size_t slices = static_cast<std::size_t>(marks.rows.y) * static_cast<unsigned>(fb.extent.z),
-                      blocks = std::min<std::size_t>(slices / (threads_per_block / 32) + 1, core::most_blocks);
+                      blocks = std::min<std::size_t>(slices / (threads_per_block / 32) + 1, core::max_blocks);
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         using target = typename core::pack_element<K, Targets...>::type;
         using map = typename target::map;

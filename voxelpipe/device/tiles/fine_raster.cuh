@@ -81,21 +81,21 @@ __device__ void block_prefix(int value, int* sums) {
 
 // ---- small triangles ------------------------------------------------------------------------------------------------
 
-inline constexpr int fragment_places = 4096;  // of the queue
-inline constexpr int most_queue_cells = 1024; // voxels of a bounding box within the tile, for its fragments to go there
+inline constexpr int fragment_places = 4096; // of the queue
+inline constexpr int max_queue_cells = 1024; // voxels of a bounding box within the tile, for its fragments to go there
 
 // A triangle's bounding box, and the part of it that lies in a tile.
 template <coverage Rule>
 struct small_part {
     raster_input<stored_source> in;
-    near_triangle t;
+    int32_triangle t;
     core::small_box box; // the part
     bool is_small;
 
     __device__ VOXELPIPE_INLINE small_part(const geometry& geo, const core::voxel_box& tile, std::uint32_t id)
         : in{{geo.draw(geo.find_draw(id))}, 0, geo.snap.fraction, geo.extent} {
         const draw_geometry& d = in.source.geometry;
-        t = load_near(in, d.triangles[id - d.first_primitive]);
+        t = load_int32(in, d.triangles[id - d.first_primitive]);
         is_small = t.is_near && t.most() <= core::small_voxels(in.fraction);
         box = t.part(geo.extent);
         int cells = 1;
@@ -105,7 +105,7 @@ struct small_part {
             if (hi < box.hi[k]) box.hi[k] = hi;
             cells *= box.hi[k] - box.lo[k] + 1;
         }
-        is_small = is_small && cells <= most_queue_cells;
+        is_small = is_small && cells <= max_queue_cells;
     }
 
     // Calls row(x, y, z, bits) for the rows of fragments in the tile.
@@ -124,7 +124,7 @@ struct small_part {
                 [[nodiscard]] __device__ VOXELPIPE_INLINE static glm::ivec3 place(int x, int y, int z) {
                     return {x, y, z};
                 }
-                __device__ VOXELPIPE_INLINE void put(const glm::ivec3& at, bool wanted) {
+                __device__ VOXELPIPE_INLINE void emit(const glm::ivec3& at, bool wanted) {
                     if (wanted) row(at.x, at.y, at.z, 1u);
                 }
             } within{tile, row};

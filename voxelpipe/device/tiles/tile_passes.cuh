@@ -33,7 +33,7 @@ using group_image =
 
 // Words of the largest image of a framebuffer's groups; 0 where none is drawn in tiles.
 template <int Log2Size, class Framebuffer>
-[[nodiscard]] constexpr int most_image_words() {
+[[nodiscard]] constexpr int max_image_words() {
     int most = 0;
     [&]<int... G>(std::integer_sequence<int, G...>) {
         ((most = group_image<Log2Size, Framebuffer, G>::words > most ? group_image<Log2Size, Framebuffer, G>::words
@@ -63,7 +63,7 @@ struct tile_memory {
     void* storage;
     std::size_t storage_bytes;
 
-    // image_words: most_image_words of the fine passes to come.
+    // image_words: max_image_words of the fine passes to come.
     tile_memory(arena& memory, const core::tile_grid& tiles_, std::uint32_t num_primitives, const capacities& limits,
                 int image_words, std::uint32_t pairs_per_item)
         : tiles(tiles_), share(take_share(memory, num_primitives, limits.tile_records)),
@@ -72,9 +72,9 @@ struct tile_memory {
             keys[i] = memory.take<std::uint32_t>(limits.tile_pairs);
             primitives[i] = memory.take<std::uint32_t>(limits.tile_pairs);
         }
-        const std::uint64_t num_images = most_images(limits.tile_pairs, pairs_per_item);
+        const std::uint64_t num_images = max_images(limits.tile_pairs, pairs_per_item);
         split.pairs_per_item = pairs_per_item;
-        split.items = memory.take<work_item>(most_items(limits.tile_pairs, tiles.count(), pairs_per_item));
+        split.items = memory.take<work_item>(max_items(limits.tile_pairs, tiles.count(), pairs_per_item));
         split.splits = memory.take<split_tile>(num_images);
         images = memory.take<word>(num_images * static_cast<std::uint64_t>(image_words));
         storage_bytes = std::max(sort_bytes<std::uint32_t>(limits.tile_pairs, bits), share_scan_bytes(num_primitives));

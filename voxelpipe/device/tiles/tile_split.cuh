@@ -28,12 +28,12 @@ struct split_buffers {
 };
 
 // Upper bounds, for allocation: an item per occupied tile, and the items of split tiles, each more than half full.
-[[nodiscard]] inline std::uint64_t most_images(std::uint64_t pair_capacity, std::uint32_t pairs_per_item) {
+[[nodiscard]] inline std::uint64_t max_images(std::uint64_t pair_capacity, std::uint32_t pairs_per_item) {
     return 2 * pair_capacity / pairs_per_item + 1;
 }
-[[nodiscard]] inline std::uint64_t most_items(std::uint64_t pair_capacity, std::uint64_t num_tiles,
-                                              std::uint32_t pairs_per_item) {
-    return (num_tiles < pair_capacity ? num_tiles : pair_capacity) + most_images(pair_capacity, pairs_per_item);
+[[nodiscard]] inline std::uint64_t max_items(std::uint64_t pair_capacity, std::uint64_t num_tiles,
+                                             std::uint32_t pairs_per_item) {
+    return (num_tiles < pair_capacity ? num_tiles : pair_capacity) + max_images(pair_capacity, pairs_per_item);
 }
 
 template <class Item>
