@@ -12,7 +12,7 @@
 namespace {
 
 namespace core = voxelpipe::core;
-using room = core::call_room<int, 2>;
+using room = core::capacity_history<int, 2>;
 using lengths = room::lengths;
 
 room make_room() { return room({true, false}); }
