@@ -6,7 +6,8 @@
     check_documents.py [--update]
 
 1. A block of code behind `<!-- samples/FILE -->` is that sample without its licence lines; behind `<!-- samples/FILE: NAME -->`
-   it is the part between `// snippet: NAME` and `// end snippet`. The samples are built and run as tests. --update writes them.
+   it is the part between `// snippet: NAME` and `// end snippet`, also of files of tests/. All of them are built and run. --update
+   writes them.
 2. Links to files of the repository lead somewhere, and to headings that exist.
 3. Names of sources in backticks (`*.hpp`, `*.cuh`, `*.cpp`, `*.cu`, `*.py`, `*.sh`) are names of files that exist.
 
@@ -20,7 +21,7 @@ import sys
 import textwrap
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-BLOCK = re.compile(r"(<!-- (samples/[^ :]+)(?:: ([^>]+?))? -->\n```\w*\n)(.*?)(^```$)", flags=re.S | re.M)
+BLOCK = re.compile(r"(<!-- ((?:samples|tests)/[^ :]+)(?:: ([^>]+?))? -->\n```\w*\n)(.*?)(^```$)", flags=re.S | re.M)
 FENCED = re.compile(r"^```.*?^```$", flags=re.S | re.M)
 
 

@@ -412,6 +412,7 @@ void compare_passes(stages<marked>& s) {
                                     16);
     ASSERT_LT(m.memory.used(), m.block.size());
     cudaStream_t const stream = s.gpu.stream;
+    // snippet: two passes
     const auto scene = buffers.shade(s.on_device(), s.g, stream);
     const device::scene<extreme_values, vp::no_varyings> other{
         scene.geo, {extreme_values{}, nullptr}, nullptr, scene.normal_factors, scene.offset};
@@ -422,6 +423,7 @@ void compare_passes(stages<marked>& s) {
     device::clear_target(vp::get<0>(d_most.view().targets), m.state, limits, stream);
     device::clear_target(vp::get<1>(d_most.view().targets), m.state, limits, stream);
     device::fine_pass<Rule, policy>(other, d_most.view(), work, none, m.state, limits, stream);
+    // end snippet
     load(d_marks);
     device::fine_pass<Rule, policy>(scene, d_marks.view(), work, none, m.state, limits, stream);
     const device::pipeline_state end = m.end(s.gpu);
