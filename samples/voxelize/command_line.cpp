@@ -210,6 +210,15 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->transform(CLI::CheckedTransformer(axes).description(""))
         ->option_text("AXIS")
         ->group("Computation");
+    const std::map<std::string, blend_alpha> alphas{
+        {"weight", blend_alpha::weight}, {"cutoff", blend_alpha::cutoff}, {"ignore", blend_alpha::ignore}};
+    app.add_option(
+           "--alpha", options.voxelize.alpha,
+           "What alpha does in materials that blend. weight: colours count by it. cutoff: fragments below 0.5 are "
+           "not there. ignore: nothing. Default: weight")
+        ->transform(CLI::CheckedTransformer(alphas).description(""))
+        ->option_text("RULE")
+        ->group("Computation");
     const std::map<std::string, backend_choice> backends{
         {"auto", backend_choice::automatic}, {"cpu", backend_choice::cpu}, {"cuda", backend_choice::cuda}};
     app.add_option("--backend", options.voxelize.backend,

@@ -26,7 +26,7 @@ struct command_line {
     // Targets that only some outputs ask for: those that show the voxels' shape or colours. Formats that hold every
     // target leave them out, so that one output does not change the content or the names of another.
     std::vector<target> implied;
-    write_options write;       // all but its progress
+    write_options write; // all but its progress
     stats_format stats = stats_format::none;
     bool quiet = false;
 };

@@ -5,6 +5,8 @@
 // in cuda_device.cu. Takes a scene, uploads it, draws every slab of the grid into a framebuffer of all wanted targets
 // and resolves it into the volume.
 
+#include "mip_levels.hpp"
+#include "outside.hpp"
 #include "parallel.hpp"
 #include "placement.hpp"
 #include "resolve.hpp"
@@ -14,6 +16,7 @@
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <algorithm>
+#include <atomic>
 #include <bitset>
 #include <chrono>
 #include <memory>
@@ -68,6 +71,9 @@ public:
     pipeline(Backend& backend, scene& model, const voxelize_request& request, voxelize_stats& stats)
         : backend_{backend}, request_{request}, stats_{stats} {
         for (const target wanted : request.targets) wanted_[static_cast<std::size_t>(wanted)] = true;
+        // What the sides of the grid see is known once all voxels are.
+        hides_occupancy_ = wants(target::color_outer) && !wants(target::occupancy);
+        if (hides_occupancy_) wanted_[static_cast<std::size_t>(target::occupancy)] = true;
         const stage_timer timer{*this, "upload"};
         tables_.push_back({backend_, one(make_color_tables())});
         upload_pictures(model);
@@ -97,22 +103,36 @@ public:
         }
         for (const target wanted : request_.targets)
             result.add(std::string(info_of(wanted).name), info_of(wanted).type, info_of(wanted).components);
+        if (hides_occupancy_) result.add("occupancy", scalar::bit);
 
-        const int depth = slab_depth();
-        const int num_slabs = (grid.extent.z + depth - 1) / depth;
-        stats_.slabs = num_slabs;
-        for (int slab = 0; slab < num_slabs; ++slab) {
-            const int begin = slab * depth;
-            const glm::ivec3 size{grid.extent.x, grid.extent.y, std::min(depth, grid.extent.z - begin)};
-            const voxelpipe::grid part = relative_grid_.crop({0, 0, begin}, size);
-            report_ = [this, slab, num_slabs](double done) {
-                if (request_.progress) request_.progress((slab + done) / num_slabs);
+        const int depth = slab_depth(surface_voxel_bytes());
+        const int passes = wants(target::color_outer) ? 2 : 1;
+        const auto report_from = [this, passes](int pass, int slab, int slabs) {
+            report_ = [this, passes, pass, slab, slabs](double done) {
+                if (request_.progress) request_.progress((pass + (slab + done) / slabs) / passes);
             };
+        };
+        stats_.slabs = for_each_slab(depth, [&](const voxelpipe::grid& part, int begin, int slab, int slabs) {
+            report_from(0, slab, slabs);
             if (only_bits_)
                 draw_bits(result, part, begin);
             else
                 draw_surface(result, part, begin);
+        });
+        if (wants(target::normal)) count_cancelled_normals(result);
+        if (wants(target::color_outer)) {
+            const voxelize_stats counted = stats_; // the same fragments again
+            const std::vector<std::uint8_t> sides = outer_sides(result);
+            constexpr double voxel_bytes = sizeof(std::uint64_t) + sizeof(std::uint8_t);
+            for_each_slab(slab_depth(voxel_bytes), [&](const voxelpipe::grid& part, int begin, int slab, int slabs) {
+                report_from(1, slab, slabs);
+                draw_outer(result, part, begin, sides);
+            });
+            std::vector<std::pair<std::string, double>> times = std::move(stats_.milliseconds);
+            stats_ = counted;
+            stats_.milliseconds = std::move(times);
         }
+        if (hides_occupancy_) result.channels.pop_back();
         return result;
     }
 
@@ -130,6 +150,8 @@ private:
                         vp::target<glm::vec4, vp::blend::add>, vp::target<glm::u8vec4, vp::blend::max>,
                         vp::target<glm::u8vec4, vp::blend::replace>, vp::target<glm::vec3, vp::blend::add>,
                         vp::target<std::uint32_t, vp::blend::replace>, vp::target<float, vp::blend::min>>;
+    using outer_draw = vp::draw<mesh_view, surface_vertex_shader, outer_fragment_shader>;
+    using outer_framebuffer = vp::framebuffer<Backend, vp::target<std::uint64_t, vp::blend::max>>;
     using bits_framebuffer =
         vp::framebuffer<Backend, vp::target<vp::bit, vp::blend::bit_or>, vp::target<std::uint32_t, vp::blend::count>>;
 
@@ -169,20 +191,46 @@ private:
 
     // ---- upload ----------------------------------------------------------------------------------------------------
 
+    [[nodiscard]] alpha_mode alpha_of(const material& m) const {
+        if (m.alpha != alpha_mode::blend || request_.alpha == blend_alpha::weight) return m.alpha;
+        return request_.alpha == blend_alpha::cutoff ? alpha_mode::mask : alpha_mode::opaque;
+    }
+    [[nodiscard]] bool shades() const {
+        return wants(target::color) || wants(target::color_max) || wants(target::color_replace) ||
+               wants(target::color_outer);
+    }
+
+    // Each picture as its materials need it: colours by alpha where that counts, alone where none of them is opaque.
     void upload_pictures(scene& model) {
-        for (picture& source : model.images) {
-            const std::span<const glm::u8vec4> texels{reinterpret_cast<const glm::u8vec4*>(source.rgba.data()),
-                                                      source.rgba.size() / 4};
-            texels_.push_back({backend_, texels});
-            if constexpr (memory_access<Backend>::on_host) source.rgba = {};
-        }
+        const auto texels_for = [&](picture& source, bool by_alpha) {
+            std::vector<buffer<glm::u8vec4>> texels;
+            if (shades()) {
+                texels.push_back({backend_, with_mip_levels(source, by_alpha, thread_count(request_.threads))});
+            } else {
+                const auto* const rgba = reinterpret_cast<const glm::u8vec4*>(source.rgba.data());
+                texels.push_back({backend_, std::span<const glm::u8vec4>{rgba, source.rgba.size() / 4}});
+            }
+            return texels;
+        };
+        pictures_.resize(model.images.size());
+        for (const bool by_alpha : {false, true})
+            for (const material& m : model.materials) {
+                if (m.texture == material::no_texture || (alpha_of(m) != alpha_mode::opaque) != by_alpha) continue;
+                const std::uint32_t image = model.textures[static_cast<std::size_t>(m.texture)].image;
+                std::vector<buffer<glm::u8vec4>>& texels = pictures_[image].texels[by_alpha ? 1 : 0];
+                if (texels.empty()) texels = texels_for(model.images[image], by_alpha);
+            }
+        if constexpr (memory_access<Backend>::on_host)
+            for (picture& source : model.images) source.rgba = {};
     }
 
     [[nodiscard]] sampled_texture texture_of(const material& m, const scene& model) {
         sampled_texture result;
         if (m.texture == material::no_texture) return result;
         const texture& source = model.textures[static_cast<std::size_t>(m.texture)];
-        result.texels = texels_[source.image].data();
+        result.texels = pictures_[source.image].texels[alpha_of(m) != alpha_mode::opaque ? 1 : 0].front().data();
+        if (shades())
+            result.levels = mip_level_count(model.images[source.image].width, model.images[source.image].height);
         result.width = static_cast<int>(model.images[source.image].width);
         result.height = static_cast<int>(model.images[source.image].height);
         result.wrap_s = source.wrap_s;
@@ -206,7 +254,8 @@ private:
                                                             {backend_, part.colors},
                                                             {},
                                                             {},
-                                                            static_cast<std::int32_t>(part.material)});
+                                                            static_cast<std::int32_t>(part.material),
+                                                            model.materials[part.material].double_sided});
             if (mirrored[i] != 0) {
                 std::vector<glm::uvec3> turned = part.triangles;
                 for (glm::uvec3& corners : turned) std::swap(corners.y, corners.z);
@@ -216,7 +265,7 @@ private:
             if (!part.texcoords.empty()) done.vertex_shader.texcoords = done.texcoords.data();
             if (!part.colors.empty()) done.vertex_shader.colors = done.colors.data();
             done.fragment_shader = fragment_shader_of(m, model, !part.texcoords.empty());
-            any_mask_ = any_mask_ || m.alpha == alpha_mode::mask;
+            any_mask_ = any_mask_ || done.fragment_shader.alpha == alpha_mode::mask;
             if constexpr (memory_access<Backend>::on_host) part = {};
         }
         std::uint64_t first_triangle = 0;
@@ -231,6 +280,7 @@ private:
             vertex_shader.place = place;
             draws_.push_back({mesh, vertex_shader, part.fragment_shader});
             bits_draws_.push_back({mesh, place, vp::constant(true, 1U)});
+            draw_is_double_sided_.push_back(part.double_sided ? 1 : 0);
             numbered_draws_.push_back({first_triangle, part.material});
             first_triangle += mesh.triangles.size();
         }
@@ -241,8 +291,8 @@ private:
         if (textured) shader.texture = texture_of(m, model);
         shader.tables = tables_.front().data();
         shader.base_color = m.base_color;
-        shader.alpha = m.alpha;
-        shader.alpha_cutoff = m.alpha_cutoff;
+        shader.alpha = alpha_of(m);
+        shader.alpha_cutoff = m.alpha == alpha_mode::blend ? 0.5F : m.alpha_cutoff;
         shader.centers = {relative_grid_.origin, relative_grid_.voxel_size};
         shader.depth_axis = request_.depth_axis;
         shader.depth_reference = reference_[request_.depth_axis];
@@ -267,12 +317,16 @@ private:
         return enabled;
     }
 
-    // Layers that go into the working memory at once; whole tiles where more than one tile's height fits.
-    [[nodiscard]] int slab_depth() const {
+    [[nodiscard]] double surface_voxel_bytes() const {
         constexpr double bytes[num_targets] = {0.125, 4, 16, 4, 4, 12, 4, 4};
         const std::bitset<num_targets> enabled = enabled_targets();
         double voxel_bytes = 0;
         for (std::size_t i = 0; i < num_targets; ++i) voxel_bytes += enabled[i] ? bytes[i] : 0;
+        return voxel_bytes;
+    }
+
+    // Layers that go into the working memory at once; whole tiles where more than one tile's height fits.
+    [[nodiscard]] int slab_depth(double voxel_bytes) const {
         const glm::ivec3 extent = request_.grid.extent;
         const double layer_bytes = voxel_bytes * extent.x * extent.y;
         const double layers =
@@ -280,6 +334,19 @@ private:
         constexpr int tile = 32;
         const int depth = static_cast<int>(layers);
         return depth < extent.z && depth > tile ? depth / tile * tile : depth;
+    }
+
+    // VISIT(part of the grid, its first layer, number of the slab, how many there are); returns how many.
+    template <class Visit>
+    int for_each_slab(int depth, const Visit& visit) {
+        const glm::ivec3 extent = request_.grid.extent;
+        const int slabs = (extent.z + depth - 1) / depth;
+        for (int slab = 0; slab < slabs; ++slab) {
+            const int begin = slab * depth;
+            const glm::ivec3 size{extent.x, extent.y, std::min(depth, extent.z - begin)};
+            visit(relative_grid_.crop({0, 0, begin}, size), begin, slab, slabs);
+        }
+        return slabs;
     }
 
     template <class Draw, class Framebuffer>
@@ -339,6 +406,56 @@ private:
         if (wants(target::depth)) copy<depth>(result, target::depth, framebuffer, begin);
     }
 
+    // ---- color-outer: the whole of the grid is known
+    // -----------------------------------------------------------------
+
+    [[nodiscard]] std::vector<std::uint8_t> outer_sides(const volume& result) {
+        const stage_timer timer{*this, "outside"};
+        for (std::size_t i = 0; i < draws_.size(); ++i)
+            outer_draws_.push_back(
+                {draws_[i].mesh, draws_[i].vertex_shader, {draws_[i].fragment_shader, draw_is_double_sided_[i] != 0}});
+        return sides_that_see(result, *result.find("occupancy"), request_.threads);
+    }
+
+    void draw_outer(volume& result, const voxelpipe::grid& part, int begin, const std::vector<std::uint8_t>& sides) {
+        const std::size_t layer = static_cast<std::size_t>(part.extent.x) * static_cast<std::size_t>(part.extent.y);
+        const buffer<std::uint8_t> of_slab{backend_,
+                                           std::span{sides}.subspan(layer * static_cast<std::size_t>(begin),
+                                                                    layer * static_cast<std::size_t>(part.extent.z))};
+        for (outer_draw& draw : outer_draws_) {
+            draw.fragment_shader.sides = of_slab.data();
+            draw.fragment_shader.first = part.offset;
+            draw.fragment_shader.extent = part.extent;
+        }
+        std::bitset<1> all;
+        all.set();
+        outer_framebuffer& framebuffer = framebuffer_for(outer_framebuffer_, part.extent, all);
+        draw_reporting(outer_draws_, part, framebuffer);
+        const stage_timer timer{*this, "resolve"};
+        resolve<glm::u8vec4>(result, target::color_outer, part.extent, begin, outer_color{elements_of<0>(framebuffer)});
+    }
+
+    // Of the covered voxels those that the resolved normals leave at 0.
+    void count_cancelled_normals(const volume& result) {
+        const stage_timer timer{*this, "resolve"};
+        const auto* const normals = reinterpret_cast<const glm::vec3*>(result.find("normal")->data.data());
+        const auto voxels = static_cast<std::size_t>(result.num_voxels());
+        constexpr std::size_t block = 1 << 20;
+        std::atomic<std::uint64_t> with_normal{0};
+        parallel_for((voxels + block - 1) / block, thread_count(request_.threads), [&](std::size_t b) {
+            std::uint64_t found = 0;
+            for (std::size_t i = b * block; i < std::min(voxels, (b + 1) * block); ++i)
+                found += normals[i] != glm::vec3(0) ? 1 : 0;
+            with_normal += found;
+        });
+        stats_.normals_cancelled = stats_.voxels - with_normal;
+        if (stats_.normals_cancelled != 0)
+            stats_.warnings.push_back("the normals of " + std::to_string(stats_.normals_cancelled) + " of " +
+                                      std::to_string(stats_.voxels) +
+                                      " voxels cancel out (two sides of a thin wall in one voxel, or triangles without "
+                                      "area); --target normal is 0 there");
+    }
+
     // Elements of a target, in the backend's memory.
     template <std::size_t I, class Framebuffer>
     [[nodiscard]] static auto* elements_of(Framebuffer& framebuffer) {
@@ -394,13 +511,17 @@ private:
     std::bitset<target_table.size()> wanted_;
     bool any_mask_ = false;
     bool only_bits_ = false;
+    bool hides_occupancy_ = false; // computed, but not asked for: the volume's last channel until the end
     std::function<void(double)> report_;
     glm::dvec3 reference_{0.0};     // what positions are relative to; see reference_point
     voxelpipe::grid relative_grid_; // the grid, its origin taken from there
 
     // The scene in the backend's memory; draws point into it.
     std::vector<buffer<color_tables>> tables_;
-    std::vector<buffer<glm::u8vec4>> texels_; // of each picture
+    struct uploaded_picture {
+        std::vector<buffer<glm::u8vec4>> texels[2]; // none or one: colours alike, colours by alpha
+    };
+    std::vector<uploaded_picture> pictures_;
     struct uploaded_primitive {
         buffer<glm::vec3> positions;
         buffer<glm::uvec3> triangles;
@@ -410,12 +531,16 @@ private:
         surface_vertex_shader vertex_shader; // all but its place
         surface_fragment_shader fragment_shader;
         std::int32_t material;
+        bool double_sided;
     };
     std::vector<uploaded_primitive> primitives_;
     std::vector<surface_draw> draws_;
     std::vector<bits_draw> bits_draws_;
     std::unique_ptr<surface_framebuffer> surface_framebuffer_;
     std::unique_ptr<bits_framebuffer> bits_framebuffer_;
+    std::vector<char> draw_is_double_sided_;
+    std::vector<outer_draw> outer_draws_;
+    std::unique_ptr<outer_framebuffer> outer_framebuffer_;
     std::vector<numbered_draw> numbered_draws_;
     std::vector<buffer<numbered_draw>> draw_table_;
     std::uint64_t num_triangles_ = 0;

@@ -74,6 +74,7 @@ void print_text(std::ostream& stream, const run_report& report) {
     if (report.stats.fragments_discarded != 0) stream << " (" << report.stats.fragments_discarded << " more discarded)";
     stream << '\n';
     line("voxels") << report.stats.voxels << '\n';
+    if (report.stats.normals_cancelled != 0) line("normals cancelled") << report.stats.normals_cancelled << '\n';
     double total = 0;
     stream << std::fixed << std::setprecision(1);
     for (const auto& [stage, time] : report.stats.milliseconds) {
@@ -108,6 +109,7 @@ void print_json(std::ostream& stream, const run_report& report) {
     root["fragments"] = report.stats.fragments;
     root["fragments_discarded"] = report.stats.fragments_discarded;
     root["voxels"] = report.stats.voxels;
+    if (report.stats.normals_cancelled != 0) root["normals_cancelled"] = report.stats.normals_cancelled;
     double total = 0;
     for (const auto& [stage, time] : report.stats.milliseconds) {
         root["ms"][stage] = time;

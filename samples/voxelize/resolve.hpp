@@ -21,7 +21,7 @@ struct as_it_is {
     [[nodiscard]] VOXELPIPE_HD T operator()(std::size_t i) const { return elements[i]; }
 };
 
-// The mean of linear colours, as sRGB.
+// The mean of linear colours by their weights, as sRGB, and of the weights, which are alphas, as alpha.
 struct mean_color {
     const glm::vec4* sums;
     const std::uint32_t* counts;
@@ -32,14 +32,25 @@ struct mean_color {
         const auto n = static_cast<float>(counts[i]);
         glm::vec4 mean;
         for (int c = 0; c < 4; ++c) {
-            mean[c] = voxelpipe::exact::div(sums[i][c], n);
+            mean[c] = voxelpipe::exact::div(sums[i][c], c < 3 ? sums[i].a : n);
             if (mean[c] > 1.0F) mean[c] = 1.0F;
         }
         return encode(*tables, mean);
     }
 };
 
-// A sum of normals, made unit.
+// The colour in the low word of outer_fragment_shader's values.
+struct outer_color {
+    const std::uint64_t* values;
+
+    [[nodiscard]] VOXELPIPE_HD glm::u8vec4 operator()(std::size_t i) const {
+        const auto color = static_cast<std::uint32_t>(values[i]);
+        return {static_cast<std::uint8_t>(color >> 24), static_cast<std::uint8_t>(color >> 16),
+                static_cast<std::uint8_t>(color >> 8), static_cast<std::uint8_t>(color)};
+    }
+};
+
+// A sum of normals, made unit. What is left of normals that cancel is rounding; it has no direction.
 struct unit_normal {
     const glm::vec3* sums;
 
@@ -49,7 +60,8 @@ struct unit_normal {
         const double y = sums[i].y;
         const double z = sums[i].z;
         const double length = exact::sqrt(exact::fma(z, z, exact::fma(y, y, exact::mul(x, x))));
-        if (!(length > 0)) return glm::vec3(0);
+        constexpr double least = 0x1p-10;
+        if (!(length > least)) return glm::vec3(0);
         return {static_cast<float>(exact::div(x, length)), static_cast<float>(exact::div(y, length)),
                 static_cast<float>(exact::div(z, length))};
     }

@@ -27,6 +27,7 @@ struct sampled_texture {
     wrap_mode wrap_s = wrap_mode::repeat;
     wrap_mode wrap_t = wrap_mode::repeat;
     filter_mode filter = filter_mode::linear;
+    int levels = 1; // in texels, one after the other; see mip_levels.hpp
 };
 
 // A coordinate brought into [0, 1]; NaN gives 0.
@@ -85,6 +86,36 @@ struct sampled_texture {
     return result;
 }
 
+// Level of a texture as a texture of its own; levels above 0 are always filtered linearly.
+[[nodiscard]] VOXELPIPE_HD inline sampled_texture level_of(sampled_texture t, int level) {
+    for (int i = 0; i < level; ++i) {
+        t.texels += static_cast<std::size_t>(t.width) * static_cast<std::size_t>(t.height);
+        t.width = t.width > 1 ? t.width / 2 : 1;
+        t.height = t.height > 1 ? t.height / 2 : 1;
+    }
+    if (level > 0) t.filter = filter_mode::linear;
+    return t;
+}
+
+// The mean of the texture around UV over FOOTPRINT texels of level 0 a side. Up to one texel that is the texture as
+// its sampler says. From there on it lies between the two levels whose texels are at most and more than that large, in
+// proportion to the footprint, so that no logarithm has to be the same on every machine.
+[[nodiscard]] VOXELPIPE_HD inline glm::vec4 sample_footprint(const sampled_texture& t, const color_tables& tables,
+                                                             glm::vec2 uv, float footprint) {
+    if (t.levels <= 1 || !(footprint > 1.0f)) return sample(t, tables, uv);
+    const auto bits = vp::core::bit_cast<std::uint32_t>(footprint);
+    const int level = static_cast<int>(bits >> 23) - 127; // floor of the logarithm
+    if (level >= t.levels - 1) return sample(level_of(t, t.levels - 1), tables, uv);
+    const float above = vp::exact::sub(vp::core::bit_cast<float>((bits & 0x7fffffU) | 0x3f800000U), 1.0f);
+    const sampled_texture fine = level_of(t, level);
+    const glm::vec4 a = sample(fine, tables, uv);
+    if (above == 0.0f) return a;
+    const glm::vec4 b = sample(level_of(fine, 1), tables, uv);
+    glm::vec4 result;
+    for (int i = 0; i < 4; ++i) result[i] = vp::exact::lerp(a[i], b[i], above);
+    return result;
+}
+
 struct surface_varyings {
     glm::vec2 texcoord;
     glm::vec4 color;
@@ -140,6 +171,49 @@ struct voxel_centers {
     return nearest;
 }
 
+// Side of a voxel in texels of the triangle's texture: the longer of its two sides seen along the dominant axis, but no
+// more than the triangle's longest edge, since texels beyond it belong to other triangles. At most 1 where the texture
+// is magnified, and for triangles without area there.
+[[nodiscard]] VOXELPIPE_HD inline float texture_footprint(const vp::fragment<surface_varyings>& f,
+                                                          const voxel_centers& centers, const sampled_texture& t) {
+    const surface_varyings& a = *f.vertex_varyings[0];
+    const surface_varyings& b = *f.vertex_varyings[1];
+    const surface_varyings& c = *f.vertex_varyings[2];
+    const auto width = static_cast<float>(t.width);
+    const auto height = static_cast<float>(t.height);
+    const float s1 = vp::exact::mul(vp::exact::sub(b.texcoord.x, a.texcoord.x), width);
+    const float t1 = vp::exact::mul(vp::exact::sub(b.texcoord.y, a.texcoord.y), height);
+    const float s2 = vp::exact::mul(vp::exact::sub(c.texcoord.x, a.texcoord.x), width);
+    const float t2 = vp::exact::mul(vp::exact::sub(c.texcoord.y, a.texcoord.y), height);
+    const float s3 = vp::exact::mul(vp::exact::sub(c.texcoord.x, b.texcoord.x), width);
+    const float t3 = vp::exact::mul(vp::exact::sub(c.texcoord.y, b.texcoord.y), height);
+    const float length1 = vp::exact::fma(s1, s1, vp::exact::mul(t1, t1));
+    const float length2 = vp::exact::fma(s2, s2, vp::exact::mul(t2, t2));
+    const float length3 = vp::exact::fma(s3, s3, vp::exact::mul(t3, t3));
+    const float longest = length1 > length2 ? (length1 > length3 ? length1 : length3)
+                                            : (length2 > length3 ? length2 : length3); // squared, as all of these
+    if (!(longest > 1.0f)) return 1.0f;
+    const int u = f.axis == 0 ? 1 : 0;
+    const int v = f.axis == 2 ? 1 : 2;
+    const float u1 = vp::exact::sub(b.position[u], a.position[u]);
+    const float v1 = vp::exact::sub(b.position[v], a.position[v]);
+    const float u2 = vp::exact::sub(c.position[u], a.position[u]);
+    const float v2 = vp::exact::sub(c.position[v], a.position[v]);
+    const float area = vp::exact::fma(u1, v2, -vp::exact::mul(u2, v1));
+    if (area == 0.0f) return 1.0f;
+    // What one step of a voxel along u, or along v, is in the texture.
+    const float along_u = vp::exact::div(vp::exact::to_float(centers.voxel_size[u]), area);
+    const float along_v = vp::exact::div(vp::exact::to_float(centers.voxel_size[v]), area);
+    const float su = vp::exact::mul(vp::exact::fma(s1, v2, -vp::exact::mul(s2, v1)), along_u);
+    const float tu = vp::exact::mul(vp::exact::fma(t1, v2, -vp::exact::mul(t2, v1)), along_u);
+    const float sv = vp::exact::mul(vp::exact::fma(s2, u1, -vp::exact::mul(s1, u2)), along_v);
+    const float tv = vp::exact::mul(vp::exact::fma(t2, u1, -vp::exact::mul(t1, u2)), along_v);
+    const float step_u = vp::exact::fma(su, su, vp::exact::mul(tu, tu));
+    const float step_v = vp::exact::fma(sv, sv, vp::exact::mul(tv, tv));
+    const float step = step_u > step_v ? step_u : step_v;
+    return vp::exact::sqrt(step < longest ? step : longest); // a step that is not a number gives the edge
+}
+
 // From a mesh's own coordinates to the world's, relative to the reference point: in double, rounded to float once.
 struct placed_vertex_shader {
     double m[3][4]; // as affine has it
@@ -187,9 +261,13 @@ struct surface_outputs {
 };
 
 // Values and order of the tool's render targets:
-//   occupancy, count, sum of linear colours, encoded colour (max), encoded colour (last), sum of normals, triangle
-//   number, depth
+//   occupancy, count, sum of linear colours by their weight and of the weights, encoded colour (max), encoded colour
+//   (last), sum of normals, triangle number, depth
 struct surface_fragment_shader {
+    // The least that a fragment weighs, so that voxels with nothing but invisible fragments have a colour too. Beside a
+    // visible fragment it is less than a tenth of a byte even where black meets white.
+    static constexpr float least_weight = 0x1p-16f;
+
     sampled_texture texture;
     const color_tables* tables = nullptr;
     glm::vec4 base_color{1.0f};
@@ -201,33 +279,108 @@ struct surface_fragment_shader {
     surface_outputs wanted;
 
     VOXELPIPE_HD auto operator()(const vp::fragment<surface_varyings>& f) const {
-        const bool shaded = wanted.linear_color || wanted.encoded_color || alpha == alpha_mode::mask;
-        const surface_varyings at = shaded || wanted.depth ? nearest_on_triangle(f, centers) : f.varyings;
+        const bool shaded = wanted.linear_color || wanted.encoded_color;
+        const bool masked = alpha == alpha_mode::mask;
+        const surface_varyings at = shaded || masked || wanted.depth ? nearest_on_triangle(f, centers) : f.varyings;
+        const bool discarded = masked && is_cut_off(at);
         glm::vec4 color(1.0f);
-        bool discarded = false;
-        if (shaded) {
-            color = shade(at);
-            discarded = alpha == alpha_mode::mask && color.a < alpha_cutoff;
-            if (alpha != alpha_mode::blend) color.a = 1.0f;
-        }
+        if (shaded) color = shade(f, at);
         glm::u8vec4 encoded(0);
         if (wanted.encoded_color) encoded = encode(*tables, color);
+        if (alpha == alpha_mode::blend) {
+            color.a = color.a > least_weight ? color.a : least_weight;
+            for (int i = 0; i < 3; ++i) color[i] = vp::exact::mul(color[i], color.a);
+        }
         const float depth = vp::exact::to_float(vp::exact::to_double(at.position[depth_axis]) + depth_reference);
         return vp::outputs(true, 1u, color, encoded, encoded, f.normal, f.primitive, depth).discard_if(discarded);
     }
 
-    // Linear, every component in [0, 1].
-    [[nodiscard]] VOXELPIPE_HD glm::vec4 shade(const surface_varyings& at) const {
-        glm::vec4 color = base_color;
-        if (texture.texels != nullptr) {
-            const glm::vec4 texel = sample(texture, *tables, at.texcoord);
-            for (int i = 0; i < 4; ++i) color[i] = vp::exact::mul(color[i], texel[i]);
-        }
+    // The colour of a fragment, filtered over its voxel. Linear, every component in [0, 1]; alpha is 1 but where the
+    // material blends.
+    [[nodiscard]] VOXELPIPE_HD glm::vec4 shade(const vp::fragment<surface_varyings>& f,
+                                               const surface_varyings& at) const {
+        glm::vec4 color(1.0f);
+        if (texture.texels != nullptr)
+            color = sample_footprint(texture, *tables, at.texcoord,
+                                     texture.levels > 1 ? texture_footprint(f, centers, texture) : 0.0f);
+        color = with_factors(color, at);
+        if (alpha != alpha_mode::blend) color.a = 1.0f;
+        return color;
+    }
+
+    // Whether a mask takes the fragment away. At the point itself: a mean over the voxel would let fine leaves vanish.
+    [[nodiscard]] VOXELPIPE_HD bool is_cut_off(const surface_varyings& at) const {
+        glm::vec4 color(1.0f);
+        if (texture.texels != nullptr) color = sample(texture, *tables, at.texcoord);
+        return with_factors(color, at).a < alpha_cutoff;
+    }
+
+private:
+    [[nodiscard]] VOXELPIPE_HD glm::vec4 with_factors(const glm::vec4& texel, const surface_varyings& at) const {
+        glm::vec4 color;
         for (int i = 0; i < 4; ++i) {
-            const float c = vp::exact::mul(color[i], at.color[i]);
+            const float c = vp::exact::mul(vp::exact::mul(base_color[i], texel[i]), at.color[i]);
             color[i] = c > 0.0f ? (c < 1.0f ? c : 1.0f) : 0.0f; // NaN gives 0
         }
         return color;
+    }
+};
+
+// For --target color-outer: the fragment's colour as a number that is greater the farther out the fragment lies, so
+// that the greatest of a voxel wins in any order. From high bits to low: whether the fragment turns its front (either
+// side, if its material is double-sided) to a side of the grid that sees the voxel; how far the triangle's plane lies
+// from the voxel's centre towards such a side, the most over those sides; the colour.
+struct outer_fragment_shader {
+    // Of a unit normal, along an axis: a side that is seen more edge-on than this has no say.
+    static constexpr float least_slope = 0x1p-6f;
+    static constexpr float lowest = -0x1p100f;
+
+    surface_fragment_shader surface;
+    bool double_sided = false;
+    const std::uint8_t* sides = nullptr; // of sides_that_see(), for the part of the grid that is drawn
+    glm::ivec3 first{0};                 // its lowest voxel, in the whole grid
+    glm::ivec3 extent{0};                // and how many it has
+
+    VOXELPIPE_HD auto operator()(const vp::fragment<surface_varyings>& f) const {
+        const surface_varyings at = nearest_on_triangle(f, surface.centers);
+        bool discarded = surface.alpha == alpha_mode::mask && surface.is_cut_off(at);
+        const glm::u8vec4 color = encode(*surface.tables, surface.shade(f, at));
+        discarded = discarded || color.a == 0; // nothing is seen there
+        const std::uint64_t value = std::uint64_t{rank(f, at)} << 32 | std::uint32_t{color.r} << 24 |
+                                    std::uint32_t{color.g} << 16 | std::uint32_t{color.b} << 8 | std::uint32_t{color.a};
+        return vp::outputs(value).discard_if(discarded);
+    }
+
+private:
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t rank(const vp::fragment<surface_varyings>& f,
+                                                  const surface_varyings& at) const {
+        const glm::ivec3 in_part = f.voxel - first;
+        const std::size_t row = static_cast<std::size_t>(in_part.z) * static_cast<std::size_t>(extent.y) +
+                                static_cast<std::size_t>(in_part.y);
+        const std::size_t voxel = row * static_cast<std::size_t>(extent.x) + static_cast<std::size_t>(in_part.x);
+        const unsigned seen_from = sides[voxel] != 0 ? sides[voxel] : 63U;
+        float along = 0.0f; // of the normal, from the centre to the plane
+        for (int a = 0; a < 3; ++a) {
+            const double from_center = vp::exact::to_double(at.position[a]) - surface.centers(a, f.voxel[a]);
+            along = vp::exact::fma(f.normal[a], vp::exact::to_float(from_center), along);
+        }
+        bool in_front = false, behind = false; // some side sees the triangle's front, its back
+        for (int side = 0; side < 6; ++side) {
+            if ((seen_from >> side & 1U) == 0) continue;
+            const float slope = side % 2 != 0 ? f.normal[side / 2] : -f.normal[side / 2]; // towards the side
+            in_front = in_front || slope > least_slope;
+            behind = behind || slope < -least_slope;
+        }
+        if (double_sided && in_front && behind) return ordered(along > 0.0f ? along : -along) >> 1 | 0x80000000U;
+        const bool shown = in_front || (double_sided && behind);
+        const float height = in_front ? along : behind ? -along : lowest;
+        return ordered(height) >> 1 | (shown ? 0x80000000U : 0U);
+    }
+
+    // Floats as integers in the same order.
+    [[nodiscard]] VOXELPIPE_HD static std::uint32_t ordered(float value) {
+        const auto bits = vp::core::bit_cast<std::uint32_t>(value);
+        return (bits >> 31) != 0 ? ~bits : bits | 0x80000000U;
     }
 };
 

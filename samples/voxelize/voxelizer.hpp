@@ -23,12 +23,16 @@ namespace voxelize {
 
 enum class backend_choice : std::uint8_t { automatic, cpu, cuda };
 
+// What a BLEND material's alpha means: the weight of its colour, a cut at one half as by MASK, or nothing.
+enum class blend_alpha : std::uint8_t { weight, cutoff, ignore };
+
 struct voxelize_request {
     voxelpipe::grid grid;
     int padding = 0; // voxels of it on every side in which nothing is drawn
     voxelpipe::coverage coverage = voxelpipe::coverage::conservative;
     std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
+    blend_alpha alpha = blend_alpha::weight;
     backend_choice backend = backend_choice::automatic;
     int threads = 0; // 0: all cores
     // Bytes for what exists only while the pipeline runs. A grid that needs more is computed in slabs along z. 0: what
@@ -50,6 +54,7 @@ struct voxelize_stats {
     std::uint64_t fragments = 0;           // kept, over all voxels
     std::uint64_t fragments_discarded = 0; // by an alpha mask
     std::uint64_t voxels = 0;              // with at least one fragment
+    std::uint64_t normals_cancelled = 0;   // voxels whose normals cancel out, or that have none; with --target normal
     std::vector<std::pair<std::string, double>> milliseconds; // stage -> time, in pipeline order
     std::vector<std::string> warnings;                        // one line each
 };

@@ -37,6 +37,7 @@ std::set<std::string> all_options() {
             "--lenient",
             "--coverage RULE",
             "--depth-axis AXIS",
+            "--alpha RULE",
             "--backend NAME",
             "-j,--threads N",
             "--work-memory MIB",

@@ -23,7 +23,7 @@ using tool_test::scratch_folder;
 
 namespace {
 
-constexpr const char* all_targets = "occupancy,count,color,color-max,color-replace,normal,material,triangle,depth";
+constexpr const char* all_targets = "occupancy,count,color,color-max,color-replace,color-outer,normal,material,triangle,depth";
 
 TEST(Tool, WrongCommandLinesAreExplained) {
     const scratch_folder folder;
@@ -129,7 +129,8 @@ TEST(Tool, ColorsMeetAsTheirTargetSays) {
         return read_npy(folder / ("o." + name + ".npy")).at<glm::u8vec4>(0);
     };
     EXPECT_EQ(3U, read_npy(folder / "o.count.npy").at<std::uint32_t>(0));
-    EXPECT_EQ(glm::u8vec4(156, 156, 73, 187), color("color")); // linear 1/3, 1/3, 0.2/3; alpha 2.2/3
+    EXPECT_EQ(glm::u8vec4(180, 180, 37, 187), color("color")); // linear 1/2.2, 1/2.2, 0.2*0.2/2.2; alpha 2.2/3
+    EXPECT_EQ(glm::u8vec4(0, 0, 124, 51), color("color-outer"));
     EXPECT_EQ(glm::u8vec4(255, 255, 124, 255), color("color-max"));
     EXPECT_EQ(glm::u8vec4(0, 0, 124, 51), color("color-replace"));
     EXPECT_EQ(2, read_npy(folder / "o.material.npy").at<std::int32_t>(0));
