@@ -3,7 +3,7 @@
 #
 # Two commands for a person, two for the maintainers. The scripts do the work and say what they do.
 #
-#   make demo [MODEL=file.glb] [RESOLUTION=256]   a glTF model becomes voxels, files and a picture in demo/
+#   make demo [MODEL=file.glb] [RESOLUTION=256]   a model (glTF, OBJ, STL, PLY, ...) becomes voxels, files and a picture in demo/
 #   make test                                     builds everything and runs all tests
 #   make bench                                    the CPU table
 #   make bench-gpu                                the GPU table (needs nvcc and a GPU); make bench-scaling: its curves

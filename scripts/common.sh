@@ -45,7 +45,8 @@ present() {
         libcli11-dev) has_header CLI/CLI.hpp ;;
         zlib1g-dev) has_header zlib.h ;;
         libminizip-dev) has_header minizip/zip.h ;;
-        libwebp-dev) has_header webp/decode.h ;;
+        libassimp-dev) has_header assimp/Importer.hpp ;;
+        libwebp-dev libassimp-dev) has_header webp/decode.h ;;
         libgtest-dev) has_header gtest/gtest.h ;;
         libbenchmark-dev) has_header benchmark/benchmark.h ;;
         python3-venv) python3 -c 'import ensurepip, venv' 2>/dev/null ;;
@@ -86,7 +87,7 @@ Install them and run the same command again; on Debian or Ubuntu:
 
 # What the library, the tool and the samples are built with.
 build_packages=(g++ cmake ninja-build libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev zlib1g-dev
-    libminizip-dev libwebp-dev)
+    libminizip-dev libwebp-dev libassimp-dev)
 
 # configure PRESET [cmake option...]: quiet unless it fails. Uses ccache where there is one, and the staged prefix.
 configure() {

@@ -39,5 +39,5 @@ cat <<TEXT
   $name.npz   for NumPy: numpy.load(...)["color"] has the shape (nz, ny, nx, 4)
   $name.vti   for ParaView
 
-Another model: make demo MODEL=file.glb (glTF 2.0, .gltf or .glb). The tool: build/demo/samples/voxelize/voxelize --help
+Another model: make demo MODEL=file.glb (glTF 2.0, .gltf or .glb; also .obj, .stl, .ply, .off and more). The tool: build/demo/samples/voxelize/voxelize --help
 TEXT

@@ -149,7 +149,10 @@ struct raw_options {
 };
 
 void describe(CLI::App& app, command_line& options, raw_options& raw) {
-    app.add_option("INPUT", options.input, "glTF 2.0 model, .glb or .gltf")->required()->option_text(" ");
+    app.add_option("INPUT", options.input,
+                   "Model: glTF 2.0 (.glb, .gltf), or .obj, .stl, .ply, .off and others that assimp reads")
+        ->required()
+        ->option_text(" ");
     app.add_option("-o,--output", options.outputs, "Write the voxels to FILE (required); one -o for each file")
         ->required()
         ->allow_extra_args(false)
@@ -180,6 +183,13 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->option_text("NX,NY,NZ")
         ->group("Grid");
 
+    app.add_option(
+           "--scale", options.load.scale,
+           "Multiply all lengths of the model by this: 0.001 takes millimetres to metres. Default: 1, the file's "
+           "own units")
+        ->check(CLI::Range(1e-30, 1e30).description(""))
+        ->option_text("F")
+        ->group("Model");
     auto* const animation =
         app.add_option(
                "--animation", options.load.gltf.animation,
@@ -280,8 +290,9 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
     app.add_flag("--no-ground", raw.no_ground, "No shadow on the ground")->group("Picture (.png)");
 
     const std::map<std::string, up_axis> ups{{"y", up_axis::y}, {"z", up_axis::z}};
-    app.add_option("--up", options.write.up,
-                   "Axis that stands upright in .png and .vox: y or z. Default: y, as in glTF")
+    app.add_option(
+           "--up", options.write.up,
+           "Axis of the model that stands upright in .png and .vox: y or z. Default: y, as in glTF; many .stl have z")
         ->transform(CLI::CheckedTransformer(ups).description(""))
         ->option_text("AXIS")
         ->group("Files");
@@ -414,6 +425,9 @@ command_line parse_command_line(int argc, const char* const* argv) {
     } catch (const CLI::ParseError& error) {
         throw usage_error(error.what());
     }
+    // Ranges let NaN through.
+    if (!std::isfinite(options.load.scale)) throw usage_error("--scale is a number");
+    if (!std::isfinite(options.load.gltf.seconds)) throw usage_error("--time is a number of seconds");
     understand_grid(options, raw, app.count("--resolution") != 0);
     understand_outputs(options, raw);
     understand_picture(options, raw);

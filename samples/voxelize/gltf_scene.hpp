@@ -42,6 +42,7 @@ struct gltf_limits {
     std::uint64_t base_memory = std::uint64_t{256} << 20;
     std::uint64_t memory_per_input_byte = 256;
     std::uint32_t max_image_side = 16384; // pixels
+    std::uint64_t import_seconds = 3;     // of processor time for assimp, and two more for each MiB of the file
 };
 
 // What a caller may choose.

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A model's file, of whatever format -> scene.
+// A model's file, of whatever format -> scene. glTF where the name ends in .gltf, .glb or nothing that is known, the
+// rest by assimp.
 
 #include "gltf_scene.hpp"
 #include "scene.hpp"
@@ -13,6 +14,7 @@ namespace voxelize {
 struct load_options {
     gltf_limits limits;
     gltf_options gltf;
+    double scale = 1; // multiplies all lengths, about the origin; finite and positive
 };
 
 // Throws model_error.

@@ -60,4 +60,78 @@ TEST(ToolInputs, LenientIsOfferedWhereItHelps) {
     EXPECT_EQ("voxelize: warning: nodes[0]: is in the scene twice; it is shown once\n", lenient.err);
 }
 
+// A box of 2 x 1 x 3 with its lowest corner at (10, 20, 30), as text.
+std::string box_obj() {
+    std::string text;
+    for (int corner = 0; corner < 8; ++corner)
+        text += "v " + std::to_string(10 + 2 * (corner & 1)) + ' ' + std::to_string(20 + (corner >> 1 & 1)) + ' ' +
+                std::to_string(30 + 3 * (corner >> 2)) + '\n';
+    return text + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+}
+
+TEST(ToolInputs, OtherFormatsAreReadOrSayHow) {
+    const scratch_folder folder;
+    std::ofstream(folder / "box.OBJ") << box_obj();
+    const outcome result = run(folder, {folder / "box.OBJ", "-o", folder / "o.npy", "-s", "1"});
+    if (!VOXELPIPE_TOOL_HAS_ASSIMP) {
+        EXPECT_EQ(2, result.code);
+        EXPECT_NE(std::string::npos, result.err.find("convert the file")) << result.err;
+        return;
+    }
+    EXPECT_EQ(0, result.code) << result.err;
+    EXPECT_EQ("", result.err);
+    const tool_test::array voxels = tool_test::read_npy(folder / "o.npy");
+    EXPECT_EQ((std::vector<std::size_t>{3, 1, 2}), voxels.shape); // nothing is rescaled
+    const outcome scaled =
+        run(folder, {folder / "box.OBJ", "-o", folder / "o.npy", "-s", "1", "--scale", "4", "--stats", "json"});
+    EXPECT_EQ(0, scaled.code) << scaled.err;
+    EXPECT_EQ((std::vector<std::size_t>{12, 4, 8}), tool_test::read_npy(folder / "o.npy").shape);
+    const json stats = json::parse(scaled.out);
+    EXPECT_EQ((json{40, 80, 120}), stats["grid"]["origin"]); // about the origin
+}
+
+TEST(ToolInputs, ScaleIsOfAllFormats) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const auto shape = [&](const std::string& scale) {
+        EXPECT_EQ(0, run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-s", "0.1", "--scale", scale}).code);
+        return tool_test::read_npy(folder / "o.npy").shape;
+    };
+    const std::vector<std::size_t> once = shape("1");
+    const std::vector<std::size_t> twice = shape("2");
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        EXPECT_GE(twice[axis], 2 * once[axis] - 2);
+        EXPECT_LE(twice[axis], 2 * once[axis]);
+    }
+    for (const char* wrong : {"0", "-1", "nan", "inf", "x"})
+        EXPECT_EQ(1, run(folder, {folder / "m.glb", "-o", folder / "o.npy", "--scale", wrong}).code) << wrong;
+}
+
+TEST(ToolInputs, AnimationsPoseTheModel) {
+    const scratch_folder folder;
+    builder file;
+    gltf_test::add_cube(file, {0, 0, 0}, 1, gltf_test::add_material(file, {1, 1, 1, 1}));
+    gltf_test::add_cube(file, {0, 0, 0}, 1, 0);
+    const int times = file.accessor(std::vector<float>{0, 2}, "SCALAR");
+    const int places = file.accessor(std::vector<float>{1, 0, 0, 9, 0, 0}, "VEC3");
+    file.root["animations"] = {{{"name", "go"},
+                                {"samplers", {{{"input", times}, {"output", places}}}},
+                                {"channels", {{{"sampler", 0}, {"target", {{"node", 1}, {"path", "translation"}}}}}}}};
+    const std::string model = folder / "m.glb";
+    file.write_glb(model);
+    const auto width = [&](const std::string& time) {
+        const outcome result =
+            run(folder, {model, "-o", folder / "o.npy", "-s", "1", "--animation", "go", "--time", time});
+        EXPECT_EQ("", result.err);
+        return tool_test::read_npy(folder / "o.npy").shape.at(2);
+    };
+    EXPECT_EQ(2U, width("0"));
+    EXPECT_EQ(6U, width("1"));
+    EXPECT_EQ(10U, width("7"));
+    const outcome away = run(folder, {model, "-o", folder / "o.npy", "--animation", "run"});
+    EXPECT_EQ(2, away.code);
+    EXPECT_EQ("voxelize: " + model + ": there is no animation \"run\"; the file has \"go\"\n", away.err);
+    EXPECT_EQ(1, run(folder, {model, "-o", folder / "o.npy", "--time", "1"}).code); // of which animation?
+}
+
 } // namespace

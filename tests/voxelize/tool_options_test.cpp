@@ -32,6 +32,7 @@ std::set<std::string> all_options() {
             "-s,--voxel-size S[,SY,SZ]",
             "--origin X,Y,Z",
             "--extent NX,NY,NZ",
+            "--scale F",
             "--animation NAME",
             "--time T",
             "--lenient",

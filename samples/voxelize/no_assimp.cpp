@@ -1,0 +1,29 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// assimp_scene.hpp in a build without assimp.
+#include "assimp_scene.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+namespace voxelize {
+
+bool is_for_assimp(const std::string& extension) {
+    constexpr std::array<std::string_view, 16> known{".obj", ".stl", ".ply", ".off", ".fbx",   ".dae", ".3ds", ".3mf",
+                                                     ".x3d", ".wrl", ".dxf", ".lwo", ".blend", ".amf", ".ase", ".x"};
+    return std::find(known.begin(), known.end(), extension) != known.end();
+}
+
+scene load_by_assimp(const std::filesystem::path&, const gltf_limits&) {
+    throw model_error(
+        "this build reads glTF only, since it has no assimp: convert the file (`assimp export IN OUT.glb`, "
+        "or Blender), or install libassimp-dev and build again");
+}
+
+scene load_by_assimp(std::span<const std::byte>, const std::string& name, const gltf_file_reader&,
+                     const gltf_limits& limits) {
+    return load_by_assimp(std::filesystem::path(name), limits);
+}
+
+} // namespace voxelize

@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// A build without assimp says what to do.
+#include <assimp_scene.hpp>
+
+#include <gtest/gtest.h>
+
+namespace {
+
+TEST(NoAssimp, SaysHowToConvert) {
+    for (const char* extension : {".obj", ".stl", ".ply", ".off", ".fbx"})
+        EXPECT_TRUE(voxelize::is_for_assimp(extension)) << extension;
+    EXPECT_FALSE(voxelize::is_for_assimp(".glb"));
+    try {
+        (void)voxelize::load_by_assimp("chair.obj");
+        ADD_FAILURE() << "no error";
+    } catch (const voxelize::model_error& error) {
+        EXPECT_STREQ(
+            "this build reads glTF only, since it has no assimp: convert the file (`assimp export IN OUT.glb`, or "
+            "Blender), or install libassimp-dev and build again",
+            error.what());
+    }
+}
+
+} // namespace
