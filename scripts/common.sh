@@ -37,7 +37,7 @@ present() {
         cmake) command -v cmake >/dev/null && printf '3.24\n%s\n' "$(cmake --version | sed -n '1s/[^0-9]*\([0-9.]*\).*/\1/p')" | sort -CV ;;
         ninja-build) command -v ninja >/dev/null ;;
         clang) command -v clang++ >/dev/null ;;
-        ccache | clang-format-14 | clang-tidy-14) command -v "$1" >/dev/null ;;
+        python3 | ccache | clang-format-14 | clang-tidy-14) command -v "$1" >/dev/null ;;
         libglm-dev) has_header glm/glm.hpp ;;
         libtinygltf-dev) has_header tiny_gltf.h ;;
         nlohmann-json3-dev) has_header nlohmann/json.hpp ;;

@@ -20,8 +20,8 @@ else
     say "make test: about $minutes minutes with $jobs jobs to build and run all tests; later runs build only what has changed"
 fi
 
-need_packages "${build_packages[@]}" libgtest-dev python3 python3-venv
-scripts/python_env.sh || printf 'note: without these modules the tests formats.read_back.* do not run\n'
+need_packages "${build_packages[@]}" libgtest-dev
+scripts/python_env.sh || printf 'note: without these Python modules the tests formats.read_back.* do not run\n'
 
 say "configuring and building the library's tests, the tool and the samples (build/$preset)"
 configure "$preset" ${VOXELPIPE_CONFIGURE_OPTIONS:-}
