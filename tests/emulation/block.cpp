@@ -20,7 +20,7 @@ namespace emulation {
 namespace {
 
 constexpr unsigned warp_size = 32, max_threads = 1024;
-constexpr std::size_t stack_bytes = std::size_t{1} << 20; // of address space; pages come as they are touched
+constexpr std::size_t stack_bytes = std::size_t{1} << 20; // of address space; pages are allocated on first use
 constexpr std::size_t max_shared_bytes = 227 * 1024;
 alignas(1024) unsigned char shared_bytes_of_block[max_shared_bytes];
 
@@ -29,8 +29,8 @@ alignas(1024) unsigned char shared_bytes_of_block[max_shared_bytes];
     std::abort();
 }
 
-// For the compiler's own setjmp, which does not ask whether a jump leaves the stack that it is on. Functions that set
-// one are not inlined.
+// For the compiler's built-in setjmp, which does not check whether a jump leaves its stack. Functions that call it must
+// not be inlined.
 using jump_buffer = void* [5];
 [[noreturn]] __attribute__((noinline)) void jump(jump_buffer& to) { __builtin_longjmp(to, 1); }
 
@@ -40,19 +40,19 @@ struct fiber {
     state is = state::ended;
     bool exists = false; // stack and context, from its first block on
     jump_buffer at{};
-    std::uint64_t value = 0, result = 0; // of a meeting
+    std::uint64_t value = 0, result = 0; // exchanged when lanes meet
     unsigned from = 0;
 };
 
-// Lanes of one mask that wait for the others of it.
+// Lanes of one mask that wait for the other lanes of the mask.
 struct meeting {
     unsigned mask = 0, arrived = 0;
     meeting_kind kind{};
 };
 
 struct warp {
-    unsigned ended = 0;        // lanes, those that the block does not have included
-    meeting places[warp_size]; // those that some lane has come to
+    unsigned ended = 0;        // lanes that have ended or that the block does not have
+    meeting places[warp_size]; // those where some lane waits
     meeting& of(unsigned mask) {
         for (meeting& m : places)
             if (m.arrived != 0 && m.mask == mask) return m;
@@ -74,7 +74,7 @@ public:
     block& operator=(const block&) = delete;
     ~block() { munmap(stacks_, stack_bytes * max_threads); }
 
-    // By blockDim.x threads.
+    // Runs blockDim.x threads.
     void run(const std::function<void()>& body) {
         if (body_ != nullptr) fail("a kernel that starts kernels");
         body_ = &body;
@@ -160,7 +160,7 @@ private:
     __attribute__((noinline)) void leave() {
         if (__builtin_setjmp(fibers_[running_].at) == 0) jump(scheduler_);
     }
-    // A fiber's life: one thread of one block after another.
+    // The main loop of a fiber: one thread of one block after another.
     static void begin() {
         block& b = *self;
         for (;;) {
@@ -198,7 +198,7 @@ private:
                 f(lane, lanes[lane]);
             }
         };
-        std::uint64_t all = 0; // what every lane has, of most kinds
+        std::uint64_t all = 0; // the result of every lane, for most kinds
         each([&](unsigned lane, const fiber& f) {
             switch (m.kind) {
             case meeting_kind::ballot:

@@ -15,7 +15,7 @@ namespace emulation {
 
 using graph_work = std::vector<std::function<void()>>;
 struct graph {
-    std::shared_ptr<const graph_work> work; // a graph and what is made of it share it
+    std::shared_ptr<const graph_work> work; // shared by a graph and its executables
 };
 struct stream {
     bool captures = false;

@@ -5,9 +5,9 @@
 
     translate.py TO ROOT FILE...
 
-Copies files, named from ROOT, below the folder TO, .cu as .cpp, and puts functions of emulation/ in the place of what is no C++:
-`kernel<<<...>>>(...)`, dynamic shared memory, and inline PTX, of which the statements are known that VoxelPipe has; any other is
-an error. Everything else compiles as it is, with the headers of include/. Lines keep their numbers.
+Copies files, named relative to ROOT, into the folder TO, .cu as .cpp. Replaces everything that is not C++ by functions of
+emulation/: `kernel<<<...>>>(...)`, dynamic shared memory, and inline PTX. A PTX statement that is not in the table is an error.
+Everything else compiles unchanged with the headers of include/. Lines keep their numbers.
 """
 
 import pathlib
@@ -43,7 +43,7 @@ PTX = {
 
 
 def closing(text, at):
-    """Where the bracket that is open at `at` closes."""
+    """Position of the bracket that closes the one at `at`."""
     depth = 0
     quoted = False
     for i in range(at, len(text)):
@@ -65,7 +65,7 @@ def with_lines_of(old, new):
 
 
 def split(text):
-    """What commas divide, outside of brackets."""
+    """Splits at commas outside of brackets."""
     parts = [""]
     at = 0
     while at < len(text):
@@ -108,7 +108,7 @@ def translate_assembly(text):
 
 
 def begin_of_name(text, end):
-    """Where the name begins, template arguments included, that ends before `end`."""
+    """Start of the name that ends before `end`, including template arguments."""
     at = end
     if text[at - 1] == ">":
         depth = 0

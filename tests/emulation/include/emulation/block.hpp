@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A grid on one CPU thread: blocks one after the other, in order of their numbers, each thread of a block a fiber that
-// runs until it waits for others. Threads of a warp do not run in step, and who comes first is drawn anew each time: a
-// kernel that relies on either gives wrong results here sooner than on a device. Threads that wait for one another at
-// different places, or for lanes that do not come, end the program with a line that says so.
+// Runs a grid on one CPU thread: blocks one after the other in order of their numbers, and each thread of a block as a
+// fiber that runs until it waits for others. Threads of a warp do not run in step, and their order is random each time,
+// so a kernel that relies on either fails here sooner than on a device. If threads wait for one another at different
+// places, or for lanes that never arrive, the program ends with a message.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,7 +19,7 @@ struct dim3 {
     constexpr dim3(unsigned x_ = 1, unsigned y_ = 1, unsigned z_ = 1) : x(x_), y(y_), z(z_) {}
 };
 
-// Of the thread that runs.
+// Of the running thread.
 extern uint3 threadIdx, blockIdx;
 extern dim3 blockDim, gridDim;
 
@@ -27,19 +27,19 @@ namespace emulation {
 
 enum class meeting_kind { syncwarp, ballot, any, all, shuffle, match, add, most, disjunction };
 
-// Runs `body` by every thread of a grid. At most 1024 threads a block, along x.
+// Runs `body` in every thread of a grid. At most 1024 threads a block, along x.
 void run_grid(dim3 blocks, dim3 threads, std::size_t shared_bytes, const std::function<void()>& body);
 
-// Waits until all lanes of the mask that have not ended are here, with the same mask and kind. Then each has what the
-// kind makes of all values: lanes' predicates as bits, the value of the lane `from`, lanes with the same value, sum,
-// maximum or or.
+// Waits until all lanes of the mask that have not ended arrive with the same mask and kind. Each lane then gets the
+// result of the kind: lanes' predicates as bits, the value of the lane `from`, lanes with the same value, sum, maximum
+// or bitwise or.
 [[nodiscard]] std::uint64_t meet(meeting_kind kind, unsigned mask, std::uint64_t value, unsigned from);
-// Waits for all threads of the block that have not ended; how many of them came with true.
+// Waits for all threads of the block that have not ended. Returns how many passed true.
 [[nodiscard]] unsigned meet_block(bool predicate);
 
 // Dynamic shared memory of the running block.
 [[nodiscard]] unsigned char* dynamic_shared();
-// Addresses within shared memory as 32 bits: from a place that all static memory is near.
+// Addresses in shared memory as 32 bits, relative to an address near all static memory.
 [[nodiscard]] std::uint32_t shared_address(const void* p);
 [[nodiscard]] void* shared_pointer(std::uint32_t address);
 

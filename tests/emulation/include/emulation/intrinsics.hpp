@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// CUDA's words and intrinsics for threads that are fibers. All run on one CPU thread, so that an atomic operation is an
-// ordinary one.
+// CUDA's keywords and intrinsics for threads that are fibers. All fibers run on one CPU thread, so an atomic operation
+// is an ordinary one.
 
 #include <emulation/block.hpp>
 
@@ -20,7 +20,7 @@
 #define __grid_constant__
 #define __launch_bounds__(...)
 #define __align__(n) __attribute__((aligned(n)))
-#define __noinline__ // within __attribute__ too, where the standard library says it
+#define __noinline__ // also inside __attribute__, as the standard library writes it
 
 // ---- vectors --------------------------------------------------------------------------------------------------------
 
@@ -121,7 +121,7 @@ template <class T>
 [[nodiscard]] inline unsigned __reduce_or_sync(unsigned mask, unsigned value) {
     return static_cast<unsigned>(emulation::meet(emulation::meeting_kind::disjunction, mask, value, 0));
 }
-// The lanes that are here together are not known: the one that asks is.
+// The set of active lanes is unknown here, so only the calling lane is returned.
 [[nodiscard]] inline unsigned __activemask() { return 1u << threadIdx.x % 32; }
 
 namespace emulation {
@@ -256,7 +256,7 @@ inline void red_shared_or_b32_second(std::uint32_t p, std::uint32_t v) { shared<
 inline void mov_u32(std::uint32_t& to, std::uint32_t from) { to = from; }
 inline void st_shared_u32(std::uint32_t p, std::uint32_t v) { *shared<std::uint32_t>(p) = v; }
 inline void ld_shared_u32(std::uint32_t& v, std::uint32_t p) { v = *shared<std::uint32_t>(p); }
-// At once, so that nothing is left to wait for.
+// Copies at once, so that there is nothing to wait for.
 inline void cp_async_4(std::uint32_t to, std::uint64_t from) {
     *shared<std::uint32_t>(to) = *global<std::uint32_t>(from);
 }

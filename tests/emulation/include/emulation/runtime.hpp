@@ -72,9 +72,9 @@ struct cudaLaunchConfig_t {
 };
 
 namespace emulation {
-// Does the work, or keeps it where the stream is being captured.
+// Does the work, or records it if the stream is being captured.
 cudaError_t put(cudaStream_t stream, std::function<void()> work);
-// kernel(arguments...) by every thread of a grid.
+// Runs kernel(arguments...) in every thread of a grid.
 template <class Kernel, class... Arguments>
 cudaError_t launch(const Kernel& kernel, dim3 blocks, dim3 threads, std::size_t shared_bytes, cudaStream_t stream,
                    const Arguments&... arguments) {
@@ -148,7 +148,7 @@ cudaError_t cudaStreamQuery(cudaStream_t stream);
 cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode mode);
 cudaError_t cudaStreamEndCapture(cudaStream_t stream, cudaGraph_t* graph);
 using cudaGraphNode_t = const void*;
-// How many there are, in any graph; nodes is null.
+// Returns the number of nodes of a graph; nodes is null.
 cudaError_t cudaGraphGetNodes(cudaGraph_t graph, cudaGraphNode_t* nodes, std::size_t* count);
 cudaError_t cudaGraphInstantiate(cudaGraphExec_t* made, cudaGraph_t graph, unsigned long long flags);
 cudaError_t cudaGraphLaunch(cudaGraphExec_t graph, cudaStream_t stream);
