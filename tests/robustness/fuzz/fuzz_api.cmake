@@ -3,7 +3,7 @@
 if(TARGET voxelpipe_oracle)
   voxelpipe_add_fuzz(fuzz_api "${CMAKE_CURRENT_LIST_DIR}/fuzz_api.cpp" LIBS voxelpipe_oracle)
 
-  # The same code as a plain program of any compiler: the corpus and pseudo-random inputs, and a way to repeat a finding.
+  # The same code as a plain program for any compiler: runs the corpus and pseudo-random inputs, and repeats a finding.
   add_executable(replay_api "${CMAKE_CURRENT_LIST_DIR}/fuzz_api.cpp")
   target_link_libraries(replay_api PRIVATE voxelpipe::cpu_ref voxelpipe_oracle)
   target_compile_definitions(replay_api PRIVATE VOXELPIPE_FUZZ_REPLAY)
@@ -11,7 +11,7 @@ if(TARGET voxelpipe_oracle)
   voxelpipe_light_test(replay_api)
   add_test(NAME fuzz_api.replay COMMAND replay_api "${CMAKE_CURRENT_LIST_DIR}/corpus/fuzz_api")
   add_test(NAME fuzz_api.random COMMAND replay_api)
-  # A corpus that got lost is not one that passes.
+  # An empty corpus must fail.
   set(no_corpus "${CMAKE_CURRENT_BINARY_DIR}/no_corpus")
   file(MAKE_DIRECTORY "${no_corpus}")
   add_test(NAME fuzz_api.replay_of_nothing COMMAND replay_api "${no_corpus}")

@@ -3,7 +3,7 @@
 if(TARGET voxelize_gltf)
   voxelpipe_add_fuzz(fuzz_gltf "${CMAKE_CURRENT_LIST_DIR}/fuzz_gltf.cpp" LIBS voxelize_gltf)
 
-  # The same code as a plain program of any compiler: every file of the corpus once, and a way to repeat a finding.
+  # The same code as a plain program for any compiler: runs every file of the corpus once, and repeats a finding.
   add_executable(replay_gltf "${CMAKE_CURRENT_LIST_DIR}/fuzz_gltf.cpp")
   target_link_libraries(replay_gltf PRIVATE voxelize_gltf)
   target_compile_definitions(replay_gltf PRIVATE VOXELPIPE_FUZZ_REPLAY)
