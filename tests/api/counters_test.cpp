@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // status::counts over several draws and several blocks of triangles. Every field has a part in every block of 8192
-// triangles, in other numbers each time: a block that is lost, counted twice or put in place of the sum shows. All
-// triangles are flat and lie along a row of voxels, so the expected numbers are known without a rasterizer.
+// triangles, in other numbers each time: a block that is lost, counted twice or put in place of the sum shows. Most
+// triangles are flat and lie along a row of voxels, so the expected numbers are known without a rasterizer. The oracle
+// says which voxels the few larger ones cover, which a GPU draws by other kernels.
 
 #include "api_model.hpp"
 
@@ -11,6 +12,7 @@
 
 #include <array>
 #include <limits>
+#include <map>
 #include <set>
 #include <string>
 
@@ -60,17 +62,22 @@ public:
                 break;
             }
             ++c.triangles_drawn;
-            const row& r = rows_[primitive];
-            for (int i = 0; i < r.length; ++i) {
-                glm::ivec3 voxel = r.first;
-                voxel[r.axis] += i;
+            const auto count_fragment = [&](glm::ivec3 voxel) {
                 if (keep(primitive, voxel)) {
                     ++c.fragments;
                     occupied.insert(unit::linear(extent, voxel));
                 } else {
                     ++c.fragments_discarded;
                 }
+            };
+            const row& r = rows_[primitive];
+            for (int i = 0; i < r.length; ++i) {
+                glm::ivec3 voxel = r.first;
+                voxel[r.axis] += i;
+                count_fragment(voxel);
             }
+            if (r.length != 0) continue;
+            for (const glm::ivec3& voxel : large_.at(primitive)[thin ? 1 : 0]) count_fragment(voxel);
         }
         c.voxels = occupied.size();
         return c;
@@ -88,8 +95,9 @@ public:
 private:
     struct row { // voxels that the triangle covers, by both rules
         glm::ivec3 first;
-        int axis, length;
+        int axis, length; // length 0: not along a row, see large_
     };
+    using by_rule = std::array<std::vector<glm::ivec3>, 2>; // conservative, thin
 
     void add_draw(std::uint32_t count) {
         unit::small_mesh& m = meshes_.emplace_back();
@@ -112,6 +120,7 @@ private:
     }
 
     std::array<glm::vec3, 3> make_triangle(kind k) {
+        if ((k == kind::drawn || k == kind::no_area) && random_.one_in(150)) return make_large_triangle(k);
         row r{};
         r.axis = static_cast<int>(random_.below(3));
         r.length = static_cast<int>(random_.between(1, 9));
@@ -135,10 +144,30 @@ private:
         return {a, b, c};
     }
 
+    // Up to 40 voxels a side, in the grid.
+    std::array<glm::vec3, 3> make_large_triangle(kind k) {
+        std::array<glm::vec3, 3> corners{};
+        for (int a = 0; a < 3; ++a) {
+            const std::int64_t size = 8 * random_.between(2, 40), first = random_.between(0, 8 * extent[a] - size);
+            for (glm::vec3& p : corners) p[a] = static_cast<float>(first + random_.between(0, size)) / 8;
+        }
+        if (k == kind::no_area) corners[2] = (corners[0] + corners[1]) / 2.0f; // exact
+        unit::small_mesh one;
+        one.positions.assign(corners.begin(), corners.end());
+        one.triangles = {{0, 1, 2}};
+        by_rule& voxels = large_[static_cast<std::uint32_t>(rows_.size())];
+        for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
+            for (const auto& f : unit::fragments_of(unit::unit_grid(extent), rule, {one}))
+                voxels[rule == vp::coverage::thin ? 1 : 0].push_back(f.voxel);
+        rows_.push_back({});
+        return corners;
+    }
+
     unit::splitmix64 random_{7};
     std::vector<unit::small_mesh> meshes_; // one a draw
     std::vector<kind> kinds_;              // by primitive, through all draws
     std::vector<row> rows_;
+    std::map<std::uint32_t, by_rule> large_; // by primitive
 };
 
 const scene& shared_scene() {
