@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Listed fragments, in any order, that are sorted by counting: the voxels ascending, and the primitives of each.
+// The counting sort of listed fragments: voxels ascending, and within each voxel primitives ascending.
 
 #include "device_test.hpp"
 
@@ -24,7 +24,7 @@ vp::cuda_backend::buffer<T> on_device(vp::cuda_backend& gpu, const std::vector<T
     return {gpu, vp::array_view<const T>(values.data(), values.size())};
 }
 
-// A call's memory from one vector, filled with a pattern where nothing has to be zero.
+// A call's memory from one vector, filled with a pattern wherever zeros are not required.
 struct call_memory {
     device::sort_pairs pairs;
     device::counting_memory counting;
@@ -45,7 +45,7 @@ struct counted {
     std::vector<std::uint32_t> primitives, narrow;
     std::vector<std::uint64_t> first, wide;
 
-    // The first num_fragments of the list. room: for voxels, beyond which nothing may be written.
+    // The first num_fragments of the list. room: capacity for voxels; nothing may be written beyond it.
     counted(const std::vector<std::uint32_t>& voxels, const std::vector<std::uint32_t>& listed,
             std::uint64_t num_fragments, std::uint64_t num_voxels, std::uint64_t num_primitives, bool is_wide,
             std::uint64_t room, std::uint64_t longest = ~0ull) {
@@ -87,8 +87,7 @@ struct counted {
     }
 };
 
-// A list of the given voxels, whose primitives are different and in any order; compares what comes back with
-// std::sort's.
+// Sorts a list of the given voxels with distinct primitives in random order, and compares with std::sort.
 void expect_counted(const std::vector<std::uint32_t>& voxels, std::uint64_t num_voxels, std::uint32_t seed,
                     std::uint32_t spread = 3) {
     SCOPED_TRACE(seed);
@@ -111,7 +110,7 @@ void expect_counted(const std::vector<std::uint32_t>& voxels, std::uint64_t num_
             list.push_back(voxels[order[i]]);
         }
     if (n != 0) first.push_back(n);
-    const auto padded = [&](std::vector<std::uint32_t> v, std::uint32_t filler) { // more room than fragments
+    const auto padded = [&](std::vector<std::uint32_t> v, std::uint32_t filler) { // more capacity than fragments
         v.resize(n + 100, filler);
         return v;
     };
@@ -127,7 +126,7 @@ void expect_counted(const std::vector<std::uint32_t>& voxels, std::uint64_t num_
     for (std::uint64_t i = n; i < n + 100; ++i) ASSERT_EQ(result.primitives[i], 42u);
 }
 
-// As many of each voxel in turn, in a list that is shuffled or in runs of neighbours.
+// The same number of fragments for each voxel, in a list that is shuffled or in runs of neighbours.
 std::vector<std::uint32_t> of_lengths(const std::vector<std::uint32_t>& lengths, std::uint32_t step, bool shuffled) {
     std::vector<std::uint32_t> voxels;
     for (std::uint32_t v = 0; v < lengths.size(); ++v) voxels.insert(voxels.end(), lengths[v], v * step);
@@ -135,7 +134,7 @@ std::vector<std::uint32_t> of_lengths(const std::vector<std::uint32_t>& lengths,
     return voxels;
 }
 
-TEST(CountingSort, GridsOfEverySize) {
+TEST(CountingSort, SortsInGridsOfEverySize) {
     constexpr std::uint32_t tile = device::counting_memory::tile;
     for (const std::uint32_t num_voxels : {1u, 2u, 5u, 4095u, tile - 1, tile, tile + 1, 33 * tile + 7, 1u << 21})
         for (const std::uint64_t n : {0u, 1u, 31u, 32u, 33u, 191u, 192u, 193u, 255u, 257u, 2048u, 50000u}) {
@@ -148,7 +147,7 @@ TEST(CountingSort, GridsOfEverySize) {
         }
 }
 
-TEST(CountingSort, VoxelsOfEveryLength) {
+TEST(CountingSort, OrdersVoxelsOfEveryLength) {
     std::vector<std::uint32_t> lengths;
     for (const std::uint32_t limit : {device::window_length, device::max_of_window, 512u, device::max_of_warp,
                                       device::max_of_block, 2 * device::max_of_block})
@@ -156,29 +155,29 @@ TEST(CountingSort, VoxelsOfEveryLength) {
     for (std::uint32_t length = 1; length < 300; ++length) lengths.push_back(length);
     for (const bool shuffled : {false, true}) {
         expect_counted(of_lengths(lengths, 7, shuffled), 3000, 1 + shuffled);
-        // Far apart, so that none is dense.
+        // Primitives far apart, so that no voxel is dense.
         expect_counted(of_lengths(lengths, 5000, shuffled), 1u << 21, 3 + shuffled, 20000);
     }
     expect_counted(of_lengths(std::vector<std::uint32_t>(40, device::window_length), 1, true), 40, 5);
-    // All of a tile are long, and all that there are are in one tile.
+    // All voxels of a tile are long, and all long voxels are in one tile.
     expect_counted(of_lengths(std::vector<std::uint32_t>(3000, 258), 1, true), 1u << 17, 6);
     for (std::uint32_t rest = 1; rest < 40; ++rest)
         expect_counted(of_lengths({1, device::window_length - 2, rest}, 3, false), 9, 7 + rest);
 }
 
-TEST(CountingSort, ManyFragments) {
+TEST(CountingSort, SortsMillionsOfFragments) {
     std::mt19937 random(9);
     std::vector<std::uint32_t> voxels(3'000'000);
     std::uint32_t at = 0;
-    for (auto& v : voxels) { // neighbours in the list are near in space
+    for (auto& v : voxels) { // neighbours in the list are near each other in space
         if (random() % 20 == 0) at = static_cast<std::uint32_t>(random()) % (1u << 21);
         v = (at + static_cast<std::uint32_t>(random() % 3)) % (1u << 21);
     }
     expect_counted(voxels, 1u << 21, 10);
 }
 
-// A list that has no room for all voxels counts them, and is not written beyond.
-TEST(CountingSort, NoRoomForAllVoxels) {
+// A list without capacity for all voxels still counts them, and nothing is written beyond its end.
+TEST(CountingSort, CountsVoxelsBeyondTheCapacityWithoutWriting) {
     std::vector<std::uint32_t> voxels(5000), listed(5000);
     for (std::uint32_t i = 0; i < 5000; ++i) {
         voxels[i] = 3 * ((4999 - i) / 2);
@@ -195,8 +194,8 @@ TEST(CountingSort, NoRoomForAllVoxels) {
     }
 }
 
-// Long voxels where a call was launched without what orders them: they are counted, and the rest is as ever.
-TEST(CountingSort, LongVoxelsThatWereNotExpected) {
+// Long voxels in a call without the kernels that order them: they are counted, and all other voxels are sorted.
+TEST(CountingSort, CountsLongVoxelsThatWereNotExpected) {
     const std::vector<std::uint32_t> voxels = of_lengths({5, 400, 7}, 1, true);
     std::vector<std::uint32_t> listed(voxels.size());
     std::iota(listed.begin(), listed.end(), 0u);
@@ -207,7 +206,7 @@ TEST(CountingSort, LongVoxelsThatWereNotExpected) {
     EXPECT_TRUE(result.first == (std::vector<std::uint64_t>{0, 5, 405, 412}));
 }
 
-TEST(CountingSort, NothingWhereTheCallHasFailed) {
+TEST(CountingSort, WritesNothingIfTheCallHasFailed) {
     const std::vector<std::uint32_t> fill(500, 41);
     const counted result(fill, fill, 1000, 42, 42, true, 500); // more fragments than room
     EXPECT_EQ(result.state.list_voxels, 0u);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// cpu_ref/stages.hpp: what each stage outputs against the oracle, stage by stage, for a whole grid and a crop that cuts
-// tiles, both coverages, and tiles of 8, 16 and 32 voxels.
+// cpu_ref/stages.hpp: the output of each stage against the oracle, for a whole grid and a crop that cuts tiles, both
+// coverages, and tiles of 8, 16 and 32 voxels.
 
 #include "api_model.hpp"
 
@@ -41,7 +41,7 @@ struct discards_some {
 };
 using draw = vp::draw<vp::mesh_view<>, moved, discards_some>;
 
-// The part's lowest voxel is where whole and part have their tile faces apart.
+// The tile faces of part and whole differ, because the part does not begin at a multiple of a tile.
 const glm::ivec3 part_begin{9, 16, 5}, part_size{53, 41, 44};
 
 void add_triangle(unit::small_mesh& m, glm::vec3 a, glm::vec3 b, glm::vec3 c) {
@@ -50,7 +50,7 @@ void add_triangle(unit::small_mesh& m, glm::vec3 a, glm::vec3 b, glm::vec3 c) {
     m.triangles.emplace_back(n, n + 1, n + 2);
 }
 
-// What is on the borders of tiles, of no area, too large, too far or no number.
+// Triangles on the borders of tiles, of zero area, too large, too far away, or not finite.
 void add_odd_triangles(unit::small_mesh& m) {
     for (const glm::vec3 begin : {glm::vec3(0.0f), glm::vec3(part_begin)})
         for (const float n : {8.0f, 16.0f, 32.0f}) { // tile faces of the whole and of the part
@@ -69,13 +69,13 @@ void add_odd_triangles(unit::small_mesh& m) {
     add_triangle(m, o, {20, 20, 1e30f}, {20, 30, 20});
     add_triangle(m, {1000, 0, 0}, {1001, 0, 0}, {1000, 1, 0});
     add_triangle(m, {-20, -20, -20}, {-10, -20, -20}, {-15, -1, -1});
-    add_triangle(m, {-500, -400, -300}, {600, 100, 90}, {30, 700, 200}); // through all of the grid
+    add_triangle(m, {-500, -400, -300}, {600, 100, 90}, {30, 700, 200}); // through the whole grid
     add_triangle(m, {-5000, 31, -5000}, {7000, 34, -5000}, {30, 33, 9000});
 }
 
 struct scene {
     std::vector<unit::small_mesh> meshes; // as drawn
-    std::vector<unit::small_mesh> shaded; // as the vertex shaders leave them
+    std::vector<unit::small_mesh> shaded; // after the vertex shaders
     std::vector<draw> draws;
     vp::grid whole = unit::unit_grid(extent), part;
 
@@ -155,7 +155,8 @@ coarse_model model_of(const scene& s, const vp::grid& g, vp::coverage rule, int 
                 ++(finite ? out.counts.triangles_too_far : out.counts.triangles_nonfinite);
                 continue;
             }
-            // Reach, in voxels of the part; first and last voxel of the triangle's depth, in those of the whole.
+            // The reach in voxels of the part. The first and last voxel of the triangle's depth, in voxels of the
+            // whole.
             std::int64_t lo[3], hi[3];
             corner first{}, last{};
             bool empty = false;
@@ -223,7 +224,7 @@ coarse_model model_of(const scene& s, const vp::grid& g, vp::coverage rule, int 
 
 class Stages : public ::testing::TestWithParam<vp::coverage> {};
 
-TEST(StagesOfBoth, VertexShadeGivesSnappedPositionsOfThePart) {
+TEST(StagesOfBoth, VertexShadeSnapsRelativeToThePart) {
     const scene s;
     const oracle::grid og = as_oracle(s.whole);
     const int fraction = oracle::fraction_bits(og);
@@ -300,7 +301,7 @@ TEST_P(Stages, RangesAndWorkItemsDivideThePairs) {
         for (const std::uint64_t most : {std::uint64_t{1}, std::uint64_t{7}, longest - 1, longest, longest + 1}) {
             const auto items = stages::work_items(ranges, most);
             std::size_t i = 0;
-            for (const auto& range : ranges) { // its items lie end to end, all full but the last
+            for (const auto& range : ranges) { // its items are contiguous, and all but the last are full
                 for (std::uint64_t at = range.first; at < range.last; ++i) {
                     ASSERT_LT(i, items.size());
                     ASSERT_EQ(items[i].tile, range.tile);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The order of fragments within voxels, and the list of those: voxels of every size, by a window, a warp, a block and
-// merged runs.
+// The order of fragments within voxels, and the list of voxels. Voxels of every size: ordered by a window, a warp, a
+// block and merged runs.
 
 #include "device_test.hpp"
 
@@ -21,9 +21,8 @@ vp::cuda_backend::buffer<T> on_device(vp::cuda_backend& gpu, const std::vector<T
     return {gpu, vp::array_view<const T>(values.data(), values.size())};
 }
 
-// Fragments in device memory, sorted by voxel, and what order_fragments makes of them; all arrays are set, so that they
-// can be copied back whole. Wide voxels go where they are asked for, narrow ones where they come to lie. room: for
-// voxels.
+// Fragments in device memory, sorted by voxel, and the result of order_fragments. All arrays are initialised, so that
+// they can be copied back whole. room: capacity for voxels.
 struct ordered {
     vp::cuda_backend gpu;
     std::uint64_t capacity;
@@ -64,7 +63,7 @@ struct ordered {
     }
 };
 
-// Voxels of the given lengths, each of different primitives in any order; compares what comes back with std::sort.
+// Voxels of the given lengths with distinct primitives in random order; compares the result with std::sort.
 void expect_ordered(const std::vector<std::uint64_t>& lengths, std::uint32_t seed, std::uint32_t largest = 0xfffffffe) {
     std::mt19937 random(seed);
     std::vector<std::uint64_t> first, voxels;
@@ -86,7 +85,7 @@ void expect_ordered(const std::vector<std::uint64_t>& lengths, std::uint32_t see
     }
     first.push_back(primitives.size());
     const std::uint64_t n = primitives.size(), num_voxels = voxels.size();
-    keys.resize(n + 100, ~0u); // more room than fragments
+    keys.resize(n + 100, ~0u); // more capacity than fragments
     primitives.resize(n + 100, 0);
     const bool is_wide = seed % 2 == 0;
     const ordered result(keys, primitives, n, std::uint64_t{largest} + 1, is_wide, num_voxels);
@@ -103,7 +102,7 @@ void expect_ordered(const std::vector<std::uint64_t>& lengths, std::uint32_t see
 
 constexpr std::uint32_t few_primitives = 1u << device::narrow_primitive_bits;
 
-TEST(FragmentOrder, EveryLengthOfAWindowAndAWarp) {
+TEST(FragmentOrder, OrdersEveryLengthOfAWindowAndAWarp) {
     std::vector<std::uint64_t> lengths(1100);
     std::iota(lengths.begin(), lengths.end(), 1);
     for (int turn = 0; turn < 2; ++turn) {
@@ -115,7 +114,7 @@ TEST(FragmentOrder, EveryLengthOfAWindowAndAWarp) {
     }
 }
 
-TEST(FragmentOrder, AtTheLimits) {
+TEST(FragmentOrder, OrdersVoxelsAtTheLimitsOfEveryClass) {
     std::vector<std::uint64_t> lengths;
     for (const std::uint32_t limit :
          {device::window_length, device::max_of_window, 512u, device::max_of_warp, device::max_of_block,
@@ -123,7 +122,7 @@ TEST(FragmentOrder, AtTheLimits) {
         for (const std::uint32_t length : {limit - 1, limit, limit + 1}) lengths.insert(lengths.end(), 3, length);
     expect_ordered(lengths, 3);
     expect_ordered(lengths, 4, few_primitives - 1);
-    // Voxels that begin and end where windows and tiles do, and last ones of every length.
+    // Voxels that begin and end at borders of windows and tiles, and last voxels of every length.
     expect_ordered(std::vector<std::uint64_t>(20, device::window_length), 15);
     expect_ordered(std::vector<std::uint64_t>(3, device::tile_counts::length), 16);
     for (std::uint32_t rest = 1; rest < 40; ++rest) {
@@ -132,14 +131,14 @@ TEST(FragmentOrder, AtTheLimits) {
     }
 }
 
-TEST(FragmentOrder, DenseVoxels) {
+TEST(FragmentOrder, OrdersDenseVoxels) {
     const std::uint32_t part = device::dense_part, most = part * device::max_dense_parts;
     const std::uint64_t block = device::max_of_block;
-    // Nearly all primitives, the fewest that are more than a block's, and what lies at a part's border.
+    // Nearly all primitives, one more than a block handles, and lengths around a part's border.
     for (const std::uint32_t num : {std::uint32_t{block} + 1, part - 1, part, part + 1, 3 * part + 17})
         for (const std::uint32_t seed : {1u, 2u})
             expect_ordered({7, num, block + 1, 300, num - 1, 2, num}, seed, num - 1);
-    // As many as are just dense, and one fewer: those are cut into runs.
+    // The smallest dense voxel, and one fragment less, which is cut into runs.
     for (const std::uint32_t num : {most, most - 1, most + 1}) {
         const std::uint64_t least = num / device::min_dense;
         expect_ordered({least - 1, least, 1, least + 1, 3 * least}, num, num - 1);
@@ -147,8 +146,8 @@ TEST(FragmentOrder, DenseVoxels) {
     expect_ordered(std::vector<std::uint64_t>(70, 5000), 5, 100000); // more parts than blocks
 }
 
-// One voxel, of far apart primitives, that fills the room to its end.
-TEST(FragmentOrder, NoMoreRoomThanFragments) {
+// One voxel of primitives far apart that fills the capacity exactly.
+TEST(FragmentOrder, NeedsNoMoreCapacityThanFragments) {
     for (const std::uint32_t n : {device::max_of_window + 1, device::max_of_block, device::max_of_block + 1,
                                   device::max_of_block + 2, 2 * device::max_of_block + 1}) {
         std::vector<std::uint32_t> primitives(n);
@@ -160,12 +159,12 @@ TEST(FragmentOrder, NoMoreRoomThanFragments) {
     }
 }
 
-TEST(FragmentOrder, FewAndMany) {
+TEST(FragmentOrder, OrdersFewAndManyFragments) {
     std::mt19937 random(4);
     std::vector<std::uint64_t> lengths(20000);
     for (std::uint64_t& length : lengths) length = 1 + random() % (random() % 50 == 0 ? 3000 : 10);
     expect_ordered(lengths, 5);
-    // Windows that only just have room for what begins in them.
+    // Windows that are exactly filled by the voxels that begin in them.
     for (std::uint64_t& length : lengths) length = 1 + random() % (random() % 8 == 0 ? device::max_of_window : 60);
     expect_ordered(lengths, 6);
     expect_ordered(lengths, 7, few_primitives - 1);
@@ -176,15 +175,16 @@ TEST(FragmentOrder, FewAndMany) {
     expect_ordered(std::vector<std::uint64_t>(300'000, 1), 9);
 }
 
-// A list that has no room for all voxels counts them, and is not written beyond.
-TEST(FragmentOrder, NoRoomForAllVoxels) {
+// A list without capacity for all voxels still counts them, and nothing is written beyond its end.
+TEST(FragmentOrder, CountsVoxelsBeyondTheCapacityWithoutWriting) {
     std::vector<std::uint32_t> keys(5000), primitives(5000);
     for (std::uint32_t i = 0; i < 5000; ++i) {
         keys[i] = i / 2;
         primitives[i] = 5000 - i;
     }
     for (const bool is_wide : {false, true}) {
-        // All are there that have room, and nothing behind them is touched: the array of places is one longer.
+        // All voxels within the capacity are there, and nothing behind them is touched; the array of offsets is one
+        // longer.
         const ordered result(keys, primitives, keys.size(), 5001, is_wide, 2000);
         EXPECT_EQ(result.state.list_voxels, 2500u);
         for (std::uint32_t i = 0; i < 2000; ++i) {
@@ -196,13 +196,13 @@ TEST(FragmentOrder, NoRoomForAllVoxels) {
 }
 
 // One, two and three merges: runs of 2^12, 2^18 and 2^24 fragments.
-TEST(FragmentOrder, MergedRuns) {
+TEST(FragmentOrder, MergesRunsOfMillionsOfFragments) {
     expect_ordered({10000, 3, 262144, 5000, 1}, 6);
     expect_ordered({262145, 7, 3000000}, 7);
     expect_ordered({2, (std::uint64_t{1} << 24) + 12345, 9}, 8);
 }
 
-TEST(FragmentOrder, NothingWhereTheCallHasFailed) {
+TEST(FragmentOrder, WritesNothingIfTheCallHasFailed) {
     const std::vector<std::uint32_t> fill(500, 41);
     const ordered result(fill, fill, 1000, 42, true, 500); // more fragments than room
     EXPECT_TRUE(result.primitives == fill);

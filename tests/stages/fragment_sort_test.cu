@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The sort of fragments by voxel: stable, by as many bits as the keys have, for as many pairs as the state says.
+// The radix sort of fragments by voxel: stable, by the bits that keys use, for the number of pairs in the state.
 
 #include "device_test.hpp"
 
@@ -23,7 +23,7 @@ struct sorted {
     std::vector<std::uint32_t> keys, values;
 };
 
-// num of the keys, in memory that nothing has zeroed; values are numbered.
+// Sorts the first num keys, in memory that was not zeroed. Values are numbered.
 sorted sort_on_device(std::vector<std::uint32_t> keys, std::uint64_t num, int bits, int items) {
     vp::cuda_backend gpu;
     const std::uint64_t capacity = keys.size();
@@ -62,7 +62,7 @@ sorted sort_on_device(std::vector<std::uint32_t> keys, std::uint64_t num, int bi
     return {std::move(keys), std::move(values)};
 }
 
-// Keys that the given function makes of their place, in a room for some more.
+// Keys by a function of their position, in an array with some spare capacity.
 template <class Key>
 void expect_sorted(std::uint64_t num, int bits, const Key& key) {
     std::vector<std::uint32_t> keys(num + 77, 5);
@@ -81,7 +81,7 @@ void expect_sorted(std::uint64_t num, int bits, const Key& key) {
 
 [[nodiscard]] std::uint32_t below(std::uint32_t random, int bits) { return bits == 0 ? 0 : random >> (32 - bits); }
 
-TEST(FragmentSort, EveryNumberOfBits) {
+TEST(FragmentSort, IsStableForEveryNumberOfBits) {
     for (int bits = 0; bits <= 32; ++bits) {
         const device::digit_plan plan(bits);
         EXPECT_GE(plan.passes * plan.bits, bits);
@@ -92,7 +92,7 @@ TEST(FragmentSort, EveryNumberOfBits) {
     }
 }
 
-TEST(FragmentSort, NumbersAtTheBordersOfTiles) {
+TEST(FragmentSort, HandlesLengthsAroundTileBorders) {
     for (const std::uint64_t tiles : {0, 1, 2, 7})
         for (const std::int64_t more : {-33, -1, 0, 1, 2, 31, 511}) {
             const std::int64_t num = static_cast<std::int64_t>(tiles * device::sort_tile(device::sort_items)) + more;
@@ -104,8 +104,8 @@ TEST(FragmentSort, NumbersAtTheBordersOfTiles) {
         }
 }
 
-// All alike, two kinds in turn, the largest key, runs, falling.
-TEST(FragmentSort, KeysThatLookAlike) {
+// All equal, two alternating, the largest key, runs, descending.
+TEST(FragmentSort, IsStableForEqualAndAlternatingKeys) {
     constexpr std::uint64_t num = 5 * device::sort_tile(device::sort_items) + 1000;
     for (const int bits : {9, 21, 27, 30, 32}) {
         const std::uint32_t largest = below(~0u, bits);
@@ -117,17 +117,17 @@ TEST(FragmentSort, KeysThatLookAlike) {
     }
 }
 
-// Many tiles: most learn of those before while these still work.
-TEST(FragmentSort, ManyTiles) {
+// Many tiles: most look back at predecessors that are still working.
+TEST(FragmentSort, LooksBackOverManyTiles) {
     std::mt19937 random(3);
-    const auto near = [&](std::uint64_t i) { // neighbours in the list are near in space
+    const auto near = [&](std::uint64_t i) { // neighbours in the list are near each other in space
         return (static_cast<std::uint32_t>(i * 37 % 4000000) + static_cast<std::uint32_t>(random() % 5000)) & 0x7ffffff;
     };
     expect_sorted(12'000'000, 27, near);
     expect_sorted(3'000'001, 30, [&](auto) { return below(static_cast<std::uint32_t>(random()), 30); });
 }
 
-TEST(FragmentSort, NothingWhereTheCallHasFailed) {
+TEST(FragmentSort, WritesNothingIfTheCallHasFailed) {
     std::vector<std::uint32_t> keys(20000);
     for (std::uint32_t i = 0; i < keys.size(); ++i) keys[i] = 20000 - i;
     const sorted s = sort_on_device(keys, keys.size() + 1, 18, device::sort_items); // two passes

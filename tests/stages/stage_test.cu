@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Each device stage by itself, called as a driver of one's own would, against the CPU's stage: snapped vertices, (tile,
-// primitive) pairs after the sort, work items after the split, fine raster and tile resolve from the CPU's work items,
-// sorted fragment lists; and several fine passes after one coarse pass.
+// Each device stage by itself against the CPU's stage: snapped vertices, (tile, primitive) pairs after the sort, work
+// items after the split, fine raster and tile resolve from the CPU's work items, sorted fragment lists. Also several
+// fine passes after one coarse pass.
 
 #include "cells.hpp"
 
@@ -44,7 +44,7 @@ struct stages {
     stages(mesh_data m, const vp::grid& g_, const FragmentShader& fs)
         : data(std::move(m)), g(g_), d_mesh(gpu, data.positions, data.triangles),
           h_mesh(cpu, data.positions, data.triangles), d_draw{d_mesh.view(), {}, fs}, h_draw{h_mesh.view(), {}, fs} {}
-    stages(const stages&) = delete; // the backends stay where they are
+    stages(const stages&) = delete; // the backends must not move
     stages& operator=(const stages&) = delete;
 
     [[nodiscard]] std::span<const draw_type> on_device() const { return {&d_draw, 1}; }
@@ -52,7 +52,7 @@ struct stages {
     [[nodiscard]] std::uint32_t num_triangles() const { return static_cast<std::uint32_t>(data.triangles.size()); }
 };
 
-// Device memory that the stages' arrays are carved from.
+// Device memory for the stages' arrays.
 struct stage_memory {
     vp::cuda_backend::buffer<std::byte> block;
     device::arena memory{block.data()};
@@ -69,7 +69,7 @@ struct stage_memory {
     }
 };
 
-TEST(Stages, VertexShade) {
+TEST(Stages, VertexShadeSnapsAsTheCpuDoes) {
     stages s(mixed_triangles(3000, 50.0f, 70), box_grid({50, 40, 30}), vp::constant(true));
     const auto snap = vp::core::make_snap_transform(s.g);
     const auto expected = vp::cpu::vertex_shade(s.how, s.on_host(), snap);
@@ -87,7 +87,7 @@ TEST(Stages, VertexShade) {
         const vp::core::snapped_position& p = actual[i];
         bool is_near = true;
         constexpr std::int64_t limit = std::int64_t{1} << 30;
-        for (const std::int64_t q : {p.x, p.y, p.z}) is_near = is_near && q >= -limit && q <= limit; // or a mark
+        for (const std::int64_t q : {p.x, p.y, p.z}) is_near = is_near && q >= -limit && q <= limit; // and not a mark
         ASSERT_EQ(in_32_bits[i].is_near != 0, is_near) << i;
         num_far += !is_near;
         if (!is_near) continue;
@@ -105,7 +105,7 @@ void compare_tiles(stages<vp::constant_output<bool>>& s, int log2_size) {
     auto coarse = vp::cpu::coarse_raster<Rule, std::uint32_t>(s.how, h_scene, tiles);
     const auto ranges = vp::cpu::tile_sort(s.how, coarse.pairs, tiles.count());
 
-    // The stages one by one, in memory of the test's own.
+    // Runs the stages one by one in the test's memory.
     const std::uint32_t n = s.num_triangles();
     const device::capacities limits{coarse.pairs.size() + 100, 100000, 0, 0};
     const std::uint32_t per_item = 64;
@@ -149,7 +149,7 @@ void compare_tiles(stages<vp::constant_output<bool>>& s, int log2_size) {
     expect_same_bytes(tile_of, copy_back(k.Current(), tile_of.size()), "tiles of the sorted pairs");
     expect_same_bytes(primitive_of, copy_back(v.Current(), tile_of.size()), "primitives of the sorted pairs");
 
-    // Work items: each range cut into pieces of at most 64 pairs, none lost, images numbered without a gap.
+    // Each range is split into work items of at most 64 pairs, none is lost, and images are numbered without gaps.
     auto items = copy_back(split.items, end.num_items);
     std::sort(items.begin(), items.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     std::size_t at = 0;
@@ -174,7 +174,7 @@ void compare_tiles(stages<vp::constant_output<bool>>& s, int log2_size) {
     EXPECT_EQ(end.num_splits, splits);
 }
 
-TEST(Stages, CoarseRasterSortAndSplit) {
+TEST(Stages, CoarseRasterSortAndSplitGiveTheCpusWorkItems) {
     stages s(mixed_triangles(5000, 90.0f, 71), box_grid({90, 71, 100}), vp::constant(true));
     for (const int log2_size : {3, 4, 5}) {
         compare_tiles<vp::coverage::thin>(s, log2_size);
@@ -184,7 +184,7 @@ TEST(Stages, CoarseRasterSortAndSplit) {
 
 // ---- fine raster and tile resolve -----------------------------------------------------------------------------------
 
-// What a fragment gives follows from its primitive, and whether it is kept from its voxel too.
+// A fragment's values depend on its primitive; whether it is kept depends on its voxel too.
 struct marked {
     VOXELPIPE_HD static auto of(std::uint32_t primitive) {
         return vp::outputs(vp::exact::mul(0.1f, static_cast<float>(primitive % 13u)), true, 0u, primitive);
@@ -204,7 +204,7 @@ using last = vp::target<std::uint32_t, blend::replace>;
 template <class Backend>
 using marked_targets = vp::framebuffer<Backend, sum, bits, counts, last>;
 
-// Of all work items, by voxel and primitive.
+// The fragments of all work items, sorted by voxel and primitive.
 template <class FragmentShader>
 std::vector<reference::covered_voxel> fragments_of(const stages<FragmentShader>& s, vp::coverage rule, int log2_size,
                                                    const std::vector<reference::tile_pair>& pairs,
@@ -251,7 +251,7 @@ vp::cuda_backend::buffer<T> to_device(vp::cuda_backend& gpu, const std::vector<T
     return {gpu, vp::array_view<const T>(host.data(), host.size())};
 }
 
-// From the work items that the CPU's stages give.
+// Starts from the work items of the CPU's stages.
 template <vp::coverage Rule>
 void compare_fine_raster(stages<marked>& s) {
     const auto pairs =
@@ -313,7 +313,7 @@ void compare_fine_raster(stages<marked>& s) {
     expect_folded<3>(fragments, vp::get<3>(fb).to_host_target(s.gpu));
 }
 
-TEST(Stages, FineRasterAndTileResolve) {
+TEST(Stages, FineRasterAndTileResolveFoldTheCpusFragments) {
     stages s(mixed_triangles(1500, 45.0f, 72), box_grid({45, 37, 50}), marked{});
     compare_fine_raster<vp::coverage::thin>(s);
     compare_fine_raster<vp::coverage::conservative>(s);
@@ -368,7 +368,7 @@ void compare_lists(stages<marked>& s) {
     expect_same_bytes(payloads, found_payloads, "payloads of the sorted fragments");
 }
 
-TEST(Stages, FragmentLists) {
+TEST(Stages, FragmentListsAreTheCpusFragments) {
     stages s(mixed_triangles(1500, 45.0f, 73), box_grid({45, 37, 50}), marked{});
     compare_lists<vp::coverage::thin>(s);
     compare_lists<vp::coverage::conservative>(s);
@@ -381,7 +381,7 @@ using extreme_values = any_values<vp::target<double, blend::max>, vp::target<glm
 
 template <vp::coverage Rule>
 void compare_passes(stages<marked>& s) {
-    // As separate calls: marks, other targets by another shader, and the marks once more onto what is there.
+    // As separate calls: marks, other targets by another shader, and the marks once more onto the stored values.
     marked_targets<vp::cuda_backend> marks{s.gpu, s.g.extent}, d_marks{s.gpu, s.g.extent};
     extremes most{s.gpu, s.g.extent}, d_most{s.gpu, s.g.extent};
     const auto call = [&](const auto& shader, auto& fb) {

@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Calls into fragment lists that wait for nothing, in memory of the caller's with a guard behind it, against
-// cpu_backend.
+// Asynchronous calls into fragment lists, in the caller's memory with a guard behind it, against cpu_backend.
 
 #include "device_test.hpp"
 
@@ -32,8 +31,8 @@ void expect_lists(const std::vector<mesh_data>& parts, const vp::grid& g, const 
     expect_same_on_host(expected.to_host(cpu), lists);
 }
 
-// Memory with a pattern behind it that must stay; it is not initialised itself, so that initcheck sees what is not
-// written before it is read.
+// Memory followed by a pattern that must stay. The memory itself is not initialised, so that initcheck finds reads of
+// unwritten memory.
 struct guarded_memory {
     static constexpr std::size_t guard = 1 << 16;
     std::size_t bytes;
@@ -51,7 +50,7 @@ struct guarded_memory {
     }
 };
 
-// A call that waits for nothing, of several draws, on a stream of its own.
+// An asynchronous call of several draws on its own stream.
 template <class Payload, class FragmentShader>
 class list_call {
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;

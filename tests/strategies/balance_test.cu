@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Adversarial loads: one triangle over everything, a million in one voxel, grid-long slivers, zero-area triangles, and
-// mixtures: equality with the CPU.
+// Adversarial loads give the CPU's bytes: one triangle over the whole grid, millions in one voxel, grid-long slivers,
+// zero-area triangles, and mixtures.
 
 #include "cells.hpp"
 
@@ -24,7 +24,7 @@ void compare(const mesh_data& m, const vp::grid& g) {
     }
 }
 
-TEST(Balance, OneTriangleOverTheWholeGrid) {
+TEST(Balance, OneTriangleOverTheWholeGridGivesTheCpusBytes) {
     mesh_data m;
     add_triangle(m, {-3000.0f, -3000.0f, -100.0f}, {5000.0f, -3000.0f, 1500.0f}, {-3000.0f, 5000.0f, 600.0f});
     for (const vp::coverage rule : both_rules) {
@@ -34,18 +34,18 @@ TEST(Balance, OneTriangleOverTheWholeGrid) {
     compare(m, box_grid({300, 400, 500}));
 }
 
-TEST(Balance, TwoMillionTrianglesInOneVoxel) {
+TEST(Balance, TwoMillionTrianglesInOneVoxelGiveTheCpusBytes) {
     const mesh_data m = triangles_in_voxel(2000000, {17.0f, 5.0f, 30.0f}, 50);
     compare(m, box_grid({64, 64, 64}));
     expect_same_lists<void>(m, box_grid({64, 64, 64}), vp::passthrough{}, vp::constant(true),
                             vp::coverage::conservative);
 }
 
-// Folds: a voxel of 200,000 fragments, a few and very many of some thousands beside each other, and short ones.
-TEST(Balance, LongVoxelsOfBlendsThatAreFolded) {
+// Folds: one voxel of 200,000 fragments, few and many neighbouring voxels of some thousands, and short ones.
+TEST(Balance, LongVoxelsOfFoldedBlendsGiveTheCpusBytes) {
     mesh_data m = triangles_in_voxel(200000, {17.0f, 5.0f, 30.0f}, 56);
     append(m, mixed_triangles(60000, 64.0f, 57));
-    for (std::uint32_t x = 0; x < 60; ++x) // the first of the grid, so that they fall to one block
+    for (std::uint32_t x = 0; x < 60; ++x) // the first voxels of the grid, so that one block gets them
         append(m, triangles_in_voxel(2200, {static_cast<float>(x), 0.0f, 0.0f}, 100 + x));
     for (std::uint32_t x = 0; x < 5; ++x)
         append(m, triangles_in_voxel(4000, {9.0f * static_cast<float>(x), 20.0f, 50.0f}, 200 + x));
@@ -57,7 +57,7 @@ TEST(Balance, LongVoxelsOfBlendsThatAreFolded) {
     }
 }
 
-TEST(Balance, GridLongSlivers) {
+TEST(Balance, GridLongSliversGiveTheCpusBytes) {
     std::mt19937 random(51);
     std::uniform_real_distribution<float> unit(0.0f, 1.0f);
     mesh_data m;
@@ -72,7 +72,7 @@ TEST(Balance, GridLongSlivers) {
     compare(m, box_grid({256, 256, 256}));
 }
 
-TEST(Balance, ThreeMillionZeroAreaTriangles) {
+TEST(Balance, ThreeMillionZeroAreaTrianglesGiveTheCpusBytes) {
     std::mt19937 random(52);
     std::uniform_real_distribution<float> unit(0.0f, 128.0f);
     mesh_data m;
@@ -86,7 +86,7 @@ TEST(Balance, ThreeMillionZeroAreaTriangles) {
 }
 
 // Everything at once, in several orders: order-free blends give one result.
-TEST(Balance, MixturesInAnyOrder) {
+TEST(Balance, MixturesInAnyOrderGiveOneResult) {
     mesh_data m = mixed_triangles(200000, 128.0f, 53);
     const vp::grid g = box_grid({128, 128, 128});
     compare(m, g);

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Shaders that give every render target values of its own type, with the hard ones among them (extremes, negative zero,
-// NaN, infinities), and the grids and meshes that every cell of (coverage x type x blend x targets) is compared on.
+// Shaders that give every render target values of its type, including extremes, negative zero, NaN and infinities, and
+// the grids and meshes on which every cell of (coverage x type x blend x targets) is compared.
 
 #include "device_test.hpp"
 
@@ -20,7 +20,7 @@ namespace device_test {
 }
 
 inline constexpr float nan =
-    std::numeric_limits<float>::quiet_NaN(); // device code may read it, but not call what gave it
+    std::numeric_limits<float>::quiet_NaN(); // device code may read it, but not call quiet_NaN()
 inline constexpr float infinity = std::numeric_limits<float>::infinity();
 
 template <class T>
@@ -70,7 +70,7 @@ struct any_value<glm::vec<N, S, Q>> {
     }
 };
 
-// One value per target from what the fragment is given; a fifth of the fragments is discarded.
+// One value per target, computed from the fragment's inputs. A fifth of the fragments is discarded.
 template <class... Targets>
 struct any_values {
     template <class Fragment>
@@ -89,7 +89,7 @@ private:
     }
 };
 
-// Blends of a user's: order-free, and too large for an atomic.
+// A user's blend that is order-free and too large for an atomic.
 struct extent_of {
     std::int32_t lo[3], hi[3];
 };
@@ -105,14 +105,14 @@ struct join {
     }
 };
 
-// And one that depends on the order: the last of a chain of hashes.
+// A user's blend that depends on the order: a chain of hashes.
 struct chain {
     static constexpr bool order_free = false;
     VOXELPIPE_HD std::uint32_t identity() const { return 1; }
     VOXELPIPE_HD std::uint32_t combine(std::uint32_t a, std::uint32_t b) const { return mix_bits(a * 3 + b); }
 };
 
-// Both, beside two that are drawn in tiles, and values for them.
+// Both blends, beside two targets that are drawn in tiles, and values for them.
 using folded_targets = target_list<vp::target<std::uint32_t, chain>, vp::target<extent_of, join>,
                                    vp::target<std::uint64_t, vp::blend::add_saturate>,
                                    vp::target<vp::bit, vp::blend::bit_and, vp::layout::tiled>>;
@@ -126,7 +126,7 @@ struct folded_values {
     }
 };
 
-// Bits, exact sums, counts and the last, in tiles. One fragment in so many is discarded; 0: none.
+// Bits, exact sums, counts and the last primitive, in tiles. One fragment in `discards` is discarded; 0: none.
 using tile_targets =
     target_list<vp::target<vp::bit, vp::blend::bit_xor>, vp::target<float, vp::blend::add>,
                 vp::target<std::uint32_t, vp::blend::count>, vp::target<std::uint32_t, vp::blend::replace>>;
@@ -141,7 +141,7 @@ struct tile_values {
     }
 };
 
-// Bits in both layouts, for a constant shader: without tiles.
+// Bits in both layouts for a constant shader, without tiles.
 using bit_targets = target_list<vp::target<vp::bit, vp::blend::bit_or, vp::layout::tiled>,
                                 vp::target<vp::bit, vp::blend::min, vp::layout::tiled>,
                                 vp::target<std::uint32_t, vp::blend::count, vp::layout::tiled>,
@@ -151,7 +151,7 @@ using bit_targets = target_list<vp::target<vp::bit, vp::blend::bit_or, vp::layou
     return vp::constant(value, value, value, value, value, value, value);
 }
 
-// Exact sums in both layouts, which are counted where the partial sums of a constant may not be exact.
+// Exact sums in both layouts. They are counted if the partial sums of a constant may be inexact.
 using sum_targets = target_list<vp::target<float, vp::blend::add>, vp::target<double, vp::blend::add>,
                                 vp::target<float, vp::blend::add, vp::layout::tiled>,
                                 vp::target<double, vp::blend::add, vp::layout::tiled>>;
@@ -167,7 +167,7 @@ inline mesh_data triangles_in_voxel(int count, glm::vec3 corner, std::uint32_t s
     return m;
 }
 
-// For fragment lists, a payload.
+// A payload for fragment lists.
 using any_double = any_values<vp::target<double, vp::blend::replace>>;
 
 // Every cell of the targets, both coverages, cleared and loaded.

@@ -16,13 +16,13 @@ void compare_float() {
                   vp::target<T, blend::max>>();
 }
 
-TEST(Cells, Half) { compare_float<vp::half>(); }
-TEST(Cells, Float) { compare_float<float>(); }
-TEST(Cells, Double) { compare_float<double>(); }
-TEST(Cells, FloatQuanta) {
+TEST(Cells, OfHalfAreTheCpus) { compare_float<vp::half>(); }
+TEST(Cells, OfFloatAreTheCpus) { compare_float<float>(); }
+TEST(Cells, OfDoubleAreTheCpus) { compare_float<double>(); }
+TEST(Cells, OfFloatWithOtherQuantaAreTheCpus) {
     compare_cells<vp::target<float, blend::add_quantum<-20>>, vp::target<float, blend::add_quantum<0>>,
                   vp::target<vp::bit, blend::bit_or>>();
 }
-TEST(Cells, OneBit) { compare_cells<vp::target<vp::bit, blend::bit_or>>(); }
+TEST(Cells, OfOneBitAreTheCpus) { compare_cells<vp::target<vp::bit, blend::bit_or>>(); }
 
 } // namespace

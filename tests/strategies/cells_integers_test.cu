@@ -17,11 +17,11 @@ void compare_integer() {
                   vp::target<T, blend::bit_or>, vp::target<T, blend::bit_xor>>();
 }
 
-TEST(Cells, Unsigned32) { compare_integer<std::uint32_t>(); }
-TEST(Cells, Unsigned64) { compare_integer<std::uint64_t>(); }
-TEST(Cells, Signed32) { compare_integer<std::int32_t>(); }
-TEST(Cells, Signed64) { compare_integer<std::int64_t>(); }
-TEST(Cells, Counts) {
+TEST(Cells, OfUnsigned32AreTheCpus) { compare_integer<std::uint32_t>(); }
+TEST(Cells, OfUnsigned64AreTheCpus) { compare_integer<std::uint64_t>(); }
+TEST(Cells, OfSigned32AreTheCpus) { compare_integer<std::int32_t>(); }
+TEST(Cells, OfSigned64AreTheCpus) { compare_integer<std::int64_t>(); }
+TEST(Cells, OfCountsAreTheCpus) {
     compare_cells<vp::target<std::uint8_t, blend::count>, vp::target<std::uint16_t, blend::count>,
                   vp::target<std::uint32_t, blend::count>, vp::target<std::uint64_t, blend::count>,
                   vp::target<std::int32_t, blend::count>, vp::target<std::int64_t, blend::count>,

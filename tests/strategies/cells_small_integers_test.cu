@@ -17,9 +17,9 @@ void compare_integer() {
                   vp::target<T, blend::bit_or>, vp::target<T, blend::bit_xor>>();
 }
 
-TEST(Cells, Unsigned8) { compare_integer<std::uint8_t>(); }
-TEST(Cells, Unsigned16) { compare_integer<std::uint16_t>(); }
-TEST(Cells, Signed16) { compare_integer<std::int16_t>(); }
-TEST(Cells, Bits) { compare_integer<vp::bit>(); }
+TEST(Cells, OfUnsigned8AreTheCpus) { compare_integer<std::uint8_t>(); }
+TEST(Cells, OfUnsigned16AreTheCpus) { compare_integer<std::uint16_t>(); }
+TEST(Cells, OfSigned16AreTheCpus) { compare_integer<std::int16_t>(); }
+TEST(Cells, OfBitsAreTheCpus) { compare_integer<vp::bit>(); }
 
 } // namespace

@@ -13,7 +13,8 @@ namespace device = voxelpipe::device;
 namespace {
 
 template <class... Targets>
-constexpr int tile_bytes = 512 / 8 * (1 + (device::bits_per_voxel<Targets>() + ...)); // a bit a voxel is for all
+constexpr int tile_bytes = 512 / 8 *
+                           (1 + (device::bits_per_voxel<Targets>() + ...)); // one bit a voxel is shared by all targets
 
 template <class... Targets>
 void compare_two_passes() {
@@ -24,11 +25,11 @@ void compare_two_passes() {
     compare_cells<Targets...>();
 }
 
-TEST(Cells, TwoPassesOf76Kilobytes) {
+TEST(Cells, InTwoPassesOf76KilobytesAreTheCpus) {
     compare_two_passes<vp::target<glm::dvec4, blend::add>, vp::target<glm::vec4, blend::add>,
                        vp::target<glm::vec2, blend::add, vp::layout::planar>>();
 }
-TEST(Cells, TwoPassesOf92Kilobytes) {
+TEST(Cells, InTwoPassesOf92KilobytesAreTheCpus) {
     compare_two_passes<vp::target<glm::dvec4, blend::add, vp::layout::tiled>, vp::target<glm::vec4, blend::add>,
                        vp::target<glm::dvec2, blend::max>, vp::target<glm::dvec2, blend::add>>();
 }

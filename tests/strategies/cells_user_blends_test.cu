@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Blends of the user's: order-free small ones by compare-and-swap, all others folded in triangle order.
+// Blends that a user defines: small order-free ones by compare-and-swap, all others folded in triangle order.
 
 #include "cells.hpp"
 
@@ -41,7 +41,7 @@ struct user_values {
     }
 };
 
-TEST(Cells, UserBlends) {
+TEST(Cells, UserBlendsAreTheCpus) {
     for (const vp::coverage rule : both_rules)
         for (const start how : {start::clear, start::load})
             expect_same<vp::target<keyed, largest_key>, vp::target<extent_of, join>, vp::target<std::uint32_t, chain>,
@@ -57,12 +57,12 @@ struct user_struct_value {
         return vp::outputs(extent_of{{p, p, p}, {f.voxel.x, f.voxel.y, f.voxel.z}});
     }
 };
-TEST(Cells, UserStructReplaced) {
+TEST(Cells, ReplacedUserStructsAreTheCpus) {
     for (const vp::coverage rule : both_rules)
         expect_same<vp::target<extent_of, blend::replace>>(mixed_triangles(2000, 40.0f, 6), box_grid({40, 33, 47}),
                                                            vp::passthrough{}, user_struct_value{}, rule);
 }
-TEST(Cells, OnlyOrdered) {
+TEST(Cells, OrderedTargetsAloneAreTheCpus) {
     for (const vp::coverage rule : both_rules)
         expect_same<vp::target<extent_of, join>>(mixed_triangles(2000, 40.0f, 7), box_grid({40, 33, 47}),
                                                  vp::passthrough{}, user_struct_value{}, rule);

@@ -17,17 +17,17 @@ using u64vec2 = glm::vec<2, std::uint64_t>;
 using vp::layout::planar;
 using vp::layout::tiled;
 
-TEST(Cells, Vectors) {
+TEST(Cells, OfVectorsAreTheCpus) {
     compare_cells<vp::target<glm::vec3, blend::add, planar>, vp::target<glm::vec3, blend::max>,
                   vp::target<u8vec4, blend::add_saturate, tiled>, vp::target<glm::dvec2, blend::add>,
                   vp::target<glm::vec4, blend::replace, planar>, vp::target<i16vec3, blend::min, tiled>,
                   vp::target<hvec2, blend::add>, vp::target<u64vec2, blend::bit_xor, planar>>();
 }
-TEST(Cells, TiledBitsAndWinners) {
+TEST(Cells, OfTiledBitsAndWinnersAreTheCpus) {
     compare_cells<vp::target<vp::bit, blend::bit_or, tiled>, vp::target<vp::bit, blend::replace, tiled>,
                   vp::target<std::uint32_t, blend::replace, tiled>, vp::target<u64vec2, blend::count>>();
 }
-TEST(Cells, SeveralPasses) {
+TEST(Cells, InSeveralPassesAreTheCpus) {
     compare_cells<vp::target<glm::dvec4, blend::add>, vp::target<glm::dvec4, blend::add, planar>,
                   vp::target<glm::dvec4, blend::add, tiled>, vp::target<glm::dvec4, blend::replace>>();
 }

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Targets that hold numbers of fragments while a constant shader is drawn, until a last pass makes values of them:
-// against cpu_backend, byte for byte, padding included, and when a call takes this way.
+// Targets that hold fragment counts while a constant shader is drawn, until a last pass turns them into values:
+// compared with cpu_backend byte for byte, padding included. Also when a call uses counts.
 
 #include "cells.hpp"
 
@@ -24,7 +24,7 @@ using vp::device::immediate_mode;
 template <class... Ts>
 using constant_draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<Ts...>>;
 
-// Triangles of all sizes; voxels of 1 to 40 fragments, and of more than a last pass has in its table.
+// Triangles of all sizes; voxels of 1 to 40 fragments, and of more than the table of the last pass holds.
 mesh_data crowded(float size, std::uint32_t seed) {
     mesh_data m = mixed_triangles(600, size, seed);
     const auto speck = [&](float x, float y, float z, float step) {
@@ -85,7 +85,7 @@ void compare_sums(const mesh_data& m, glm::ivec3 extent, float value, double wid
     }(sum_targets{});
 }
 
-// How a call would go, which needs no device.
+// The plan of a call, which needs no device.
 template <class... Targets, class... Ts>
 auto plan(const std::vector<vp::constant_output<Ts...>>& shaders, const vp::framebuffer_view<Targets...>& fb,
           std::uint64_t num_primitives, bool count_voxels) {
@@ -97,7 +97,7 @@ auto plan(const std::vector<vp::constant_output<Ts...>>& shaders, const vp::fram
 using float_sum = vp::target<float, blend::add>;
 using bits = vp::target<vp::bit, blend::bit_or>;
 
-const glm::ivec3 odd_extent{37, 21, 31}; // one element is left beyond whole 16 bytes
+const glm::ivec3 odd_extent{37, 21, 31}; // one element remains after whole 16-byte words
 
 template <class T>
 std::vector<T> constants() {
@@ -117,7 +117,7 @@ std::vector<T> constants() {
             -limits::quiet_NaN()};
 }
 
-TEST(Counted, SumsOfAnyConstant) {
+TEST(Counted, SumsOfAnyConstantAreTheCpus) {
     const mesh_data m = crowded(36.0f, 200);
     const std::vector<float> values = constants<float>();
     const std::vector<double> wide_values = constants<double>();
@@ -128,7 +128,7 @@ TEST(Counted, SumsOfAnyConstant) {
     }
 }
 
-TEST(Counted, OntoAnyClearValue) {
+TEST(Counted, SumsOntoAnyClearValueAreTheCpus) {
     const mesh_data m = crowded(36.0f, 201);
     const std::vector<float> values = constants<float>();
     const std::vector<double> wide_values = constants<double>();
@@ -139,7 +139,7 @@ TEST(Counted, OntoAnyClearValue) {
 }
 
 // Bricks, whose padding holds the clear value; extents from 1 voxel on.
-TEST(Counted, LayoutsAndExtents) {
+TEST(Counted, EveryLayoutAndExtentHoldsTheCpusBytes) {
     for (const glm::ivec3 extent : {odd_extent, glm::ivec3(1), glm::ivec3(3, 1, 2), glm::ivec3(40, 16, 24)})
         for (const float clear : {0.0f, 0.3f}) {
             const mesh_data m = crowded(static_cast<float>(extent.x), 202);
@@ -147,18 +147,17 @@ TEST(Counted, LayoutsAndExtents) {
         }
 }
 
-// Grids large enough for marks, whose last pass reads only what they mark: rows that go 16 bytes at a time and rows
-// that cannot, extents that end within a chunk, more chunks along x than a word has bits. Then a clear value for which
-// all has to be read.
-TEST(Counted, LargeGridsByMarks) {
+// Grids large enough for marks, whose last pass reads only marked chunks: rows with and without 16-byte access, extents
+// that end within a chunk, more chunks along x than a word has bits. Then a clear value for which everything is read.
+TEST(Counted, LargeGridsWithMarksHoldTheCpusBytes) {
     for (const glm::ivec3 extent : {glm::ivec3(320, 200, 140), glm::ivec3(333, 191, 141), glm::ivec3(1100, 92, 91)}) {
         ASSERT_GE(static_cast<std::size_t>(extent.x) * static_cast<std::size_t>(extent.y * extent.z) * sizeof(float),
                   vp::device::marked_bytes);
         const glm::vec3 size(extent);
-        mesh_data m = mixed_triangles(1500, size.x, 210); // many beyond the grid's faces, and some across them
+        mesh_data m = mixed_triangles(1500, size.x, 210); // many outside the grid, and some across its faces
         append(m, crowded(36.0f, 211));
         append(m, mixed_triangles(1500, size.z, 212));
-        for (const float x : {0.01f, 0.4f, 0.99f}) { // across the whole grid, and slivers
+        for (const float x : {0.01f, 0.4f, 0.99f}) { // across the whole grid, also slivers
             add_triangle(m, size * glm::vec3(x, 0.0f, 0.0f), size * glm::vec3(x, 1.0f, 0.1f), size);
             add_triangle(m, size * glm::vec3(0.0f, x, 1.0f), size * glm::vec3(1.0f, x, 0.9f),
                          size * glm::vec3(1.0f, x, 0.901f));
@@ -169,7 +168,7 @@ TEST(Counted, LargeGridsByMarks) {
 }
 
 // As few as the tiles took before there were marks.
-TEST(Counted, FewLargeTrianglesByMarks) {
+TEST(Counted, FewLargeTrianglesWithMarksGiveTheCpusBytes) {
     const glm::ivec3 extent(260, 210, 170);
     const glm::vec3 size(extent);
     mesh_data m;
@@ -180,7 +179,7 @@ TEST(Counted, FewLargeTrianglesByMarks) {
         compare<float_sum>({m}, extent, std::vector{vp::constant(value)}, vp::core::make_pack(0.0f));
 }
 
-TEST(Counted, SeveralDraws) {
+TEST(Counted, SeveralDrawsGiveTheCpusBytes) {
     const std::vector<mesh_data> meshes{crowded(36.0f, 203), mixed_triangles(300, 30.0f, 204), crowded(30.0f, 205)};
     const auto draw = [&](float a, float b, float c) {
         compare<float_sum>(meshes, odd_extent, std::vector{vp::constant(a), vp::constant(b), vp::constant(c)},
@@ -192,7 +191,7 @@ TEST(Counted, SeveralDraws) {
     draw(0.5f, 2.0f, -1.0f);
 }
 
-TEST(Counted, BesideBits) {
+TEST(Counted, TargetsBesideBitsHoldTheCpusBytes) {
     const mesh_data m = crowded(36.0f, 206);
     for (const float value : {1.0f, 0.1f})
         for (const bool set : {false, true})
@@ -200,8 +199,8 @@ TEST(Counted, BesideBits) {
                                      vp::core::make_pack(set, 0.0f));
 }
 
-// Blends that are counted only where the voxels are wanted, and another scale of the sum.
-TEST(Counted, IntegersAndQuanta) {
+// Blends that are counted only if the number of voxels is asked for, and another quantum of the sum.
+TEST(Counted, IntegersAndOtherQuantaAreTheCpus) {
     const mesh_data m = crowded(36.0f, 207);
     const std::int64_t pattern = 0x123456789abcdef, clear = -77;
     for (const float value : {0.3f, 1.0f, 1e-4f, 1e20f})
@@ -212,8 +211,8 @@ TEST(Counted, IntegersAndQuanta) {
                                                        vp::core::make_pack(0x80000000u));
 }
 
-// Terms of which any order of additions is exact.
-TEST(Counted, UnorderedSums) {
+// Terms whose sums are exact in any order.
+TEST(Counted, UnorderedSumsOfExactTermsAreTheCpus) {
     const mesh_data m = crowded(36.0f, 208);
     const float infinity = std::numeric_limits<float>::infinity();
     for (const float value : {0.125f, -0.0f, infinity})
@@ -222,15 +221,15 @@ TEST(Counted, UnorderedSums) {
                                                              vp::core::make_pack(clear));
 }
 
-TEST(Counted, NotWhereTheMemoryIsLoaded) {
+TEST(Counted, LoadedTargetsAreNotCounted) {
     const mesh_data m = crowded(36.0f, 209);
     for (const bool count_voxels : {false, true})
         expect_same<float_sum>(m, box_grid(odd_extent), vp::passthrough{}, vp::constant(0.1f),
                                vp::voxelize_options{vp::coverage::conservative, count_voxels}, start::load);
 }
 
-// More fragments than a float counts. A fold on the host would take its time: the sum is exact in a double.
-TEST(Counted, SixteenMillionFragmentsInAVoxel) {
+// More fragments than a float can count. The expected sum is exact in a double, because a fold on the host is slow.
+TEST(Counted, SixteenMillionFragmentsInAVoxelAreCountedExactly) {
     constexpr std::uint32_t n = (1u << 24) + 3;
     const glm::ivec3 extent(5, 4, 3);
     mesh_data m;
@@ -271,7 +270,8 @@ TEST(Counted, BadIndexWritesNothing) {
     expect_same_bytes(before, vp::get<0>(fb).to_host(be), "after a bad index");
 }
 
-// ---- when -----------------------------------------------------------------------------------------------------------
+// ---- when a call uses counts
+// -----------------------------------------------------------------------------------------------------------
 
 template <class... Targets>
 vp::framebuffer_view<Targets...> view_of(glm::ivec3 extent) {
@@ -281,7 +281,7 @@ vp::framebuffer_view<Targets...> view_of(glm::ivec3 extent) {
     return fb;
 }
 
-TEST(CountedPlan, OnlyWhereItIsNeeded) {
+TEST(CountedPlan, CountsOnlyIfNeeded) {
     const auto of_sum = [](std::vector<float> values, std::uint64_t n, bool count_voxels) {
         std::vector<vp::constant_output<float>> shaders;
         for (const float v : values) shaders.push_back(vp::constant(v));
@@ -298,23 +298,23 @@ TEST(CountedPlan, OnlyWhereItIsNeeded) {
     }
     EXPECT_EQ(of_sum({0.1f}, 1000, false).voxels_of, -1);
     EXPECT_EQ(of_sum({0.1f}, 1000, true).voxels_of, 0);
-    EXPECT_TRUE(of_sum({0.5f, 1.0f}, 1000, false).possible); // exact: each where it lies
+    EXPECT_TRUE(of_sum({0.5f, 1.0f}, 1000, false).possible); // exact: blended in place
     EXPECT_FALSE(of_sum({0.5f, 1.0f}, 1000, true).possible);
     EXPECT_FALSE(of_sum({0.1f, 0.2f}, 1000, false).possible);
     EXPECT_FALSE(of_sum({0.0f, -0.0f}, 1000, false).possible);
 }
 
-TEST(CountedPlan, BesideATargetThatTellsFirstTouches) {
+TEST(CountedPlan, LetsAnotherTargetGiveTheNumberOfVoxels) {
     auto fb = view_of<bits, float_sum>({32, 32, 32});
     const auto beside = [&](float value) { return plan(std::vector{vp::constant(true, value)}, fb, 1000, true); };
-    // Bits tell the voxels when all is drawn,
+    // A target of bits gives the number of voxels after drawing,
     EXPECT_TRUE(beside(1.0f).possible);
     EXPECT_EQ(beside(1.0f).modes.of[0], immediate_mode::blend);
     EXPECT_EQ(beside(1.0f).modes.of[1], immediate_mode::blend);
     EXPECT_FALSE(beside(1.0f).modes.counts_first);
     EXPECT_EQ(beside(1.0f).bits_of, 0);
     EXPECT_EQ(beside(1.0f).voxels_of, -1);
-    // many of them while it is.
+    // or, if there are many, during drawing.
     fb = view_of<bits, float_sum>({2048, 2048, 1024});
     EXPECT_TRUE(beside(1.0f).possible);
     EXPECT_EQ(beside(1.0f).modes.of[0], immediate_mode::count_first);
@@ -322,13 +322,13 @@ TEST(CountedPlan, BesideATargetThatTellsFirstTouches) {
     EXPECT_TRUE(beside(1.0f).modes.counts_first);
     EXPECT_EQ(beside(1.0f).bits_of, -1);
     EXPECT_EQ(beside(1.0f).voxels_of, -1);
-    // Words beyond 2^30 want wider numbers: their places in bytes are beyond 2^32.
+    // More than 2^30 words need wider offsets: in bytes they exceed 2^32.
     fb = view_of<bits, float_sum>({32, 1 << 15, (1 << 15) - 1});
     EXPECT_EQ(plan(std::vector{vp::constant(true, 1.0f)}, fb, 1000, false).modes.of[0], immediate_mode::blend);
     fb = view_of<bits, float_sum>({32, 1 << 15, 1 << 15});
     EXPECT_EQ(plan(std::vector{vp::constant(true, 1.0f)}, fb, 1000, false).modes.of[0], immediate_mode::blend_far);
     fb = view_of<bits, float_sum>({32, 32, 32});
-    // What is counted anyway tells the voxels too.
+    // A target that is counted anyway gives the number of voxels too.
     EXPECT_EQ(beside(0.1f).modes.of[0], immediate_mode::blend);
     EXPECT_EQ(beside(0.1f).modes.of[1], immediate_mode::count);
     EXPECT_FALSE(beside(0.1f).modes.counts_first);
@@ -340,8 +340,8 @@ TEST(CountedPlan, BesideATargetThatTellsFirstTouches) {
     EXPECT_EQ(beside(0.1f).modes.of[1], immediate_mode::blend);
 }
 
-// A few triangles in a large grid are drawn sooner than the grid is read, where that is not spared by marks.
-TEST(CountedPlan, NotForAFewTrianglesWhereTheWholeGridIsRead) {
+// A few triangles in a large grid are not counted if the last pass would read the whole grid, which takes longer.
+TEST(CountedPlan, DoesNotCountAFewTrianglesIfTheWholeGridWouldBeRead) {
     const std::vector shaders{vp::constant(0.1f)};
     auto fb = view_of<float_sum>({1024, 1024, 1024});
     EXPECT_TRUE(plan(shaders, fb, 12, true).possible);

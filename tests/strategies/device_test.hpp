@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the GPU tests share: generated meshes, the benchmark scenes where they are present, and expect_same, which runs
-// one call on cpu_backend and on cuda_backend and compares every byte of the results and every counter.
+// Shared by the GPU tests: generated meshes, the benchmark scenes if present, and expect_same, which runs one call on
+// cpu_backend and on cuda_backend and compares every byte of the results and every counter.
 
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/device/backend.cuh>
@@ -35,8 +35,8 @@ inline void add_triangle(mesh_data& m, glm::vec3 a, glm::vec3 b, glm::vec3 c) {
     m.triangles.emplace_back(n, n + 1, n + 2);
 }
 
-// Long thin triangles across a grid and somewhat beyond: bounding boxes of many columns of bricks, and few fragments. A
-// third have a short side of some 20 voxels.
+// Long thin triangles across a grid and slightly beyond: large bounding boxes and few fragments. A third have a short
+// side of about 20 voxels.
 inline mesh_data long_triangles(glm::ivec3 extent, int count, std::uint32_t seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<float> unit(-0.1f, 1.1f);
@@ -123,9 +123,9 @@ inline mesh_data triangles_at_faces(glm::ivec3 extent, int count, bool upper, st
     return m;
 }
 
-// A mesh finer than a grid of some 46 voxels a side, of which one triangle in `step` (0: none) is up to `longest`
-// voxels long and one or two wide, some of these without an area; some lie beyond the grid. Where the long ones are few
-// and short, blocks of a first kernel draw them at their end (direct_raster.cuh).
+// A mesh finer than a grid of about 46 voxels a side. One triangle in `step` (0: none) is up to `longest` voxels long
+// and one or two wide; some of these have no area, and some lie outside the grid. If the long ones are few and short,
+// blocks of a first kernel draw them at their end (direct_raster.cuh).
 inline mesh_data fine_triangles(int count, int step, float longest) {
     mesh_data m;
     for (int i = 0; i < count; ++i) {
@@ -154,7 +154,7 @@ inline void append(mesh_data& m, const mesh_data& more) {
     for (const glm::uvec3& t : more.triangles) m.triangles.push_back(t + glm::uvec3(first));
 }
 
-// A vertex shader that does not run on the spot: its positions are stored first.
+// A vertex shader whose positions are stored before the raster.
 struct shift {
     float by;
     template <class Vertex>
@@ -169,7 +169,7 @@ inline vp::grid box_grid(glm::ivec3 extent) {
     return g;
 }
 
-// A scene by name (VPM file in VOXELPIPE_VPM_DIR), empty where it is absent.
+// A scene by name (VPM file in VOXELPIPE_VPM_DIR); empty if absent.
 inline mesh_data load_scene(const std::string& name) {
     mesh_data m;
     const char* const folder = std::getenv("VOXELPIPE_VPM_DIR");
@@ -219,11 +219,10 @@ void expect_same_bytes(const std::vector<T>& cpu, const std::vector<T>& gpu, con
                   << ": cpu " << hex(cpu[first]) << ", gpu " << hex(gpu[first]);
 }
 
-// How the targets start: cleared (to their blends' identities) or loaded with a pattern of bytes drawn by an earlier
-// call.
+// Start of the targets: cleared to their blends' identities, or loaded with a byte pattern that an earlier call drew.
 enum class start { clear, load };
 
-// Whether calls are told that a mesh's indices have been looked at.
+// Whether calls know that a mesh's indices have been checked.
 enum class indices { checked, unknown };
 
 template <class Backend>
@@ -251,7 +250,7 @@ void expect_same(const mesh_data& m, const vp::grid& g, const VertexShader& vs, 
     vp::cpu_backend cpu;
     vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
     const vp::status sa = draw_framebuffer(cpu, a, m, g, vs, fs, options, how);
-    // Constants are drawn without lists and tiles, mostly, but by other ways where indices have to be looked at.
+    // Constants are mostly drawn without lists and tiles, and by other kernels if indices must be checked.
     constexpr bool constant = vp::core::is_constant<FragmentShader>;
     for (const bool first : {true, false}) {
         SCOPED_TRACE(constant ? first ? "indices checked" : "indices unknown"
@@ -271,7 +270,7 @@ void expect_same(const mesh_data& m, const vp::grid& g, const VertexShader& vs, 
     }
 }
 
-// Targets that several tests draw into, named once: each set of targets and shaders is kernels of its own to compile.
+// Targets of several tests, named once, because each set of targets and shaders compiles its own kernels.
 template <class... Targets>
 struct target_list {
     template <class Backend>
@@ -309,7 +308,7 @@ void expect_same_lists(const mesh_data& m, const vp::grid& g, const VertexShader
     expect_same_on_host(a.to_host(cpu), b.to_host(gpu));
 }
 
-// Counts what it gives out, and refuses what would take it beyond `most`.
+// Counts live bytes, and refuses allocations beyond `most`.
 struct counting_resource {
     std::size_t live = 0, most = std::size_t{1} << 40; // bytes
     int calls = 0;
@@ -334,8 +333,7 @@ struct stream_owner {
     ~stream_owner() { cudaStreamDestroy(stream); }
 };
 
-// Stage times are asked for without a change to what a call gives: they are parts of the call, and a call that is not
-// asked for them leaves them alone.
+// Stage times do not change the result. They are parts of the call's time, and a call without them does not write them.
 template <class Call>
 vp::stage_times time_stages(vp::cuda_backend& be, const Call& call) {
     cudaEvent_t begin = nullptr, end = nullptr;
@@ -353,7 +351,7 @@ vp::stage_times time_stages(vp::cuda_backend& be, const Call& call) {
     EXPECT_EQ(cudaEventElapsedTime(&whole, begin, end), cudaSuccess);
     for (const auto& [name, field] : vp::stage_time_fields) EXPECT_GE(times.*field, 0.0) << name;
     EXPECT_GT(vp::sum_of(times), 0.0);
-    EXPECT_LE(vp::sum_of(times), whole + 0.01); // events are good to half a microsecond each
+    EXPECT_LE(vp::sum_of(times), whole + 0.01); // events have a resolution of half a microsecond
     const vp::stage_times before = times;
     EXPECT_TRUE(call().ok());
     EXPECT_EQ(before, times);

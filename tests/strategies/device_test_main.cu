@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// main of the GPU tests: says which device they ran on, and exits with 77, "not run", where there is none.
+// main of the GPU tests: prints the device, and exits with 77, "not run", if there is none.
 
 #include <cuda_runtime.h>
 #include <gtest/gtest.h>

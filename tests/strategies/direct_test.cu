@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Constant shaders, which are drawn without tiles where every target takes a fragment by one atomic: every such target
-// against cpu_backend, byte for byte, and the border between this way and the tiles.
+// Constant shaders are drawn without tiles if every target takes a fragment by one atomic. Every such target is
+// compared with cpu_backend byte for byte, and so is the choice between this strategy and tiles.
 
 #include "cells.hpp"
 
@@ -34,7 +34,7 @@ mesh_data specks() {
     return m;
 }
 
-// Slivers and others with bounding boxes of 2 to 40 voxels, or as many as `longest`, in all directions.
+// Slivers and other triangles with bounding boxes of 2 to 40 voxels, or up to `longest`, in all directions.
 mesh_data middling_triangles(glm::ivec3 extent, std::uint32_t seed, int count = 3000, float longest = 40.0f) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<float> unit(0.0f, 1.0f);
@@ -51,7 +51,7 @@ mesh_data middling_triangles(glm::ivec3 extent, std::uint32_t seed, int count = 
     return m;
 }
 
-// Cleared and loaded, with and without the voxel counter, a grid that cuts triangles off at every side.
+// Cleared and loaded, with and without the voxel counter, in a grid that cuts triangles at every side.
 template <class Targets, class... Values>
 void compare_constants(Targets targets, const vp::constant_output<Values...>& shader) {
     for (const vp::coverage rule : both_rules) {
@@ -60,7 +60,7 @@ void compare_constants(Targets targets, const vp::constant_output<Values...>& sh
         expect_same(targets, m, box_grid({97, 9, 31}), vp::passthrough{}, shader, vp::voxelize_options{rule, false},
                     start::load);
         expect_same(targets, mixed_triangles(200, 1.0f, 82), box_grid({1, 1, 1}), vp::passthrough{}, shader, rule);
-        // Neighbours of one voxel each that share it, odd and even numbers of them.
+        // Odd and even numbers of neighbouring triangles that share one voxel.
         expect_same(targets, specks(), box_grid({40, 5, 3}), vp::passthrough{}, shader,
                     vp::voxelize_options{rule, false});
     }
@@ -74,17 +74,17 @@ void compare_integers(T value) {
     compare_constants(targets{}, vp::constant(value, value, value, value, value, value, value));
 }
 
-TEST(Direct, Unsigned32) { compare_integers<std::uint32_t>(0x9234567u); }
-TEST(Direct, Signed32) { compare_integers<std::int32_t>(-7654321); }
-TEST(Direct, Unsigned64) { compare_integers<std::uint64_t>(0x923456789abcdef1u); }
-TEST(Direct, Signed64) { compare_integers<std::int64_t>(-765432123456789); }
+TEST(Direct, Unsigned32IsTheCpus) { compare_integers<std::uint32_t>(0x9234567u); }
+TEST(Direct, Signed32IsTheCpus) { compare_integers<std::int32_t>(-7654321); }
+TEST(Direct, Unsigned64IsTheCpus) { compare_integers<std::uint64_t>(0x923456789abcdef1u); }
+TEST(Direct, Signed64IsTheCpus) { compare_integers<std::int64_t>(-765432123456789); }
 
-TEST(Direct, Bits) {
+TEST(Direct, BitsAreTheCpus) {
     for (const bool value : {false, true}) compare_constants(bit_targets{}, same_bits(value));
 }
 
-// The classes of work between one thread's and a large triangle's, whose limits follow the fraction bits of the grid.
-TEST(Direct, MiddlingTriangles) {
+// The size classes between a thread's and a split triangle's. Their limits depend on the grid's fraction bits.
+TEST(Direct, TrianglesOfMediumSizeGiveTheCpusBytes) {
     for (const glm::ivec3 extent : {glm::ivec3(120, 90, 100), glm::ivec3(300, 60, 50), glm::ivec3(40, 60, 1100)})
         for (const vp::coverage rule : both_rules) {
             expect_same<vp::target<vp::bit, blend::bit_or>>(middling_triangles(extent, 84), box_grid(extent),
@@ -96,8 +96,8 @@ TEST(Direct, MiddlingTriangles) {
         }
 }
 
-// From one triangle, whose pieces are spread over the device, to more than it takes at once.
-TEST(Direct, FewAndManyLargeTriangles) {
+// From one triangle, whose work items are spread over the device, to more than it runs at once.
+TEST(Direct, FewAndManyLargeTrianglesGiveTheCpusBytes) {
     const glm::ivec3 extent(150, 130, 140);
     std::mt19937 random(86);
     std::uniform_real_distribution<float> unit(-0.3f, 1.3f);
@@ -112,8 +112,8 @@ TEST(Direct, FewAndManyLargeTriangles) {
     }
 }
 
-// So many of each kind that a thread has one, and in thin bits the warps gather words; also some beyond the grid.
-TEST(Direct, ManyMiddlingTriangles) {
+// Enough of each size class that every thread has one, and that warps combine words of thin bits. Some lie outside.
+TEST(Direct, ManyTrianglesOfMediumSizeGiveTheCpusBytes) {
     const glm::ivec3 extent(190, 170, 180);
     const mesh_data m = middling_triangles(extent, 89, 150000, 16.0f);
     for (const vp::coverage rule : both_rules)
@@ -124,9 +124,8 @@ TEST(Direct, ManyMiddlingTriangles) {
                             vp::voxelize_options{vp::coverage::thin, true});
 }
 
-// Few triangles in bits too large to be gathered apart: what an or and an and do to words where they lie, of targets
-// that were there before.
-TEST(Direct, FewTrianglesInManyBits) {
+// Few triangles in a bit grid too large for an occupancy mask: bitwise or and and in place, onto loaded targets.
+TEST(Direct, FewTrianglesInManyBitsGiveTheCpusBytes) {
     const glm::ivec3 extent(250, 200, 256);
     mesh_data m = middling_triangles(extent, 88);
     m.triangles.resize(300);
@@ -142,8 +141,8 @@ TEST(Direct, FewTrianglesInManyBits) {
     }
 }
 
-// Many records of each, more than the device has warps.
-TEST(Direct, ManyRecordsOfLargeTriangles) {
+// Many work items of each triangle, more than the device has warps.
+TEST(Direct, LargeTrianglesWithManyWorkItemsGiveTheCpusBytes) {
     const glm::ivec3 extent(420, 390, 400);
     const mesh_data m = long_triangles(extent, 1500, 87);
     for (const vp::coverage rule : both_rules) {
@@ -155,9 +154,9 @@ TEST(Direct, ManyRecordsOfLargeTriangles) {
     }
 }
 
-// As many as there is room to keep set-ups for, of which some are not cut, and more, with room to spare: then none is
-// kept, and each record finds out what it needs for itself.
-TEST(Direct, MoreLargeTrianglesThanAreSetUp) {
+// As many as there are kept set-ups, some of which are not split, and more: then no set-up is kept, and each work item
+// repeats it.
+TEST(Direct, MoreLargeTrianglesThanKeptSetUpsGiveTheCpusBytes) {
     constexpr auto most = static_cast<int>(vp::device::deferred_triangles::max_setups);
     const glm::ivec3 extent(150, 160, 140);
     for (const int count : {most, most + most / 4}) {
@@ -168,9 +167,9 @@ TEST(Direct, MoreLargeTrianglesThanAreSetUp) {
     }
 }
 
-// Floors, walls and ceilings, some a little or more out of level, at the centres and faces of voxels and in between,
-// out of the grid too: rows of one depth, of few and of many, along each axis.
-TEST(Direct, FlatLargeTriangles) {
+// Floors, walls and ceilings, some tilted, at the centres and faces of voxels and in between, also outside the grid:
+// rows of one, of few and of many depths, along each axis.
+TEST(Direct, FlatLargeTrianglesGiveTheCpusBytes) {
     const glm::ivec3 extent(130, 100, 110);
     mesh_data m;
     for (int axis = 0; axis < 3; ++axis)
@@ -198,11 +197,10 @@ TEST(Direct, FlatLargeTriangles) {
     }
 }
 
-// Exact partial sums, and values that have none and take the tiles.
 // Many triangles for their grid (may_be_close), of which a warp's lie within two, three or five voxels, over a grid
 // whose rows are more than a word long, at its faces and beyond them; one in some batches is longer, lies apart or has
 // no area.
-TEST(Direct, CloseTriangles) {
+TEST(Direct, CloseTrianglesGiveTheCpusBytes) {
     const glm::ivec3 extent(70, 30, 24);
     std::mt19937 random(91);
     std::uniform_real_distribution<float> unit(0.0f, 1.0f);
@@ -230,7 +228,7 @@ TEST(Direct, CloseTriangles) {
                                                                 vp::constant(true), {rule, counts}, how);
 }
 
-TEST(Direct, Sums) {
+TEST(Direct, SumsAreTheCpus) {
     for (const float value : {1.0f, -0.75f, 0.1f, 3e9f, 1e-20f, std::numeric_limits<float>::infinity()})
         compare_constants(sum_targets{}, same_sums(value, value));
 }
@@ -240,11 +238,11 @@ TEST(Direct, SumsAreExactOnlyWhereProven) {
     constexpr std::uint64_t limit = std::uint64_t{1} << 24;
     EXPECT_TRUE(sums_are_exact(1.0f, 0.0f, limit - 1, -32));
     EXPECT_FALSE(sums_are_exact(1.0f, 0.0f, limit, -32));
-    EXPECT_FALSE(sums_are_exact(1.0f, 1.0f, limit - 1, -32)); // what is there already counts
+    EXPECT_FALSE(sums_are_exact(1.0f, 1.0f, limit - 1, -32)); // the stored value counts too
     EXPECT_TRUE(sums_are_exact(-0.5f, 0.0f, limit - 1, -32));
     EXPECT_TRUE(sums_are_exact(3.0f, 0.25f, 1000, -32));
-    EXPECT_FALSE(sums_are_exact(0.1f, 0.0f, 100, -32));                // 24 bits leave no room
-    EXPECT_TRUE(sums_are_exact(0.1f, 0.0f, 1, -32));                   // one alone is exact
+    EXPECT_FALSE(sums_are_exact(0.1f, 0.0f, 100, -32));                // 24 bits do not suffice
+    EXPECT_TRUE(sums_are_exact(0.1f, 0.0f, 1, -32));                   // a single term is exact
     EXPECT_FALSE(sums_are_exact(std::ldexp(1.0f, -33), 0.0f, 1, -32)); // below the quantum
     EXPECT_FALSE(sums_are_exact(std::ldexp(1.0f, 31), 0.0f, 1, -32));  // infinite by definition
     EXPECT_FALSE(sums_are_exact(0.0f, 0.0f, 1, -32));
@@ -255,7 +253,7 @@ TEST(Direct, SumsAreExactOnlyWhereProven) {
     EXPECT_FALSE(sums_are_exact(1.0, 0.0, std::uint64_t{1} << 53, -64));
 }
 
-// Several draws with transforms and constants of their own, by both ways of making positions.
+// Several draws, each with its transform and constant, with positions made in the raster and before it.
 template <class Backend, class VertexShader>
 std::vector<std::uint32_t> draw_several(const std::vector<mesh_data>& meshes, const std::vector<VertexShader>& shaders,
                                         const vp::grid& g, vp::counters& counts) {
@@ -288,8 +286,8 @@ void compare_draws(const std::vector<VertexShader>& shaders) {
     expect_same_counts(a, b);
 }
 
-// Calls of one backend, whose counters come back by a copy first and through locked memory later, or never.
-TEST(Direct, ManyCallsOfOneBackend) {
+// Calls of one backend. Counters are read by a copy first and through pinned memory later, or not at all.
+TEST(Direct, ManyCallsOfOneBackendGiveTheCpusBytes) {
     const vp::grid g = box_grid({60, 47, 71});
     for (const bool locks : {true, false}) {
         vp::cuda_backend gpu;
@@ -317,7 +315,7 @@ TEST(Direct, ManyCallsOfOneBackend) {
     }
 }
 
-TEST(Direct, SeveralDraws) {
+TEST(Direct, SeveralDrawsGiveTheCpusBytes) {
     glm::mat4 turned(1.0f);
     turned[0] = {0.0f, 1.0f, 0.0f, 0.0f};
     turned[1] = {1.0f, 0.0f, 0.0f, 0.0f};
@@ -325,7 +323,7 @@ TEST(Direct, SeveralDraws) {
     compare_draws<shift>({shift{0.0f}, shift{2.5f}, shift{-9.0f}});
 }
 
-// A bad index leaves the targets as they were, cleared ones too, whatever is known of others.
+// A bad index leaves the targets unchanged, cleared ones too, even if other meshes' indices are known.
 TEST(Direct, BadIndexWritesNothing) {
     vp::cuda_backend be;
     mesh_data m = mixed_triangles(500, 20.0f, 95);
@@ -363,8 +361,8 @@ TEST(Direct, BadIndexWritesNothing) {
     expect_refused(part, "more than were looked at");
 }
 
-// The greatest index, wherever it is, of any number of triangles.
-TEST(Direct, ChecksIndices) {
+// Finds the greatest index at any position, for any number of triangles.
+TEST(Direct, FindsTheGreatestIndex) {
     vp::cuda_backend be;
     std::mt19937 random(97);
     for (const std::size_t count : {1, 31, 1000, 300000}) {

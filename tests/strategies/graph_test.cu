@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Calls in a CUDA graph, replayed with changed vertices, and on several streams at once: the way without tiles, the
-// fragment lists of constant and of shaded fragments, of several draws and in grids beyond 32 bits; capacities of the
-// lists that are too small, and kernels that are left out. All against cpu_backend.
+// Calls in a CUDA graph, replayed with changed vertices, and on several streams at once, against cpu_backend: drawing
+// without tiles, lists of constant and of shaded fragments, several draws, grids beyond 32 bits, list capacities that
+// are too small, and omitted kernels.
 
 #include "async_lists.hpp"
 #include "cells.hpp"
@@ -17,7 +17,7 @@ namespace {
 using namespace device_test;
 namespace blend = voxelpipe::blend;
 
-// What a call launches, to be launched again.
+// A captured call that can be launched again.
 class captured_graph {
 public:
     captured_graph(cudaStream_t stream, const std::function<vp::status()>& call) {
@@ -40,10 +40,10 @@ public:
 private:
     cudaGraph_t graph_ = nullptr;
     cudaGraphExec_t instance_ = nullptr;
-    std::size_t num_nodes_ = 0; // kernels and whatever else
+    std::size_t num_nodes_ = 0; // kernels and other nodes
 };
 
-// Meshes with the same triangles and other vertices, of which the first is on the device.
+// Meshes with the same triangles and different vertices. The first is on the device.
 struct moving_mesh {
     std::vector<mesh_data> poses;
     vp::cuda_backend::buffer<glm::vec3> positions;
@@ -94,12 +94,12 @@ void replay_without_tiles(float value) {
         stream_owner owner;
         vp::cuda_backend be{owner.stream};
         vp::stage_times times;
-        be.times = &times; // for voxelize: a call that never waits has none to give, and captures no events
+        be.times = &times; // for voxelize; an asynchronous call has no stage times and captures no events
         moving_mesh mesh(be, 3000, 60.0f, 91);
         immediate_framebuffer<vp::cuda_backend> fb{be, g.extent};
         const raster_draw_call d{mesh.view(), {}, vp::constant(true, 1u, value)};
         const std::span<const raster_draw_call> draws(&d, 1);
-        const vp::workspace_limits limits{}; // this way has no lists that could overflow
+        const vp::workspace_limits limits{}; // without lists nothing can overflow
         const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), rule, limits);
         ASSERT_GT(bytes, 0u);
         vp::cuda_backend::buffer<std::byte> memory(be, bytes);
@@ -120,7 +120,7 @@ TEST(Graph, WithoutTilesIsReplayedWithChangedVertices) {
     replay_without_tiles(0.1f); // the sums are counted
 }
 
-TEST(Graph, TwoStreamsAtOnceWithoutTiles) {
+TEST(Graph, TwoStreamsAtOnceWithoutTilesAreIndependent) {
     const vp::grid g = box_grid({64, 57, 71});
     stream_owner streams[2];
     vp::cuda_backend first{streams[0].stream}, second{streams[1].stream};
@@ -219,7 +219,7 @@ void compare_overflowing_lists(const FragmentShader& fs, std::uint32_t seed) {
         }
         memory.expect_untouched_behind(be);
     }
-    EXPECT_GT(failures, 1); // counts the last try too
+    EXPECT_GT(failures, 1); // including the last attempt
 }
 
 TEST(Graph, ListsThatDoNotFitSayWhatIsNeeded) {
@@ -227,7 +227,8 @@ TEST(Graph, ListsThatDoNotFitSayWhatIsNeeded) {
     compare_overflowing_lists<double>(any_double{}, 106);
 }
 
-// Without the kernels for long voxels: the same lists where there are none; otherwise none, and that they are wanted.
+// Without the kernels for long voxels: the same lists if there are no long voxels; otherwise no lists, and a status
+// that asks for these kernels.
 template <class Payload, class FragmentShader>
 void compare_without_long_voxels(const FragmentShader& fs, bool lists_fragments) {
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;
@@ -235,7 +236,7 @@ void compare_without_long_voxels(const FragmentShader& fs, bool lists_fragments)
     for (const bool is_long : {false, true}) {
         vp::cuda_backend be;
         mesh_data m = triangles_at_faces(g.extent, 300, true, 107);
-        append(m, triangles_in_voxel(is_long ? 400 : 200, {3, 4, 5}, 108)); // of which a shader may discard some
+        append(m, triangles_in_voxel(is_long ? 400 : 200, {3, 4, 5}, 108)); // a shader may discard some of these
         const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
         const draw_type d{mesh.view(), {}, fs};
         const std::span<const draw_type> draws(&d, 1);
@@ -263,14 +264,14 @@ void compare_without_long_voxels(const FragmentShader& fs, bool lists_fragments)
     }
 }
 
-TEST(Graph, ListsWithoutLongVoxels) {
+TEST(Graph, ListsNeedNoKernelsForLongVoxelsIfThereAreNone) {
     compare_without_long_voxels<void>(vp::constant(true), false);
     compare_without_long_voxels<double>(vp::constant(0.5), false);
     compare_without_long_voxels<double>(any_double{}, true);
 }
 
-// By the number of launches: kernels for long voxels, for dense ones and for merges of more than 2^12 fragments are
-// left out where they are not asked for or cannot be needed; a counting sort is three kernels, a radix sort of ten bits
+// Checked by the number of launches: kernels for long voxels, for dense ones and for merges of more than 2^12 fragments
+// are omitted if they are not asked for or cannot be needed; a counting sort is three kernels, a radix sort of ten bits
 // two.
 TEST(Graph, ListsLaunchWhatTheyNeed) {
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, decltype(vp::constant(true))>;
@@ -361,7 +362,7 @@ void compare_without_larger(const Shader& shader, bool fails, int num_draws, boo
         }
 }
 
-TEST(Graph, WithoutTheKernelForLargerTriangles) {
+TEST(Graph, MayOmitTheKernelForLargerTriangles) {
     using occupied = vp::target<vp::bit, blend::bit_or>;
     using parity = vp::target<vp::bit, blend::bit_xor>;
     for (const indices known : {indices::checked, indices::unknown}) {
@@ -412,13 +413,13 @@ void compare_lists_without_larger(const Shader& shader) {
         }
 }
 
-TEST(Graph, ListsWithoutTheKernelForLargerTriangles) {
+TEST(Graph, ListsMayOmitTheKernelForLargerTriangles) {
     compare_lists_without_larger<void>(vp::constant(true));
     compare_lists_without_larger<double>(any_double{});
 }
 
-// A blend that needs an order, which long voxels do not get: the target stays as it was.
-TEST(Graph, AnOrderedTargetWithoutLongVoxels) {
+// An ordered blend with long voxels but without the kernels for them: the target is unchanged.
+TEST(Graph, AnOrderedTargetIsUnchangedIfLongVoxelsCannotBeOrdered) {
     using target = vp::target<std::uint32_t, chain>;
     using shader = decltype(vp::constant(std::uint32_t{5}));
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, shader>;
@@ -464,14 +465,14 @@ void compare_list_calls(const FragmentShader& fs, std::uint32_t seed) {
         list_call<Payload, FragmentShader> small(several, box_grid({40, 33, 47}), fs, rule);
         list_call<Payload, FragmentShader> one_far({far[1]}, box_grid({2048, 2048, 2048}), fs, rule);
         list_call<Payload, FragmentShader> all_far(far, box_grid({2048, 2048, 2048}), fs, rule);
-        // Three streams at once, over and over.
+        // Three streams at once, repeatedly.
         for (int round = 0; round < 5; ++round)
             for (auto* call : {&small, &one_far, &all_far}) call->launch();
         for (auto* call : {&small, &one_far, &all_far}) call->expect_the_cpus();
     }
 }
 
-TEST(Graph, ListsOfSeveralDrawsAndLargeGridsOnStreamsAtOnce) {
+TEST(Graph, ListsOfSeveralDrawsAndLargeGridsAreIndependentOnStreams) {
     compare_list_calls<void>(vp::constant(true), 120);
     compare_list_calls<double>(any_double{}, 130);
 }
@@ -500,7 +501,7 @@ TEST(Lists, NoMemoryForTheCopyIsInTheStatus) {
     vp::abuffer<vp::cuda_backend> first{be}, second{be};
     ASSERT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), first).ok());
     const auto before = first.to_host(be);
-    resource.most = resource.live; // the workspace is there already
+    resource.most = resource.live; // the workspace exists already
     for (auto* lists : {&first, &second}) {
         const vp::status s = vp::voxelize(be, mesh, other, vp::passthrough{}, vp::constant(true), *lists);
         EXPECT_EQ(s.code, vp::status_code::out_of_memory);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Grids whose voxels pass 2^32, and slivers as long as a grid of 1024^3: every byte that of the CPU. A test that the
-// machine has too little memory for is skipped, which its record shows.
+// Grids of more than 2^32 voxels, and slivers as long as a grid of 1024^3, give the CPU's bytes. A test is skipped, and
+// recorded as skipped, if the machine has too little memory.
 
 #include "device_test.hpp"
 
@@ -22,7 +22,7 @@ constexpr double gib = 1024.0 * 1024.0 * 1024.0;
     return static_cast<double>(free) >= device_gib * gib && host >= host_gib * gib;
 }
 
-// One target on both backends. The CPU's memory is compared where it lies, for it is large.
+// One target on both backends. The CPU's memory is compared in place, because it is large.
 template <class Target, class Shader>
 void compare_in_place(const mesh_data& m, const vp::grid& g, const Shader& shader, vp::coverage rule) {
     vp::cpu_backend cpu;
@@ -48,7 +48,7 @@ void compare_in_place(const mesh_data& m, const vp::grid& g, const Shader& shade
     EXPECT_EQ(first, actual.size()) << "the first element that differs";
 }
 
-// Triangles through the whole of a grid of 2048^3, the last layers and the last corner among them.
+// Triangles through the whole grid of 2048^3, including its last layers and its last corner.
 mesh_data far_triangles() {
     mesh_data m = mixed_triangles(3000, 2048.0f, 80);
     append(m, translated(mixed_triangles(500, 40.0f, 81), glm::vec3(2010.0f)));
@@ -85,7 +85,7 @@ struct byte_chain {
     }
 };
 
-// The lists behind a blend that depends on the order number voxels with 64 bits here.
+// For a blend that depends on the order, the lists number voxels with 64 bits here.
 TEST(LargeGrid, FoldsBeyond32BitsAreTheCpus) {
     if (!has_memory(8, 12)) GTEST_SKIP() << "needs 8 GiB of GPU memory and 12 GiB of the host's";
     mesh_data m = translated(mixed_triangles(400, 60.0f, 83), {2000.0f, 2000.0f, 990.0f});
@@ -94,7 +94,7 @@ TEST(LargeGrid, FoldsBeyond32BitsAreTheCpus) {
         compare_in_place<vp::target<std::uint8_t, byte_chain>>(m, box_grid({2048, 2048, 1040}), by_voxel{}, rule);
 }
 
-// 10^5 slivers from face to face, most of them along an axis.
+// 10^5 slivers from face to face, mostly along an axis.
 mesh_data slivers(float size) {
     std::mt19937 random(82);
     std::uniform_real_distribution<float> unit(0.0f, 1.0f);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Blocks that start in other orders and numbers: kernels that hold some, most or all of the multiprocessors for a
-// while, fewer persistent blocks, draws and triangles in other orders. What comes out is cpu_backend's, byte for byte.
+// The order and number of running blocks do not change the result: kernels that occupy some or all multiprocessors,
+// fewer persistent blocks, draws and triangles in other orders. All bytes equal cpu_backend's.
 
 #include "cells.hpp"
 
@@ -14,7 +14,7 @@ using namespace device_test;
 
 namespace {
 
-// Ends by itself: the blocks that come first stay longest, so multiprocessors become free one after the other.
+// Ends by itself. The first blocks run longest, so multiprocessors become free one after the other.
 __global__ void hold_multiprocessor(long long cycles, unsigned* sink) {
     extern __shared__ unsigned all_of_it[];
     const long long mine = cycles / (1 + blockIdx.x % 7);
@@ -25,7 +25,7 @@ __global__ void hold_multiprocessor(long long cycles, unsigned* sink) {
     if (n == 0) *sink = all_of_it[threadIdx.x];
 }
 
-// Takes multiprocessors away, a block for each: it has all of the shared memory that a block may have.
+// Occupies multiprocessors with one block each, which uses the largest possible shared memory.
 class company {
 public:
     company() : sink_(backend_, 1) {
@@ -37,7 +37,7 @@ public:
                   cudaSuccess);
         EXPECT_EQ(cudaStreamSynchronize(owner_.stream), cudaSuccess);
     }
-    // One, a third, all but one, all, and more than there are at once.
+    // One, a third, all but one, all, and more than exist.
     [[nodiscard]] std::vector<int> numbers() const {
         return {1, multiprocessors_ / 3 + 1, std::max(1, multiprocessors_ - 1), multiprocessors_, 3 * multiprocessors_};
     }
@@ -56,7 +56,7 @@ private:
     int multiprocessors_ = 0, bytes_ = 0;
 };
 
-// Persistent blocks a multiprocessor: the kernels are the same, only the host starts other numbers of them.
+// Persistent blocks a multiprocessor: the kernels are the same, and the host launches other numbers of blocks.
 template <int Blocks>
 struct few_blocks {
     constexpr vp::tuning::fine_raster_policy operator()(int bits, int capability) const {
@@ -83,8 +83,8 @@ struct model {
     [[nodiscard]] std::span<const draw_type> all() const { return draws; }
 };
 
-// Parts of different sizes, large triangles among them; those far beyond the grid, which take long, in the smallest
-// part only.
+// Parts of different sizes with large triangles. Triangles far beyond the grid, which take long, are only in the
+// smallest part.
 std::vector<mesh_data> make_parts() {
     std::vector<mesh_data> parts;
     for (std::uint32_t k = 0; k < 4; ++k) {
@@ -103,7 +103,7 @@ std::vector<mesh_data> make_parts() {
     return parts;
 }
 
-// Calls f with the parts as they are, and with draws and triangles in other orders.
+// Calls f with the parts unchanged, and with draws and triangles in other orders.
 template <class F>
 void for_each_order(const F& f) {
     std::vector<mesh_data> parts = make_parts();
@@ -152,20 +152,20 @@ void compare(target_list<Targets...>, const FragmentShader& shader, vp::coverage
     });
 }
 
-TEST(LaunchOrder, OfTilesDoesNotShow) {
+TEST(LaunchOrder, DoesNotChangeTiles) {
     for (const vp::coverage rule : both_rules) compare(tile_targets{}, tile_values{9}, rule);
 }
 
-TEST(LaunchOrder, OfListedFragmentsDoesNotShow) {
+TEST(LaunchOrder, DoesNotChangeListedFragments) {
     for (const vp::coverage rule : both_rules) compare(tile_targets{}, tile_values{9}, rule, true);
 }
 
-TEST(LaunchOrder, WithoutTilesDoesNotShow) {
+TEST(LaunchOrder, DoesNotChangeTargetsWithoutTiles) {
     for (const vp::coverage rule : both_rules) compare(bit_targets{}, same_bits(true), rule);
 }
 
-// Many draws take the shared count, one draw the lists' own raster.
-TEST(LaunchOrder, OfListsDoesNotShow) {
+// Many draws use count-and-emit, one draw the lists' own raster.
+TEST(LaunchOrder, DoesNotChangeLists) {
     company others;
     stream_owner owner;
     vp::cuda_backend gpu{owner.stream};

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Lists of constant shaders, which take a way of their own: with a payload, through vertex shaders that run on the spot
-// and through one that does not, with triangles of every size and voxels of many fragments.
+// Lists of constant shaders, which have their own kernels: with a payload, with vertex shaders that run in the raster
+// and one that runs before it, with triangles of every size and voxels of many fragments.
 
 #include "cells.hpp"
 
@@ -30,12 +30,12 @@ void compare(const FragmentShader& shader, std::uint32_t seed) {
         }
 }
 
-TEST(Lists, WithoutPayload) { compare<void>(vp::constant(true), 120); }
+TEST(Lists, WithoutPayloadAreTheCpus) { compare<void>(vp::constant(true), 120); }
 
-TEST(Lists, WithAConstantPayload) { compare<float>(vp::constant(0.5f), 121); }
+TEST(Lists, WithAConstantPayloadAreTheCpus) { compare<float>(vp::constant(0.5f), 121); }
 
-// More than a warp, a block and a run of a block takes.
-TEST(Lists, VoxelsOfManyFragments) {
+// More than a warp, a block and a run of a block hold.
+TEST(Lists, OfVoxelsWithManyFragmentsAreTheCpus) {
     std::mt19937 random(122);
     std::uniform_real_distribution<float> unit(0.0f, 1.0f);
     mesh_data m;
@@ -51,8 +51,8 @@ TEST(Lists, VoxelsOfManyFragments) {
         expect_same_lists<float>(m, box_grid({24, 20, 16}), vp::passthrough{}, vp::constant(2.0f), rule);
 }
 
-// A call like the one before knows how much to expect: the same again, then other meshes of as many triangles, with
-// more voxels, fewer fragments, none, and more of both.
+// A call with the same arguments as an earlier one uses its sizes. The mesh changes: the same, then meshes with the
+// same number of triangles and more voxels, fewer fragments, none, and more of both.
 template <class Payload, class FragmentShader>
 void compare_repeated(const FragmentShader& shader) {
     vp::cuda_backend gpu;
@@ -77,13 +77,13 @@ void compare_repeated(const FragmentShader& shader) {
     }
 }
 
-TEST(Lists, RepeatedWithoutPayload) { compare_repeated<void>(vp::constant(true)); }
-TEST(Lists, RepeatedWithAConstantPayload) { compare_repeated<float>(vp::constant(0.5f)); }
-TEST(Lists, RepeatedWithAComputedPayload) { compare_repeated<double>(any_double{}); }
+TEST(Lists, OfRepeatedCallsWithoutPayloadAreTheCpus) { compare_repeated<void>(vp::constant(true)); }
+TEST(Lists, OfRepeatedCallsWithAConstantPayloadAreTheCpus) { compare_repeated<float>(vp::constant(0.5f)); }
+TEST(Lists, OfRepeatedCallsWithAComputedPayloadAreTheCpus) { compare_repeated<double>(any_double{}); }
 
-// Arrays that are made beforehand are larger than the lists. Where only exact ones fit, a repeated call makes do with
-// these; where they do not, it says so and leaves the lists as they were.
-TEST(Lists, RepeatedWithRoomForTheListsOnly) {
+// Arrays allocated beforehand are larger than the lists. If memory suffices only for exact arrays, a repeated call uses
+// these. If it does not suffice for them, the call fails and leaves the lists unchanged.
+TEST(Lists, OfRepeatedCallsFitInExactMemoryOrFail) {
     counting_resource memory;
     const stream_owner s;
     vp::cuda_backend gpu{s.stream, memory};
@@ -108,17 +108,17 @@ TEST(Lists, RepeatedWithRoomForTheListsOnly) {
     expect_same_on_host(first, lists.to_host(gpu));
 }
 
-// Many records of each, more than the device has warps.
-TEST(Lists, ManyRecordsOfLargeTriangles) {
+// Many work items of each triangle, more than the device has warps.
+TEST(Lists, OfLargeTrianglesWithManyWorkItemsAreTheCpus) {
     const glm::ivec3 extent(400, 390, 380);
     for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
         expect_same_lists<void>(long_triangles(extent, 1200, 125), box_grid(extent), vp::passthrough{},
                                 vp::constant(true), rule);
 }
 
-// A thin fragment may lie a voxel beyond its triangle's box: a warp with a triangle where the grid ends does not take
-// the way by rounds. So many that they fill a device by a thread each.
-TEST(Lists, TrianglesAtTheGridsFaces) {
+// A thin fragment may lie one voxel beyond its triangle's box, so a warp with a triangle at the grid's end does not
+// work in rounds. There are enough triangles to fill a device with one thread each.
+TEST(Lists, OfTrianglesAtTheGridsFacesAreTheCpus) {
     const glm::ivec3 extent(80, 70, 60);
     for (const bool upper : {false, true})
         for (const vp::coverage rule : both_rules)
@@ -126,8 +126,8 @@ TEST(Lists, TrianglesAtTheGridsFaces) {
                                     vp::constant(true), rule);
 }
 
-// Slivers across the grid and triangles without area, alone.
-TEST(Lists, SliversAndZeroArea) {
+// Only slivers across the grid and triangles without area.
+TEST(Lists, OfSliversAndZeroAreaTrianglesAreTheCpus) {
     mesh_data m;
     for (int i = 0; i < 400; ++i) {
         const float at = 0.1f * static_cast<float>(i);

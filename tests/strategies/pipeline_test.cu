@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The promises of a call beside its bits: status and counters, nothing written on failure, memory through the resource,
+// Promises of a call other than its bits: status and counters, nothing written on failure, memory from the resource,
 // several draws with attributes and varyings, crops, streams, no wait in voxelize_async, graphs, tile policies.
 
 #include "cells.hpp"
@@ -16,7 +16,7 @@ namespace {
 using bits = vp::target<vp::bit, blend::bit_or>;
 using sum = vp::target<float, blend::add>;
 
-// glm arithmetic on the device: lost without --expt-relaxed-constexpr in some versions.
+// glm arithmetic on the device, which some versions lose without --expt-relaxed-constexpr.
 struct varyings {
     glm::vec3 colour;
     std::array<float, 2> uv;
@@ -85,7 +85,7 @@ outcome<Backend> run_draws(const vp::grid& g, vp::coverage rule) {
     return o;
 }
 
-TEST(Pipeline, SeveralDrawsWithVaryings) {
+TEST(Pipeline, SeveralDrawsWithVaryingsGiveTheCpusBytes) {
     const vp::grid whole = box_grid({40, 33, 47});
     for (const vp::coverage rule : both_rules)
         for (const vp::grid& g : {whole, whole.crop({7, 3, 11}, {20, 30, 17})}) {
@@ -150,7 +150,7 @@ TEST(Pipeline, MemoryComesFromTheResource) {
     EXPECT_EQ(resource.live, 0u);
 }
 
-// Constant, which the library cannot know.
+// Constant, but the library cannot know it.
 struct computed {
     template <class Fragment>
     VOXELPIPE_HD auto operator()(const Fragment&) const {
@@ -158,10 +158,10 @@ struct computed {
     }
 };
 
-// Where there is memory for tiles only, listed fragments give way to them; then nothing does.
-TEST(Pipeline, FragmentsAreDrawnInTilesWhereThereIsNoMemoryToListThem) {
+// If memory suffices for tiles only, the call uses tiles instead of lists. With less memory it fails.
+TEST(Pipeline, FragmentsAreDrawnInTilesIfMemoryDoesNotSufficeForLists) {
     mesh_data m = mixed_triangles(200, 60.0f, 35);
-    for (int i = 0; i < 300; ++i) { // more fragments than pairs with tiles, many times
+    for (int i = 0; i < 300; ++i) { // many times more fragments than tile pairs
         const float h = 0.2f * static_cast<float>(i);
         add_triangle(m, {-9.0f, -9.0f, h}, {130.0f, -9.0f, h + 3.0f}, {-9.0f, 130.0f, h + 9.0f});
     }
@@ -199,7 +199,7 @@ TEST(Pipeline, FragmentsAreDrawnInTilesWhereThereIsNoMemoryToListThem) {
     }
 }
 
-// More pairs, records and fragments than the first guess has room for.
+// More pairs, work items and fragments than the first guess of the capacities.
 TEST(Pipeline, ACallThatOverflowsIsRunAgain) {
     mesh_data m;
     for (int i = 0; i < 40; ++i) {
@@ -214,7 +214,7 @@ TEST(Pipeline, ACallThatOverflowsIsRunAgain) {
     }
 }
 
-TEST(Pipeline, ListsWithPayloads) {
+TEST(Pipeline, ListsWithPayloadsAreTheCpus) {
     const any_double shader;
     for (const vp::coverage rule : both_rules) {
         expect_same_lists<double>(mixed_triangles(2000, 40.0f, 33), box_grid({40, 33, 47}), vp::passthrough{}, shader,
@@ -225,7 +225,7 @@ TEST(Pipeline, ListsWithPayloads) {
 }
 
 // A linear id beyond 32 bits.
-TEST(Pipeline, ListsOfAGridBeyond32Bits) {
+TEST(Pipeline, ListsOfAGridBeyond32BitsAreTheCpus) {
     const mesh_data m = translated(mixed_triangles(300, 100.0f, 35), {1900.0f, 1950.0f, 1980.0f});
     for (const vp::coverage rule : both_rules)
         expect_same_lists<void>(m, box_grid({2048, 2048, 2048}), vp::passthrough{}, vp::constant(true), rule);
@@ -268,7 +268,7 @@ TEST(Pipeline, ResultsDoNotDependOnThePolicy) {
 
 using one_draw = vp::draw<vp::mesh_view<>, vp::passthrough, computed>;
 
-TEST(Pipeline, TwoStreamsAtOnce) {
+TEST(Pipeline, TwoStreamsAtOnceAreIndependent) {
     const mesh_data m = mixed_triangles(4000, 60.0f, 37);
     const vp::grid g = box_grid({64, 64, 64});
     vp::counters counts;
@@ -320,7 +320,7 @@ void replay(bool lists) {
     const std::span<const one_draw> draws(&d, 1);
     auto limits = vp::workspace_limits::for_triangles(4 * m.triangles.size());
     limits.lists_fragments = lists;
-    limits.fragments *= 16; // large triangles among them
+    limits.fragments *= 16; // some triangles are large
     const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), {}, limits);
     vp::cuda_backend::buffer<std::byte> memory(be, bytes);
     const vp::workspace_view workspace{memory.data(), bytes, limits};
@@ -388,7 +388,7 @@ void start_too_small(vp::workspace_limits limits) {
 
 TEST(Pipeline, AWorkspaceThatIsTooSmallSaysWhatIsNeeded) {
     start_too_small({10, 1, 0, 0});
-    start_too_small({}); // no room at all: nothing may be launched with no blocks
+    start_too_small({}); // capacity 0: no kernel may be launched without blocks
     start_too_small({0, 0, 10, 0, true});
     start_too_small({0, 0, 0, 0, true});
 }
@@ -409,7 +409,7 @@ TEST(Pipeline, AWorkspaceBeyond32BitsIsRefused) {
     }
 }
 
-// The arithmetic is tests/core/launch_size_test.cpp's; here with this device's multiprocessors.
+// The numbers of blocks for this device. tests/core/launch_size_test.cpp checks the arithmetic.
 TEST(Pipeline, LaunchesFillTheDevice) {
     int device = 0;
     cudaDeviceProp properties{};
@@ -430,13 +430,13 @@ TEST(Pipeline, LaunchesFillTheDevice) {
         const std::uint64_t rounds = (items + in_round - 1) / in_round;
         EXPECT_LE(rounds, vp::device::warp_triangles::max_rounds) << bit;
         EXPECT_GE(blocks, std::min<std::uint64_t>(multiprocessors, (items + 127) / 128)) << bit;
-        EXPECT_LT((blocks - 1) * vp::device::raster_threads, items) << bit; // none without a triangle
+        EXPECT_LT((blocks - 1) * vp::device::raster_threads, items) << bit; // no block without a triangle
         EXPECT_LE(blocks, static_cast<unsigned>(properties.maxGridSize[0])) << bit;
     }
 }
 
-// When a call's first kernel is launched alone: which results are right either way, so no comparison would tell.
-TEST(Pipeline, OfFineMeshesTheFirstKernelIsAlone) {
+// When a call's first kernel is launched alone. Results are right either way, so no comparison could find a mistake.
+TEST(Pipeline, TheFirstKernelIsAloneForFineMeshesOnly) {
     using deferred = decltype(vp::device::pipeline_state::deferred);
     const std::uint64_t much = ~std::uint64_t{0};
     for (const vp::coverage rule : both_rules) {
@@ -461,7 +461,7 @@ TEST(Pipeline, OfFineMeshesTheFirstKernelIsAlone) {
     EXPECT_FALSE(vp::device::leaves_few(1u << 30, each * at_once + 1));
 }
 
-// add_unordered is not the same bits: it stays within the rounding of its additions.
+// add_unordered may differ in bits, but stays within the rounding errors of its additions.
 TEST(Pipeline, UnorderedSumsStayWithinABound) {
     const mesh_data m = mixed_triangles(3000, 30.0f, 41);
     const vp::grid g = box_grid({32, 32, 32});

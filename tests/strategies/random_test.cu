@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Random configurations: grids, crops, voxels of any shape, meshes, coverage, cleared and loaded targets, counted
-// voxels or not; for each of them several sets of targets, and fragment lists. VOXELPIPE_TEST_SEED asks for others.
+// Random configurations of grid, crop, voxel shape, mesh, coverage, cleared or loaded targets, and voxel counter. Each
+// is compared for several sets of targets and for fragment lists. VOXELPIPE_TEST_SEED chooses other configurations.
 
 #include "cells.hpp"
 
@@ -87,7 +87,7 @@ configuration make(int i, std::mt19937& random) {
     return {m, g, {both_rules[random() % 2], i % 5 != 0}, i % 2 == 0 ? start::clear : start::load};
 }
 
-TEST(Random, Configurations) {
+TEST(Random, ConfigurationsGiveTheCpusBytes) {
     const char* const seed = std::getenv("VOXELPIPE_TEST_SEED");
     std::mt19937 random(seed != nullptr ? static_cast<uint32_t>(std::atoi(seed)) : 55u);
     for (int i = 0; i < 200 && !HasFailure(); ++i) {

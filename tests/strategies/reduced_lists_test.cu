@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Every kernel on small loads, quick enough for compute-sanitizer: fragment lists.
+// Every kernel of fragment lists on small loads, quick enough for compute-sanitizer.
 
 #include "async_lists.hpp"
 #include "cells.hpp"
@@ -12,7 +12,7 @@ using namespace device_test;
 
 namespace {
 
-TEST(ReducedLists, OfConstantAndComputedPayloads) {
+TEST(ReducedLists, OfConstantAndComputedPayloadsAreTheCpus) {
     const mesh_data m = mixed_triangles(300, 30.0f, 62);
     const vp::grid g = box_grid({30, 21, 33});
     for (const vp::coverage rule : both_rules) {
@@ -23,7 +23,7 @@ TEST(ReducedLists, OfConstantAndComputedPayloads) {
 }
 
 struct shaded_late {
-    std::uint32_t discards = 0; // one fragment in so many; 0: none
+    std::uint32_t discards = 0; // one fragment in this many is discarded; 0: none
 
     template <class Fragment>
     VOXELPIPE_HD auto operator()(const Fragment& f) const {
@@ -32,8 +32,8 @@ struct shaded_late {
     }
 };
 
-// Lists are shaded where they lie as long as nothing is discarded: one backend, calls that discard and calls that do
-// not, the first ones often enough to become a graph, with voxels of one fragment and of thousands.
+// Lists are shaded in place as long as nothing is discarded. One backend gets calls that discard and calls that do not,
+// the first often enough to become a graph, with voxels of one fragment and of thousands.
 template <class Payload>
 void list_late(vp::coverage rule) {
     mesh_data m = mixed_triangles(400, 30.0f, 63);
@@ -57,7 +57,7 @@ void list_late(vp::coverage rule) {
     }
 }
 
-TEST(ReducedLists, ShadedLate) {
+TEST(ReducedLists, ShadedInPlaceAreTheCpus) {
     for (const vp::coverage rule : both_rules) {
         list_late<float>(rule);
         list_late<void>(rule);
@@ -68,7 +68,7 @@ TEST(ReducedLists, ShadedLate) {
 const vp::grid large_grid = box_grid({2048, 2048, 2048});
 mesh_data far_triangles(std::uint32_t seed) { return translated(mixed_triangles(80, 25.0f, seed), glm::vec3(2020.0f)); }
 
-TEST(ReducedLists, OfVoxelNumbersBeyond32Bits) {
+TEST(ReducedLists, OfVoxelNumbersBeyond32BitsAreTheCpus) {
     for (const vp::coverage rule : both_rules) {
         expect_same_lists<void>(far_triangles(68), large_grid, vp::passthrough{}, vp::constant(true), rule);
         expect_same_lists<double>(far_triangles(69), large_grid, vp::passthrough{}, any_double{}, rule);
@@ -85,7 +85,7 @@ void compare_without_a_wait(const std::vector<mesh_data>& parts, const vp::grid&
     }
 }
 
-TEST(ReducedLists, WithoutAWait) {
+TEST(ReducedLists, OfAsynchronousCallsAreTheCpus) {
     const vp::grid g = box_grid({30, 21, 33});
     for (const vp::coverage rule : both_rules) {
         compare_without_a_wait<void>({mixed_triangles(300, 30.0f, 70)}, g, vp::constant(true), rule);
@@ -96,8 +96,8 @@ TEST(ReducedLists, WithoutAWait) {
     }
 }
 
-// One draw of a constant shader is listed on the spot; several have their vertices shaded first.
-TEST(ReducedLists, StageTimes) {
+// One draw of a constant shader is listed by the raster; for several draws, vertices are shaded first.
+TEST(ReducedLists, StageTimesAddUpToTheCall) {
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<bool>>;
     const mesh_data m = mixed_triangles(300, 30.0f, 65);
     const vp::grid g = box_grid({30, 21, 33});

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Every kernel on small loads, quick enough for compute-sanitizer: render targets. Lists: reduced_lists_test.cu.
+// Every kernel of render targets on small loads, quick enough for compute-sanitizer. Lists: reduced_lists_test.cu.
 
 #include "cells.hpp"
 
@@ -10,7 +10,7 @@ namespace blend = voxelpipe::blend;
 
 namespace {
 
-// Drawn in tiles, and one that is folded in order.
+// Targets that are drawn in tiles, and one that is folded in order.
 template <template <class...> class Pipeline, class... First>
 using with_every_kind = Pipeline<First..., vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>,
                                  vp::target<double, blend::max>, vp::target<std::uint32_t, blend::replace>,
@@ -22,15 +22,15 @@ struct on_both {
     }
 };
 
-TEST(Reduced, EveryKindOfTarget) {
+TEST(Reduced, EveryKindOfTargetHoldsTheCpusBytes) {
     for (const vp::coverage rule : both_rules) {
         with_every_kind<on_both>::compare(mixed_triangles(300, 30.0f, 60), box_grid({30, 21, 33}), rule);
-        // More triangles in a tile than a work item takes.
+        // More triangles in a tile than a work item holds.
         with_every_kind<on_both>::compare(mixed_triangles(1200, 4.0f, 66), box_grid({5, 4, 6}), rule);
     }
 }
 
-TEST(Reduced, LargeTrianglesWithoutTiles) {
+TEST(Reduced, LargeTrianglesWithoutTilesGiveTheCpusBytes) {
     mesh_data m = mixed_triangles(1500, 4.0f, 61);
     add_triangle(m, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
     for (const vp::coverage rule : both_rules) {
@@ -41,8 +41,8 @@ TEST(Reduced, LargeTrianglesWithoutTiles) {
     }
 }
 
-// Sums that are counted until a last pass, which reads all of a small grid, and what is marked of a large one.
-TEST(Reduced, CountedSums) {
+// Sums that are counted until a last pass, which reads a small grid whole and only the marked chunks of a large one.
+TEST(Reduced, CountedSumsAreTheCpus) {
     mesh_data m = mixed_triangles(800, 40.0f, 68);
     add_triangle(m, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
     for (const vp::coverage rule : both_rules)
@@ -51,8 +51,8 @@ TEST(Reduced, CountedSums) {
                                                        rule);
 }
 
-// From the third call on a graph.
-TEST(Reduced, RepeatedCalls) {
+// The third call and later ones use a graph.
+TEST(Reduced, RepeatedCallsGiveTheCpusBytes) {
     const mesh_data m = mixed_triangles(300, 30.0f, 69);
     const vp::grid g = box_grid({30, 21, 33});
     vp::cuda_backend gpu;
@@ -68,8 +68,8 @@ TEST(Reduced, RepeatedCalls) {
     }
 }
 
-// More fragments than a thread folds alone, by a block for one voxel after the other and by its threads side by side.
-TEST(Reduced, LongVoxelsOfBlendsThatAreFolded) {
+// More fragments than one thread folds: a block folds one voxel after the other, or its threads fold in parallel.
+TEST(Reduced, LongVoxelsOfFoldedBlendsGiveTheCpusBytes) {
     const vp::grid g = box_grid({36, 5, 6});
     mesh_data m = mixed_triangles(200, 36.0f, 74);
     append(m, triangles_in_voxel(2000, {3.0f, 2.0f, 4.0f}, 75));
@@ -79,15 +79,15 @@ TEST(Reduced, LongVoxelsOfBlendsThatAreFolded) {
     expect_same(folded_targets{}, m, g, vp::passthrough{}, folded_values{}, vp::coverage::conservative);
 }
 
-// The identity of these blends is a set bit: rows and bricks that end within a word.
-TEST(Reduced, BitsThatAreClearedToOne) {
+// The identity of these blends is a set bit. Rows and bricks end within a word.
+TEST(Reduced, BitsClearedToOneAreTheCpus) {
     expect_same<vp::target<vp::bit, blend::bit_and>, vp::target<vp::bit, blend::min, vp::layout::tiled>>(
         mixed_triangles(200, 30.0f, 67), box_grid({37, 21, 6}), vp::passthrough{}, vp::constant(false, false),
         vp::coverage::conservative);
 }
 
-// Shaded and blended by voxel: runs that a voxel goes through, voxels without a fragment that is kept, and draws.
-TEST(Reduced, ListedFragments) {
+// Fragments shaded and blended by voxel: voxels that span runs, voxels whose fragments are all discarded, and draws.
+TEST(Reduced, ListedFragmentsGiveTheCpusBytes) {
     mesh_data m = mixed_triangles(700, 30.0f, 70);
     append(m, triangles_in_voxel(3000, {3.0f, 2.0f, 4.0f}, 71));
     for (std::uint32_t x = 0; x < 20; ++x)
@@ -109,7 +109,7 @@ TEST(Reduced, ListedFragments) {
     for (const double none : {times.coarse_raster, times.tile_split, times.abuffer_emit}) EXPECT_EQ(none, 0.0);
 }
 
-TEST(Reduced, StageTimesOfTilesAndOrderedTargets) {
+TEST(Reduced, StageTimesOfTilesAndOrderedTargetsAddUpToTheCall) {
     using fb_type = with_every_kind<vp::framebuffer, vp::cuda_backend>;
     const with_every_kind<any_values> shader;
     const mesh_data m = mixed_triangles(300, 30.0f, 63);
@@ -135,7 +135,7 @@ TEST(Reduced, StageTimesOfTilesAndOrderedTargets) {
     });
 }
 
-TEST(Reduced, StageTimesWithoutTiles) {
+TEST(Reduced, StageTimesWithoutTilesAddUpToTheCall) {
     using fb_type = vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>>;
     const mesh_data m = mixed_triangles(300, 30.0f, 64);
     const auto times_of = [&](const vp::grid& g, bool count_voxels, indices known = indices::unknown) {
@@ -153,17 +153,17 @@ TEST(Reduced, StageTimesWithoutTiles) {
             EXPECT_EQ(none, 0.0);
         return times;
     };
-    // Into the target: its indices are checked first, and it is cleared.
+    // In place: indices are checked first, and the target is cleared.
     const vp::stage_times direct = times_of(box_grid({256, 200, 256}), false);
     EXPECT_GT(direct.coarse_raster, 0.0);
     EXPECT_GT(direct.clear, 0.0);
     EXPECT_EQ(direct.tile_resolve, 0.0);
-    // Of indices that are known nothing is read.
+    // Known indices are not read.
     const vp::stage_times known = times_of(box_grid({30, 21, 33}), false, indices::checked);
     EXPECT_EQ(known.coarse_raster, 0.0);
     EXPECT_GT(known.clear, 0.0);
     EXPECT_EQ(known.tile_resolve, 0.0);
-    // By touched voxels, which become the target at the end.
+    // By an occupancy mask, which fills the target at the end.
     const vp::stage_times touched = times_of(box_grid({30, 21, 33}), true);
     EXPECT_EQ(touched.coarse_raster, 0.0);
     EXPECT_EQ(touched.clear, 0.0);

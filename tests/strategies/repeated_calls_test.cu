@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Calls of one backend with the same arguments, which it keeps as a CUDA graph from the third on: what lies in the
-// meshes and targets may change in between, and so may the arguments.
+// Calls of one backend with the same arguments, which it keeps as a CUDA graph from the third call on. The contents of
+// meshes and targets may change between calls, and so may the arguments.
 
 #include "cells.hpp"
 
@@ -64,15 +64,15 @@ void repeat(vp::cuda_backend& gpu, const Shader& shader) {
         ASSERT_EQ(a.code, b.code) << a.message();
         ASSERT_EQ(a.ok(), !is_bad) << a.message();
         if (a.ok()) expect_same_counts(b.counts, a.counts);
-        vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() { // a call that failed changed nothing
+        vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() { // a failed call changes nothing
             expect_same_bytes(vp::get<I>(cpu_fb).to_host(cpu), vp::get<I>(gpu_fb).to_host(gpu),
                               ("target " + std::to_string(I)).c_str());
         });
     }
 }
 
-// Lists, whose arrays are others each time: two sets of them take turns. Vertices that give as much as before, more,
-// less and nothing; an index that names no vertex, which leaves the lists as they were.
+// Lists, in two sets of arrays that alternate. The vertices give as many fragments as before, more, fewer and none. An
+// index out of range leaves the lists unchanged.
 template <class Payload, class Shader>
 void repeat_lists(vp::cuda_backend& gpu, const Shader& shader) {
     using draw = vp::draw<vp::mesh_view<>, vp::passthrough, Shader>;
@@ -111,7 +111,7 @@ void repeat_lists(vp::cuda_backend& gpu, const Shader& shader) {
     }
 }
 
-// On the legacy default stream, which cannot be captured, and on one of the caller's.
+// On the legacy default stream, which cannot be captured, and on the caller's stream.
 template <class... Targets, class Shader>
 void repeat_everywhere(const Shader& shader) {
     for (const bool keeps : {true, false}) {
@@ -126,12 +126,12 @@ void repeat_everywhere(const Shader& shader) {
     }
 }
 
-TEST(RepeatedCalls, WithoutTiles) {
+TEST(RepeatedCalls, WithoutTilesGiveTheCpusBytes) {
     repeat_everywhere<vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>>(vp::constant(true, 0.1f));
 }
 
-// Counters that the host does not look for, since its threads are to sleep while they wait for the device.
-TEST(RepeatedCalls, WhereThreadsSleep) {
+// The host does not poll for counters, because its threads are set to sleep while they wait for the device.
+TEST(RepeatedCalls, OfSleepingThreadsGiveTheCpusBytes) {
     unsigned before = 0, now = 0;
     ASSERT_EQ(cudaGetDeviceFlags(&before), cudaSuccess);
     ASSERT_EQ(cudaSetDeviceFlags(cudaDeviceScheduleBlockingSync), cudaSuccess);
@@ -141,14 +141,14 @@ TEST(RepeatedCalls, WhereThreadsSleep) {
     EXPECT_EQ(cudaSetDeviceFlags(before & cudaDeviceScheduleMask), cudaSuccess);
 }
 
-// Through tiles, and lists for the blend that needs an order.
-TEST(RepeatedCalls, ThroughTilesAndLists) {
+// Through tiles, and through lists for the ordered blend.
+TEST(RepeatedCalls, ThroughTilesAndListsGiveTheCpusBytes) {
     using first = vp::target<std::int32_t, blend::max>;
     using second = vp::target<float, blend::replace>;
     repeat_everywhere<first, second>(any_values<first, second>{});
 }
 
-TEST(RepeatedCalls, OfLists) {
+TEST(RepeatedCalls, OfListsGiveTheCpusBytes) {
     for (const bool keeps : {true, false}) {
         SCOPED_TRACE(keeps);
         vp::cuda_backend on_default;
@@ -163,8 +163,8 @@ TEST(RepeatedCalls, OfLists) {
     }
 }
 
-// Framebuffers and lists of one backend in turn, in the same memory.
-TEST(RepeatedCalls, OfListsAndFramebuffers) {
+// Framebuffers and lists of one backend alternate in the same memory.
+TEST(RepeatedCalls, OfListsAndFramebuffersGiveTheCpusBytes) {
     const mesh_data m = mixed_triangles(800, 30.0f, 223);
     const vp::grid g = box_grid({31, 30, 29});
     vp::cuda_backend gpu;
@@ -193,8 +193,8 @@ TEST(RepeatedCalls, OfListsAndFramebuffers) {
     }
 }
 
-// What calls like the last did not need is left out of the next, which finds that it does: in turn meshes of as many
-// triangles, which lie in voxels of their own, and, `large`, reach over many voxels, or lie in one, `count` of them.
+// A kernel that earlier calls did not need is omitted, and the next call needs it. Meshes with `count` triangles
+// alternate: each triangle in its own voxel, all over many voxels if `large`, or all in one voxel.
 mesh_data spread_triangles(int count, bool large) {
     mesh_data m;
     for (int i = 0; i < count; ++i) {
@@ -206,8 +206,8 @@ mesh_data spread_triangles(int count, bool large) {
     return m;
 }
 
-// Meshes of as many triangles, by number in turn, into one target, which is cleared, or with `loads` the first time
-// only.
+// Meshes with the same number of triangles, in the given sequence, into one target. It is cleared each time, or with
+// `loads` the first time only.
 template <class Target, class Shader>
 void draw_in_turn(const std::vector<mesh_data>& meshes, const std::vector<int>& sequence, const Shader& shader,
                   const vp::voxelize_options& options, indices known, bool loads = false) {
@@ -238,7 +238,7 @@ void draw_in_turn(const std::vector<mesh_data>& meshes, const std::vector<int>& 
     }
 }
 
-TEST(RepeatedCalls, WithTrianglesForASecondKernelOrNone) {
+TEST(RepeatedCalls, MayNeedTheSecondKernelOrNot) {
     const std::vector<mesh_data> meshes{spread_triangles(3000, false), spread_triangles(3000, true)};
     for (const bool loads : {false, true})
         draw_in_turn<vp::target<float, blend::add>>(meshes, {0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1, 0, 1},
@@ -246,7 +246,7 @@ TEST(RepeatedCalls, WithTrianglesForASecondKernelOrNone) {
                                                     indices::unknown, loads);
 }
 
-// Fine meshes whose larger triangles are drawn by the first kernel alone, from the second call on, where these are few.
+// Fine meshes with few larger triangles. From the second call on, the first kernel draws these too.
 enum : int { none_left, few_left, many_left, large_left };
 std::vector<mesh_data> fine_meshes() {
     constexpr int count = 2000;
@@ -258,7 +258,7 @@ const std::vector<int> fine_sequence{few_left, few_left,  few_left, few_left, no
 const std::vector<int> fine_sequence_from_none{none_left,  none_left, few_left, few_left,
                                                large_left, few_left,  few_left};
 
-TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTriangles) {
+TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesGiveTheCpusBytes) {
     const std::vector<mesh_data> meshes = fine_meshes();
     for (const vp::coverage rule : both_rules)
         for (const auto& sequence : {fine_sequence, fine_sequence_from_none}) {
@@ -275,7 +275,7 @@ TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTriangles) {
         }
 }
 
-TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesShaded) {
+TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesShadedGiveTheCpusBytes) {
     using sum = vp::target<float, blend::add>;
     using last = vp::target<double, blend::replace>;
     const std::vector<mesh_data> meshes = fine_meshes();
@@ -285,7 +285,7 @@ TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesShaded) {
     }
 }
 
-// The same into lists, which each call makes anew: mesh_of(i) for the numbers i of the sequence.
+// The same into lists, which each call allocates: mesh_of(i) for the numbers i of the sequence.
 template <class Payload, class Shader, class MeshOf>
 void list_in_turn(const MeshOf& mesh_of, const std::vector<int>& sequence, const vp::grid& g, const Shader& shader,
                   vp::coverage rule) {
@@ -310,19 +310,19 @@ void list_in_turn(const MeshOf& mesh_of, const std::vector<int>& sequence, const
     }
 }
 
-TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesIntoLists) {
+TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesGiveTheCpusLists) {
     const std::vector<mesh_data> meshes = fine_meshes();
     const auto mesh_of = [&](int which) { return meshes[static_cast<std::size_t>(which)]; };
     const vp::grid g = box_grid({47, 46, 45});
     for (const vp::coverage rule : both_rules) {
         list_in_turn<void>(mesh_of, fine_sequence, g, vp::constant(true), rule);
-        list_in_turn<double>(mesh_of, fine_sequence, g, any_double{}, rule); // some are discarded
+        list_in_turn<double>(mesh_of, fine_sequence, g, any_double{}, rule); // some fragments are discarded
     }
 }
 
-// In voxels of their own; a window's voxels and ones for a warp; a block; dense, by bits; and runs that are merged, for
-// which there have to be many more triangles.
-TEST(RepeatedCalls, WithLongVoxelsOrNone) {
+// Voxels of one fragment; for a window and a warp; for a block; dense ones, by bits; and merged runs, which need many
+// more triangles.
+TEST(RepeatedCalls, MayHaveLongVoxelsOrNot) {
     // The first `inside` triangles lie in one voxel.
     const auto meshes_of = [](bool is_many) {
         return [is_many](int inside) {
@@ -338,14 +338,13 @@ TEST(RepeatedCalls, WithLongVoxelsOrNone) {
     const vp::coverage rule = vp::coverage::conservative;
     const std::vector<int> sequence{0, 0, 0, 0, 0, 700, 0, 0, 0, 0, 3000, 0, 8000, 4000, 1, 8000, 300};
     list_in_turn<void>(meshes_of(false), sequence, g, vp::constant(true), rule);
-    list_in_turn<double>(meshes_of(false), sequence, g, any_double{}, rule); // shaded in the finished lists
+    list_in_turn<double>(meshes_of(false), sequence, g, any_double{}, rule); // shaded in place
     list_in_turn<void>(meshes_of(true), {0, 0, 8000}, g, vp::constant(true), rule);
 }
 
-// Two sets of arguments in turn never make a graph; each after itself does.
-// Many fragments a voxel, which are sorted by counting, and few, which are not: what calls had before decides, whose
-// memory holds other things then.
-TEST(RepeatedCalls, WithManyFragmentsAVoxelOrFew) {
+// Many fragments a voxel, which are sorted by counting, and few, which are not. The earlier call decides, and the
+// memory then holds other data.
+TEST(RepeatedCalls, MayHaveManyFragmentsAVoxelOrFew) {
     constexpr int count = 6400;
     using draw = vp::draw<vp::mesh_view<>, vp::passthrough, decltype(vp::constant(true))>;
     vp::cuda_backend gpu;
@@ -381,7 +380,7 @@ TEST(RepeatedCalls, WithManyFragmentsAVoxelOrFew) {
     }
 }
 
-TEST(RepeatedCalls, InTurn) {
+TEST(RepeatedCalls, WithAlternatingArgumentsGiveTheCpusBytes) {
     const mesh_data m = mixed_triangles(800, 30.0f, 221);
     const vp::grid g = box_grid({31, 30, 29});
     vp::cuda_backend gpu;

@@ -1,9 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The cells of the paper's table on the benchmark scenes: one bit, reproducible float sum and A-buffer, byte for byte
-// as the CPU has them. Scenes come as .vpm files from the folder VOXELPIPE_VPM_DIR; without it generated meshes stand
-// in.
+// The cells of the paper's table on the benchmark scenes: one bit, reproducible float sum and A-buffer equal the CPU's
+// byte for byte. Scenes are .vpm files in the folder VOXELPIPE_VPM_DIR; without it, generated meshes replace them.
 
 #include "device_test.hpp"
 
@@ -13,7 +12,7 @@ using namespace device_test;
 
 namespace {
 
-// A closed wavy surface of about 2 * n * n triangles, where the scenes are absent.
+// A closed wavy surface of about 2 * n * n triangles, used if the scenes are absent.
 mesh_data wavy_sphere(int n) {
     mesh_data m;
     for (int i = 0; i <= n; ++i)

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Constants and blends for which only it counts which voxels are touched: every such target against cpu_backend, byte
-// for byte, cleared to either value and loaded; calls of one backend that leave zeros to one another; and the borders
-// of this way, beyond which targets are drawn into as they lie.
+// Constants and blends for which only the set of covered voxels matters, the occupancy mask. Every such target is
+// compared with cpu_backend byte for byte, cleared to either value and loaded. Also calls of one backend that rely on
+// each other's zeros, and the limits beyond which targets are drawn in place.
 
 #include "cells.hpp"
 
@@ -21,7 +21,7 @@ namespace layout = voxelpipe::layout;
 template <class Blend, class Layout = layout::linear>
 using bits = vp::target<vp::bit, Blend, Layout>;
 
-// One call into targets that are cleared to these values, or that hold a pattern of bytes; some are off.
+// One call into targets that are cleared to these values or hold a byte pattern; some are off.
 template <class Backend, class... Targets, class Values, class... Clear>
 vp::status draw_constants(Backend& be, vp::framebuffer<Backend, Targets...>& fb, const mesh_data& m, const vp::grid& g,
                           const Values& values, const vp::voxelize_options& options, start how, indices known,
@@ -71,7 +71,7 @@ void compare_constants(target_list<Targets...>, const Values& values, Clear... c
             }
 }
 
-TEST(Touched, Bits) {
+TEST(Touched, BitsAreTheCpus) {
     using targets = target_list<bits<blend::bit_or>, bits<blend::replace>, bits<blend::bit_and>, bits<blend::max>,
                                 bits<blend::min, layout::tiled>, bits<blend::replace, layout::tiled>>;
     for (const bool value : {true, false})
@@ -80,7 +80,7 @@ TEST(Touched, Bits) {
                               clear, clear, clear);
 }
 
-TEST(Touched, Values) {
+TEST(Touched, ValuesAreTheCpus) {
     using targets = target_list<vp::target<float, blend::replace>, vp::target<float, blend::min>,
                                 vp::target<std::uint8_t, blend::max>, vp::target<std::uint64_t, blend::bit_or>,
                                 vp::target<std::uint16_t, blend::bit_and, layout::tiled>, bits<blend::bit_or>>;
@@ -88,14 +88,14 @@ TEST(Touched, Values) {
         targets{},
         vp::constant(0.25f, -3.0f, std::uint8_t{200}, std::uint64_t{0x1234567890abcdefu}, std::uint16_t{0x0ff0}, true),
         -1.0f, 7.5f, std::uint8_t{3}, std::uint64_t{1} << 40, std::uint16_t{0x3c3c}, false);
-    // Where blending changes nothing, or what is there is no number.
+    // Blends that change nothing, and stored values that are NaN.
     compare_constants(
         targets{},
         vp::constant(device_test::nan, infinity, std::uint8_t{2}, std::uint64_t{0}, std::uint16_t{0xffff}, false),
         device_test::nan, -0.0f, std::uint8_t{3}, std::uint64_t{5}, std::uint16_t{1}, false);
 }
 
-TEST(Touched, Vectors) {
+TEST(Touched, VectorsAreTheCpus) {
     using targets = target_list<vp::target<glm::vec4, blend::replace>, vp::target<glm::vec3, blend::replace>,
                                 vp::target<glm::vec3, blend::max, layout::planar>,
                                 vp::target<glm::vec4, blend::replace, layout::tiled>>;
@@ -105,16 +105,16 @@ TEST(Touched, Vectors) {
                       glm::vec4(0.5f), glm::vec3(-1), glm::vec3(1), glm::vec4(-2));
 }
 
-// Positions that a vertex shader leaves in memory, and a part of a grid.
-TEST(Touched, ShadedVertices) {
+// Positions that a vertex shader stores in memory, and a part of a grid.
+TEST(Touched, ShadedVerticesGiveTheCpusBytes) {
     for (const vp::coverage rule : both_rules)
         expect_same<bits<blend::bit_or>, vp::target<float, blend::replace>>(
             mixed_triangles(700, 60.0f, 412), box_grid({60, 64, 70}).crop({7, 5, 3}, {41, 52, 60}), shift{0.25f},
             vp::constant(true, 2.5f), rule);
 }
 
-// The same call by voxelize, in what other calls have left, and by voxelize_async.
-TEST(Touched, CallsOfOneBackendInTurn) {
+// The same call by voxelize, in memory that other calls have used, and by voxelize_async.
+TEST(Touched, AlternatingCallsOfOneBackendGiveTheCpusBytes) {
     using single = target_list<bits<blend::bit_or>>;
     using draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<bool>>;
     vp::cpu_backend cpu;
@@ -142,7 +142,7 @@ TEST(Touched, CallsOfOneBackendInTurn) {
             const auto seed = 421 + static_cast<std::uint32_t>(round);
             expect_bits(mixed_triangles(300, 30.0f, seed), small, vp::coverage::conservative);
             expect_bits(mixed_triangles(150, 30.0f, seed), large, vp::coverage::thin);
-            // Lists of fragments lie where the touched voxels were.
+            // Fragment lists use the memory of the occupancy mask.
             vp::abuffer<vp::cuda_backend, void> lists{gpu};
             const mesh_data m = mixed_triangles(900, 20.0f, seed);
             const vp::mesh<vp::cuda_backend> mesh{gpu, m.positions, m.triangles};
@@ -205,8 +205,8 @@ void compare_parts(target_list<Targets...>, const std::vector<mesh_data>& parts,
     }
 }
 
-// Three draws that give one value, and others, which are drawn into the targets as they lie.
-TEST(Touched, SeveralDraws) {
+// Three draws of one value, and draws of different values, which are drawn in place.
+TEST(Touched, SeveralDrawsGiveTheCpusBytes) {
     mesh_data large = mixed_triangles(200, 40.0f, 440);
     add_triangle(large, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 50.0f}, {-300.0f, 500.0f, 20.0f});
     const std::vector<mesh_data> parts{large, mixed_triangles(600, 40.0f, 441), mixed_triangles(300, 40.0f, 442)};
@@ -221,15 +221,15 @@ TEST(Touched, SeveralDraws) {
                   std::vector<bit_value>{vp::constant(true), vp::constant(false), vp::constant(true)});
 }
 
-// Grids of more than 32 MB of bits are drawn into directly, and where nothing is counted also those of more than 1 MB
-// of few triangles, and those of indices that are known.
-TEST(Touched, LargeGridsOfBits) {
+// Grids of more than 32 MB of bits are drawn in place. Without counters, so are grids of more than 1 MB with few
+// triangles or with known indices.
+TEST(Touched, LargeGridsOfBitsAreTheCpus) {
     const mesh_data m = mixed_triangles(60, 40.0f, 450);
     for (const bool count : {false, true})
         expect_same<bits<blend::bit_or>>(m, box_grid({416, 200, 200}), vp::passthrough{}, vp::constant(true),
                                          vp::voxelize_options{vp::coverage::conservative, count});
     expect_same<bits<blend::bit_or>>(m, box_grid({1056, 600, 512}), vp::passthrough{}, vp::constant(true), {});
-    // Voxels of a target that starts with all bits set.
+    // A target that starts with all bits set.
     const glm::ivec3 extent(1056, 600, 512);
     vp::cpu_backend cpu;
     vp::cuda_backend gpu;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Framebuffers that track their changes: sequences of calls leave what they leave in one of the CPU that does not, and
-// clears write no more than what was drawn into.
+// Framebuffers that track their changes: after any sequence of calls they hold the bytes of a CPU framebuffer without
+// tracking, and clears write only chunks that were drawn into.
 
 #include "device_test.hpp"
 
@@ -18,16 +18,16 @@ namespace blend = voxelpipe::blend;
 
 enum class before { clear, load, off };
 
-// What a call of a sequence draws, and how. Meshes differ in where they lie.
+// A call of a sequence: its mesh and how it is drawn. Meshes differ in position.
 struct sequence_step {
     before targets[2];
     float clear_value;
     int mesh;
     float value;            // of constant shaders
     bool varies = false;    // a shader that computes
-    bool is_listed = true;  // where it computes: not in tiles, whose fragments are not marked
+    bool is_listed = true;  // a computing shader by lists; in tiles, fragments are not marked
     bool fails = false;     // an index out of range
-    bool elsewhere = false; // the memory is written to by other means before, which is said
+    bool elsewhere = false; // other code has written the memory before, and the framebuffer is told
 };
 
 // Small and large triangles in a part of the grid that differs by the number.
@@ -38,8 +38,8 @@ mesh_data sequence_mesh(const glm::ivec3& extent, int number) {
     return translated(m, room * glm::vec3(number % 2, number / 2 % 2, number % 3 == 0 ? 1 : 0));
 }
 
-// Two targets, what they are cleared to, and shaders: by what way the pipeline draws into them.
-struct by_atomics { // fragments straight into the targets, or counted
+// Two targets, their clear values and shaders, named by the way in which they are drawn.
+struct by_atomics { // in place by atomics, or counted
     using first = vp::target<float, blend::add>;
     using second = vp::target<std::uint32_t, blend::add>;
     static auto constant(float v) { return vp::constant(v, 3u); }
@@ -51,7 +51,7 @@ struct by_atomics { // fragments straight into the targets, or counted
     };
     static auto cleared(float v) { return std::pair(v, static_cast<std::uint32_t>(v)); }
 };
-struct by_touched_voxels { // constants that need only these; fragments listed and resolved
+struct by_touched_voxels { // constants by an occupancy mask; computed fragments by lists
     using first = vp::target<float, blend::replace>;
     using second = vp::target<glm::vec3, blend::max, vp::layout::planar>;
     static auto constant(float v) { return vp::constant(v, glm::vec3(v, 1, 2)); }
@@ -64,7 +64,7 @@ struct by_touched_voxels { // constants that need only these; fragments listed a
     };
     static auto cleared(float v) { return std::pair(v, glm::vec3(v, v, -v)); }
 };
-struct by_touched_vectors { // the same, of 12 and 16 bytes a voxel
+struct by_touched_vectors { // the same with 12 and 16 bytes a voxel
     using first = vp::target<glm::vec3, blend::min>;
     using second = vp::target<glm::dvec2, blend::replace>;
     static auto constant(float v) { return vp::constant(glm::vec3(v, -1, 2), glm::dvec2(v, 0.3)); }
@@ -82,7 +82,7 @@ struct hash_chain {
     VOXELPIPE_HD std::uint32_t identity() const { return 7; }
     VOXELPIPE_HD std::uint32_t combine(std::uint32_t a, std::uint32_t b) const { return (a ^ b) * 16777619u; }
 };
-struct in_order { // lists that are folded; with bits, of which nothing is known
+struct in_order { // lists that are folded; with bits of unknown state
     using first = vp::target<std::uint32_t, hash_chain>;
     using second = vp::target<vp::bit, blend::bit_or>;
     static auto constant(float v) { return vp::constant(static_cast<std::uint32_t>(8 * v), true); }
@@ -141,12 +141,12 @@ private:
 constexpr auto C = before::clear, L = before::load, O = before::off;
 const sequence_step steps[] = {
     {{C, C}, 0, 0, 1},
-    {{C, C}, 0, 1, 1}, // of which nothing may be left of the mesh before
+    {{C, C}, 0, 1, 1}, // nothing of the previous mesh may remain
     {{L, L}, 0, 2, 1},
     {{C, C}, 0, 1, 1},
-    {{C, C}, 2, 0, 1}, // another value: all of it
+    {{C, C}, 2, 0, 1}, // another clear value: everything is cleared
     {{C, C}, 2, 3, 1},
-    {{C, L}, 2, 1, 1}, // the marks are the other target's too
+    {{C, L}, 2, 1, 1}, // both targets share the marks
     {{C, C}, 2, 2, 1},
     {{O, C}, 2, 0, 1},
     {{C, C}, 2, 3, 1},
@@ -155,7 +155,7 @@ const sequence_step steps[] = {
     {{C, C}, 0, 0, 0.1f}, // sums are counted, by the marks of the framebuffer
     {{C, C}, 0, 2, 0.1f},
     {{C, C}, 0, 1, 1},
-    {{C, C}, 5, 0, 0.1f}, // counted, but what is not drawn is written at the end
+    {{C, C}, 5, 0, 0.1f}, // counted; the last pass writes voxels that are not drawn
     {{C, C}, 0, 3, 1},
     {{C, C}, 0, 0, 1, true},
     {{C, C}, 0, 1, 1, true},
@@ -165,10 +165,10 @@ const sequence_step steps[] = {
     {{C, C}, 0, 0, 1},
     {{L, L}, 0, 1, 1, true, false},
     {{C, C}, 0, 2, 1},
-    {{C, C}, 0, 1, 1, false, true, true}, // nothing happens
+    {{C, C}, 0, 1, 1, false, true, true}, // the call fails, nothing changes
     {{C, C}, 0, 1, 1, true, true, true},
     {{C, C}, 0, 3, 1},
-    {{C, C}, 0, 0, 1, false, true, false, true}, // forgotten
+    {{C, C}, 0, 0, 1, false, true, false, true}, // the marks are forgotten
     {{C, C}, 0, 1, 1},
 };
 
@@ -200,17 +200,21 @@ void expect_same_sequences(const glm::ivec3& extent) {
     }
 }
 
-// Rows that go 16 bytes at a time, rows that do not, and rows of more than one word of marks.
-TEST(Tracked, SequencesByAtomics) { expect_same_sequences<by_atomics>({256, 160, 206}); }
-TEST(Tracked, SequencesByAtomicsInOddRows) { expect_same_sequences<by_atomics>({203, 211, 197}); }
-TEST(Tracked, SequencesByAtomicsInLongRows) { expect_same_sequences<by_atomics>({1060, 95, 84}); }
-TEST(Tracked, SequencesByTouchedVoxels) { expect_same_sequences<by_touched_voxels>({256, 160, 206}); }
-TEST(Tracked, SequencesByTouchedVoxelsInOddRows) { expect_same_sequences<by_touched_voxels>({1061, 95, 84}); }
-TEST(Tracked, SequencesByTouchedVoxelsOfVectors) { expect_same_sequences<by_touched_vectors>({160, 131, 140}); }
-TEST(Tracked, SequencesInOrder) { expect_same_sequences<in_order>({203, 211, 197}); }
+// Rows with and without 16-byte access, and rows of more than one word of marks.
+TEST(Tracked, SequencesByAtomicsLeaveTheCpusBytes) { expect_same_sequences<by_atomics>({256, 160, 206}); }
+TEST(Tracked, SequencesByAtomicsInOddRowsLeaveTheCpusBytes) { expect_same_sequences<by_atomics>({203, 211, 197}); }
+TEST(Tracked, SequencesByAtomicsInLongRowsLeaveTheCpusBytes) { expect_same_sequences<by_atomics>({1060, 95, 84}); }
+TEST(Tracked, SequencesByTouchedVoxelsLeaveTheCpusBytes) { expect_same_sequences<by_touched_voxels>({256, 160, 206}); }
+TEST(Tracked, SequencesByTouchedVoxelsInOddRowsLeaveTheCpusBytes) {
+    expect_same_sequences<by_touched_voxels>({1061, 95, 84});
+}
+TEST(Tracked, SequencesByTouchedVoxelsOfVectorsLeaveTheCpusBytes) {
+    expect_same_sequences<by_touched_vectors>({160, 131, 140});
+}
+TEST(Tracked, SequencesInOrderLeaveTheCpusBytes) { expect_same_sequences<in_order>({203, 211, 197}); }
 
-// What a clear does not write to is what no call has drawn into, so that what was put there by other means stays,
-// unless that is said.
+// A clear does not write chunks that no call has drawn into. So values that other code wrote there stay, unless the
+// framebuffer is told.
 TEST(Tracked, ClearsOnlyWhatWasDrawn) {
     vp::cuda_backend be;
     const glm::ivec3 extent(256, 160, 206);
@@ -219,7 +223,7 @@ TEST(Tracked, ClearsOnlyWhatWasDrawn) {
     fb.track_changes(be);
     mesh_data m;
     add_triangle(m, {40.5f, 20.5f, 30.5f}, {44.5f, 20.5f, 30.5f},
-                 {40.5f, 25.5f, 33.5f}); // in a chunk, and the next along y, z
+                 {40.5f, 25.5f, 33.5f}); // in a chunk, and in the next along y and z
     const vp::mesh<vp::cuda_backend> mesh(be, m.positions, m.triangles);
     const auto draw = [&] { ASSERT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(1.0f), fb).ok()); };
     const auto place = [&](int x, int y, int z) {
@@ -237,7 +241,7 @@ TEST(Tracked, ClearsOnlyWhatWasDrawn) {
     put(63, 16, 24);
     put(64, 16, 24);
     draw();
-    EXPECT_FALSE(has(63, 16, 24)); // nothing was known
+    EXPECT_FALSE(has(63, 16, 24)); // the state was unknown
     EXPECT_FALSE(has(64, 16, 24));
     const auto emit_all = [&] {
         for (const glm::ivec3 v : {glm::ivec3(32, 16, 24), glm::ivec3(63, 31, 39), glm::ivec3(31, 20, 30),
@@ -246,7 +250,7 @@ TEST(Tracked, ClearsOnlyWhatWasDrawn) {
     };
     emit_all();
     draw();
-    EXPECT_FALSE(has(32, 16, 24)); // the ends of what was drawn into
+    EXPECT_FALSE(has(32, 16, 24)); // the ends of the drawn chunks
     EXPECT_FALSE(has(63, 31, 39));
     EXPECT_TRUE(has(31, 20, 30)); // beside it
     EXPECT_TRUE(has(64, 20, 30));
@@ -258,8 +262,8 @@ TEST(Tracked, ClearsOnlyWhatWasDrawn) {
     EXPECT_FALSE(has(40, 20, 23));
 }
 
-// The same of every way to draw that is tracked: a call like the one before leaves what lies far from its triangles as
-// it is, and sees to what lies beside them. Results alone would not tell that all is cleared after all.
+// For every tracked way of drawing: a repeated call leaves voxels far from its triangles unchanged and clears those
+// beside them. Without this test, clearing everything would give the same results.
 template <class Kind, class Shader>
 void expect_chunks_cleared(const Shader& shader, vp::coverage rule, const char* what) {
     SCOPED_TRACE(what);
@@ -269,7 +273,7 @@ void expect_chunks_cleared(const Shader& shader, vp::coverage rule, const char* 
     const glm::ivec3 extent(256, 160, 206);
     vp::framebuffer<vp::cuda_backend, first_type, typename Kind::second> fb{be, extent};
     fb.track_changes(be);
-    // Of each kind: a voxel or two, a few, some ten, and one that is cut into pieces.
+    // One of each size class: a voxel or two, a few, about ten, and one that is split.
     mesh_data m;
     for (const float size : {0.6f, 1.7f, 4.0f, 14.0f, 70.0f}) {
         const glm::vec3 at(110.3f, 84.2f, 100.4f);
@@ -286,11 +290,11 @@ void expect_chunks_cleared(const Shader& shader, vp::coverage rule, const char* 
         return reinterpret_cast<std::uint32_t*>(vp::get<0>(fb).view().elements) +
                (static_cast<std::size_t>(v.z) * 160 + static_cast<std::size_t>(v.y)) * 256 + v.x;
     };
-    const glm::ivec3 beside(97, 81, 97); // in a chunk with the first of them
+    const glm::ivec3 beside(97, 81, 97); // in the same chunk as the first of them
     const glm::ivec3 far_ones[] = {{0, 0, 0},     {255, 159, 205}, {110, 84, 95}, {110, 79, 100},
-                                   {95, 84, 100}, {20, 14, 10}}; // the last where the call before drew
+                                   {95, 84, 100}, {20, 14, 10}}; // the last lies where the previous call drew
     draw(elsewhere);
-    draw(elsewhere); // by then it is known how many fragments there are
+    draw(elsewhere); // by now the number of fragments is known
     draw(mesh);
     const std::vector<typename first_type::element_type> expected = vp::get<0>(fb).to_host(be);
     const auto get = [&](const glm::ivec3& v) {
@@ -319,12 +323,12 @@ void expect_chunks_cleared_of_all(bool counts) {
         expect_chunks_cleared<Kind>(typename Kind::shader{0.5f}, rule, "a shader that computes");
     }
 }
-TEST(Tracked, ClearsChunksByAtomics) { expect_chunks_cleared_of_all<by_atomics>(true); }
-TEST(Tracked, ClearsChunksByTouchedVoxels) { expect_chunks_cleared_of_all<by_touched_voxels>(false); }
-TEST(Tracked, ClearsChunksInOrder) { expect_chunks_cleared_of_all<in_order>(false); }
+TEST(Tracked, ClearsOnlyDrawnChunksByAtomics) { expect_chunks_cleared_of_all<by_atomics>(true); }
+TEST(Tracked, ClearsOnlyDrawnChunksByTouchedVoxels) { expect_chunks_cleared_of_all<by_touched_voxels>(false); }
+TEST(Tracked, ClearsOnlyDrawnChunksInOrder) { expect_chunks_cleared_of_all<in_order>(false); }
 
-// Calls that never wait, captured in a graph, which knows on the device what the launches before it left.
-TEST(Tracked, GraphLaunchedAgain) {
+// Asynchronous calls captured in a graph. The device keeps the state between launches.
+TEST(Tracked, AGraphMayBeLaunchedAgain) {
     using target = vp::target<float, blend::add>;
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<float>>;
     const glm::ivec3 extent(256, 160, 206);

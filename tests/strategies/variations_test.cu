@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// What must not show in the results: the tile policy, where memory comes from, the order of calls, and other work on
-// the device at the same time.
+// Results do not depend on the tile policy, the memory resource, the order of calls, or other work on the device at the
+// same time.
 
-// The toolkit's memory resources, still behind this switch in CUDA 13.0. First, for it is read with the first header.
+// Enables the toolkit's memory resources, which CUDA 13.0 still hides. It must come before the first header.
 #define LIBCUDACXX_ENABLE_EXPERIMENTAL_MEMORY_RESOURCE
 #include <cuda/memory_resource>
 
@@ -16,10 +16,11 @@
 using namespace device_test;
 namespace blend = voxelpipe::blend;
 
-// Named, so that nvcc does not miss a use of what only the library's concepts ask for.
+// Named, because nvcc would warn that functions are unused which only the library's concepts require.
 namespace resources {
 
-// ---- memory resources: the forms that cuda_backend takes ------------------------------------------------------------
+// ---- memory resources: the forms that cuda_backend accepts
+// -----------------------------------------------------------
 
 struct account {
     std::size_t live = 0, total = 0;
@@ -56,7 +57,7 @@ struct stream_first_form : account {
     void deallocate(cudaStream_t stream, void* p, std::size_t bytes, std::size_t) noexcept { emit(p, bytes, stream); }
 };
 
-// A resource by the concepts of the toolkit's own library; tests hand it over through its type-erased reference.
+// A resource by the concepts of the toolkit's library; tests pass it as a type-erased reference.
 struct library_form : account {
     void* allocate(std::size_t bytes, std::size_t = 256) {
         void* const p = take(bytes, nullptr);
@@ -96,7 +97,7 @@ std::vector<float> sums_through(Resource& resource, cudaStream_t stream) {
     return vp::get<0>(fb).to_host(be);
 }
 
-TEST(Variations, EveryFormOfMemoryResourceServes) {
+TEST(Variations, EveryFormOfMemoryResourceIsAccepted) {
     resources::async_form first;
     resources::stream_first_form second;
     resources::library_form third;
@@ -168,7 +169,7 @@ several_results with(const mesh_data& m, const vp::grid& g, vp::coverage rule, v
     return results_of(be, fb, s);
 }
 
-TEST(Variations, ThePolicyDoesNotShow) {
+TEST(Variations, ThePolicyDoesNotChangeTheResult) {
     mesh_data m = mixed_triangles(4000, 60.0f, 91);
     add_triangle(m, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
     const vp::grid g = box_grid({61, 50, 67});
@@ -181,7 +182,7 @@ TEST(Variations, ThePolicyDoesNotShow) {
     }
 }
 
-// Bits alone, for which a tile can have any size.
+// Only bits, for which a tile can have any size.
 struct bits_of_some {
     template <class Fragment>
     VOXELPIPE_HD auto operator()(const Fragment& f) const {
@@ -201,7 +202,7 @@ std::vector<std::uint32_t> bits_with(const mesh_data& m, const vp::grid& g, vp::
     return vp::get<0>(fb).to_host(be);
 }
 
-TEST(Variations, TheTilesOfBitsDoNotShow) {
+TEST(Variations, TheTileSizeOfBitsDoesNotChangeTheResult) {
     mesh_data m = mixed_triangles(4000, 60.0f, 17);
     add_triangle(m, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
     const vp::grid g = box_grid({61, 50, 67});
@@ -224,7 +225,7 @@ struct small_tiles_for {
 
 __global__ void any_kernel() {}
 
-// The compute capability whose code the current device runs, from the code itself.
+// The compute capability whose code the current device runs, reported by the code itself.
 int running_capability() {
     cudaFuncAttributes attributes{};
     EXPECT_EQ(cudaFuncGetAttributes(&attributes, any_kernel), cudaSuccess);
@@ -233,7 +234,7 @@ int running_capability() {
 
 struct policy_run {
     several_results results;
-    std::size_t bytes; // of all allocations: the tile's size shows in the workspace's
+    std::size_t bytes; // of all allocations; the workspace depends on the tile's size
 };
 template <class Selector>
 policy_run measure(const mesh_data& m, const vp::grid& g) {
@@ -244,7 +245,7 @@ policy_run measure(const mesh_data& m, const vp::grid& g) {
 }
 
 TEST(Variations, TheSelectorIsAskedForTheArchitectureThatRuns) {
-    const mesh_data m = mixed_triangles(60, 60.0f, 93); // few: the first try's memory is enough
+    const mesh_data m = mixed_triangles(60, 60.0f, 93); // few, so that the memory of the first attempt suffices
     const vp::grid g = box_grid({61, 50, 67});
     const policy_run small = measure<fixed_policy<32, 3, 1>>(m, g), large = measure<fixed_policy<512, 4, 1>>(m, g);
     ASSERT_NE(small.bytes, large.bytes);
@@ -264,7 +265,8 @@ TEST(Variations, TheSelectorIsAskedForTheArchitectureThatRuns) {
     EXPECT_EQ(measure<small_tiles_for<0>>(m, g).bytes, large.bytes); // no such architecture
 }
 
-// ---- order and company ----------------------------------------------------------------------------------------------
+// ---- order of calls, other work
+// ----------------------------------------------------------------------------------------------
 
 __global__ void keep_busy(unsigned long long cycles, unsigned* sink) {
     const long long start = clock64();
@@ -273,8 +275,8 @@ __global__ void keep_busy(unsigned long long cycles, unsigned* sink) {
     if (n == 0) *sink = n;
 }
 
-// Other kernels hold a changing part of the device, so that blocks start at other times and in another order.
-TEST(Variations, OtherWorkOnTheDeviceDoesNotShow) {
+// Other kernels occupy a changing part of the device, so that blocks start at other times and in another order.
+TEST(Variations, OtherWorkOnTheDeviceDoesNotChangeTheResult) {
     const mesh_data m = mixed_triangles(60000, 100.0f, 92);
     const vp::grid g = box_grid({100, 90, 110});
     cudaStream_t other = nullptr;
@@ -305,8 +307,8 @@ TEST(Variations, OtherWorkOnTheDeviceDoesNotShow) {
     cudaStreamDestroy(own);
 }
 
-// A mesh in parts, each part a call that loads what the calls before it left: order-free blends give one result in any
-// order of the calls, that of one call for all.
+// A mesh in parts. Each call draws one part and loads the targets. Order-free blends give the result of a single call
+// in any order of the parts.
 TEST(Variations, CallsInAnyOrderGiveOneResult) {
     const mesh_data m = mixed_triangles(8000, 60.0f, 93);
     const vp::grid g = box_grid({61, 50, 67});
