@@ -64,6 +64,37 @@ TEST(Snap, IsTheFormulaWithEveryStepRoundedOnce) {
     }
 }
 
+// Positions whose product is exactly half a unit, after a difference that was rounded: any other order of the steps, or
+// one rounding fewer, leaves the tie and snaps some of them to the other unit.
+TEST(Snap, RoundsTheDifferenceThenTheProduct) {
+    splitmix64 random(4);
+    int ties = 0, fused_differs = 0;
+    for (std::int64_t i = 0; i < unit::cases(3'000); ++i) {
+        const double scale = random.uniform(3000.0, 70000.0);
+        const double half_units =
+            static_cast<double>(random.between(std::int64_t{1} << 36, std::int64_t{1} << 39)) + 0.5;
+        const double difference = half_units / scale;
+        const auto p = static_cast<float>(difference * random.uniform(-1.0, 1.0));
+        const double origin = double{p} - difference;
+        if (double{p} - origin != difference || difference * scale != half_units) continue;
+        ++ties;
+        vp::core::snap_transform t{};
+        t.fraction = 14;
+        for (int a = 0; a < 3; ++a) {
+            t.origin[a] = origin;
+            t.scale[a] = scale;
+        }
+        const std::int64_t expected = snap_model(p, origin, scale).value();
+        const vp::core::snapped_position q = vp::core::snap(t, p, p, p);
+        ASSERT_EQ(q.x, expected);
+        ASSERT_EQ(q.y, expected);
+        ASSERT_EQ(q.z, expected);
+        fused_differs += std::llrint(std::fma(double{p}, scale, -(origin * scale))) != expected ? 1 : 0;
+    }
+    EXPECT_GT(ties, 20);
+    EXPECT_GT(fused_differs, ties / 20);
+}
+
 // Positions half-way between two sub-voxel units go to the even one.
 TEST(Snap, TakesTiesToEven) {
     vp::grid g;
@@ -166,6 +197,46 @@ TEST(Grid, ValidateNamesWhatIsWrong) {
                   }),
                   status_code::bad_extent);
     }
+}
+
+// The formula in exact rationals: each step is rounded once, 1 + 2 margin and the origin by a fused step.
+TEST(Fit, IsTheFormulaWithEveryStepRoundedOnce) {
+    const auto plus = [](const unit::rational& a, const unit::rational& b) {
+        return unit::rational{a.numerator * b.denominator + b.numerator * a.denominator, a.denominator * b.denominator};
+    };
+    const auto times = [](const unit::rational& a, const unit::rational& b) {
+        return unit::rational{a.numerator * b.numerator, a.denominator * b.denominator};
+    };
+    splitmix64 random(5);
+    int fusing_shows = 0;
+    for (std::int64_t i = 0; i < unit::cases(500); ++i) {
+        std::vector<glm::vec3> positions;
+        for (int n = 0; n < 2; ++n)
+            positions.emplace_back(random.uniform(-9, 9), random.uniform(-9, 9), random.uniform(-9, 9));
+        const glm::ivec3 extent(static_cast<int>(random.between(1, 3000)));
+        const double margin = random.uniform(0.0, 0.1);
+        const unit::rational two{unit::wide(2)}, one{unit::wide(1)};
+        const double larger = unit::nearest_double(plus(times(two, unit::exact(margin)), one));
+        double size = 0, lo[3], hi[3];
+        for (int a = 0; a < 3; ++a) {
+            lo[a] = std::min(positions[0][a], positions[1][a]);
+            hi[a] = std::max(positions[0][a], positions[1][a]);
+            const double box = unit::nearest_double(plus(unit::exact(hi[a]), unit::exact(-lo[a])));
+            const unit::rational side = unit::exact(unit::nearest_double(times(unit::exact(box), unit::exact(larger))));
+            size = std::max(size, unit::nearest_double({side.numerator, side.denominator * unit::wide(extent.x)}));
+        }
+        const vp::grid g = vp::fit(positions, extent, margin);
+        for (int a = 0; a < 3; ++a) {
+            ASSERT_EQ(g.voxel_size[a], size);
+            const double middle = 0.5 * unit::nearest_double(plus(unit::exact(lo[a]), unit::exact(hi[a])));
+            const unit::rational half = times(unit::exact(-0.5 * extent[a]), unit::exact(size));
+            ASSERT_EQ(g.origin[a], unit::nearest_double(plus(half, unit::exact(middle))));
+            const double rounded = unit::nearest_double(half);
+            fusing_shows +=
+                unit::nearest_double(plus(unit::exact(rounded), unit::exact(middle))) != g.origin[a] ? 1 : 0;
+        }
+    }
+    EXPECT_GT(fusing_shows, 100);
 }
 
 TEST(Fit, CentresABoxOfCubicVoxelsRoundThePositions) {
