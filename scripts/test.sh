@@ -2,22 +2,22 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# test.sh [PRESET [ctest option...]]: builds everything of a preset (default cpu: no nvcc, no GPU) and runs its tests. Sets
-# up what the tests need, the Python readers of tests/formats among it, and says first how long it will take.
+# test.sh [PRESET [ctest option...]]: builds everything of a preset (default test: no nvcc, no GPU) and runs its tests. Installs
+# what the tests need, including the Python readers of tests/formats, and says first how long it will take.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-preset="${1:-cpu}"
+preset="${1:-test}"
 shift || true
 
-# Processor time of the preset cpu from an empty build folder, without a compiler cache, and what one core does alone.
-cpu_minutes=22
+# Processor time of the preset `test` from an empty build folder, without a compiler cache.
+cpu_minutes=18
 minutes=$(((cpu_minutes + jobs - 1) / jobs))
-if [[ $preset != cpu ]]; then
-    say "make test, preset $preset"
-elif [[ -e build/cpu/tests/api/api_test ]]; then
-    say "make test: at most $minutes minutes with $jobs jobs; what has not changed since the last run is not built again"
+if [[ $preset != test ]]; then
+    say "builds and tests the preset $preset"
+elif [[ -e build/test/tests/api/api_test ]]; then
+    say "make test: at most $minutes minutes with $jobs jobs; only what has changed since the last run is built again"
 else
-    say "make test: about $minutes minutes with $jobs jobs to build and run all tests; later runs build only what has changed"
+    say "make test: about $minutes minutes with $jobs jobs to build everything and run all tests"
 fi
 
 need_packages "${build_packages[@]}" libgtest-dev
