@@ -46,7 +46,7 @@ present() {
         zlib1g-dev) has_header zlib.h ;;
         libminizip-dev) has_header minizip/zip.h ;;
         libassimp-dev) has_header assimp/Importer.hpp ;;
-        libwebp-dev libassimp-dev) has_header webp/decode.h ;;
+        libwebp-dev) has_header webp/decode.h ;;
         libgtest-dev) has_header gtest/gtest.h ;;
         libbenchmark-dev) has_header benchmark/benchmark.h ;;
         python3-venv) python3 -c 'import ensurepip, venv' 2>/dev/null ;;
