@@ -47,6 +47,8 @@ present() {
         libminizip-dev) has_header minizip/zip.h ;;
         libassimp-dev) has_header assimp/Importer.hpp ;;
         libwebp-dev) has_header webp/decode.h ;;
+        libdraco-dev) has_header draco/compression/decode.h ;;
+        libmeshoptimizer-dev) has_header meshoptimizer.h ;;
         libgtest-dev) has_header gtest/gtest.h ;;
         libbenchmark-dev) has_header benchmark/benchmark.h ;;
         python3-venv) python3 -c 'import ensurepip, venv' 2>/dev/null ;;
@@ -87,7 +89,7 @@ Install them and run the same command again; on Debian or Ubuntu:
 
 # What the library, the tool and the samples are built with.
 build_packages=(g++ cmake ninja-build libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev zlib1g-dev
-    libminizip-dev libwebp-dev libassimp-dev)
+    libminizip-dev libwebp-dev libassimp-dev libdraco-dev libmeshoptimizer-dev)
 
 # configure PRESET [cmake option...]: quiet unless it fails. Uses ccache where there is one, and the staged prefix.
 configure() {

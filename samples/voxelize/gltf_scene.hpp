@@ -11,9 +11,9 @@
 // Skins, morph targets and instances of EXT_mesh_gpu_instancing stand in the pose that the file states, or in that of
 // one animation at one time.
 //
-// What is not supported: where geometry would be lost (Draco or meshopt compression, required extensions that are not
-// known) the load fails and says so; otherwise scene::warnings names it. Points and lines have no surface and are left
-// out.
+// What is not supported: where geometry would be lost (required extensions that are not known, Draco or meshopt
+// compression in a build without the library) the load fails and says so; otherwise scene::warnings names it. Points and
+// lines have no surface and are left out.
 
 #include "model_error.hpp"
 #include "scene.hpp"

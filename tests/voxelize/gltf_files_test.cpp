@@ -70,6 +70,7 @@ void write_table(std::ostream& stream, const std::map<std::string, std::string>&
 
 void expect_same(const std::map<std::string, std::string>& expected, const std::map<std::string, std::string>& found) {
     for (const auto& [name, text] : expected) {
+        if (!VOXELPIPE_TOOL_HAS_MESHOPT && name == "gltf-transform/BoxMeshopt.glb") continue; // cannot be had there
         const auto match = found.find(name);
         if (match == found.end())
             ADD_FAILURE() << name << " is in the table, but there is no such file";

@@ -24,7 +24,8 @@ using tool_test::read_file;
 using tool_test::run;
 using tool_test::scratch_folder;
 
-const std::string all_targets = "occupancy,count,color,color-max,color-replace,color-outer,normal,material,triangle,depth";
+const std::string all_targets =
+    "occupancy,count,color,color-max,color-replace,color-outer,normal,material,triangle,depth";
 
 // The folder of models: the environment's, for tests moved to another machine, or that of the build.
 fs::path models() {

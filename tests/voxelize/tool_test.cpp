@@ -23,7 +23,8 @@ using tool_test::scratch_folder;
 
 namespace {
 
-constexpr const char* all_targets = "occupancy,count,color,color-max,color-replace,color-outer,normal,material,triangle,depth";
+constexpr const char* all_targets =
+    "occupancy,count,color,color-max,color-replace,color-outer,normal,material,triangle,depth";
 
 TEST(Tool, WrongCommandLinesAreExplained) {
     const scratch_folder folder;

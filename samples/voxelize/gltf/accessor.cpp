@@ -54,7 +54,40 @@ std::size_t component_count(const tinygltf::Accessor& accessor) {
 
 } // namespace
 
+void accessor_reader::read_draco() {
+    const std::vector<draco_primitive>& primitives = document_.draco_primitives;
+    if (primitives.empty()) return;
+    std::vector<std::span<const std::byte>> compressed;
+    for (const draco_primitive& primitive : primitives) compressed.push_back(view(primitive.buffer_view));
+    const std::vector<std::vector<std::byte>> decoded = decode_draco(primitives, compressed, memory_);
+    for (std::size_t i = 0; i < primitives.size(); ++i) {
+        auto at = decoded[i].begin();
+        const auto take = [&](const draco_accessor& filled) {
+            const std::size_t size =
+                filled.count * filled.components * component_size(static_cast<int>(filled.component_type));
+            draco_accessors_[filled.accessor].assign(at, at + static_cast<std::ptrdiff_t>(size));
+            at += static_cast<std::ptrdiff_t>(size);
+        };
+        for (const draco_accessor& attribute : primitives[i].attributes) take(attribute);
+        take(primitives[i].indices);
+    }
+}
+
 std::span<const std::byte> accessor_reader::view(std::size_t index) const {
+    if (index < document_.meshopt_views.size() && document_.meshopt_views[index]) {
+        const auto known = meshopt_views_.find(index);
+        if (known != meshopt_views_.end()) return known->second;
+        const meshopt_view& compressed = *document_.meshopt_views[index];
+        const std::string where = "bufferViews[" + std::to_string(index) + "]";
+        memory_.charge_to_the_end(compressed.count, compressed.byte_stride, where);
+        return meshopt_views_
+            .emplace(index, decode_meshopt(compressed,
+                                           bytes_.buffer(compressed.buffer)
+                                               .subspan(static_cast<std::size_t>(compressed.byte_offset),
+                                                        static_cast<std::size_t>(compressed.byte_length)),
+                                           where))
+            .first->second;
+    }
     const tinygltf::BufferView& view = model_.bufferViews[index];
     return bytes_.buffer(static_cast<std::size_t>(view.buffer)).subspan(view.byteOffset, view.byteLength);
 }
@@ -63,6 +96,7 @@ std::vector<std::byte> accessor_reader::packed(std::size_t index, std::size_t el
                                                const std::string& user) const {
     const tinygltf::Accessor& accessor = model_.accessors[index];
     memory_.charge(accessor.count, element_bytes, user);
+    if (const auto found = draco_accessors_.find(index); found != draco_accessors_.end()) return found->second;
     std::vector<std::byte> elements(accessor.count * element_bytes);
     if (!document_.zero_base[index]) {
         const auto view_index = static_cast<std::size_t>(accessor.bufferView);

@@ -12,6 +12,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,10 +21,12 @@ namespace voxelize::gltf {
 
 class accessor_reader {
 public:
-    // All of them must outlive this.
+    // All of them must outlive this. Decodes what Draco has compressed; throws gltf_error.
     accessor_reader(const tinygltf::Model& model, const checked_document& document, const resources& bytes,
                     budget& memory)
-        : model_{model}, document_{document}, bytes_{bytes}, memory_{memory} {}
+        : model_{model}, document_{document}, bytes_{bytes}, memory_{memory} {
+        read_draco();
+    }
 
     // count * components numbers of accessor INDEX, which must not be a matrix. Integers as they are, or with
     // NORMALIZED as glTF maps them to [0, 1] or [-1, 1]. USER is named in errors.
@@ -32,10 +35,12 @@ public:
     // The values of an unsigned scalar accessor.
     [[nodiscard]] std::vector<std::uint32_t> indices(std::size_t index, const std::string& user) const;
 
-    // The bytes of buffer view INDEX.
+    // The bytes of buffer view INDEX, decompressed where they have to be.
     [[nodiscard]] std::span<const std::byte> view(std::size_t index) const;
 
 private:
+    void read_draco();
+
     // count elements, tightly packed, sparse substitution done.
     [[nodiscard]] std::vector<std::byte> packed(std::size_t index, std::size_t element_bytes,
                                                 const std::string& user) const;
@@ -44,6 +49,8 @@ private:
     const checked_document& document_;
     const resources& bytes_;
     budget& memory_;
+    std::map<std::size_t, std::vector<std::byte>> draco_accessors_; // packed
+    mutable std::map<std::size_t, std::vector<std::byte>> meshopt_views_;
 };
 
 } // namespace voxelize::gltf

@@ -27,19 +27,26 @@ public:
         used_ += bytes;
     }
 
+    // The same for what outlives every scope.
+    void charge_to_the_end(std::uint64_t count, std::uint64_t bytes_each, const std::string& what) {
+        charge(count, bytes_each, what);
+        lasting_ += saturating_product(count, bytes_each);
+    }
+
     [[nodiscard]] const gltf_limits& limits() const { return limits_; }
 
     // What is charged while a scope lives is temporary: it is given back at the scope's end.
     class scope {
     public:
-        explicit scope(budget& owner) : owner_{owner}, used_before_{owner.used_} {}
-        ~scope() { owner_.used_ = used_before_; }
+        explicit scope(budget& owner) : owner_{owner}, used_before_{owner.used_}, lasting_before_{owner.lasting_} {}
+        ~scope() { owner_.used_ = used_before_ + (owner_.lasting_ - lasting_before_); }
         scope(const scope&) = delete;
         scope& operator=(const scope&) = delete;
 
     private:
         budget& owner_;
         std::uint64_t used_before_;
+        std::uint64_t lasting_before_;
     };
 
 private:
@@ -53,6 +60,7 @@ private:
     gltf_limits limits_;
     std::uint64_t allowed_;
     std::uint64_t used_ = 0;
+    std::uint64_t lasting_ = 0; // of used_: what no scope gives back
 };
 
 } // namespace voxelize::gltf

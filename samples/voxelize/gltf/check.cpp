@@ -166,14 +166,66 @@ void checker::check_buffer_views() {
                                   "it is used as it is");
             checked.byte_stride = *stride;
         }
+        document_.meshopt_views.push_back(std::nullopt);
         if (const auto extensions = entry.object("extensions"))
             for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression", "MESHOPT_compression"})
-                if (extensions->member(name) && is_placeholder(buffer))
-                    entry.fail("geometry is compressed with " + std::string(name) + ", which is not supported");
+                if (extensions->member(name) && is_placeholder(buffer)) {
+                    if (!reads_meshopt)
+                        entry.fail("geometry is compressed with " + std::string(name) +
+                                   ", which is not supported by this build (it has no meshoptimizer)");
+                    document_.meshopt_views.back() =
+                        check_meshopt(extensions->required(name, extensions->object(name)), checked.byte_length);
+                }
         views_.push_back(checked);
         document_.view_strides.push_back(checked.byte_stride.value_or(0));
         entry.keep_only({"buffer", "byteOffset", "byteLength"});
     });
+}
+
+// The stride and the count that mode and filter allow, and bytes that are there.
+meshopt_view checker::check_meshopt(const json_at& at, std::uint64_t view_length) const {
+    meshopt_view view;
+    view.buffer = at.required("buffer", at.index("buffer", "buffers", num_buffers_));
+    view.byte_offset = at.integer("byteOffset", 0, largest_integer).value_or(0);
+    view.byte_length = at.required("byteLength", at.integer("byteLength", 1, largest_integer));
+    view.byte_stride = at.required("byteStride", at.integer("byteStride", 1, 256));
+    view.count = at.required("count", at.integer("count", 1, UINT32_MAX));
+    if (view.byte_offset + view.byte_length > document_.buffers[view.buffer].byte_length)
+        at.fail("ends at byte " + std::to_string(view.byte_offset + view.byte_length) + " of a buffer with " +
+                std::to_string(document_.buffers[view.buffer].byte_length));
+    if (view.count * view.byte_stride != view_length)
+        at.fail("gives " + std::to_string(view.count * view.byte_stride) + " bytes, its buffer view has " +
+                std::to_string(view_length));
+    const std::string_view mode = at.required("mode", at.string("mode"));
+    const std::string_view filter = at.string("filter").value_or("NONE");
+    const auto require = [&](bool holds, std::string_view what) {
+        if (!holds)
+            at.fail(std::string(what) + " cannot have " + std::to_string(view.count) + " elements of " +
+                    std::to_string(view.byte_stride) + " bytes");
+    };
+    if (mode == "ATTRIBUTES") {
+        view.mode = meshopt_mode::attributes;
+        require(view.byte_stride % 4 == 0, mode);
+    } else if (mode == "TRIANGLES" || mode == "INDICES") {
+        view.mode = mode == "TRIANGLES" ? meshopt_mode::triangles : meshopt_mode::indices;
+        require(view.byte_stride == 2 || view.byte_stride == 4, mode);
+        require(mode == "INDICES" || view.count % 3 == 0, mode);
+    } else {
+        at.fail("mode " + in_quotes(mode) + " is not known");
+    }
+    if (filter == "OCTAHEDRAL") {
+        view.filter = meshopt_filter::octahedral;
+        require(view.byte_stride == 4 || view.byte_stride == 8, filter);
+    } else if (filter == "QUATERNION") {
+        view.filter = meshopt_filter::quaternion;
+        require(view.byte_stride == 8, filter);
+    } else if (filter == "EXPONENTIAL") {
+        view.filter = meshopt_filter::exponential;
+        require(view.byte_stride % 4 == 0, filter);
+    } else if (filter != "NONE") {
+        at.fail("filter " + in_quotes(filter) + " is not supported");
+    }
+    return view;
 }
 
 // Bytes [offset, offset + stride * (count - 1) + element) must lie inside the view. All of it fits 64 bits:

@@ -6,6 +6,7 @@
 // reduced text that this leaves, in which all of that has been settled, and never the file itself.
 
 #include "budget.hpp"
+#include "compression.hpp"
 #include "leniency.hpp"
 
 #include <cstdint>
@@ -32,6 +33,8 @@ struct checked_document {
     std::string json; // for tinygltf: without buffers, images, cameras, extras, other animations
     std::vector<buffer_source> buffers;
     std::vector<std::uint64_t> view_strides; // per buffer view, 0: packed. tinygltf insists on multiples of 4
+    std::vector<std::optional<meshopt_view>> meshopt_views; // per buffer view that has compressed bytes only
+    std::vector<draco_primitive> draco_primitives;          // those that have compressed data only
     std::vector<image_source> images;
     // Per texture: indices into images that show the same thing, the one to try first in front. Empty: none is named.
     std::vector<std::vector<std::uint32_t>> texture_images;

@@ -4,6 +4,8 @@
 
 #include <tiny_gltf.h>
 
+#include <utility>
+
 namespace voxelize::gltf {
 
 void checker::check_meshes() {
@@ -27,10 +29,48 @@ void checker::check_primitive(const json_at& primitive) {
     check_targets(primitive);
     if (const auto extensions = primitive.object("extensions")) {
         const auto position = attributes.index("POSITION", "accessors", num_accessors_);
-        if (extensions->member("KHR_draco_mesh_compression") && (!position || document_.zero_base[*position]))
-            primitive.fail("geometry is compressed with KHR_draco_mesh_compression, which is not supported");
+        const auto draco = extensions->object("KHR_draco_mesh_compression");
+        if (draco && (!position || document_.zero_base[*position])) check_draco(primitive, *draco);
     }
     primitive.keep_only({"attributes", "mode", "material", "indices", "targets"});
+}
+
+// A primitive whose accessors are empty but for what Draco gives.
+void checker::check_draco(const json_at& primitive, const json_at& extension) {
+    if (!reads_draco)
+        primitive.fail(
+            "geometry is compressed with KHR_draco_mesh_compression, which is not supported by this build (it "
+            "has no Draco)");
+    draco_primitive result;
+    result.where = primitive.path();
+    result.buffer_view = extension.required("bufferView", extension.index("bufferView", "bufferViews", num_views_));
+    const auto describe = [&](std::uint32_t index) {
+        const json& accessor = root_.value()["accessors"][index];
+        draco_accessor wanted;
+        wanted.accessor = index;
+        wanted.component_type = accessor["componentType"].get<std::uint32_t>();
+        const auto& type = accessor["type"].get_ref<const std::string&>();
+        wanted.components = type == "SCALAR"          ? 1
+                            : type.starts_with("VEC") ? static_cast<std::uint32_t>(type[3] - '0')
+                                                      : 0;
+        if (wanted.components == 0) extension.fail("a matrix cannot be compressed");
+        wanted.count = accessor["count"].get<std::uint64_t>();
+        return wanted;
+    };
+    const json_at attributes = primitive.required("attributes", primitive.object("attributes"));
+    const json_at ids = extension.required("attributes", extension.object("attributes"));
+    for (const auto& entry : ids.value().items()) {
+        const auto id = static_cast<std::uint32_t>(*ids.integer(entry.key(), 0, UINT32_MAX));
+        const auto accessor = attributes.index(entry.key(), "accessors", num_accessors_);
+        if (!accessor) ids.fail(in_quotes(entry.key()) + " is not an attribute of the primitive");
+        result.attributes.push_back(describe(*accessor));
+        result.attributes.back().attribute = id;
+    }
+    const auto indices = primitive.index("indices", "accessors", num_accessors_);
+    if (!indices) primitive.fail("is compressed with KHR_draco_mesh_compression and has no indices");
+    result.indices = describe(*indices);
+    memory_.charge(1, sizeof(draco_primitive) + result.attributes.size() * sizeof(draco_accessor), "meshes");
+    document_.draco_primitives.push_back(std::move(result));
 }
 
 void checker::check_index_accessor(const json_at& primitive, std::uint32_t index) {

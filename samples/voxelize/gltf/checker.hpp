@@ -42,6 +42,7 @@ private:
     void check_buffers();
     void check_buffer_views();
     void check_accessors();
+    [[nodiscard]] meshopt_view check_meshopt(const json_at& at, std::uint64_t view_length) const;
     [[nodiscard]] bool is_placeholder(std::size_t buffer) const;
     void check_span(const json_at& at, std::uint32_t view_index, std::uint64_t offset, std::uint64_t stride,
                     std::uint64_t count, std::uint64_t element) const;
@@ -58,6 +59,7 @@ private:
     // check_nodes.cpp: what is shown, and where.
     void check_meshes();
     void check_primitive(const json_at& primitive);
+    void check_draco(const json_at& primitive, const json_at& extension);
     void check_index_accessor(const json_at& primitive, std::uint32_t index);
     void check_nodes_and_scenes();
     void check_node_extensions(const json_at& extensions) const;

@@ -3,6 +3,8 @@
 #pragma once
 // What each glTF extension means for a voxelization: one table.
 
+#include "compression.hpp"
+
 #include <array>
 #include <string_view>
 
@@ -29,10 +31,7 @@ enum class extension_effect {
         rule{"KHR_lights_punctual", extension_effect::honoured},
         rule{"KHR_xmp", extension_effect::honoured},
         rule{"KHR_xmp_json_ld", extension_effect::honoured},
-        rule{"KHR_draco_mesh_compression", extension_effect::fallback},
-        rule{"EXT_meshopt_compression", extension_effect::fallback},
-        rule{"KHR_meshopt_compression", extension_effect::fallback},
-        rule{"MESHOPT_compression", extension_effect::fallback},
+        rule{"KHR_draco_mesh_compression", reads_draco ? extension_effect::honoured : extension_effect::fallback},
         rule{"EXT_mesh_gpu_instancing", extension_effect::honoured},
         rule{"KHR_node_visibility", extension_effect::honoured},
         // A picture that cannot be decoded is named when it is needed.
@@ -45,6 +44,7 @@ enum class extension_effect {
         rule{"EXT_lights_image_based", extension_effect::appearance},
         rule{"KHR_techniques_webgl", extension_effect::appearance},
     };
+    if (is_meshopt(name)) return reads_meshopt ? extension_effect::honoured : extension_effect::fallback;
     for (const rule& known : rules)
         if (known.name == name) return known.effect;
     for (const std::string_view prefix : {"KHR_materials_", "EXT_materials_", "ADOBE_materials_"})
