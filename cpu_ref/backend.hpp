@@ -36,8 +36,14 @@ public:
         [[nodiscard]] T* data() { return data_.get(); }
         [[nodiscard]] const T* data() const { return data_.get(); }
         [[nodiscard]] std::size_t size() const { return count_; }
-        [[nodiscard]] array_view<const T> view() const { return {data_.get(), count_}; }
+        [[nodiscard]] backend_view<const T> view() const { return {data_.get(), count_}; }
         [[nodiscard]] std::vector<T> to_host(cpu_backend&) const { return {data_.get(), data_.get() + count_}; }
+        // Copies a box of the elements; `to` has room for box.count() of them.
+        void read_box(cpu_backend&, const core::element_box& box, T* to) const {
+            for (std::size_t z = 0; z < box.slices; ++z)
+                for (std::size_t y = 0; y < box.rows; ++y, to += box.row)
+                    std::copy_n(data_.get() + box.first + z * box.slice_pitch + y * box.row_pitch, box.row, to);
+        }
 
     private:
         struct release {
@@ -65,6 +71,12 @@ public:
     stage_times* times = nullptr; // where to add up the time of each stage, if anywhere
     std::function<void(std::uint64_t done, std::uint64_t total)> progress; // called from any thread, one call at a time
 
+    // Copies an array of this backend's memory; what bounds() calls.
+    template <class T>
+    [[nodiscard]] std::vector<std::remove_const_t<T>> read(backend_view<T> from) const {
+        return {from.begin(), from.end()};
+    }
+
     // What check_indices calls.
     [[nodiscard]] std::uint32_t max_index(array_view<const glm::uvec3> triangles) const {
         return core::max_index(triangles);
@@ -75,8 +87,7 @@ public:
     [[nodiscard]] status run(const Draws& draws, const grid& g, Output& out, const voxelize_options& options,
                              std::uint64_t triangles_in) {
         stage at = stage::validate;
-        const cpu::execution how{threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency()), times,
-                                 &progress, &at};
+        const cpu::execution how = execution(&at);
         const auto out_of_memory = [&] {
             status failed = core::failure(status_code::out_of_memory, at);
             failed.counts.triangles_in = triangles_in;
@@ -93,7 +104,22 @@ public:
         }
     }
 
+    // What vp::clear calls, and voxelize without triangles; arguments are validated.
+    template <class... Targets>
+    [[nodiscard]] status clear(const framebuffer_view<Targets...>& fb) {
+        const cpu::execution how = execution(nullptr);
+        const cpu::stopwatch watch(times, &stage_times::clear);
+        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            const auto& t = get<I>(fb.targets);
+            if (t.load == load_operation::clear) cpu::clear_target(how, t);
+        });
+        return {};
+    }
+
 private:
+    [[nodiscard]] cpu::execution execution(stage* at) const {
+        return {threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency()), times, &progress, at};
+    }
     // Tile numbers of 32 bits keep the tile pairs small. A grid with more tiles than that has 2^47 voxels, more than
     // any framebuffer holds, though not more than an A-buffer may span.
     static bool has_small_keys(const grid& g) {

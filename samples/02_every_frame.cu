@@ -87,7 +87,7 @@ bool run(cudaStream_t stream) {
     const vp::grid grid = vp::fit(std::vector<glm::vec3>{{-1, -1, -1}, {1, 1, 1}}, {256, 256, 256}); // however it turns
     using target = vp::target<vp::bit, vp::blend::bit_or>;
     vp::framebuffer<vp::cuda_backend, target> waited{backend, grid.extent}, captured{backend, grid.extent};
-    const vp::voxelize_options options(vp::coverage::conservative, false); // nobody asks how many voxels there are
+    const vp::voxelize_options options{.count_voxels = false}; // nobody asks how many voxels there are
 
     // Memory that suffices for every frame: bits of a constant need what follows from the mesh alone. Where a call
     // lists fragments or tiles, run the worst frame once, ask read_status, and make more where it says so.

@@ -5,6 +5,11 @@
 // Version and the few macros of the library. Everything else is C++.
 // VOXELPIPE_HD marks a function that runs on the host and, when nvcc compiles, on the device.
 
+#if (defined(_MSVC_LANG) ? _MSVC_LANG : __cplusplus) < 202002L
+#error "VoxelPipe needs C++20: compile with -std=c++20, which nvcc wants too (the CMake targets voxelpipe::* bring it)"
+#include <voxelpipe/needs_cxx_20> // does not exist: ends the compilation here, before errors that do not say why
+#endif
+
 #include <cassert>
 
 #define VOXELPIPE_VERSION_MAJOR 0
@@ -16,8 +21,17 @@
 #endif
 
 #if defined(__CUDACC__)
+// Before any other header includes GLM: versions before 1.0.0 put __host__ __device__ on defaulted functions, of which
+// nvcc warns 84 times a file.
+#pragma nv_diagnostic push
+#pragma nv_diag_suppress 20012
+#include <glm/fwd.hpp>
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#pragma nv_diagnostic pop
 #if !defined(__CUDACC_RELAXED_CONSTEXPR__)
-#include <glm/fwd.hpp> // its version
 #if GLM_VERSION_MAJOR > 1 || (GLM_VERSION_MAJOR == 1 && (GLM_VERSION_MINOR > 0 || GLM_VERSION_PATCH > 1))
 // These silently lose vector arithmetic on the device without this flag.
 #error                                                                                                                 \
@@ -55,9 +69,14 @@
 #define VOXELPIPE_ASSERT(condition) assert(condition)
 #endif
 
-// A precondition of an accessor that returns no status: compiled out with NDEBUG.
+// A precondition of an accessor that returns no status. Checked on the host, compiled out with NDEBUG; kernels would
+// pay for it in every debug build.
 #if !defined(VOXELPIPE_EXPECTS)
+#if defined(__CUDA_ARCH__)
+#define VOXELPIPE_EXPECTS(condition) static_cast<void>(0)
+#else
 #define VOXELPIPE_EXPECTS(condition) assert(condition)
+#endif
 #endif
 
 #if !defined(__SIZEOF_INT128__)

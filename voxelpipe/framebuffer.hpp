@@ -8,6 +8,7 @@
 #include <voxelpipe/blend.hpp>
 #include <voxelpipe/core/change_log.hpp>
 #include <voxelpipe/core/layout.hpp>
+#include <voxelpipe/host_target.hpp>
 #include <voxelpipe/status.hpp>
 
 #include <array>
@@ -60,11 +61,19 @@ struct target_view {
     load_operation load = load_operation::clear;
     value_type clear_value = Target::traits::identity();
 
+    // (x, y, z) is in the extent, there is memory, and the caller can read and write it.
     [[nodiscard]] VOXELPIPE_HD value_type operator()(int x, int y, int z) const {
+        VOXELPIPE_EXPECTS(has(x, y, z));
         return map::load(elements, extent, x, y, z);
     }
     VOXELPIPE_HD
-    void store(int x, int y, int z, const value_type& v) const { map::store(elements, extent, x, y, z, v); }
+    void store(int x, int y, int z, const value_type& v) const {
+        VOXELPIPE_EXPECTS(has(x, y, z));
+        map::store(elements, extent, x, y, z, v);
+    }
+    [[nodiscard]] VOXELPIPE_HD bool has(int x, int y, int z) const {
+        return elements != nullptr && x >= 0 && y >= 0 && z >= 0 && x < extent.x && y < extent.y && z < extent.z;
+    }
 };
 
 template <class... Targets>
@@ -75,6 +84,15 @@ struct framebuffer_view {
 
     glm::ivec3 extent{0};
     core::pack<target_view<Targets>...> targets;
+    // A view of memory that the caller owns, one pointer per target, all cleared by the next call; a null pointer turns
+    // its target off.
+    [[nodiscard]] static framebuffer_view on(glm::ivec3 extent, typename Targets::element_type*... elements) {
+        const auto view_of = [&]<class Target>(std::type_identity<Target>, typename Target::element_type* p) {
+            return target_view<Target>{p, extent, p == nullptr ? load_operation::off : load_operation::clear};
+        };
+        return {extent, core::make_pack(view_of(std::type_identity<Targets>{}, elements)...)};
+    }
+
     // Where what is drawn is kept account of (framebuffer::track_changes): change_words(extent) words on the backend,
     // zeros before the first call, not written to by anybody but the calls. Null: nowhere.
     std::uint32_t* changes = nullptr;
@@ -82,17 +100,6 @@ struct framebuffer_view {
 
 // Words that framebuffer_view::changes has.
 [[nodiscard]] inline std::size_t change_words(const glm::ivec3& extent) { return core::change_log::num_words(extent); }
-
-// A copy of a target in host memory, addressed by voxel whatever the layout.
-template <class Target>
-struct host_target {
-    using map = typename Target::map;
-    std::vector<typename Target::element_type> elements;
-    glm::ivec3 extent{0};
-    [[nodiscard]] typename Target::value_type operator()(int x, int y, int z) const {
-        return map::load(elements.data(), extent, x, y, z);
-    }
-};
 
 // Whether a target of this extent can be addressed at all.
 template <class Target>
@@ -127,28 +134,62 @@ public:
     [[nodiscard]] const view_type& view() const { return view_; }
     operator const view_type&() const { return view_; } // NOLINT(*-explicit-*)
 
-    // From now on calls keep account of where they draw, and one that clears a target to the value of the clear before
-    // writes only where something has been drawn since: of floats in 1024^3 some 0.2 GB instead of 4 for a surface.
-    // Where most of the grid is drawn into it gains little, or costs a few percent. The results are the same. In
-    // exchange the targets' memory is for voxelize alone to write to: who has written to it by other means says so by
-    // forget_changes. Takes 64 KB for 1024^3. On cuda_backend it holds for targets of values in rows (layout::linear,
-    // layout::planar), of 32 MB or more and up to 32 bytes a value, and for calls that need no tiles; other targets,
-    // and what other calls have drawn, are cleared as a whole, and so is all on cpu_backend. A call that clears some
-    // targets and not others tracks those that it clears. Throws std::bad_alloc.
+    // Repeated clears to the same value write only voxels near those drawn since the previous clear: for a surface in
+    // 1024^3 floats some 0.2 GB instead of 4. Results are the same. It gains little, or costs a few percent, if most of
+    // the grid is drawn into. Only voxelize and clear may write to the targets' memory; call forget_changes after any
+    // other write. Takes 64 KB for 1024^3. It holds on cuda_backend for linear and planar targets of at least 32 MB and
+    // at most 32 bytes a value, in calls that need no tiles; everything else is cleared as a whole. A call that clears
+    // only some targets tracks those. Throws std::bad_alloc.
     void track_changes(Backend& backend) { forget_changes(backend); }
-    // Nothing is known of what the targets hold, as before the first call. Views of before must not be used any more.
+    // Says that the targets may hold anything, as before the first call. Earlier views must not be used any more.
     void forget_changes(Backend& backend) {
         const std::vector<std::uint32_t> zeros(change_words(view_.extent));
         changes_ = std::make_unique<buffer<std::uint32_t>>(backend, array_view<const std::uint32_t>(zeros));
         view_.changes = changes_->data();
     }
 
-    // One target of the framebuffer: vp::get<I>(fb).
+    // One target of a framebuffer that cannot be changed: vp::get<I>(fb) of a const fb.
     template <std::size_t I>
-    class reference {
+    class const_reference {
     public:
         using target_type = typename core::pack_element<I, Targets...>::type;
-        explicit reference(framebuffer& owner) : owner_(owner) {}
+        explicit const_reference(const framebuffer& owner) : owner_(owner) {}
+
+        [[nodiscard]] const target_view<target_type>& view() const { return get<I>(owner_.view_.targets); }
+        // Raw elements in the target's layout; copies, then waits. None, if the framebuffer was made without the
+        // target.
+        [[nodiscard]] std::vector<typename target_type::element_type> to_host(Backend& backend) const {
+            return get<I>(owner_.storage_).to_host(backend);
+        }
+        // The same, addressed by voxel.
+        [[nodiscard]] host_target<target_type> to_host_target(Backend& backend) const {
+            return {to_host(backend), owner_.view_.extent};
+        }
+        // The part [begin, begin + size), addressed by the voxels of the whole; copies little more than that, then
+        // waits. Throws std::out_of_range if the part is not within the extent.
+        [[nodiscard]] host_region<target_type> to_host_region(Backend& backend, glm::ivec3 begin,
+                                                              glm::ivec3 size) const {
+            const glm::ivec3 extent = owner_.view_.extent;
+            for (int a = 0; a < 3; ++a)
+                if (begin[a] < 0 || size[a] < 0 || size[a] > extent[a] - begin[a])
+                    throw std::out_of_range("voxelpipe: a region to read that is not within the framebuffer");
+            const auto& from = get<I>(owner_.storage_);
+            if (from.size() == 0 || size.x == 0 || size.y == 0 || size.z == 0) return {};
+            host_region<target_type> part(extent, begin, size);
+            part.fill(extent, [&](const core::element_box& box, auto* to) { from.read_box(backend, box, to); });
+            return part;
+        }
+
+    private:
+        const framebuffer& owner_;
+    };
+
+    // One target of the framebuffer: vp::get<I>(fb).
+    template <std::size_t I>
+    class reference : public const_reference<I> {
+    public:
+        using target_type = typename core::pack_element<I, Targets...>::type;
+        explicit reference(framebuffer& owner) : const_reference<I>(owner), owner_(owner) {}
 
         // Before the next voxelize: every voxel is `value`, which blends like a first fragment's.
         void clear(const typename target_type::value_type& value) {
@@ -160,16 +201,6 @@ public:
         void load() { get<I>(owner_.view_.targets).load = load_operation::load; }
         // Take no part in the next voxelize.
         void off() { get<I>(owner_.view_.targets).load = load_operation::off; }
-
-        [[nodiscard]] const target_view<target_type>& view() const { return get<I>(owner_.view_.targets); }
-        // Raw elements in the target's layout; copies, then waits.
-        [[nodiscard]] std::vector<typename target_type::element_type> to_host(Backend& backend) const {
-            return get<I>(owner_.storage_).to_host(backend);
-        }
-        // The same, addressed by voxel.
-        [[nodiscard]] host_target<target_type> to_host_target(Backend& backend) const {
-            return {to_host(backend), owner_.view_.extent};
-        }
 
     private:
         framebuffer& owner_;
@@ -199,6 +230,10 @@ private:
 template <std::size_t I, class Backend, class... Targets>
 [[nodiscard]] auto get(framebuffer<Backend, Targets...>& fb) {
     return typename framebuffer<Backend, Targets...>::template reference<I>(fb);
+}
+template <std::size_t I, class Backend, class... Targets>
+[[nodiscard]] auto get(const framebuffer<Backend, Targets...>& fb) {
+    return typename framebuffer<Backend, Targets...>::template const_reference<I>(fb);
 }
 
 } // namespace voxelpipe

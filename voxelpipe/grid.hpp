@@ -5,6 +5,7 @@
 // Where the voxels lie in space: extent, origin and voxel size, all run-time values, no power of two, no cube.
 // fit() makes a grid around positions; grid::crop() names a part of a grid whose result is the crop of the whole.
 
+#include <voxelpipe/core/exact.hpp>
 #include <voxelpipe/core/fixed_point.hpp>
 #include <voxelpipe/core/pack.hpp>
 #include <voxelpipe/core/triangle_setup.hpp>
@@ -15,6 +16,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 namespace voxelpipe {
 
@@ -42,8 +44,47 @@ struct grid {
 
     [[nodiscard]] glm::ivec3 whole_extent() const { return whole == glm::ivec3(0) ? extent : whole; }
 
+    // The grid that this one was cropped from; itself, if it is no crop. Its voxels are numbered as fragment::voxel is.
+    [[nodiscard]] grid uncropped() const {
+        grid all = *this;
+        all.extent = whole_extent();
+        all.offset = glm::ivec3(0);
+        return all;
+    }
+
     // World position of the computed part's lowest corner.
     [[nodiscard]] glm::dvec3 part_origin() const { return origin + glm::dvec3(offset) * voxel_size; }
+
+    // World and voxels. Voxels are numbered as framebuffers and A-buffers number them, from the corner of the computed
+    // part; in a crop, uncropped() has the same functions for fragment::voxel.
+
+    // World position of continuous voxel coordinates, in which voxel (i, j, k) is the box from (i, j, k) to (i + 1,
+    // j + 1, k + 1).
+    [[nodiscard]] VOXELPIPE_HD glm::dvec3 to_world(const glm::dvec3& p) const {
+        return {exact::fma(offset.x + p.x, voxel_size.x, origin.x), exact::fma(offset.y + p.y, voxel_size.y, origin.y),
+                exact::fma(offset.z + p.z, voxel_size.z, origin.z)};
+    }
+    // Continuous voxel coordinates of a world position: the inverse, up to rounding.
+    [[nodiscard]] VOXELPIPE_HD glm::dvec3 to_voxels(const glm::dvec3& world) const {
+        return {(world.x - origin.x) / voxel_size.x - offset.x, (world.y - origin.y) / voxel_size.y - offset.y,
+                (world.z - origin.z) / voxel_size.z - offset.z};
+    }
+    // World position of a voxel's centre.
+    [[nodiscard]] VOXELPIPE_HD glm::dvec3 voxel_center(const glm::ivec3& voxel) const {
+        return to_world({voxel.x + 0.5, voxel.y + 0.5, voxel.z + 0.5});
+    }
+    // The voxel that holds a world position, the upper one on a face between two. Outside the computed part it is an
+    // index that contains() refuses. Positions must be finite and within 2^31 voxels of the part's corner.
+    [[nodiscard]] glm::ivec3 voxel_at(const glm::dvec3& world) const {
+        const glm::dvec3 p = to_voxels(world);
+        return {static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)),
+                static_cast<int>(std::floor(p.z))};
+    }
+    // Whether the computed part has this voxel.
+    [[nodiscard]] VOXELPIPE_HD bool contains(const glm::ivec3& voxel) const {
+        return voxel.x >= 0 && voxel.y >= 0 && voxel.z >= 0 && voxel.x < extent.x && voxel.y < extent.y &&
+               voxel.z < extent.z;
+    }
 
     friend bool operator==(const grid&, const grid&) = default;
 };
@@ -57,9 +98,9 @@ struct grid {
     };
     const glm::ivec3 whole = g.whole_extent();
     for (int a = 0; a < 3; ++a) {
-        if (g.extent[a] <= 0 || whole[a] <= 0 || g.offset[a] < 0) return fail(status_code::bad_extent);
+        if (g.extent[a] <= 0 || whole[a] <= 0) return fail(status_code::bad_extent);
         if (whole[a] > grid::max_extent) return fail(status_code::extent_too_large);
-        if (g.offset[a] > whole[a] - g.extent[a]) return fail(status_code::bad_extent);
+        if (g.offset[a] < 0 || g.offset[a] > whole[a] - g.extent[a]) return fail(status_code::bad_crop);
         if (!std::isfinite(g.origin[a])) return fail(status_code::bad_origin);
         if (!std::isfinite(g.voxel_size[a]) || !(g.voxel_size[a] > 0.0)) return fail(status_code::bad_voxel_size);
         // The scale is 2^F / voxel_size with F from 1 to 16: both ends must be ordinary numbers.
@@ -95,19 +136,32 @@ namespace core {
 
 } // namespace core
 
-// A grid of cubic voxels, `extent` of them, around the finite ones of `positions`, centred. Along the tightest axis
-// (1 + 2 * margin) times the bounding box fits exactly. A box without size gets unit voxels.
-[[nodiscard]] inline grid fit(array_view<const glm::vec3> positions, glm::ivec3 extent, double margin = 1e-4) {
-    glm::dvec3 lo(0.0), hi(0.0);
-    bool any = false;
+// A box in world coordinates. Empty where a `low` is above its `high`, as it is by default.
+struct bounding_box {
+    glm::dvec3 low{std::numeric_limits<double>::infinity()};
+    glm::dvec3 high{-std::numeric_limits<double>::infinity()};
+
+    [[nodiscard]] bool empty() const { return !(low.x <= high.x && low.y <= high.y && low.z <= high.z); }
+    friend bool operator==(const bounding_box&, const bounding_box&) = default;
+};
+
+// The box of the finite ones of positions in host memory.
+[[nodiscard]] inline bounding_box bounds(array_view<const glm::vec3> positions) {
+    bounding_box box;
     for (const glm::vec3& p : positions) {
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) continue;
         for (int a = 0; a < 3; ++a) {
-            lo[a] = any ? std::min(lo[a], double{p[a]}) : double{p[a]};
-            hi[a] = any ? std::max(hi[a], double{p[a]}) : double{p[a]};
+            box.low[a] = std::min(box.low[a], double{p[a]});
+            box.high[a] = std::max(box.high[a], double{p[a]});
         }
-        any = true;
     }
+    return box;
+}
+
+// A grid of cubic voxels, `extent` of them, around a box, centred. Along the tightest axis (1 + 2 * margin) times the
+// box fits exactly. A box without size, or an empty one, gets unit voxels.
+[[nodiscard]] inline grid fit(const bounding_box& box, glm::ivec3 extent, double margin = 1e-4) {
+    const glm::dvec3 lo = box.empty() ? glm::dvec3(0.0) : box.low, hi = box.empty() ? glm::dvec3(0.0) : box.high;
     double size = 0.0;
     for (int a = 0; a < 3; ++a) {
         if (extent[a] <= 0) continue;
@@ -120,6 +174,70 @@ namespace core {
     g.voxel_size = glm::dvec3(size);
     for (int a = 0; a < 3; ++a) g.origin[a] = std::fma(-0.5 * extent[a], size, 0.5 * (lo[a] + hi[a]));
     return g;
+}
+
+// A grid of n cubic voxels along the longest side of a box, and along the others as few as hold it, centred; with the
+// margin of fit(). n < 1 gives a grid that calls refuse as bad_extent.
+[[nodiscard]] inline grid fit_longest(const bounding_box& box, int n, double margin = 1e-4) {
+    const glm::dvec3 side = box.empty() ? glm::dvec3(0.0) : (box.high - box.low) * std::fma(2.0, margin, 1.0);
+    const double longest = std::max({side.x, side.y, side.z});
+    glm::ivec3 extent(n);
+    for (int a = 0; a < 3 && longest > 0.0; ++a)
+        if (side[a] < longest)
+            extent[a] = std::clamp(static_cast<int>(std::ceil(side[a] / longest * n)), 1, std::max(n, 1));
+    return fit(box, extent, margin);
+}
+
+// A grid of voxels of this size, world units per axis, on the lattice of the size's multiples: the voxels that the box
+// spans, and at least one an axis. What snaps to a face of the lattice counts as lying in it, and a box that ends there
+// gets the voxel within alone: a side from 0 to 0.6f is 6 voxels of 0.1. Conservative coverage of a surface in that
+// face touches the next layer too; `padding` adds voxels at either end. A size that is not positive, or that needs more
+// than grid::max_extent voxels, gives a grid that calls refuse.
+[[nodiscard]] inline grid fit_voxel_size(const bounding_box& box, glm::dvec3 voxel_size, int padding = 0) {
+    const auto fit_with = [&](double tolerance) {
+        grid g;
+        g.voxel_size = voxel_size;
+        for (int a = 0; a < 3; ++a) {
+            const double lo = box.empty() ? 0.0 : box.low[a], hi = box.empty() ? 0.0 : box.high[a];
+            const double first = std::floor(lo / voxel_size[a] + tolerance);
+            const double last = std::max(std::ceil(hi / voxel_size[a] - tolerance), first + 1.0);
+            const double count = last - first + 2.0 * padding;
+            g.origin[a] = (first - padding) * voxel_size[a];
+            if (count >= 1.0) g.extent[a] = static_cast<int>(std::min(count, 2.0 * grid::max_extent));
+        }
+        return g;
+    };
+    const grid g = fit_with(0.0); // two voxels an axis too large at most, so that its units are at most twice as large
+    if (!validate(g).ok()) return g;
+    const int bits = core::fraction_bits(std::max({g.extent.x, g.extent.y, g.extent.z}));
+    return fit_with(0.25 / static_cast<double>(std::int64_t{1} << bits));
+}
+[[nodiscard]] inline grid fit_voxel_size(const bounding_box& box, double voxel_size, int padding = 0) {
+    return fit_voxel_size(box, glm::dvec3(voxel_size), padding);
+}
+
+// The same around the finite ones of positions in host memory.
+[[nodiscard]] inline grid fit(array_view<const glm::vec3> positions, glm::ivec3 extent, double margin = 1e-4) {
+    return fit(bounds(positions), extent, margin);
+}
+
+// Around positions in the memory of a backend, such as mesh::view().positions: they are copied to the host, once for
+// all that is asked of the box.
+template <class Backend>
+[[nodiscard]] bounding_box bounds(Backend& backend, backend_view<const glm::vec3> positions) {
+    return bounds(backend.read(positions));
+}
+
+// Instead of reading a backend's memory on the host.
+template <class T>
+void bounds(backend_view<T>) {
+    static_assert(core::never<T>, "voxelpipe: these positions may be in device memory: use bounds(backend, positions)");
+}
+template <class T>
+grid fit(backend_view<T>, glm::ivec3, double = 0) {
+    static_assert(core::never<T>,
+                  "voxelpipe: these positions may be in device memory: use fit(bounds(backend, positions), extent)");
+    return {};
 }
 
 } // namespace voxelpipe

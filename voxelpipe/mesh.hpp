@@ -33,10 +33,10 @@ struct mesh_view {
                   "voxelpipe: vertex attributes must be trivially copyable");
     static constexpr std::size_t num_attributes = sizeof...(Attributes);
 
-    array_view<const glm::vec3> positions;                       // one per vertex
-    array_view<const glm::uvec3> triangles;                      // vertex indices
+    backend_view<const glm::vec3> positions;                     // one per vertex
+    backend_view<const glm::uvec3> triangles;                    // vertex indices
     core::pack<array_view<const Attributes>...> attributes = {}; // each as long as positions
-    // By check_indices, or by mesh. What it says of other triangles than those above counts for nothing.
+    // By check_indices, or by mesh. Ignored if it describes a different triangle array.
     checked_indices checked = {};
 
     // Whether all indices are known to name vertices. Otherwise calls look at each of them, and say where one does not.
@@ -80,10 +80,11 @@ public:
 
     [[nodiscard]] mesh_view<Attributes...> view() const {
         return [this]<std::size_t... I>(std::index_sequence<I...>) {
-            return mesh_view<Attributes...>{positions_.view(),
-                                            triangles_.view(),
-                                            core::make_pack(voxelpipe::get<I>(attributes_).view()...),
-                                            {triangles_.data(), triangles_.size(), index_bound_}};
+            return mesh_view<Attributes...>{
+                positions_.view(),
+                triangles_.view(),
+                core::make_pack(array_view<const Attributes>(voxelpipe::get<I>(attributes_).view())...),
+                {triangles_.data(), triangles_.size(), index_bound_}};
         }
         (std::index_sequence_for<Attributes...>{});
     }

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a voxelize call reports: success, or which check failed at which stage, with counts. Nothing in the library
-// throws on bad input; or_throw() turns a status into an exception for those who like exceptions.
+// What a voxelize call reports: success, or which check failed at which stage, with counts. Calls do not throw on bad
+// input; or_throw() turns a status into an exception for those who like exceptions. Constructors, which have no status
+// to return, throw: std::bad_alloc or the backend's error, and std::length_error for a framebuffer too large to
+// address.
 
 #include <cstdint>
 #include <stdexcept>
@@ -13,11 +15,12 @@ namespace voxelpipe {
 
 enum class status_code : std::uint8_t {
     ok,
-    empty_mesh,         // no triangles in any draw
     null_view,          // a view with elements but without memory, or a target that is on but has none
     index_out_of_range, // a triangle names a vertex that the mesh does not have
     attribute_mismatch, // a vertex attribute array is not as long as the positions
+    not_affine,         // vp::transform with a matrix whose last row is not 0 0 0 1
     bad_extent,         // an extent that is zero or negative
+    bad_crop,           // a crop that is not within the whole grid
     extent_too_large,   // an extent above grid::max_extent
     bad_origin,         // NaN or infinite
     bad_voxel_size,     // zero, negative, NaN, infinite, or so small or large that the snapping scale is no number
@@ -69,16 +72,18 @@ struct required_sizes {
     switch (code) {
     case status_code::ok:
         return "ok";
-    case status_code::empty_mesh:
-        return "empty mesh: no triangles in any draw";
     case status_code::null_view:
         return "null view: a non-empty array or an enabled target has no memory";
     case status_code::index_out_of_range:
         return "index out of range: a triangle names a vertex that does not exist";
     case status_code::attribute_mismatch:
         return "attribute mismatch: an attribute array is not as long as the positions";
+    case status_code::not_affine:
+        return "not affine: the last row of a vp::transform's matrix is not 0 0 0 1";
     case status_code::bad_extent:
         return "bad extent: zero or negative";
+    case status_code::bad_crop:
+        return "bad crop: not within the whole grid";
     case status_code::extent_too_large:
         return "extent too large";
     case status_code::bad_origin:
@@ -125,29 +130,43 @@ struct required_sizes {
     return "unknown stage";
 }
 
+struct checked_status;
+
 struct [[nodiscard]] status {
     status_code code = status_code::ok;
     stage where = stage::validate; // the stage that failed; meaningless when ok
     int device_error = 0;          // cudaError_t, 0 on the CPU
     counters counts{};
     required_sizes required{};
+    static constexpr std::uint32_t unknown = ~std::uint32_t{0};
+    std::uint32_t draw = unknown; // of index_out_of_range: the first such triangle and its draw, if voxelize returns
+    std::uint32_t triangle = unknown; // it; voxelize_async does not look for them
 
     [[nodiscard]] bool ok() const { return code == status_code::ok; }
+    // A success that drew no triangle: there was none, all were outside the grid, or all were dropped (NaN).
+    [[nodiscard]] bool nothing_drawn() const { return ok() && counts.triangles_drawn == 0; }
     explicit operator bool() const { return ok(); }
 
     // One line: what failed and where.
     [[nodiscard]] std::string message() const {
         if (ok()) return to_string(code);
         std::string text = std::string(to_string(where)) + ": " + to_string(code);
+        if (triangle != unknown)
+            text += " (triangle " + std::to_string(triangle) + " of draw " + std::to_string(draw) + ")";
         if (device_error != 0) text += " (CUDA error " + std::to_string(device_error) + ")";
         return text;
     }
 
-    // Returns *this when ok; throws std::runtime_error with message() otherwise.
-    const status& or_throw() const {
-        if (!ok()) throw std::runtime_error("voxelpipe: " + message());
-        return *this;
-    }
+    // Returns a copy of *this when ok; throws std::runtime_error with message() otherwise.
+    checked_status or_throw() const; // NOLINT(*-nodiscard)
 };
+
+// A status that is ok. Unlike other statuses it may be ignored.
+struct checked_status : status {};
+
+inline checked_status status::or_throw() const {
+    if (!ok()) throw std::runtime_error("voxelpipe: " + message());
+    return {*this};
+}
 
 } // namespace voxelpipe

@@ -12,22 +12,24 @@
 #include <voxelpipe/shader.hpp>
 #include <voxelpipe/status.hpp>
 
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
+#include <iterator>
 #include <limits>
 #include <new>
 #include <span>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 namespace voxelpipe {
 
+// Written {.rule = coverage::thin, .count_voxels = false}. Where a call takes options, a coverage is enough.
 struct voxelize_options {
     coverage rule = coverage::conservative;
     bool count_voxels = true; // fill counters::voxels; costs a bit per voxel of a tile, or reading a target once
-
-    voxelize_options() = default;
-    voxelize_options(coverage rule_, bool count_voxels_ = true) // NOLINT(*-explicit-*): a coverage is enough
-        : rule(rule_), count_voxels(count_voxels_) {}
 };
 
 namespace core {
@@ -94,7 +96,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
     return s;
 }
 
-// Everything about the draws that can be told without reading them. Fills counts.triangles_in.
+// Everything about the draws that can be told without reading their arrays. Fills counts.triangles_in.
 template <class Mesh, class VertexShader, class FragmentShader>
 [[nodiscard]] status validate_draws(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws) {
     std::uint64_t triangles = 0;
@@ -115,9 +117,13 @@ template <class Mesh, class VertexShader, class FragmentShader>
         if (attributes != status_code::ok) return failure(attributes);
         if (m.triangles.size() > std::numeric_limits<std::uint32_t>::max() - triangles)
             return failure(status_code::too_many_triangles);
+        if constexpr (std::is_same_v<VertexShader, transform>) {
+            const glm::mat4& t = d.vertex_shader.matrix;
+            if (t[0][3] != 0.0f || t[1][3] != 0.0f || t[2][3] != 0.0f || t[3][3] != 1.0f)
+                return failure(status_code::not_affine);
+        }
         triangles += m.triangles.size();
     }
-    if (triangles == 0) return failure(status_code::empty_mesh);
     status s;
     s.counts.triangles_in = triangles;
     return s;
@@ -141,11 +147,63 @@ template <class... Targets>
     return code == status_code::ok ? status{} : failure(code);
 }
 
+// Names the first triangle with an index out of range in the status of a call that met one; reads the indices once
+// more. Where they cannot be read, nothing is named.
+template <class Backend, class Mesh, class VertexShader, class FragmentShader>
+[[nodiscard]] status name_bad_triangle(Backend& backend,
+                                       std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, status s) {
+    if (s.code != status_code::index_out_of_range) return s;
+    try {
+        for (std::size_t d = 0; d < draws.size(); ++d) {
+            const auto vertices = draws[d].mesh.positions.size();
+            const std::vector<glm::uvec3> triangles = backend.read(draws[d].mesh.triangles);
+            for (std::size_t i = 0; i < triangles.size(); ++i) {
+                const glm::uvec3& t = triangles[i];
+                if (t.x < vertices && t.y < vertices && t.z < vertices) continue;
+                s.draw = static_cast<std::uint32_t>(d);
+                s.triangle = static_cast<std::uint32_t>(i);
+                return s;
+            }
+        }
+    } catch (const std::exception&) {
+    }
+    return s;
+}
+
+// A contiguous range of draws that is not the span that voxelize takes.
+template <class Range>
+using draw_of = std::remove_cvref_t<decltype(*std::data(std::declval<const Range&>()))>;
+template <class T>
+inline constexpr bool is_draw = false;
+template <class Mesh, class VertexShader, class FragmentShader>
+inline constexpr bool is_draw<draw<Mesh, VertexShader, FragmentShader>> = true;
+template <class Range>
+concept draw_range = requires(const Range& r) {
+    requires is_draw<draw_of<Range>>;
+    std::size(r);
+}
+&&!std::is_same_v<Range, std::span<const draw_of<Range>>>;
+
 } // namespace core
+
+// Clears the targets of a framebuffer that are to be cleared, to their clear values, as a call that draws nothing does:
+// those that load keep what they hold. Returns after the work is done.
+template <class Backend, class... Targets>
+[[nodiscard]] status clear(Backend& backend, const framebuffer_view<Targets...>& fb) {
+    grid g;
+    g.extent = fb.extent;
+    if (const status s = validate(g); !s.ok()) return s;
+    if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
+    return backend.clear(fb);
+}
+template <class Backend, class... Targets>
+[[nodiscard]] status clear(Backend& backend, framebuffer<Backend, Targets...>& fb) {
+    return clear(backend, fb.view());
+}
 
 // Draws meshes into render targets. The draws share one type of mesh, vertex and fragment shader; their data differ.
 // Draw i's triangles come before draw i + 1's: that is the order of blend::replace. Returns after the work is done; on
-// a GPU backend that is one wait.
+// a GPU backend that is one wait. Without any triangles it clears, as vp::clear does, and is a success.
 template <class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, const framebuffer_view<Targets...>& fb, voxelize_options options = {}) {
@@ -154,7 +212,8 @@ template <class Backend, class Mesh, class VertexShader, class FragmentShader, c
         if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
         const status s = core::validate_draws(draws);
         if (!s.ok()) return s;
-        return backend.run(draws, g, fb, options, s.counts.triangles_in);
+        if (s.counts.triangles_in == 0) return backend.clear(fb);
+        return core::name_bad_triangle(backend, draws, backend.run(draws, g, fb, options, s.counts.triangles_in));
     } else {
         return {}; // does not compile: a static_assert has said why
     }
@@ -174,7 +233,12 @@ template <class Backend, class Mesh, class VertexShader, class FragmentShader, c
         if (const status s = validate(g); !s.ok()) return s;
         const status s = core::validate_draws(draws);
         if (!s.ok()) return s;
-        return backend.run(draws, g, lists, options, s.counts.triangles_in);
+        if (s.counts.triangles_in == 0) {
+            lists = abuffer<Backend, Payload>(backend);
+            lists.extent = g.extent;
+            return s;
+        }
+        return core::name_bad_triangle(backend, draws, backend.run(draws, g, lists, options, s.counts.triangles_in));
     } else {
         return {}; // does not compile: a static_assert has said why
     }
@@ -195,6 +259,26 @@ template <class Backend, class... Attributes, class VertexShader, class Fragment
                               const VertexShader& vertex_shader, const FragmentShader& fragment_shader, Output&& out,
                               voxelize_options options = {}) {
     return voxelize(backend, m.view(), g, vertex_shader, fragment_shader, out, options);
+}
+
+// Draws in any contiguous range, such as a std::vector.
+template <class Backend, core::draw_range Draws, class Output>
+[[nodiscard]] status voxelize(Backend& backend, const Draws& draws, const grid& g, Output&& out,
+                              voxelize_options options = {}) {
+    return voxelize(backend, std::span<const core::draw_of<Draws>>(std::data(draws), std::size(draws)), g, out,
+                    options);
+}
+
+// A coverage in place of options.
+template <class Backend, class Draws, class Output, std::same_as<coverage> Rule>
+[[nodiscard]] status voxelize(Backend& backend, const Draws& draws, const grid& g, Output&& out, Rule rule) {
+    return voxelize(backend, draws, g, out, voxelize_options{rule, true});
+}
+template <class Backend, class Mesh, class VertexShader, class FragmentShader, class Output,
+          std::same_as<coverage> Rule>
+[[nodiscard]] status voxelize(Backend& backend, const Mesh& mesh, const grid& g, const VertexShader& vertex_shader,
+                              const FragmentShader& fragment_shader, Output&& out, Rule rule) {
+    return voxelize(backend, mesh, g, vertex_shader, fragment_shader, out, voxelize_options{rule, true});
 }
 
 } // namespace voxelpipe

@@ -211,12 +211,18 @@ TEST(Status, MessageNamesStageAndReasonAndOrThrowThrowsIt) {
     vp::status ok;
     EXPECT_TRUE(ok);
     EXPECT_EQ(ok.message(), "ok");
-    EXPECT_EQ(&ok.or_throw(), &ok);
+    ok.counts.voxels = 42;
+    const auto& passed = vp::status(ok).or_throw(); // a copy: the temporary is gone
+    EXPECT_EQ(passed.counts.voxels, 42u);
+    EXPECT_FALSE((std::is_reference_v<decltype(ok.or_throw())>));
     vp::status bad;
     bad.code = vp::status_code::index_out_of_range;
     bad.where = vp::stage::coarse_raster;
     EXPECT_FALSE(bad);
     EXPECT_EQ(bad.message(), std::string("coarse raster: ") + vp::to_string(vp::status_code::index_out_of_range));
+    bad.draw = 2;
+    bad.triangle = 7;
+    EXPECT_NE(bad.message().find("(triangle 7 of draw 2)"), std::string::npos);
     bad.device_error = 700;
     EXPECT_NE(bad.message().find("CUDA error 700"), std::string::npos);
     try {

@@ -99,7 +99,7 @@ void expect_same(const vp::core::pack<typename Targets::value_type...>& clear, c
                     vp::get<I>(constant_output).clear(vp::get<I>(clear));
                     vp::get<I>(shaded).clear(vp::get<I>(clear));
                 });
-                const vp::voxelize_options options(rule);
+                const vp::voxelize_options options{rule};
                 const auto one = draw_twice(backend, constant_output, meshes,
                                             shaders<vp::constant_output>(3, a, several_values ? b : a), options);
                 const auto two =

@@ -109,6 +109,18 @@ cudaError_t cudaMemcpy(void* to, const void* from, std::size_t bytes, cudaMemcpy
 cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind, cudaStream_t s) {
     return put(s, [=] { (void)cudaMemcpy(to, from, bytes, kind); });
 }
+cudaError_t cudaMemcpy2DAsync(void* to, std::size_t to_pitch, const void* from, std::size_t from_pitch,
+                              std::size_t width, std::size_t height, cudaMemcpyKind kind, cudaStream_t s) {
+    return put(s, [=] {
+        for (std::size_t y = 0; y < height; ++y)
+            (void)cudaMemcpy(static_cast<char*>(to) + y * to_pitch, static_cast<const char*>(from) + y * from_pitch,
+                             width, kind);
+    });
+}
+cudaError_t cudaPointerGetAttributes(cudaPointerAttributes* attributes, const void*) {
+    *attributes = {cudaMemoryTypeUnregistered}; // all memory is the host's
+    return cudaSuccess;
+}
 cudaError_t cudaMemset(void* to, int byte, std::size_t bytes) {
     if (bytes != 0) std::memset(to, byte, bytes);
     return cudaSuccess;

@@ -17,7 +17,7 @@ namespace device_test {
 // `parts`: the mesh of each draw.
 template <class Payload, class FragmentShader>
 void expect_lists(const std::vector<mesh_data>& parts, const vp::grid& g, const FragmentShader& fs,
-                  const vp::voxelize_options& options, const vp::host_abuffer<Payload>& lists, const vp::status& s) {
+                  const call_options& options, const vp::host_abuffer<Payload>& lists, const vp::status& s) {
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;
     vp::cpu_backend cpu;
     vp::abuffer<vp::cpu_backend, Payload> expected{cpu};

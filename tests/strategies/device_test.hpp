@@ -222,6 +222,12 @@ void expect_same_bytes(const std::vector<T>& cpu, const std::vector<T>& gpu, con
 // Start of the targets: cleared to their blends' identities, or loaded with a byte pattern that an earlier call drew.
 enum class start { clear, load };
 
+// The options of a call, or a coverage in their place, as voxelize takes them.
+struct call_options : vp::voxelize_options {
+    call_options(vp::coverage rule_) : vp::voxelize_options{rule_, true} {}  // NOLINT(*-explicit-*)
+    call_options(const vp::voxelize_options& o) : vp::voxelize_options(o) {} // NOLINT(*-explicit-*)
+};
+
 // Whether calls know that a mesh's indices have been checked.
 enum class indices { checked, unknown };
 
@@ -235,7 +241,7 @@ vp::mesh_view<> view_of(const vp::mesh<Backend>& mesh, indices known) {
 template <class Backend, class... Targets, class VertexShader, class FragmentShader>
 vp::status draw_framebuffer(Backend& backend, vp::framebuffer<Backend, Targets...>& fb, const mesh_data& m,
                             const vp::grid& g, const VertexShader& vs, const FragmentShader& fs,
-                            const vp::voxelize_options& options, start how, indices known = indices::checked) {
+                            const call_options& options, start how, indices known = indices::checked) {
     const vp::mesh<Backend> mesh(backend, m.positions, m.triangles);
     const vp::mesh_view<> view = view_of(mesh, known);
     vp::status s = vp::voxelize(backend, view, g, vs, fs, fb, options);
@@ -246,7 +252,7 @@ vp::status draw_framebuffer(Backend& backend, vp::framebuffer<Backend, Targets..
 
 template <class... Targets, class VertexShader, class FragmentShader>
 void expect_same(const mesh_data& m, const vp::grid& g, const VertexShader& vs, const FragmentShader& fs,
-                 vp::voxelize_options options, start how = start::clear) {
+                 call_options options, start how = start::clear) {
     vp::cpu_backend cpu;
     vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
     const vp::status sa = draw_framebuffer(cpu, a, m, g, vs, fs, options, how);
@@ -294,7 +300,7 @@ void expect_same_on_host(const vp::host_abuffer<Payload>& a, const vp::host_abuf
 
 template <class Payload, class VertexShader, class FragmentShader>
 void expect_same_lists(const mesh_data& m, const vp::grid& g, const VertexShader& vs, const FragmentShader& fs,
-                       vp::voxelize_options options) {
+                       call_options options) {
     vp::cpu_backend cpu;
     vp::cuda_backend gpu;
     vp::abuffer<vp::cpu_backend, Payload> a{cpu};

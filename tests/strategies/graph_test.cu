@@ -72,7 +72,7 @@ using raster_draw_call = vp::draw<vp::mesh_view<>, vp::passthrough, decltype(vp:
 template <class Backend>
 using immediate_framebuffer = vp::framebuffer<Backend, bits, hits, sums>;
 
-void expect_direct(const mesh_data& m, const vp::grid& g, const vp::voxelize_options& options, vp::cuda_backend& be,
+void expect_direct(const mesh_data& m, const vp::grid& g, const call_options& options, vp::cuda_backend& be,
                    immediate_framebuffer<vp::cuda_backend>& fb, const vp::status& s, float value) {
     vp::cpu_backend cpu;
     immediate_framebuffer<vp::cpu_backend> expected{cpu, g.extent};
@@ -100,12 +100,12 @@ void replay_without_tiles(float value) {
         const raster_draw_call d{mesh.view(), {}, vp::constant(true, 1u, value)};
         const std::span<const raster_draw_call> draws(&d, 1);
         const vp::workspace_limits limits{}; // without lists nothing can overflow
-        const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), rule, limits);
+        const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), {rule}, limits);
         ASSERT_GT(bytes, 0u);
         vp::cuda_backend::buffer<std::byte> memory(be, bytes);
         const vp::workspace_view workspace{memory.data(), bytes, limits};
         const captured_graph graph(be.stream,
-                                   [&] { return vp::voxelize_async(be, draws, g, fb.view(), rule, workspace); });
+                                   [&] { return vp::voxelize_async(be, draws, g, fb.view(), {rule}, workspace); });
         for (const mesh_data& m : mesh.poses) {
             mesh.pose(be, m);
             graph.launch(be.stream);
@@ -164,11 +164,11 @@ void compare_replayed_lists(const FragmentShader& fs, std::uint32_t seed) {
         const std::span<const draw_type> draws(&d, 1);
         const vp::workspace_limits limits{0, 0, 1 << 21, 1 << 16};
         vp::abuffer_view<Payload> lists;
-        const std::size_t bytes = vp::workspace_bytes(draws, g, lists, rule, limits);
+        const std::size_t bytes = vp::workspace_bytes(draws, g, lists, {rule}, limits);
         ASSERT_GT(bytes, 0u);
         const guarded_memory memory(be, bytes);
         const vp::workspace_view workspace{const_cast<unsigned char*>(memory.memory.data()), bytes, limits};
-        const captured_graph graph(be.stream, [&] { return vp::voxelize_async(be, draws, g, lists, rule, workspace); });
+        const captured_graph graph(be.stream, [&] { return vp::voxelize_async(be, draws, g, lists, {rule}, workspace); });
         for (const mesh_data& m : mesh.poses) {
             mesh.pose(be, m);
             graph.launch(be.stream);
@@ -393,12 +393,12 @@ void compare_lists_without_larger(const Shader& shader) {
             vp::workspace_limits limits{0, 0, 1 << 17, 1 << 16, true, true, false};
             vp::abuffer_view<Payload> lists;
             for (bool fails = longest > 3.0f;; fails = false) {
-                const std::size_t bytes = vp::workspace_bytes(draws, g, lists, rule, limits);
+                const std::size_t bytes = vp::workspace_bytes(draws, g, lists, {rule}, limits);
                 ASSERT_GT(bytes, 0u);
                 const guarded_memory memory(be, bytes);
                 const vp::workspace_view workspace{const_cast<unsigned char*>(memory.memory.data()), bytes, limits};
                 for (int round = 0; round < 2; ++round)
-                    ASSERT_TRUE(vp::voxelize_async(be, draws, g, lists, rule, workspace).ok());
+                    ASSERT_TRUE(vp::voxelize_async(be, draws, g, lists, {rule}, workspace).ok());
                 const vp::status s = vp::read_status(be, workspace, &limits);
                 EXPECT_EQ(limits.expects_deferred, longest > 3.0f);
                 memory.expect_untouched_behind(be);

@@ -6,6 +6,7 @@
 
 #include "cells.hpp"
 
+#include <algorithm>
 #include <numeric>
 
 using namespace device_test;
@@ -111,6 +112,7 @@ TEST(Pipeline, AnIndexOutOfRangeWritesNothing) {
     const vp::status s = vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(1.0f), fb);
     EXPECT_EQ(s.code, vp::status_code::index_out_of_range);
     EXPECT_EQ(s.where, vp::stage::coarse_raster);
+    EXPECT_EQ(s.triangle, 321u);
     EXPECT_EQ(s.counts.triangles_in, 500u);
     for (const float v : vp::get<0>(fb).to_host(be)) ASSERT_EQ(std::bit_cast<std::uint32_t>(v), 0x5a5a5a5au);
     vp::abuffer<vp::cuda_backend> lists{be};
@@ -121,15 +123,98 @@ TEST(Pipeline, AnIndexOutOfRangeWritesNothing) {
 
 TEST(Pipeline, BadArgumentsAreRefused) {
     vp::cuda_backend be;
-    mesh_data m = mixed_triangles(5, 20.0f, 31);
+    const mesh_data m = mixed_triangles(5, 20.0f, 31);
     vp::mesh mesh{be, m.positions, m.triangles};
     vp::framebuffer<vp::cuda_backend, bits> fb{be, {20, 20, 20}};
     EXPECT_EQ(vp::voxelize(be, mesh, box_grid({20, 20, 21}), vp::passthrough{}, vp::constant(true), fb).code,
               vp::status_code::extent_mismatch);
-    m.triangles.clear();
-    vp::mesh empty{be, m.positions, m.triangles};
-    EXPECT_EQ(vp::voxelize(be, empty, box_grid({20, 20, 20}), vp::passthrough{}, vp::constant(true), fb).code,
-              vp::status_code::empty_mesh);
+}
+
+// Calls without triangles clear, on the stream and in a workspace too; what loads keeps what it holds.
+TEST(Pipeline, ACallWithoutTrianglesClears) {
+    vp::cuda_backend be;
+    const vp::grid g = box_grid({20, 20, 20});
+    const mesh_data m = mixed_triangles(50, 20.0f, 31);
+    const vp::mesh mesh{be, m.positions, m.triangles}, empty{be, m.positions, std::vector<glm::uvec3>{}};
+    vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
+    const auto holds = [&](float value) {
+        for (const float v : vp::get<0>(fb).to_host(be)) ASSERT_EQ(v, value);
+    };
+    const auto fill = [&] {
+        vp::get<0>(fb).clear(0.0f);
+        ASSERT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(1.0f), fb).ok());
+    };
+    for (const bool tracked : {false, true}) {
+        if (tracked) fb.track_changes(be);
+        fill();
+        vp::get<0>(fb).clear(3.0f);
+        const vp::status s = vp::voxelize(be, empty, g, vp::passthrough{}, vp::constant(1.0f), fb);
+        EXPECT_TRUE(s.ok()) << s.message();
+        EXPECT_TRUE(s.nothing_drawn());
+        holds(3.0f);
+        fill();
+        vp::get<0>(fb).clear(4.0f);
+        EXPECT_TRUE(vp::clear(be, fb).ok());
+        holds(4.0f);
+        vp::get<0>(fb).load();
+        EXPECT_TRUE(vp::clear(be, fb).ok());
+        holds(4.0f);
+    }
+    fill();
+    vp::get<0>(fb).clear(5.0f);
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<float>>;
+    const draw nothing{empty, {}, vp::constant(1.0f)};
+    const std::span<const draw> draws(&nothing, 1);
+    const vp::workspace_limits limits{};
+    const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), {}, limits);
+    vp::cuda_backend::buffer<std::byte> memory(be, bytes);
+    const vp::workspace_view workspace{memory.data(), bytes, limits};
+    EXPECT_TRUE(vp::voxelize_async(be, draws, g, fb.view(), {}, workspace).ok());
+    EXPECT_TRUE(vp::read_status(be, workspace).ok());
+    holds(5.0f);
+    EXPECT_EQ(vp::voxelize_async(be, draws, g, fb.view(), {}, {memory.data(), 8, limits}).code,
+              vp::status_code::capacity_exceeded);
+
+    vp::abuffer<vp::cuda_backend> lists{be};
+    ASSERT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), lists).ok());
+    EXPECT_GT(lists.num_fragments(), 0u);
+    EXPECT_TRUE(vp::voxelize(be, empty, g, vp::passthrough{}, vp::constant(true), lists).ok());
+    EXPECT_EQ(lists.num_fragments(), 0u);
+    EXPECT_EQ(lists.to_host(be).extent, g.extent);
+}
+
+// What the host gets of a target: a box of it, and nothing more; and what the device gets of page-locked memory, whose
+// owner may write to it as soon as the constructor returns.
+TEST(Pipeline, MemoryIsCopiedBothWays) {
+    vp::cuda_backend be;
+    const vp::grid g = box_grid({70, 20, 20});
+    const mesh_data m = mixed_triangles(50, 20.0f, 31);
+    const vp::mesh mesh{be, m.positions, m.triangles};
+    vp::framebuffer<vp::cuda_backend, sum> sums{be, g.extent};
+    vp::framebuffer<vp::cuda_backend, bits> words{be, g.extent};
+    ASSERT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(1.0f), sums).ok());
+    ASSERT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), words).ok());
+    const glm::ivec3 begin{3, 5, 7}, size{40, 9, 12};
+    const auto check = [&](const auto& whole, const auto& part) {
+        bool same = true;
+        vp::for_each_voxel(part,
+                           [&](glm::ivec3 v, const auto& value) { same = same && value == whole(v.x, v.y, v.z); });
+        EXPECT_TRUE(same);
+        EXPECT_EQ(part.last() - part.first(), size);
+    };
+    check(vp::get<0>(sums).to_host_target(be), vp::get<0>(sums).to_host_region(be, begin, size));
+    check(vp::get<0>(words).to_host_target(be), vp::get<0>(words).to_host_region(be, begin, size));
+    EXPECT_EQ(vp::bounds(be, mesh.view().positions), vp::bounds(m.positions));
+
+    std::vector<float> source(std::size_t{1} << 22, 1.0f);
+    ASSERT_EQ(cudaHostRegister(source.data(), source.size() * sizeof(float), 0), cudaSuccess);
+    const vp::cuda_backend::buffer<float> copy(be, source);
+    std::fill(source.begin(), source.end(), 2.0f);
+    const std::vector<float> host = copy.to_host(be);
+    EXPECT_EQ(std::count(host.begin(), host.end(), 1.0f), static_cast<std::ptrdiff_t>(host.size()));
+    cudaHostUnregister(source.data());
+    const vp::cuda_backend::buffer<float> again(be, copy.view()); // from device memory
+    EXPECT_EQ(again.to_host(be), host);
 }
 
 TEST(Pipeline, MemoryComesFromTheResource) {

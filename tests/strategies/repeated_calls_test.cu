@@ -210,7 +210,7 @@ mesh_data spread_triangles(int count, bool large) {
 // `loads` the first time only.
 template <class Target, class Shader>
 void draw_in_turn(const std::vector<mesh_data>& meshes, const std::vector<int>& sequence, const Shader& shader,
-                  const vp::voxelize_options& options, indices known, bool loads = false) {
+                  const call_options& options, indices known, bool loads = false) {
     using draw = vp::draw<vp::mesh_view<>, vp::passthrough, Shader>;
     vp::cuda_backend gpu;
     vp::cpu_backend cpu;

@@ -24,7 +24,7 @@ using bits = vp::target<vp::bit, Blend, Layout>;
 // One call into targets that are cleared to these values or hold a byte pattern; some are off.
 template <class Backend, class... Targets, class Values, class... Clear>
 vp::status draw_constants(Backend& be, vp::framebuffer<Backend, Targets...>& fb, const mesh_data& m, const vp::grid& g,
-                          const Values& values, const vp::voxelize_options& options, start how, indices known,
+                          const Values& values, const call_options& options, start how, indices known,
                           Clear... clear) {
     const vp::mesh<Backend> mesh{be, m.positions, m.triangles};
     const auto each = [&](auto&& f) {
@@ -121,7 +121,7 @@ TEST(Touched, AlternatingCallsOfOneBackendGiveTheCpusBytes) {
     for (const bool locks : {true, false}) {
         vp::cuda_backend gpu;
         gpu.use_pinned_memory = locks;
-        const auto expect_bits = [&](const mesh_data& m, glm::ivec3 extent, const vp::voxelize_options& options) {
+        const auto expect_bits = [&](const mesh_data& m, glm::ivec3 extent, const call_options& options) {
             single::framebuffer<vp::cuda_backend> on_gpu{gpu, extent};
             single::framebuffer<vp::cpu_backend> on_cpu{cpu, extent};
             const auto before = vp::get<0>(on_gpu).to_host(gpu);

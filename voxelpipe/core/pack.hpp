@@ -92,6 +92,11 @@ VOXELPIPE_HD constexpr void for_each_index(F&& f) {
 
 } // namespace core
 
+namespace core {
+template <class T>
+inline constexpr bool never = false; // in the static_assert of a function that must not be used
+} // namespace core
+
 // A non-owning array; T may be const. Unlike std::span it can be used in device code without flags.
 template <class T>
 struct array_view {
@@ -113,9 +118,21 @@ struct array_view {
     [[nodiscard]] VOXELPIPE_HD constexpr T* data() const { return elements; }
     [[nodiscard]] VOXELPIPE_HD constexpr std::size_t size() const { return count; }
     [[nodiscard]] VOXELPIPE_HD constexpr bool empty() const { return count == 0; }
-    [[nodiscard]] VOXELPIPE_HD constexpr T& operator[](std::size_t i) const { return elements[i]; }
+    [[nodiscard]] VOXELPIPE_HD constexpr T& operator[](std::size_t i) const {
+        VOXELPIPE_EXPECTS(i < count);
+        return elements[i];
+    }
     [[nodiscard]] VOXELPIPE_HD constexpr T* begin() const { return elements; }
     [[nodiscard]] VOXELPIPE_HD constexpr T* end() const { return elements + count; }
+};
+
+// An array in the memory of a backend, which the host may not be able to read. The same for host memory, where the
+// backend runs on the host.
+template <class T>
+struct backend_view : array_view<T> {
+    using array_view<T>::array_view;
+    constexpr backend_view() = default;
+    VOXELPIPE_HD constexpr backend_view(const array_view<T>& a) : array_view<T>(a) {} // NOLINT(*-explicit-*)
 };
 
 } // namespace voxelpipe

@@ -105,9 +105,11 @@ template <class Call, class Payload>
     return plan.used();
 }
 
-} // namespace device
-
-namespace device {
+// The workspace of a call without triangles.
+struct empty_lists {
+    pipeline_state state;
+    list_counts counts;
+};
 
 // With lists_fragments, one draw of a shader that computes is listed by the raster; what it discards has to fit too.
 // How many voxels there will be nobody knows: small triangles are taken to share them.
@@ -134,6 +136,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
                                           const voxelize_options& options, const workspace_limits& limits) {
     const status s = core::validate_draws(draws);
     if (!s.ok() || !validate(g).ok() || limits.fragments > core::max_numbered) return 0;
+    if (s.counts.triangles_in == 0) return sizeof(device::empty_lists);
     try {
         const auto call = device::make_list_call<draw<Mesh, VertexShader, FragmentShader>, Payload>(
             draws, g, s.counts.triangles_in, limits);
@@ -156,6 +159,18 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         if (!s.ok()) return s;
         if (workspace.limits.fragments > core::max_numbered) return core::failure(status_code::size_overflow);
         try {
+            if (s.counts.triangles_in == 0) {
+                if (workspace.memory == nullptr || workspace.bytes < sizeof(device::empty_lists)) {
+                    s.code = status_code::capacity_exceeded;
+                    s.required.bytes = sizeof(device::empty_lists);
+                    return s;
+                }
+                auto* const empty = static_cast<device::empty_lists*>(workspace.memory);
+                device::check(cudaMemsetAsync(empty, 0, sizeof(device::empty_lists), backend.stream));
+                lists.counts = &empty->counts;
+                lists.extent = g.extent;
+                return s;
+            }
             const auto call = device::make_list_call<draw<Mesh, VertexShader, FragmentShader>, Payload>(
                 draws, g, s.counts.triangles_in, workspace.limits);
             const std::size_t need = device::list_bytes(call, options.rule, lists);

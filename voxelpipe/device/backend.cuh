@@ -103,12 +103,16 @@ public:
             if (count > std::numeric_limits<std::size_t>::max() / sizeof(T)) throw std::bad_alloc();
             translate([&] { block_ = device_block(count * sizeof(T), backend.resource, backend.stream); });
         }
-        // Copies from the host: the source may go when the constructor returns.
+        // Copies from the host, or from device memory: the source may go when the constructor returns, which therefore
+        // waits for the copy unless it is from pageable memory, of which CUDA has a copy by then.
         buffer(cuda_backend& backend, array_view<const T> source) : buffer(backend, source.size()) {
             if (count_ == 0) return;
             translate([&] {
-                device::check(cudaMemcpyAsync(block_.data(), source.data(), count_ * sizeof(T), cudaMemcpyHostToDevice,
+                device::check(cudaMemcpyAsync(block_.data(), source.data(), count_ * sizeof(T), cudaMemcpyDefault,
                                               backend.stream));
+                cudaPointerAttributes memory{};
+                device::check(cudaPointerGetAttributes(&memory, source.data()));
+                if (memory.type != cudaMemoryTypeUnregistered) device::check(cudaStreamSynchronize(backend.stream));
             });
         }
 
@@ -124,7 +128,7 @@ public:
         [[nodiscard]] T* data() { return static_cast<T*>(block_.data()); }
         [[nodiscard]] const T* data() const { return static_cast<const T*>(block_.data()); }
         [[nodiscard]] std::size_t size() const { return count_; }
-        [[nodiscard]] array_view<const T> view() const { return {data(), count_}; }
+        [[nodiscard]] backend_view<const T> view() const { return {data(), count_}; }
         // Copies, then waits.
         [[nodiscard]] std::vector<T> to_host(cuda_backend& backend) const {
             std::vector<T> host(count_);
@@ -135,6 +139,17 @@ public:
                     device::check(cudaStreamSynchronize(backend.stream));
                 });
             return host;
+        }
+        // Copies a box of the elements, then waits; `to` has room for box.count() of them.
+        void read_box(cuda_backend& backend, const core::element_box& box, T* to) const {
+            translate([&] {
+                for (std::size_t z = 0; z < box.slices; ++z)
+                    device::check(cudaMemcpy2DAsync(to + z * box.row * box.rows, box.row * sizeof(T),
+                                                    data() + box.first + z * box.slice_pitch, box.row_pitch * sizeof(T),
+                                                    box.row * sizeof(T), box.rows, cudaMemcpyDeviceToHost,
+                                                    backend.stream));
+                device::check(cudaStreamSynchronize(backend.stream));
+            });
         }
 
     private:
@@ -189,6 +204,19 @@ public:
     // drawn, for 10 bytes or so a pair of triangle and tile that meet. Results are the same.
     bool lists_fragments = true;
 
+    // Copies an array of device memory, then waits. Throws like buffer.
+    template <class T>
+    [[nodiscard]] std::vector<std::remove_const_t<T>> read(backend_view<T> from) {
+        std::vector<std::remove_const_t<T>> host(from.size());
+        if (from.size() != 0)
+            buffer<std::remove_const_t<T>>::translate([&] {
+                device::check(
+                    cudaMemcpyAsync(host.data(), from.data(), from.size() * sizeof(T), cudaMemcpyDeviceToHost, stream));
+                device::check(cudaStreamSynchronize(stream));
+            });
+        return host;
+    }
+
     // What check_indices calls.
     [[nodiscard]] std::uint32_t max_index(array_view<const glm::uvec3> triangles) {
         buffer<std::uint32_t> most(*this, std::size_t{1});
@@ -197,6 +225,27 @@ public:
             device::find_most_index(triangles, most.data(), stream);
         });
         return most.to_host(*this)[0];
+    }
+
+    // What vp::clear calls, and voxelize without triangles; arguments are validated. Waits.
+    template <class... Targets>
+    [[nodiscard]] status clear(const framebuffer_view<Targets...>& fb) {
+        try {
+            device::launch_until(stage::fine_raster, [&] {
+                constexpr std::size_t bytes = sizeof(device::pipeline_state);
+                auto* const state = static_cast<device::pipeline_state*>(reserve(bytes));
+                if (zeroed_bytes_ < bytes) device::check(cudaMemsetAsync(state, 0, bytes, stream));
+                zeroed_bytes_ = std::max(zeroed_bytes_, bytes);
+                device::clear_framebuffer(fb, state, stream);
+                device::check(cudaStreamSynchronize(stream));
+            });
+        } catch (const device::cuda_failure& e) {
+            zeroed_bytes_ = 0;
+            return device::to_status(e);
+        } catch (const std::bad_alloc&) {
+            return core::failure(status_code::out_of_memory);
+        }
+        return {};
     }
 
     // What voxelize calls; arguments are validated. `Selector` picks tile and block size (tuning/); results do not

@@ -81,6 +81,23 @@ auto with_call(std::span<const Draw> draws, const grid& g, const Framebuffer& fb
         });
 }
 
+// A call without triangles.
+template <class... Targets>
+[[nodiscard]] status clear_async(cuda_backend& backend, const framebuffer_view<Targets...>& fb,
+                                 const workspace_view& workspace) {
+    if (workspace.memory == nullptr || workspace.bytes < sizeof(pipeline_state)) {
+        status s = core::failure(status_code::capacity_exceeded);
+        s.required.bytes = sizeof(pipeline_state);
+        return s;
+    }
+    auto* const state = static_cast<pipeline_state*>(workspace.memory);
+    launch_until(stage::fine_raster, [&] {
+        check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), backend.stream));
+        clear_framebuffer(fb, state, backend.stream);
+    });
+    return {};
+}
+
 } // namespace device
 
 // Bytes that voxelize_async needs for such a call on the current device; 0 where the arguments are refused.
@@ -90,6 +107,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
                                           const voxelize_options& options, const workspace_limits& limits) {
     const status s = core::validate_draws(draws);
     if (!s.ok() || !validate(g).ok() || !device::are_numbered(limits)) return 0;
+    if (s.counts.triangles_in == 0) return sizeof(device::pipeline_state);
     try {
         return device::with_call(draws, g, fb, options, s.counts.triangles_in, limits,
                                  [&](const auto& call) { return device::bytes_of(call, options.rule); });
@@ -112,6 +130,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
         if (!s.ok()) return s;
         if (!device::are_numbered(workspace.limits)) return core::failure(status_code::size_overflow);
         try {
+            if (s.counts.triangles_in == 0) return device::clear_async(backend, fb, workspace);
             const auto launch = [&](const auto& call) {
                 const std::size_t need = device::bytes_of(call, options.rule);
                 if (workspace.memory == nullptr || workspace.bytes < need) {

@@ -169,12 +169,10 @@ bool may_be(vp::status_code code, const input& in) {
         bad_size = bad_size || !(size > 0.0) || !std::isfinite(size);
         odd_size = odd_size || size < 1e-290 || size > 1e290; // too extreme to divide by; it may be refused
     }
-    const bool bad = bad_index || bad_origin || bad_size || in.triangles.empty();
+    const bool bad = bad_index || bad_origin || bad_size;
     switch (code) {
     case vp::status_code::ok:
         return !bad;
-    case vp::status_code::empty_mesh:
-        return in.triangles.empty();
     case vp::status_code::index_out_of_range:
         return bad_index;
     case vp::status_code::bad_origin:

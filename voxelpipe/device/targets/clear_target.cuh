@@ -105,4 +105,17 @@ void clear_target(const target_view<Target>& t, const pipeline_state* state, con
     }
 }
 
+// Clears the targets that are to be cleared, without a call that draws: `state` is zeros. A log of changes starts anew,
+// since it may know another value.
+template <class... Targets>
+void clear_framebuffer(const framebuffer_view<Targets...>& fb, const pipeline_state* state, cudaStream_t stream) {
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
+        const auto& t = voxelpipe::get<K>(fb.targets);
+        if (t.load == load_operation::clear) clear_target(t, state, {}, stream);
+    });
+    if (fb.changes != nullptr)
+        check(cudaMemsetAsync(fb.changes, 0, core::change_log::header_words * sizeof(std::uint32_t), stream),
+              stage::fine_raster);
+}
+
 } // namespace voxelpipe::device
