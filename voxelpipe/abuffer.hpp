@@ -7,10 +7,12 @@
 // fragment shader gave (its one output), or the number alone where Payload is void: the triangle lists of a ray-tracing
 // grid.
 
+#include <voxelpipe/core/index_iterator.hpp>
 #include <voxelpipe/framebuffer.hpp>
 
 #include <glm/vec3.hpp>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
@@ -24,8 +26,10 @@ struct no_payload {};
 template <class Payload>
 using payload_storage = std::conditional_t<std::is_void_v<Payload>, no_payload, Payload>;
 
-// Host copy of an A-buffer. voxels[i] is a linear id, (z * ny + y) * nx + x, within the computed part of the grid; its
+// Host copy of an A-buffer. voxels[i] is a linear id, (z * ny + y) * nx + x, within the computed part of the grid: in a
+// crop it counts from the crop's corner, as a framebuffer does, while fragment::voxel counts in the whole grid. Its
 // fragments are [offsets[i], offsets[i + 1]). payloads is empty where Payload is void.
+// A random-access range of its occupied voxels, ascending; each has a random-access range of its fragments.
 template <class Payload>
 class host_abuffer {
 public:
@@ -35,42 +39,35 @@ public:
     std::vector<payload_storage<Payload>> payloads;
     glm::ivec3 extent{0};
 
-    // A fragment unpacks as [triangle, value]; the value of a void payload is no_payload.
+    // A fragment unpacks as [primitive, value]; the value of a void payload is no_payload. The primitive counts on
+    // through all draws of the call: primitive_map gives the draw and the triangle.
     struct fragment_entry {
-        std::uint32_t triangle;
+        std::uint32_t primitive;
         [[no_unique_address]] payload_storage<Payload> value;
     };
 
+    // The fragments of a voxel. Refers to the host_abuffer.
     class fragment_range {
     public:
+        fragment_range() = default;
         fragment_range(const host_abuffer& owner, std::size_t first, std::size_t last)
-            : owner_(owner), first_(first), last_(last) {}
-        class iterator {
-        public:
-            iterator(const host_abuffer& owner, std::size_t i) : owner_(&owner), i_(i) {}
-            fragment_entry operator*() const {
-                if constexpr (std::is_void_v<Payload>)
-                    return {owner_->primitives[i_], {}};
-                else
-                    return {owner_->primitives[i_], owner_->payloads[i_]};
-            }
-            iterator& operator++() {
-                ++i_;
-                return *this;
-            }
-            friend bool operator==(const iterator& a, const iterator& b) { return a.i_ == b.i_; }
-
-        private:
-            const host_abuffer* owner_;
-            std::size_t i_;
-        };
-        [[nodiscard]] iterator begin() const { return {owner_, first_}; }
-        [[nodiscard]] iterator end() const { return {owner_, last_}; }
+            : owner_(&owner), first_(first), last_(last) {}
+        [[nodiscard]] fragment_entry operator[](std::size_t i) const {
+            VOXELPIPE_EXPECTS(i < size());
+            return owner_->fragment(first_ + i);
+        }
+        [[nodiscard]] auto begin() const { return core::index_iterator(fragment_at{owner_}, first_); }
+        [[nodiscard]] auto end() const { return core::index_iterator(fragment_at{owner_}, last_); }
         [[nodiscard]] std::size_t size() const { return last_ - first_; }
+        [[nodiscard]] bool empty() const { return first_ == last_; }
 
     private:
-        const host_abuffer& owner_;
-        std::size_t first_, last_;
+        struct fragment_at {
+            const host_abuffer* owner = nullptr;
+            fragment_entry operator()(std::size_t i) const { return owner->fragment(i); }
+        };
+        const host_abuffer* owner_ = nullptr;
+        std::size_t first_ = 0, last_ = 0;
     };
 
     // An occupied voxel unpacks as [voxel, fragments].
@@ -79,30 +76,49 @@ public:
         fragment_range fragments;
     };
 
-    class iterator {
-    public:
-        iterator(const host_abuffer& owner, std::size_t i) : owner_(&owner), i_(i) {}
-        voxel_entry operator*() const {
-            return {owner_->position(owner_->voxels[i_]),
-                    fragment_range(*owner_, owner_->offsets[i_], owner_->offsets[i_ + 1])};
-        }
-        iterator& operator++() {
-            ++i_;
-            return *this;
-        }
-        friend bool operator==(const iterator& a, const iterator& b) { return a.i_ == b.i_; }
+    // Occupied voxel i.
+    [[nodiscard]] voxel_entry operator[](std::size_t i) const {
+        VOXELPIPE_EXPECTS(i < size());
+        return {position(voxels[i]), fragment_range(*this, offsets[i], offsets[i + 1])};
+    }
+    [[nodiscard]] std::size_t size() const { return voxels.size(); }
+    [[nodiscard]] bool empty() const { return voxels.empty(); }
+    [[nodiscard]] auto begin() const { return core::index_iterator(voxel_at{this}, 0); }
+    [[nodiscard]] auto end() const { return core::index_iterator(voxel_at{this}, size()); }
 
-    private:
-        const host_abuffer* owner_;
-        std::size_t i_;
-    };
-    [[nodiscard]] iterator begin() const { return {*this, 0}; }
-    [[nodiscard]] iterator end() const { return {*this, voxels.size()}; }
+    // The fragments of a voxel, found by bisection: none, if it is not occupied.
+    [[nodiscard]] fragment_range find(const glm::ivec3& voxel) const {
+        for (int a = 0; a < 3; ++a)
+            if (voxel[a] < 0 || voxel[a] >= extent[a]) return {};
+        const auto at = std::lower_bound(voxels.begin(), voxels.end(), id(voxel));
+        if (at == voxels.end() || *at != id(voxel)) return {};
+        const auto i = static_cast<std::size_t>(at - voxels.begin());
+        return fragment_range(*this, offsets[i], offsets[i + 1]);
+    }
 
+    // Fragment i of all.
+    [[nodiscard]] fragment_entry fragment(std::size_t i) const {
+        if constexpr (std::is_void_v<Payload>)
+            return {primitives[i], {}};
+        else
+            return {primitives[i], payloads[i]};
+    }
+
+    // A voxel's linear id, and back.
+    [[nodiscard]] std::uint64_t id(const glm::ivec3& voxel) const {
+        const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
+        return (wide(voxel.z) * wide(extent.y) + wide(voxel.y)) * wide(extent.x) + wide(voxel.x);
+    }
     [[nodiscard]] glm::ivec3 position(std::uint64_t voxel) const {
         const auto nx = static_cast<std::uint64_t>(extent.x), ny = static_cast<std::uint64_t>(extent.y);
         return {static_cast<int>(voxel % nx), static_cast<int>(voxel / nx % ny), static_cast<int>(voxel / (nx * ny))};
     }
+
+private:
+    struct voxel_at {
+        const host_abuffer* owner = nullptr;
+        voxel_entry operator()(std::size_t i) const { return (*owner)[i]; }
+    };
 };
 
 // Owns its lists on `Backend`; voxelize makes them as long as they must be. Empty before the first voxelize; after one

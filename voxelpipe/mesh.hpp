@@ -7,6 +7,7 @@
 // front; attributes are any number of per-vertex arrays of trivially copyable types, for the vertex shader.
 
 #include <voxelpipe/core/pack.hpp>
+#include <voxelpipe/mesh_source.hpp>
 #include <voxelpipe/status.hpp>
 
 #include <glm/vec3.hpp>
@@ -66,17 +67,19 @@ namespace core {
 
 } // namespace core
 
-// Backend::buffer<T> holds the arrays; they are copied in by the constructor, which throws std::bad_alloc (or the
-// backend's error) where there is no memory. The constructor looks at the indices too, once for all calls, for nobody
-// can write to them afterwards; one that names no vertex is the calls' error all the same.
+// Owns its arrays, in Backend::buffer<T>. The constructor copies them from what mesh_source.hpp names: ranges of
+// glm::vec3 and glm::uvec3, interleaved vertices, flat or short indices, or none; also from memory of the backend. It
+// throws std::bad_alloc (or the backend's error) if there is no memory, and std::invalid_argument for indices that are
+// no multiple of 3. The indices are checked here, once for all calls; calls report one that names no vertex.
 template <class Backend, class... Attributes>
 class mesh {
 public:
-    mesh(Backend& backend, array_view<const glm::vec3> positions, array_view<const glm::uvec3> triangles,
-         array_view<const Attributes>... attributes)
-        : positions_(backend, positions),
-          triangles_(backend, triangles), attributes_{core::make_pack(buffer<Attributes>(backend, attributes)...)},
-          index_bound_(triangles.size() == 0 ? 0 : std::uint64_t{core::max_index(triangles)} + 1) {}
+    mesh(Backend& backend, const vertex_source<glm::vec3>& positions, triangle_source&& triangles,
+         const vertex_source<Attributes>&... attributes)
+        : positions_(backend, positions.view()),
+          triangles_(backend, triangles.view(positions.view().size())), attributes_{core::make_pack(buffer<Attributes>(
+                                                                            backend, attributes.view())...)},
+          index_bound_(find_bound(backend, triangles)) {}
 
     [[nodiscard]] mesh_view<Attributes...> view() const {
         return [this]<std::size_t... I>(std::index_sequence<I...>) {
@@ -94,6 +97,13 @@ private:
     template <class T>
     using buffer = typename Backend::template buffer<T>;
 
+    [[nodiscard]] std::uint64_t find_bound(Backend& backend, triangle_source& triangles) const {
+        if (triangles_.size() == 0) return 0;
+        const std::uint64_t most = triangles.is_in_backend() ? backend.max_index(triangles_.view())
+                                                             : core::max_index(triangles.view(positions_.size()));
+        return most + 1;
+    }
+
     buffer<glm::vec3> positions_;
     buffer<glm::uvec3> triangles_;
     core::pack<buffer<Attributes>...> attributes_;
@@ -104,6 +114,6 @@ template <class Backend, class Positions, class Triangles>
 mesh(Backend&, const Positions&, const Triangles&) -> mesh<Backend>;
 template <class Backend, class Positions, class Triangles, class... Ranges>
 mesh(Backend&, const Positions&, const Triangles&, const Ranges&...)
-    -> mesh<Backend, std::remove_cvref_t<decltype(*std::data(std::declval<const Ranges&>()))>...>;
+    -> mesh<Backend, typename core::source_value<Ranges>::type...>;
 
 } // namespace voxelpipe

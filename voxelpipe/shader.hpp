@@ -18,8 +18,13 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 namespace voxelpipe {
 
@@ -249,6 +254,39 @@ struct draw {
     Mesh mesh;
     VertexShader vertex_shader;
     FragmentShader fragment_shader;
+};
+
+// Which draw of a call a triangle was in, and which triangle of its mesh.
+struct draw_triangle {
+    std::uint32_t draw = 0, triangle = 0;
+    friend bool operator==(const draw_triangle&, const draw_triangle&) = default;
+};
+
+// The way back from fragment::primitive, which is what A-buffers keep, to draw and triangle. On the host; knows the
+// draws as they were when it was made, and refers to nothing.
+class primitive_map {
+public:
+    template <class Mesh, class VertexShader, class FragmentShader>
+    explicit primitive_map(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws) {
+        std::uint64_t end = 0;
+        for (const auto& d : draws) ends_.push_back(end += d.mesh.triangles.size());
+    }
+    template <class Mesh, class VertexShader, class FragmentShader>
+    explicit primitive_map(const std::vector<draw<Mesh, VertexShader, FragmentShader>>& draws)
+        : primitive_map(std::span<const draw<Mesh, VertexShader, FragmentShader>>(draws)) {}
+
+    // How many primitives there are.
+    [[nodiscard]] std::uint64_t size() const { return ends_.empty() ? 0 : ends_.back(); }
+    // `primitive` is below size().
+    [[nodiscard]] draw_triangle operator()(std::uint32_t primitive) const {
+        VOXELPIPE_EXPECTS(primitive < size());
+        const auto at = std::upper_bound(ends_.begin(), ends_.end(), std::uint64_t{primitive});
+        const std::uint64_t first = at == ends_.begin() ? 0 : *(at - 1);
+        return {static_cast<std::uint32_t>(at - ends_.begin()), static_cast<std::uint32_t>(primitive - first)};
+    }
+
+private:
+    std::vector<std::uint64_t> ends_; // number of primitives up to each draw's end
 };
 
 } // namespace voxelpipe

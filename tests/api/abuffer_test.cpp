@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <ranges>
 
 namespace {
 
@@ -197,6 +198,55 @@ TEST(Abuffer, HoldsManyFragmentsOfOneVoxel) {
     ASSERT_EQ(host.voxels, (std::vector<std::uint64_t>{13}));
     ASSERT_EQ(host.offsets, (std::vector<std::uint64_t>{0, m.triangles.size()}));
     for (std::uint32_t i = 0; i < host.primitives.size(); ++i) ASSERT_EQ(host.primitives[i], i);
+}
+
+// What was copied to the host is a range of ranges that the standard's algorithms take; a voxel is found in it, and a
+// primitive number leads back to its draw and triangle.
+TEST(AbufferOnHost, IsARangeOfRangesInWhichVoxelsAreFound) {
+    backend_type be = unit::make_backend();
+    const unit::small_mesh a = unit::make_mesh(21, 40, extent), b = unit::make_mesh(22, 25, extent), none;
+    const auto ma = a.on(be), mb = b.on(be), mn = none.on(be);
+    using draw = vp::draw<vp::mesh_view<>, vp::passthrough, payload_shader>;
+    const std::vector<draw> draws{{ma, {}, {}}, {mn, {}, {}}, {mb, {}, {}}, {ma, {}, {}}};
+    vp::grid whole = unit::unit_grid(extent);
+    const vp::grid g = whole.crop({3, 4, 5}, {60, 30, 20});
+    vp::abuffer<backend_type, payload> lists{be};
+    vp::voxelize(be, draws, g, lists).or_throw();
+    const vp::host_abuffer<payload> host = lists.to_host(be);
+
+    static_assert(std::ranges::random_access_range<const vp::host_abuffer<payload>>);
+    static_assert(std::ranges::sized_range<const vp::host_abuffer<payload>>);
+    static_assert(std::ranges::random_access_range<decltype(host[0].fragments)>);
+    static_assert(std::ranges::sized_range<decltype(host[0].fragments)>);
+
+    const vp::primitive_map where(draws);
+    EXPECT_EQ(where.size(), 105u);
+    std::size_t fragments = 0, i = 0;
+    for (const auto& [voxel, list] : host) {
+        EXPECT_EQ(host[i++].voxel, voxel);
+        EXPECT_EQ(host.position(host.id(voxel)), voxel);
+        const auto found = host.find(voxel);
+        ASSERT_EQ(found.size(), list.size());
+        EXPECT_TRUE(std::ranges::is_sorted(list, {}, [](const auto& f) { return f.primitive; }));
+        for (std::size_t k = 0; k < list.size(); ++k) {
+            EXPECT_EQ(found[k].primitive, list[k].primitive);
+            const auto [d, t] = where(list[k].primitive);
+            EXPECT_EQ(list[k].value.draw, d);
+            EXPECT_EQ(list[k].value.triangle, t);
+        }
+        fragments += list.size();
+    }
+    EXPECT_EQ(i, host.size());
+    EXPECT_EQ(fragments, lists.num_fragments());
+    std::size_t found = 0; // every voxel of the part is found or not
+    for (int z = -1; z <= g.extent.z; ++z)
+        for (int y = -1; y <= g.extent.y; ++y)
+            for (int x = -1; x <= g.extent.x; ++x) found += host.find({x, y, z}).empty() ? 0u : 1u;
+    EXPECT_EQ(found, host.size());
+    EXPECT_EQ(where(0), (vp::draw_triangle{0, 0}));
+    EXPECT_EQ(where(39), (vp::draw_triangle{0, 39}));
+    EXPECT_EQ(where(40), (vp::draw_triangle{2, 0}));
+    EXPECT_EQ(where(104), (vp::draw_triangle{3, 39}));
 }
 
 } // namespace
