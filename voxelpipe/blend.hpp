@@ -6,7 +6,8 @@
 // defined by the fragments alone, never by a race: see docs/design.md, "Blending".
 //
 // A blend of your own is a functor with   static constexpr bool order_free;  T identity() const;  T combine(T, T) const
-// (or templates of them). One that is not order-free is folded in triangle order.
+// (or templates of them), and without data members: the library makes one wherever it needs it. One that is not
+// order-free is folded in triangle order.
 
 #include <voxelpipe/core/pack.hpp>
 #include <voxelpipe/core/reproducible_sum.hpp>
@@ -58,13 +59,84 @@ concept user_blend_template = requires(const Blend& f, T a, T b) {
     { f.combine(a, b) } -> std::same_as<T>;
 };
 
+// Whether a class is meant as a blend of your own: it has one of the members.
+template <class Blend>
+concept has_blend_member = requires {
+    Blend::order_free;
+}
+|| requires { &Blend::identity; }
+|| requires { &Blend::combine; }
+|| requires { &Blend::template identity<float>; };
+
+// Whether Blend can be a user's blend of T; otherwise the first thing that is wrong with it is one line of the
+// compiler's.
+template <class Blend, class T>
+[[nodiscard]] constexpr bool check_user_blend() {
+    constexpr bool empty = std::is_empty_v<Blend>;
+    static_assert(empty,
+                  "voxelpipe: a blend of your own must not have data members: the library makes a Blend{} wherever "
+                  "it needs one, and what they hold would be ignored");
+    if constexpr (empty) {
+        constexpr bool says_order = requires {
+            { Blend::order_free } -> std::convertible_to<bool>;
+        };
+        static_assert(says_order,
+                      "voxelpipe: a blend of your own needs `static constexpr bool order_free`: true if the "
+                      "order of combine does not matter");
+        constexpr bool plain_identity = requires(const Blend& f) { f.identity(); };
+        constexpr bool template_identity = requires(const Blend& f) { f.template identity<T>(); };
+        constexpr bool has_identity = plain_identity || template_identity;
+        static_assert(!says_order || has_identity,
+                      "voxelpipe: a blend of your own needs `T identity() const`, or a template identity<T>(): is it "
+                      "there, public, const, and VOXELPIPE_HD?");
+        if constexpr (says_order && has_identity) {
+            constexpr bool gives_value = [] {
+                if constexpr (requires(const Blend& f) { f.identity(); }) return requires(const Blend& f) {
+                        { f.identity() } -> std::same_as<T>;
+                    };
+                else
+                    return requires(const Blend& f) {
+                        { f.template identity<T>() } -> std::same_as<T>;
+                    };
+            }();
+            static_assert(gives_value,
+                          "voxelpipe: identity() of a blend of your own must return the target's value type");
+            constexpr bool combines = requires(const Blend& f, T a) { f.combine(a, a); };
+            static_assert(
+                !gives_value || combines,
+                "voxelpipe: a blend of your own needs `T combine(T, T) const`, for the target's value type: is it "
+                "there, public, const, and does it take two values?");
+            if constexpr (gives_value && combines) {
+                constexpr bool gives_combined = requires(const Blend& f, T a) {
+                    { f.combine(a, a) } -> std::same_as<T>;
+                };
+                static_assert(gives_combined,
+                              "voxelpipe: combine() of a blend of your own must return the target's value type");
+                return gives_combined;
+            }
+        }
+    }
+    return false;
+}
+
+// Stands in for the traits of a blend that is refused, so that the reason is the only error.
+template <class T>
+struct refused_blend {
+    static constexpr bool available = false;
+    static constexpr bool order_free = true;
+    using accumulator = T;
+    VOXELPIPE_HD static T identity() { return T{}; }
+    VOXELPIPE_HD static T begin(const T& stored) { return stored; }
+    template <class Value>
+    VOXELPIPE_HD static void apply(T&, const Value&) {}
+    VOXELPIPE_HD static T end(const T& value) { return value; }
+};
+
 // blend_traits<Blend, T>: accumulator, identity(), begin(stored value), apply(accumulator, value), end(accumulator).
 // Folding begin, apply..., end in triangle order is the meaning of every blend; where order_free holds, any order gives
 // the same bits. T is a scalar here; vectors go component by component below.
 template <class Blend, class T>
-struct blend_traits {
-    static constexpr bool available = false;
-};
+struct blend_traits : refused_blend<T> {};
 
 template <class T>
 struct in_place_blend {
@@ -333,6 +405,15 @@ requires(user_blend<Blend, T> || user_blend_template<Blend, T>) struct blend_tra
     VOXELPIPE_HD
     static void apply(T& a, const T& v) { a = Blend{}.combine(a, v); }
 };
+
+// True; where Blend is a user's and cannot be used, it does not compile, and one line says why. A blend of a vector's
+// components is a blend of the vector too, which blend_traits knows.
+template <class Blend, class T>
+[[nodiscard]] constexpr bool explain_user_blend() {
+    if constexpr (has_blend_member<Blend> && !(blend_traits<Blend, T>::available && std::is_empty_v<Blend>))
+        static_cast<void>(check_user_blend<Blend, T>());
+    return true;
+}
 
 } // namespace core
 } // namespace voxelpipe

@@ -38,8 +38,10 @@ struct target {
     static_assert(!std::is_same_v<T, bool>, "voxelpipe: a target of bits is written target<voxelpipe::bit, ...>");
     static_assert(std::is_trivially_copyable_v<value_type>,
                   "voxelpipe: a target's value type must be trivially copyable");
+    static constexpr bool is_own_blend = core::has_blend_member<Blend>;
+    static_assert(core::explain_user_blend<Blend, value_type>());
     static_assert(
-        traits::available,
+        is_own_blend || traits::available,
         "voxelpipe: this blend mode is not defined for this value type (bitwise blends and count need integers "
         "or bit, add_saturate integers, add_unordered floating types, a user struct its own blend)");
 };

@@ -206,8 +206,11 @@ template <class Mesh, class VertexShader>
         static_assert(known, "voxelpipe: a vertex shader must return glm::vec3 or vertex_output<Varyings>");
         if constexpr (known) {
             constexpr bool interpolable = is_varyings<typename shaded<Mesh, VertexShader>::varyings>();
-            static_assert(interpolable, "voxelpipe: varyings must be an aggregate of float, glm::vec2/3/4, "
-                                        "std::array<float, N> or flat<T>");
+            constexpr bool few = has_few_members<typename shaded<Mesh, VertexShader>::varyings>();
+            static_assert(few, "voxelpipe: varyings may have at most 12 members (put floats together in glm::vec4 or "
+                               "std::array<float, N>)");
+            static_assert(interpolable || !few, "voxelpipe: varyings must be an aggregate of float, glm::vec2/3/4, "
+                                                "std::array<float, N> or flat<T>, at most 12 of them");
             return interpolable;
         }
     }

@@ -58,7 +58,7 @@ class list_call {
 public:
     list_call(std::vector<mesh_data> parts, const vp::grid& g, const FragmentShader& fs, vp::coverage rule,
               bool lists_fragments = false)
-        : parts_(std::move(parts)), grid_(g), shader_(fs), options_(rule) {
+        : parts_(std::move(parts)), grid_(g), shader_(fs), options_{rule} {
         for (const mesh_data& m : parts_) meshes_.emplace_back(backend_, m.positions, m.triangles);
         for (const auto& m : meshes_) draws_.push_back({m.view(), {}, shader_});
         const vp::workspace_limits limits{0, 0, 1 << 17, 1 << 16, lists_fragments};

@@ -224,6 +224,7 @@ enum class start { clear, load };
 
 // The options of a call, or a coverage in their place, as voxelize takes them.
 struct call_options : vp::voxelize_options {
+    call_options() = default;
     call_options(vp::coverage rule_) : vp::voxelize_options{rule_, true} {}  // NOLINT(*-explicit-*)
     call_options(const vp::voxelize_options& o) : vp::voxelize_options(o) {} // NOLINT(*-explicit-*)
 };

@@ -142,6 +142,13 @@ struct all_allowed : std::false_type {};
 template <class... Ms>
 struct all_allowed<pack<Ms*...>> : std::bool_constant<(member_traits<Ms>::allowed && ...)> {};
 
+// Whether a struct has no more members than varyings may have, as far as they can be counted.
+template <class V>
+consteval bool has_few_members() {
+    if constexpr (std::is_aggregate_v<V>) return num_members<V>() <= max_varyings_members;
+    return true;
+}
+
 template <class V>
 consteval bool is_varyings() {
     // Two conditions: the second must not be asked of what is no aggregate.
