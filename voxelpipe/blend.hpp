@@ -81,13 +81,13 @@ template <class Blend, class T>
             { Blend::order_free } -> std::convertible_to<bool>;
         };
         static_assert(says_order,
-                      "voxelpipe: a blend of your own needs `static constexpr bool order_free`: true if the "
+                      "voxelpipe: a blend of your own needs 'static constexpr bool order_free': true if the "
                       "order of combine does not matter");
         constexpr bool plain_identity = requires(const Blend& f) { f.identity(); };
         constexpr bool template_identity = requires(const Blend& f) { f.template identity<T>(); };
         constexpr bool has_identity = plain_identity || template_identity;
         static_assert(!says_order || has_identity,
-                      "voxelpipe: a blend of your own needs `T identity() const`, or a template identity<T>(): is it "
+                      "voxelpipe: a blend of your own needs 'T identity() const', or a template identity<T>(): is it "
                       "there, public, const, and VOXELPIPE_HD?");
         if constexpr (says_order && has_identity) {
             constexpr bool gives_value = [] {
@@ -104,7 +104,7 @@ template <class Blend, class T>
             constexpr bool combines = requires(const Blend& f, T a) { f.combine(a, a); };
             static_assert(
                 !gives_value || combines,
-                "voxelpipe: a blend of your own needs `T combine(T, T) const`, for the target's value type: is it "
+                "voxelpipe: a blend of your own needs 'T combine(T, T) const', for the target's value type: is it "
                 "there, public, const, and does it take two values?");
             if constexpr (gives_value && combines) {
                 constexpr bool gives_combined = requires(const Blend& f, T a) {
