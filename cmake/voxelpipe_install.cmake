@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# The install tree: include/voxelpipe, include/cpu_ref, and a config file that gives the targets of the build tree.
+# The install tree: include/voxelpipe/voxelpipe and include/voxelpipe/cpu_ref, so that nothing beside them bears a name
+# that others may have, and a config file that gives the targets of the build tree.
 include_guard(GLOBAL)
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -10,7 +11,7 @@ set(voxelpipe_config_dir "${CMAKE_INSTALL_DATADIR}/cmake/voxelpipe")
 foreach(folder IN ITEMS voxelpipe cpu_ref)
   install(
     DIRECTORY "${PROJECT_SOURCE_DIR}/${folder}"
-    DESTINATION include
+    DESTINATION include/voxelpipe # the include root
     COMPONENT voxelpipe
     FILES_MATCHING
     REGEX "\\.(hpp|cuh)$")

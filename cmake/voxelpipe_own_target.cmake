@@ -10,10 +10,8 @@ function(voxelpipe_own_target)
     target_compile_options(
       ${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-Wall;-Wextra;-Wpedantic;-Wconversion>
                         $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra,-Wno-parentheses>
-                        # GLM 0.9.9: __host__ __device__ on defaulted functions, in headers that are not SYSTEM to nvcc
+                        # GLM 0.9.9, of files that include it before the library, which knows how not to be warned
                         $<$<COMPILE_LANGUAGE:CUDA>:-diag-suppress=20012>
-                        # nvcc 13.0 takes a reference to a [[nodiscard]] class, which or_throw() returns, for the class
-                        $<$<COMPILE_LANGUAGE:CUDA>:-diag-suppress=2810>
                         $<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<STREQUAL:$<TARGET_PROPERTY:CUDA_ARCHITECTURES>,OFF>>:${VOXELPIPE_CUDA_CODE};${VOXELPIPE_CUDA_HOST_OPTIONS}>)
     if(VOXELPIPE_WERROR)
       target_compile_options(${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-Werror>

@@ -7,6 +7,9 @@
 //   vertex shader    vertex_output<Varyings> operator()(const vertex<Attributes...>&) const   (or a bare glm::vec3)
 //   fragment shader  output<T...> operator()(const fragment<Varyings>&) const                 one value per render
 //   target
+// A shader for the device only, __device__ without __host__, as one that reads texture objects, spells its result:
+//   __device__ vp::output<glm::vec3, float> operator()(const vp::fragment<Varyings>&) const
+// because the host compiler, which has to know the type, does not see the body.
 //
 // Both are copied to where they run and called from many threads: const, trivially copyable, no side effects.
 
@@ -228,8 +231,13 @@ template <class Mesh, class VertexShader, class FragmentShader>
                       "voxelpipe: the fragment shader cannot be called with const fragment<Varyings>& "
                       "(is its operator() const, and does it take the varyings that the vertex shader makes?)");
         if constexpr (copyable && callable) {
-            constexpr bool gives_output = is_output<shader_output<Mesh, VertexShader, FragmentShader>>;
-            static_assert(gives_output,
+            using result = shader_output<Mesh, VertexShader, FragmentShader>;
+            constexpr bool gives_output = is_output<result>, gives_nothing = std::is_void_v<result>;
+            static_assert(
+                !gives_nothing,
+                "voxelpipe: the fragment shader returns void. If it is for the device only (__device__ without "
+                "__host__), write vp::output<T...> instead of auto: the host compiler does not see its body");
+            static_assert(gives_output || gives_nothing,
                           "voxelpipe: a fragment shader must return vp::outputs(...), one value per render target");
             return gives_output;
         }

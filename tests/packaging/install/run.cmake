@@ -26,13 +26,17 @@ set(consumer "${CMAKE_CURRENT_LIST_DIR}/consumer")
 
 if(NOT WAY STREQUAL "fetch_content")
   run("${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${prefix}" --component voxelpipe)
+  file(GLOB installed RELATIVE "${prefix}/include" "${prefix}/include/*")
+  if(NOT installed STREQUAL "voxelpipe")
+    message(FATAL_ERROR "only voxelpipe belongs in include/, not: ${installed}")
+  endif()
 endif()
 
 if(WAY STREQUAL "bare_compiler")
   string(REPLACE "|" ";" includes "${INCLUDES}")
   list(TRANSFORM includes PREPEND "-I")
   separate_arguments(flags UNIX_COMMAND "${CXX_FLAGS}")
-  run("${CXX_COMPILER}" -std=c++20 ${flags} "-I${prefix}/include" ${includes} "${consumer}/main.cpp"
+  run("${CXX_COMPILER}" -std=c++20 ${flags} "-I${prefix}/include/voxelpipe" ${includes} "${consumer}/main.cpp"
       "${consumer}/second_unit.cpp" -pthread -o "${WORK_DIR}/consumer")
   run("${WORK_DIR}/consumer")
   return()
