@@ -168,6 +168,10 @@ inline constexpr bool is_output = false;
 template <class... Ts>
 inline constexpr bool is_output<output<Ts...>> = true;
 
+// What a fragment shader gives; nothing, if it returns void, so that nothing but the check of shaders complains.
+template <class T>
+using output_or_none = std::conditional_t<std::is_void_v<T>, output<>, T>;
+
 template <class T>
 inline constexpr bool is_constant = false;
 template <class... Ts>

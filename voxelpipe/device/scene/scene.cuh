@@ -111,7 +111,8 @@ struct draw_shading {
 template <class FragmentShader, class Varyings>
 struct scene {
     using varyings = Varyings;
-    using fragment_output = std::remove_cvref_t<std::invoke_result_t<const FragmentShader&, const fragment<Varyings>&>>;
+    using fragment_output = core::output_or_none<
+        std::remove_cvref_t<std::invoke_result_t<const FragmentShader&, const fragment<Varyings>&>>>;
     using shading = draw_shading<FragmentShader, Varyings>;
 
     geometry geo;
