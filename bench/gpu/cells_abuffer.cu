@@ -12,8 +12,8 @@ namespace {
 class abuffer_cell : public prepared_cell {
 public:
     abuffer_cell(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule)
-        : session_(s), backend_(s.stream()), draw_{view(mesh, backend_), {}, vp::constant(true)}, grid_(grid),
-          options_{rule}, lists_(backend_) {}
+        : session_(s), backend_(s.stream()), draw_{view(mesh, backend_), {}, vp::constant(true)},
+          grid_(grid), options_{rule}, lists_(backend_) {}
 
     vp::counters call() override {
         const vp::status s = vp::voxelize(backend_, draws(), grid_, lists_, options_);

@@ -36,8 +36,8 @@ public:
     framebuffer_cell(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule,
                      const FragmentShader& shader, std::optional<baseline_output> baseline, bool count_voxels = false,
                      bool tracks = false)
-        : session_(s), backend_(s.stream()), draw_{view(mesh, backend_), {}, shader}, grid_(grid),
-          options_{rule, count_voxels}, framebuffer_(backend_, grid.extent), baseline_(baseline) {
+        : session_(s), backend_(s.stream()), draw_{view(mesh, backend_), {}, shader},
+          grid_(grid), options_{rule, count_voxels}, framebuffer_(backend_, grid.extent), baseline_(baseline) {
         if (tracks) framebuffer_.track_changes(backend_);
     }
 

@@ -33,8 +33,8 @@ class tuned_cell : public prepared_cell {
 public:
     tuned_cell(session& s, const resident_mesh& mesh, const vp::grid& grid, vp::coverage rule, Value value,
                baseline_output baseline)
-        : session_(s), backend_(s.stream()), draw_{view(mesh, backend_), {}, {value}}, grid_(grid),
-          options_{rule, false}, framebuffer_(backend_, grid.extent), baseline_(baseline) {
+        : session_(s), backend_(s.stream()), draw_{view(mesh, backend_), {}, {value}},
+          grid_(grid), options_{rule, false}, framebuffer_(backend_, grid.extent), baseline_(baseline) {
         backend_.lists_fragments = false; // in tiles
     }
 

@@ -210,7 +210,7 @@ TEST(BadInput, PositionsThatAreNotFiniteDropTheirTriangle) {
                 EXPECT_EQ(s.counts.triangles_nonfinite, 1u);
                 EXPECT_EQ(s.counts.triangles_drawn, 1u);
                 for (const auto& [voxel, fragments] : lists.to_host(be))
-                    for (const auto& f : fragments) EXPECT_EQ(f.triangle, 1u);
+                    for (const auto& f : fragments) EXPECT_EQ(f.primitive, 1u);
             }
 }
 
