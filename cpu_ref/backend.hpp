@@ -11,7 +11,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -24,7 +23,7 @@ namespace voxelpipe {
 
 class cpu_backend {
 public:
-    // Host memory, uninitialised, 64-byte aligned. Throws std::bad_alloc.
+    // Host memory by operator new, uninitialised, 64-byte aligned. Throws std::bad_alloc.
     template <class T>
     class buffer {
     public:
@@ -46,19 +45,16 @@ public:
         }
 
     private:
+        static constexpr std::align_val_t alignment{64};
         struct release {
-            void operator()(T* p) const { std::free(p); }
+            void operator()(T* p) const { ::operator delete(p, alignment); }
         };
         static T* allocate(std::size_t count) {
             static_assert(std::is_trivially_copyable_v<T>,
                           "voxelpipe: what a backend stores must be trivially copyable");
             if (count == 0) return nullptr;
-            constexpr std::size_t alignment = 64;
-            if (count > (std::numeric_limits<std::size_t>::max() - alignment) / sizeof(T)) throw std::bad_alloc();
-            const std::size_t bytes = (count * sizeof(T) + alignment - 1) / alignment * alignment;
-            void* const p = std::aligned_alloc(alignment, bytes);
-            if (p == nullptr) throw std::bad_alloc();
-            return static_cast<T*>(p);
+            if (count > std::numeric_limits<std::size_t>::max() / 2 / sizeof(T)) throw std::bad_alloc();
+            return static_cast<T*>(::operator new(count * sizeof(T), alignment));
         }
         std::unique_ptr<T[], release> data_;
         std::size_t count_;

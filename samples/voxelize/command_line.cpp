@@ -242,6 +242,14 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->option_text("N")
         ->group("Computation");
     app.add_option_function<int>(
+           "--max-memory",
+           [&options](int mebibytes) { options.max_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
+           "The most MiB of this machine's memory that the run may hold at any time. Default: nine tenths of what "
+           "there is")
+        ->check(CLI::Range(1, 1 << 30).description(""))
+        ->option_text("MIB")
+        ->group("Computation");
+    app.add_option_function<int>(
            "--work-memory",
            [&options](int mebibytes) { options.voxelize.work_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
            "MiB for sums that exist only on the way; a grid that needs more is computed in slabs, with the same "

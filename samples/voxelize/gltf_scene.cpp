@@ -71,8 +71,8 @@ scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_f
         load(result, bytes, read_file, limits, options);
     } catch (const gltf_error& error) {
         fail(error);
-    } catch (const std::bad_alloc&) {
-        fail(gltf_error("not enough memory to load the file"));
+    } catch (const std::bad_alloc&) { // an honest file that does not fit
+        throw;
     } catch (const std::exception& error) { // nothing of the libraries underneath gets past
         fail(gltf_error(gltf::printable(error.what(), 200)));
     }

@@ -34,8 +34,9 @@ struct gltf_error : model_error {
     using model_error::model_error;
 };
 
-// Bounds on what a file may make the loader do. Memory for decoded data (vertices, triangles, pictures) may reach
-// base_memory + memory_per_input_byte * (bytes read), so an instancing or decompression bomb is refused by name.
+// Bounds on what a file may make the loader do. Memory for decoded data (vertices, triangles, nodes) may reach
+// base_memory + memory_per_input_byte * (bytes read), and a picture what its bytes can decode to, so that a file which
+// claims more than it holds is refused by name.
 struct gltf_limits {
     std::uint64_t max_file_bytes = std::uint64_t{8} << 30;
     std::uint64_t max_json_bytes = std::uint64_t{1} << 30;
@@ -60,11 +61,12 @@ struct gltf_options {
 using gltf_file_reader =
     std::function<std::vector<std::byte>(const std::filesystem::path& relative, std::uint64_t max_bytes)>;
 
-// Loads FILE; a .gltf finds its buffers and images in its own folder or below it. Throws gltf_error.
+// Loads FILE; a .gltf finds its buffers and images in its own folder or below it. Throws gltf_error, and std::bad_alloc
+// where a file whose claims are in order does not fit into memory.
 [[nodiscard]] scene load_gltf(const std::filesystem::path& file, const gltf_limits& limits = {},
                               const gltf_options& options = {});
 
-// The same from memory. Without a reader a file that names other files is refused. Throws gltf_error.
+// The same from memory. Without a reader a file that names other files is refused.
 [[nodiscard]] scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_file = {},
                               const gltf_limits& limits = {}, const gltf_options& options = {});
 

@@ -51,12 +51,15 @@ void run(const command_line& options) {
     report.warnings = std::move(model.warnings);
     report.vertices = model.vertex_count();
     for (const material& m : model.materials) report.materials.push_back(m.name);
-    const auto refuse = [&report](const char* why) {
+    const auto refuse = [&report](const std::string& why) {
         model_error error(why);
         error.warnings = report.warnings;
         throw error;
     };
     if (model.triangle_count() == 0) refuse("there are no triangles to voxelize");
+    if (model.triangle_count() > UINT32_MAX)
+        refuse("there are " + std::to_string(model.triangle_count()) + " triangles, more than the " +
+               std::to_string(UINT32_MAX) + " that can be numbered");
     const bounding_box bounds = bounds_of(model, options.voxelize.threads);
     if (bounds.empty) refuse("no triangle has a corner at a finite position");
     report.request.grid = place_grid(options.grid, bounds);
@@ -84,7 +87,7 @@ void run(const command_line& options) {
     }
     bar.clear();
     report.stats.milliseconds.emplace_back("write", milliseconds_since(start));
-    report.peak_memory = peak_memory_bytes();
+    report.peak_memory = memory::peak();
 
     if (!options.quiet) {
         print_warnings(report.warnings);
@@ -109,6 +112,7 @@ int run_main(int argc, char** argv) {
     } catch (const usage_error& error) {
         return fail(exit_usage, std::string(error.what()) + "\nTry: voxelize --help");
     }
+    memory::set_limit(options.max_memory, options.max_memory != 0);
     try {
         run(options);
     } catch (const model_error& error) {
@@ -120,7 +124,7 @@ int run_main(int argc, char** argv) {
     } catch (const memory_error& error) {
         return fail(exit_too_large, error.what());
     } catch (const std::bad_alloc&) {
-        return fail(exit_too_large, "not enough memory");
+        return fail(exit_too_large, memory::shortage());
     } catch (const write_error& error) {
         return fail(exit_output, error.what());
     } catch (const backend_error& error) {

@@ -17,7 +17,7 @@ struct load_options {
     double scale = 1; // multiplies all lengths, about the origin; finite and positive
 };
 
-// Throws model_error.
+// Throws model_error, and std::bad_alloc where an honest file does not fit into memory.
 [[nodiscard]] scene load_model(const std::filesystem::path& file, const load_options& options = {});
 
 } // namespace voxelize

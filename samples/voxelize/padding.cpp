@@ -9,6 +9,7 @@
 #include <cstring>
 #include <optional>
 #include <utility>
+#include <vector>
 
 namespace voxelize {
 
@@ -69,7 +70,7 @@ volume padded(volume inner, int padding) {
                 }
             }
         }
-        from.data = {};
+        from.data = std::vector<std::byte>(); // = {} would keep the memory
     }
     return outer;
 }

@@ -9,6 +9,8 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
+#include <new>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -42,7 +44,11 @@ void parallel_for(std::size_t count, int threads, Work work, Done done) {
     };
     std::vector<std::jthread> helpers;
     const std::size_t wanted = std::min(count, static_cast<std::size_t>(std::max(threads, 1)));
-    for (std::size_t n = 1; n < wanted; ++n) helpers.emplace_back(run, false);
+    try {
+        for (std::size_t n = 1; n < wanted; ++n) helpers.emplace_back(run, false);
+    } catch (const std::system_error&) { // the machine gives no more threads: those that are there do the work
+    } catch (const std::bad_alloc&) {
+    }
     run(true);
     helpers.clear(); // joins
     if (failure) std::rethrow_exception(failure);

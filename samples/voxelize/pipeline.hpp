@@ -212,16 +212,20 @@ private:
             }
             return texels;
         };
+        std::vector<std::array<bool, 2>> needed(model.images.size()); // without and with the weight of alpha
+        for (const material& m : model.materials)
+            if (m.texture != material::no_texture)
+                needed[model.textures[static_cast<std::size_t>(m.texture)].image]
+                      [alpha_of(m) != alpha_mode::opaque ? 1 : 0] = true;
         pictures_.resize(model.images.size());
-        for (const bool by_alpha : {false, true})
-            for (const material& m : model.materials) {
-                if (m.texture == material::no_texture || (alpha_of(m) != alpha_mode::opaque) != by_alpha) continue;
-                const std::uint32_t image = model.textures[static_cast<std::size_t>(m.texture)].image;
-                std::vector<buffer<glm::u8vec4>>& texels = pictures_[image].texels[by_alpha ? 1 : 0];
-                if (texels.empty()) texels = texels_for(model.images[image], by_alpha);
-            }
-        if constexpr (memory_access<Backend>::on_host)
-            for (picture& source : model.images) source.rgba = {};
+        for (std::size_t image = 0; image < model.images.size(); ++image) {
+            picture& source = model.images[image];
+            for (const bool by_alpha : {false, true})
+                if (needed[image][by_alpha ? 1 : 0])
+                    pictures_[image].texels[by_alpha ? 1 : 0] = texels_for(source, by_alpha);
+            if constexpr (memory_access<Backend>::on_host)
+                source.rgba = std::vector<std::uint8_t>(); // = {} would keep the memory
+        }
     }
 
     [[nodiscard]] sampled_texture texture_of(const material& m, const scene& model) {

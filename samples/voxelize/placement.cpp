@@ -114,41 +114,74 @@ voxelpipe::grid fit_voxel_size(const grid_request& request, const bounding_box& 
 
 } // namespace
 
+namespace {
+
+// A box that holds everything in BOX under TO_WORLD. Exactly: a fused step rounds monotonically, so no point between
+// the corners gets past what they get.
+bounding_box box_around(const bounding_box& box, const affine& to_world) {
+    bounding_box result;
+    if (box.empty) return result;
+    for (int corner = 0; corner < 8; ++corner) {
+        const glm::dvec3 p =
+            to_world({(corner & 1) != 0 ? box.high.x : box.low.x, (corner & 2) != 0 ? box.high.y : box.low.y,
+                      (corner & 4) != 0 ? box.high.z : box.low.z});
+        result.include({p, p, false});
+    }
+    return result;
+}
+
+} // namespace
+
 bounding_box bounds_of(const scene& model, int threads) {
     std::vector<std::vector<bool>> corners(model.primitives.size()); // of each primitive: which vertices are any
+    std::vector<bounding_box> own(model.primitives.size());          // around them, in its own coordinates
     parallel_for(model.primitives.size(), thread_count(threads), [&](std::size_t n) {
         const primitive& part = model.primitives[n];
         corners[n].resize(part.positions.size());
         for (const glm::uvec3& triangle : part.triangles)
             for (int i = 0; i < 3; ++i) corners[n][triangle[i]] = true;
         for (std::size_t i = 0; i < part.positions.size(); ++i)
-            if (const glm::vec3& p = part.positions[i]; !is_finite(p)) corners[n][i] = false;
+            if (const glm::vec3& p = part.positions[i]; !is_finite(p))
+                corners[n][i] = false;
+            else if (corners[n][i])
+                own[n].include({p, p, false});
     });
 
-    struct piece {
-        const instance* shown;
-        std::size_t begin, end; // of its vertices
-    };
-    constexpr std::size_t piece_size = 1 << 16;
-    std::vector<piece> pieces;
-    for (const instance& shown : model.instances) {
-        const std::size_t count = model.primitives[shown.primitive].positions.size();
-        for (std::size_t begin = 0; begin < count; begin += piece_size)
-            pieces.push_back({&shown, begin, std::min(count, begin + piece_size)});
-    }
-    std::vector<bounding_box> boxes(pieces.size());
-    parallel_for(pieces.size(), thread_count(threads), [&](std::size_t n) {
-        const auto& [shown, begin, end] = pieces[n];
-        const std::vector<glm::vec3>& positions = model.primitives[shown->primitive].positions;
-        for (std::size_t i = begin; i < end; ++i) {
-            if (!corners[shown->primitive][i]) continue;
-            const glm::dvec3 p = shown->to_world(positions[i]);
-            // What is no float is not drawn.
-            if (is_finite(glm::vec3(p))) boxes[n].include({p, p, false});
-        }
+    // A box around each instance, by the corners of its primitive's own box: most instances of a forest lie inside of
+    // what others reach, and need no look at their vertices.
+    std::vector<bounding_box> around(model.instances.size());
+    parallel_for(model.instances.size(), thread_count(threads), [&](std::size_t n) {
+        const instance& shown = model.instances[n];
+        around[n] = box_around(own[shown.primitive], shown.to_world);
     });
     bounding_box all;
-    for (const bounding_box& box : boxes) all.include(box);
+    const auto look_at = [&](std::size_t n) {
+        if (all.holds(around[n])) return;
+        const instance& shown = model.instances[n];
+        const std::vector<glm::vec3>& positions = model.primitives[shown.primitive].positions;
+        constexpr std::size_t piece = 1 << 16;
+        std::vector<bounding_box> boxes((positions.size() + piece - 1) / piece);
+        parallel_for(boxes.size(), thread_count(threads), [&](std::size_t b) {
+            for (std::size_t i = b * piece; i < std::min(positions.size(), (b + 1) * piece); ++i) {
+                if (!corners[shown.primitive][i]) continue;
+                const glm::dvec3 p = shown.to_world(positions[i]);
+                // What is no float is not drawn.
+                if (is_finite(glm::vec3(p))) boxes[b].include({p, p, false});
+            }
+        });
+        for (const bounding_box& box : boxes) all.include(box);
+    };
+    for (int axis = 0; axis < 3; ++axis) { // those that reach furthest first
+        std::size_t lowest = 0, highest = 0;
+        for (std::size_t n = 0; n < around.size(); ++n) {
+            if (around[n].low[axis] < around[lowest].low[axis]) lowest = n;
+            if (around[n].high[axis] > around[highest].high[axis]) highest = n;
+        }
+        if (around.empty()) break;
+        look_at(lowest);
+        look_at(highest);
+    }
+    for (std::size_t n = 0; n < around.size(); ++n) look_at(n);
     return all;
 }
 

@@ -44,6 +44,10 @@ struct bounding_box {
     glm::dvec3 high{0.0};
     bool empty = true;
 
+    [[nodiscard]] bool holds(const bounding_box& other) const {
+        return other.empty || (!empty && glm::all(glm::lessThanEqual(low, other.low)) &&
+                               glm::all(glm::greaterThanEqual(high, other.high)));
+    }
     void include(const bounding_box& other) {
         if (other.empty) return;
         low = empty ? other.low : glm::min(low, other.low);

@@ -48,9 +48,6 @@ struct run_report {
     std::uint64_t peak_memory = 0; // bytes
 };
 
-// The most memory that this process has held, in bytes.
-[[nodiscard]] std::uint64_t peak_memory_bytes();
-
 void print_text(std::ostream& stream, const run_report& report);
 void print_json(std::ostream& stream, const run_report& report);
 

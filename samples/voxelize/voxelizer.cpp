@@ -8,10 +8,8 @@
 
 #include <cpu_ref/backend.hpp>
 
-#include <unistd.h>
-
+#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <new>
 #include <optional>
 #include <utility>
@@ -29,24 +27,69 @@ double volume_bytes(const voxelize_request& request) {
 
 namespace {
 
-// Refuses what the machine cannot hold before the system does, less kindly, while it runs.
-void check_memory(const voxelize_request& request) {
-    const double needed = volume_bytes(request);
-    const double physical = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
-    if (needed > 0.9 * physical)
-        throw memory_error("the result needs " + std::to_string(std::llround(needed / (1 << 20))) +
-                           " MiB, this machine has " + std::to_string(std::llround(physical / (1 << 20))) +
-                           " MiB: take fewer targets or voxels");
+constexpr const char* memory_hint = "take fewer targets or voxels";
+
+// The result, and while a ring is put around it its largest channel once more.
+void require_volume(const voxelize_request& request) {
+    double bytes = volume_bytes(request);
+    if (request.padding != 0) {
+        double largest = 0;
+        for (const target id : request.targets) {
+            voxelize_request alone = request;
+            alone.targets = {id};
+            largest = std::max(largest, volume_bytes(alone));
+        }
+        bytes += largest;
+    }
+    const glm::ivec3 extent = request.grid.extent;
+    memory::require(bytes,
+                    "a result of " + std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
+                        std::to_string(extent.z) + " voxels",
+                    memory_hint);
 }
 
-volume run_on_cpu(scene& model, const voxelize_request& request, voxelize_stats& stats) {
+// Bytes for each vertex and triangle of every instance, while a slab is drawn.
+struct scene_bytes {
+    double vertices = 0;  // as they are snapped: at least
+    double varyings = 0;  // what shaders hand on
+    double triangles = 0; // their pairs with tiles, one for most, listed and sorted
+};
+
+scene_bytes bytes_of(const scene& model, const voxelize_request& request) {
+    bool shaded = false;
+    for (const target id : request.targets) shaded = shaded || (id != target::occupancy && id != target::count);
+    for (const material& m : model.materials) shaded = shaded || m.alpha == alpha_mode::mask;
+    const auto vertices = static_cast<double>(model.vertex_count());
+    return {vertices * sizeof(vp::core::snapped_position), shaded ? vertices * sizeof(surface_varyings) : 0,
+            static_cast<double>(model.triangle_count()) * 24};
+}
+
+volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats) {
     const int threads = thread_count(request.threads);
+    const scene_bytes parts = bytes_of(model, request);
+    const double least = parts.vertices + volume_bytes(request);
+    const double likely = least + parts.varyings + parts.triangles;
+    memory::require(least,
+                    "a scene of " + std::to_string(model.vertex_count()) + " vertices and " +
+                        std::to_string(model.triangle_count()) + " triangles",
+                    memory_hint, likely);
+    const auto room = static_cast<double>(memory::room());
+    const double likely_in_all = static_cast<double>(memory::limit()) - room + likely;
+    if (request.work_memory == 0) {
+        constexpr double most_work = 128 << 20, least_work = 1 << 20;
+        request.work_memory = static_cast<std::uint64_t>(std::clamp((room - likely) / 4, least_work, most_work));
+    }
     vp::cpu_backend backend{static_cast<unsigned>(threads)};
     vp::stage_times times;
     backend.times = &times;
     stats.backend = "cpu";
     stats.threads = threads;
-    volume result = pipeline<vp::cpu_backend>{backend, model, request, stats}.run();
+    volume result;
+    try {
+        result = pipeline<vp::cpu_backend>{backend, model, request, stats}.run();
+    } catch (const std::bad_alloc&) {
+        throw memory_error(memory::shortage(memory_hint, likely_in_all + static_cast<double>(request.work_memory)));
+    }
 
     constexpr std::string_view absent[] = {"tile_split", "tile_resolve", "abuffer_emit"};
     show_stages(stats, times, absent, "");
@@ -90,17 +133,16 @@ volume with_ring(volume inside, const voxelize_request& request) {
 } // namespace
 
 volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
-    check_memory(request);
+    require_volume(request);
     try {
         voxelize_request inside = request;
         inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
         if (request.backend != backend_choice::cpu)
             if (std::optional<volume> result = try_cuda(model, inside, stats))
                 return with_ring(std::move(*result), request);
-        if (inside.work_memory == 0) inside.work_memory = std::uint64_t{128} << 20;
         return with_ring(run_on_cpu(model, inside, stats), request);
     } catch (const std::bad_alloc&) {
-        throw memory_error("not enough memory: take fewer targets or voxels");
+        throw memory_error(memory::shortage(memory_hint));
     }
 }
 

@@ -4,6 +4,7 @@
 // scene + options -> volume: all targets in one pass of the pipeline, on the backend of the user's choice. The result
 // is the same bytes for every backend, number of threads and amount of working memory.
 
+#include "memory.hpp"
 #include "scene.hpp"
 #include "targets.hpp"
 #include "volume.hpp"
@@ -36,7 +37,7 @@ struct voxelize_request {
     backend_choice backend = backend_choice::automatic;
     int threads = 0; // 0: all cores
     // Bytes for what exists only while the pipeline runs. A grid that needs more is computed in slabs along z. 0: what
-    // suits the backend.
+    // suits the backend and the run's memory.
     std::uint64_t work_memory = 0;
     std::uint64_t device_memory = 0;      // most bytes to take of a GPU's memory; 0: all that is free
     std::function<void(double)> progress; // called with 0..1, one call at a time; may be empty
@@ -57,11 +58,6 @@ struct voxelize_stats {
     std::uint64_t normals_cancelled = 0;   // voxels whose normals cancel out, or that have none; with --target normal
     std::vector<std::pair<std::string, double>> milliseconds; // stage -> time, in pipeline order
     std::vector<std::string> warnings;                        // one line each
-};
-
-// The grid's voxels do not fit into memory.
-struct memory_error : std::runtime_error {
-    using std::runtime_error::runtime_error;
 };
 
 // The backend was not built, or there is no device for it.

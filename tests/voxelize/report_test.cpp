@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // The progress bar: drawn on terminals only, and only for work that takes a while.
+#include <memory.hpp>
 #include <report.hpp>
 
 #include <gtest/gtest.h>
@@ -72,10 +73,10 @@ TEST(ProgressBar, IsNotDrawnElsewhere) {
 }
 
 TEST(PeakMemory, GrowsWithUse) {
-    const std::uint64_t before = voxelize::peak_memory_bytes();
+    const std::uint64_t before = voxelize::memory::peak();
     const std::string block(std::size_t{64} << 20, 'x');
-    EXPECT_LE(before, voxelize::peak_memory_bytes());
-    EXPECT_LT(block.size(), voxelize::peak_memory_bytes());
+    EXPECT_LE(before, voxelize::memory::peak());
+    EXPECT_LT(block.size(), voxelize::memory::peak());
 }
 
 } // namespace

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -53,8 +54,9 @@ struct outcome {
     std::string err;
 };
 
-// Neither stream is a terminal.
-inline outcome run(const scratch_folder& folder, const std::vector<std::string>& arguments) {
+// Neither stream is a terminal. ADDRESS_SPACE bounds that of the program, in bytes; 0: it has no bound.
+inline outcome run(const scratch_folder& folder, const std::vector<std::string>& arguments,
+                   std::uint64_t address_space = 0) {
     const char* const elsewhere = std::getenv("VOXELPIPE_VOXELIZE"); // for tests moved to another machine
     std::vector<std::string> all{elsewhere != nullptr ? elsewhere : VOXELPIPE_VOXELIZE};
     all.insert(all.end(), arguments.begin(), arguments.end());
@@ -65,6 +67,8 @@ inline outcome run(const scratch_folder& folder, const std::vector<std::string>&
     const std::string err = folder / "stderr.txt";
     const pid_t child = fork();
     if (child == 0) {
+        const rlimit bound{address_space, address_space};
+        if (address_space != 0) setrlimit(RLIMIT_AS, &bound);
         dup2(open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), STDOUT_FILENO);
         dup2(open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), STDERR_FILENO);
         execv(argv[0], argv.data());

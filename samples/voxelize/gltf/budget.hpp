@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The memory that a file may ask for, in proportion to its own size. Every allocation whose size the file decides is
-// charged here before it is made; what does not fit is a gltf_error.
+// The memory that a file may ask for, in proportion to its own size: a protection against files that claim what they do
+// not hold. Every allocation whose size the file decides is charged here before it is made; what does not fit is a
+// gltf_error. Honest files stay far below; whether they fit into the machine is another question (memory.hpp).
 
 #include "../gltf_scene.hpp"
 
@@ -16,14 +17,19 @@ public:
     explicit budget(const gltf_limits& limits) : limits_{limits}, allowed_{limits.base_memory} {}
 
     // BYTES of input have been read: that much more may be asked for.
-    void grant_input(std::uint64_t bytes) { allowed_ += saturating_product(bytes, limits_.memory_per_input_byte); }
+    void grant_input(std::uint64_t bytes) {
+        input_ += bytes;
+        allowed_ += saturating_product(bytes, limits_.memory_per_input_byte);
+    }
 
     // WHAT is going to take COUNT things of BYTES_EACH. Products that overflow never fit.
     void charge(std::uint64_t count, std::uint64_t bytes_each, const std::string& what) {
         const std::uint64_t bytes = saturating_product(count, bytes_each);
         if (bytes > allowed_ - used_)
-            throw gltf_error(what + ": needs " + std::to_string(bytes >> 20) + " MiB, and a file of this size gets " +
-                             std::to_string(allowed_ >> 20) + " MiB for everything");
+            throw gltf_error(what + ": with it the file asks for " +
+                             std::to_string((used_ + bytes + (1 << 20) - 1) >> 20) + " MiB of memory, and its " +
+                             std::to_string(input_) + " bytes cannot hold what fills more than " +
+                             std::to_string(allowed_ >> 20) + " MiB");
         used_ += bytes;
     }
 
@@ -61,6 +67,7 @@ private:
     std::uint64_t allowed_;
     std::uint64_t used_ = 0;
     std::uint64_t lasting_ = 0; // of used_: what no scope gives back
+    std::uint64_t input_ = 0; // bytes
 };
 
 } // namespace voxelize::gltf

@@ -12,6 +12,8 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <new>
+#include <string>
 #include <string_view>
 
 namespace voxelize::gltf {
@@ -56,20 +58,18 @@ std::string reason_against(std::span<const std::byte> bytes) {
 }
 
 // A picture may take 64 MiB, or 1024 times its encoded size, whichever is more: deflate cannot do better on channels of
-// 8 bits. Colour values of less than a byte can, and are no loss. Charges what it will take.
-void check_and_charge(std::uint64_t width, std::uint64_t height, std::uint64_t encoded_bytes, budget& memory,
-                      const std::string& what) {
+// 8 bits. Colour values of less than a byte can, and are no loss.
+void check_size(std::uint64_t width, std::uint64_t height, std::uint64_t encoded_bytes, const gltf_limits& limits) {
     const std::string size = std::to_string(width) + " x " + std::to_string(height);
-    const std::uint32_t side = memory.limits().max_image_side;
+    const std::uint32_t side = limits.max_image_side;
     if (width > side || height > side)
         throw gltf_error("its " + size + " pixels are more than " + std::to_string(side) + " a side");
     const std::uint64_t allowed = (std::uint64_t{64} << 20) + 1024 * encoded_bytes;
     if (width * height * 4 > allowed)
         throw gltf_error("its " + size + " pixels cannot come from " + std::to_string(encoded_bytes) + " bytes");
-    memory.charge(width * height, 4, what);
 }
 
-picture decode_by_stb(std::span<const std::byte> bytes, budget& memory, const std::string& what) {
+picture decode_by_stb(std::span<const std::byte> bytes, const gltf_limits& limits) {
     const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
     const int size = static_cast<int>(bytes.size());
     const auto reason = [] { return printable(stbi_failure_reason() != nullptr ? stbi_failure_reason() : "unknown"); };
@@ -78,12 +78,13 @@ picture decode_by_stb(std::span<const std::byte> bytes, budget& memory, const st
     int channels = 0;
     if (stbi_info_from_memory(data, size, &width, &height, &channels) == 0 || width < 1 || height < 1)
         throw gltf_error("it cannot be decoded (" + reason() + ")");
-    check_and_charge(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), bytes.size(), memory, what);
+    check_size(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), bytes.size(), limits);
     struct free_pixels {
         void operator()(stbi_uc* pixels) const { stbi_image_free(pixels); }
     };
     const std::unique_ptr<stbi_uc, free_pixels> decoded{
         stbi_load_from_memory(data, size, &width, &height, &channels, 4)};
+    if (!decoded && reason() == "outofmem") throw std::bad_alloc{};
     if (!decoded) throw gltf_error("it cannot be decoded (" + reason() + ")");
     picture result;
     result.width = static_cast<std::uint32_t>(width);
@@ -93,13 +94,13 @@ picture decode_by_stb(std::span<const std::byte> bytes, budget& memory, const st
 }
 
 #ifdef VOXELIZE_HAS_WEBP
-picture decode_webp(std::span<const std::byte> bytes, budget& memory, const std::string& what) {
+picture decode_webp(std::span<const std::byte> bytes, const gltf_limits& limits) {
     const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
     int width = 0;
     int height = 0;
     if (WebPGetInfo(data, bytes.size(), &width, &height) == 0 || width < 1 || height < 1)
         throw gltf_error("it cannot be decoded (not a WebP picture)");
-    check_and_charge(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), bytes.size(), memory, what);
+    check_size(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), bytes.size(), limits);
     picture result;
     result.width = static_cast<std::uint32_t>(width);
     result.height = static_cast<std::uint32_t>(height);
@@ -109,21 +110,21 @@ picture decode_webp(std::span<const std::byte> bytes, budget& memory, const std:
     return result;
 }
 #else
-picture decode_webp(std::span<const std::byte>, budget&, const std::string&) {
+picture decode_webp(std::span<const std::byte>, const gltf_limits&) {
     throw gltf_error("it is WebP, and this build has no libwebp");
 }
 #endif
 
 } // namespace
 
-picture decode_picture(std::span<const std::byte> bytes, budget& memory, const std::string& what) {
+picture decode_picture(std::span<const std::byte> bytes, const gltf_limits& limits) {
     if (bytes.size() > INT32_MAX) throw gltf_error("it is larger than 2 GiB");
     switch (format_of(bytes)) {
     case picture_format::png:
     case picture_format::jpeg:
-        return decode_by_stb(bytes, memory, what);
+        return decode_by_stb(bytes, limits);
     case picture_format::webp:
-        return decode_webp(bytes, memory, what);
+        return decode_webp(bytes, limits);
     case picture_format::other:
         break;
     }

@@ -4,19 +4,15 @@
 // Encoded pictures -> RGBA: PNG and JPEG, and WebP in a build with libwebp. The bytes say what they are, not a file's
 // name or media type.
 
-#include "budget.hpp"
-
-#include "../scene.hpp"
+#include "../gltf_scene.hpp"
 
 #include <cstddef>
 #include <span>
-#include <string>
 
 namespace voxelize::gltf {
 
-// The picture in BYTES, without a name. Its memory is charged to MEMORY in the name of WHAT before it is taken. Throws
-// gltf_error with the bare reason: a format that is not supported is named (KTX2, AVIF, ...), a size that the bytes
-// cannot hold is refused.
-[[nodiscard]] picture decode_picture(std::span<const std::byte> bytes, budget& memory, const std::string& what);
+// The picture in BYTES, without a name. Throws gltf_error with the bare reason: a format that is not supported is named
+// (KTX2, AVIF, ...), a size that the bytes cannot hold is refused before memory is taken.
+[[nodiscard]] picture decode_picture(std::span<const std::byte> bytes, const gltf_limits& limits);
 
 } // namespace voxelize::gltf

@@ -131,7 +131,7 @@ picture resources::decode_image(std::size_t index, std::span<const std::byte> vi
     } else if (!source.buffer_view) {
         throw gltf_error("it has neither a uri nor a bufferView");
     }
-    picture result = decode_picture(bytes, memory_, "images[" + std::to_string(index) + "]");
+    picture result = decode_picture(bytes, memory_.limits());
     result.name = source.name;
     return result;
 }

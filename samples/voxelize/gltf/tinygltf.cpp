@@ -8,5 +8,19 @@
 
 #include <fstream> // tinygltf's writer wants it even with TINYGLTF_NO_FS
 
+// What stb_image takes is counted as all else that the program takes.
+#include <cstring>
+#include <new>
+static void* resized_block(void* block, std::size_t old_size, std::size_t new_size) {
+    void* const larger = ::operator new(new_size, std::nothrow);
+    if (larger != nullptr && block != nullptr) std::memcpy(larger, block, old_size < new_size ? old_size : new_size);
+    if (larger != nullptr) ::operator delete(block);
+    return larger;
+}
+#define STBI_MALLOC(size) ::operator new(size, std::nothrow)
+#define STBI_REALLOC_SIZED(block, old_size, new_size) resized_block(block, old_size, new_size)
+#define STBI_REALLOC(block, size) static_assert(false)
+#define STBI_FREE(block) ::operator delete(block)
+
 #include <stb_image.h>
 #include <tiny_gltf.h>

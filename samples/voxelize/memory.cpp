@@ -1,0 +1,138 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "memory.hpp"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <string_view>
+
+namespace voxelize::memory {
+
+namespace {
+
+std::atomic<std::uint64_t> counted{0};          // bytes of large blocks that are held
+std::atomic<std::uint64_t> allowed{UINT64_MAX}; // that they may reach: the limit without what else is resident
+std::atomic<std::uint64_t> overhead{0};         // what else is resident; never taken to shrink
+std::atomic<std::uint64_t> wanted{0};           // counted bytes of the last refusal; 0: there was none
+std::uint64_t limit_bytes = UINT64_MAX;
+bool limit_is_option = false;
+
+// Without an allocation: it is called within operator new.
+std::uint64_t resident_now() noexcept {
+    std::FILE* const file = std::fopen("/proc/self/statm", "r");
+    if (file == nullptr) return 0;
+    unsigned long long all = 0, pages = 0;
+    const bool read = std::fscanf(file, "%llu %llu", &all, &pages) == 2;
+    std::fclose(file);
+    return read ? pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) : 0;
+}
+
+// Code, stacks, small blocks and what other libraries take have to fit beside the counted blocks.
+void measure_overhead() noexcept {
+    const std::uint64_t now = resident_now(), blocks = counted;
+    const std::uint64_t rest = std::max(overhead.load(), now > blocks ? now - blocks : 0);
+    overhead = rest;
+    if (limit_bytes != UINT64_MAX) allowed = limit_bytes > rest ? limit_bytes - rest : 0;
+}
+
+// The number in FILE; the greatest where there is none ("max").
+std::uint64_t number_in(const std::string& file) {
+    std::ifstream stream(file);
+    std::uint64_t number = 0;
+    return stream >> number ? number : UINT64_MAX;
+}
+
+std::string limit_text() {
+    return mebibytes(static_cast<double>(limit_bytes)) +
+           (limit_is_option ? " are allowed by --max-memory" : " may be used of this machine's memory (--max-memory)");
+}
+
+std::string need_text(double least, double likely) {
+    return (likely > least ? "about " : "at least ") + mebibytes(std::max(least, likely)) + " are needed";
+}
+
+std::string with(const std::string& hint) { return hint.empty() ? hint : ": " + hint; }
+
+} // namespace
+
+std::uint64_t machine_limit() {
+    std::uint64_t least =
+        static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+    // Control groups: version 2 by the path of this process and those above it, version 1 where containers see it.
+    std::ifstream groups("/proc/self/cgroup");
+    for (std::string line; std::getline(groups, line);) {
+        if (!line.starts_with("0::")) continue;
+        for (std::string path = line.substr(3);; path.erase(path.find_last_of('/'))) {
+            if (path == "/") path.clear();
+            least = std::min(least, number_in("/sys/fs/cgroup" + path + "/memory.max"));
+            if (path.find('/') == std::string::npos) break;
+        }
+    }
+    least = std::min(least, number_in("/sys/fs/cgroup/memory/memory.limit_in_bytes"));
+    for (const auto resource : {RLIMIT_AS, RLIMIT_DATA}) {
+        rlimit own{};
+        if (getrlimit(resource, &own) == 0 && own.rlim_cur != RLIM_INFINITY)
+            least = std::min(least, static_cast<std::uint64_t>(own.rlim_cur));
+    }
+    return least - least / 10;
+}
+
+void set_limit(std::uint64_t limit, bool is_option) {
+    limit_bytes = limit != 0 ? limit : machine_limit();
+    limit_is_option = is_option;
+    measure_overhead();
+}
+
+std::uint64_t limit() { return limit_bytes; }
+
+std::uint64_t resident() { return resident_now(); }
+
+std::uint64_t peak() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+std::uint64_t room() {
+    measure_overhead();
+    const std::uint64_t blocks = counted;
+    return allowed > blocks ? allowed - blocks : 0;
+}
+
+bool take(std::size_t bytes) noexcept {
+    constexpr std::size_t worth_a_look = std::size_t{16} << 20;
+    if (bytes >= worth_a_look) measure_overhead();
+    const std::uint64_t now = counted += bytes;
+    if (now <= allowed) return true;
+    wanted = now;
+    counted -= bytes;
+    return false;
+}
+
+void give_back(std::size_t bytes) noexcept { counted -= bytes; }
+
+void refused(std::size_t bytes) noexcept { wanted = counted + bytes; }
+
+void require(double bytes, const std::string& what, const std::string& hint, double likely) {
+    if (bytes <= static_cast<double>(room())) return;
+    const auto held = static_cast<double>(counted + overhead);
+    throw memory_error(what + ": " + need_text(held + bytes, held + likely) + ", and " + limit_text() + with(hint));
+}
+
+std::string shortage(const std::string& hint, double likely) {
+    const double held = static_cast<double>(overhead) + static_cast<double>(wanted != 0 ? wanted : counted);
+    const std::string need = wanted != 0 ? need_text(held, likely) : "the system gave no more than " + mebibytes(held);
+    return "not enough memory: " + need + ", and " + limit_text() + with(hint);
+}
+
+std::string mebibytes(double bytes) {
+    return std::to_string(static_cast<long long>(std::ceil(std::min(bytes / (1 << 20), 9e18)))) + " MiB";
+}
+
+} // namespace voxelize::memory

@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// The program's operator new and delete: malloc and free, with large blocks counted against the budget of memory.hpp.
+// Of the program alone, not of the libraries that its tests link.
+#include "memory.hpp"
+
+#include <malloc.h>
+
+#include <cstdlib>
+#include <new>
+
+namespace {
+
+void* guarded(void* block, std::size_t wanted) {
+    if (block == nullptr) {
+        voxelize::memory::refused(wanted);
+        throw std::bad_alloc{};
+    }
+    const std::size_t size = malloc_usable_size(block);
+    if (size >= voxelize::memory::counted_block && !voxelize::memory::take(size)) {
+        std::free(block);
+        throw std::bad_alloc{};
+    }
+    return block;
+}
+
+void release(void* block) noexcept {
+    if (block == nullptr) return;
+    const std::size_t size = malloc_usable_size(block);
+    if (size >= voxelize::memory::counted_block) voxelize::memory::give_back(size);
+    std::free(block);
+}
+
+// malloc keeps the memory of blocks below its threshold, and raises that as it goes: fixed, so that what is given back
+// is gone and what is counted is what is resident.
+[[maybe_unused]] const int fixed_threshold = mallopt(M_MMAP_THRESHOLD, 1 << 20);
+
+} // namespace
+
+// operator new[], the variants that do not throw, and their partners call these.
+void* operator new(std::size_t size) { return guarded(std::malloc(size != 0 ? size : 1), size); }
+void* operator new(std::size_t size, std::align_val_t align) {
+    const auto a = static_cast<std::size_t>(align);
+    return guarded(std::aligned_alloc(a, (size + a - 1) / a * a), size);
+}
+void operator delete(void* block) noexcept { release(block); }
+void operator delete(void* block, std::size_t) noexcept { release(block); }
+void operator delete(void* block, std::align_val_t) noexcept { release(block); }
+void operator delete(void* block, std::size_t, std::align_val_t) noexcept { release(block); }
