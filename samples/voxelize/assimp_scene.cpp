@@ -65,7 +65,7 @@ private:
     picture decode(const assimp::texture_source& wanted) const {
         if (wanted.path.empty()) {
             const assimp::embedded_picture& embedded = source_.embedded[static_cast<std::size_t>(wanted.embedded)];
-            if (embedded.width == 0) return gltf::decode_picture(embedded.bytes, memory_, "an embedded texture");
+            if (embedded.width == 0) return gltf::decode_picture(embedded.bytes, memory_.limits());
             if (embedded.height == 0) throw model_error("it has no pixels");
             memory_.charge(embedded.bytes.size(), 1, "an embedded texture");
             picture result;
@@ -86,7 +86,7 @@ private:
             bytes = read_file_(path->filename(), memory_.limits().max_file_bytes);
         }
         memory_.grant_input(bytes.size());
-        return gltf::decode_picture(bytes, memory_, "a texture");
+        return gltf::decode_picture(bytes, memory_.limits());
     }
 
     const assimp::model& source_;
@@ -123,15 +123,11 @@ scene load_by_assimp(std::span<const std::byte> bytes, const std::string& name, 
     if (bytes.empty()) throw model_error("the file is empty");
     gltf::budget memory{limits};
     memory.grant_input(bytes.size());
-    try {
-        const std::vector<std::byte> reply =
-            run_isolated([&] { return assimp::to_bytes(assimp::read_model(bytes, name, read_file)); },
-                         limits_for(bytes.size(), limits), "assimp");
-        memory.charge(reply.size(), 1, "the model");
-        return to_scene(assimp::from_bytes(reply), read_file, memory);
-    } catch (const std::bad_alloc&) {
-        throw model_error("not enough memory to load the file");
-    }
+    const std::vector<std::byte> reply =
+        run_isolated([&] { return assimp::to_bytes(assimp::read_model(bytes, name, read_file)); },
+                     limits_for(bytes.size(), limits), "assimp");
+    memory.charge(reply.size(), 1, "the model");
+    return to_scene(assimp::from_bytes(reply), read_file, memory);
 }
 
 scene load_by_assimp(const std::filesystem::path& file, const gltf_limits& limits) {

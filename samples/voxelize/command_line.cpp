@@ -13,13 +13,14 @@
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <optional>
 
 namespace voxelize {
 
 namespace {
 
-// "1,2,3" -> numbers; LEAST to 3 of them.
+// "1,2,3" or "1x2x3" -> numbers; LEAST to 3 of them.
 template <class Number>
 std::vector<Number> parse_list(const std::string& option, const std::string& text, std::size_t least) {
     std::vector<Number> numbers;
@@ -28,7 +29,7 @@ std::vector<Number> parse_list(const std::string& option, const std::string& tex
     while (true) {
         Number number{};
         const auto [next, error] = std::from_chars(at, end, number);
-        bool good = error == std::errc{} && (next == end || *next == ',');
+        bool good = error == std::errc{} && (next == end || *next == ',' || *next == 'x');
         if constexpr (std::is_floating_point_v<Number>) good = good && std::isfinite(number);
         if (!good) break;
         numbers.push_back(number);
@@ -63,6 +64,48 @@ std::string lower(std::string text) {
     return text;
 }
 
+// "y or z", "weight, cutoff or ignore".
+template <class T>
+std::string in_words(const std::vector<std::pair<const char*, T>>& choices) {
+    std::string text;
+    for (std::size_t i = 0; i < choices.size(); ++i)
+        text += std::string(i == 0 ? "" : i + 1 == choices.size() ? " or " : ", ") + choices[i].first;
+    return text;
+}
+
+// An option that takes one of a few words.
+template <class T>
+CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
+                        std::vector<std::pair<const char*, T>> choices, const std::string& description) {
+    const auto take = [&value, name, choices = std::move(choices)](const std::string& text) {
+        for (const auto& [word, meaning] : choices) {
+            if (lower(text) != word) continue;
+            value = meaning;
+            return;
+        }
+        throw usage_error(name + " takes " + in_words(choices) + ", not \"" + text + '"');
+    };
+    return app.add_option_function<std::string>(name, take, description);
+}
+
+// What --help says before the options: each example works as it is printed, on files of those names.
+constexpr const char* introduction =
+    "Turns a 3D model into voxels: exact coverage, several values a voxel, many file formats.\n"
+    "\n"
+    "EXAMPLES\n"
+    "  voxelize helmet.glb -o helmet.vox -o helmet.png -r 256\n"
+    "      coloured voxels, 256 along the longest side, for MagicaVoxel, and a picture of them\n"
+    "  voxelize part.glb -o part.npy -s 0.5 --coverage thin\n"
+    "      a thin shell of voxels of 0.5 units, as a NumPy array of 0 and 1\n"
+    "  voxelize part.glb -o part.npz -t occupancy,normal,material --stats\n"
+    "      three arrays in one file, and what it took to compute them\n";
+
+struct help_formatter : CLI::Formatter {
+    std::string make_usage(const CLI::App*, std::string) const override {
+        return "\nUsage: voxelize INPUT -o FILE [-o FILE...] [OPTIONS]\n";
+    }
+};
+
 // What --help says after the options.
 std::string footer() {
     std::string text = "TARGETS (--target NAME)\n";
@@ -92,11 +135,7 @@ std::string footer() {
             "  0 done   1 wrong command line   2 the model cannot be used   3 not enough memory\n"
             "  4 an output cannot be written   5 --backend cuda cannot be used   70 a bug of this program\n"
             "  5 is: built without CUDA, no driver, a driver too old, no GPU, or one that there is no code for; too\n"
-            "  little memory on the GPU is 3, as on the machine. With --backend auto the CPU does the work instead.\n"
-            "\nEXAMPLES\n"
-            "  voxelize helmet.glb -o helmet.vox -o helmet.png --resolution 256\n"
-            "  voxelize part.glb -o part.npy --voxel-size 0.5 --coverage thin\n"
-            "  voxelize part.glb -o part.npz --target occupancy --target normal --target material\n";
+            "  little memory on the GPU is 3, as on the machine. With --backend auto the CPU does the work instead.\n";
     return text;
 }
 
@@ -120,18 +159,38 @@ std::string wrapped(const std::string& text, std::size_t width) {
     return lines;
 }
 
-// "--stats" may stand before INPUT: only "json" and "text" are its value.
+bool is_number(const std::string& text) {
+    double number = 0;
+    const char* const end = text.data() + text.size();
+    return !text.empty() && std::from_chars(text.data(), end, number).ptr == end;
+}
+
+// As the parser understands it: "--stats" may stand before INPUT, since only "json" and "text" are its value, and the
+// options that take three numbers take them as one word or as three, negative ones too.
 std::vector<std::string> arguments(int argc, const char* const* argv) {
+    const std::map<std::string, std::string> points{{"--origin", "--origin"},         {"--extent", "--extent"},
+                                                    {"--voxel-size", "--voxel-size"}, {"-s", "--voxel-size"},
+                                                    {"--resolution", "--resolution"}, {"-r", "--resolution"}};
     std::vector<std::string> list;
     for (int i = 1; i < argc; ++i) {
         list.emplace_back(argv[i]);
-        if (list.back() != "--stats") continue;
         const std::string next = i + 1 < argc ? argv[i + 1] : "";
-        if (next == "json" || next == "text") {
-            list.back() += '=' + next;
-            ++i;
-        } else {
-            list.back() += "=text";
+        if (list.back() == "--stats") {
+            if (next == "json" || next == "text") {
+                list.back() += '=' + next;
+                ++i;
+            } else {
+                list.back() += "=text";
+            }
+        } else if (const auto point = points.find(list.back()); point != points.end() && !next.empty()) {
+            if (i + 3 < argc && is_number(next) && is_number(argv[i + 2]) && is_number(argv[i + 3])) {
+                list.back() = point->second + '=' + next + ',' + argv[i + 2] + ',' + argv[i + 3];
+                i += 3;
+            } else if (next.size() > 1 && next[0] == '-' &&
+                       (std::isdigit(static_cast<unsigned char>(next[1])) != 0 || next[1] == '.')) {
+                list.back() = point->second + '=' + next;
+                ++i;
+            }
         }
     }
     std::reverse(list.begin(), list.end()); // as CLI::App::parse wants it
@@ -140,9 +199,8 @@ std::vector<std::string> arguments(int argc, const char* const* argv) {
 
 // What the options fill before it is understood.
 struct raw_options {
-    std::string origin, voxel_size, extent, image_size, background;
+    std::string resolution, origin, voxel_size, extent, image_size, background;
     std::vector<std::string> targets;
-    int resolution = 0;
     bool no_edges = false;
     bool no_ground = false;
     bool no_color = false;
@@ -156,27 +214,32 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
     app.add_option("-o,--output", options.outputs, "Write the voxels to FILE (required); one -o for each file")
         ->required()
         ->allow_extra_args(false)
-        ->option_text("FILE");
+        ->option_text("FILE")
+        ->group("Output");
     app.add_option("-t,--target", raw.targets,
                    "What to compute for each voxel, see TARGETS; may be repeated. Default: occupancy, with color where "
                    "an output shows colours (.vox, .glb, .obj, .ply, .xyz, .png)")
         ->allow_extra_args(false)
         ->delimiter(',')
-        ->option_text("NAME");
+        ->option_text("NAME")
+        ->group("Output");
 
     app.add_option("-r,--resolution", raw.resolution,
-                   "N voxels along the longest side of the model, cubic and centred. Default: 128")
-        ->option_text("N")
+                   "N voxels along the longest side of the model, cubic and centred; or exactly NX x NY x NZ of them "
+                   "around it. Default: 128")
+        ->option_text("N|NXxNYxNZ")
         ->group("Grid");
-    app.add_option("--padding", options.grid.padding, "Keep N voxels free on every side. Default: 0")
+    app.add_option("--padding", options.grid.padding, "Keep the N outermost voxels on every side free. Default: 0")
         ->option_text("N")
         ->group("Grid");
     app.add_option("-s,--voxel-size", raw.voxel_size,
                    "Voxels of this size in the model's units instead, on the lattice of its multiples")
         ->option_text("S[,SY,SZ]")
         ->group("Grid");
-    app.add_option("--origin", raw.origin,
-                   "With --voxel-size and --extent: the exact grid, its lowest corner at this point")
+    app.add_option(
+           "--origin", raw.origin,
+           "With --voxel-size and --extent: the exact grid, its lowest corner at this point (three numbers may also "
+           "stand apart)")
         ->option_text("X,Y,Z")
         ->group("Grid");
     app.add_option("--extent", raw.extent, "Voxels along each axis of the exact grid")
@@ -208,39 +271,32 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->group("Model");
 
     using voxelpipe::coverage;
-    const std::map<std::string, coverage> coverages{{"conservative", coverage::conservative}, {"thin", coverage::thin}};
-    app.add_option("--coverage", options.voxelize.coverage,
-                   "conservative: every voxel that a triangle touches. thin: the fewest without a hole (6-separating). "
-                   "Default: conservative")
-        ->transform(CLI::CheckedTransformer(coverages).description(""))
+    add_choice(app, "--coverage", options.voxelize.coverage,
+               {{"conservative", coverage::conservative}, {"thin", coverage::thin}},
+               "conservative: every voxel that a triangle touches. thin: the fewest without a hole (6-separating). "
+               "Default: conservative")
         ->option_text("RULE")
-        ->group("Computation");
-    const std::map<std::string, int> axes{{"x", 0}, {"y", 1}, {"z", 2}};
-    app.add_option("--depth-axis", options.voxelize.depth_axis, "Axis of --target depth: x, y or z. Default: z")
-        ->transform(CLI::CheckedTransformer(axes).description(""))
+        ->group("Coverage and values");
+    add_choice(app, "--depth-axis", options.voxelize.depth_axis, {{"x", 0}, {"y", 1}, {"z", 2}},
+               "Axis of --target depth: x, y or z. Default: z")
         ->option_text("AXIS")
-        ->group("Computation");
-    const std::map<std::string, blend_alpha> alphas{
-        {"weight", blend_alpha::weight}, {"cutoff", blend_alpha::cutoff}, {"ignore", blend_alpha::ignore}};
-    app.add_option(
-           "--alpha", options.voxelize.alpha,
-           "What alpha does in materials that blend. weight: colours count by it. cutoff: fragments below 0.5 are "
-           "not there. ignore: nothing. Default: weight")
-        ->transform(CLI::CheckedTransformer(alphas).description(""))
+        ->group("Coverage and values");
+    add_choice(app, "--alpha", options.voxelize.alpha,
+               {{"weight", blend_alpha::weight}, {"cutoff", blend_alpha::cutoff}, {"ignore", blend_alpha::ignore}},
+               "What alpha does in materials that blend. weight: colours count by it. cutoff: fragments below 0.5 are "
+               "not there. ignore: nothing. Default: weight")
         ->option_text("RULE")
-        ->group("Computation");
-    const std::map<std::string, backend_choice> backends{
-        {"auto", backend_choice::automatic}, {"cpu", backend_choice::cpu}, {"cuda", backend_choice::cuda}};
-    app.add_option("--backend", options.voxelize.backend,
-                   "cpu, cuda (the first GPU that CUDA shows), or auto: cuda where it can be used, otherwise cpu. All "
-                   "give the same bytes. Default: auto")
-        ->transform(CLI::CheckedTransformer(backends).description(""))
+        ->group("Coverage and values");
+    add_choice(app, "--backend", options.voxelize.backend,
+               {{"auto", backend_choice::automatic}, {"cpu", backend_choice::cpu}, {"cuda", backend_choice::cuda}},
+               "cpu, cuda (the first GPU that CUDA shows), or auto: cuda where it can be used, otherwise cpu. All "
+               "give the same bytes. Default: auto")
         ->option_text("NAME")
-        ->group("Computation");
+        ->group("Machine");
     app.add_option("-j,--threads", options.voxelize.threads, "Threads on the CPU. Default: 0, one for each core")
         ->check(CLI::Range(0, 1024).description(""))
         ->option_text("N")
-        ->group("Computation");
+        ->group("Machine");
     app.add_option_function<int>(
            "--max-memory",
            [&options](int mebibytes) { options.max_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
@@ -248,7 +304,7 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
            "there is")
         ->check(CLI::Range(1, 1 << 30).description(""))
         ->option_text("MIB")
-        ->group("Computation");
+        ->group("Machine");
     app.add_option_function<int>(
            "--work-memory",
            [&options](int mebibytes) { options.voxelize.work_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
@@ -256,7 +312,7 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
            "result. Default: 128, on a GPU up to 1024")
         ->check(CLI::Range(1, 1 << 20).description(""))
         ->option_text("MIB")
-        ->group("Computation");
+        ->group("Machine");
     app.add_option_function<int>(
            "--device-memory",
            [&options](int mebibytes) { options.voxelize.device_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
@@ -264,7 +320,7 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
            "is free")
         ->check(CLI::Range(1, 1 << 20).description(""))
         ->option_text("MIB")
-        ->group("Computation");
+        ->group("Machine");
 
     preview_options& picture = options.write.preview;
     app.add_option("--image-size", raw.image_size, "Pixels. Default: 1280x960")
@@ -297,11 +353,9 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
     app.add_flag("--no-edges", raw.no_edges, "No lines between voxels")->group("Picture (.png)");
     app.add_flag("--no-ground", raw.no_ground, "No shadow on the ground")->group("Picture (.png)");
 
-    const std::map<std::string, up_axis> ups{{"y", up_axis::y}, {"z", up_axis::z}};
-    app.add_option(
-           "--up", options.write.up,
-           "Axis of the model that stands upright in .png and .vox: y or z. Default: y, as in glTF; many .stl have z")
-        ->transform(CLI::CheckedTransformer(ups).description(""))
+    add_choice(
+        app, "--up", options.write.up, {{"y", up_axis::y}, {"z", up_axis::z}},
+        "Axis of the model that stands upright in .png and .vox: y or z. Default: y, as in glTF; many .stl have z")
         ->option_text("AXIS")
         ->group("Files");
     app.add_flag("--merge", options.write.merge_faces,
@@ -314,10 +368,8 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->option_text("N")
         ->group("Files");
 
-    const std::map<std::string, stats_format> styles{{"text", stats_format::text}, {"json", stats_format::json}};
-    app.add_option("--stats", options.stats,
-                   "Print counts, times and memory; `--stats json` for programs, one object on standard output")
-        ->transform(CLI::CheckedTransformer(styles).description(""))
+    add_choice(app, "--stats", options.stats, {{"text", stats_format::text}, {"json", stats_format::json}},
+               "Print counts, times and memory; `--stats json` for programs, one object on standard output")
         ->option_text("[json]")
         ->group("Messages");
     app.add_flag("-q,--quiet", options.quiet, "Print errors (and --stats) only")->group("Messages");
@@ -329,8 +381,14 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->group("Messages");
 }
 
-void understand_grid(command_line& options, const raw_options& raw, bool has_resolution) {
-    if (has_resolution) options.grid.resolution = raw.resolution;
+void understand_grid(command_line& options, const raw_options& raw) {
+    if (!raw.resolution.empty()) {
+        const std::vector<int> n = parse_list<int>("--resolution", raw.resolution, 1);
+        if (n.size() == 1)
+            options.grid.resolution = n[0];
+        else
+            options.grid.box = glm::ivec3(n[0], n[1], n[2]);
+    }
     if (!raw.voxel_size.empty()) options.grid.voxel_size = parse_point("--voxel-size", raw.voxel_size, 1);
     if (!raw.origin.empty()) options.grid.origin = parse_point("--origin", raw.origin, 3);
     if (!raw.extent.empty()) {
@@ -377,6 +435,16 @@ void understand_outputs(command_line& options, const raw_options& raw) {
             throw usage_error("--target \"" + name + "\" is not one of " + names(target_table, &target_info::name));
         if (std::find(targets.begin(), targets.end(), *id) == targets.end()) targets.push_back(*id);
     }
+    for (const target id : targets) {
+        const std::string_view name = info_of(id).name;
+        const bool held = std::any_of(options.outputs.begin(), options.outputs.end(), [&](const auto& output) {
+            const format* const found = find_format(output);
+            return id == target::occupancy || found->all_channels || (found->shows_colors && name.starts_with("color"));
+        });
+        if (!held)
+            options.warnings.push_back("--target " + std::string(name) +
+                                       " is in none of the outputs: their formats hold no such values");
+    }
     if (targets.empty()) {
         targets.push_back(target::occupancy);
         if (shows_colors && !raw.no_color) options.implied.push_back(target::color);
@@ -416,8 +484,8 @@ void understand_picture(command_line& options, const raw_options& raw) {
 command_line parse_command_line(int argc, const char* const* argv) {
     command_line options;
     raw_options raw;
-    CLI::App app{"Turns a glTF model into voxels: exact coverage, several values a voxel, many file formats.",
-                 "voxelize"};
+    CLI::App app{introduction, "voxelize"};
+    app.formatter(std::make_shared<help_formatter>());
     app.footer(footer());
     constexpr int name_column = 28;
     app.get_formatter()->column_width(name_column);
@@ -436,7 +504,7 @@ command_line parse_command_line(int argc, const char* const* argv) {
     // Ranges let NaN through.
     if (!std::isfinite(options.load.scale)) throw usage_error("--scale is a number");
     if (!std::isfinite(options.load.gltf.seconds)) throw usage_error("--time is a number of seconds");
-    understand_grid(options, raw, app.count("--resolution") != 0);
+    understand_grid(options, raw);
     understand_outputs(options, raw);
     understand_picture(options, raw);
     return options;

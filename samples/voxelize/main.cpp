@@ -48,7 +48,8 @@ void run(const command_line& options) {
 
     auto start = std::chrono::steady_clock::now();
     scene model = load_model(options.input, options.load);
-    report.warnings = std::move(model.warnings);
+    report.warnings = options.warnings;
+    report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
     report.vertices = model.vertex_count();
     for (const material& m : model.materials) report.materials.push_back(m.name);
     const auto refuse = [&report](const std::string& why) {
@@ -75,7 +76,7 @@ void run(const command_line& options) {
     if (report.stats.triangles_dropped != 0)
         report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
                                   " triangles are dropped: a position is not finite, or too far from the grid");
-    if (report.stats.voxels == 0) report.warnings.emplace_back("no voxel is covered: the model lies outside the grid");
+    if (report.stats.voxels == 0) report.warnings.push_back(why_empty(report.stats));
 
     start = std::chrono::steady_clock::now();
     for (const std::filesystem::path& output : options.outputs) {

@@ -360,6 +360,8 @@ private:
         if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
         status.or_throw();
         stats_.triangles_dropped = status.counts.triangles_dropped();
+        stats_.triangles_drawn += status.counts.triangles_drawn;
+        stats_.triangles_flat += status.counts.triangles_zero_area;
         stats_.fragments += status.counts.fragments;
         stats_.fragments_discarded += status.counts.fragments_discarded;
         stats_.voxels += status.counts.voxels;

@@ -55,6 +55,25 @@ voxelpipe::grid fit_resolution(int resolution, int padding, const bounding_box& 
     return grid;
 }
 
+voxelpipe::grid fit_box(const glm::ivec3& box, int padding, const bounding_box& bounds) {
+    const glm::dvec3 size = bounds.high - bounds.low;
+    double voxel = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const int inner = box[axis] - 2 * padding;
+        if (inner < 1)
+            throw grid_error("--padding " + std::to_string(padding) + " leaves nothing of --resolution " +
+                             std::to_string(box.x) + "x" + std::to_string(box.y) + "x" + std::to_string(box.z));
+        voxel = std::max(voxel, size[axis] * (1 + 2 * margin) / inner);
+    }
+    voxelpipe::grid grid;
+    grid.voxel_size = glm::dvec3(voxel > 0 ? voxel : 1.0);
+    grid.extent = box;
+    for (int axis = 0; axis < 3; ++axis)
+        grid.origin[axis] =
+            std::fma(-0.5 * box[axis], grid.voxel_size.x, 0.5 * bounds.low[axis] + 0.5 * bounds.high[axis]);
+    return grid;
+}
+
 // Voxels of the lattice, numbers along each axis; the last is not among them.
 struct lattice_box {
     glm::dvec3 first{0.0};
@@ -238,17 +257,23 @@ voxelpipe::grid place(const grid_request& request, const bounding_box& bounds) {
     if (request.origin || request.extent) {
         if (!request.origin || !request.extent || !request.voxel_size)
             throw grid_error("an exact grid needs all three of --origin, --voxel-size and --extent");
-        if (request.resolution || request.padding != 0)
+        if (request.resolution || request.box || request.padding != 0)
             throw grid_error("--resolution and --padding do not go with --origin and --extent");
         grid.origin = *request.origin;
         grid.voxel_size = *request.voxel_size;
         grid.extent = *request.extent;
-    } else if (request.resolution && request.voxel_size) {
+    } else if ((request.resolution || request.box) && request.voxel_size) {
         throw grid_error("--resolution and --voxel-size do not go together");
     } else if (request.voxel_size) {
         for (int axis = 0; axis < 3; ++axis)
             if (!((*request.voxel_size)[axis] > 0)) throw grid_error("--voxel-size must be positive");
         grid = fit_voxel_size(request, bounds);
+    } else if (request.box) {
+        for (int axis = 0; axis < 3; ++axis) {
+            if ((*request.box)[axis] < 1) throw grid_error("--resolution must be at least 1");
+            if ((*request.box)[axis] > voxelpipe::grid::max_extent) too_many_voxels((*request.box)[axis], axis);
+        }
+        grid = fit_box(*request.box, request.padding, bounds);
     } else {
         const int resolution = request.resolution.value_or(128);
         if (resolution < 1) throw grid_error("--resolution must be at least 1");

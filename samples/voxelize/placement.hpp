@@ -16,17 +16,19 @@
 
 namespace voxelize {
 
-// Exactly one of three ways:
+// Exactly one of four ways:
 //   resolution                     that many cubic voxels along the longest side of the model, centred
+//   box                            that many along each axis, cubic, as small as the model allows, centred
 //   voxel_size                     voxels of that size on the lattice of its multiples: those that the model's box
 //   spans origin, voxel_size, extent     as given
-// The first two leave `padding` voxels on every side in which nothing is drawn; with resolution they are among the
-// number asked for.
+// All but the last leave `padding` voxels on every side in which nothing is drawn; with resolution and box they are
+// among the number asked for.
 // With voxel_size a face of the box in a plane of the lattice ends there, and rounding noise does not count: 6 voxels
 // of 0.1 for 0.60000002. Conservative fragments in the layer beyond, which the box only touches, are cropped. Thin
 // fragments of a face in a plane lie in the voxel above it, so thin coverage gets that layer too.
 struct grid_request {
     std::optional<int> resolution;
+    std::optional<glm::ivec3> box;
     int padding = 0;
     std::optional<glm::dvec3> voxel_size;
     std::optional<glm::dvec3> origin;

@@ -132,6 +132,19 @@ volume with_ring(volume inside, const voxelize_request& request) {
 
 } // namespace
 
+std::string why_empty(const voxelize_stats& stats) {
+    const std::string text = "no voxel is covered: ";
+    if (stats.fragments_discarded != 0)
+        return text + "alpha discards all " + std::to_string(stats.fragments_discarded) + " fragments";
+    if (stats.triangles_drawn != 0) return text + "what the triangles cover lies outside the grid";
+    if (stats.triangles_flat != 0)
+        return text +
+               "the triangles have no area, and thin coverage draws areas only (--coverage conservative draws all)";
+    if (stats.triangles != 0 && stats.triangles_dropped == stats.triangles)
+        return text + "no triangle has three positions that can be drawn";
+    return text + "the model lies outside the grid";
+}
+
 volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
     require_volume(request);
     try {

@@ -52,6 +52,8 @@ struct voxelize_stats {
     int slabs = 0;
     std::uint64_t triangles = 0;
     std::uint64_t triangles_dropped = 0;   // a position that is not finite, or too far from the grid to be snapped
+    std::uint64_t triangles_drawn = 0;     // that reach into the grid, summed over slabs
+    std::uint64_t triangles_flat = 0;      // left out by thin coverage: they have no area; summed over slabs
     std::uint64_t fragments = 0;           // kept, over all voxels
     std::uint64_t fragments_discarded = 0; // by an alpha mask
     std::uint64_t voxels = 0;              // with at least one fragment
@@ -69,6 +71,9 @@ struct backend_error : std::runtime_error {
 // the CPU otherwise, with a warning where only the GPU's memory was too small. Throws memory_error, backend_error, and
 // std::runtime_error for what the library refuses.
 [[nodiscard]] volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
+
+// Why no voxel is covered, one line; for stats that count none.
+[[nodiscard]] std::string why_empty(const voxelize_stats& stats);
 
 // Bytes of the volume that a request gives.
 [[nodiscard]] double volume_bytes(const voxelize_request& request);

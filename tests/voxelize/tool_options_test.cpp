@@ -25,15 +25,43 @@ namespace {
 
 // All that the program takes, as the help writes it.
 std::set<std::string> all_options() {
-    return {
-        "-o,--output FILE", "-t,--target NAME",  "-r,--resolution N",   "--padding N",      "-s,--voxel-size S[,SY,SZ]",
-        "--origin X,Y,Z",   "--extent NX,NY,NZ", "--scale F",           "--animation NAME", "--time T",
-        "--lenient",        "--coverage RULE",   "--depth-axis AXIS",   "--alpha RULE",     "--backend NAME",
-        "-j,--threads N",   "--work-memory MIB", "--device-memory MIB", "--image-size WxH", "--azimuth DEG",
-        "--elevation DEG",  "--zoom F",          "--fov DEG",           "--samples N",      "--background COLOUR",
-        "--no-color",       "--no-edges",        "--no-ground",         "--up AXIS",        "--compression N",
-        "--merge",          "--points",          "--stats [json]",      "-q,--quiet",       "-h,--help",
-        "--version"};
+    return {"-o,--output FILE",
+            "-t,--target NAME",
+            "-r,--resolution N|NXxNYxNZ",
+            "--padding N",
+            "-s,--voxel-size S[,SY,SZ]",
+            "--origin X,Y,Z",
+            "--extent NX,NY,NZ",
+            "--scale F",
+            "--animation NAME",
+            "--time T",
+            "--lenient",
+            "--coverage RULE",
+            "--depth-axis AXIS",
+            "--alpha RULE",
+            "--backend NAME",
+            "-j,--threads N",
+            "--max-memory MIB",
+            "--work-memory MIB",
+            "--device-memory MIB",
+            "--image-size WxH",
+            "--azimuth DEG",
+            "--elevation DEG",
+            "--zoom F",
+            "--fov DEG",
+            "--samples N",
+            "--background COLOUR",
+            "--no-color",
+            "--no-edges",
+            "--no-ground",
+            "--up AXIS",
+            "--compression N",
+            "--merge",
+            "--points",
+            "--stats [json]",
+            "-q,--quiet",
+            "-h,--help",
+            "--version"};
 }
 
 // The first column of the help, which the parser writes; each entry must have a description beside or below it.

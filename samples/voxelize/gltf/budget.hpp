@@ -67,7 +67,7 @@ private:
     std::uint64_t allowed_;
     std::uint64_t used_ = 0;
     std::uint64_t lasting_ = 0; // of used_: what no scope gives back
-    std::uint64_t input_ = 0; // bytes
+    std::uint64_t input_ = 0;   // bytes
 };
 
 } // namespace voxelize::gltf

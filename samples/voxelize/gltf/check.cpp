@@ -121,18 +121,27 @@ void checker::check_extensions() {
     }
     std::set<std::string> used = names("extensionsUsed");
     used.insert(required.begin(), required.end());
+    warn_of_extensions(used, extension_effect::appearance, "not supported",
+                       ": only base colour, texture and alpha of materials are used");
+    warn_of_extensions(used, extension_effect::unknown, "not known and ignored", "");
+    warn_of_extensions(used, extension_effect::fallback, "not supported",
+                       ": the file's uncompressed copy of the geometry is used");
+}
+
+// One line for all extensions of the same effect.
+void checker::warn_of_extensions(const std::set<std::string>& used, extension_effect effect, const std::string& what,
+                                 const std::string& consequence) {
+    constexpr std::size_t most_named = 8;
+    std::string list;
+    std::size_t count = 0;
     for (const std::string& name : used) {
-        const extension_effect effect = effect_of(name);
-        if (effect == extension_effect::appearance)
-            tolerance_.warnings().push_back(
-                "extension " + printable(name) +
-                " is not supported: only base colour, texture and alpha of materials are used");
-        if (effect == extension_effect::unknown)
-            tolerance_.warnings().push_back("extension " + printable(name) + " is not known and ignored");
-        if (effect == extension_effect::fallback)
-            tolerance_.warnings().push_back("extension " + printable(name) +
-                                            " is not supported: the file's uncompressed copy of the geometry is used");
+        if (effect_of(name) != effect || ++count > most_named) continue;
+        list += (count == 1 ? "" : ", ") + printable(name);
     }
+    if (count == 0) return;
+    if (count > most_named) list += " and " + std::to_string(count - most_named) + " more";
+    tolerance_.warnings().push_back((count == 1 ? "extension " : "extensions ") + list +
+                                    (count == 1 ? " is " : " are ") + what + consequence);
 }
 
 void checker::check_buffers() {

@@ -4,11 +4,13 @@
 // The parts of check_document: one object that walks a document once. Private to check*.cpp.
 
 #include "check.hpp"
+#include "extensions.hpp"
 #include "json_at.hpp"
 
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,6 +41,8 @@ private:
     void check_asset();
     void count_lists();
     void check_extensions();
+    void warn_of_extensions(const std::set<std::string>& used, extension_effect effect, const std::string& what,
+                            const std::string& consequence);
     void check_buffers();
     void check_buffer_views();
     void check_accessors();
