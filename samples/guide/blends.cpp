@@ -60,7 +60,7 @@ int main() {
     // Several meshes in one call share the types of their shaders; draw i's triangles come before those of draw i + 1.
     using draw = vp::draw<vp::mesh_view<>, vp::passthrough, layer>;
     const std::vector<draw> draws{{mesh, {}, {0.5f}}, {mesh, {}, {0.25f}}};
-    vp::voxelize(backend, std::span<const draw>(draws), grid, picture).or_throw();
+    vp::voxelize(backend, draws, grid, picture).or_throw();
     // end snippet
 
     const surface near = vp::get<0>(picture).to_host_target(backend)(1, 1, 0);

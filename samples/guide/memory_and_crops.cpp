@@ -24,9 +24,8 @@ int main() {
     const vp::mesh_view<> mesh{positions, triangles};
     using count = vp::target<std::uint32_t, vp::blend::count>;
     std::vector<std::uint32_t> voxels(count::map::elements(whole.extent));
-    vp::framebuffer_view<count> view{whole.extent, {}};
-    vp::get<0>(view.targets) = {voxels.data(), whole.extent}; // cleared by the call; load keeps what it holds
-    vp::status drawn = vp::voxelize(backend, mesh, whole, vp::passthrough{}, vp::constant(1U), view);
+    const auto view = vp::framebuffer_view<count>::on(whole.extent, voxels.data()); // one pointer per target
+    const vp::status drawn = vp::voxelize(backend, mesh, whole, vp::passthrough{}, vp::constant(1U), view);
     // end snippet
     bool good = drawn.ok() && drawn.counts.fragments != 0;
 

@@ -51,7 +51,7 @@ bool run(cudaStream_t stream) {
     const vp::grid grid{{0, 0, 0}, {1, 1, 1}, {64, 64, 64}};
     vp::cpu_backend host;
     vp::framebuffer<vp::cpu_backend, sums> expected{host, grid.extent};
-    (void)draw(host, grid, expected).or_throw();
+    draw(host, grid, expected).or_throw();
 
     pool memory;
     bool good = true;
@@ -60,9 +60,7 @@ bool run(cudaStream_t stream) {
         vp::cuda_backend backend{stream, memory}; // all work, copies and memory go through this stream
         float* voxels = nullptr;                  // or a tensor, a field of a solver, ...
         check(cudaMallocAsync(&voxels, sums::map::elements(grid.extent) * sizeof(float), stream));
-        vp::framebuffer_view<sums> view{grid.extent, {}};
-        vp::get<0>(view.targets) = {voxels, grid.extent};
-        (void)draw(backend, grid, view).or_throw(); // returns when the voxels are there
+        draw(backend, grid, vp::framebuffer_view<sums>::on(grid.extent, voxels)).or_throw(); // returns when all is done
         // end snippet
         std::vector<float> got(sums::map::elements(grid.extent));
         check(cudaMemcpyAsync(got.data(), voxels, got.size() * sizeof(float), cudaMemcpyDeviceToHost, stream));
@@ -73,7 +71,7 @@ bool run(cudaStream_t stream) {
         // snippet: tracked
         vp::framebuffer<vp::cuda_backend, sums> frames{backend, grid.extent};
         frames.track_changes(backend); // each clear writes only where something was drawn since the last one
-        for (int frame = 0; frame < 3; ++frame) (void)draw(backend, grid, frames).or_throw();
+        for (int frame = 0; frame < 3; ++frame) draw(backend, grid, frames).or_throw();
         // end snippet
         good = good && vp::get<0>(frames).to_host(backend) == vp::get<0>(expected).to_host(host);
     }
