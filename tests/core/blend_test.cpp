@@ -57,8 +57,8 @@ T random_value(splitmix64& random) {
 }
 
 template <class T>
-std::vector<T> random_values(splitmix64& random, std::uint64_t most) {
-    std::vector<T> v(random.below(most + 1));
+std::vector<T> random_values(splitmix64& random, std::uint64_t max_count) {
+    std::vector<T> v(random.below(max_count + 1));
     for (std::size_t i = 0; i < v.size(); ++i) v[i] = random_value<T>(random);
     return v;
 }

@@ -70,13 +70,13 @@ TEST(ListWalk, AdvancesAllListsAtTheSamePace) {
     std::uint32_t done[3]{};
     for (const walk::chunk& chunk : all_chunks(chunks, workers)) {
         ++done[chunk.list];
-        double least = 1, most = 0;
+        double lowest = 1, highest = 0;
         for (int k = 0; k < 3; ++k) {
             const double part = static_cast<double>(done[k]) / chunks[k];
-            least = std::min(least, part);
-            most = std::max(most, part);
+            lowest = std::min(lowest, part);
+            highest = std::max(highest, part);
         }
-        ASSERT_LE(most - least, 1.0 / 64 + 1.0 / 900);
+        ASSERT_LE(highest - lowest, 1.0 / 64 + 1.0 / 900);
     }
     int last = 2;
     for (const walk::chunk& chunk : all_chunks({30, 20, 10}, workers)) {

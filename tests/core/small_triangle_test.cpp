@@ -75,9 +75,9 @@ struct generator {
 };
 
 bool make_small(const snapped_position (&v)[3], int fraction, const voxel_box& box, small_triangle& t) {
-    const int most = small_voxels(fraction);
+    const int max_extent = small_voxels(fraction);
     for (int k = 0; k < 3; ++k)
-        if (box.hi[k] - box.lo[k] >= most) return false;
+        if (box.hi[k] - box.lo[k] >= max_extent) return false;
     for (int i = 0; i < 3; ++i) {
         const std::int64_t q[3] = {v[i].x, v[i].y, v[i].z};
         for (int k = 0; k < 3; ++k) t.p[i][k] = static_cast<std::int32_t>(q[k] - (box.lo[k] << fraction));
@@ -451,10 +451,11 @@ TEST(BrickTriangle, RowsOfTheLargestTrianglesAreTheGeneralSet) {
     std::uint64_t rows = 0, far_rows = 0;
     for (const int fraction : {12, 13, 14, 15, 16})
         for (int i = 0; i < unit::cases(300); ++i) {
-            const std::int64_t most = (std::int64_t{1} << narrow_edge_bits(fraction)) - 1;
-            const std::int64_t size[3] = {g.number(most / 2, most), g.number(most / 64, most),
-                                          g.number(most / 2, most)};
-            const snapped_position corner{g.number(-most, most), g.number(-most, most), g.number(-most, most)};
+            const std::int64_t max_size = (std::int64_t{1} << narrow_edge_bits(fraction)) - 1;
+            const std::int64_t size[3] = {g.number(max_size / 2, max_size), g.number(max_size / 64, max_size),
+                                          g.number(max_size / 2, max_size)};
+            const snapped_position corner{g.number(-max_size, max_size), g.number(-max_size, max_size),
+                                          g.number(-max_size, max_size)};
             snapped_position v[3];
             for (auto& p : v)
                 p = {corner.x + g.number(0, size[0]), corner.y + g.number(0, size[1]), corner.z + g.number(0, size[2])};

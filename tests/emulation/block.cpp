@@ -209,7 +209,7 @@ private:
             case meeting_kind::add:
                 all += f.value;
                 break;
-            case meeting_kind::most:
+            case meeting_kind::maximum:
                 all = f.value > all ? f.value : all;
                 break;
             case meeting_kind::disjunction:

@@ -148,9 +148,9 @@ TEST_P(LibraryCoverage, IsTheOraclesToTheVoxel) {
             where = focused(where, p.as_region());
         }
         // From a handful to thousands in one call.
-        const auto most = std::min<std::uint64_t>(covers_much(kind) ? 40 : 4000, wanted / test_grids().size() + 1);
+        const auto max_count = std::min<std::uint64_t>(covers_much(kind) ? 40 : 4000, wanted / test_grids().size() + 1);
         std::vector<world_triangle> triangles;
-        for (std::uint64_t n = 1 + random.below(most); n > 0; --n)
+        for (std::uint64_t n = 1 + random.below(max_count); n > 0; --n)
             triangles.push_back(make_triangle(random, where, kind));
         const auto threads = static_cast<unsigned>(1 + random.below(3));
         for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin}) {

@@ -209,9 +209,9 @@ private:
         for (double& x : step) x = static_cast<double>(random_.between(-3, 3));
         if (random_.one_in(2)) step = rounded((unit_ * 0.25) * step);
         const double limit = std::max(1.0, std::floor(reach() * unit_ / std::max(1.0, std::fabs(step[0]) + 1.0) / 8.0));
-        const auto most = static_cast<std::int64_t>(std::min(limit, 64.0));
-        return {a, a + static_cast<double>(random_.between(-most, most)) * step,
-                a + static_cast<double>(random_.between(-most, most)) * step};
+        const auto range = static_cast<std::int64_t>(std::min(limit, 64.0));
+        return {a, a + static_cast<double>(random_.between(-range, range)) * step,
+                a + static_cast<double>(random_.between(-range, range)) * step};
     }
 
     corners half_lattice() {
@@ -256,11 +256,11 @@ private:
 
     corners lattice() {
         const position centre = lattice_point(3);
-        const std::int64_t most = std::int64_t{1} << random_.between(1, 12);
+        const std::int64_t range = std::int64_t{1} << random_.between(1, 12);
         corners c;
         for (position& p : c)
             for (std::size_t axis = 0; axis < 3; ++axis)
-                p[axis] = centre[axis] + static_cast<double>(random_.between(-most, most));
+                p[axis] = centre[axis] + static_cast<double>(random_.between(-range, range));
         return c;
     }
 
@@ -301,18 +301,19 @@ private:
     }
 
     corners far_away() {
-        const double most = exact_ ? 0x1p40 : 0x1.fffp39; // the limit itself, where floats reach it exactly
+        const double farthest = exact_ ? 0x1p40 : 0x1.fffp39; // the limit itself, where floats reach it exactly
         corners c;
         const std::size_t near = random_.below(4); // up to two vertices stay near the grid
         for (std::size_t vertex = 0; vertex < 3; ++vertex) {
             const double size = std::exp2(random_.uniform(24.0, 39.9));
             c[vertex] = vertex < near ? inside(0.5) : size * direction();
-            if (vertex >= near && random_.one_in(16)) c[vertex][random_.below(3)] = random_.one_in(2) ? most : -most;
+            if (vertex >= near && random_.one_in(16))
+                c[vertex][random_.below(3)] = random_.one_in(2) ? farthest : -farthest;
         }
         if (near == 0 || near == 3) { // through the grid: the third vertex opposite to the others
             const position at = inside(0.0);
             c[2] = at + -1.0 * (c[0] + c[1]);
-            for (double& x : c[2]) x = std::clamp(x, -0.999 * most, 0.999 * most);
+            for (double& x : c[2]) x = std::clamp(x, -0.999 * farthest, 0.999 * farthest);
         }
         std::swap(c[2], c[random_.below(3)]);
         return c;

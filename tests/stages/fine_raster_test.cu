@@ -105,7 +105,7 @@ template <vp::coverage Rule>
 void compare_passes(stages<marked>& s) {
     // As separate calls: marks, other targets by another shader, and the marks once more onto the stored values.
     marked_targets<vp::cuda_backend> marks{s.gpu, s.g.extent}, d_marks{s.gpu, s.g.extent};
-    extremes most{s.gpu, s.g.extent}, d_most{s.gpu, s.g.extent};
+    extremes bounds{s.gpu, s.g.extent}, d_bounds{s.gpu, s.g.extent};
     const auto call = [&](const auto& shader, auto& fb) {
         const vp::status status = vp::voxelize(s.gpu, s.d_mesh, s.g, vp::passthrough{}, shader, fb, Rule);
         EXPECT_TRUE(status.ok()) << status.message();
@@ -118,7 +118,7 @@ void compare_passes(stages<marked>& s) {
         vp::get<3>(fb).load();
     };
     const vp::counters counted = call(marked{}, marks);
-    call(extreme_values{}, most);
+    call(extreme_values{}, bounds);
     load(marks);
     call(marked{}, marks);
 
@@ -142,9 +142,9 @@ void compare_passes(stages<marked>& s) {
     clear_targets(d_marks.view(), m.state, limits, stream);
     device::fine_pass<Rule, policy>(scene, d_marks.view(), work, {}, m.state, limits, stream);
     const device::pass_counters none{false, false};
-    device::clear_target(vp::get<0>(d_most.view().targets), m.state, limits, stream);
-    device::clear_target(vp::get<1>(d_most.view().targets), m.state, limits, stream);
-    device::fine_pass<Rule, policy>(other, d_most.view(), work, none, m.state, limits, stream);
+    device::clear_target(vp::get<0>(d_bounds.view().targets), m.state, limits, stream);
+    device::clear_target(vp::get<1>(d_bounds.view().targets), m.state, limits, stream);
+    device::fine_pass<Rule, policy>(other, d_bounds.view(), work, none, m.state, limits, stream);
     // end snippet
     load(d_marks);
     device::fine_pass<Rule, policy>(scene, d_marks.view(), work, none, m.state, limits, stream);
@@ -157,8 +157,8 @@ void compare_passes(stages<marked>& s) {
     expect_same_bytes(vp::get<1>(marks).to_host(s.gpu), vp::get<1>(d_marks).to_host(s.gpu), "bits");
     expect_same_bytes(vp::get<2>(marks).to_host(s.gpu), vp::get<2>(d_marks).to_host(s.gpu), "counts");
     expect_same_bytes(vp::get<3>(marks).to_host(s.gpu), vp::get<3>(d_marks).to_host(s.gpu), "last");
-    expect_same_bytes(vp::get<0>(most).to_host(s.gpu), vp::get<0>(d_most).to_host(s.gpu), "maxima");
-    expect_same_bytes(vp::get<1>(most).to_host(s.gpu), vp::get<1>(d_most).to_host(s.gpu), "minima");
+    expect_same_bytes(vp::get<0>(bounds).to_host(s.gpu), vp::get<0>(d_bounds).to_host(s.gpu), "maxima");
+    expect_same_bytes(vp::get<1>(bounds).to_host(s.gpu), vp::get<1>(d_bounds).to_host(s.gpu), "minima");
 }
 
 TEST(FineRaster, SeveralPassesMayShareOneCoarsePass) {

@@ -315,13 +315,13 @@ void expect_same_lists(const mesh_data& m, const vp::grid& g, const VertexShader
     expect_same_on_host(a.to_host(cpu), b.to_host(gpu));
 }
 
-// Counts live bytes, and refuses allocations beyond `most`.
+// Counts live bytes, and refuses allocations beyond `limit`.
 struct counting_resource {
-    std::size_t live = 0, most = std::size_t{1} << 40; // bytes
+    std::size_t live = 0, limit = std::size_t{1} << 40; // bytes
     int calls = 0;
     void* allocate_async(std::size_t bytes, std::size_t, cudaStream_t stream) {
         void* p = nullptr;
-        if (live + bytes > most || cudaMallocAsync(&p, bytes, stream) != cudaSuccess) throw std::bad_alloc();
+        if (live + bytes > limit || cudaMallocAsync(&p, bytes, stream) != cudaSuccess) throw std::bad_alloc();
         live += bytes;
         ++calls;
         return p;

@@ -501,7 +501,7 @@ TEST(Lists, NoMemoryForTheCopyIsInTheStatus) {
     vp::abuffer<vp::cuda_backend> first{be}, second{be};
     ASSERT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(true), first).ok());
     const auto before = first.to_host(be);
-    resource.most = resource.live; // the workspace exists already
+    resource.limit = resource.live; // the workspace exists already
     for (auto* lists : {&first, &second}) {
         const vp::status s = vp::voxelize(be, mesh, other, vp::passthrough{}, vp::constant(true), *lists);
         EXPECT_EQ(s.code, vp::status_code::out_of_memory);

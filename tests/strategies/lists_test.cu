@@ -99,11 +99,11 @@ TEST(Lists, OfRepeatedCallsFitInExactMemoryOrFail) {
     const auto first = lists.to_host(gpu);
     const std::size_t bytes =
         (2 * lists.num_voxels() + 1) * sizeof(std::uint64_t) + lists.num_fragments() * sizeof(std::uint32_t);
-    memory.most = memory.live + bytes;
+    memory.limit = memory.live + bytes;
     const vp::status exact = draw();
     EXPECT_TRUE(exact.ok()) << exact.message();
     expect_same_on_host(first, lists.to_host(gpu));
-    memory.most = memory.live + bytes - 1;
+    memory.limit = memory.live + bytes - 1;
     EXPECT_EQ(draw().code, vp::status_code::out_of_memory);
     expect_same_on_host(first, lists.to_host(gpu));
 }

@@ -228,7 +228,7 @@ TEST(Pipeline, MemoryComesFromTheResource) {
         EXPECT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(1.0f), fb).ok());
         EXPECT_GT(resource.calls, 3);
         be.release();
-        resource.most = resource.live;
+        resource.limit = resource.live;
         const vp::status s = vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(1.0f), fb);
         EXPECT_EQ(s.code, vp::status_code::out_of_memory);
     }
@@ -272,14 +272,14 @@ TEST(Pipeline, FragmentsAreDrawnInTilesIfMemoryDoesNotSufficeForLists) {
             expect_same_bytes(expected, values, "in tiles");
     }
     ASSERT_GT(bytes[0], bytes[1]);
-    for (const std::size_t most : {bytes[0], bytes[1], bytes[1] - 1}) {
+    for (const std::size_t bytes_free : {bytes[0], bytes[1], bytes[1] - 1}) {
         counting_resource resource;
         vp::cuda_backend be{nullptr, resource};
         vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
         const std::size_t of_mesh = m.positions.size() * sizeof(glm::vec3) + m.triangles.size() * sizeof(glm::uvec3);
-        resource.most = resource.live + of_mesh + most;
+        resource.limit = resource.live + of_mesh + bytes_free;
         const vp::status s = draw(be, fb);
-        EXPECT_EQ(s.code, most < bytes[1] ? vp::status_code::out_of_memory : vp::status_code::ok) << most;
+        EXPECT_EQ(s.code, bytes_free < bytes[1] ? vp::status_code::out_of_memory : vp::status_code::ok) << bytes_free;
         if (s.ok()) expect_same_bytes(expected, vp::get<0>(fb).to_host(be), "with less memory");
     }
 }

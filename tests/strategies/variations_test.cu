@@ -140,7 +140,7 @@ struct several_results {
     vp::counters counts;
     std::vector<std::uint32_t> bits, last;
     std::vector<float> sums;
-    std::vector<glm::u8vec4> most;
+    std::vector<glm::u8vec4> maxima;
 };
 
 void expect_same_results(const several_results& a, const several_results& b) {
@@ -148,7 +148,7 @@ void expect_same_results(const several_results& a, const several_results& b) {
     expect_same_bytes(a.bits, b.bits, "bits");
     expect_same_bytes(a.sums, b.sums, "sums");
     expect_same_bytes(a.last, b.last, "last");
-    expect_same_bytes(a.most, b.most, "maxima");
+    expect_same_bytes(a.maxima, b.maxima, "maxima");
 }
 
 several_results results_of(vp::cuda_backend& be, several& fb, const vp::status& s) {

@@ -25,7 +25,7 @@ extern dim3 blockDim, gridDim;
 
 namespace emulation {
 
-enum class meeting_kind { syncwarp, ballot, any, all, shuffle, match, add, most, disjunction };
+enum class meeting_kind { syncwarp, ballot, any, all, shuffle, match, add, maximum, disjunction };
 
 // Runs `body` in every thread of a grid. At most 1024 threads a block, along x.
 void run_grid(dim3 blocks, dim3 threads, std::size_t shared_bytes, const std::function<void()>& body);

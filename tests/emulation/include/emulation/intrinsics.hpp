@@ -113,7 +113,7 @@ template <class T>
     return static_cast<unsigned>(emulation::meet(emulation::meeting_kind::add, mask, value, 0));
 }
 [[nodiscard]] inline unsigned __reduce_max_sync(unsigned mask, unsigned value) {
-    return static_cast<unsigned>(emulation::meet(emulation::meeting_kind::most, mask, value, 0));
+    return static_cast<unsigned>(emulation::meet(emulation::meeting_kind::maximum, mask, value, 0));
 }
 [[nodiscard]] inline unsigned __reduce_min_sync(unsigned mask, unsigned value) {
     return ~__reduce_max_sync(mask, ~value);
