@@ -89,7 +89,7 @@ def main():
         found = INCLUDE.findall(file.read_text())
         includes[name] = [t for t in found if t in names]
         for target in found:
-            ours = target.startswith(("voxelpipe/", "cpu_ref/"))
+            ours = target.startswith(("voxelpipe/", "cpu_ref/")) and target.endswith((".hpp", ".cuh"))
             why = complaint(name, target) if target in names else "no such file" if ours else None
             if why:
                 print(f"{name}: includes <{target}>: {why}")

@@ -43,8 +43,7 @@ mesh_data crowded(float size, std::uint32_t seed) {
 template <class Backend, class... Targets, class... Ts>
 vp::status draw_constant(Backend& be, vp::framebuffer<Backend, Targets...>& fb, const vp::grid& g,
                          const std::vector<mesh_data>& meshes, const std::vector<vp::constant_output<Ts...>>& shaders,
-                         const vp::core::pack<typename Targets::value_type...>& clear,
-                         const call_options& options) {
+                         const vp::core::pack<typename Targets::value_type...>& clear, const call_options& options) {
     std::vector<vp::mesh<Backend>> on_backend;
     std::vector<constant_draw<Ts...>> draws;
     for (const mesh_data& m : meshes) on_backend.emplace_back(be, m.positions, m.triangles);

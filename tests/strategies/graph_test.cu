@@ -168,7 +168,8 @@ void compare_replayed_lists(const FragmentShader& fs, std::uint32_t seed) {
         ASSERT_GT(bytes, 0u);
         const guarded_memory memory(be, bytes);
         const vp::workspace_view workspace{const_cast<unsigned char*>(memory.memory.data()), bytes, limits};
-        const captured_graph graph(be.stream, [&] { return vp::voxelize_async(be, draws, g, lists, {rule}, workspace); });
+        const captured_graph graph(be.stream,
+                                   [&] { return vp::voxelize_async(be, draws, g, lists, {rule}, workspace); });
         for (const mesh_data& m : mesh.poses) {
             mesh.pose(be, m);
             graph.launch(be.stream);

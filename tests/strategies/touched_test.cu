@@ -24,8 +24,7 @@ using bits = vp::target<vp::bit, Blend, Layout>;
 // One call into targets that are cleared to these values or hold a byte pattern; some are off.
 template <class Backend, class... Targets, class Values, class... Clear>
 vp::status draw_constants(Backend& be, vp::framebuffer<Backend, Targets...>& fb, const mesh_data& m, const vp::grid& g,
-                          const Values& values, const call_options& options, start how, indices known,
-                          Clear... clear) {
+                          const Values& values, const call_options& options, start how, indices known, Clear... clear) {
     const vp::mesh<Backend> mesh{be, m.positions, m.triangles};
     const auto each = [&](auto&& f) {
         const auto clears = vp::core::make_pack(clear...);
