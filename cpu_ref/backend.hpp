@@ -21,6 +21,8 @@
 
 namespace voxelpipe {
 
+// Threads may call through one backend at the same time, each with a framebuffer or A-buffer of its own, if `times` is
+// null; `progress` then hears of all calls.
 class cpu_backend {
 public:
     // Host memory by operator new, uninitialised, 64-byte aligned. Throws std::bad_alloc.

@@ -90,6 +90,10 @@ private:
     cudaStream_t stream_ = nullptr;
 };
 
+// May be used by one thread at a time, with its framebuffers, A-buffers and buffers, since a call changes the
+// workspace, the history and the kept graph that the backend keeps. Threads that work at the same time have a backend
+// each, with a stream each; meshes that nobody changes may be shared, once the stream that made them has been waited
+// for.
 class cuda_backend {
 public:
     // Device memory on the backend's stream, uninitialised. Throws std::bad_alloc, or std::runtime_error with the CUDA

@@ -40,7 +40,9 @@ struct workspace_limits {
 };
 
 // Memory of the caller's, at least workspace_bytes(...) of it, aligned to 256 bytes, in use from the call until the
-// stream has passed it.
+// stream has passed it: by one call at a time. Calls on other streams or threads have other workspaces; one workspace
+// may serve calls that follow each other on one stream, and a captured graph may be launched by any thread, one at a
+// time.
 struct workspace_view {
     void* memory = nullptr;
     std::size_t bytes = 0;
