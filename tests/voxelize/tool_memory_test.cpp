@@ -168,7 +168,8 @@ TEST(Memory, LargePlainPicturesAllShow) {
     file.write_glb(folder / "m.glb");
     EXPECT_GT(1000000U, std::filesystem::file_size(folder / "m.glb"));
     const std::vector<std::string> arguments{
-        folder / "m.glb", "-o", folder / "o.npy", "-t", "color", "--origin=0,0,-0.5", "-s", "1", "--extent", "1,1,6"};
+        folder / "m.glb", "-o",    folder / "o.npy", "-t", "color", "--origin=0,0,-0.5", "-s", "1",
+        "--extent",       "1,1,6", "--backend",      "cpu"};
     const outcome result = run(folder, arguments, sanitized ? 0 : std::uint64_t{6} << 30);
     ASSERT_EQ(0, result.code) << result.err;
     EXPECT_EQ(std::string::npos, result.err.find("warning")) << result.err;
@@ -186,8 +187,8 @@ TEST(Memory, LargePlainPicturesAllShow) {
 TEST(Memory, ResultsThatDoNotFitNameTheirSize) {
     const scratch_folder folder;
     gltf_test::small_world().write_glb(folder / "m.glb");
-    const outcome result = run(
-        folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "color,normal", "-r", "1000", "--max-memory", "900"});
+    const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "color,normal", "-r", "1000",
+                                        "--max-memory", "900", "--backend", "cpu"});
     EXPECT_EQ(3, result.code);
     EXPECT_NE(std::string::npos, result.err.find("voxels: at least")) << result.err;
     EXPECT_NE(std::string::npos, result.err.find("900 MiB are allowed by --max-memory: take fewer targets or voxels"))
@@ -200,8 +201,9 @@ void expect_refusal(const std::string& name, const std::string& bytes, int code)
     std::ofstream(folder / "m.glb", std::ios::binary) << bytes;
     rusage before{}, after{};
     getrusage(RUSAGE_CHILDREN, &before);
-    const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "color", "-r", "64"},
-                               sanitized ? 0 : std::uint64_t{6} << 30);
+    const outcome result =
+        run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "color", "-r", "64", "--backend", "cpu"},
+            sanitized ? 0 : std::uint64_t{6} << 30);
     getrusage(RUSAGE_CHILDREN, &after);
     EXPECT_EQ(code, result.code) << name << ": " << result.err;
     EXPECT_NE(std::string::npos, result.err.find("MiB")) << name << ": " << result.err;
