@@ -121,6 +121,40 @@ TEST(Coordinates, AnExactGridFarAwayIsFilledAsOneNearby) {
     EXPECT_GE(2U, differing(expected, found));
 }
 
+// One mesh, shown plain and mirrored: normals look outwards from both.
+TEST(Coordinates, MirroringKeepsFrontsInFront) {
+    const scratch_folder folder;
+    const auto check = [&](const std::vector<std::vector<double>>& scales,
+                           const std::vector<std::vector<double>>& places) {
+        builder file;
+        gltf_test::add_cube(file, {0, 0, 0}, 1, gltf_test::add_material(file, {1, 1, 1, 1}));
+        file.root["nodes"] = json::array();
+        for (std::size_t i = 0; i < scales.size(); ++i)
+            file.append("nodes", {{"mesh", 0}, {"scale", scales[i]}, {"translation", places[i]}});
+        file.write_glb(folder / "m.glb");
+        const outcome done = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "normal", "--origin=0,0,0",
+                                          "-s", "0.25", "--extent", "12,4,4", "--backend", "cpu"});
+        ASSERT_EQ(0, done.code) << done.err;
+        const tool_test::array normals = read_npy(folder / "o.npy");
+        for (const int left : {0, 8}) {
+            for (int axis = 0; axis < 3; ++axis) {
+                for (const int side : {0, 3}) { // the middle of a face, where no other is near
+                    glm::ivec3 at(1);
+                    at[axis] = side;
+                    const auto i = static_cast<std::size_t>((at.z * 4 + at.y) * 12 + at.x + left);
+                    glm::vec3 outwards(0);
+                    outwards[axis] = side == 0 ? -1.0F : 1.0F;
+                    EXPECT_EQ(outwards, normals.at<glm::vec3>(i)) << left << ' ' << axis << ' ' << side;
+                }
+            }
+        }
+    };
+    check({{1, 1, 1}, {1, 1, 1}}, {{0, 0, 0}, {2, 0, 0}});
+    check({{1, 1, 1}, {-1, 1, 1}}, {{0, 0, 0}, {3, 0, 0}});
+    check({{-1, -1, -1}, {1, 1, -1}}, {{1, 1, 1}, {2, 0, 1}});
+    check({{-1, -1, 1}, {1, -1, -1}}, {{1, 1, 0}, {2, 1, 1}});
+}
+
 TEST(Coordinates, DepthIsAWorldPosition) {
     const scratch_folder folder;
     builder file;
