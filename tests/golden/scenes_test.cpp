@@ -106,8 +106,7 @@ outcome voxelize(const bench::mesh_data& mesh, const scene_case& c, unsigned thr
     vp::framebuffer_view<target> fb{c.extent, {}};
     vp::get<0>(fb.targets) = {r.words.data(), c.extent, vp::load_operation::clear, false};
     const vp::mesh_view<> view{mesh.positions, mesh.triangles};
-    const vp::status s =
-        vp::voxelize(backend, view, r.grid, vp::passthrough{}, vp::constant(true), fb, c.rule);
+    const vp::status s = vp::voxelize(backend, view, r.grid, vp::passthrough{}, vp::constant(true), fb, c.rule);
     s.or_throw();
     r.voxels = s.counts.voxels;
     r.fragments = s.counts.fragments;
