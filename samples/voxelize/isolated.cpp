@@ -11,6 +11,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -47,8 +48,12 @@ std::uint64_t address_space_in_use() {
     return pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
+// Never above what holds already.
 void limit(int resource, std::uint64_t soft, std::uint64_t hard) {
-    const rlimit value{static_cast<rlim_t>(soft), static_cast<rlim_t>(hard)};
+    rlimit now{};
+    if (getrlimit(resource, &now) != 0) return;
+    const rlimit value{std::min(now.rlim_cur, static_cast<rlim_t>(soft)),
+                       std::min(now.rlim_max, static_cast<rlim_t>(hard))};
     (void)setrlimit(resource, &value);
 }
 
