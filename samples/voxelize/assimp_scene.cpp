@@ -23,8 +23,9 @@ isolation_limits limits_for(std::uint64_t bytes, const gltf_limits& limits) {
     constexpr std::uint64_t most = std::uint64_t{1} << 46;
     isolation_limits result;
     const std::uint64_t each = std::max<std::uint64_t>(limits.memory_per_input_byte, 1);
-    result.memory = 2 * limits.base_memory + (bytes > most / each ? most : bytes * each);
-    result.result = result.memory;
+    const std::uint64_t of_size = 2 * limits.base_memory + (bytes > most / each ? most : bytes * each);
+    result.memory = std::min(of_size, limits.room);
+    result.result = of_size;
     result.seconds = limits.import_seconds + 2 * (bytes >> 20); // two a MiB: twenty times what text takes
     return result;
 }
@@ -123,9 +124,15 @@ scene load_by_assimp(std::span<const std::byte> bytes, const std::string& name, 
     if (bytes.empty()) throw model_error("the file is empty");
     gltf::budget memory{limits};
     memory.grant_input(bytes.size());
-    const std::vector<std::byte> reply =
-        run_isolated([&] { return assimp::to_bytes(assimp::read_model(bytes, name, read_file)); },
-                     limits_for(bytes.size(), limits), "assimp");
+    const isolation_limits bounds = limits_for(bytes.size(), limits);
+    std::vector<std::byte> reply;
+    try {
+        reply = run_isolated([&] { return assimp::to_bytes(assimp::read_model(bytes, name, read_file)); }, bounds,
+                             "assimp");
+    } catch (const isolation_memory_error&) {
+        if (bounds.memory == limits.room) throw std::bad_alloc(); // the run's limit, not the file's
+        throw;
+    }
     memory.charge(reply.size(), 1, "the model");
     return to_scene(assimp::from_bytes(reply), read_file, memory);
 }

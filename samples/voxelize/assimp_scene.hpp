@@ -24,8 +24,8 @@ namespace voxelize {
 // assimp is best known for.
 [[nodiscard]] bool is_for_assimp(const std::string& extension);
 
-// Loads FILE. Throws model_error, in a build without assimp always, with what to do instead; and std::bad_alloc where an
-// honest file does not fit into memory.
+// Loads FILE. Throws model_error, in a build without assimp always, with what to do instead; and std::bad_alloc where
+// an honest file does not fit into memory.
 [[nodiscard]] scene load_by_assimp(const std::filesystem::path& file, const gltf_limits& limits = {});
 
 // The same from memory; NAME is the file's, its extension says the format. Without a reader other files are not read.

@@ -12,8 +12,8 @@
 // one animation at one time.
 //
 // What is not supported: where geometry would be lost (required extensions that are not known, Draco or meshopt
-// compression in a build without the library) the load fails and says so; otherwise scene::warnings names it. Points and
-// lines have no surface and are left out.
+// compression in a build without the library) the load fails and says so; otherwise scene::warnings names it. Points
+// and lines have no surface and are left out.
 
 #include "model_error.hpp"
 #include "scene.hpp"
@@ -43,6 +43,7 @@ struct gltf_limits {
     std::uint64_t base_memory = std::uint64_t{256} << 20;
     std::uint64_t memory_per_input_byte = 256;
     std::uint32_t max_image_side = 16384; // pixels
+    std::uint64_t room = UINT64_MAX;      // bytes that the run may still take; assimp's process keeps to it
     std::uint64_t import_seconds = 3;     // of processor time for assimp, and two more for each MiB of the file
 };
 

@@ -3,7 +3,6 @@
 #include "isolated.hpp"
 
 #include "gltf/text.hpp"
-#include "model_error.hpp"
 
 #include <fcntl.h>
 #include <sys/prctl.h>
@@ -160,8 +159,8 @@ std::vector<std::byte> run_isolated(const std::function<std::vector<std::byte>()
     bytes.erase(bytes.begin());
     if (how == outcome::done) return bytes;
     if (how == outcome::no_memory)
-        throw model_error(who + " needs more than the " + mebibytes(limits.memory) +
-                          " of memory that a file of this size gets");
+        throw isolation_memory_error(who + " needs more than the " + mebibytes(limits.memory) +
+                                     " of memory that a file of this size gets");
     const std::string text = gltf::printable({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, 200);
     throw model_error(who + ": " + (text.empty() ? "the file cannot be read" : text));
 }

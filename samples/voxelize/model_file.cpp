@@ -4,6 +4,9 @@
 
 #include "assimp/file_name.hpp"
 #include "assimp_scene.hpp"
+#include "memory.hpp"
+
+#include <algorithm>
 
 namespace voxelize {
 
@@ -13,7 +16,9 @@ scene load(const std::filesystem::path& file, const load_options& options) {
     const std::string extension = assimp::lower_extension(file);
     if (!is_for_assimp(extension)) return load_gltf(file, options.limits, options.gltf);
     if (options.gltf.animation) throw model_error("--animation is for glTF models");
-    return load_by_assimp(file, options.limits);
+    gltf_limits limits = options.limits;
+    limits.room = std::min(limits.room, memory::room());
+    return load_by_assimp(file, limits);
 }
 
 } // namespace
