@@ -225,7 +225,8 @@ enum class start { clear, load };
 // The options of a call, or a coverage in their place, as voxelize takes them.
 struct call_options : vp::voxelize_options {
     call_options() = default;
-    call_options(vp::coverage rule_) : vp::voxelize_options{rule_, true} {}  // NOLINT(*-explicit-*)
+    call_options(vp::coverage rule_, bool count_voxels_ = true) // NOLINT(*-explicit-*)
+        : vp::voxelize_options{rule_, count_voxels_} {}
     call_options(const vp::voxelize_options& o) : vp::voxelize_options(o) {} // NOLINT(*-explicit-*)
 };
 

@@ -28,6 +28,7 @@ struct sequence_step {
     bool is_listed = true;  // a computing shader by lists; in tiles, fragments are not marked
     bool fails = false;     // an index out of range
     bool elsewhere = false; // other code has written the memory before, and the framebuffer is told
+    bool nothing = false;   // a mesh without triangles: a clear alone
 };
 
 // Small and large triangles in a part of the grid that differs by the number.
@@ -119,7 +120,7 @@ public:
         begin(vp::get<0>(fb_), s.targets[0], cleared.first);
         begin(vp::get<1>(fb_), s.targets[1], cleared.second);
         if constexpr (std::is_same_v<Backend, vp::cuda_backend>) backend_.lists_fragments = s.is_listed;
-        const auto& mesh = (s.fails ? broken_ : meshes_)[static_cast<std::size_t>(s.mesh)];
+        const auto& mesh = s.nothing ? empty_ : (s.fails ? broken_ : meshes_)[static_cast<std::size_t>(s.mesh)];
         const vp::voxelize_options options{s.mesh < 3 ? vp::coverage::conservative : vp::coverage::thin,
                                            s.mesh % 2 == 0};
         if (s.varies)
@@ -136,6 +137,7 @@ private:
     vp::framebuffer<Backend, typename Kind::first, typename Kind::second> fb_;
     vp::grid grid_;
     std::vector<vp::mesh<Backend>> meshes_, broken_;
+    vp::mesh<Backend> empty_{backend_, std::vector<glm::vec3>{}, std::vector<glm::uvec3>{}};
 };
 
 constexpr auto C = before::clear, L = before::load, O = before::off;
@@ -170,6 +172,12 @@ const sequence_step steps[] = {
     {{C, C}, 0, 3, 1},
     {{C, C}, 0, 0, 1, false, true, false, true}, // the marks are forgotten
     {{C, C}, 0, 1, 1},
+    {{C, C}, 0, 0, 1, false, true, false, false, true}, // clears alone, to the same value
+    {{C, C}, 0, 1, 1},
+    {{C, C}, 3, 0, 1, false, true, false, false, true}, // to another: what the marks said before holds no longer
+    {{C, C}, 0, 2, 1},
+    {{L, C}, 4, 0, 1, false, true, false, false, true},
+    {{C, C}, 0, 3, 1},
 };
 
 template <class Kind>
