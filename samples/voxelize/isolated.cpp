@@ -4,6 +4,17 @@
 
 #include "gltf/text.hpp"
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define VOXELIZE_IS_SANITIZED
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define VOXELIZE_IS_SANITIZED
+#endif
+#endif
+#ifdef VOXELIZE_IS_SANITIZED
+#include <sanitizer/common_interface_defs.h>
+#endif
+
 #include <fcntl.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -22,14 +33,8 @@ namespace voxelize {
 
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef VOXELIZE_IS_SANITIZED
 constexpr bool bounds_memory = false;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
-constexpr bool bounds_memory = false;
-#else
-constexpr bool bounds_memory = true;
-#endif
 #else
 constexpr bool bounds_memory = true;
 #endif
@@ -69,6 +74,9 @@ bool write_all(int file, std::span<const std::byte> bytes) {
 [[noreturn]] void run_child(const std::function<std::vector<std::byte>()>& work, const isolation_limits& limits,
                             int out) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
+#ifdef VOXELIZE_IS_SANITIZED
+    __sanitizer_set_death_callback(nullptr); // a fuzzer's, which would keep the input as a finding of its own
+#endif
     for (const int signal : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGXCPU}) std::signal(signal, SIG_DFL);
     // Libraries print what they find; nobody asked for it.
     if (const int nowhere = open("/dev/null", O_RDWR); nowhere >= 0)
