@@ -6,6 +6,9 @@
 
 #include "stage_scene.hpp"
 
+#include <voxelpipe/device/scene/count_and_emit.cuh>
+#include <voxelpipe/device/tiles/coarse_raster.cuh>
+
 using namespace stage_test;
 
 namespace {
@@ -36,7 +39,7 @@ void compare_tiles(stages<vp::constant_output<bool>>& s, int log2_size) {
     const std::size_t bytes =
         std::max(device::sort_bytes<std::uint32_t>(limits.tile_pairs, bits), device::share_scan_bytes(n));
     void* const storage = m.memory.take<std::byte>(bytes);
-    device::split_buffers<> split{};
+    device::split_buffers split{};
     split.pairs_per_item = per_item;
     split.items = m.memory.take<device::work_item>(device::max_items(limits.tile_pairs, tiles.count(), per_item));
     split.splits = m.memory.take<device::split_tile>(device::max_images(limits.tile_pairs, per_item));
@@ -46,9 +49,9 @@ void compare_tiles(stages<vp::constant_output<bool>>& s, int log2_size) {
     device::share_count(scene.geo, op, share, m.state, storage, bytes, vp::stage::coarse_raster, s.gpu.stream);
     device::share_emit(scene.geo, op, share, m.state, limits, vp::stage::coarse_raster, s.gpu.stream);
     device::fill_end(keys[0], primitives[0], share.num_cells, limits.tile_pairs, m.state, limits, s.gpu.stream);
-    cub::DoubleBuffer<std::uint32_t> k(keys[0], keys[1]), v(primitives[0], primitives[1]);
-    device::sort_by_cell(k, v, limits.tile_pairs, bits, storage, bytes, vp::stage::tile_sort, s.gpu.stream);
-    device::tile_split(k.Current(), split, m.state, limits, s.gpu.stream);
+    const int sorted = device::sort_by_cell(keys, primitives, limits.tile_pairs, bits, storage, bytes,
+                                            vp::stage::tile_sort, s.gpu.stream);
+    device::tile_split(keys[sorted], split, m.state, limits, s.gpu.stream);
     const device::pipeline_state end = m.end(s.gpu);
     ASSERT_EQ(end.tile_pairs, coarse.pairs.size());
     EXPECT_EQ(end.drawn, coarse.counts.triangles_drawn);
@@ -58,8 +61,8 @@ void compare_tiles(stages<vp::constant_output<bool>>& s, int log2_size) {
         tile_of.push_back(p.key);
         primitive_of.push_back(p.primitive);
     }
-    expect_same_bytes(tile_of, copy_back(k.Current(), tile_of.size()), "tiles of the sorted pairs");
-    expect_same_bytes(primitive_of, copy_back(v.Current(), tile_of.size()), "primitives of the sorted pairs");
+    expect_same_bytes(tile_of, copy_back(keys[sorted], tile_of.size()), "tiles of the sorted pairs");
+    expect_same_bytes(primitive_of, copy_back(primitives[sorted], tile_of.size()), "primitives of the sorted pairs");
 
     // Each range is split into work items of at most 64 pairs, none is lost, and images are numbered without gaps.
     auto items = copy_back(split.items, end.num_items);

@@ -11,6 +11,7 @@
 #include <voxelpipe/device/call/framebuffer_call.cuh>
 #include <voxelpipe/device/call/graph_cache.cuh>
 #include <voxelpipe/device/call/readback.cuh>
+#include <voxelpipe/device/kernels.cuh>
 #include <voxelpipe/device/scene/check_indices.cuh>
 
 #include <algorithm>
@@ -221,7 +222,8 @@ public:
         return host;
     }
 
-    // What check_indices calls.
+    // What check_indices calls. A template, so that its kernel is compiled where it is called.
+    template <int = 0>
     [[nodiscard]] std::uint32_t max_index(array_view<const glm::uvec3> triangles) {
         buffer<std::uint32_t> most(*this, std::size_t{1});
         buffer<std::uint32_t>::translate([&] {
@@ -258,60 +260,12 @@ public:
               class... Targets>
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              const framebuffer_view<Targets...>& fb, const voxelize_options& options,
-                             std::uint64_t triangles_in) {
-        return attempt(framebuffer_room_, {triangles_in, g.extent, g.offset, options.rule},
-                       [&](device::capacities& limits, std::uint64_t, std::uint64_t left, device::pipeline_state& state,
-                           device::stage_clock* clock) {
-                           limits.longest_ordered = ~0ull; // an order may come before a blend
-                           return device::with_framebuffer_call<Selector>(
-                               draws, g, fb, options, triangles_in, limits, [&](auto call) {
-                                   call.clock = clock;
-                                   call.may_list = lists_fragments;
-                                   limits.skips_deferred_pass = call.limits.skips_deferred_pass =
-                                       call.can_skip_deferred_pass(left) ? 1 : 0;
-                                   launch_where_it_fits(call, state);
-                                   return call.is_listed_call();
-                               });
-                       });
-    }
+                             std::uint64_t triangles_in);
 
     template <class Mesh, class VertexShader, class FragmentShader, class Payload>
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              abuffer<cuda_backend, Payload>& lists, const voxelize_options& options,
-                             std::uint64_t triangles_in) {
-        using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
-        abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
-        status s =
-            attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
-                    [&](device::capacities& limits, std::uint64_t voxel_room, std::uint64_t left,
-                        device::pipeline_state& state, device::stage_clock* clock) {
-                        call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
-                        limits.skips_deferred_pass = call.limits.skips_deferred_pass =
-                            call.can_skip_deferred_pass(left) ? 1 : 0;
-                        call.has_few_a_voxel = limits.fragments < device::min_counted * voxel_room;
-                        if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
-                            fill<std::uint64_t>(options.rule, call, voxel_room, made, state);
-                            return false;
-                        }
-                        call.may_shade_late = true;
-                        const void* const kind = device::tag_of_call<call_type>();
-                        call.filters = std::find(discarding_.begin(), discarding_.end(), kind) != discarding_.end();
-                        fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
-                        if (state.discarded != 0 && call.template shades_late<std::uint32_t>() && !call.filters) {
-                            discarding_.push_back(kind);
-                            call.filters = true;
-                            fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
-                        }
-                        return false;
-                    });
-        if (s.ok()) {
-            made.extent = g.extent;
-            lists = std::move(made);
-            s.counts.fragments = lists.num_fragments();
-            s.counts.voxels = lists.num_voxels();
-        }
-        return s;
-    }
+                             std::uint64_t triangles_in);
 
     // Gives back the memory that is kept between calls.
     void release() {
@@ -616,5 +570,70 @@ private:
     std::size_t zeroed_bytes_ = 0;        // of the workspace, from its start
     std::vector<const void*> discarding_; // kinds of lists' calls that were shaded late and discarded fragments
 };
+
+// Not in the class, and so not inline: a unit that links voxelpipe::cuda_kernels does not compile what that has
+// (device/kernels.cuh).
+template <class Selector, class Mesh, class VertexShader, class FragmentShader, class... Targets>
+status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
+                         const framebuffer_view<Targets...>& fb, const voxelize_options& options,
+                         std::uint64_t triangles_in) {
+    return attempt(framebuffer_room_, {triangles_in, g.extent, g.offset, options.rule},
+                   [&](device::capacities& limits, std::uint64_t, std::uint64_t left, device::pipeline_state& state,
+                       device::stage_clock* clock) {
+                       limits.longest_ordered = ~0ull; // an order may come before a blend
+                       return device::with_framebuffer_call<Selector>(
+                           draws, g, fb, options, triangles_in, limits, [&](auto call) {
+                               call.clock = clock;
+                               call.may_list = lists_fragments;
+                               limits.skips_deferred_pass = call.limits.skips_deferred_pass =
+                                   call.can_skip_deferred_pass(left) ? 1 : 0;
+                               launch_where_it_fits(call, state);
+                               return call.is_listed_call();
+                           });
+                   });
+}
+
+template <class Mesh, class VertexShader, class FragmentShader, class Payload>
+status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
+                         abuffer<cuda_backend, Payload>& lists, const voxelize_options& options,
+                         std::uint64_t triangles_in) {
+    using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
+    abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
+    status s = attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
+                       [&](device::capacities& limits, std::uint64_t voxel_room, std::uint64_t left,
+                           device::pipeline_state& state, device::stage_clock* clock) {
+                           call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
+                           limits.skips_deferred_pass = call.limits.skips_deferred_pass =
+                               call.can_skip_deferred_pass(left) ? 1 : 0;
+                           call.has_few_a_voxel = limits.fragments < device::min_counted * voxel_room;
+                           if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
+                               fill<std::uint64_t>(options.rule, call, voxel_room, made, state);
+                               return false;
+                           }
+                           call.may_shade_late = true;
+                           const void* const kind = device::tag_of_call<call_type>();
+                           call.filters = std::find(discarding_.begin(), discarding_.end(), kind) != discarding_.end();
+                           fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
+                           if (state.discarded != 0 && call.template shades_late<std::uint32_t>() && !call.filters) {
+                               discarding_.push_back(kind);
+                               call.filters = true;
+                               fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
+                           }
+                           return false;
+                       });
+    if (s.ok()) {
+        made.extent = g.extent;
+        lists = std::move(made);
+        s.counts.fragments = lists.num_fragments();
+        s.counts.voxels = lists.num_voxels();
+    }
+    return s;
+}
+
+#if defined(VOXELPIPE_LINKS_CUDA_KERNELS)
+VOXELPIPE_BIT_CALLS(extern template)
+VOXELPIPE_SUM_CALLS(extern template)
+VOXELPIPE_LIST_CALLS(extern template)
+#endif
 
 } // namespace voxelpipe

@@ -7,6 +7,7 @@
 // touches what a kernel of the same call writes; everywhere else, both are an ordinary launch and nothing.
 
 #include <voxelpipe/config.hpp>
+#include <voxelpipe/device/base/kernel_library.cuh>
 #include <voxelpipe/device/base/launch_size.hpp>
 #include <voxelpipe/device/base/memory.cuh>
 
@@ -104,21 +105,9 @@ inline constexpr int threads_per_block = 256; // of kernels that have no tuning 
 // ---- kernels of any call
 // -----------------------------------------------------------------------------------------------
 
-// Writes zeros. A template, as all kernels in headers are.
-template <class Word>
-__global__ void zero_kernel(Word* memory, std::uint64_t words) {
-    await_stream();
-    for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < words;
-         i += std::uint64_t{gridDim.x} * blockDim.x)
-        memory[i] = {};
-}
-
 // Where a call starts that leaves no zeros for the next: the start of its memory, whole uint4s. By a kernel, for the
 // next one can begin early behind a kernel, and not behind cudaMemsetAsync.
-inline void zero_memory(void* memory, std::size_t bytes, cudaStream_t stream) {
-    launch_behind(zero_kernel<uint4>, fill_device(bytes / sizeof(uint4)), threads_per_block, stream, stage::validate,
-                  static_cast<uint4*>(memory), std::uint64_t{bytes / sizeof(uint4)});
-}
+VOXELPIPE_DECLARES_KERNELS void zero_memory(void* memory, std::size_t bytes, cudaStream_t stream);
 
 // Copies a few host values to the device as kernel arguments: no host memory has to outlive the call, and a captured
 // graph replays it.
@@ -132,6 +121,12 @@ __global__ void write_chunk(T* to, const __grid_constant__ argument_chunk<T, N> 
     if (i < count) to[i] = chunk.items[i];
 }
 
+template <class T, int N>
+void write_arguments(T* to, const argument_chunk<T, N>& chunk, int count, cudaStream_t stream) {
+    write_chunk<T, N><<<1, 256, 0, stream>>>(to, chunk, count);
+    check(cudaGetLastError(), stage::vertex_shade);
+}
+
 template <class T, class Source>
 void upload(T* to, std::size_t count, Source&& source, cudaStream_t stream) {
     constexpr int n = sizeof(T) > 1024 ? 1 : static_cast<int>(3072 / sizeof(T) < 256 ? 3072 / sizeof(T) : 256);
@@ -140,8 +135,7 @@ void upload(T* to, std::size_t count, Source&& source, cudaStream_t stream) {
         argument_chunk<T, n> chunk{};
         const std::size_t part = count - first < n ? count - first : n;
         for (std::size_t i = 0; i < part; ++i) chunk.items[i] = source(first + i);
-        write_chunk<T, n><<<1, 256, 0, stream>>>(to + first, chunk, static_cast<int>(part));
-        check(cudaGetLastError(), stage::vertex_shade);
+        write_arguments(to + first, chunk, static_cast<int>(part), stream);
     }
 }
 

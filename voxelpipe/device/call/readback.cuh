@@ -30,24 +30,8 @@ struct sent_state {
     std::uint64_t words[count];
 };
 
-// Sends the state to memory that the host sees, and leaves zeros for the next call. One warp.
-template <class State>
-__global__ void send_state_kernel(State* state, sent_state<State>* to) {
-    await_stream();
-    using sent = sent_state<State>;
-    std::uint32_t words[(sent::count + 31) / 32];
-    const auto each = [&](auto&& f) VOXELPIPE_INLINE_LAMBDA {
-#pragma unroll
-        for (unsigned k = 0; k < (sent::count + 31) / 32; ++k)
-            if (const unsigned i = 32 * k + threadIdx.x; i < sent::count) f(words[k], i);
-    };
-    each([&](std::uint32_t& word, unsigned i) { word = reinterpret_cast<const std::uint32_t*>(state)[i]; });
-    __threadfence_system();
-    each([&](std::uint32_t& word, unsigned i) {
-        *static_cast<volatile std::uint64_t*>(&to->words[i]) = sent::arrived | word;
-    });
-    each([&](std::uint32_t&, unsigned i) { reinterpret_cast<std::uint32_t*>(state)[i] = 0; });
-}
+// Sends the state to memory that the host sees, and leaves zeros for the next call.
+VOXELPIPE_DECLARES_KERNELS void send_state(pipeline_state* state, sent_state<pipeline_state>* to, cudaStream_t stream);
 
 // Brings the state of a call to the host. Into ordinary memory the driver copies it; from the second call on a page of
 // host memory is locked, which a kernel writes in less time: 10 us of a call that takes 60. The host looks at the page
@@ -86,7 +70,7 @@ public:
     // The last that a call puts on its stream. With a page, the state is zeroed then.
     void send(pipeline_state* state, cudaStream_t stream) const {
         if (on_device_ == nullptr) return;
-        launch_behind(send_state_kernel<pipeline_state>, 1, 32, stream, stage::validate, state, &on_device_->state);
+        send_state(state, &on_device_->state, stream);
     }
     // What was sent, once all that the stream had before is done.
     [[nodiscard]] pipeline_state receive(const pipeline_state* state, cudaStream_t stream) const {

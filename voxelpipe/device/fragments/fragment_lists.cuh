@@ -18,9 +18,6 @@
 #include <voxelpipe/device/scene/cub_sort.cuh>
 #include <voxelpipe/device/scene/fragment_shade.cuh>
 
-#include <cub/device/device_select.cuh>
-#include <thrust/iterator/counting_iterator.h>
-
 #include <algorithm>
 #include <bit>
 #include <utility>
@@ -85,27 +82,6 @@ struct all_values {
         return o.values;
     }
 };
-
-// Whether fragment i is the first of its voxel.
-template <class Key>
-struct is_first_of_voxel {
-    const Key* keys;
-    const pipeline_state* state;
-    capacities limits;
-    [[nodiscard]] __device__ bool operator()(unsigned long long i) const {
-        return !has_failed(*state, limits) && i < state->list_fragments && (i == 0 || keys[i] != keys[i - 1]);
-    }
-};
-
-template <class Key>
-[[nodiscard]] std::size_t select_bytes(std::uint64_t capacity) {
-    std::size_t bytes = 0;
-    check(cub::DeviceSelect::If(nullptr, bytes, thrust::counting_iterator<unsigned long long>(0),
-                                static_cast<std::uint64_t*>(nullptr), static_cast<unsigned long long*>(nullptr),
-                                capacity, is_first_of_voxel<Key>{}),
-          stage::abuffer_emit);
-    return bytes;
-}
 
 // Arrays of the fragment lists of one call.
 template <class Key, class Payload>
@@ -173,16 +149,10 @@ struct fragment_lists {
     }
 };
 
-// Between what lists fragments and the sort, where the raster has not done it: what the sort and the order want of
-// their memory, and fillers where cub sorts.
+// Does what the preparation wants and, where the capacity is sorted by cub, fills it up beyond the fragments.
 template <class Key>
-__global__ void prepare_sort_kernel(Key* keys, std::uint32_t* values, std::uint64_t capacity,
-                                    const __grid_constant__ sort_preparation preparation, const pipeline_state* state,
-                                    capacities limits) {
-    await_stream();
-    preparation.run(std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x, std::uint64_t{gridDim.x} * blockDim.x);
-    if (!are_sorted_here<Key>(capacity)) fill_end_by_all(keys, values, state->list_fragments, capacity, *state, limits);
-}
+void prepare_sort(Key* keys, std::uint32_t* values, std::uint64_t capacity, const sort_preparation& preparation,
+                  const pipeline_state* state, const capacities& limits, cudaStream_t stream);
 
 // What has to be done for the lists of a call before they are sorted.
 template <class Key, class Payload>
@@ -211,15 +181,11 @@ template <class Key, class Payload>
                                               pipeline_state* state, const capacities& limits, cudaStream_t stream,
                                               stage_clock* clock) {
     if (preparation.is_wanted)
-        launch_behind(prepare_sort_kernel<Key>, fill_device(limits.fragments), threads_per_block, stream,
-                      stage::tile_sort, b.keys[0], b.values[0], limits.fragments, preparation, state, limits);
+        prepare_sort(b.keys[0], b.values[0], limits.fragments, preparation, state, limits, stream);
     int at = 0;
     if (!are_sorted_here<Key>(limits.fragments)) {
-        cub::DoubleBuffer<Key> keys(b.keys[0], b.keys[1]);
-        cub::DoubleBuffer<std::uint32_t> values(b.values[0], b.values[1]);
-        sort_by_cell(keys, values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit, stream);
-        at = keys.selector;
-        VOXELPIPE_ASSERT(values.selector == at);
+        at = sort_by_cell(b.keys, b.values, limits.fragments, b.bits, b.storage, b.storage_bytes, stage::abuffer_emit,
+                          stream);
     } else if constexpr (sizeof(Key) == sizeof(std::uint32_t)) {
         at = sort_fragments({{b.keys[0], b.keys[1]}, {b.values[0], b.values[1]}}, sort_count{state, limits},
                             limits.fragments, b.sort, stream);
@@ -242,11 +208,7 @@ template <class Key, class Payload>
     lists.payloads = b.payloads;
     lists.first_of_voxel = b.first_of_voxel;
     lists.places = b.places;
-    std::size_t bytes = b.storage_bytes;
-    check(cub::DeviceSelect::If(b.storage, bytes, thrust::counting_iterator<unsigned long long>(0), b.first_of_voxel,
-                                &state->list_voxels, limits.fragments,
-                                is_first_of_voxel<Key>{lists.keys, state, limits}, stream),
-          stage::abuffer_emit);
+    select_voxels(lists.keys, b.first_of_voxel, state, limits, b.storage, b.storage_bytes, stream);
     end_stage(clock, &stage_times::abuffer_emit);
     return lists;
 }
@@ -340,12 +302,8 @@ __global__ __launch_bounds__(threads_per_block, 4) void filter_lists_kernel(cons
         atomicAdd(&state->discarded, sum);
     }
 }
-// Behind it: the list is what was kept. One thread.
-template <class State>
-__global__ void end_filter_kernel(State* state, capacities limits) {
-    await_stream();
-    if (!has_failed(*state, limits)) state->list_fragments = state->kept;
-}
+// Behind it: the list is what was kept.
+VOXELPIPE_DECLARES_KERNELS void end_filter(pipeline_state* state, const capacities& limits, cudaStream_t stream);
 
 // Leaves fragments out that are discarded. The buffers' first arrays hold what there is, before and after.
 template <class Scene, class Payload>
@@ -354,7 +312,7 @@ void filter_lists(const Scene& s, list_buffers<std::uint32_t, Payload>& b, pipel
     const listed_fragments all{b.keys[0], b.values[0]}, kept{b.keys[1], b.values[1]};
     launch_behind(filter_lists_kernel<Scene>, fill_device(limits.fragments), threads_per_block, stream,
                   stage::abuffer_emit, s, all, kept, state, limits);
-    launch_behind(end_filter_kernel<pipeline_state>, 1, 1, stream, stage::abuffer_emit, state, limits);
+    end_filter(state, limits, stream);
     std::swap(b.keys[0], b.keys[1]);
     std::swap(b.values[0], b.values[1]);
 }

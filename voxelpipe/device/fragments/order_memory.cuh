@@ -8,8 +8,6 @@
 #include <voxelpipe/device/fragments/radix_sort.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
 
-#include <cuda/atomic>
-
 #include <bit>
 #include <cstdint>
 
@@ -135,37 +133,6 @@ struct tile_counts {
 
     [[nodiscard]] VOXELPIPE_HD static std::uint64_t num(std::uint64_t capacity) {
         return (capacity + length - 1) / length;
-    }
-
-    using word = ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device>;
-
-    // Says how many voxels begin in this tile, for those behind. By one thread.
-    __device__ void publish(std::uint32_t tile, unsigned long long count) const {
-        if (tile != 0) word(words[tile]).store(own | count, ::cuda::memory_order_relaxed);
-    }
-    // How many voxels begin in the tiles before this one, in which `count` do, as has been published. By all lanes of
-    // one warp. Blocks begin in the order of their tiles, so those before are under way.
-    [[nodiscard]] __device__ unsigned long long before(std::uint32_t tile, unsigned long long count) const {
-        const auto lane = threadIdx.x % 32;
-        unsigned long long sum = 0;
-        if (tile != 0) {
-            for (std::int64_t last = std::int64_t{tile} - 1;; last -= 32) { // lane k looks at tile last - k
-                const std::int64_t mine = last - lane;
-                unsigned long long w = all; // before the first tile
-                if (mine >= 0) do
-                        w = word(words[mine]).load(::cuda::memory_order_relaxed);
-                    while ((w & ~value) == 0);
-                const unsigned with_all = __ballot_sync(0xffffffffu, (w & all) != 0);
-                const unsigned nearest =
-                    with_all == 0 ? 31 : static_cast<unsigned>(__ffs(static_cast<int>(with_all))) - 1;
-                unsigned part = lane <= nearest ? static_cast<unsigned>(w & value) : 0; // fewer than 2^32 fragments
-                part = __reduce_add_sync(0xffffffffu, part);
-                sum += part;
-                if (with_all != 0) break;
-            }
-        }
-        if (lane == 0) word(words[tile]).store(all | (sum + count), ::cuda::memory_order_relaxed);
-        return sum;
     }
 };
 

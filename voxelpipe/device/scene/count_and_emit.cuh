@@ -7,10 +7,8 @@
 // exact within any box, so the pieces give exactly the whole. Every stage that turns triangles into cells is two
 // passes, count and emit, with a prefix sum between: cells come out by ascending primitive, whatever the launch order.
 
+#include <voxelpipe/device/scene/cub_sort.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
-
-#include <cub/device/device_scan.cuh>
-#include <cuda/std/functional>
 
 namespace voxelpipe::device {
 
@@ -242,23 +240,13 @@ __global__ __launch_bounds__(threads_per_block,
                     });
 }
 
-[[nodiscard]] inline std::size_t share_scan_bytes(std::uint32_t num_primitives) {
-    std::size_t bytes = 0;
-    check(cub::DeviceScan::ExclusiveScan(nullptr, bytes, static_cast<const std::uint32_t*>(nullptr),
-                                         static_cast<unsigned long long*>(nullptr), ::cuda::std::plus<>{}, 0ull,
-                                         num_primitives));
-    return bytes;
-}
-
 // Counts the cells of the large primitives, then where every primitive's cells begin.
 template <class Op>
 void share_count_rest(const geometry& geo, const Op& op, const share_buffers& b, pipeline_state* state,
                       void* scan_storage, std::size_t scan_bytes, stage where, cudaStream_t stream) {
     share_count_large<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state);
     check(cudaGetLastError(), where);
-    check(cub::DeviceScan::ExclusiveScan(scan_storage, scan_bytes, static_cast<const std::uint32_t*>(b.counts),
-                                         b.offsets, ::cuda::std::plus<>{}, 0ull, geo.num_primitives, stream),
-          where);
+    sum_counts(b.counts, b.offsets, geo.num_primitives, scan_storage, scan_bytes, where, stream);
 }
 
 // Counts the cells of every primitive and where each one's begin.

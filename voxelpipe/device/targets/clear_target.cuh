@@ -76,19 +76,28 @@ __global__ void fill_bits_kernel(const __grid_constant__ target_view<Target> t, 
     }
 }
 
+// `count` elements. Streams: past the cache.
+template <bool Streams, class Element>
+void fill_elements(Element* to, std::uint64_t count, const fill_pattern<Element>& pattern, const pipeline_state* state,
+                   const capacities& limits, cudaStream_t stream) {
+    constexpr std::uint64_t bytes_per_block = std::uint64_t{16} * fill_stores * threads_per_block;
+    const std::uint64_t blocks = count * sizeof(Element) / bytes_per_block + 1;
+    launch_behind(fill_kernel<Streams, Element>, static_cast<unsigned>(std::min(blocks, core::max_blocks)),
+                  threads_per_block, stream, stage::fine_raster, to, count, pattern, state, limits);
+}
+
 template <class Target>
 void clear_target(const target_view<Target>& t, const pipeline_state* state, const capacities& limits,
                   cudaStream_t stream) {
     using map = typename Target::map;
     using element = typename Target::element_type;
-    const auto fill = [&](element* to, std::size_t count, const element& value) {
-        constexpr std::uint64_t bytes_per_block = std::uint64_t{16} * fill_stores * threads_per_block;
-        const std::uint64_t bytes = count * sizeof(element), blocks = bytes / bytes_per_block + 1;
-        auto* kernel = fill_kernel<false, element>;
+    const auto fill = [&](element* to, std::uint64_t count, const element& value) {
         if constexpr (map::is_bit)
-            if (bytes >= min_streamed && bytes <= max_streamed) kernel = fill_kernel<true, element>;
-        launch_behind(kernel, static_cast<unsigned>(std::min(blocks, core::max_blocks)), threads_per_block, stream,
-                      stage::fine_raster, to, count, fill_pattern<element>{value}, state, limits);
+            if (const std::uint64_t bytes = count * sizeof(element); bytes >= min_streamed && bytes <= max_streamed) {
+                fill_elements<true>(to, count, fill_pattern<element>{value}, state, limits, stream);
+                return;
+            }
+        fill_elements<false>(to, count, fill_pattern<element>{value}, state, limits, stream);
     };
     if constexpr (map::is_bit) {
         fill(t.elements, map::elements(t.extent), 0u);

@@ -159,6 +159,17 @@ __global__ __launch_bounds__(threads_per_block) void clear_chunks_kernel(
         });
 }
 
+// What of a plane of a target is marked, or all of it where the log does not know it as `wanted`.
+template <class Element>
+void clear_chunks(Element* to, const chunk_marks& marks, const word* known, const core::change_log::known& wanted,
+                  const fill_pattern<Element>& pattern, const pipeline_state* state, const capacities& limits,
+                  cudaStream_t stream) {
+    const std::size_t slices = static_cast<std::size_t>(marks.rows.y) * static_cast<unsigned>(marks.extent.z);
+    const std::size_t blocks = std::min<std::size_t>(slices / (threads_per_block / 32) + 1, core::max_blocks);
+    launch_behind(clear_chunks_kernel<Element>, static_cast<unsigned>(blocks), threads_per_block, stream,
+                  stage::fine_raster, to, marks, known, wanted, pattern, state, limits);
+}
+
 // What is known from now on; with `wipes`, nothing is marked.
 template <std::size_t N>
 struct known_targets {
@@ -177,6 +188,12 @@ __global__ void note_clears_kernel(word* log, const __grid_constant__ known_targ
     if (!wipes) return;
     for (std::size_t i = first; i < marks.rows.num_words(); i += threads) marks.words[i] = 0;
 }
+template <std::size_t N>
+void note_known(word* log, const known_targets<N>& after, const chunk_marks& marks, bool wipes,
+                const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+    launch_behind(note_clears_kernel<N>, wipes ? fill_device(marks.rows.num_words()) : 1, threads_per_block, stream,
+                  stage::fine_raster, log, after, marks, wipes, state, limits);
+}
 // When all targets are cleared. The log knows nothing of those that the call does not clear by chunks: the marks are
 // those of all.
 template <class... Targets>
@@ -187,8 +204,7 @@ void note_clears(const change_tracking<framebuffer_view<Targets...>>& tracking, 
     known_targets<count> after;
     std::copy_n(tracking.after, count, after.of);
     const chunk_marks marks = tracking.marks();
-    launch_behind(note_clears_kernel<count>, wipes ? fill_device(marks.rows.num_words()) : 1, threads_per_block, stream,
-                  stage::fine_raster, tracking.log, after, marks, wipes, state, limits);
+    note_known(tracking.log, after, marks, wipes, state, limits, stream);
 }
 
 // Clears what the tracking says, by chunks, and notes that.
@@ -198,8 +214,6 @@ void clear_by_chunks(const change_tracking<framebuffer_view<Targets...>>& tracki
                      cudaStream_t stream) {
     if (!tracking.changes_known) return;
     const chunk_marks marks = tracking.marks();
-    const std::size_t slices = static_cast<std::size_t>(marks.rows.y) * static_cast<unsigned>(fb.extent.z),
-                      blocks = std::min<std::size_t>(slices / (threads_per_block / 32) + 1, core::max_blocks);
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         using target = typename core::pack_element<K, Targets...>::type;
         using map = typename target::map;
@@ -207,9 +221,8 @@ void clear_by_chunks(const change_tracking<framebuffer_view<Targets...>>& tracki
         if (!tracking.by_chunks[K]) return;
         const auto& t = voxelpipe::get<K>(fb.targets);
         const auto clear = [&](element* to, const element& value) {
-            launch_behind(clear_chunks_kernel<element>, static_cast<unsigned>(blocks), threads_per_block, stream,
-                          stage::fine_raster, to, marks, tracking.known_of(K), tracking.after[K],
-                          fill_pattern<element>{value}, state, limits);
+            clear_chunks(to, marks, tracking.known_of(K), tracking.after[K], fill_pattern<element>{value}, state,
+                         limits, stream);
         };
         if constexpr (map::planes) {
             for (int c = 0; c < map::components; ++c)
@@ -237,13 +250,17 @@ __launch_bounds__(threads_per_block) void mark_voxels_kernel(const Voxel* voxels
         marks.mark_row(at.x, at.x, at.y, at.z);
     }
 }
+template <class Voxel>
+void mark_listed(const Voxel* voxels, const unsigned long long* num, std::uint64_t room, const chunk_marks& marks,
+                 const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
+    launch_behind(mark_voxels_kernel<Voxel>, fill_device(room), threads_per_block, stream, stage::tile_resolve, voxels,
+                  num, marks, state, limits);
+}
 // Where the call has to: `num` of the state's counters says how many there are, room is no less.
 template <class Tracking, class Voxel>
 void mark_voxels(const Tracking& tracking, const Voxel* voxels, const unsigned long long* num, std::uint64_t room,
                  const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
-    if (tracking.log == nullptr) return;
-    launch_behind(mark_voxels_kernel<Voxel>, fill_device(room), threads_per_block, stream, stage::tile_resolve, voxels,
-                  num, tracking.marks(), state, limits);
+    if (tracking.log != nullptr) mark_listed(voxels, num, room, tracking.marks(), state, limits, stream);
 }
 
 } // namespace voxelpipe::device

@@ -8,8 +8,8 @@
 // number of fine passes, each with shaders and targets of its own. Nothing here waits or allocates.
 
 #include <voxelpipe/device/base/stage_clock.cuh>
+#include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/scene/cub_sort.cuh>
-#include <voxelpipe/device/tiles/coarse_raster.cuh>
 #include <voxelpipe/device/tiles/tile_resolve.cuh>
 #include <voxelpipe/device/tiles/tile_split.cuh>
 
@@ -57,7 +57,7 @@ struct tile_memory {
     core::tile_grid tiles;
     share_buffers share;
     std::uint32_t *keys[2], *primitives[2];
-    split_buffers<> split{};
+    split_buffers split{};
     word* images;
     int bits; // of a tile's number
     void* storage;
@@ -92,22 +92,7 @@ struct tile_work {
 // Counts triangles in the state, which is zeroed beforehand.
 template <coverage Rule>
 [[nodiscard]] tile_work coarse_pass(const geometry& geo, const tile_memory& m, pipeline_state* state,
-                                    const capacities& limits, cudaStream_t stream, stage_clock* clock = nullptr) {
-    share_buffers share = m.share;
-    share.num_records = &state->tile_records;
-    share.num_cells = &state->tile_pairs;
-    const tile_cells<Rule> op{m.tiles, m.keys[0], m.primitives[0]};
-    share_count(geo, op, share, state, m.storage, m.storage_bytes, stage::coarse_raster, stream);
-    share_emit(geo, op, share, state, limits, stage::coarse_raster, stream);
-    end_stage(clock, &stage_times::coarse_raster);
-    fill_end(m.keys[0], m.primitives[0], share.num_cells, limits.tile_pairs, state, limits, stream);
-    cub::DoubleBuffer<std::uint32_t> k(m.keys[0], m.keys[1]), v(m.primitives[0], m.primitives[1]);
-    sort_by_cell(k, v, limits.tile_pairs, m.bits, m.storage, m.storage_bytes, stage::tile_sort, stream);
-    end_stage(clock, &stage_times::tile_sort);
-    tile_split(k.Current(), m.split, state, limits, stream);
-    end_stage(clock, &stage_times::tile_split);
-    return {k.Current(), {v.Current(), m.split.items, m.images, m.tiles, false, false, false}, m.split.splits};
-}
+                                    const capacities& limits, cudaStream_t stream, stage_clock* clock = nullptr);
 
 // ---- a fine pass ----------------------------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@
 
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/tiles/fine_raster.cuh>
+#include <voxelpipe/device/tiles/tile_split.cuh>
 
 namespace voxelpipe::device {
 
@@ -159,12 +160,6 @@ __global__ __launch_bounds__(threads_per_block) void tile_resolve_kernel(const _
     }
 }
 
-// Makes the fine raster of another group of targets start again.
-template <class State>
-__global__ void restart_items(State* state) {
-    state->next_item = 0;
-}
-
 // One fine pass over the work items for the targets of one image type. blocks_per_sm: see fine_raster_policy.
 template <coverage Rule, class Image, int Threads, int MinBlocks, class Scene, class Framebuffer>
 void draw_tiles(const Scene& s, const Framebuffer& fb, const fine_raster_input& in, const split_tile* splits,
@@ -177,8 +172,7 @@ void draw_tiles(const Scene& s, const Framebuffer& fb, const fine_raster_input& 
     int blocks = 0;
     check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, Threads, Image::bytes), stage::fine_raster);
     if (blocks_per_sm != 0 && blocks_per_sm < blocks) blocks = blocks_per_sm;
-    restart_items<<<1, 1, 0, stream>>>(state);
-    check(cudaGetLastError(), stage::fine_raster);
+    restart_items(state, stream);
     kernel<<<static_cast<unsigned>((blocks < 1 ? 1 : blocks) * num_multiprocessors()), Threads, Image::bytes, stream>>>(
         s, fb, in, state, limits);
     check(cudaGetLastError(), stage::fine_raster);

@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+//
+// Sorts, sums and selections by cub, and what goes before them.
+#include <voxelpipe/device/fragments/fragment_lists_kernels.cuh>
+#include <voxelpipe/device/scene/cub_sort_kernels.cuh>
+#include <voxelpipe/voxelpipe.hpp>
+
+namespace voxelpipe::device {
+
+#define VOXELPIPE_KEY(KEY)                                                                                             \
+    template std::size_t sort_bytes<KEY>(std::uint64_t, int);                                                          \
+    template int sort_by_cell(KEY* const(&)[2], std::uint32_t* const(&)[2], std::uint64_t, int, void*, std::size_t,    \
+                              stage, cudaStream_t);                                                                    \
+    template void fill_end(KEY*, std::uint32_t*, const unsigned long long*, std::uint64_t, const pipeline_state*,      \
+                           const capacities&, cudaStream_t);                                                           \
+    template std::size_t select_bytes<KEY>(std::uint64_t);                                                             \
+    template void select_voxels(const KEY*, std::uint64_t*, pipeline_state*, const capacities&, void*, std::size_t,    \
+                                cudaStream_t);                                                                         \
+    template void prepare_sort(KEY*, std::uint32_t*, std::uint64_t, const sort_preparation&, const pipeline_state*,    \
+                               const capacities&, cudaStream_t);
+VOXELPIPE_KEY(std::uint32_t)
+VOXELPIPE_KEY(std::uint64_t)
+
+} // namespace voxelpipe::device

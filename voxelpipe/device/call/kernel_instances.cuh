@@ -1,0 +1,74 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What voxelpipe::cuda_kernels holds of function templates whose kernels depend on types that the library names itself:
+// rasters into a list or a mask of voxels, clears of common elements, whole calls of constants. Each macro is a list of
+// explicit instantiations: HOW is `extern template` in a program that links the library, and `template` in the file of
+// the library that has them (voxelpipe/cuda_kernels/). The functions are on the host, and none is inline: a program
+// compiles neither them nor their kernels, and does not link without the library.
+
+#include <voxelpipe/device/call/abuffer_call.cuh>
+#include <voxelpipe/device/call/framebuffer_call.cuh>
+
+#include <cstdint>
+
+// In namespace voxelpipe::device, here and below. Vertices that a kernel has shaded, and those that need none.
+#define VOXELPIPE_VERTEX_SHADES(HOW)                                                                                   \
+    HOW void vertex_shade(const mesh_view<>&, const passthrough&, const core::snap_transform&, std::uint32_t,          \
+                          const vertex_positions&, no_varyings*, cudaStream_t);                                        \
+    HOW void vertex_shade(const mesh_view<>&, const transform&, const core::snap_transform&, std::uint32_t,            \
+                          const vertex_positions&, no_varyings*, cudaStream_t);                                        \
+    HOW void write_arguments(draw_geometry*, const argument_chunk<draw_geometry, 3072 / sizeof(draw_geometry)>&, int,  \
+                             cudaStream_t);
+
+#define VOXELPIPE_LIST_RASTER(HOW, RULE, ...)                                                                          \
+    HOW void list_raster<RULE>(const raster_input<__VA_ARGS__>&, std::uint32_t, std::uint32_t,                         \
+                               const deferred_triangles&, std::uint32_t*, std::uint32_t*, const sort_preparation&,     \
+                               pipeline_state*, const capacities&, cudaStream_t);
+#define VOXELPIPE_LIST_RASTERS(HOW)                                                                                    \
+    VOXELPIPE_LIST_RASTER(HOW, coverage::conservative, stored_source)                                                  \
+    VOXELPIPE_LIST_RASTER(HOW, coverage::thin, stored_source)
+
+#define VOXELPIPE_MASK_RASTER(HOW, RULE, ...)                                                                          \
+    HOW void launch_raster(const raster_call<RULE, __VA_ARGS__, mask_output>&, pipeline_state*, stage, cudaStream_t,   \
+                           bool, bool);
+#define VOXELPIPE_MASK_RASTERS(HOW)                                                                                    \
+    VOXELPIPE_MASK_RASTER(HOW, coverage::conservative, stored_source)                                                  \
+    VOXELPIPE_MASK_RASTER(HOW, coverage::thin, stored_source)                                                          \
+    VOXELPIPE_MASK_RASTER(HOW, coverage::conservative, shading_source<mesh_view<>, passthrough>)                       \
+    VOXELPIPE_MASK_RASTER(HOW, coverage::thin, shading_source<mesh_view<>, passthrough>)
+
+#define VOXELPIPE_CLEARS_OF(HOW, ELEMENT)                                                                              \
+    HOW void fill_elements<false>(ELEMENT*, std::uint64_t, const fill_pattern<ELEMENT>&, const pipeline_state*,        \
+                                  const capacities&, cudaStream_t);                                                    \
+    HOW void clear_chunks(ELEMENT*, const chunk_marks&, const word*, const core::change_log::known&,                   \
+                          const fill_pattern<ELEMENT>&, const pipeline_state*, const capacities&, cudaStream_t);
+#define VOXELPIPE_KNOWN_TARGETS(HOW, N)                                                                                \
+    HOW void note_known(word*, const known_targets<N>&, const chunk_marks&, bool, const pipeline_state*,               \
+                        const capacities&, cudaStream_t);
+#define VOXELPIPE_CLEARS(HOW)                                                                                          \
+    HOW void fill_elements<true>(word*, std::uint64_t, const fill_pattern<word>&, const pipeline_state*,               \
+                                 const capacities&, cudaStream_t);                                                     \
+    VOXELPIPE_CLEARS_OF(HOW, std::uint8_t)                                                                             \
+    VOXELPIPE_CLEARS_OF(HOW, std::uint16_t)                                                                            \
+    VOXELPIPE_CLEARS_OF(HOW, std::uint32_t)                                                                            \
+    VOXELPIPE_CLEARS_OF(HOW, std::int32_t)                                                                             \
+    VOXELPIPE_CLEARS_OF(HOW, std::uint64_t)                                                                            \
+    VOXELPIPE_CLEARS_OF(HOW, float)                                                                                    \
+    VOXELPIPE_KNOWN_TARGETS(HOW, 1)                                                                                    \
+    VOXELPIPE_KNOWN_TARGETS(HOW, 2)                                                                                    \
+    VOXELPIPE_KNOWN_TARGETS(HOW, 3)                                                                                    \
+    HOW void mark_listed(const std::uint32_t*, const unsigned long long*, std::uint64_t, const chunk_marks&,           \
+                         const pipeline_state*, const capacities&, cudaStream_t);
+
+// In namespace voxelpipe: calls of voxelize whose every type the library names: bits of a surface, sums of a number,
+// and the primitives of each voxel.
+#define VOXELPIPE_CONSTANT_CALL(HOW, VALUE, ...)                                                                       \
+    HOW status cuda_backend::run(std::span<const draw<mesh_view<>, passthrough, constant_output<VALUE>>>, const grid&, \
+                                 const framebuffer_view<__VA_ARGS__>&, const voxelize_options&, std::uint64_t);
+#define VOXELPIPE_BIT_CALLS(HOW) VOXELPIPE_CONSTANT_CALL(HOW, bool, target<bit, blend::bit_or>)
+#define VOXELPIPE_SUM_CALLS(HOW) VOXELPIPE_CONSTANT_CALL(HOW, float, target<float, blend::add>)
+#define VOXELPIPE_LIST_CALLS(HOW)                                                                                      \
+    HOW status cuda_backend::run(std::span<const draw<mesh_view<>, passthrough, constant_output<bool>>>, const grid&,  \
+                                 abuffer<cuda_backend, void>&, const voxelize_options&, std::uint64_t);

@@ -1,0 +1,236 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The kernels of the counting sort (fragments/counting_sort.cuh), and their launches.
+
+#include <voxelpipe/device/fragments/counting_sort.cuh>
+
+#include <cuda/atomic>
+
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+inline constexpr unsigned counting_items = 8; // fragments of a thread that do not wait for one another
+inline constexpr unsigned counting_threads = 1024;
+
+// Numbers each fragment within its voxel, and counts.
+template <class Count>
+__global__ __launch_bounds__(threads_per_block) void number_fragments_kernel(
+    const std::uint32_t* voxels, const __grid_constant__ Count count, const __grid_constant__ counting_memory m) {
+    constexpr unsigned items = counting_items;
+    await_stream();
+    const auto n = static_cast<std::uint32_t>(count.get());
+    const std::uint32_t lane = threadIdx.x % 32, below = (1u << lane) - 1;
+    const std::uint64_t warp = std::uint64_t{blockIdx.x} * (threads_per_block / 32) + warp_in_block(),
+                        warps = std::uint64_t{gridDim.x} * (threads_per_block / 32);
+    for (std::uint64_t start = warp * items * 32; start < n; start += warps * items * 32) {
+        const std::uint64_t first = start + lane;
+        std::uint32_t voxel[items], number[items];
+        unsigned same[items];
+#pragma unroll
+        for (unsigned k = 0; k < items; ++k) voxel[k] = first + 32 * k < n ? voxels[first + 32 * k] : ~0u;
+#pragma unroll
+        for (unsigned k = 0; k < items; ++k) {
+            same[k] = __match_any_sync(0xffffffffu, voxel[k]); // neighbours in the list are often of one voxel
+            number[k] = 0;
+            if ((same[k] & below) == 0 && voxel[k] != ~0u)
+                number[k] = atomicAdd(&m.counts[voxel[k]], static_cast<std::uint32_t>(__popc(same[k])));
+        }
+#pragma unroll
+        for (unsigned k = 0; k < items; ++k) {
+            number[k] = __shfl_sync(0xffffffffu, number[k], __ffs(static_cast<int>(same[k])) - 1);
+            if (voxel[k] != ~0u) m.numbers[first + 32 * k] = number[k] + static_cast<unsigned>(__popc(same[k] & below));
+        }
+    }
+}
+
+// Sums over the lanes before this one, and in `all` over all of them.
+[[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long sum_before(unsigned long long own,
+                                                                        unsigned long long& all) {
+    unsigned long long up_to = own;
+#pragma unroll
+    for (unsigned apart = 1; apart < 32; apart *= 2) {
+        const unsigned long long other = __shfl_up_sync(0xffffffffu, up_to, apart);
+        up_to += threadIdx.x % 32 >= apart ? other : 0;
+    }
+    all = __shfl_sync(0xffffffffu, up_to, 31);
+    return up_to - own;
+}
+
+// What a tile tells those behind: fragments and, from bit `voxels` on, voxels that have some.
+struct tile_sums {
+    static constexpr int voxels = 31;
+    static constexpr unsigned long long own = 1ull << 62, all = 2ull << 62, value = own - 1, low = (1ull << voxels) - 1;
+
+    // The sums of the tiles before this one, whose own are given. By all lanes of one warp. See count_before.
+    [[nodiscard]] __device__ static unsigned long long before(unsigned long long* words, std::uint32_t tile,
+                                                              unsigned long long sums) {
+        using word = ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device>;
+        const auto lane = threadIdx.x % 32;
+        if (lane == 0 && tile != 0) word(words[tile]).store(own | sums, ::cuda::memory_order_relaxed);
+        unsigned long long sum = 0;
+        for (std::int64_t last = std::int64_t{tile} - 1; tile != 0; last -= 32) { // lane k looks at tile last - k
+            const std::int64_t mine = last - lane;
+            unsigned long long w = all; // before the first tile
+            if (mine >= 0) do
+                    w = word(words[mine]).load(::cuda::memory_order_relaxed);
+                while ((w & ~value) == 0);
+            const unsigned with_all = __ballot_sync(0xffffffffu, (w & all) != 0);
+            const unsigned nearest = with_all == 0 ? 31 : static_cast<unsigned>(__ffs(static_cast<int>(with_all))) - 1;
+            w = lane <= nearest ? w & value : 0;
+            const unsigned fragments = __reduce_add_sync(0xffffffffu, static_cast<unsigned>(w & low));
+            const unsigned of_voxels = __reduce_add_sync(0xffffffffu, static_cast<unsigned>(w >> voxels));
+            sum += static_cast<unsigned long long>(of_voxels) << voxels | fragments;
+            if (with_all != 0) break;
+        }
+        if (lane == 0) word(words[tile]).store(all | (sum + sums), ::cuda::memory_order_relaxed);
+        return sum;
+    }
+};
+
+// Makes of each voxel's count where its first fragment goes, and lists the voxels that have any.
+template <class Memory>
+__global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __grid_constant__ order_buffers b,
+                                                                        const __grid_constant__ Memory m,
+                                                                        pipeline_state* state, capacities limits) {
+    constexpr unsigned rounds = Memory::tile / counting_threads / 4, warps = counting_threads / 32;
+    constexpr int shift = tile_sums::voxels;
+    __shared__ unsigned long long of_warps[warps];
+    __shared__ unsigned long long before_tile;
+    // Of the tile's long voxels that go to a list of voxels, how many; then where the next one goes. One atomic of the
+    // device for each list: all tiles ask for the same words.
+    constexpr int lists = order_lists::block_list + 1;
+    __shared__ unsigned num_long[lists], next_long[lists];
+    if (threadIdx.x < lists) num_long[threadIdx.x] = 0;
+    await_stream();
+    __syncthreads();
+    if (has_failed(*state, limits)) return;
+    const auto n = static_cast<std::uint32_t>(state->list_fragments);
+    if (n == 0) return;
+    const std::uint32_t lane = threadIdx.x % 32, warp = warp_in_block(), tile = blockIdx.x;
+    // A warp's voxels are neighbours, in each round a lane's four.
+    const std::uint32_t first_four = tile * (Memory::tile / 4) + warp * (32 * rounds) + lane;
+    uint4* const mine = reinterpret_cast<uint4*>(m.counts) + first_four;
+    uint4 four[rounds];
+    unsigned long long before[rounds], sum = 0;
+#pragma unroll
+    for (unsigned r = 0; r < rounds; ++r) four[r] = mine[32 * r];
+#pragma unroll
+    for (unsigned r = 0; r < rounds; ++r) {
+        const uint4 c = four[r];
+        const unsigned voxels = (c.x != 0) + (c.y != 0) + (c.z != 0) + (c.w != 0);
+        const std::uint32_t fragments = c.x + c.y + c.z + c.w;
+        if (fragments > max_of_window)
+            for (const std::uint32_t one : {c.x, c.y, c.z, c.w})
+                if (const int list = order_lists::list_of(one); list >= 0) atomicAdd(&num_long[list], 1u);
+        unsigned long long all = 0;
+        before[r] = sum + sum_before(static_cast<unsigned long long>(voxels) << shift | fragments, all);
+        sum += all;
+    }
+    if (lane == 0) of_warps[warp] = sum;
+    __syncthreads();
+    if (warp == 0) {
+        unsigned long long all = 0;
+        const unsigned long long earlier = sum_before(lane < warps ? of_warps[lane] : 0, all);
+        if (lane < warps) of_warps[lane] = earlier;
+        const unsigned long long of_tiles = tile_sums::before(m.tiles, tile, all);
+        if (lane == 0) before_tile = of_tiles;
+        if (lane == 0 && tile == gridDim.x - 1) {
+            const list_places to = b.places();
+            const std::uint64_t num = (of_tiles + all) >> shift;
+            state->list_voxels = num;
+            if (num <= to.room) to.offsets[num] = n;
+            atomicOr(&m.starts[n / 32], 1u << n % 32);
+        }
+    }
+    if (warp == 1 && lane < lists)
+        next_long[lane] = num_long[lane] == 0 ? 0 : atomicAdd(&b.lists.counts[lane], num_long[lane]);
+    __syncthreads();
+    const unsigned long long earlier = before_tile + of_warps[warp];
+    const list_places to = b.places();
+#pragma unroll
+    for (unsigned r = 0; r < rounds; ++r) {
+        const std::uint32_t c[4] = {four[r].x, four[r].y, four[r].z, four[r].w};
+        if ((c[0] | c[1] | c[2] | c[3]) == 0) continue;
+        const unsigned long long at = earlier + before[r];
+        auto place = static_cast<std::uint32_t>(at & tile_sums::low);
+        std::uint64_t number = at >> shift;
+        std::uint32_t places[4];
+#pragma unroll
+        for (unsigned k = 0; k < 4; ++k) {
+            places[k] = place;
+            if (c[k] == 0) continue;
+            if (const int list = order_lists::list_of(c[k]); list >= 0)
+                b.lists.add(atomicAdd(&next_long[list], 1u), place, c[k]);
+            else if (c[k] > max_of_block)
+                b.lists.push(place, c[k]);
+            const std::uint32_t voxel = 4 * (first_four + 32 * r) + k;
+            if (number < to.room) {
+                if (to.voxels != nullptr)
+                    to.voxels[number] = voxel;
+                else
+                    to.narrow_voxels[number] = voxel;
+                to.offsets[number] = place;
+            }
+            ++number;
+            atomicOr(&m.starts[place / 32], 1u << place % 32);
+            place += c[k];
+        }
+        mine[32 * r] = {places[0], places[1], places[2], places[3]};
+    }
+}
+
+// Puts each fragment's primitive where it belongs.
+template <class Count>
+__global__ __launch_bounds__(threads_per_block) void place_fragments_kernel(const std::uint32_t* voxels,
+                                                                            const std::uint32_t* values,
+                                                                            std::uint32_t* to,
+                                                                            const __grid_constant__ Count count,
+                                                                            const __grid_constant__ counting_memory m) {
+    constexpr unsigned items = counting_items;
+    await_stream();
+    const auto n = static_cast<std::uint32_t>(count.get());
+    for (std::uint64_t first = std::uint64_t{blockIdx.x} * items * threads_per_block + threadIdx.x; first < n;
+         first += std::uint64_t{gridDim.x} * items * threads_per_block) {
+        std::uint32_t voxel[items], value[items], at[items];
+#pragma unroll
+        for (unsigned k = 0; k < items; ++k) {
+            const std::uint64_t i = first + k * threads_per_block;
+            if (i >= n) continue;
+            voxel[k] = voxels[i];
+            value[k] = values[i];
+            at[k] = m.numbers[i];
+        }
+#pragma unroll
+        for (unsigned k = 0; k < items; ++k)
+            if (first + k * threads_per_block < n) at[k] += m.counts[voxel[k]];
+#pragma unroll
+        for (unsigned k = 0; k < items; ++k)
+            if (first + k * threads_per_block < n) to[at[k]] = value[k];
+    }
+}
+
+VOXELPIPE_DEFINES_KERNELS void order_by_counting(order_buffers b, const counted_pairs& pairs, const counting_memory& m,
+                                                 std::uint64_t num_primitives, pipeline_state* state,
+                                                 const capacities& limits, cudaStream_t stream, stage_clock* clock) {
+    constexpr stage where = stage::abuffer_emit;
+    const unsigned blocks = fill_device(limits.fragments / counting_items + 1);
+    b.starts = m.starts;
+    if (num_primitives <= std::uint64_t{dense_part} * max_dense_parts)
+        b.lists.num_primitives = static_cast<std::uint32_t>(num_primitives);
+    capacities of_lists = limits;
+    of_lists.longest_ordered = ~0ull; // what is found out about voxels must not stop these
+    const sort_count count{state, of_lists};
+    launch_behind(number_fragments_kernel<sort_count>, blocks, threads_per_block, stream, where, pairs.voxels, count,
+                  m);
+    launch_behind(list_counted_kernel<counting_memory>, static_cast<unsigned>(m.num_tiles()), counting_threads, stream,
+                  where, b, m, state, of_lists);
+    launch_behind(place_fragments_kernel<sort_count>, blocks, threads_per_block, stream, where, pairs.voxels,
+                  pairs.primitives, b.from, count, m);
+    end_stage(clock, &stage_times::tile_sort);
+    order_fragments(b, num_primitives, state, limits, stream);
+}
+
+} // namespace voxelpipe::device

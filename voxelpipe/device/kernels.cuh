@@ -1,0 +1,26 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The kernels that depend on no type of the program, unless voxelpipe::cuda_kernels has them (base/kernel_library.cuh).
+
+#if !defined(VOXELPIPE_LINKS_CUDA_KERNELS)
+#include <voxelpipe/device/base/launch_kernels.cuh>
+#include <voxelpipe/device/call/readback_kernels.cuh>
+#include <voxelpipe/device/fragments/counting_sort_kernels.cuh>
+#include <voxelpipe/device/fragments/fragment_lists_kernels.cuh>
+#include <voxelpipe/device/fragments/order_voxels_kernels.cuh>
+#include <voxelpipe/device/fragments/radix_sort_kernels.cuh>
+#include <voxelpipe/device/scene/check_indices_kernels.cuh>
+#include <voxelpipe/device/scene/cub_sort_kernels.cuh>
+#include <voxelpipe/device/tiles/tile_passes_kernels.cuh>
+#else
+#include <voxelpipe/device/call/kernel_instances.cuh>
+
+namespace voxelpipe::device {
+VOXELPIPE_VERTEX_SHADES(extern template)
+VOXELPIPE_LIST_RASTERS(extern template)
+VOXELPIPE_MASK_RASTERS(extern template)
+VOXELPIPE_CLEARS(extern template)
+} // namespace voxelpipe::device
+#endif

@@ -1,0 +1,90 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The coarse pass (tiles/tile_passes.cuh) and its kernels: they depend on no shader and no target.
+
+#include <voxelpipe/device/tiles/coarse_raster.cuh>
+#include <voxelpipe/device/tiles/tile_passes.cuh>
+
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+template <class Buffers>
+__global__ void tile_split_kernel(const std::uint32_t* keys, Buffers out, pipeline_state* state, capacities limits) {
+    if (has_failed(*state, limits)) return;
+    const auto num_pairs = static_cast<std::uint32_t>(state->tile_pairs);
+    const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    if (i >= num_pairs) return;
+    const std::uint32_t tile = keys[i];
+    if (i != 0 && keys[i - 1] == tile) return;
+    // First position after the run: doubling steps from its start, then halving.
+    const auto first = static_cast<std::uint32_t>(i);
+    std::uint64_t lo = first, step = 1;
+    while (lo + step < num_pairs && keys[lo + step] == tile) {
+        lo += step;
+        step *= 2;
+    }
+    std::uint64_t hi = lo + step < num_pairs ? lo + step : num_pairs;
+    while (hi - lo > 1) {
+        const std::uint64_t middle = lo + (hi - lo) / 2;
+        if (keys[middle] == tile)
+            lo = middle;
+        else
+            hi = middle;
+    }
+    const auto count = static_cast<std::uint32_t>(hi - first);
+    const std::uint32_t parts = (count + out.pairs_per_item - 1) / out.pairs_per_item;
+    const std::uint32_t at = atomicAdd(&state->num_items, parts);
+    if (parts == 1) {
+        out.items[at] = {tile, first, count, no_image};
+        return;
+    }
+    const std::uint32_t image = atomicAdd(&state->num_images, parts);
+    out.splits[atomicAdd(&state->num_splits, 1u)] = {tile, image, parts};
+    const std::uint32_t each = (count + parts - 1) / parts;
+    for (std::uint32_t p = 0; p < parts; ++p) {
+        const std::uint32_t begin = p * each < count ? p * each : count;
+        const std::uint32_t end = begin + each < count ? begin + each : count;
+        out.items[at + p] = {tile, first + begin, end - begin, image + p};
+    }
+}
+
+VOXELPIPE_DEFINES_KERNELS void tile_split(const std::uint32_t* keys, const split_buffers& out, pipeline_state* state,
+                                          const capacities& limits, cudaStream_t stream) {
+    tile_split_kernel<<<num_blocks(limits.tile_pairs), threads_per_block, 0, stream>>>(keys, out, state, limits);
+    check(cudaGetLastError(), stage::tile_split);
+}
+
+// Makes the fine raster of another group of targets start again.
+template <class State>
+__global__ void restart_items_kernel(State* state) {
+    state->next_item = 0;
+}
+
+VOXELPIPE_DEFINES_KERNELS void restart_items(pipeline_state* state, cudaStream_t stream) {
+    restart_items_kernel<<<1, 1, 0, stream>>>(state);
+    check(cudaGetLastError(), stage::fine_raster);
+}
+
+template <coverage Rule>
+tile_work coarse_pass(const geometry& geo, const tile_memory& m, pipeline_state* state, const capacities& limits,
+                      cudaStream_t stream, stage_clock* clock) {
+    share_buffers share = m.share;
+    share.num_records = &state->tile_records;
+    share.num_cells = &state->tile_pairs;
+    const tile_cells<Rule> op{m.tiles, m.keys[0], m.primitives[0]};
+    share_count(geo, op, share, state, m.storage, m.storage_bytes, stage::coarse_raster, stream);
+    share_emit(geo, op, share, state, limits, stage::coarse_raster, stream);
+    end_stage(clock, &stage_times::coarse_raster);
+    fill_end(m.keys[0], m.primitives[0], share.num_cells, limits.tile_pairs, state, limits, stream);
+    const int at = sort_by_cell(m.keys, m.primitives, limits.tile_pairs, m.bits, m.storage, m.storage_bytes,
+                                stage::tile_sort, stream);
+    end_stage(clock, &stage_times::tile_sort);
+    tile_split(m.keys[at], m.split, state, limits, stream);
+    end_stage(clock, &stage_times::tile_split);
+    return {m.keys[at], {m.primitives[at], m.split.items, m.images, m.tiles, false, false, false}, m.split.splits};
+}
+
+} // namespace voxelpipe::device
