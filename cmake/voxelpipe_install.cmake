@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # The install tree: include/voxelpipe/voxelpipe and include/voxelpipe/cpu_ref, so that nothing beside them bears a name
-# that others may have, and a config file that gives the targets of the build tree.
+# that others may have, the library of kernels where it is built, and a config file that gives the targets of the build tree.
 include_guard(GLOBAL)
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -19,6 +19,15 @@ endforeach()
 
 install(TARGETS voxelpipe voxelpipe_cpu_ref voxelpipe_cuda EXPORT voxelpipe-targets)
 install(EXPORT voxelpipe-targets NAMESPACE voxelpipe:: DESTINATION "${voxelpipe_config_dir}" COMPONENT voxelpipe)
+
+# The compiled kernels, for their architectures and this build's compiler: a component of its own.
+if(TARGET voxelpipe_cuda_kernels)
+  install(
+    TARGETS voxelpipe_cuda_kernels
+    EXPORT voxelpipe-cuda-kernels-targets
+    ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT cuda_kernels)
+  install(EXPORT voxelpipe-cuda-kernels-targets NAMESPACE voxelpipe:: DESTINATION "${voxelpipe_config_dir}" COMPONENT cuda_kernels)
+endif()
 
 configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/voxelpipe-config.cmake.in"
                               "${PROJECT_BINARY_DIR}/voxelpipe-config.cmake" INSTALL_DESTINATION "${voxelpipe_config_dir}")

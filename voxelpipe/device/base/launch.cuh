@@ -27,23 +27,33 @@ __device__ VOXELPIPE_INLINE void await_stream() {
 #endif
 }
 
+// The architectures that a unit is compiled for. A type, and a parameter of what launches: units of one program may be
+// compiled for others, the library's (base/kernel_library.cuh) among them, and each asks for its own.
+template <int...>
+struct architectures {};
+#if defined(__CUDA_ARCH_LIST__) && CUDART_VERSION >= 12030 // from here on graphs capture early launches
+using compiled_for = architectures<__CUDA_ARCH_LIST__>;
+#else
+using compiled_for = architectures<>;
+#endif
+
 // Whether the code that the current device runs waits in await_stream. Not so where it is made from PTX of before: only
 // an exact match of a compiled architecture with the device tells.
-[[nodiscard]] inline bool can_launch_early() {
-#if defined(__CUDA_ARCH_LIST__) && CUDART_VERSION >= 12030 // from here on graphs capture it
-    constexpr int compiled_for[] = {__CUDA_ARCH_LIST__};
-    int device = 0, major = 0, minor = 0;
-    check(cudaGetDevice(&device));
-    check(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device));
-    check(cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, device));
-    for (const int architecture : compiled_for)
-        if (major >= 9 && architecture == 100 * major + 10 * minor) return true;
-#endif
-    return false;
+template <int... Compiled>
+[[nodiscard]] bool can_launch_early(architectures<Compiled...>) {
+    if constexpr (sizeof...(Compiled) == 0) {
+        return false;
+    } else {
+        int device = 0, major = 0, minor = 0;
+        check(cudaGetDevice(&device));
+        check(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device));
+        check(cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, device));
+        return major >= 9 && ((Compiled == 100 * major + 10 * minor) || ...);
+    }
 }
 
 // Starts a kernel, early where the device can. shared_bytes: of dynamic shared memory.
-template <class... Parameters, class... Arguments>
+template <class CompiledFor = compiled_for, class... Parameters, class... Arguments>
 void launch_kernel(bool early, void (*kernel)(Parameters...), unsigned blocks, unsigned threads,
                    std::size_t shared_bytes, cudaStream_t stream, stage where, Arguments&&... arguments) {
     cudaLaunchAttribute attribute{};
@@ -55,19 +65,20 @@ void launch_kernel(bool early, void (*kernel)(Parameters...), unsigned blocks, u
     config.dynamicSmemBytes = shared_bytes;
     config.stream = stream;
     config.attrs = &attribute;
-    config.numAttrs = early && can_launch_early() ? 1 : 0;
+    config.numAttrs = early && can_launch_early(CompiledFor{}) ? 1 : 0;
     check(cudaLaunchKernelEx(&config, kernel, std::forward<Arguments>(arguments)...), where);
 }
 // Starts a kernel that begins with await_stream.
-template <class... Parameters, class... Arguments>
+template <class CompiledFor = compiled_for, class... Parameters, class... Arguments>
 void launch_behind(void (*kernel)(Parameters...), unsigned blocks, unsigned threads, std::size_t shared_bytes,
                    cudaStream_t stream, stage where, Arguments&&... arguments) {
-    launch_kernel(true, kernel, blocks, threads, shared_bytes, stream, where, std::forward<Arguments>(arguments)...);
+    launch_kernel<CompiledFor>(true, kernel, blocks, threads, shared_bytes, stream, where,
+                               std::forward<Arguments>(arguments)...);
 }
-template <class... Parameters, class... Arguments>
+template <class CompiledFor = compiled_for, class... Parameters, class... Arguments>
 void launch_behind(void (*kernel)(Parameters...), unsigned blocks, unsigned threads, cudaStream_t stream, stage where,
                    Arguments&&... arguments) {
-    launch_kernel(true, kernel, blocks, threads, 0, stream, where, std::forward<Arguments>(arguments)...);
+    launch_kernel<CompiledFor>(true, kernel, blocks, threads, 0, stream, where, std::forward<Arguments>(arguments)...);
 }
 
 // ---- sizes of launches ----------------------------------------------------------------------------------------------
