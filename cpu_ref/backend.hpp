@@ -81,9 +81,9 @@ public:
     }
 
     // What voxelize calls; arguments are validated. Exceptions of a user's shader or progress function pass through.
-    template <class Draws, class Output>
+    template <class Draws, class Output, class Coverage = core::known_coverage<>>
     [[nodiscard]] status run(const Draws& draws, const grid& g, Output& out, const voxelize_options& options,
-                             std::uint64_t triangles_in) {
+                             std::uint64_t triangles_in, Coverage = {}) {
         stage at = stage::validate;
         const cpu::execution how = execution(&at);
         const auto out_of_memory = [&] {
@@ -93,8 +93,7 @@ public:
         };
         try {
             const auto s = cpu::make_scene(how, draws, g);
-            return options.rule == coverage::thin ? pass<coverage::thin>(how, s, out, options)
-                                                  : pass<coverage::conservative>(how, s, out, options);
+            return Coverage::dispatch(options.rule, [&]<coverage Rule>() { return pass<Rule>(how, s, out, options); });
         } catch (const std::bad_alloc&) {
             return out_of_memory();
         } catch (const std::length_error&) { // a vector longer than can be: the same thing

@@ -34,6 +34,24 @@ struct voxelize_options {
 
 namespace core {
 
+// The coverage of a call where the program's text says it, voxelize<coverage::thin>(...), or <>: only the call's
+// options do, and both are compiled.
+template <coverage... Known>
+struct known_coverage {
+    static_assert(sizeof...(Known) <= 1, "voxelpipe: a call has one coverage");
+    // f.operator()<Rule>().
+    template <class F>
+    static decltype(auto) dispatch(coverage rule, F&& f) {
+        if constexpr (sizeof...(Known) != 0)
+            return (f.template operator()<Known>(), ...);
+        else if (rule == coverage::thin)
+            return f.template operator()<coverage::thin>();
+        else
+            return f.template operator()<coverage::conservative>();
+    }
+    static void set(voxelize_options& options) { ((options.rule = Known), ...); }
+};
+
 // Checks of shaders against what they draw into. Each stops at its first mistake and what depends on it is not
 // instantiated, so that a mistake is one line of the compiler's output.
 template <class Output>
@@ -204,7 +222,9 @@ template <class Backend, class... Targets>
 // Draws meshes into render targets. The draws share one type of mesh, vertex and fragment shader; their data differ.
 // Draw i's triangles come before draw i + 1's: that is the order of blend::replace. Returns after the work is done; on
 // a GPU backend that is one wait. Without any triangles it clears, as vp::clear does, and is a success.
-template <class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
+// With a coverage between angle brackets, as voxelize<coverage::thin>(...), the call has that one whatever its options
+// say, and the other is not compiled.
+template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, const framebuffer_view<Targets...>& fb, voxelize_options options = {}) {
     if constexpr (core::shaders_fit_targets<Mesh, VertexShader, FragmentShader, Targets...>()) {
@@ -213,20 +233,23 @@ template <class Backend, class Mesh, class VertexShader, class FragmentShader, c
         const status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (s.counts.triangles_in == 0) return backend.clear(fb);
-        return core::name_bad_triangle(backend, draws, backend.run(draws, g, fb, options, s.counts.triangles_in));
+        core::known_coverage<Known...>::set(options);
+        return core::name_bad_triangle(
+            backend, draws,
+            backend.run(draws, g, fb, options, s.counts.triangles_in, core::known_coverage<Known...>{}));
     } else {
         return {}; // does not compile: a static_assert has said why
     }
 }
 
-template <class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
+template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, framebuffer<Backend, Targets...>& fb, voxelize_options options = {}) {
-    return voxelize(backend, draws, g, fb.view(), options);
+    return voxelize<Known...>(backend, draws, g, fb.view(), options);
 }
 
 // Draws meshes into an A-buffer. The fragment shader's one output is the payload; values are ignored where it is void.
-template <class Backend, class Mesh, class VertexShader, class FragmentShader, class Payload>
+template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class Payload>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, abuffer<Backend, Payload>& lists, voxelize_options options = {}) {
     if constexpr (core::shaders_fit_payload<Mesh, VertexShader, FragmentShader, Payload>()) {
@@ -238,47 +261,50 @@ template <class Backend, class Mesh, class VertexShader, class FragmentShader, c
             lists.extent = g.extent;
             return s;
         }
-        return core::name_bad_triangle(backend, draws, backend.run(draws, g, lists, options, s.counts.triangles_in));
+        core::known_coverage<Known...>::set(options);
+        return core::name_bad_triangle(
+            backend, draws,
+            backend.run(draws, g, lists, options, s.counts.triangles_in, core::known_coverage<Known...>{}));
     } else {
         return {}; // does not compile: a static_assert has said why
     }
 }
 
 // One mesh, into a framebuffer, a framebuffer_view or an A-buffer.
-template <class Backend, class... Attributes, class VertexShader, class FragmentShader, class Output>
+template <coverage... Known, class Backend, class... Attributes, class VertexShader, class FragmentShader, class Output>
 [[nodiscard]] status voxelize(Backend& backend, const mesh_view<Attributes...>& mesh, const grid& g,
                               const VertexShader& vertex_shader, const FragmentShader& fragment_shader, Output&& out,
                               voxelize_options options = {}) {
     using draw_type = draw<mesh_view<Attributes...>, VertexShader, FragmentShader>;
     const draw_type d{mesh, vertex_shader, fragment_shader};
-    return voxelize(backend, std::span<const draw_type>(&d, 1), g, out, options);
+    return voxelize<Known...>(backend, std::span<const draw_type>(&d, 1), g, out, options);
 }
 
-template <class Backend, class... Attributes, class VertexShader, class FragmentShader, class Output>
+template <coverage... Known, class Backend, class... Attributes, class VertexShader, class FragmentShader, class Output>
 [[nodiscard]] status voxelize(Backend& backend, const mesh<Backend, Attributes...>& m, const grid& g,
                               const VertexShader& vertex_shader, const FragmentShader& fragment_shader, Output&& out,
                               voxelize_options options = {}) {
-    return voxelize(backend, m.view(), g, vertex_shader, fragment_shader, out, options);
+    return voxelize<Known...>(backend, m.view(), g, vertex_shader, fragment_shader, out, options);
 }
 
 // Draws in any contiguous range, such as a std::vector.
-template <class Backend, core::draw_range Draws, class Output>
+template <coverage... Known, class Backend, core::draw_range Draws, class Output>
 [[nodiscard]] status voxelize(Backend& backend, const Draws& draws, const grid& g, Output&& out,
                               voxelize_options options = {}) {
-    return voxelize(backend, std::span<const core::draw_of<Draws>>(std::data(draws), std::size(draws)), g, out,
-                    options);
+    return voxelize<Known...>(backend, std::span<const core::draw_of<Draws>>(std::data(draws), std::size(draws)), g,
+                              out, options);
 }
 
 // A coverage in place of options.
-template <class Backend, class Draws, class Output, std::same_as<coverage> Rule>
+template <coverage... Known, class Backend, class Draws, class Output, std::same_as<coverage> Rule>
 [[nodiscard]] status voxelize(Backend& backend, const Draws& draws, const grid& g, Output&& out, Rule rule) {
-    return voxelize(backend, draws, g, out, voxelize_options{rule, true});
+    return voxelize<Known...>(backend, draws, g, out, voxelize_options{rule, true});
 }
-template <class Backend, class Mesh, class VertexShader, class FragmentShader, class Output,
+template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class Output,
           std::same_as<coverage> Rule>
 [[nodiscard]] status voxelize(Backend& backend, const Mesh& mesh, const grid& g, const VertexShader& vertex_shader,
                               const FragmentShader& fragment_shader, Output&& out, Rule rule) {
-    return voxelize(backend, mesh, g, vertex_shader, fragment_shader, out, voxelize_options{rule, true});
+    return voxelize<Known...>(backend, mesh, g, vertex_shader, fragment_shader, out, voxelize_options{rule, true});
 }
 
 } // namespace voxelpipe

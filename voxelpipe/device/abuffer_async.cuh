@@ -87,21 +87,19 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
     memory = behind;
 }
 
-template <bool Run, class Payload, class Call>
+template <class Coverage, bool Run, class Payload, class Call>
 void list_async(const Call& call, coverage rule, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
     const bool small = num_voxels(call.g) < std::numeric_limits<std::uint32_t>::max();
-    if (rule == coverage::thin)
-        small ? list_async<coverage::thin, Run, std::uint32_t>(call, memory, lists, stream)
-              : list_async<coverage::thin, Run, std::uint64_t>(call, memory, lists, stream);
-    else
-        small ? list_async<coverage::conservative, Run, std::uint32_t>(call, memory, lists, stream)
-              : list_async<coverage::conservative, Run, std::uint64_t>(call, memory, lists, stream);
+    Coverage::dispatch(rule, [&]<coverage Rule>() {
+        small ? list_async<Rule, Run, std::uint32_t>(call, memory, lists, stream)
+              : list_async<Rule, Run, std::uint64_t>(call, memory, lists, stream);
+    });
 }
 
 template <class Call, class Payload>
 [[nodiscard]] std::size_t list_bytes(const Call& call, coverage rule, abuffer_view<Payload> lists) {
     arena plan;
-    list_async<false>(call, rule, plan, lists, nullptr);
+    list_async<core::known_coverage<>, false>(call, rule, plan, lists, nullptr);
     return plan.used();
 }
 
@@ -147,12 +145,14 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
 }
 
 // Puts the call on the backend's stream, sets `lists` to where its results will be, and returns. A status other than ok
-// means that nothing was launched, or that a launch failed; what the device finds out is in read_status.
-template <class Mesh, class VertexShader, class FragmentShader, class Payload>
+// means that nothing was launched, or that a launch failed; what the device finds out is in read_status. With
+// a coverage between angle brackets, as for voxelize.
+template <coverage... Known, class Mesh, class VertexShader, class FragmentShader, class Payload>
 [[nodiscard]] status
 voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
-               abuffer_view<Payload>& lists, const voxelize_options& options, const workspace_view& workspace) {
+               abuffer_view<Payload>& lists, voxelize_options options, const workspace_view& workspace) {
     if constexpr (core::shaders_fit_payload<Mesh, VertexShader, FragmentShader, Payload>()) {
+        core::known_coverage<Known...>::set(options);
         lists = {};
         if (const status s = validate(g); !s.ok()) return s;
         status s = core::validate_draws(draws);
@@ -181,7 +181,8 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
             }
             device::launch_until(stage::abuffer_emit, [&] {
                 device::arena memory(workspace.memory);
-                device::list_async<true>(call, options.rule, memory, lists, backend.stream);
+                device::list_async<core::known_coverage<Known...>, true>(call, options.rule, memory, lists,
+                                                                         backend.stream);
             });
         } catch (const device::cuda_failure& e) {
             return device::to_status(e);

@@ -257,15 +257,16 @@ public:
     // What voxelize calls; arguments are validated. `Selector` picks tile and block size (tuning/); results do not
     // depend on it.
     template <class Selector = tuning::fine_raster_selector, class Mesh, class VertexShader, class FragmentShader,
-              class... Targets>
+              class... Targets, class Coverage = core::known_coverage<>>
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              const framebuffer_view<Targets...>& fb, const voxelize_options& options,
-                             std::uint64_t triangles_in);
+                             std::uint64_t triangles_in, Coverage = {});
 
-    template <class Mesh, class VertexShader, class FragmentShader, class Payload>
+    template <class Mesh, class VertexShader, class FragmentShader, class Payload,
+              class Coverage = core::known_coverage<>>
     [[nodiscard]] status run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                              abuffer<cuda_backend, Payload>& lists, const voxelize_options& options,
-                             std::uint64_t triangles_in);
+                             std::uint64_t triangles_in, Coverage = {});
 
     // Gives back the memory that is kept between calls.
     void release() {
@@ -385,13 +386,10 @@ private:
     }
 
     // With fragments listed where there is memory for them.
-    template <class Call>
+    template <class Coverage, class Call>
     void launch_where_it_fits(Call call, device::pipeline_state& state) {
         const auto launch_one = [&] {
-            if (call.options.rule == coverage::thin)
-                launch<coverage::thin>(call, state);
-            else
-                launch<coverage::conservative>(call, state);
+            Coverage::dispatch(call.options.rule, [&]<coverage Rule>() { launch<Rule>(call, state); });
         };
         if (!call.is_listed_call()) {
             launch_one();
@@ -488,13 +486,10 @@ private:
         }
     }
 
-    template <class Key, class Call, class Payload>
+    template <class Coverage, class Key, class Call, class Payload>
     void fill(coverage rule, const Call& call, std::uint64_t voxel_room, abuffer<cuda_backend, Payload>& lists,
               device::pipeline_state& state) {
-        if (rule == coverage::thin)
-            fill<coverage::thin, Key>(call, voxel_room, lists, state);
-        else
-            fill<coverage::conservative, Key>(call, voxel_room, lists, state);
+        Coverage::dispatch(rule, [&]<coverage Rule>() { fill<Rule, Key>(call, voxel_room, lists, state); });
     }
 
     // voxel_room: how many voxels the lists are likely to have, 0 where nothing is known. Otherwise nobody waits in
@@ -573,10 +568,10 @@ private:
 
 // Not in the class, and so not inline: a unit that links voxelpipe::cuda_kernels does not compile what that has
 // (device/kernels.cuh).
-template <class Selector, class Mesh, class VertexShader, class FragmentShader, class... Targets>
+template <class Selector, class Mesh, class VertexShader, class FragmentShader, class... Targets, class Coverage>
 status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                          const framebuffer_view<Targets...>& fb, const voxelize_options& options,
-                         std::uint64_t triangles_in) {
+                         std::uint64_t triangles_in, Coverage) {
     return attempt(framebuffer_room_, {triangles_in, g.extent, g.offset, options.rule},
                    [&](device::capacities& limits, std::uint64_t, std::uint64_t left, device::pipeline_state& state,
                        device::stage_clock* clock) {
@@ -587,16 +582,16 @@ status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader
                                call.may_list = lists_fragments;
                                limits.skips_deferred_pass = call.limits.skips_deferred_pass =
                                    call.can_skip_deferred_pass(left) ? 1 : 0;
-                               launch_where_it_fits(call, state);
+                               launch_where_it_fits<Coverage>(call, state);
                                return call.is_listed_call();
                            });
                    });
 }
 
-template <class Mesh, class VertexShader, class FragmentShader, class Payload>
+template <class Mesh, class VertexShader, class FragmentShader, class Payload, class Coverage>
 status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                          abuffer<cuda_backend, Payload>& lists, const voxelize_options& options,
-                         std::uint64_t triangles_in) {
+                         std::uint64_t triangles_in, Coverage) {
     using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
     abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
     status s = attempt(list_room_, {triangles_in, g.extent, g.offset, options.rule},
@@ -607,17 +602,17 @@ status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader
                                call.can_skip_deferred_pass(left) ? 1 : 0;
                            call.has_few_a_voxel = limits.fragments < device::min_counted * voxel_room;
                            if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
-                               fill<std::uint64_t>(options.rule, call, voxel_room, made, state);
+                               fill<Coverage, std::uint64_t>(options.rule, call, voxel_room, made, state);
                                return false;
                            }
                            call.may_shade_late = true;
                            const void* const kind = device::tag_of_call<call_type>();
                            call.filters = std::find(discarding_.begin(), discarding_.end(), kind) != discarding_.end();
-                           fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
+                           fill<Coverage, std::uint32_t>(options.rule, call, voxel_room, made, state);
                            if (state.discarded != 0 && call.template shades_late<std::uint32_t>() && !call.filters) {
                                discarding_.push_back(kind);
                                call.filters = true;
-                               fill<std::uint32_t>(options.rule, call, voxel_room, made, state);
+                               fill<Coverage, std::uint32_t>(options.rule, call, voxel_room, made, state);
                            }
                            return false;
                        });

@@ -119,13 +119,13 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
 }
 
 // Puts the call on the backend's stream and returns. A status other than ok means that nothing was launched, or that a
-// launch failed; what the device finds out is in read_status.
-template <class Mesh, class VertexShader, class FragmentShader, class... Targets>
-[[nodiscard]] status voxelize_async(cuda_backend& backend,
-                                    std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
-                                    const framebuffer_view<Targets...>& fb, const voxelize_options& options,
-                                    const workspace_view& workspace) {
+// launch failed; what the device finds out is in read_status. With a coverage between angle brackets, as for voxelize.
+template <coverage... Known, class Mesh, class VertexShader, class FragmentShader, class... Targets>
+[[nodiscard]] status
+voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
+               const framebuffer_view<Targets...>& fb, voxelize_options options, const workspace_view& workspace) {
     if constexpr (core::shaders_fit_targets<Mesh, VertexShader, FragmentShader, Targets...>()) {
+        core::known_coverage<Known...>::set(options);
         if (const status s = validate(g); !s.ok()) return s;
         if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
         status s = core::validate_draws(draws);
@@ -143,10 +143,8 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
                 device::launch_until(call.last_stage(), [&] {
                     device::arena memory(workspace.memory);
                     device::zero_memory(workspace.memory, call.zeroed_bytes(), backend.stream);
-                    if (options.rule == coverage::thin)
-                        call.template go<coverage::thin, true>(memory, backend.stream);
-                    else
-                        call.template go<coverage::conservative, true>(memory, backend.stream);
+                    core::known_coverage<Known...>::dispatch(
+                        options.rule, [&]<coverage Rule>() { call.template go<Rule, true>(memory, backend.stream); });
                     if (!workspace.limits.expects_deferred && call.limits.skips_deferred_pass == 0) { // none is missing
                         auto* const state = static_cast<device::pipeline_state*>(workspace.memory);
                         device::check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), backend.stream));
@@ -195,5 +193,10 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
     }
     return device::to_status(state);
 }
+
+#if defined(VOXELPIPE_LINKS_CUDA_KERNELS)
+VOXELPIPE_BIT_ASYNC_CALLS(extern template)
+VOXELPIPE_SUM_ASYNC_CALLS(extern template)
+#endif
 
 } // namespace voxelpipe

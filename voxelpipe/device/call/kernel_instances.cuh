@@ -62,13 +62,28 @@
     HOW void mark_listed(const std::uint32_t*, const unsigned long long*, std::uint64_t, const chunk_marks&,           \
                          const pipeline_state*, const capacities&, cudaStream_t);
 
-// In namespace voxelpipe: calls of voxelize whose every type the library names: bits of a surface, sums of a number,
-// and the primitives of each voxel.
-#define VOXELPIPE_CONSTANT_CALL(HOW, VALUE, ...)                                                                       \
-    HOW status cuda_backend::run(std::span<const draw<mesh_view<>, passthrough, constant_output<VALUE>>>, const grid&, \
-                                 const framebuffer_view<__VA_ARGS__>&, const voxelize_options&, std::uint64_t);
-#define VOXELPIPE_BIT_CALLS(HOW) VOXELPIPE_CONSTANT_CALL(HOW, bool, target<bit, blend::bit_or>)
-#define VOXELPIPE_SUM_CALLS(HOW) VOXELPIPE_CONSTANT_CALL(HOW, float, target<float, blend::add>)
-#define VOXELPIPE_LIST_CALLS(HOW)                                                                                      \
-    HOW status cuda_backend::run(std::span<const draw<mesh_view<>, passthrough, constant_output<bool>>>, const grid&,  \
-                                 abuffer<cuda_backend, void>&, const voxelize_options&, std::uint64_t);
+// In namespace voxelpipe: calls of voxelize and voxelize_async whose every type the library names: bits of a surface,
+// sums of a number, and the primitives of each voxel. One of voxelize with a known coverage takes no kernels of its
+// own.
+#define VOXELPIPE_DRAWS(VALUE) std::span<const draw<mesh_view<>, passthrough, constant_output<VALUE>>>
+#define VOXELPIPE_CALL(HOW, VALUE, COVERAGE, ...)                                                                      \
+    HOW status cuda_backend::run(VOXELPIPE_DRAWS(VALUE), const grid&, __VA_ARGS__&, const voxelize_options&,           \
+                                 std::uint64_t, COVERAGE);
+#define VOXELPIPE_CALLS(HOW, VALUE, ...)                                                                               \
+    VOXELPIPE_CALL(HOW, VALUE, core::known_coverage<>, __VA_ARGS__)                                                    \
+    VOXELPIPE_CALL(HOW, VALUE, core::known_coverage<coverage::conservative>, __VA_ARGS__)                              \
+    VOXELPIPE_CALL(HOW, VALUE, core::known_coverage<coverage::thin>, __VA_ARGS__)
+#define VOXELPIPE_ASYNC_CALLS(HOW, VALUE, ...)                                                                         \
+    HOW std::size_t workspace_bytes(VOXELPIPE_DRAWS(VALUE), const grid&, const __VA_ARGS__&, const voxelize_options&,  \
+                                    const workspace_limits&);                                                          \
+    HOW status voxelize_async<>(cuda_backend&, VOXELPIPE_DRAWS(VALUE), const grid&, const __VA_ARGS__&,                \
+                                voxelize_options, const workspace_view&);
+
+#define VOXELPIPE_BITS framebuffer_view<target<bit, blend::bit_or>>
+#define VOXELPIPE_SUMS framebuffer_view<target<float, blend::add>>
+#define VOXELPIPE_LISTS abuffer<cuda_backend, void>
+#define VOXELPIPE_BIT_CALLS(HOW) VOXELPIPE_CALLS(HOW, bool, const VOXELPIPE_BITS)
+#define VOXELPIPE_SUM_CALLS(HOW) VOXELPIPE_CALLS(HOW, float, const VOXELPIPE_SUMS)
+#define VOXELPIPE_LIST_CALLS(HOW) VOXELPIPE_CALLS(HOW, bool, VOXELPIPE_LISTS)
+#define VOXELPIPE_BIT_ASYNC_CALLS(HOW) VOXELPIPE_ASYNC_CALLS(HOW, bool, VOXELPIPE_BITS)
+#define VOXELPIPE_SUM_ASYNC_CALLS(HOW) VOXELPIPE_ASYNC_CALLS(HOW, float, VOXELPIPE_SUMS)
