@@ -26,45 +26,46 @@ namespace voxelpipe::device {
 
 // Fragments as cells of work_share: the voxel is the key; the value is the primitive or, where there are payloads, the
 // fragment's place among them.
-template <coverage Rule, class Scene, class Key, class Payload, class MakePayload>
+template <coverage Rule, class Scene, class Payload, class MakePayload>
 struct fragment_cells {
     static constexpr coverage rule = Rule;
     static constexpr std::int64_t small_columns = 256; // a warp per triangle pays only beyond
     static constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
 
     Scene s;
-    Key* keys;
+    void* keys; // std::uint64_t where they are wide, otherwise std::uint32_t: one kernel for both
+    bool are_wide;
     std::uint32_t* values;
     std::uint32_t* primitives; // by place, where there are payloads
     Payload* payloads;         // by place
     bool counts_triangles;
 
-    struct cell {
-        std::uint64_t voxel;
-        typename Scene::fragment_output out;
-    };
-
     [[nodiscard]] __device__ core::voxel_box cells(const core::voxel_box& reach) const { return reach; }
-    template <class Visit>
-    __device__ void enumerate(const geometry& geo, const loaded_triangle& t, std::uint32_t id,
-                              const core::voxel_box& box, bool, Visit&& visit) const {
-        const auto nx = static_cast<std::uint64_t>(geo.extent.x), ny = static_cast<std::uint64_t>(geo.extent.y);
-        shade_fragments<Rule>(s, t, id, box, [&](int x, int y, int z, const auto& out) {
-            visit(cell{(static_cast<std::uint64_t>(z) * ny + static_cast<std::uint64_t>(y)) * nx +
-                           static_cast<std::uint64_t>(x),
-                       out});
-        });
+    [[nodiscard]] __device__ cell_counts count(const geometry&, const loaded_triangle& t, std::uint32_t primitive,
+                                               const core::voxel_box& box, bool) const {
+        cell_counts n;
+        shade_fragments<Rule>(s, t, primitive, box,
+                              [&](int, int, int, const auto& out) { ++(out.keep ? n.kept : n.discarded); });
+        return n;
     }
-    [[nodiscard]] __device__ static bool keep(const cell& c) { return c.out.keep; }
-    __device__ void store(unsigned long long at, std::uint32_t primitive, const cell& c) const {
-        std::uint32_t value = primitive;
-        if constexpr (has_payload) {
-            value = static_cast<std::uint32_t>(at);
-            primitives[at] = primitive;
-            payloads[at] = MakePayload{}(c.out);
-        }
-        keys[at] = static_cast<Key>(c.voxel);
-        values[at] = value;
+    __device__ void emit(const geometry& geo, const loaded_triangle& t, std::uint32_t primitive,
+                         const core::voxel_box& box, bool, unsigned long long at) const {
+        const auto nx = static_cast<std::uint64_t>(geo.extent.x), ny = static_cast<std::uint64_t>(geo.extent.y);
+        shade_fragments<Rule>(s, t, primitive, box, [&](int x, int y, int z, const auto& out) {
+            if (!out.keep) return;
+            const std::uint64_t voxel = (static_cast<std::uint64_t>(z) * ny + static_cast<std::uint64_t>(y)) * nx +
+                                        static_cast<std::uint64_t>(x);
+            if (are_wide)
+                static_cast<std::uint64_t*>(keys)[at] = voxel;
+            else
+                static_cast<std::uint32_t*>(keys)[at] = static_cast<std::uint32_t>(voxel);
+            if constexpr (has_payload) {
+                primitives[at] = primitive;
+                payloads[at] = MakePayload{}(out);
+            }
+            values[at] = has_payload ? static_cast<std::uint32_t>(at) : primitive;
+            ++at;
+        });
     }
 };
 
@@ -343,8 +344,8 @@ template <coverage Rule, class MakePayload, class Scene, class Key, class Payloa
 build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const list_memory& m, pipeline_state* state,
             const capacities& limits, bool counts_triangles, cudaStream_t stream, stage_clock* clock,
             const output_pointers& asked = {}) {
-    const fragment_cells<Rule, Scene, Key, Payload, MakePayload> op{
-        s, b.keys[0], b.values[0], b.primitives, b.payloads, counts_triangles};
+    const fragment_cells<Rule, Scene, Payload, MakePayload> op{
+        s, b.keys[0], sizeof(Key) == sizeof(std::uint64_t), b.values[0], b.primitives, b.payloads, counts_triangles};
     share_count(s.geo, op, m.share, state, m.storage, m.storage_bytes, stage::abuffer_emit, stream);
     share_emit(s.geo, op, m.share, state, limits, stage::abuffer_emit, stream);
     end_stage(clock, &stage_times::fine_raster);

@@ -78,14 +78,18 @@ __device__ inline void count_discarded(std::uint64_t discarded, pipeline_state* 
     if (threadIdx.x == 0) atomicAdd(&state->discarded, sum);
 }
 
+// Of a triangle within a box.
+struct cell_counts {
+    std::uint32_t kept = 0, discarded = 0; // cells that are stored, and others
+};
+
 // Op is the stage:
 //   static constexpr coverage rule;   std::int64_t small_columns (what one thread takes)
 //     bool counts_triangles (whether this stage fills the triangle counters)
 //   voxel_box cells(voxel_box reach)                          voxels to cells
-//   enumerate(geometry, triangle, primitive, box, whole, visit)   calls visit(cell) for every cell within the box;
-//                                                                 whole: the box is all of the triangle's
-//   keep(cell)                                                whether it is stored, or only counted as discarded
-//   store(position, primitive, cell)
+//   count(geometry, triangle, primitive, box, whole)           the cells of the triangle within the box; whole: the box
+//                                                             is all of the triangle's
+//   emit(geometry, triangle, primitive, box, whole, place)    stores those that count() counts from this place on
 template <class Op>
 __global__ __launch_bounds__(threads_per_block,
                              share_min_blocks) void share_count_small(const __grid_constant__ geometry geo,
@@ -110,7 +114,9 @@ __global__ __launch_bounds__(threads_per_block,
             if (kind == triangle_class::drawn) {
                 const core::voxel_box box = op.cells(reach);
                 if (is_small(box, Op::small_columns)) {
-                    op.enumerate(geo, t, id, box, true, [&](const auto& cell) { ++(Op::keep(cell) ? n : discarded); });
+                    const cell_counts cells = op.count(geo, t, id, box, true);
+                    n = cells.kept;
+                    discarded = cells.discarded;
                 } else {
                     const chunk_grid chunks(box, core::dominant_axis(t.a, t.b, t.c, geo.snap.fraction));
                     const auto records = static_cast<unsigned long long>(chunks.records());
@@ -170,13 +176,11 @@ __global__ __launch_bounds__(threads_per_block,
         for_each_record(geo, op, b,
                         [&](std::uint32_t id, const loaded_triangle& t, bool valid, const core::voxel_box& box) {
                             std::uint32_t n = 0;
-                            if (valid)
-                                op.enumerate(geo, t, id, box, false, [&](const auto& cell) {
-                                    if (Op::keep(cell))
-                                        ++n;
-                                    else
-                                        ++discarded;
-                                });
+                            if (valid) {
+                                const cell_counts cells = op.count(geo, t, id, box, false);
+                                n = cells.kept;
+                                discarded += cells.discarded;
+                            }
                             const std::uint32_t sum = __reduce_add_sync(0xffffffffu, n);
                             if (threadIdx.x % 32 == 0 && sum != 0) atomicAdd(&b.counts[id], sum);
                             all += n;
@@ -200,10 +204,7 @@ __global__ __launch_bounds__(threads_per_block,
     (void)core::classify<Op::rule>(t.a, t.b, t.c, geo.snap.fraction, geo.whole_box(), reach);
     const core::voxel_box box = op.cells(reach);
     if (!is_small(box, Op::small_columns)) return;
-    unsigned long long at = b.offsets[i];
-    op.enumerate(geo, t, id, box, true, [&](const auto& cell) {
-        if (Op::keep(cell)) op.store(at++, id, cell);
-    });
+    op.emit(geo, t, id, box, true, b.offsets[i]);
 }
 
 // counts become what of a primitive is not yet placed: its records take their places in any order, which a later stable
@@ -217,10 +218,7 @@ __global__ __launch_bounds__(threads_per_block,
     for_each_record(geo, op, b,
                     [&](std::uint32_t id, const loaded_triangle& t, bool valid, const core::voxel_box& box) {
                         std::uint32_t n = 0;
-                        if (valid)
-                            op.enumerate(geo, t, id, box, false, [&](const auto& cell) {
-                                if (Op::keep(cell)) ++n;
-                            });
+                        if (valid) n = op.count(geo, t, id, box, false).kept;
                         const unsigned lane = threadIdx.x % 32;
                         std::uint32_t before = n; // inclusive sum over the lanes
                         for (unsigned step = 1; step < 32; step *= 2) {
@@ -232,11 +230,8 @@ __global__ __launch_bounds__(threads_per_block,
                         std::uint32_t left = 0;
                         if (lane == 0) left = atomicSub(&b.counts[id], sum);
                         left = __shfl_sync(0xffffffffu, left, 0);
-                        unsigned long long at = b.offsets[id] + (left - sum) + (before - n);
-                        if (n != 0)
-                            op.enumerate(geo, t, id, box, false, [&](const auto& cell) {
-                                if (Op::keep(cell)) op.store(at++, id, cell);
-                            });
+                        const unsigned long long at = b.offsets[id] + (left - sum) + (before - n);
+                        if (n != 0) op.emit(geo, t, id, box, false, at);
                     });
 }
 

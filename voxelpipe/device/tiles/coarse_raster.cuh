@@ -22,33 +22,41 @@ struct tile_cells {
     [[nodiscard]] __device__ core::voxel_box cells(const core::voxel_box& reach) const {
         return core::coarsen(reach, tiles.log2_size);
     }
-    template <class Visit>
-    __device__ void enumerate(const geometry& geo, const loaded_triangle& t, std::uint32_t, const core::voxel_box& box,
-                              bool whole, Visit&& visit) const {
-        // A triangle that lies in one tile needs no test; a chunk of a larger one does.
-        if (whole && box.lo[0] == box.hi[0] && box.lo[1] == box.hi[1] && box.lo[2] == box.hi[2])
-            visit(tiles.index(box.lo[0], box.lo[1], box.lo[2]));
-        else
-            enumerate_within(geo.snap.fraction + tiles.log2_size, t, box, visit);
+    [[nodiscard]] __device__ cell_counts count(const geometry& geo, const loaded_triangle& t, std::uint32_t primitive,
+                                               const core::voxel_box& box, bool whole) const {
+        return {walk(geo.snap.fraction + tiles.log2_size, t, primitive, box, whole, nothing), 0};
     }
-    [[nodiscard]] __device__ static bool keep(std::uint64_t) { return true; }
-    __device__ void store(unsigned long long at, std::uint32_t primitive, std::uint64_t tile) const {
-        keys[at] = static_cast<std::uint32_t>(tile);
-        primitives[at] = primitive;
+    __device__ void emit(const geometry& geo, const loaded_triangle& t, std::uint32_t primitive,
+                         const core::voxel_box& box, bool whole, unsigned long long at) const {
+        (void)walk(geo.snap.fraction + tiles.log2_size, t, primitive, box, whole, at);
     }
 
 private:
-    template <class Visit>
-    __device__ void enumerate_within(int fraction, const loaded_triangle& t, const core::voxel_box& box,
-                                     Visit&& visit) const {
+    static constexpr unsigned long long nothing = ~0ull;
+
+    // Goes through the tiles of the triangle within the box, stores them from `at` on, unless that is `nothing`, and
+    // says how many they are. One function out of line for all kernels of the coarse raster: it is most of their code.
+    __device__ __noinline__ std::uint32_t walk(int fraction, const loaded_triangle& t, std::uint32_t primitive,
+                                               const core::voxel_box& box, bool whole, unsigned long long at) const {
         constexpr auto cells_rule = Rule == coverage::thin ? core::span_rule::columns : core::span_rule::conservative;
+        std::uint32_t n = 0;
+        const auto visit = [&](std::uint64_t tile) {
+            if (at != nothing) {
+                keys[at + n] = static_cast<std::uint32_t>(tile);
+                primitives[at + n] = primitive;
+            }
+            ++n;
+        };
         const auto column = [&](int axis, std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
             for (std::int64_t w = w0; w <= w1; ++w) {
                 const auto p = core::to_xyz(axis, u, v, w);
                 visit(tiles.index(p[0], p[1], p[2]));
             }
         };
-        if (core::fits_narrow(t.a, t.b, t.c, fraction)) {
+        // A triangle that lies in one tile needs no test; a chunk of a larger one does.
+        if (whole && box.lo[0] == box.hi[0] && box.lo[1] == box.hi[1] && box.lo[2] == box.hi[2]) {
+            visit(tiles.index(box.lo[0], box.lo[1], box.lo[2]));
+        } else if (core::fits_narrow(t.a, t.b, t.c, fraction)) {
             const auto setup = core::setup_triangle<cells_rule, std::int64_t>(t.a, t.b, t.c, fraction);
             core::for_each_span<cells_rule>(setup, box,
                                             [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
@@ -59,6 +67,7 @@ private:
             for_each_wide_span<cells_rule>(t.a, t.b, t.c, fraction, box,
                                            [&](const wide_span& s) { column(axis, s.u, s.v, s.w_first, s.w_last); });
         }
+        return n;
     }
 };
 
