@@ -59,7 +59,7 @@ if(WAY STREQUAL "fetch_content")
   run(${configure} -S "${consumer}" -B "${build}" -DCONSUMER_USES=FetchContent
       "-DFETCHCONTENT_SOURCE_DIR_VOXELPIPE=${SOURCE_DIR}" "-DCMAKE_PREFIX_PATH=${PREFIX_PATH}")
   # A subproject brings its library alone: no tests, no tool, no install rules.
-  file(STRINGS "${build}/CMakeCache.txt" built REGEX "^VOXELPIPE_(BUILD_TESTS|BUILD_SAMPLES|BUILD_BENCH|INSTALL):.*=ON$")
+  file(STRINGS "${build}/CMakeCache.txt" built REGEX "^VOXELPIPE_(BUILD_TESTS|BUILD_SAMPLES|BUILD_BENCH|BUILD_CUDA_KERNELS|INSTALL):.*=ON$")
   if(built)
     message(FATAL_ERROR "a subproject must not build: ${built}")
   endif()
