@@ -55,6 +55,54 @@ TEST(Draws, AreOrderedAndPlacedByTheirTransforms) {
     EXPECT_TRUE(unit::same_bytes(vp::get<0>(fb).to_host(backend), expected));
 }
 
+// A coverage between angle brackets gives what the options give, and goes before theirs.
+TEST(Draws, AKnownCoverageIsTheOneOfTheCall) {
+    const unit::small_mesh m = unit::make_mesh(4, 60, extent);
+    backend_type backend = unit::make_backend();
+    const auto on_backend = m.on(backend);
+    const vp::grid grid = unit::unit_grid(extent);
+    const auto draw = [&](const auto& call) {
+        vp::framebuffer<backend_type, id_target> fb{backend, extent};
+        const vp::status s = call(fb);
+        EXPECT_TRUE(s.ok()) << s.message();
+        return vp::get<0>(fb).to_host(backend);
+    };
+    const auto asked = [&](vp::coverage rule) {
+        return draw([&](auto& fb) {
+            return vp::voxelize(backend, on_backend.view(), grid, vp::passthrough{}, id_shader{}, fb,
+                                vp::voxelize_options{rule});
+        });
+    };
+    const auto thin = asked(vp::coverage::thin), conservative = asked(vp::coverage::conservative);
+    EXPECT_FALSE(unit::same_bytes(thin, conservative));
+    EXPECT_TRUE(unit::same_bytes(draw([&](auto& fb) {
+                                     return vp::voxelize<vp::coverage::thin>(backend, on_backend.view(), grid,
+                                                                             vp::passthrough{}, id_shader{}, fb);
+                                 }),
+                                 thin));
+    EXPECT_TRUE(unit::same_bytes(draw([&](auto& fb) {
+                                     return vp::voxelize<vp::coverage::conservative>(
+                                         backend, on_backend.view(), grid, vp::passthrough{}, id_shader{}, fb,
+                                         vp::voxelize_options{vp::coverage::thin});
+                                 }),
+                                 conservative));
+    // Lists take it too.
+    const auto lists = [&](const auto& call) {
+        vp::abuffer<backend_type, void> ab(backend);
+        const vp::status s = call(ab);
+        EXPECT_TRUE(s.ok()) << s.message();
+        return ab.primitives.to_host(backend);
+    };
+    EXPECT_EQ(lists([&](auto& ab) {
+                  return vp::voxelize<vp::coverage::thin>(backend, on_backend.view(), grid, vp::passthrough{},
+                                                          vp::constant(true), ab);
+              }),
+              lists([&](auto& ab) {
+                  return vp::voxelize(backend, on_backend.view(), grid, vp::passthrough{}, vp::constant(true), ab,
+                                      vp::voxelize_options{vp::coverage::thin});
+              }));
+}
+
 TEST(Draws, TransformPointIsThreeFusedSteps) {
     unit::splitmix64 random(3);
     for (int i = 0; i < 2000; ++i) {

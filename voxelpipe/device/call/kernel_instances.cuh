@@ -48,6 +48,8 @@
     HOW void note_known(word*, const known_targets<N>&, const chunk_marks&, bool, const pipeline_state*,               \
                         const capacities&, cudaStream_t);
 #define VOXELPIPE_CLEARS(HOW)                                                                                          \
+    HOW void clear_target(const target_view<target<bit, blend::bit_or>>&, const pipeline_state*, const capacities&,    \
+                          cudaStream_t);                                                                               \
     HOW void fill_elements<true>(word*, std::uint64_t, const fill_pattern<word>&, const pipeline_state*,               \
                                  const capacities&, cudaStream_t);                                                     \
     VOXELPIPE_CLEARS_OF(HOW, std::uint8_t)                                                                             \
