@@ -4,6 +4,8 @@
 
 // A random-access iterator over whatever gives its elements by number, for ranges that make them as they are read.
 
+#include <voxelpipe/config.hpp>
+
 #include <compare>
 #include <cstddef>
 #include <iterator>
