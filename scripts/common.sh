@@ -46,6 +46,7 @@ present() {
         zlib1g-dev) has_header zlib.h ;;
         libminizip-dev) has_header minizip/zip.h ;;
         libassimp-dev) has_header assimp/Importer.hpp ;;
+        libdeflate-dev) has_header libdeflate.h ;;
         libwebp-dev) has_header webp/decode.h ;;
         libdraco-dev) has_header draco/compression/decode.h ;;
         libmeshoptimizer-dev) has_header meshoptimizer.h ;;
@@ -89,7 +90,7 @@ Install them and run the same command again; on Debian or Ubuntu:
 
 # What the library, the tool and the samples are built with.
 build_packages=(g++ cmake ninja-build libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev zlib1g-dev
-    libminizip-dev libwebp-dev libassimp-dev libdraco-dev libmeshoptimizer-dev)
+    libminizip-dev libdeflate-dev libwebp-dev libassimp-dev libdraco-dev libmeshoptimizer-dev)
 
 # configure PRESET [cmake option...]: quiet unless it fails. Uses ccache where there is one, and the staged prefix.
 configure() {

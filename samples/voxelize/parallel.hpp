@@ -6,12 +6,16 @@
 
 #include <algorithm>
 #include <atomic>
+#include <condition_variable>
 #include <cstddef>
 #include <exception>
 #include <mutex>
 #include <new>
 #include <system_error>
+#include <optional>
 #include <thread>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace voxelize {
@@ -57,6 +61,77 @@ void parallel_for(std::size_t count, int threads, Work work, Done done) {
 template <class Work>
 void parallel_for(std::size_t count, int threads, Work work) {
     parallel_for(count, threads, work, [](std::size_t) {});
+}
+
+// Calls use(n, make(n)) for n = 0 .. count - 1: make on all threads, use on the calling thread, in order. At most four
+// results a thread wait to be used. The first exception of either stops the work and is thrown here.
+template <class Make, class Use>
+void ordered_for(std::size_t count, int threads, const Make& make, const Use& use) {
+    using result = std::invoke_result_t<const Make&, std::size_t>;
+    if (threads <= 1 || count <= 1) {
+        for (std::size_t n = 0; n < count; ++n) use(n, make(n));
+        return;
+    }
+    std::mutex mutex;
+    std::condition_variable changed;
+    std::vector<std::optional<result>> waiting(4 * static_cast<std::size_t>(threads)); // result n at n modulo the size
+    std::size_t next = 0, used = 0;
+    std::exception_ptr failure;
+    const auto may_take = [&] { return next < count && next < used + waiting.size(); };
+    // Makes one result; the lock is held before and after.
+    const auto make_one = [&](std::unique_lock<std::mutex>& lock) {
+        const std::size_t n = next++;
+        lock.unlock();
+        std::optional<result> made;
+        std::exception_ptr problem;
+        try {
+            made.emplace(make(n));
+        } catch (...) {
+            problem = std::current_exception();
+        }
+        lock.lock();
+        if (problem && !failure) failure = problem;
+        waiting[n % waiting.size()] = std::move(made);
+        changed.notify_all();
+    };
+    std::vector<std::jthread> helpers;
+    for (std::size_t n = 1; n < std::min(count, static_cast<std::size_t>(threads)); ++n)
+        helpers.emplace_back([&] {
+            std::unique_lock lock(mutex);
+            while (true) {
+                changed.wait(lock, [&] { return failure || next == count || may_take(); });
+                if (failure || next == count) return;
+                make_one(lock);
+            }
+        });
+    {
+        std::unique_lock lock(mutex);
+        while (used < count && !failure) {
+            std::optional<result>& ready = waiting[used % waiting.size()];
+            if (ready) {
+                const result taken = std::move(*ready);
+                ready.reset();
+                lock.unlock();
+                try {
+                    use(used, taken);
+                } catch (...) {
+                    lock.lock();
+                    if (!failure) failure = std::current_exception();
+                    break;
+                }
+                lock.lock();
+                ++used;
+                changed.notify_all();
+            } else if (may_take()) {
+                make_one(lock);
+            } else {
+                changed.wait(lock);
+            }
+        }
+        changed.notify_all();
+    }
+    helpers.clear(); // joins
+    if (failure) std::rethrow_exception(failure);
 }
 
 } // namespace voxelize

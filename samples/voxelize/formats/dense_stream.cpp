@@ -23,24 +23,25 @@ constexpr std::array<std::array<std::uint8_t, 8>, 256> make_expansion() {
 }
 constexpr auto expansion = make_expansion();
 
-void stream_bits(const volume& v, const channel& c, const byte_sink& sink) {
-    const auto nx = static_cast<std::size_t>(v.extent[0]);
+void expand_bits(const volume& v, const channel& c, std::uint64_t begin, std::span<std::byte> out) {
+    const auto nx = static_cast<std::uint64_t>(v.extent[0]);
     const auto pitch = static_cast<std::size_t>(v.words_per_row()) * 4;
-    const std::size_t rows = static_cast<std::size_t>(v.extent[1]) * static_cast<std::size_t>(v.extent[2]);
-    // Eight spare bytes: the last group of a row is expanded whole, and the next row overwrites what is too much.
-    std::vector<std::byte> piece(std::max(piece_bytes, nx) + 8);
-    std::size_t filled = 0;
-    for (std::size_t row = 0; row < rows; ++row) {
-        if (filled + nx + 8 > piece.size()) {
-            sink(std::span{piece}.first(filled));
-            filled = 0;
+    for (std::size_t filled = 0; filled < out.size();) {
+        const std::uint64_t at = begin + filled;
+        const std::byte* packed = c.data.data() + at / nx * pitch;
+        auto i = static_cast<std::size_t>(at % nx);
+        const std::size_t end = std::min(static_cast<std::size_t>(nx), i + out.size() - filled);
+        while (i < end) {
+            const auto& eight = expansion[std::to_integer<std::size_t>(packed[i / 8])];
+            const std::size_t n = std::min(end, i / 8 * 8 + 8) - i;
+            if (n == 8)
+                std::memcpy(out.data() + filled, eight.data(), 8);
+            else
+                std::memcpy(out.data() + filled, eight.data() + i % 8, n);
+            filled += n;
+            i += n;
         }
-        const std::byte* packed = c.data.data() + row * pitch;
-        for (std::size_t i = 0; i < nx; i += 8)
-            std::memcpy(piece.data() + filled + i, expansion[std::to_integer<std::size_t>(packed[i / 8])].data(), 8);
-        filled += nx;
     }
-    sink(std::span{piece}.first(filled));
 }
 
 // IEEE 754 binary16 to binary32; exact for every value, NaN payloads included.
@@ -56,20 +57,6 @@ std::uint32_t widen(std::uint16_t half) {
     return sign | (113 - shift) << 23 | (mantissa << shift & 0x3ffu) << 13;
 }
 
-void stream_widened(const channel& c, const byte_sink& sink) {
-    std::vector<std::uint32_t> piece(piece_bytes / 4);
-    const std::size_t count = c.data.size() / 2;
-    for (std::size_t begin = 0; begin < count; begin += piece.size()) {
-        const std::size_t n = std::min(piece.size(), count - begin);
-        for (std::size_t i = 0; i < n; ++i) {
-            std::uint16_t half;
-            std::memcpy(&half, c.data.data() + 2 * (begin + i), 2);
-            piece[i] = widen(half);
-        }
-        sink(std::as_bytes(std::span{piece}.first(n)));
-    }
-}
-
 } // namespace
 
 scalar streamed_type(scalar type, half_floats halves) {
@@ -83,12 +70,35 @@ std::uint64_t streamed_bytes(const volume& v, const channel& c, half_floats halv
            static_cast<std::uint64_t>(c.components);
 }
 
+std::span<const std::byte> streamed_piece(const volume& v, const channel& c, half_floats halves, std::uint64_t begin,
+                                          std::size_t size, std::vector<std::byte>& room) {
+    if (c.type == scalar::bit) {
+        room.resize(size);
+        expand_bits(v, c, begin, room);
+        return room;
+    }
+    if (c.type != scalar::f16 || halves == half_floats::keep)
+        return std::span{c.data}.subspan(static_cast<std::size_t>(begin), size);
+    // From the value that begins at or before `begin`, so that a piece may begin and end anywhere.
+    const auto first = static_cast<std::size_t>(begin / 4);
+    const std::size_t skip = begin % 4;
+    const std::size_t count = (skip + size + 3) / 4;
+    room.resize(4 * count);
+    for (std::size_t i = 0; i < count; ++i) {
+        std::uint16_t half;
+        std::memcpy(&half, c.data.data() + 2 * (first + i), 2);
+        const std::uint32_t wide = widen(half);
+        std::memcpy(room.data() + 4 * i, &wide, 4);
+    }
+    return std::span{room}.subspan(skip, size);
+}
+
 void stream_values(const volume& v, const channel& c, half_floats halves, const byte_sink& sink) {
-    if (c.type == scalar::bit) return stream_bits(v, c, sink);
-    if (c.type == scalar::f16 && halves == half_floats::widen) return stream_widened(c, sink);
-    const std::span<const std::byte> all{c.data};
-    for (std::size_t begin = 0; begin < all.size(); begin += piece_bytes)
-        sink(all.subspan(begin, std::min(piece_bytes, all.size() - begin)));
+    const std::uint64_t total = streamed_bytes(v, c, halves);
+    std::vector<std::byte> room;
+    for (std::uint64_t begin = 0; begin < total; begin += piece_bytes)
+        sink(streamed_piece(v, c, halves, begin,
+                            static_cast<std::size_t>(std::min<std::uint64_t>(piece_bytes, total - begin)), room));
 }
 
 } // namespace voxelize

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <vector>
 
 namespace voxelize {
 
@@ -25,6 +26,12 @@ using byte_sink = std::function<void(std::span<const std::byte>)>;
 
 // Bytes that the whole stream has.
 [[nodiscard]] std::uint64_t streamed_bytes(const volume& v, const channel& c, half_floats halves);
+
+// Bytes [begin, begin + size) of the stream, which must be in it. They lie in the channel itself where it is streamed
+// as it is, otherwise in `room`, which is resized to hold them. Several threads may read one channel.
+[[nodiscard]] std::span<const std::byte> streamed_piece(const volume& v, const channel& c, half_floats halves,
+                                                        std::uint64_t begin, std::size_t size,
+                                                        std::vector<std::byte>& room);
 
 // Calls `sink` with one piece after the other until the channel is through.
 void stream_values(const volume& v, const channel& c, half_floats halves, const byte_sink& sink);

@@ -3,15 +3,20 @@
 
 #include "npz.hpp"
 
+#include "deflate.hpp"
 #include "dense_stream.hpp"
 #include "npy.hpp"
 #include "progress.hpp"
 
 #include <exception>
 #include <minizip/zip.h>
+#include <zlib.h>
 
 namespace voxelize {
 namespace {
+
+// What a thread compresses at once; numpy never sees it.
+constexpr std::size_t piece_bytes = std::size_t{256} << 10;
 
 // minizip writes through these callbacks into our output_file. A C library must not see an exception, so the first one
 // is kept here and thrown again once minizip has returned its error code.
@@ -79,11 +84,30 @@ std::vector<std::filesystem::path> write_npz(const volume& v, const std::filesys
     info.dosDate = 1u << 21 | 1u << 16; // 1980-01-01, the earliest that zip knows
     for (const channel& c : v.channels) {
         const std::string name = c.name + ".npy";
-        const int method = options.compression > 0 ? Z_DEFLATED : 0;
-        check(zipOpenNewFileInZip64(archive, name.c_str(), &info, nullptr, 0, nullptr, 0, nullptr, method,
-                                    options.compression, 1));
-        entry_open = true;
         const std::string header = npy_header(v, c);
+        if (options.compression > 0) {
+            // Compressed here, on all threads; minizip writes what surrounds it.
+            check(zipOpenNewFileInZip2_64(archive, name.c_str(), &info, nullptr, 0, nullptr, 0, nullptr, Z_DEFLATED,
+                                          options.compression, 1, 1));
+            entry_open = true;
+            piece_compressor compressor(piece_compressor::form::stream_part, options.compression);
+            running_crc whole;
+            const auto add = [&](std::span<const std::byte> bytes) {
+                check(zipWriteInFileInZip(archive, bytes.data(), static_cast<unsigned>(bytes.size())));
+            };
+            compress_channel(v, c, half_floats::keep, std::as_bytes(std::span{header}), piece_bytes, options.threads,
+                             compressor, [&](const compressed_piece& piece) {
+                                 add(piece.bytes);
+                                 whole.add(piece);
+                                 meter.advance(piece.source_size);
+                             });
+            add(deflate_end);
+            entry_open = false;
+            check(zipCloseFileInZipRaw64(archive, whole.size, whole.crc));
+            continue;
+        }
+        check(zipOpenNewFileInZip64(archive, name.c_str(), &info, nullptr, 0, nullptr, 0, nullptr, 0, 0, 1));
+        entry_open = true;
         check(zipWriteInFileInZip(archive, header.data(), static_cast<unsigned>(header.size())));
         stream_values(v, c, half_floats::keep, [&](std::span<const std::byte> piece) {
             check(zipWriteInFileInZip(archive, piece.data(), static_cast<unsigned>(piece.size())));

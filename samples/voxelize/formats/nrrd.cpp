@@ -3,6 +3,7 @@
 
 #include "nrrd.hpp"
 
+#include "deflate.hpp"
 #include "dense_stream.hpp"
 #include "npy.hpp"
 #include "progress.hpp"
@@ -10,7 +11,6 @@
 
 #include <array>
 #include <memory>
-#include <zlib.h>
 
 namespace voxelize {
 namespace {
@@ -56,38 +56,25 @@ std::string header_of(const volume& v, const channel& c, bool compress) {
     return text;
 }
 
-// A gzip stream into an output_file, with an empty name and no time, so that equal input gives equal bytes.
-class gzip_stream {
-public:
-    gzip_stream(output_file& out, int level) : out_(out), buffer_(std::size_t{1} << 18) {
-        constexpr int gzip_window = 15 + 16; // 32 KiB window, gzip wrapper
-        if (deflateInit2(&stream_, level, Z_DEFLATED, gzip_window, 8, Z_DEFAULT_STRATEGY) != Z_OK)
-            throw write_error(out.target(), "out of memory");
-    }
-    ~gzip_stream() { deflateEnd(&stream_); }
-    gzip_stream(const gzip_stream&) = delete;
-    gzip_stream& operator=(const gzip_stream&) = delete;
+constexpr std::size_t piece_bytes = std::size_t{256} << 10; // what a thread compresses at once
 
-    // Pieces stay far below 4 GiB, which is what zlib's counters hold.
-    void write(std::span<const std::byte> piece) { run(piece, Z_NO_FLUSH); }
-    void finish() { run({}, Z_FINISH); }
-
-private:
-    void run(std::span<const std::byte> piece, int flush) {
-        stream_.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(piece.data()));
-        stream_.avail_in = static_cast<uInt>(piece.size());
-        do {
-            stream_.next_out = reinterpret_cast<Bytef*>(buffer_.data());
-            stream_.avail_out = static_cast<uInt>(buffer_.size());
-            deflate(&stream_, flush); // cannot fail on a valid stream with room to write
-            out_.write(std::span{buffer_}.first(buffer_.size() - stream_.avail_out));
-        } while (stream_.avail_out == 0);
-    }
-
-    output_file& out_;
-    std::vector<std::byte> buffer_;
-    z_stream stream_{};
-};
+// A gzip stream with an empty name and no time, so that equal input gives equal bytes.
+void write_gzip(output_file& out, const volume& v, const channel& c, const write_options& options,
+                progress_meter& meter) {
+    constexpr std::array<std::uint8_t, 10> head{0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255};
+    out.write(std::as_bytes(std::span{head}));
+    piece_compressor compressor(piece_compressor::form::stream_part, options.compression);
+    running_crc whole;
+    compress_channel(v, c, half_floats::widen, {}, piece_bytes, options.threads, compressor,
+                     [&](const compressed_piece& piece) {
+                         out.write(piece.bytes);
+                         whole.add(piece);
+                         meter.advance(piece.source_size);
+                     });
+    out.write(deflate_end);
+    out.write_value(whole.crc);
+    out.write_value(static_cast<std::uint32_t>(whole.size)); // modulo 2^32, as gzip has it
+}
 
 } // namespace
 
@@ -103,12 +90,7 @@ std::vector<std::filesystem::path> write_nrrd(const volume& v, const std::filesy
         output_file& out = *files.back();
         out.write(header_of(v, c, compress));
         if (compress) {
-            gzip_stream gzip(out, options.compression);
-            stream_values(v, c, half_floats::widen, [&](std::span<const std::byte> piece) {
-                gzip.write(piece);
-                meter.advance(piece.size());
-            });
-            gzip.finish();
+            write_gzip(out, v, c, options, meter);
         } else {
             stream_values(v, c, half_floats::widen, [&](std::span<const std::byte> piece) {
                 out.write(piece);

@@ -3,13 +3,13 @@
 
 #include "vti.hpp"
 
+#include "deflate.hpp"
 #include "dense_stream.hpp"
 #include "progress.hpp"
 #include "text.hpp"
 
 #include <algorithm>
 #include <array>
-#include <zlib.h>
 
 namespace voxelize {
 namespace {
@@ -64,7 +64,8 @@ void write_raw(output_file& out, const volume& v, const channel& c, progress_met
 
 // One array in zlib blocks: number of blocks, bytes of a block, bytes of the last one where it is shorter (else 0), the
 // compressed bytes of each; then the blocks. The sizes are filled in at the end.
-void write_compressed(output_file& out, const volume& v, const channel& c, int level, progress_meter& meter) {
+void write_compressed(output_file& out, const volume& v, const channel& c, const write_options& options,
+                      progress_meter& meter) {
     const std::uint64_t total = streamed_bytes(v, c, half_floats::widen);
     const std::uint64_t num_blocks = (total + block_bytes - 1) / block_bytes;
     std::vector<std::uint64_t> table(3 + num_blocks);
@@ -74,29 +75,14 @@ void write_compressed(output_file& out, const volume& v, const channel& c, int l
     const std::uint64_t table_at = out.tell();
     out.write(std::as_bytes(std::span{table}));
 
-    std::vector<std::byte> block;
-    block.reserve(block_bytes);
-    std::vector<std::byte> packed(compressBound(block_bytes));
     std::size_t next = 3;
-    const auto flush = [&] {
-        uLongf size = static_cast<uLongf>(packed.size());
-        if (compress2(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(block.data()),
-                      static_cast<uLong>(block.size()), level) != Z_OK)
-            throw write_error(out.target(), "out of memory");
-        out.write(std::span{packed}.first(size));
-        table[next++] = size;
-        meter.advance(block.size());
-        block.clear();
-    };
-    stream_values(v, c, half_floats::widen, [&](std::span<const std::byte> piece) {
-        while (!piece.empty()) {
-            const std::size_t n = std::min(piece.size(), block_bytes - block.size());
-            block.insert(block.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(n));
-            piece = piece.subspan(n);
-            if (block.size() == block_bytes) flush();
-        }
-    });
-    if (!block.empty()) flush();
+    piece_compressor compressor(piece_compressor::form::zlib, options.compression);
+    compress_channel(v, c, half_floats::widen, {}, block_bytes, options.threads, compressor,
+                     [&](const compressed_piece& piece) {
+                         out.write(piece.bytes);
+                         table[next++] = piece.bytes.size();
+                         meter.advance(piece.source_size);
+                     });
 
     const std::uint64_t end = out.tell();
     out.seek(table_at);
@@ -120,7 +106,7 @@ std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesys
     for (std::size_t i = 0; i < v.channels.size(); ++i) {
         offsets[i] = out.tell() - data_at;
         if (compress)
-            write_compressed(out, v, v.channels[i], options.compression, meter);
+            write_compressed(out, v, v.channels[i], options, meter);
         else
             write_raw(out, v, v.channels[i], meter);
     }
