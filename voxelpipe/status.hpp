@@ -29,6 +29,7 @@ enum class status_code : std::uint8_t {
     too_many_triangles, // more than 2^32 - 1 in all draws together
     out_of_memory,
     capacity_exceeded, // the caller's workspace is too small; `required` says what is needed
+    strategy_unavailable, // the strategy that the backend was told to use cannot serve the call
     no_device,
     device_error, // `device_error` holds the CUDA error
 };
@@ -100,6 +101,8 @@ struct required_sizes {
         return "out of memory";
     case status_code::capacity_exceeded:
         return "capacity exceeded: see the required sizes";
+    case status_code::strategy_unavailable:
+        return "strategy unavailable: the forced strategy cannot serve this call";
     case status_code::no_device:
         return "no usable device";
     case status_code::device_error:

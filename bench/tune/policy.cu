@@ -35,7 +35,7 @@ public:
                baseline_output baseline)
         : session_(s), backend_(s.stream()), draw_{view(mesh, backend_), {}, {value}},
           grid_(grid), options_{rule, false}, framebuffer_(backend_, grid.extent), baseline_(baseline) {
-        backend_.lists_fragments = false; // in tiles
+        backend_.strategy = vp::strategy::tiled;
     }
 
     vp::counters call() override {

@@ -293,6 +293,13 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
                "give the same bytes. Default: auto")
         ->option_text("NAME")
         ->group("Machine");
+    std::vector<std::pair<const char*, voxelpipe::strategy>> strategies{{"automatic", voxelpipe::strategy::automatic}};
+    for (const auto& rule : voxelpipe::device::rules) strategies.emplace_back(to_string(rule.value), rule.value);
+    add_choice(app, "--strategy", options.voxelize.strategy, std::move(strategies),
+               "How a GPU draws: occupancy_mask, immediate, sorted_reduce, sorted_fold, tiled (the pipeline of the "
+               "paper), or automatic. All give the same bytes; not all can draw all targets. Default: automatic")
+        ->option_text("NAME")
+        ->group("Machine");
     app.add_option("-j,--threads", options.voxelize.threads, "Threads on the CPU. Default: 0, one for each core")
         ->check(CLI::Range(0, 1024).description(""))
         ->option_text("N")
@@ -507,6 +514,8 @@ command_line parse_command_line(int argc, const char* const* argv) {
     understand_grid(options, raw);
     understand_outputs(options, raw);
     understand_picture(options, raw);
+    if (options.voxelize.backend == backend_choice::cpu && options.voxelize.strategy != voxelpipe::strategy::automatic)
+        throw usage_error("--strategy says how a GPU draws; it does not go with --backend cpu");
     return options;
 }
 

@@ -159,10 +159,12 @@ volume run_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request
     try {
         vp::stage_times times;
         backend.times = &times;
+        backend.strategy = request.strategy;
         volume result = pipeline<vp::cuda_backend>{backend, model, request, stats}.run();
         constexpr std::string_view absent[] = {"abuffer_emit"};
         show_stages(stats, times, absent, "cuda_calls"); // launches, memory, the waits for the counters
         stats.device_memory = memory.most();
+        stats.strategy = backend.last_strategy();
         return result;
     } catch (const std::bad_alloc&) {
         if (memory.refused() == 0) throw;

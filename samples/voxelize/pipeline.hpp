@@ -358,6 +358,9 @@ private:
         const vp::status status = vp::voxelize(backend_, std::span<const Draw>(draws), part, framebuffer,
                                                vp::voxelize_options{request_.coverage});
         if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
+        if (status.code == vp::status_code::strategy_unavailable)
+            throw backend_error(std::string("--strategy ") + to_string(request_.strategy) +
+                                " cannot draw these targets; automatic and tiled can");
         status.or_throw();
         stats_.triangles_dropped = status.counts.triangles_dropped();
         stats_.triangles_drawn += status.counts.triangles_drawn;

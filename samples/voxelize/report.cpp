@@ -59,6 +59,8 @@ void print_text(std::ostream& stream, const run_report& report) {
            << (report.stats.slabs == 1 ? " slab" : " slabs");
     if (!report.stats.no_cuda.empty()) stream << " (not cuda: " << report.stats.no_cuda << ')';
     stream << '\n';
+    if (report.stats.strategy.value != voxelpipe::strategy::automatic)
+        line("strategy") << to_string(report.stats.strategy.value) << " (" << report.stats.strategy.why << ")\n";
     line("triangles") << report.stats.triangles;
     if (report.stats.triangles_dropped != 0) stream << " (" << report.stats.triangles_dropped << " dropped)";
     stream << '\n';
@@ -94,6 +96,8 @@ void print_json(std::ostream& stream, const run_report& report) {
     root["backend"] = report.stats.backend;
     if (!report.stats.device.empty()) root["device"] = report.stats.device;
     if (!report.stats.no_cuda.empty()) root["no_cuda"] = report.stats.no_cuda;
+    if (report.stats.strategy.value != voxelpipe::strategy::automatic)
+        root["strategy"] = {{"name", to_string(report.stats.strategy.value)}, {"why", report.stats.strategy.why}};
     root["threads"] = report.stats.threads;
     root["slabs"] = report.stats.slabs;
     root["triangles"] = report.stats.triangles;

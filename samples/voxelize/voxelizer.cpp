@@ -102,6 +102,9 @@ std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_
     const cuda_facts facts = look_for_cuda();
     stats.no_cuda = why_not(facts);
     if (!stats.no_cuda.empty()) {
+        if (request.strategy != voxelpipe::strategy::automatic)
+            throw backend_error(std::string("--strategy ") + to_string(request.strategy) +
+                                " needs a GPU: " + stats.no_cuda);
         if (request.backend == backend_choice::cuda)
             throw backend_error("--backend cuda: " + stats.no_cuda + "; use --backend cpu");
         return std::nullopt;

@@ -10,6 +10,7 @@
 #include "volume.hpp"
 
 #include <voxelpipe/core/coverage.hpp>
+#include <voxelpipe/device/call/strategy.hpp>
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/status.hpp>
 
@@ -35,7 +36,8 @@ struct voxelize_request {
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
     blend_alpha alpha = blend_alpha::weight;
     backend_choice backend = backend_choice::automatic;
-    int threads = 0; // 0: all cores
+    voxelpipe::strategy strategy = voxelpipe::strategy::automatic; // on a GPU
+    int threads = 0;                                               // 0: all cores
     // Bytes for what exists only while the pipeline runs. A grid that needs more is computed in slabs along z. 0: what
     // suits the backend and the run's memory.
     std::uint64_t work_memory = 0;
@@ -44,11 +46,12 @@ struct voxelize_request {
 };
 
 struct voxelize_stats {
-    std::string backend;             // "cpu" or "cuda"
-    std::string device;              // the GPU's name
-    std::string no_cuda;             // why the choice between the two fell on the CPU
-    std::uint64_t device_memory = 0; // the most that was held there, in bytes
-    int threads = 0;                 // on the CPU
+    std::string backend;                 // "cpu" or "cuda"
+    std::string device;                  // the GPU's name
+    voxelpipe::strategy_choice strategy; // of the last call on a GPU
+    std::string no_cuda;                 // why the choice between the two fell on the CPU
+    std::uint64_t device_memory = 0;     // the most that was held there, in bytes
+    int threads = 0;                     // on the CPU
     int slabs = 0;
     std::uint64_t triangles = 0;
     std::uint64_t triangles_dropped = 0;   // a position that is not finite, or too far from the grid to be snapped
@@ -62,7 +65,7 @@ struct voxelize_stats {
     std::vector<std::string> warnings;                        // one line each
 };
 
-// The backend was not built, or there is no device for it.
+// The backend was not built, there is no device for it, or it cannot draw in the way that was asked for.
 struct backend_error : std::runtime_error {
     using std::runtime_error::runtime_error;
 };

@@ -66,7 +66,7 @@ int count_wrong(const Call& call) {
 template <class Targets, class FragmentShader>
 int draw_broken(broken what, const FragmentShader& fs, bool lists = false) {
     broken_mesh m;
-    m.be.lists_fragments = lists;
+    if (!lists && !vp::core::is_constant<FragmentShader>) m.be.strategy = vp::strategy::tiled;
     typename Targets::template framebuffer<vp::cuda_backend> fb{m.be, g.extent};
     auto view = fb.view();
     auto& target = vp::get<0>(view.targets);

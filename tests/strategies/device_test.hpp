@@ -265,7 +265,7 @@ void expect_same(const mesh_data& m, const vp::grid& g, const VertexShader& vs, 
                      : first  ? "fragments listed, where they can be"
                               : "in tiles");
         vp::cuda_backend gpu;
-        gpu.lists_fragments = constant || first;
+        if (!constant && !first) gpu.strategy = vp::strategy::tiled;
         vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
         const vp::status sb = draw_framebuffer(gpu, b, m, g, vs, fs, options, how,
                                                constant && !first ? indices::unknown : indices::checked);

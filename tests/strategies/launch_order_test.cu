@@ -123,7 +123,7 @@ void compare(target_list<Targets...>, const FragmentShader& shader, vp::coverage
     company others;
     stream_owner owner;
     vp::cuda_backend gpu{owner.stream};
-    gpu.lists_fragments = lists;
+    if (!lists && !vp::core::is_constant<FragmentShader>) gpu.strategy = vp::strategy::tiled;
     vp::cpu_backend cpu;
     const vp::voxelize_options options{rule};
     for_each_order([&](const std::vector<mesh_data>& parts) {

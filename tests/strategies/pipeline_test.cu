@@ -260,7 +260,7 @@ TEST(Pipeline, FragmentsAreDrawnInTilesIfMemoryDoesNotSufficeForLists) {
     for (const bool lists : {true, false}) {
         counting_resource resource;
         vp::cuda_backend be{nullptr, resource};
-        be.lists_fragments = lists;
+        if (!lists) be.strategy = vp::strategy::tiled;
         vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
         const std::size_t before = resource.live;
         ASSERT_TRUE(draw(be, fb).ok());
@@ -326,7 +326,7 @@ struct large_blocks {
 template <class Selector>
 std::vector<float> run_policy(const mesh_data& m, const vp::grid& g, vp::coverage rule, vp::counters& counts) {
     vp::cuda_backend be;
-    be.lists_fragments = false;
+    be.strategy = vp::strategy::tiled;
     vp::mesh mesh{be, m.positions, m.triangles};
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, computed>;

@@ -115,7 +115,7 @@ TEST(Reduced, StageTimesOfTilesAndOrderedTargetsAddUpToTheCall) {
     const mesh_data m = mixed_triangles(300, 30.0f, 63);
     const vp::grid g = box_grid({30, 21, 33});
     vp::cuda_backend be;
-    be.lists_fragments = false;
+    be.strategy = vp::strategy::tiled;
     fb_type timed{be, g.extent}, plain{be, g.extent};
     const auto draw = [&](fb_type& fb) {
         return draw_framebuffer(be, fb, m, g, vp::passthrough{}, shader, {}, start::clear);

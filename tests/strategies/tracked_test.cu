@@ -119,7 +119,8 @@ public:
         const auto cleared = Kind::cleared(s.clear_value);
         begin(vp::get<0>(fb_), s.targets[0], cleared.first);
         begin(vp::get<1>(fb_), s.targets[1], cleared.second);
-        if constexpr (std::is_same_v<Backend, vp::cuda_backend>) backend_.lists_fragments = s.is_listed;
+        if constexpr (std::is_same_v<Backend, vp::cuda_backend>)
+            backend_.strategy = s.varies && !s.is_listed ? vp::strategy::tiled : vp::strategy::automatic;
         const auto& mesh = s.nothing ? empty_ : (s.fails ? broken_ : meshes_)[static_cast<std::size_t>(s.mesh)];
         const vp::voxelize_options options{s.mesh < 3 ? vp::coverage::conservative : vp::coverage::thin,
                                            s.mesh % 2 == 0};

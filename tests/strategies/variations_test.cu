@@ -159,7 +159,7 @@ several_results results_of(vp::cuda_backend& be, several& fb, const vp::status& 
 
 template <class Selector>
 several_results with(const mesh_data& m, const vp::grid& g, vp::coverage rule, vp::cuda_backend be = {}) {
-    be.lists_fragments = false;
+    be.strategy = vp::strategy::tiled;
     const vp::mesh mesh{be, m.positions, m.triangles};
     several fb{be, g.extent};
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, several_values>;
@@ -192,7 +192,7 @@ struct bits_of_some {
 template <class Selector>
 std::vector<std::uint32_t> bits_with(const mesh_data& m, const vp::grid& g, vp::coverage rule) {
     vp::cuda_backend be;
-    be.lists_fragments = false;
+    be.strategy = vp::strategy::tiled;
     const vp::mesh mesh{be, m.positions, m.triangles};
     vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_xor>> fb{be, g.extent};
     const vp::draw<vp::mesh_view<>, vp::passthrough, bits_of_some> d{mesh.view(), {}, {}};

@@ -122,6 +122,15 @@ void expect_no_cuda(const std::string& reason) {
 
     list.back() = "text";
     EXPECT_NE(std::string::npos, run(folder, list).out.find("(not cuda: " + reason + ")\n"));
+
+    // A strategy is a GPU's: what is asked for is not silently left out.
+    list.insert(list.end(), {"--strategy", "tiled"});
+    const outcome forced = run(folder, list);
+    EXPECT_EQ(5, forced.code);
+    EXPECT_EQ("voxelize: --strategy tiled needs a GPU: " + reason + "\n", forced.err);
+    std::vector<std::string> on_cpu = arguments(folder / "cpu.npz", "cpu");
+    on_cpu.insert(on_cpu.end(), {"--strategy", "tiled"});
+    EXPECT_EQ(1, run(folder, on_cpu).code);
 }
 
 #if VOXELPIPE_TOOL_HAS_CUDA

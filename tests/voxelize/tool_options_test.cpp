@@ -40,6 +40,7 @@ std::set<std::string> all_options() {
             "--depth-axis AXIS",
             "--alpha RULE",
             "--backend NAME",
+            "--strategy NAME",
             "-j,--threads N",
             "--max-memory MIB",
             "--work-memory MIB",

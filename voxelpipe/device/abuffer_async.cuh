@@ -60,7 +60,7 @@ namespace device {
 template <coverage Rule, bool Run, class Key, class Payload, class Call>
 void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
     arena behind = memory; // what the stages take
-    (void)call.template go<Rule, false, Key>(behind, stream);
+    call.template plan_memory<Key>(behind);
     const std::size_t room = call.limits.fragments;
     auto* const counts = behind.take<list_counts>(1);
     auto* const voxels = behind.take<std::uint64_t>(room);
@@ -69,7 +69,7 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
     auto* const payloads = std::is_void_v<Payload> ? nullptr : behind.take<payload_storage<Payload>>(room);
     if constexpr (Run) {
         arena start = memory;
-        auto* const state = start.take<pipeline_state>(1); // what `go` takes first
+        auto* const state = start.take<pipeline_state>(1); // what the call takes first
         zero_memory(state, start.used() - memory.used(), stream);
         output_pointers asked;
         asked.value.voxels = voxels;
@@ -77,7 +77,7 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
         asked.value.room = room;
         asked.value.primitives = primitives;
         asked.value.payloads = payloads;
-        const auto sorted = call.template go<Rule, true, Key>(memory, stream, asked);
+        const auto sorted = call.template launch<Rule, Key>(memory, stream, asked);
         const bool are_done = sorted.are_placed && std::is_void_v<Payload>; // only their numbers are left
         launch_behind(publish_lists_kernel<Key, payload_storage<Payload>>, are_done ? 1 : fill_device(room),
                       threads_per_block, stream, stage::abuffer_emit, sorted, state, call.limits, counts, voxels,

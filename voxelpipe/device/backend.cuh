@@ -203,11 +203,15 @@ public:
     // The driver has memory of its own for it, until a call with other arguments, release or the destructor.
     bool use_graphs = true;
 
-    // Whether voxelize may list the fragments of a framebuffer's shaders that compute, sort them by voxel and blend
-    // them then: mostly 2 to 4 times as fast as in tiles, for 17 bytes of device memory a fragment, and more where a
-    // blend needs an order. Without it, where there is no such memory, and beyond 2^28 fragments, tiles of the grid are
-    // drawn, for 10 bytes or so a pair of triangle and tile that meet. Results are the same.
-    bool lists_fragments = true;
+    // How framebuffer calls are drawn (call/strategy.hpp). Results are the same. `automatic` takes the first rule of a
+    // table that applies; any other value forces that strategy, and a call that it cannot serve fails with
+    // strategy_unavailable and writes nothing. Sorted strategies take 17 bytes of device memory a fragment, and more if
+    // a blend depends on the order; if there is no such memory, `automatic` draws in tiles, for about 10 bytes a pair
+    // of triangle and tile that meet. A-buffer calls do not look at it.
+    voxelpipe::strategy strategy = voxelpipe::strategy::automatic;
+
+    // The strategy of the last framebuffer call, and the rule that chose it in words.
+    [[nodiscard]] strategy_choice last_strategy() const { return choice_; }
 
     // Copies an array of device memory, then waits. Throws like buffer.
     template <class T>
@@ -300,7 +304,8 @@ private:
             const std::uint64_t n = key.triangles;
             // No room for the lists of voxels where nothing is known of the call: they are copied when all is.
             // Tiny triangles have few fragments: those of a framebuffer are not taken for too many beforehand.
-            const std::uint64_t most = &memory == &framebuffer_room_ ? device::max_resolved : core::max_numbered;
+            const std::uint64_t most =
+                &memory == &framebuffer_room_ ? device::max_sorted_fragments : core::max_numbered;
             room::lengths there = memory.guess(
                 key, {n + n / 4 + 16384, n / 16 + 4096, std::min(4 * n + 65536, most), n / 16 + 4096, 0, 0, 0});
             const auto longest = memory.max_needed(key, 5), left = memory.max_needed(key, 6);
@@ -342,6 +347,8 @@ private:
             s = device::to_status(e);
         } catch (const std::bad_alloc&) {
             s = core::failure(status_code::out_of_memory);
+        } catch (const strategy_refused&) {
+            s = core::failure(status_code::strategy_unavailable);
         }
         s.counts.triangles_in = key.triangles;
         return s;
@@ -389,9 +396,9 @@ private:
     template <class Coverage, class Call>
     void launch_where_it_fits(Call call, device::pipeline_state& state) {
         const auto launch_one = [&] {
-            Coverage::dispatch(call.options.rule, [&]<coverage Rule>() { launch<Rule>(call, state); });
+            Coverage::dispatch(call.plan.options.rule, [&]<coverage Rule>() { launch<Rule>(call, state); });
         };
-        if (!call.is_listed_call()) {
+        if (!call.lists_fragments() || strategy != voxelpipe::strategy::automatic) {
             launch_one();
             return;
         }
@@ -405,15 +412,21 @@ private:
             fits = false;
         }
         if (fits) return;
-        call.may_list = false;
+        choose(call, false);
         launch_one();
+    }
+
+    // Chooses the call's strategy. Throws strategy_refused if it is forced and cannot serve the call.
+    struct strategy_refused {};
+    template <class Call>
+    void choose(Call& call, bool may_list) {
+        if (!call.choose(strategy, may_list)) throw strategy_refused{};
+        choice_ = {call.plan.rule->value, call.plan.rule->when};
     }
 
     template <coverage Rule, class Call>
     void launch(const Call& call, device::pipeline_state& state) {
-        device::arena plan;
-        call.template go<Rule, false>(plan, stream);
-        void* const workspace = reserve(plan.used());
+        void* const workspace = reserve(call.plan_memory());
         state_reader_.prepare(use_pinned_memory);
         device::launch_until(call.last_stage(), [&] {
             std::optional<device::call_bytes> bytes;
@@ -421,7 +434,7 @@ private:
                 if (may_keep_graph(call.clock)) bytes = call.template bytes<Rule>(workspace, state_reader_.page());
             state = run_stages(call.clock, bytes, call.zeroed_bytes(), [&](cudaStream_t on) {
                 device::arena memory(workspace);
-                call.template go<Rule, true>(memory, on);
+                call.template launch<Rule>(memory, on);
             });
         });
     }
@@ -499,7 +512,7 @@ private:
               device::pipeline_state& state) {
         constexpr stage where = stage::abuffer_emit;
         device::arena plan;
-        (void)call.template go<Rule, false, Key>(plan, stream);
+        call.template plan_memory<Key>(plan);
         void* const workspace = reserve(plan.used());
         state_reader_.prepare(use_pinned_memory);
         list_arrays<Payload> arrays = make_beforehand<Payload>(voxel_room, call.limits.fragments);
@@ -514,7 +527,7 @@ private:
             const device::output_pointers asked = state_reader_.ask(arrays.places(voxel_room));
             state = run_stages(call.clock, bytes, sizeof(device::pipeline_state), [&](cudaStream_t on) {
                 device::arena memory(workspace);
-                const auto sorted = call.template go<Rule, true, Key>(memory, on, asked);
+                const auto sorted = call.template launch<Rule, Key>(memory, on, asked);
                 const auto* const d_state = static_cast<const device::pipeline_state*>(workspace);
                 device::place_lists(sorted, d_state, call.limits, on, call.clock);
             });
@@ -541,7 +554,7 @@ private:
         device::launch_until(where, [&] {
             state = run_stages(call.clock, std::nullopt, sizeof(device::pipeline_state), [&](cudaStream_t on) {
                 device::arena memory(workspace);
-                sorted = call.template go<Rule, true, Key>(memory, on);
+                sorted = call.template launch<Rule, Key>(memory, on);
             });
         });
         if (device::has_failed(state, call.limits)) return;
@@ -562,7 +575,8 @@ private:
     device_block workspace_;
     device::readback state_reader_;
     device::call_graph call_graph_;
-    std::size_t zeroed_bytes_ = 0;        // of the workspace, from its start
+    std::size_t zeroed_bytes_ = 0; // of the workspace, from its start
+    strategy_choice choice_;
     std::vector<const void*> discarding_; // kinds of lists' calls that were shaded late and discarded fragments
 };
 
@@ -579,11 +593,11 @@ status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader
                        return device::with_framebuffer_call<Selector>(
                            draws, g, fb, options, triangles_in, limits, [&](auto call) {
                                call.clock = clock;
-                               call.may_list = lists_fragments;
-                               limits.skips_deferred_pass = call.limits.skips_deferred_pass =
+                               choose(call, true);
+                               limits.skips_deferred_pass = call.plan.limits.skips_deferred_pass =
                                    call.can_skip_deferred_pass(left) ? 1 : 0;
                                launch_where_it_fits<Coverage>(call, state);
-                               return call.is_listed_call();
+                               return call.lists_fragments() && strategy == voxelpipe::strategy::automatic;
                            });
                    });
 }

@@ -4,8 +4,7 @@
 
 // voxelize_async: a framebuffer call that never waits and never allocates. It works in the caller's memory, so a CUDA
 // graph can capture it and replay it with changed vertices. Capacities are fixed beforehand; what does not fit leaves
-// every target as it was (but see workspace_limits::expects_deferred), and read_status says what would have been
-// needed.
+// every target as it was, and read_status says what would have been needed.
 
 #include <voxelpipe/device/backend.cuh>
 
@@ -29,9 +28,11 @@ struct workspace_limits {
     // Of calls without tiles: whether there may be more than a few triangles whose bounding boxes have more than two
     // voxels a side, or three where coverage is conservative. Without, the kernel for those is left out, which takes
     // some 3 to 6 us off the call of a mesh that is finer than the grid; a few in a hundred may be larger, but none by
-    // much. A call that meets more all the same fails for its capacity, and targets that it clears may have been
-    // written to. Calls of several draws, and ones that blend into targets as they lie, keep the kernel.
+    // much. A call that meets more all the same fails for its capacity and writes no target. Calls of several draws,
+    // and the strategies that write targets at once (immediate, tiled), keep the kernel.
     bool expects_deferred = true;
+    // How the call is drawn, as cuda_backend::strategy.
+    voxelpipe::strategy strategy = voxelpipe::strategy::automatic;
 
     // A start for a mesh whose triangles are mostly smaller than a tile.
     [[nodiscard]] static workspace_limits for_triangles(std::uint64_t triangles) {
@@ -51,16 +52,6 @@ struct workspace_view {
 
 namespace device {
 
-template <class Call>
-[[nodiscard]] std::size_t bytes_of(const Call& call, coverage rule) {
-    arena plan;
-    if (rule == coverage::thin)
-        call.template go<coverage::thin, false>(plan, nullptr);
-    else
-        call.template go<coverage::conservative, false>(plan, nullptr);
-    return plan.used();
-}
-
 // Pairs and fragments are numbered with 32 bits.
 [[nodiscard]] inline bool are_numbered(const workspace_limits& l) {
     return l.tile_pairs <= core::max_numbered && l.fragments <= core::max_numbered;
@@ -77,9 +68,9 @@ auto with_call(std::span<const Draw> draws, const grid& g, const Framebuffer& fb
                std::uint64_t triangles, const workspace_limits& limits, const F& f) {
     return with_framebuffer_call<tuning::fine_raster_selector>(
         draws, g, fb, options, triangles, to_capacities(limits), [&](auto call) {
-            call.may_list = limits.lists_fragments;
-            if (!limits.expects_deferred && !call.can_skip_deferred_pass(0)) call.limits.skips_deferred_pass = 0;
-            return f(call);
+            const bool is_served = call.choose(limits.strategy, limits.lists_fragments);
+            if (is_served && !call.can_skip_deferred_pass(0)) call.plan.limits.skips_deferred_pass = 0;
+            return f(call, is_served);
         });
 }
 
@@ -112,7 +103,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
     if (s.counts.triangles_in == 0) return sizeof(device::pipeline_state);
     try {
         return device::with_call(draws, g, fb, options, s.counts.triangles_in, limits,
-                                 [&](const auto& call) { return device::bytes_of(call, options.rule); });
+                                 [](const auto& call, bool is_served) { return is_served ? call.plan_memory() : 0; });
     } catch (const device::cuda_failure&) {
         return 0;
     }
@@ -133,8 +124,12 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         if (!device::are_numbered(workspace.limits)) return core::failure(status_code::size_overflow);
         try {
             if (s.counts.triangles_in == 0) return device::clear_async(backend, fb, workspace);
-            const auto launch = [&](const auto& call) {
-                const std::size_t need = device::bytes_of(call, options.rule);
+            const auto launch = [&](const auto& call, bool is_served) {
+                if (!is_served) {
+                    s.code = status_code::strategy_unavailable;
+                    return;
+                }
+                const std::size_t need = call.plan_memory();
                 if (workspace.memory == nullptr || workspace.bytes < need) {
                     s.code = status_code::capacity_exceeded;
                     s.required = {workspace.limits.tile_pairs, workspace.limits.fragments, need};
@@ -144,8 +139,9 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                     device::arena memory(workspace.memory);
                     device::zero_memory(workspace.memory, call.zeroed_bytes(), backend.stream);
                     core::known_coverage<Known...>::dispatch(
-                        options.rule, [&]<coverage Rule>() { call.template go<Rule, true>(memory, backend.stream); });
-                    if (!workspace.limits.expects_deferred && call.limits.skips_deferred_pass == 0) { // none is missing
+                        options.rule, [&]<coverage Rule>() { call.template launch<Rule>(memory, backend.stream); });
+                    if (!workspace.limits.expects_deferred &&
+                        call.plan.limits.skips_deferred_pass == 0) { // none is missing
                         auto* const state = static_cast<device::pipeline_state*>(workspace.memory);
                         device::check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), backend.stream));
                     }
@@ -187,7 +183,8 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                      larger(workspace.limits.fragment_records, state.fragment_records),
                      workspace.limits.lists_fragments,
                      workspace.limits.orders_long_voxels || state.longest_ordered() != 0,
-                     workspace.limits.expects_deferred || !state.deferred.are_none()};
+                     workspace.limits.expects_deferred || !state.deferred.are_none(),
+                     workspace.limits.strategy};
         }
         return s;
     }

@@ -67,111 +67,149 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
         return !core::is_constant<FragmentShader> && is_listed_call<Key>();
     }
 
-    // Carves the memory and, with Run, launches the stages up to the sorted lists, which may be where they are asked
-    // for already (are_placed): there is room for limits.fragments primitives. The state comes first in the memory, and
-    // is zeroed before.
-    template <coverage Rule, bool Run, class Key>
-    [[nodiscard]] fragment_lists<Key, Payload> go(arena& memory, cudaStream_t stream,
-                                                  const output_pointers& asked = {}) const {
+    // Takes the memory of the call, and nothing else.
+    template <class Key>
+    void plan_memory(arena& memory) const {
+        (void)memory.take<pipeline_state>(1);
+        with_lists<Key>([&]<class Lists>() { Lists(*this, memory); });
+    }
+    // Launches the stages up to the sorted lists, which may be where they are asked for already (are_placed): there is
+    // room for limits.fragments primitives. The state comes first in the memory, and must be zero on entry.
+    template <coverage Rule, class Key>
+    [[nodiscard]] fragment_lists<Key, Payload> launch(arena& memory, cudaStream_t stream,
+                                                      const output_pointers& asked = {}) const {
         pipeline_state* const state = memory.take<pipeline_state>(1);
-        if constexpr (sizeof(Key) == sizeof(std::uint32_t)) {
-            if (is_listed_call<Key>()) {
-                if constexpr (core::is_constant<FragmentShader>)
-                    return launch_immediate<Rule, Run>(memory, state, stream, asked);
-                else
-                    return go_shaded<Rule, Run>(memory, state, stream, asked);
-            }
-        }
-        const auto lists = take_lists<Key, Payload>(memory, num_voxels(g), limits.fragments);
-        const scene_buffers buffers(memory, draws);
-        const list_memory share(memory, num_primitives, limits.fragment_records);
-        if constexpr (Run) {
-            const scene_type s = buffers.shade(draws, g, stream);
-            end_stage(clock, &stage_times::vertex_shade);
-            return build_lists<Rule, first_value>(s, lists, share.with(state), state, limits, true, stream, clock,
-                                                  asked);
-        } else {
-            return {};
-        }
+        fragment_lists<Key, Payload> sorted{};
+        with_lists<Key>(
+            [&]<class Lists>() { sorted = Lists(*this, memory).template launch<Rule>(state, stream, asked); });
+        return sorted;
     }
 
 private:
-    // By counting, but not where voxels are known to have so many fragments that atomics wait for one another, or so
-    // few that each is by itself.
+    // By counting, unless voxels are known to have so many fragments that atomics wait for one another, or so few that
+    // each is by itself.
     [[nodiscard]] bool may_count() const {
         return !has_few_a_voxel && (limits.longest_ordered <= max_of_block || limits.longest_ordered == ~0ull);
     }
 
-    // One draw of a constant shader.
-    template <coverage Rule, bool Run>
-    [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-    launch_immediate(arena& memory, pipeline_state* state, cudaStream_t stream, const output_pointers& asked) const {
-        constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
-        const draw_type& d = draws[0];
-        const auto lists =
-            take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true, may_count());
-        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : d.mesh.positions.size());
-        const deferred_triangles deferred = deferred_triangles::take(memory, num_primitives);
-        const order_memory order = order_memory::take(memory, limits.fragments);
-        if constexpr (Run) {
-            const core::snap_transform snap = core::make_snap_transform(g);
+    // Fragments are counted, given their places by a scan, and written by ascending primitive: any number of draws,
+    // voxels and triangles.
+    template <class Key>
+    struct counted_lists {
+        const abuffer_call& call;
+        list_buffers<Key, Payload> lists;
+        scene_buffers buffers;
+        list_memory share;
+
+        counted_lists(const abuffer_call& c, arena& memory)
+            : call(c), lists(take_lists<Key, Payload>(memory, num_voxels(c.g), c.limits.fragments)),
+              buffers(memory, c.draws), share(memory, c.num_primitives, c.limits.fragment_records) {}
+        template <coverage Rule>
+        [[nodiscard]] fragment_lists<Key, Payload> launch(pipeline_state* state, cudaStream_t stream,
+                                                          const output_pointers& asked) const {
+            const scene_type s = buffers.shade(call.draws, call.g, stream);
+            end_stage(call.clock, &stage_times::vertex_shade);
+            return build_lists<Rule, first_value>(s, lists, share.with(state), state, call.limits, true, stream,
+                                                  call.clock, asked);
+        }
+    };
+
+    // The raster lists the fragments of one draw of a constant shader, in any order.
+    struct constant_lists {
+        static constexpr bool shades_in_raster =
+            is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
+        const abuffer_call& call;
+        list_buffers<std::uint32_t, Payload> lists;
+        vertex_positions positions;
+        deferred_triangles deferred;
+        order_memory order;
+
+        constant_lists(const abuffer_call& c, arena& memory)
+            : call(c), lists(take_lists<std::uint32_t, Payload>(memory, num_voxels(c.g), c.limits.fragments, true,
+                                                                c.may_count())),
+              positions(vertex_positions::take(memory, shades_in_raster ? 0 : c.draws[0].mesh.positions.size())),
+              deferred(deferred_triangles::take(memory, c.num_primitives)),
+              order(order_memory::take(memory, c.limits.fragments)) {}
+        template <coverage Rule>
+        [[nodiscard]] fragment_lists<std::uint32_t, Payload> launch(pipeline_state* state, cudaStream_t stream,
+                                                                    const output_pointers& asked) const {
+            const draw_type& d = call.draws[0];
+            const core::snap_transform snap = core::make_snap_transform(call.g);
             const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
             const auto raster = [&](const auto& source) {
-                const raster_input<std::remove_cvref_t<decltype(source)>> in{source, num_primitives, snap.fraction,
-                                                                             g.extent};
+                const raster_input<std::remove_cvref_t<decltype(source)>> in{source, call.num_primitives, snap.fraction,
+                                                                             call.g.extent};
                 list_raster<Rule>(in, num_vertices, 0, deferred.with(state), lists.keys[0], lists.values[0],
-                                  prepare_lists(lists, asked, order.tiles, limits), state, limits, stream);
+                                  prepare_lists(lists, asked, order.tiles, call.limits), state, call.limits, stream);
             };
-            if constexpr (on_the_spot) {
+            if constexpr (shades_in_raster) {
                 raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, 0});
             } else {
                 vertex_shade(d.mesh, d.vertex_shader, snap, 0, positions, static_cast<no_varyings*>(nullptr), stream);
-                end_stage(clock, &stage_times::vertex_shade);
+                end_stage(call.clock, &stage_times::vertex_shade);
                 raster(stored_source{{d.mesh.triangles.data(), positions, 0, num_vertices}});
             }
-            end_stage(clock, &stage_times::fine_raster);
-            fragment_lists<std::uint32_t, Payload> sorted =
-                sort_unordered(lists, order, asked, num_primitives, nullptr, state, limits, stream, clock);
+            end_stage(call.clock, &stage_times::fine_raster);
+            fragment_lists<std::uint32_t, Payload> sorted = sort_unordered(
+                lists, order, asked, call.num_primitives, nullptr, state, call.limits, stream, call.clock);
             if constexpr (!std::is_same_v<Payload, no_payload>)
                 sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
             return sorted;
-        } else {
-            return {};
         }
-    }
+    };
 
-    // One draw of any other shader.
-    template <coverage Rule, bool Run>
-    [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-    go_shaded(arena& memory, pipeline_state* state, cudaStream_t stream, const output_pointers& asked) const {
-        constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
-        auto lists = take_lists<std::uint32_t, Payload>(memory, num_voxels(g), limits.fragments, true);
-        const scene_buffers buffers(memory, draws);
-        const deferred_triangles deferred = deferred_triangles::take(memory, num_primitives);
-        const order_memory order = order_memory::take(memory, limits.fragments);
-        auto* const spare = memory.take<std::uint32_t>(limits.fragments);
-        auto* const payloads = memory.take<Payload>(has_payload ? limits.fragments : 0);
-        if constexpr (Run) {
-            const scene_type s = buffers.shade(draws, g, stream);
-            end_stage(clock, &stage_times::vertex_shade);
-            const raster_input<stored_source> in{{s.geo.one}, num_primitives, s.geo.snap.fraction, g.extent};
+    // The same for any other shader, which runs when the lists are sorted; what it discards is filtered out before, if
+    // that is wanted.
+    struct shaded_lists {
+        static constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
+        const abuffer_call& call;
+        list_buffers<std::uint32_t, Payload> lists;
+        scene_buffers buffers;
+        deferred_triangles deferred;
+        order_memory order;
+        std::uint32_t* spare;
+        Payload* payloads;
+
+        shaded_lists(const abuffer_call& c, arena& memory)
+            : call(c), lists(take_lists<std::uint32_t, Payload>(memory, num_voxels(c.g), c.limits.fragments, true)),
+              buffers(memory, c.draws), deferred(deferred_triangles::take(memory, c.num_primitives)),
+              order(order_memory::take(memory, c.limits.fragments)),
+              spare(memory.take<std::uint32_t>(c.limits.fragments)),
+              payloads(memory.take<Payload>(has_payload ? c.limits.fragments : 0)) {}
+        template <coverage Rule>
+        [[nodiscard]] fragment_lists<std::uint32_t, Payload> launch(pipeline_state* state, cudaStream_t stream,
+                                                                    const output_pointers& asked) {
+            const capacities& limits = call.limits;
+            const scene_type s = buffers.shade(call.draws, call.g, stream);
+            end_stage(call.clock, &stage_times::vertex_shade);
+            const raster_input<stored_source> in{{s.geo.one}, call.num_primitives, s.geo.snap.fraction, call.g.extent};
             list_raster<Rule>(in, s.geo.one.num_vertices, 0, deferred.with(state), lists.keys[0], lists.values[0],
                               prepare_lists(lists, asked, order.tiles, limits), state, limits, stream);
-            if (filters) filter_lists(s, lists, state, limits, stream);
-            end_stage(clock, &stage_times::fine_raster);
+            if (call.filters) filter_lists(s, lists, state, limits, stream);
+            end_stage(call.clock, &stage_times::fine_raster);
             fragment_lists<std::uint32_t, Payload> sorted =
-                sort_unordered(lists, order, asked, num_primitives, spare, state, limits, stream, clock);
-            if (!filters || has_payload) {
+                sort_unordered(lists, order, asked, call.num_primitives, spare, state, limits, stream, call.clock);
+            if (!call.filters || has_payload) {
                 launch_behind(shade_lists_kernel<first_value, scene_type, Payload>, fill_device(limits.fragments),
                               threads_per_block, stream, stage::abuffer_emit, s, sorted, payloads, state, limits);
-                end_stage(clock, &stage_times::abuffer_emit);
+                end_stage(call.clock, &stage_times::abuffer_emit);
             }
             sorted.payloads = has_payload ? payloads : nullptr;
             sorted.payloads_in_order = true;
             return sorted;
-        } else {
-            return {};
         }
+    };
+
+    template <class Key, class F>
+    void with_lists(const F& f) const {
+        if constexpr (sizeof(Key) == sizeof(std::uint32_t)) {
+            if (is_listed_call<Key>()) {
+                using listed = std::conditional_t<core::is_constant<FragmentShader>, constant_lists, shaded_lists>;
+                f.template operator()<listed>();
+                return;
+            }
+        }
+        f.template operator()<counted_lists<Key>>();
     }
 };
 

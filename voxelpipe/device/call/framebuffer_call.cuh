@@ -2,355 +2,159 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Host side of a framebuffer call: which targets go through which path, what memory that takes (plan), and the launch
-// of every stage on one stream, without a wait (launch). The same plan serves voxelize, which reads the state once at
-// the end, and voxelize_async, which leaves it on the device.
+// Host side of a framebuffer call: chooses the strategy once, says how much memory it takes (plan_memory), and launches
+// its kernels on one stream without a wait (launch). voxelize reads the counters at the end; voxelize_async leaves them
+// on the device.
 
-#include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/call/graph_cache.cuh>
-#include <voxelpipe/device/call/immediate_plan.cuh>
-#include <voxelpipe/device/fragments/fold.cuh>
-#include <voxelpipe/device/fragments/fragment_lists.cuh>
-#include <voxelpipe/device/fragments/segmented_reduce.cuh>
-#include <voxelpipe/device/raster/mask_sink.cuh>
-#include <voxelpipe/device/raster/raster.cuh>
-#include <voxelpipe/device/scene/check_indices.cuh>
-#include <voxelpipe/device/scene/scene_memory.cuh>
-#include <voxelpipe/device/targets/clear_target.cuh>
-#include <voxelpipe/device/targets/fill_from_mask.cuh>
-#include <voxelpipe/device/targets/finalize_counts.cuh>
-#include <voxelpipe/device/tiles/tile_passes.cuh>
+#include <voxelpipe/device/call/immediate_strategy.cuh>
+#include <voxelpipe/device/call/mask_strategy.cuh>
+#include <voxelpipe/device/call/sorted_strategy.cuh>
+#include <voxelpipe/device/call/strategy.hpp>
+#include <voxelpipe/device/call/tiled_strategy.cuh>
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
+#include <limits>
 #include <span>
 
 namespace voxelpipe::device {
 
-// Whether a constant shader and its targets need no tiles.
+// Which strategies these types allow.
 template <class FragmentShader, class Framebuffer>
-inline constexpr bool can_draw_immediately = false;
+inline constexpr possible_strategies strategies_of{};
 template <class FragmentShader, class... Targets>
-inline constexpr bool
-    can_draw_immediately<FragmentShader, framebuffer_view<Targets...>> = core::is_constant<FragmentShader> &&
-                                                                         (is_immediate<Targets>() && ...);
+inline constexpr possible_strategies strategies_of<FragmentShader, framebuffer_view<Targets...>> = {
+    core::is_constant<FragmentShader>&& depends_on_mask<framebuffer_view<Targets...>>,
+    core::is_constant<FragmentShader> && (is_immediate<Targets>() && ...),
+    is_resolvable<framebuffer_view<Targets...>> && !target_groups<framebuffer_view<Targets...>>::has_ordered,
+    target_groups<framebuffer_view<Targets...>>::has_ordered,
+};
 
-inline constexpr std::size_t max_immediate_draws = 16; // each has launches of its own
-
-template <class Draw, class Framebuffer, tuning::fine_raster_policy Policy>
-struct framebuffer_call;
-template <class Mesh, class VertexShader, class FragmentShader, class Framebuffer, tuning::fine_raster_policy Policy>
-struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, Policy> {
-    using draw_type = draw<Mesh, VertexShader, FragmentShader>;
-    using scene_buffers = scene_memory<Mesh, VertexShader, FragmentShader>;
-    using scene_type = typename scene_buffers::scene_type;
-    using groups = target_groups<Framebuffer>;
-    using values = decltype(std::declval<typename scene_type::fragment_output>().values);
-    static constexpr bool in_tiles = groups::num_groups() > 0;
-    static constexpr bool can_be_listed = is_resolvable<Framebuffer> || groups::has_ordered;
-    using tracking_type = change_tracking<Framebuffer>;
-
-    std::span<const draw_type> draws;
+// Everything that the launches of a call depend on but its draws. With the bytes of the draws these bytes are the key
+// of a kept graph (call/graph_cache.cuh): a field that is added here is part of the key.
+template <class Framebuffer>
+struct framebuffer_plan {
     grid g;
     Framebuffer fb;
     voxelize_options options;
     std::uint32_t num_primitives;
     capacities limits;
-    bool may_list = false; // fragments, where limits.fragments holds them
-    core::tile_grid tiles{g.extent, Policy.log2_tile_size};
-    stage_clock* clock = nullptr; // where the call is asked for its times
+    const strategy_rule* rule;
+    immediate_plan<targets_of<Framebuffer>::count> targets; // of a constant shader
+};
 
-    // Carves the memory and, with Run, launches every stage. Whatever can fail is known before the first voxel is
-    // written. The state comes first in the memory, whose first zeroed_bytes() are zeroed before.
-    template <coverage Rule, bool Run>
-    void go(arena& memory, cudaStream_t stream) const {
-        pipeline_state* const state = memory.take<pipeline_state>(1);
-        if constexpr (Run)
-            if (can_be_known(fb) && !is_tracked_call())
-                check(cudaMemsetAsync(fb.changes, 0, core::change_log::header_words * sizeof(word), stream));
-        if constexpr (can_use_mask) {
-            if (uses_mask()) {
-                launch_mask<Rule, Run>(memory, state, stream);
-                return;
-            }
-        }
-        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>) {
-            if (is_immediate_call()) {
-                launch_immediate<Rule, Run>(memory, state, stream);
-                return;
-            }
-        }
-        if constexpr (can_be_listed) {
-            if (is_listed_call()) {
-                if constexpr (groups::has_ordered)
-                    launch_folded<Rule, Run>(memory, state, stream);
-                else
-                    launch_listed<Rule, Run>(memory, state, stream);
-                return;
-            }
-        }
-        // Voxel ids of 32 bits keep the lists of the ordered targets small wherever the grid allows.
-        if (!groups::has_ordered || num_voxels(g) < std::numeric_limits<std::uint32_t>::max())
-            launch_tiles<Rule, Run, std::uint32_t>(memory, state, stream);
-        else if constexpr (groups::has_ordered)
-            launch_tiles<Rule, Run, std::uint64_t>(memory, state, stream);
+template <class Draw, class Framebuffer, tuning::fine_raster_policy Policy>
+struct framebuffer_call;
+template <class Mesh, class VertexShader, class FragmentShader, class Framebuffer, tuning::fine_raster_policy Policy>
+struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, Policy> {
+    using mesh_type = Mesh;
+    using vertex_shader_type = VertexShader;
+    using fragment_shader_type = FragmentShader;
+    using framebuffer_type = Framebuffer;
+    using draw_type = draw<Mesh, VertexShader, FragmentShader>;
+    using scene_buffers = scene_memory<Mesh, VertexShader, FragmentShader>;
+    using scene_type = typename scene_buffers::scene_type;
+    using groups = target_groups<Framebuffer>;
+    using values = decltype(std::declval<typename scene_type::fragment_output>().values);
+    using tracking_type = change_tracking<Framebuffer>;
+    static constexpr tuning::fine_raster_policy policy = Policy;
+    static constexpr possible_strategies possible = strategies_of<FragmentShader, Framebuffer>;
+
+    std::span<const draw_type> draws;
+    framebuffer_plan<Framebuffer> plan;
+    stage_clock* clock = nullptr; // receives the call's times if not null
+
+    framebuffer_call(std::span<const draw_type> draws_, const grid& g, const Framebuffer& fb,
+                     const voxelize_options& options, std::uint32_t num_primitives, const capacities& limits)
+        : draws(draws_) {
+        std::memset(static_cast<void*>(&plan), 0, sizeof(plan)); // padding is part of the key
+        plan.g = g;
+        plan.fb = fb;
+        plan.options = options;
+        plan.num_primitives = num_primitives;
+        plan.limits = limits;
+        if constexpr (possible.immediate) plan_immediate(draws, fb, num_primitives, options.count_voxels, plan.targets);
     }
 
-    // All that the launches of this call depend on, where it is plain bytes.
+    // Chooses how the call is drawn, by the table or as it is forced. False if a forced strategy cannot serve the call;
+    // then nothing may be launched. may_list: there is memory for lists of fragments.
+    [[nodiscard]] bool choose(strategy forced, bool may_list) {
+        plan.rule = choose_rule(facts(may_list), forced);
+        return plan.rule != nullptr;
+    }
+    [[nodiscard]] strategy chosen() const { return plan.rule->value; }
+    // The memory of the call grows with its fragments.
+    [[nodiscard]] bool lists_fragments() const {
+        return chosen() == strategy::sorted_reduce || chosen() == strategy::sorted_fold;
+    }
+    // True if the deferred pass may be left out, where calls like this one deferred so many triangles. Safe, because
+    // these strategies write no target before all triangles are drawn: a wrong guess costs time only.
+    [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t num_deferred) const {
+        if (draws.size() != 1 || !leaves_few(max_triangles(), num_deferred)) return false;
+        return chosen() == strategy::occupancy_mask || lists_fragments();
+    }
+
+    // Bytes of the workspace.
+    [[nodiscard]] std::size_t plan_memory() const {
+        arena memory;
+        (void)memory.take<pipeline_state>(1);
+        with_strategy([&]<class Strategy>() { Strategy(*this, memory); });
+        return memory.used();
+    }
+    // Bytes at the start of the workspace that must be zero on entry. A finished call leaves them zero, but for the
+    // state.
+    [[nodiscard]] std::size_t zeroed_bytes() const {
+        arena memory;
+        (void)memory.take<pipeline_state>(1);
+        if (chosen() == strategy::occupancy_mask) (void)memory.take<word>(mask_target::map::elements(plan.g.extent));
+        return memory.used();
+    }
+    // Launches every kernel of the call. Whatever can fail is known before the first voxel is written.
+    template <coverage Rule>
+    void launch(arena& memory, cudaStream_t stream) const {
+        pipeline_state* const state = memory.take<pipeline_state>(1);
+        if (can_be_known(plan.fb) && !is_tracked()) // what the log says of the targets will not hold
+            check(cudaMemsetAsync(plan.fb.changes, 0, core::change_log::header_words * sizeof(word), stream));
+        with_strategy([&]<class Strategy>() { Strategy(*this, memory).template launch<Rule>(state, stream); });
+    }
+    // The stage that a failure is put down to that shows only at the end of the call.
+    [[nodiscard]] stage last_stage() const {
+        switch (chosen()) {
+        case strategy::occupancy_mask:
+            return stage::fine_raster;
+        case strategy::immediate:
+            return plan.targets.any_counted() ? stage::tile_resolve : stage::fine_raster;
+        default:
+            return groups::has_ordered ? stage::fine_raster : stage::tile_resolve;
+        }
+    }
+
+    // All that the launches depend on, if it is plain bytes.
     static constexpr bool has_bytes =
         std::is_trivially_copyable_v<draw_type> && std::is_trivially_copyable_v<Framebuffer>;
     template <coverage Rule>
     [[nodiscard]] call_bytes bytes(const void* workspace, const void* page) const {
         call_bytes b = bytes_of_call<framebuffer_call>(workspace, page);
         b.add(Rule);
+        b.add(plan);
         for (const draw_type& d : draws) b.add(d);
-        b.add(g);
-        b.add(fb);
-        b.add(options);
-        b.add(num_primitives);
-        b.add(limits);
-        b.add(may_list);
         return b;
     }
-    // Of the memory, from its start: zeroed before, and, but for the state, by a call that has run.
-    [[nodiscard]] std::size_t zeroed_bytes() const {
-        arena memory;
-        (void)memory.take<pipeline_state>(1);
-        if (uses_mask()) (void)memory.take<word>(mask_target::map::elements(g.extent));
-        return memory.used();
-    }
-    // Whether the call lists its fragments: its memory grows with them.
-    [[nodiscard]] bool is_listed_call() const {
-        if (uses_mask()) return false;
-        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>)
-            if (is_immediate_call()) return false;
-        if (!can_be_listed || !may_list || draws.size() > max_immediate_draws) return false;
-        if (num_voxels(g) >= std::numeric_limits<std::uint32_t>::max() || limits.fragments > max_resolved) return false;
-        return is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
-    }
 
-    // Of this call: what a failure that shows only at its end is put down to.
-    [[nodiscard]] stage last_stage() const {
-        if (uses_mask()) return stage::fine_raster;
-        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>) {
-            if (is_immediate_call())
-                return plan_immediate(draws, fb, num_primitives, options.count_voxels).any_counted()
-                           ? stage::tile_resolve
-                           : stage::fine_raster;
-        }
-        return groups::has_ordered ? stage::fine_raster : stage::tile_resolve;
-    }
+    // ---- what the strategies ask ------------------------------------------------------------------------------------
 
-    // Whether limits.skips_deferred_pass may hold, where calls like this one num_deferred so many triangles: it can be
-    // made once more, since it writes nothing where that was wrong, or clears all that it draws into.
-    [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t left) const {
-        if (draws.size() != 1 || !leaves_few(max_triangles(), left)) return false;
-        if (uses_mask() || is_listed_call()) return true;
-        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>)
-            // Sums' first kernel (raster/block_pass.cuh) draws nothing at its end for the second.
-            return is_immediate_call() && clears_all_in_use(fb) && (has_only_bits<Framebuffer> || left == 0);
-        return false;
-    }
-
-private:
-    static constexpr bool can_use_mask = core::is_constant<FragmentShader> && depends_on_mask<Framebuffer>;
-    [[nodiscard]] bool uses_mask() const {
-        if (!can_use_mask || draws.size() > max_immediate_draws || !have_one_value() ||
-            !is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent))
-            return false;
-        const std::uint64_t bytes = mask_target::map::elements(g.extent) * sizeof(word);
-        bool can_be_immediate = false;
-        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>)
-            can_be_immediate = plan_immediate(draws, fb, num_primitives, options.count_voxels).possible;
-        if (!can_be_immediate) return bytes <= max_mask_bytes;
-        if (bytes > max_mask_bytes_of_immediate) return false;
-        return options.count_voxels || clears_values(fb) ||
-               (!have_checked_indices() && bytes <= min_mask_bytes + num_primitives * mask_bytes_per_triangle);
-    }
-    // Whether no call need look at any draw's indices.
-    [[nodiscard]] bool have_checked_indices() const {
-        for (const draw_type& d : draws)
-            if (!d.mesh.has_checked_indices()) return false;
-        return true;
-    }
-    // Whether all draws give the same bytes.
-    [[nodiscard]] bool have_one_value() const {
-        if constexpr (core::is_constant<FragmentShader>) {
-            const auto& first = draws[0].fragment_shader.values;
-            for (const draw_type& d : draws)
-                if (std::memcmp(&first, &d.fragment_shader.values, sizeof(first)) != 0) return false;
-        }
-        return true;
-    }
-    [[nodiscard]] bool is_immediate_call() const {
-        if (draws.size() > max_immediate_draws ||
-            !is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent))
-            return false;
-        return plan_immediate(draws, fb, num_primitives, options.count_voxels).possible;
-    }
-
-    // Whether all that the call draws is marked, since the framebuffer tracks its changes.
-    [[nodiscard]] bool is_tracked_call() const {
-        if (!can_be_known(fb)) return false;
-        if constexpr (can_draw_immediately<FragmentShader, Framebuffer>)
-            if (is_immediate_call()) return true;
-        return uses_mask() || is_listed_call();
-    }
-    // Of calls that know what a voxel ends with when it is drawn.
+    // All that the call draws is marked in the framebuffer's log of changes. Tiles mark nothing.
+    [[nodiscard]] bool is_tracked() const { return can_be_known(plan.fb) && chosen() != strategy::tiled; }
+    // Tracking of a call that knows what a voxel ends with when it is drawn.
     [[nodiscard]] tracking_type track() const {
-        return {fb, is_tracked_call(), [](const auto&, std::size_t) { return true; }};
+        return {plan.fb, is_tracked(), [](const auto&, std::size_t) { return true; }};
     }
-
-    // Vertices are shaded by the raster itself where that costs nothing.
-    static constexpr bool on_the_spot = is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
-
-    template <coverage Rule, bool Run>
-    void launch_mask(arena& memory, pipeline_state* state, cudaStream_t stream) const {
-        word* const touched = memory.take<word>(mask_target::map::elements(g.extent));
-        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : max_vertices());
-        const deferred_triangles deferred = deferred_triangles::take(memory, max_triangles());
-        if constexpr (Run) {
-            const core::snap_transform snap = core::make_snap_transform(g);
-            for (std::size_t i = 0; i < draws.size(); ++i) {
-                const draw_type& d = draws[i];
-                const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
-                const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
-                if (num_triangles == 0) continue;
-                if (i != 0) check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
-                const auto raster = [&](const auto& source) {
-                    using source_type = std::remove_cvref_t<decltype(source)>;
-                    const raster_call<Rule, source_type, mask_output> call{
-                        {source, num_triangles, snap.fraction, g.extent},
-                        {touched, g.extent, num_vertices, state, false},
-                        deferred.with(state)};
-                    launch_raster(call, state, stage::fine_raster, stream, on_the_spot && i == 0,
-                                  limits.skips_deferred_pass != 0);
-                    end_stage(clock, &stage_times::fine_raster);
-                };
-                raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);
-            }
-            fill_from_mask(touched, fb, track(), draws[0].fragment_shader.values, options.count_voxels, state, limits,
-                           stream);
-            end_stage(clock, &stage_times::tile_resolve);
-        }
+    [[nodiscard]] bool has_checked_indices() const {
+        return std::all_of(draws.begin(), draws.end(), [](const draw_type& d) { return d.mesh.has_checked_indices(); });
     }
-
-    // raster(source), with vertices that are shaded there, or before.
-    template <class Raster>
-    void raster_draw(const draw_type& d, std::uint32_t number, const core::snap_transform& snap,
-                     const vertex_positions& positions, cudaStream_t stream, const Raster& raster) const {
-        if constexpr (on_the_spot) {
-            raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, number});
-        } else {
-            vertex_shade(d.mesh, d.vertex_shader, snap, number, positions, static_cast<no_varyings*>(nullptr),
-                         stream); // nobody reads them
-            end_stage(clock, &stage_times::vertex_shade);
-            raster(stored_source{
-                {d.mesh.triangles.data(), positions, 0, static_cast<std::uint32_t>(d.mesh.positions.size())}});
-        }
-    }
-
-    template <coverage Rule, bool Run>
-    void launch_immediate(arena& memory, pipeline_state* state, cudaStream_t stream) const {
-        const auto plan = plan_immediate(draws, fb, num_primitives, options.count_voxels);
-        bool has_marks = false; // of this call alone
-        core::for_each_index<groups::count>([&]<std::size_t K>() {
-            has_marks = has_marks || (plan.counts(K) && ends_by_marks(voxelpipe::get<K>(fb.targets)));
-        });
-        const tracking_type tracking(fb, is_tracked_call(),
-                                     [&](const auto& t, std::size_t k) { return !plan.counts(k) || ends_by_marks(t); });
-        chunk_marks marks = tracking.marks();
-        const bool is_tracked = marks.words != nullptr; // those hold what the call's own would, and more
-        has_marks = has_marks && !is_tracked;
-        if (has_marks) marks = chunk_marks::take(memory, g.extent);
-        const vertex_positions positions = vertex_positions::take(memory, on_the_spot ? 0 : max_vertices());
-        const deferred_triangles deferred = deferred_triangles::take(memory, max_triangles());
-        if constexpr (Run) {
-            if (has_marks) check(cudaMemsetAsync(marks.words, 0, marks.rows.num_words() * sizeof(word), stream));
-            for (const draw_type& d : draws)
-                if (!d.mesh.has_checked_indices())
-                    check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state,
-                                  stream);
-            if (!have_checked_indices()) end_stage(clock, &stage_times::coarse_raster);
-            core::for_each_index<groups::count>([&]<std::size_t K>() {
-                auto t = voxelpipe::get<K>(fb.targets);
-                if (plan.counts(K)) t.clear_value = {}; // no fragments
-                if (t.load == load_operation::clear && !tracking.by_chunks[K]) clear_target(t, state, limits, stream);
-            });
-            clear_by_chunks(tracking, fb, state, limits, stream);
-            end_stage(clock, &stage_times::clear);
-            const core::snap_transform snap = core::make_snap_transform(g);
-            for (std::size_t i = 0; i < draws.size(); ++i) {
-                const draw_type& d = draws[i];
-                const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
-                if (num_triangles == 0) continue;
-                if (i != 0) check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
-                const auto raster = [&](const auto& source) {
-                    using source_type = std::remove_cvref_t<decltype(source)>;
-                    using values_type = decltype(d.fragment_shader.values);
-                    const auto draw_into = [&](const auto& output) {
-                        const raster_call<Rule, source_type, std::remove_cvref_t<decltype(output)>> call{
-                            {source, num_triangles, snap.fraction, g.extent}, output, deferred.with(state)};
-                        // Without a check and a clear these may be the first kernels, but then nobody writes to
-                        // the indices (mesh_view::checked).
-                        launch_raster(call, state, stage::fine_raster, stream, false, limits.skips_deferred_pass != 0);
-                        end_stage(clock, &stage_times::fine_raster);
-                    };
-                    // The kernels that know that they only set bits.
-                    if constexpr (is_mask_itself<Framebuffer>) {
-                        const auto& t = voxelpipe::get<0>(fb.targets);
-                        if (plan.modes.of[0] == immediate_mode::blend && t.load != load_operation::off &&
-                            voxelpipe::get<0>(d.fragment_shader.values)) {
-                            draw_into(mask_output{t.elements, g.extent,
-                                                  static_cast<std::uint32_t>(d.mesh.positions.size()), state, true});
-                            return;
-                        }
-                    }
-                    const framebuffer_output<Framebuffer, values_type> output{fb, d.fragment_shader.values, plan.modes,
-                                                                              marks};
-                    if constexpr (has_only_values<Framebuffer>) {
-                        if (plan.only_blends() && all_in_use(fb)) {
-                            if (is_tracked)
-                                draw_into(blended_output<Framebuffer, values_type, true>{output});
-                            else
-                                draw_into(blended_output<Framebuffer, values_type, false>{output});
-                            return;
-                        }
-                    }
-                    draw_into(output);
-                };
-                raster_draw(d, static_cast<std::uint32_t>(i), snap, positions, stream, raster);
-            }
-            if (plan.has_last_pass()) {
-                finalize_counts(plan, fb, draws[0].fragment_shader.values, marks, state, limits, stream);
-                end_stage(clock, &stage_times::tile_resolve);
-            }
-        }
-    }
-
-    // Appends the fragments of all draws to two arrays.
-    template <coverage Rule>
-    void list_draws(const scene_type& s, const vertex_positions& positions, const deferred_triangles& deferred,
-                    std::uint32_t* voxels, std::uint32_t* primitives, sort_preparation preparation,
-                    pipeline_state* state, cudaStream_t stream) const {
-        draw_geometry of_draw{draws[0].mesh.triangles.data(), positions, 0, 0};
-        for (const draw_type& d : draws) {
-            const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
-            of_draw.triangles = d.mesh.triangles.data();
-            of_draw.num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
-            if (num_triangles != 0) {
-                if (of_draw.first_primitive != 0)
-                    check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
-                const raster_input<stored_source> in{{of_draw}, num_triangles, s.geo.snap.fraction, g.extent};
-                list_raster<Rule>(in, of_draw.num_vertices, of_draw.first_primitive, deferred.with(state), voxels,
-                                  primitives, preparation, state, limits, stream);
-                preparation.is_wanted = false;
-            }
-            of_draw.positions = of_draw.positions.from(of_draw.num_vertices);
-            of_draw.first_primitive += num_triangles;
-        }
-    }
-    // Of a draw.
+    // Of the largest draw.
     [[nodiscard]] std::size_t max_triangles() const {
         std::size_t most = 0;
         for (const draw_type& d : draws) most = std::max(most, d.mesh.triangles.size());
@@ -361,115 +165,96 @@ private:
         for (const draw_type& d : draws) most = std::max(most, d.mesh.positions.size());
         return most;
     }
+    // The raster shades vertices itself if that costs no more than to read them: once a corner, not once a vertex.
+    static constexpr bool shades_in_raster =
+        is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
 
-    template <coverage Rule, bool Run>
-    void launch_listed(arena& memory, pipeline_state* state, cudaStream_t stream) const {
-        using ends_type = run_ends<voxel_cells<Framebuffer>>;
-        const scene_buffers buffers(memory, draws);
-        const sort_pairs pairs = sort_pairs::take(memory, limits.fragments);
-        const sort_memory sort =
-            sort_memory::take(memory, limits.fragments, static_cast<int>(std::bit_width(num_voxels(g) - 1)));
-        const deferred_triangles deferred = deferred_triangles::take(memory, max_triangles());
-        const ends_type ends = ends_type::take(memory, limits.fragments);
-        if constexpr (Run) {
-            const scene_type s = buffers.shade(draws, g, stream);
-            end_stage(clock, &stage_times::vertex_shade);
-            sort_preparation preparation;
-            preparation.is_wanted = preparation.sorts = true;
-            preparation.sort = sort;
-            preparation.capacity = limits.fragments;
-            list_draws<Rule>(s, buffers.positions, deferred, pairs.keys[0], pairs.values[0], preparation, state,
-                             stream);
-            end_stage(clock, &stage_times::fine_raster);
-            const int at = sort_fragments(pairs, sort_count{state, limits}, limits.fragments, sort, stream);
-            end_stage(clock, &stage_times::tile_sort);
-            const tracking_type tracking = track();
-            clear_targets(tracking, state, stream);
-            mark_voxels(tracking, pairs.keys[at], &state->list_fragments, limits.fragments, state, limits, stream);
-            resolve_fragments(s, fb, {pairs.keys[at], pairs.values[at]}, ends, options.count_voxels, state, limits,
-                              stream);
-            end_stage(clock, &stage_times::tile_resolve);
+    // Calls raster(draw, source, is_first) for each draw that has triangles.
+    template <class Raster>
+    void raster_draws(const vertex_positions& positions, pipeline_state* state, cudaStream_t stream,
+                      const Raster& raster) const {
+        const core::snap_transform snap = core::make_snap_transform(plan.g);
+        for (std::size_t i = 0; i < draws.size(); ++i) {
+            const draw_type& d = draws[i];
+            const auto number = static_cast<std::uint32_t>(i);
+            if (d.mesh.triangles.size() == 0) continue;
+            if (i != 0) check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
+            if constexpr (shades_in_raster) {
+                raster(d, shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, number}, i == 0);
+            } else {
+                vertex_shade(d.mesh, d.vertex_shader, snap, number, positions, static_cast<no_varyings*>(nullptr),
+                             stream); // nobody reads them
+                end_stage(clock, &stage_times::vertex_shade);
+                raster(d,
+                       stored_source{{d.mesh.triangles.data(), positions, 0,
+                                      static_cast<std::uint32_t>(d.mesh.positions.size())}},
+                       false);
+            }
         }
     }
-
-    // The same for blends that need an order: lists that are in it are folded.
-    template <coverage Rule, bool Run>
-    void launch_folded(arena& memory, pipeline_state* state, cudaStream_t stream) const {
-        auto lists = take_lists<std::uint32_t, values>(memory, num_voxels(g), limits.fragments, true);
-        const scene_buffers buffers(memory, draws);
-        const deferred_triangles deferred = deferred_triangles::take(memory, max_triangles());
-        const order_memory order = order_memory::take(memory, limits.fragments);
-        auto* const spare = memory.take<std::uint32_t>(limits.fragments);
-        auto* const payloads = memory.take<values>(limits.fragments);
-        if constexpr (Run) {
-            const scene_type s = buffers.shade(draws, g, stream);
-            end_stage(clock, &stage_times::vertex_shade);
-            list_draws<Rule>(s, buffers.positions, deferred, lists.keys[0], lists.values[0],
-                             prepare_lists(lists, {}, order.tiles, limits), state, stream);
-            filter_lists(s, lists, state, limits, stream);
-            end_stage(clock, &stage_times::fine_raster);
-            fragment_lists<std::uint32_t, values> sorted =
-                sort_unordered(lists, order, {}, num_primitives, spare, state, limits, stream, clock);
-            launch_behind(shade_lists_kernel<all_values, scene_type, values>, fill_device(limits.fragments),
-                          threads_per_block, stream, stage::abuffer_emit, s, sorted, payloads, state, limits);
-            end_stage(clock, &stage_times::abuffer_emit);
-            sorted.payloads = payloads;
-            sorted.payloads_in_order = true;
-            const tracking_type tracking = track();
-            clear_targets(tracking, state, stream);
-            mark_voxels(tracking, sorted.voxels, &state->list_voxels, limits.fragments, state, limits, stream);
-            fold_lists(sorted, fb, options.count_voxels, state, limits, std::make_index_sequence<groups::count>{},
-                       stream, clock);
-        }
+    template <class Source>
+    [[nodiscard]] raster_input<Source> raster_input_of(const draw_type& d, const Source& source) const {
+        return {source, static_cast<std::uint32_t>(d.mesh.triangles.size()), core::make_snap_transform(plan.g).fraction,
+                plan.g.extent};
     }
-
     void clear_targets(const tracking_type& tracking, const pipeline_state* state, cudaStream_t stream) const {
         core::for_each_index<groups::count>([&]<std::size_t K>() {
-            const auto& t = voxelpipe::get<K>(fb.targets);
-            if (t.load == load_operation::clear && !tracking.by_chunks[K]) clear_target(t, state, limits, stream);
+            auto t = voxelpipe::get<K>(plan.fb.targets);
+            if (chosen() == strategy::immediate && plan.targets.counts(K)) t.clear_value = {}; // no fragments
+            if (t.load == load_operation::clear && !tracking.by_chunks[K]) clear_target(t, state, plan.limits, stream);
         });
-        clear_by_chunks(tracking, fb, state, limits, stream);
+        clear_by_chunks(tracking, plan.fb, state, plan.limits, stream);
         end_stage(clock, &stage_times::clear);
     }
 
-    template <coverage Rule, bool Run, class Key>
-    void launch_tiles(arena& memory, pipeline_state* state, cudaStream_t stream) const {
-        const scene_buffers buffers(memory, draws);
-        scene_type s{};
-        if constexpr (Run) {
-            s = buffers.shade(draws, g, stream);
-            end_stage(clock, &stage_times::vertex_shade);
-        }
-        tile_work work;
-        if constexpr (in_tiles) {
-            const tile_memory m(memory, tiles, num_primitives, limits,
-                                max_image_words<Policy.log2_tile_size, Framebuffer>(),
-                                default_pairs_per_item(limits.tile_pairs));
-            if constexpr (Run) work = coarse_pass<Rule>(s.geo, m, state, limits, stream, clock);
-        }
-        fragment_lists<Key, values> lists{};
-        if constexpr (groups::has_ordered) lists = list_fragments<Rule, Run, Key>(memory, s, state, stream);
-        if constexpr (Run) {
-            clear_targets({}, state, stream);
-            // Fragments and voxels are counted once: by the lists, where there are any.
-            if constexpr (in_tiles)
-                fine_pass<Rule, Policy>(s, fb, work,
-                                        {!groups::has_ordered, !groups::has_ordered && options.count_voxels}, state,
-                                        limits, stream, clock);
-            if constexpr (groups::has_ordered)
-                fold_ordered(lists, fb, options.count_voxels, state, limits, stream, clock);
-        }
+private:
+    [[nodiscard]] call_facts facts(bool may_list) const {
+        call_facts f;
+        f.possible = possible;
+        f.num_draws = draws.size();
+        f.num_triangles = plan.num_primitives;
+        f.num_voxels = num_voxels(plan.g);
+        f.mask_bytes = mask_target::map::elements(plan.g.extent) * sizeof(word);
+        f.fragment_capacity = plan.limits.fragments;
+        f.fits_int32 = is_listable(plan.num_primitives, core::make_snap_transform(plan.g).fraction, plan.g.extent);
+        if constexpr (core::is_constant<FragmentShader>)
+            f.all_draws_equal = std::all_of(draws.begin(), draws.end(), [&](const draw_type& d) {
+                return std::memcmp(&draws[0].fragment_shader.values, &d.fragment_shader.values,
+                                   sizeof(d.fragment_shader.values)) == 0;
+            });
+        f.blends_in_place = possible.immediate && plan.targets.possible;
+        f.counts_are_cheap = plan.targets.is_cheap;
+        f.counts_voxels = plan.options.count_voxels;
+        f.clears_values = device::clears_values(plan.fb);
+        f.has_checked_indices = has_checked_indices();
+        f.may_list = may_list;
+        return f;
     }
 
-    template <coverage Rule, bool Run, class Key>
-    [[nodiscard]] fragment_lists<Key, values> list_fragments(arena& memory, const scene_type& s, pipeline_state* state,
-                                                             cudaStream_t stream) const {
-        const auto lists = take_lists<Key, values>(memory, num_voxels(g), limits.fragments);
-        const list_memory share(memory, num_primitives, limits.fragment_records);
-        if constexpr (Run)
-            return build_lists<Rule, all_values>(s, lists, share.with(state), state, limits, !in_tiles, stream, clock);
-        else
-            return {};
+    // Calls f with the type of the chosen strategy: only those that the program's types allow are instantiated.
+    template <class F>
+    void with_strategy(const F& f) const {
+        switch (chosen()) {
+        case strategy::occupancy_mask:
+            if constexpr (possible.occupancy_mask) f.template operator()<mask_strategy<framebuffer_call>>();
+            break;
+        case strategy::immediate:
+            if constexpr (possible.immediate) f.template operator()<immediate_strategy<framebuffer_call>>();
+            break;
+        case strategy::sorted_reduce:
+            if constexpr (possible.sorted_reduce) f.template operator()<reduce_strategy<framebuffer_call>>();
+            break;
+        case strategy::sorted_fold:
+            if constexpr (possible.sorted_fold) f.template operator()<fold_strategy<framebuffer_call>>();
+            break;
+        case strategy::automatic:
+        case strategy::tiled:
+            // Voxel ids of 32 bits keep the lists of ordered targets small wherever the grid allows.
+            if (!groups::has_ordered || num_voxels(plan.g) < max_listed_voxels)
+                f.template operator()<tiled_strategy<framebuffer_call, std::uint32_t>>();
+            else if constexpr (groups::has_ordered)
+                f.template operator()<tiled_strategy<framebuffer_call, std::uint64_t>>();
+        }
     }
 };
 
@@ -480,8 +265,8 @@ auto with_framebuffer_call(std::span<const Draw> draws, const grid& g, const Fra
                            const F& f) {
     return tuning::with_policy<Selector, target_groups<Framebuffer>::max_bits()>(
         compute_capability(), [&]<tuning::fine_raster_policy Policy>() {
-            return f(framebuffer_call<Draw, Framebuffer, Policy>{draws, g, fb, options,
-                                                                 static_cast<std::uint32_t>(triangles), limits});
+            return f(framebuffer_call<Draw, Framebuffer, Policy>(draws, g, fb, options,
+                                                                 static_cast<std::uint32_t>(triangles), limits));
         });
 }
 

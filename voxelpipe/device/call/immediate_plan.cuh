@@ -44,22 +44,14 @@ template <class... Targets>
     return all;
 }
 
-// Whether a call gives the same however often it is made.
-template <class... Targets>
-[[nodiscard]] bool clears_all_in_use(const framebuffer_view<Targets...>& fb) {
-    bool all = true;
-    core::for_each_index<sizeof...(Targets)>(
-        [&]<std::size_t K>() { all = all && voxelpipe::get<K>(fb.targets).load != load_operation::load; });
-    return all;
-}
-
-// How a call of constant shaders can do without tiles. A target is counted only where blending it in place would not
-// give its blend's bits, or where nothing else tells how many voxels are touched.
+// Fills in how a call of constant shaders does without tiles. The modes of `plan` are those of a new one. Writes
+// members only, and leaves padding as it is: the bytes are part of a graph's key. A target is counted only where
+// blending it in place would not give its blend's bits, or where nothing else tells how many voxels are touched.
 template <class Draw, class... Targets>
-[[nodiscard]] immediate_plan<sizeof...(Targets)> plan_immediate(std::span<const Draw> draws,
-                                                                const framebuffer_view<Targets...>& fb,
-                                                                std::uint64_t num_primitives, bool count_voxels) {
-    immediate_plan<sizeof...(Targets)> plan;
+void plan_immediate(std::span<const Draw> draws, const framebuffer_view<Targets...>& fb, std::uint64_t num_primitives,
+                    bool count_voxels, immediate_plan<sizeof...(Targets)>& plan) {
+    plan.possible = plan.is_cheap = true;
+    plan.voxels_of = plan.bits_of = -1;
     int telling = -1, countable = -1; // the first target that tells first touches, that may be counted
     int telling_bits = -1;            // that tells them by its bits when all is drawn
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
@@ -102,8 +94,7 @@ template <class Draw, class... Targets>
         if (plan.counts(K) && !ends_by_marks(voxelpipe::get<K>(fb.targets)))
             bytes += target::map::elements(fb.extent) * sizeof(typename target::element_type);
     });
-    if (bytes > counted_bytes + num_primitives * counted_bytes_per_triangle) plan.possible = false;
-    return plan;
+    plan.is_cheap = bytes <= counted_bytes + num_primitives * counted_bytes_per_triangle;
 }
 
 } // namespace voxelpipe::device

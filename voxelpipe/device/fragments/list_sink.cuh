@@ -264,6 +264,7 @@ struct list_output {
     template <class Call>
     using deferred_sink = listing_sink<Call, 960, 192>; // fewer blocks, and triangles of many rows
     static constexpr bool defers = true;
+    static constexpr bool can_skip_deferred_pass = true; // no target is written if triangles are missing
     static constexpr bool only_sets = false;
     static constexpr bool only_blends = false;
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return false; }

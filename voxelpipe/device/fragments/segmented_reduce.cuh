@@ -20,7 +20,6 @@ namespace voxelpipe::device {
 
 inline constexpr std::uint32_t resolve_run = 256; // fragments
 inline constexpr std::size_t max_cell_bytes = 128;
-inline constexpr std::uint64_t max_resolved = std::uint64_t{1} << 28; // fragments of a call: 16 bytes each
 
 // ---- what the fragments of a voxel come to --------------------------------------------------------------------------
 

@@ -171,6 +171,8 @@ struct framebuffer_output {
     template <class Call>
     using deferred_sink = sink<Call>;
     static constexpr bool defers = has_only_bits<Framebuffer>; // otherwise raster/block_pass.cuh
+    // Targets are written while triangles are drawn: none may be missing at the end.
+    static constexpr bool can_skip_deferred_pass = false;
     // Known to the compiler: all targets are in use, and all values true, or the mode of all is to blend.
     static constexpr bool only_sets = false;
     static constexpr bool only_blends = false;

@@ -353,21 +353,27 @@ __global__ __launch_bounds__(raster_threads,
 template <class Call>
 void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
                    bool skips_deferred_pass = false) {
+    static_assert(fragment_sink<typename Call::sink> && fragment_sink<typename Call::deferred_sink>);
     const unsigned triangles = call.in.num_triangles;
     if constexpr (Call::output::defers) {
         bool are_close = false;
         if constexpr (has_close_cubes<Call>) are_close = may_be_close(triangles, call.in.extent);
         const unsigned blocks = raster_blocks(triangles, first_min_blocks<Call>);
-        const auto launch = [&](auto* raster, auto* alone) {
-            if (skips_deferred_pass)
-                launch_kernel(!is_first, alone, blocks, raster_threads, 0, stream, where, call, call, state);
-            else
-                launch_kernel(!is_first, raster, blocks, raster_threads, 0, stream, where, call, state);
+        const auto launch = [&]<bool Close>() {
+            if constexpr (Call::output::can_skip_deferred_pass) {
+                if (skips_deferred_pass) {
+                    launch_kernel(!is_first, only_pass_kernel<Call, Close>, blocks, raster_threads, 0, stream, where,
+                                  call, call, state);
+                    return;
+                }
+            }
+            launch_kernel(!is_first, first_pass_kernel<Call, Close>, blocks, raster_threads, 0, stream, where, call,
+                          state);
         };
         if (are_close)
-            launch(first_pass_kernel<Call, has_close_cubes<Call>>, only_pass_kernel<Call, has_close_cubes<Call>>);
+            launch.template operator()<has_close_cubes<Call>>();
         else
-            launch(first_pass_kernel<Call, false>, only_pass_kernel<Call, false>);
+            launch.template operator()<false>();
     } else {
         launch_kernel(!is_first, block_raster_kernel<Call>, raster_blocks(triangles, block_min_blocks), raster_threads,
                       0, stream, where, call, state);

@@ -2,53 +2,80 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// One draw of the raster, and the sink that takes its fragments: blending (raster/blend_sink.cuh), a mask of voxels
-// (raster/mask_sink.cuh) or lists (fragments/list_sink.cuh). A sink has
-//   stages_in_shared         whether settle(), which all lanes call between triangles, is wanted (feed)
-//   place(x, y, z)    where a voxel lies, as something linear: ivec3, or numbers modulo 2^32
-//   begin(triangle), row(x0, y, z, mask), cube(x, y, z, bits), voxels(bits, place), emit(place, wanted):
-//                     the fragments of one triangle, as a row of bits along x, as 2 x 2 x 2 (blend_cube) or one by one
-//   shares            whether one(x, y, z), a fragment of a triangle that has no other, is more than a row of one
-//   emit_line(place, step, count): count fragments from a place on, step apart
-//   spreads           whether a row costs by its voxels, so that lanes had better share long ones:
-//   row_by_all(group, x0, y, z, mask): a row by group_lanes neighbours, all with the same arguments
-//   mark_boxes(wanted, triangle), mark_row(x0, x1, y, z), mark_brick(corner, lane): told of what a triangle may touch
-//                     before it comes, of a brick by each of group_lanes lanes
-//   drop(class)       counts a triangle that is not drawn
-//   takes_warp_rounds        whether a warp had better give it fragments by
-//   rounds(count, is_done, next): thin ones of all lanes, one of each lane at a time: next() is the place of the next
-//                     of this lane's `count`
-//   share(count, of): thin ones of all lanes, 32 at a time whoever's they are: of(lane, i) is the place of a lane's i
-//   row_rounds(is_done, next): rows of all lanes, one of each lane at a time, of at most 16 voxels: next(emit) calls
-//                     emit(x0, y, z, bits), unless nothing is left of it; bits are one run
+// What the raster asks of a sink, and one draw of the raster. A sink takes the fragments of triangles: it blends them
+// into targets (raster/blend_sink.cuh), sets bits of a mask (raster/mask_sink.cuh) or lists them
+// (fragments/list_sink.cuh). A new kind of output is a new sink; nothing else in raster/ changes.
 
+#include <voxelpipe/core/slim_box.hpp>
 #include <voxelpipe/device/raster/deferred_triangles.cuh>
 #include <voxelpipe/device/scene/triangle_source.cuh>
 
+#include <concepts>
 #include <cstdint>
 
 namespace voxelpipe::device {
 
-// One draw. Output says where its fragments go, and has the sink that takes them there: framebuffer_output, or
-// list_output (fragments/list_sink.cuh).
+// Each thread has a sink of its own. Voxels are (x, y, z) of the grid; `mask` has a bit for each voxel of a row along
+// x, lowest first. Some kinds have more members: commit() if fragments are staged; one(x, y, z) and mark_boxes,
+// mark_brick if equal voxels are merged; row_by_all(lanes, x, y, z, mask) if long rows are split; rounds, share and
+// row_rounds if rounds are taken; emit_line(place, step, count), fragments a step apart, if they are staged or only
+// bits are set.
+template <class Sink>
+concept fragment_sink = requires(Sink sink, const glm::uvec3& indices, std::uint32_t triangle, int x, int y, int z,
+                                 word mask, pipeline_state* state) {
+    // ---- what kind it is, at compile time ----
+    // commit() takes part in every triangle: fragments are staged in shared memory of the warp (emit_with_retry).
+    { Sink::stages_in_shared } -> std::convertible_to<bool>;
+    // one(x, y, z) merges equal voxels of neighbouring lanes; otherwise it is a row of one voxel.
+    { Sink::merges_equal_voxels } -> std::convertible_to<bool>;
+    // A row costs by its voxels, so that group_lanes lanes share a long one: row_by_all.
+    { Sink::splits_long_rows } -> std::convertible_to<bool>;
+    // Fragments of all lanes come in rounds, one of each lane at a time: rounds, share and row_rounds.
+    { Sink::takes_warp_rounds } -> std::convertible_to<bool>;
+
+    // ---- triangles ----
+    { sink.check(indices) } -> std::same_as<bool>; // the indices name vertices; notes an error otherwise
+    sink.begin(triangle);                          // what comes next belongs to this triangle
+    sink.drop(core::triangle_class{});             // counts a triangle that is not drawn
+
+    // ---- fragments ----
+    // Where a voxel lies, linear in x, y and z: ivec3, or a number modulo 2^32. emit(place, wanted) takes one fragment.
+    sink.place(x, y, z);
+    sink.row(x, y, z, mask);               // a row from (x, y, z) on
+    sink.cube(x, y, z, mask);              // 2 x 2 x 2 voxels from (x, y, z) on, x first: 8 bits
+    sink.slim(x, y, z, core::slim_rows{}); // rows of a box that is one voxel wide along two axes or three long
+
+    // ---- what a triangle may touch, before its fragments come ----
+    sink.mark_row(x, x, y, z); // a part of a row of a large triangle
+
+    // ---- the end ----
+    sink.take_over(sink.end()); // counts move from one sink of a thread to another
+    sink.finish(state);         // adds up the counts of a block; all of its threads take part
+};
+
+// One draw. Output says where its fragments go, and names the sinks that take them there, of the first pass and of the
+// deferred one. Its compile-time members:
+//   defers                  the first pass leaves larger triangles to the deferred pass; otherwise block_pass.cuh
+//   can_skip_deferred_pass  the deferred pass may be left out, where a call that misses triangles writes no target
+//   only_sets, only_blends  all targets are in use and all values true, or all targets are blended in place
 template <coverage Rule, class Source, class Output>
 struct raster_call {
     static constexpr coverage rule = Rule;
     using source_type = Source;
     using output = Output;
     using sink = typename Output::template sink<raster_call>;
-    using deferred_sink = typename Output::template deferred_sink<raster_call>; // of the second kernel
+    using deferred_sink = typename Output::template deferred_sink<raster_call>;
     raster_input<Source> in;
     Output out;
     deferred_triangles lists;
 };
 
-// What every sink of a direct call does with triangles that are not drawn.
+// The part of every sink of a raster_call: triangles that are not drawn. Marks nothing.
 template <class Call>
 struct sink_base {
     static constexpr bool takes_warp_rounds = false;
     const Call& call;
-    unsigned* dropped; // by triangle_class, of the block
+    unsigned* dropped; // of the block, by triangle_class
 
     __device__ VOXELPIPE_INLINE void drop(core::triangle_class kind) {
         atomicAdd(&dropped[static_cast<int>(kind)], 1u);
@@ -57,8 +84,8 @@ struct sink_base {
     __device__ VOXELPIPE_INLINE static void mark_brick(const std::int32_t (&)[3], unsigned) {}
 };
 
-// Runs f, which gives a sink fragments, on all lanes of a warp. A sink that buffers them may find that there were too
-// many, and then wants them once more.
+// Runs f, which gives a sink the fragments of one triangle, on all lanes of a warp; again if the sink's staging memory
+// was too small for them.
 template <class Sink, class F>
 __device__ VOXELPIPE_INLINE void emit_with_retry(Sink& sink, F&& f) {
     if constexpr (Sink::stages_in_shared) {

@@ -241,14 +241,6 @@ void fill_chunks(const word* touched, const target_view<Target>& t, const typena
     }
 }
 
-// Of the touched voxels' bits, which the last passes go through.
-inline constexpr std::uint64_t max_mask_bytes = std::uint64_t{512} << 20;
-// Where targets can be drawn into as they lie (raster/raster.cuh): what is in L2 then. Without voxels to count, nor
-// values to clear, those passes take longer than a clear, from more bytes than these on: 16 MB and the 871,000
-// triangles of the dragon 0.0976 instead of 0.0935 ms, 2.9 million the same, 7.2 million 0.173 instead of 0.193.
-inline constexpr std::uint64_t max_mask_bytes_of_immediate = std::uint64_t{32} << 20;
-inline constexpr std::uint64_t min_mask_bytes = std::uint64_t{1} << 20, mask_bytes_per_triangle = 6;
-
 // ---- the last passes ------------------------------------------------------------------------------------------------
 
 // Whether the second fragment of one value changes nothing.

@@ -21,7 +21,8 @@ namespace voxelpipe::device {
 
 template <std::size_t N>
 struct immediate_plan {
-    bool possible = true;
+    bool possible = true; // every target can be blended or counted in place
+    bool is_cheap = true; // the last pass costs less than tiles would
     immediate_modes<N> modes;
     int voxels_of = -1; // which counted target tells at the end how many voxels are touched
     int bits_of = -1;   // which target of bits does
