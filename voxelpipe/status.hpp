@@ -28,7 +28,7 @@ enum class status_code : std::uint8_t {
     size_overflow,      // a buffer would have more bytes than this machine can address
     too_many_triangles, // more than 2^32 - 1 in all draws together
     out_of_memory,
-    capacity_exceeded, // the caller's workspace is too small; `required` says what is needed
+    capacity_exceeded,    // the caller's workspace is too small; `required` says what is needed
     strategy_unavailable, // the strategy that the backend was told to use cannot serve the call
     no_device,
     device_error, // `device_error` holds the CUDA error

@@ -11,8 +11,8 @@
 #include <exception>
 #include <mutex>
 #include <new>
-#include <system_error>
 #include <optional>
+#include <system_error>
 #include <thread>
 #include <type_traits>
 #include <utility>
