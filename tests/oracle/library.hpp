@@ -101,7 +101,7 @@ std::vector<std::vector<voxel>> voxels_by_triangle(const vp::host_abuffer<Payloa
     std::vector<std::vector<voxel>> result(triangles);
     for (const auto& [at, fragments] : lists)
         for (const auto& entry : fragments)
-            result.at(entry.triangle).push_back({at.x + p.begin[0], at.y + p.begin[1], at.z + p.begin[2]});
+            result.at(entry.primitive).push_back({at.x + p.begin[0], at.y + p.begin[1], at.z + p.begin[2]});
     return result;
 }
 
