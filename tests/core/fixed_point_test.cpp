@@ -189,13 +189,13 @@ TEST(Grid, ValidateNamesWhatIsWrong) {
         }
         for (const double bad : {0.0, -0.0, -1.0, 1e-320, 5e-305, 1.7e308})
             EXPECT_EQ(code([&](vp::grid& g) { g.voxel_size[a] = bad; }), status_code::bad_voxel_size) << bad;
-        EXPECT_EQ(code([&](vp::grid& g) { g.offset[a] = -1; }), status_code::bad_extent);
-        EXPECT_EQ(code([&](vp::grid& g) { g = g.crop(glm::ivec3(0), g.extent + 1); }), status_code::bad_extent);
+        EXPECT_EQ(code([&](vp::grid& g) { g.offset[a] = -1; }), status_code::bad_crop);
+        EXPECT_EQ(code([&](vp::grid& g) { g = g.crop(glm::ivec3(0), g.extent + 1); }), status_code::bad_crop);
         EXPECT_EQ(code([&](vp::grid& g) {
                       g.whole = {4, 4, 4};
                       g.offset[a] = 4;
                   }),
-                  status_code::bad_extent);
+                  status_code::bad_crop);
     }
 }
 

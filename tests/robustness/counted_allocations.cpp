@@ -38,12 +38,24 @@ void* operator new(std::size_t size) {
     return p;
 }
 
+// What cpu_backend's buffers take.
+void* operator new(std::size_t size, std::align_val_t alignment) {
+    const auto multiple = static_cast<std::size_t>(alignment);
+    void* const p =
+        unit::is_refused() ? nullptr : __real_aligned_alloc(multiple, (size + multiple - 1) / multiple * multiple);
+    if (p == nullptr) throw std::bad_alloc();
+    ++unit::live_allocations;
+    return p;
+}
+
 void operator delete(void* p) noexcept {
     if (p != nullptr) --unit::live_allocations;
     __real_free(p);
 }
 
 void operator delete(void* p, std::size_t) noexcept { operator delete(p); }
+void operator delete(void* p, std::align_val_t) noexcept { operator delete(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { operator delete(p); }
 
 void* __wrap_aligned_alloc(std::size_t alignment, std::size_t size) {
     void* const p = unit::is_refused() ? nullptr : __real_aligned_alloc(alignment, size);
