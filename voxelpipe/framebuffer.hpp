@@ -143,7 +143,7 @@ public:
     // at most 32 bytes a value, in calls that need no tiles; everything else is cleared as a whole. A call that clears
     // only some targets tracks those. Throws std::bad_alloc.
     void track_changes(Backend& backend) { forget_changes(backend); }
-    // Says that the targets may hold anything, as before the first call. Earlier views must not be used any more.
+    // Says that the targets may hold anything, as before the first call. Earlier views become invalid.
     void forget_changes(Backend& backend) {
         const std::vector<std::uint32_t> zeros(change_words(view_.extent));
         changes_ = std::make_unique<buffer<std::uint32_t>>(backend, array_view<const std::uint32_t>(zeros));

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // The program's operator new and delete: malloc and free, with large blocks counted against the budget of memory.hpp.
-// Of the program alone, not of the libraries that its tests link.
+// Linked into the program alone, not into the libraries that its tests link.
 #include "memory.hpp"
 
 #include <malloc.h>

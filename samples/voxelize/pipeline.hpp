@@ -444,7 +444,7 @@ private:
         resolve<glm::u8vec4>(result, target::color_outer, part.extent, begin, outer_color{elements_of<0>(framebuffer)});
     }
 
-    // Of the covered voxels those that the resolved normals leave at 0.
+    // Counts the covered voxels whose resolved normal is 0.
     void count_cancelled_normals(const volume& result) {
         const stage_timer timer{*this, "resolve"};
         const auto* const normals = reinterpret_cast<const glm::vec3*>(result.find("normal")->data.data());

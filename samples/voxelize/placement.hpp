@@ -58,8 +58,8 @@ struct bounding_box {
     }
 };
 
-// Of the corners of the scene's triangles in world space, in double; those with a position that is not finite are left
-// out. THREADS <= 0 takes one for each core.
+// The box around all corners of the scene's triangles, in world space and in double. Positions that are not finite are
+// left out. THREADS <= 0 takes one for each core.
 [[nodiscard]] bounding_box bounds_of(const scene& model, int threads = 0);
 
 // What positions are taken relative to before they are rounded to float, for the library to snap: the world's own

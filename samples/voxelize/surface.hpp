@@ -331,7 +331,7 @@ private:
 // side, if its material is double-sided) to a side of the grid that sees the voxel; how far the triangle's plane lies
 // from the voxel's centre towards such a side, the most over those sides; the colour.
 struct outer_fragment_shader {
-    // Of a unit normal, along an axis: a side that is seen more edge-on than this has no say.
+    // The least component of a unit normal along an axis for which the side of that axis counts: others see it edge-on.
     static constexpr float least_slope = 0x1p-6f;
     static constexpr float lowest = -0x1p100f;
 

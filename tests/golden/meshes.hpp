@@ -3,7 +3,7 @@
 #pragma once
 
 // Meshes for the golden hashes. They are made with integers only (a coordinate is an integer times a power of two), so
-// that no compiler flag and no library changes the input. Never change one: its hashes could not be compared any more.
+// that no compiler flag and no library changes the input. Never change one: its hashes would lose their reference.
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
