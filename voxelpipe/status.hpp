@@ -30,6 +30,8 @@ enum class status_code : std::uint8_t {
     out_of_memory,
     capacity_exceeded,    // the caller's workspace is too small; `required` says what is needed
     strategy_unavailable, // the strategy that the backend was told to use cannot serve the call
+    bad_solid_options,    // an option of voxelize_solid is out of its range
+    crop_without_whole,   // repair::exterior of a crop: what lies outside follows from the whole grid
     no_device,
     device_error, // `device_error` holds the CUDA error
 };
@@ -60,6 +62,24 @@ struct counters {
 
     [[nodiscard]] std::uint64_t triangles_dropped() const { return triangles_nonfinite + triangles_too_far; }
     friend bool operator==(const counters&, const counters&) = default;
+};
+
+// What voxelize_solid counts besides `counters`; zeros from other calls. Of a crop these are numbers of the crop's
+// rows, along x through the whole grid. Numbers of slabs along y and z add up to those of the whole; of slabs along x
+// each has the same rows, and open_rows and crossings are the same numbers.
+struct solid_counters {
+    // Rows whose crossings, in, before and behind the grid, are odd in number (fill_rule::even_odd) or do not sum to 0
+    // (other rules); with bodies::draw each draw counts for itself. More than 0 proves that the mesh is not closed; 0
+    // proves only that these rows balance.
+    std::uint64_t open_rows = 0;
+    std::uint64_t crossings = 0;   // of triangles with rows, in, before and behind the grid
+    std::uint64_t max_winding = 0; // greatest |winding number| of a voxel's centre; 0 for fill_rule::even_odd
+    // repair::close_holes only:
+    std::uint64_t hole_edges = 0; // edges that no opposite edge cancels
+    std::uint64_t holes = 0;      // their connected components
+    std::uint64_t cones = 0;      // holes that were closed
+
+    friend bool operator==(const solid_counters&, const solid_counters&) = default;
 };
 
 // Sizes that a caller's workspace must have; filled where `code` is capacity_exceeded.
@@ -103,6 +123,10 @@ struct required_sizes {
         return "capacity exceeded: see the required sizes";
     case status_code::strategy_unavailable:
         return "strategy unavailable: the forced strategy cannot serve this call";
+    case status_code::bad_solid_options:
+        return "bad solid options: a value out of its range";
+    case status_code::crop_without_whole:
+        return "crop without whole: the exterior of a crop follows from the whole grid, draw that";
     case status_code::no_device:
         return "no usable device";
     case status_code::device_error:
@@ -140,6 +164,7 @@ struct [[nodiscard]] status {
     stage where = stage::validate; // the stage that failed; meaningless when ok
     int device_error = 0;          // cudaError_t, 0 on the CPU
     counters counts{};
+    solid_counters solid{};
     required_sizes required{};
     static constexpr std::uint32_t unknown = ~std::uint32_t{0};
     std::uint32_t draw = unknown; // of index_out_of_range: the first such triangle and its draw, if voxelize returns

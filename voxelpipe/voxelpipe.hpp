@@ -13,6 +13,7 @@
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/mesh.hpp>
 #include <voxelpipe/shader.hpp>
+#include <voxelpipe/solid.hpp>
 #include <voxelpipe/stage_times.hpp>
 #include <voxelpipe/status.hpp>
 #include <voxelpipe/voxelize.hpp>
