@@ -33,7 +33,7 @@ struct abuffer_view {
         const auto copy = [&](void* to, const void* from, std::size_t bytes) {
             if (bytes != 0) device::check(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, backend.stream));
         };
-        try {
+        device::with_runtime_errors([&] {
             list_counts n{};
             copy(&n, counts, sizeof(n));
             device::check(cudaStreamSynchronize(backend.stream));
@@ -46,9 +46,7 @@ struct abuffer_view {
             copy(h.primitives.data(), primitives, h.primitives.size() * sizeof(std::uint32_t));
             copy(h.payloads.data(), payloads, h.payloads.size() * sizeof(payload_type));
             device::check(cudaStreamSynchronize(backend.stream));
-        } catch (const device::cuda_failure& e) {
-            throw std::runtime_error(std::string("voxelpipe: ") + cudaGetErrorString(e.error));
-        }
+        });
         return h;
     }
 };

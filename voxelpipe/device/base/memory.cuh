@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Device memory of the CUDA backend: where it comes from (memory_resource), how one block is carved into named arrays
-// (arena), and how CUDA errors become exceptions inside the backend and a status at its surface.
+// Device memory of the CUDA backend: where it comes from (memory_resource), who owns it (device_block), how one block
+// is carved into named arrays (arena), and how CUDA errors become exceptions inside the backend and a status at its
+// surface.
 
 #include <voxelpipe/status.hpp>
 
@@ -14,6 +15,7 @@
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 namespace voxelpipe {
 
@@ -106,6 +108,41 @@ private:
     void* object_ = nullptr;
     void* (*allocate_)(void*, std::size_t, cudaStream_t) = nullptr;
     void (*deallocate_)(void*, void*, std::size_t, cudaStream_t) = nullptr;
+};
+
+// A stream and the memory that is taken in its order: a cuda_backend is one.
+struct stream_memory {
+    cudaStream_t stream = nullptr; // not owned
+    memory_resource resource;      // where all memory comes from
+};
+
+// Owns one block of device memory, freed in the order of its stream. Moves, is never shared.
+class device_block {
+public:
+    device_block() = default;
+    device_block(std::size_t bytes, const memory_resource& resource, cudaStream_t stream)
+        : pointer_(resource.allocate(bytes, stream)), bytes_(bytes), resource_(resource), stream_(stream) {}
+    device_block(device_block&& other) noexcept { swap(other); }
+    device_block& operator=(device_block&& other) noexcept {
+        device_block(std::move(other)).swap(*this);
+        return *this;
+    }
+    ~device_block() { resource_.deallocate(pointer_, bytes_, stream_); }
+
+    [[nodiscard]] void* data() const { return pointer_; }
+    [[nodiscard]] std::size_t size() const { return bytes_; }
+
+private:
+    void swap(device_block& other) noexcept {
+        std::swap(pointer_, other.pointer_);
+        std::swap(bytes_, other.bytes_);
+        std::swap(resource_, other.resource_);
+        std::swap(stream_, other.stream_);
+    }
+    void* pointer_ = nullptr;
+    std::size_t bytes_ = 0;
+    memory_resource resource_;
+    cudaStream_t stream_ = nullptr;
 };
 
 namespace device {
