@@ -251,6 +251,11 @@ std::string precision_warning(const scene& model, const voxelpipe::grid& grid) {
 
 namespace {
 
+// Out of line, because g++ 11 (-O3) and g++ 12 (-O2) leave out the rounding where they vectorise two neighbours:
+//     void f(const double* in, double* out) { float a = in[0], b = in[1]; out[0] = a; out[1] = b; }
+// is compiled to a plain copy.
+[[gnu::noinline]] double rounded_to_float(double x) { return static_cast<float>(x); }
+
 voxelpipe::grid place(const grid_request& request, const bounding_box& bounds) {
     if (request.padding < 0) throw grid_error("--padding cannot be negative");
     voxelpipe::grid grid;
@@ -289,7 +294,11 @@ voxelpipe::grid place(const grid_request& request, const bounding_box& bounds) {
 
 voxelpipe::grid place_grid(const grid_request& request, const bounding_box& bounds) {
     // The bounds of what is drawn: of positions as they are rounded.
-    const bounding_box rounded{glm::vec3(bounds.low), glm::vec3(bounds.high), bounds.empty};
+    bounding_box rounded = bounds;
+    for (int axis = 0; axis < 3; ++axis) {
+        rounded.low[axis] = rounded_to_float(bounds.low[axis]);
+        rounded.high[axis] = rounded_to_float(bounds.high[axis]);
+    }
     const voxelpipe::grid grid = place(request, rounded);
     return reference_point(grid) == glm::dvec3(0) ? grid : place(request, bounds);
 }

@@ -222,6 +222,23 @@ TEST(Placement, ResolutionGivesBoxesTheirProportions) {
 }
 
 // Every channel's rows, in a ring of its empty value.
+// Some compilers leave the rounding to float out, see place_grid.
+TEST(Placement, DigitsBeyondFloatDoNotMoveTheGrid) {
+    voxelize::grid_request request;
+    request.resolution = 64;
+    const voxelize::bounding_box bounds{{-0.94747634, -0.90097301, -0.98100002}, {0.9474, 0.90089998, 0.98123}, false};
+    voxelize::bounding_box rounded = bounds;
+    for (int axis = 0; axis < 3; ++axis) {
+        volatile float low = static_cast<float>(bounds.low[axis]), high = static_cast<float>(bounds.high[axis]);
+        rounded.low[axis] = low;
+        rounded.high[axis] = high;
+        EXPECT_NE(rounded.low[axis], bounds.low[axis]);
+    }
+    const voxelpipe::grid grid = place_grid(request, bounds), expected = place_grid(request, rounded);
+    EXPECT_EQ(grid.origin, expected.origin);
+    EXPECT_EQ(grid.voxel_size, expected.voxel_size);
+}
+
 TEST(Placement, PaddingHoldsTheEmptyValueOfEveryTarget) {
     const voxelize::scene model = box({0.2, 0.1, 0.3}, {37.7, 4.6, 3.4});
     std::vector<voxelize::target> all;
