@@ -484,6 +484,7 @@ void understand_picture(command_line& options, const raw_options& raw) {
     picture.up = options.write.up;
     picture.threads = options.voxelize.threads;
     options.write.threads = options.voxelize.threads;
+    options.load.gltf.threads = options.voxelize.threads;
 }
 
 } // namespace

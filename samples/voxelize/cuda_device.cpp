@@ -4,6 +4,7 @@
 #include "cuda_device.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace voxelize {
 
@@ -30,6 +31,18 @@ std::uint64_t bytes_of(const scene& model) {
 }
 
 } // namespace
+
+cuda_start::cuda_start() {
+    std::promise<cuda_facts> found;
+    facts_ = found.get_future().share();
+    thread_ = std::jthread([found = std::move(found)]() mutable { found.set_value(look_for_cuda()); });
+}
+
+double cuda_start::milliseconds_ago() const {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count();
+}
+
+std::uint64_t model_bytes(const scene& model) { return bytes_of(model); }
 
 std::string why_not(const cuda_facts& facts) {
     if (!facts.built_in) return "this program was built without CUDA";

@@ -6,8 +6,11 @@
 
 #include "voxelizer.hpp"
 
+#include <chrono>
 #include <cstdint>
+#include <future>
 #include <string>
+#include <thread>
 
 namespace voxelize {
 
@@ -31,11 +34,36 @@ struct cuda_facts {
 // that CUDA takes to start.
 [[nodiscard]] cuda_facts look_for_cuda();
 
+// look_for_cuda() on a thread of its own, while the program does something else. The destructor waits for the thread: a
+// process that ends while CUDA starts may crash.
+class cuda_start {
+public:
+    cuda_start();
+    cuda_start(const cuda_start&) = delete;
+    cuda_start& operator=(const cuda_start&) = delete;
+
+    // Waits for it.
+    [[nodiscard]] cuda_facts facts() { return facts_.get(); }
+    [[nodiscard]] double milliseconds_ago() const;
+    [[nodiscard]] bool ready() const { return facts_.wait_for(std::chrono::seconds(0)) == std::future_status::ready; }
+
+private:
+    std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+    std::shared_future<cuda_facts> facts_;
+    std::jthread thread_;
+};
+
+// Whether this program has CUDA code at all.
+[[nodiscard]] bool built_with_cuda();
+
 // Why the pipeline cannot run there: the rest of a sentence, without a full stop. Empty where it can.
 [[nodiscard]] std::string why_not(const cuda_facts& facts);
 
 // Bytes of working memory where the user leaves the choice: larger slabs, because each costs a pass over all triangles.
 [[nodiscard]] std::uint64_t default_work_memory(const cuda_facts& facts);
+
+// Bytes of a scene's vertices, indices and texels.
+[[nodiscard]] std::uint64_t model_bytes(const scene& model);
 
 // Why a scene cannot fit into that device's memory, as far as can be told before the attempt. Empty where it may.
 [[nodiscard]] std::string why_too_large(const cuda_facts& facts, const scene& model, const voxelize_request& request);

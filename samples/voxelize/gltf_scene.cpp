@@ -7,6 +7,7 @@
 #include "gltf/budget.hpp"
 #include "gltf/check.hpp"
 #include "gltf/container.hpp"
+#include "gltf/mapped_file.hpp"
 #include "gltf/materials.hpp"
 #include "gltf/nodes.hpp"
 #include "gltf/pose.hpp"
@@ -50,7 +51,7 @@ void load(scene& result, std::span<const std::byte> bytes, const gltf_file_reade
     if (options.animation) gltf::apply_animation(model, accessors, options.seconds, result.warnings);
     const gltf::shown_scene shown_scene = gltf::shown_meshes(model, accessors, tolerance);
     const gltf::pose_reader poses{model, accessors, shown_scene.node_to_world, memory};
-    gltf::primitive_reader primitives{model, accessors, materials, poses, memory, result};
+    gltf::primitive_reader primitives{model, accessors, materials, poses, memory, result, options.threads};
     for (const gltf::shown_mesh& shown : shown_scene.meshes)
         for (std::size_t part = 0; part < model.meshes[shown.mesh].primitives.size(); ++part)
             primitives.show(shown, part);
@@ -80,8 +81,8 @@ scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_f
 }
 
 scene load_gltf(const std::filesystem::path& file, const gltf_limits& limits, const gltf_options& options) {
-    const std::vector<std::byte> bytes = gltf::read_whole_file(file, limits.max_file_bytes);
-    return load_gltf(bytes, gltf::folder_reader(file.parent_path()), limits, options);
+    const gltf::mapped_file mapped(file, limits.max_file_bytes);
+    return load_gltf(mapped.bytes(), gltf::folder_reader(file.parent_path()), limits, options);
 }
 
 } // namespace voxelize

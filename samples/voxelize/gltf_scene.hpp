@@ -55,6 +55,7 @@ struct gltf_options {
     // them.
     std::optional<std::string> animation;
     double seconds = 0;
+    int threads = 0; // that read vertices and indices; 0: one for each core. The scene does not depend on it
 };
 
 // Gives the bytes of a file that a .gltf names. The path is relative, normalised, percent-decoded and never leaves

@@ -1,7 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // voxelize INPUT.glb -o OUT... [options]: turns a glTF model into voxels. See --help.
+#include "backend_estimate.hpp"
 #include "command_line.hpp"
+#include "cuda_device.hpp"
 #include "exit_code.hpp"
 #include "model_file.hpp"
 #include "report.hpp"
@@ -9,6 +11,8 @@
 #include <chrono>
 #include <cstdio>
 #include <iostream>
+#include <memory>
+#include <system_error>
 
 namespace voxelize {
 namespace {
@@ -36,22 +40,41 @@ void print_warnings(const std::vector<std::string>& warnings) {
     for (const std::string& warning : warnings) std::cerr << "voxelize: warning: " << warning << '\n';
 }
 
-// What comes after the command line; every way to fail is an exception.
-void run(const command_line& options) {
-    const auto milliseconds_since = [](std::chrono::steady_clock::time_point start) {
-        return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    };
+using clock = std::chrono::steady_clock;
+
+double milliseconds_since(clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(clock::now() - start).count();
+}
+
+// CUDA, starting already where it will be used or may be.
+std::shared_ptr<cuda_start> start_cuda(const command_line& options) {
+    if (!built_with_cuda() || options.voxelize.backend == backend_choice::cpu) return nullptr;
+    std::error_code error;
+    const std::uintmax_t bytes = std::filesystem::file_size(options.input, error);
+    if (error) return nullptr; // the model cannot be read either
+    if (options.voxelize.backend == backend_choice::automatic &&
+        !cuda_may_pay(options.grid, options.voxelize, static_cast<double>(bytes)))
+        return nullptr;
+    return std::make_shared<cuda_start>();
+}
+
+// What comes after the command line; every way to fail is an exception. The program began at BEGIN.
+void run(const command_line& options, clock::time_point begin) {
     run_report report;
     report.input = options.input;
     report.request = options.voxelize;
     progress_bar bar{!options.quiet};
+    report.stats.milliseconds.emplace_back("options", milliseconds_since(begin));
 
-    auto start = std::chrono::steady_clock::now();
+    auto start = clock::now();
+    report.request.cuda = start_cuda(options);
     scene model = load_model(options.input, options.load);
     report.warnings = options.warnings;
     report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
     report.vertices = model.vertex_count();
     for (const material& m : model.materials) report.materials.push_back(m.name);
+    report.stats.milliseconds.emplace_back("read", milliseconds_since(start));
+    start = clock::now();
     const auto refuse = [&report](const std::string& why) {
         model_error error(why);
         error.warnings = report.warnings;
@@ -67,7 +90,7 @@ void run(const command_line& options) {
     report.request.padding = options.grid.padding;
     if (std::string warning = precision_warning(model, report.request.grid); !warning.empty())
         report.warnings.push_back(std::move(warning));
-    report.stats.milliseconds.emplace_back("read", milliseconds_since(start));
+    report.stats.milliseconds.emplace_back("place", milliseconds_since(start));
 
     bar.start("voxelizing");
     report.request.progress = [&bar](double done) { bar.show(done); };
@@ -78,7 +101,7 @@ void run(const command_line& options) {
                                   " triangles are dropped: a position is not finite, or too far from the grid");
     if (report.stats.voxels == 0) report.warnings.push_back(why_empty(report.stats));
 
-    start = std::chrono::steady_clock::now();
+    start = clock::now();
     for (const std::filesystem::path& output : options.outputs) {
         write_options how = options.write;
         bar.start("writing " + output.filename().string());
@@ -88,6 +111,11 @@ void run(const command_line& options) {
     }
     bar.clear();
     report.stats.milliseconds.emplace_back("write", milliseconds_since(start));
+    start = clock::now();
+    model = {};
+    voxels = {};
+    report.request.cuda.reset();
+    report.stats.milliseconds.emplace_back("release", milliseconds_since(start));
     report.peak_memory = memory::peak();
 
     if (!options.quiet) {
@@ -99,11 +127,13 @@ void run(const command_line& options) {
         stream << report.stats.voxels << " of " << extent.x << " x " << extent.y << " x " << extent.z
                << " voxels are covered\n";
     }
+    add_rest(report, milliseconds_since(begin));
     if (options.stats == stats_format::text) print_text(std::cout, report);
     if (options.stats == stats_format::json) print_json(std::cout, report);
 }
 
 int run_main(int argc, char** argv) {
+    const clock::time_point begin = clock::now();
     command_line options;
     try {
         options = parse_command_line(argc, argv);
@@ -115,7 +145,7 @@ int run_main(int argc, char** argv) {
     }
     memory::set_limit(options.max_memory, options.max_memory != 0);
     try {
-        run(options);
+        run(options, begin);
     } catch (const model_error& error) {
         if (!options.quiet) print_warnings(error.warnings);
         return fail(exit_input, options.input.string() + ": " + error.what() +

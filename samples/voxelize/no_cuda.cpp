@@ -5,6 +5,8 @@
 
 namespace voxelize {
 
+bool built_with_cuda() { return false; }
+
 cuda_facts look_for_cuda() { return {}; }
 
 volume run_on_cuda(const cuda_facts& facts, scene&, const voxelize_request&, voxelize_stats&) {

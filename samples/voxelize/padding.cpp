@@ -70,7 +70,7 @@ volume padded(volume inner, int padding) {
                 }
             }
         }
-        from.data = std::vector<std::byte>(); // = {} would keep the memory
+        from.data = channel_bytes(); // = {} would keep the memory
     }
     return outer;
 }

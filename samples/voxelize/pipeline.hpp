@@ -102,8 +102,8 @@ public:
             result.voxel_size[axis] = grid.voxel_size[a];
         }
         for (const target wanted : request_.targets)
-            result.add(std::string(info_of(wanted).name), info_of(wanted).type, info_of(wanted).components);
-        if (hides_occupancy_) result.add("occupancy", scalar::bit);
+            result.add_unset(std::string(info_of(wanted).name), info_of(wanted).type, info_of(wanted).components);
+        if (hides_occupancy_) result.add_unset("occupancy", scalar::bit);
 
         const int depth = slab_depth(surface_voxel_bytes());
         const int passes = wants(target::color_outer) ? 2 : 1;
@@ -139,6 +139,25 @@ public:
 private:
     template <class T>
     using buffer = typename Backend::template buffer<T>;
+
+    // A list of the scene where the backend reads it: taken over where that is host memory, otherwise copied.
+    template <class T>
+    class stored {
+    public:
+        stored(Backend& backend, std::vector<T>& source) {
+            if constexpr (memory_access<Backend>::on_host)
+                host_ = std::move(source);
+            else
+                copy_.push_back({backend, source});
+        }
+        [[nodiscard]] const T* data() const { return copy_.empty() ? host_.data() : copy_.front().data(); }
+        [[nodiscard]] std::size_t size() const { return copy_.empty() ? host_.size() : copy_.front().size(); }
+        [[nodiscard]] vp::array_view<const T> view() const { return {data(), size()}; }
+
+    private:
+        std::vector<T> host_;
+        std::vector<buffer<T>> copy_;
+    };
     using mesh_view = vp::mesh_view<>;
     using surface_draw = vp::draw<mesh_view, surface_vertex_shader, surface_fragment_shader>;
     using bits_draw = vp::draw<mesh_view, placed_vertex_shader, vp::constant_output<bool, std::uint32_t>>;
@@ -250,6 +269,13 @@ private:
             if (shown.to_world.mirrors()) mirrored[shown.primitive] = 1;
         for (std::size_t i = 0; i < model.primitives.size(); ++i) {
             primitive& part = model.primitives[i];
+            const bool has_texcoords = !part.texcoords.empty();
+            const bool has_colors = !part.colors.empty();
+            std::vector<glm::uvec3> turned;
+            if (mirrored[i] != 0) {
+                turned = part.triangles;
+                for (glm::uvec3& corners : turned) std::swap(corners.y, corners.z);
+            }
             uploaded_primitive& done =
                 primitives_.emplace_back(uploaded_primitive{{backend_, part.positions},
                                                             {backend_, part.triangles},
@@ -260,15 +286,11 @@ private:
                                                             {},
                                                             static_cast<std::int32_t>(part.material),
                                                             model.materials[part.material].double_sided});
-            if (mirrored[i] != 0) {
-                std::vector<glm::uvec3> turned = part.triangles;
-                for (glm::uvec3& corners : turned) std::swap(corners.y, corners.z);
-                done.mirrored_triangles.push_back({backend_, turned});
-            }
+            if (mirrored[i] != 0) done.mirrored_triangles.push_back({backend_, turned});
             const material& m = model.materials[part.material];
-            if (!part.texcoords.empty()) done.vertex_shader.texcoords = done.texcoords.data();
-            if (!part.colors.empty()) done.vertex_shader.colors = done.colors.data();
-            done.fragment_shader = fragment_shader_of(m, model, !part.texcoords.empty());
+            if (has_texcoords) done.vertex_shader.texcoords = done.texcoords.data();
+            if (has_colors) done.vertex_shader.colors = done.colors.data();
+            done.fragment_shader = fragment_shader_of(m, model, has_texcoords);
             any_mask_ = any_mask_ || done.fragment_shader.alpha == alpha_mode::mask;
             if constexpr (memory_access<Backend>::on_host) part = {};
         }
@@ -532,11 +554,11 @@ private:
     };
     std::vector<uploaded_picture> pictures_;
     struct uploaded_primitive {
-        buffer<glm::vec3> positions;
-        buffer<glm::uvec3> triangles;
-        std::vector<buffer<glm::uvec3>> mirrored_triangles; // one, where an instance mirrors
-        buffer<glm::vec2> texcoords;
-        buffer<glm::vec4> colors;
+        stored<glm::vec3> positions;
+        stored<glm::uvec3> triangles;
+        std::vector<stored<glm::uvec3>> mirrored_triangles; // one, where an instance mirrors
+        stored<glm::vec2> texcoords;
+        stored<glm::vec4> colors;
         surface_vertex_shader vertex_shader; // all but its place
         surface_fragment_shader fragment_shader;
         std::int32_t material;

@@ -43,6 +43,20 @@ void progress_bar::clear() {
     drawn_ = false;
 }
 
+namespace {
+
+double sum_of_stages(const run_report& report) {
+    double sum = 0;
+    for (const auto& [stage, time] : report.stats.milliseconds) sum += time;
+    return sum;
+}
+
+} // namespace
+
+void add_rest(run_report& report, double wall_milliseconds) {
+    report.stats.milliseconds.emplace_back("other", std::max(0.0, wall_milliseconds - sum_of_stages(report)));
+}
+
 void print_text(std::ostream& stream, const run_report& report) {
     const voxelpipe::grid& grid = report.request.grid;
     const auto line = [&stream](const char* name) -> std::ostream& {
@@ -57,7 +71,10 @@ void print_text(std::ostream& stream, const run_report& report) {
     if (!report.stats.device.empty()) stream << report.stats.device << ", ";
     stream << report.stats.threads << " threads, " << report.stats.slabs
            << (report.stats.slabs == 1 ? " slab" : " slabs");
-    if (!report.stats.no_cuda.empty()) stream << " (not cuda: " << report.stats.no_cuda << ')';
+    if (!report.stats.no_cuda.empty())
+        stream << " (not cuda: " << report.stats.no_cuda << ')';
+    else if (!report.stats.estimate.empty())
+        stream << " (auto: " << report.stats.estimate << ')';
     stream << '\n';
     if (report.stats.strategy.value != voxelpipe::strategy::automatic)
         line("strategy") << to_string(report.stats.strategy.value) << " (" << report.stats.strategy.why << ")\n";
@@ -70,13 +87,10 @@ void print_text(std::ostream& stream, const run_report& report) {
     stream << '\n';
     line("voxels") << report.stats.voxels << '\n';
     if (report.stats.normals_cancelled != 0) line("normals cancelled") << report.stats.normals_cancelled << '\n';
-    double total = 0;
     stream << std::fixed << std::setprecision(1);
-    for (const auto& [stage, time] : report.stats.milliseconds) {
+    for (const auto& [stage, time] : report.stats.milliseconds)
         line((stage + " ms").c_str()) << std::setw(10) << time << '\n';
-        total += time;
-    }
-    line("all ms") << std::setw(10) << total << '\n';
+    line("all ms") << std::setw(10) << sum_of_stages(report) << '\n';
     if (report.stats.device_memory != 0)
         line("GPU memory MiB") << std::setw(10) << static_cast<double>(report.stats.device_memory) / (1 << 20) << '\n';
     line("peak memory MiB") << std::setw(10) << static_cast<double>(report.peak_memory) / (1 << 20) << '\n';
@@ -98,6 +112,7 @@ void print_json(std::ostream& stream, const run_report& report) {
     if (!report.stats.no_cuda.empty()) root["no_cuda"] = report.stats.no_cuda;
     if (report.stats.strategy.value != voxelpipe::strategy::automatic)
         root["strategy"] = {{"name", to_string(report.stats.strategy.value)}, {"why", report.stats.strategy.why}};
+    if (!report.stats.estimate.empty()) root["estimate"] = report.stats.estimate;
     root["threads"] = report.stats.threads;
     root["slabs"] = report.stats.slabs;
     root["triangles"] = report.stats.triangles;
@@ -107,12 +122,8 @@ void print_json(std::ostream& stream, const run_report& report) {
     root["fragments_discarded"] = report.stats.fragments_discarded;
     root["voxels"] = report.stats.voxels;
     if (report.stats.normals_cancelled != 0) root["normals_cancelled"] = report.stats.normals_cancelled;
-    double total = 0;
-    for (const auto& [stage, time] : report.stats.milliseconds) {
-        root["ms"][stage] = time;
-        total += time;
-    }
-    root["ms"]["total"] = total;
+    for (const auto& [stage, time] : report.stats.milliseconds) root["ms"][stage] = time;
+    root["ms"]["total"] = sum_of_stages(report);
     if (report.stats.device_memory != 0) root["device_memory_bytes"] = report.stats.device_memory;
     root["peak_memory_bytes"] = report.peak_memory;
     root["materials"] = report.materials;

@@ -48,6 +48,9 @@ struct run_report {
     std::uint64_t peak_memory = 0; // bytes
 };
 
+// Adds the stage "other": what is left of the program's wall time, so that the stages add up to it.
+void add_rest(run_report& report, double wall_milliseconds);
+
 void print_text(std::ostream& stream, const run_report& report);
 void print_json(std::ostream& stream, const run_report& report);
 

@@ -16,9 +16,11 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -56,13 +58,32 @@ enum class scalar : std::uint8_t { bit, u8, u16, u32, u64, i32, i64, f16, f32, f
     return names[static_cast<std::size_t>(type)];
 }
 
+// std::allocator, but that elements without a value stay as the memory is. Clearing gigabytes on one thread before all
+// threads write them would cost more than the writing.
+template <class T>
+struct unset_allocator : std::allocator<T> {
+    template <class U>
+    struct rebind {
+        using other = unset_allocator<U>;
+    };
+    template <class U>
+    void construct(U* at) noexcept(std::is_nothrow_default_constructible_v<U>) {
+        ::new (static_cast<void*>(at)) U;
+    }
+    template <class U, class... Args>
+    void construct(U* at, Args&&... args) {
+        ::new (static_cast<void*>(at)) U(std::forward<Args>(args)...);
+    }
+};
+using channel_bytes = std::vector<std::byte, unset_allocator<std::byte>>;
+
 // One value per voxel. Names with a meaning to the writers: "occupancy" (bit), "color" (u8 x 4, sRGB and alpha).
 // A name is made of letters, digits, '_', '-' and '.', since it becomes part of file names and of XML.
 struct channel {
     std::string name;
     scalar type = scalar::bit;
     int components = 1; // 1..4; always 1 for `bit`
-    std::vector<std::byte> data;
+    channel_bytes data;
 };
 
 struct volume {
@@ -89,6 +110,13 @@ struct volume {
 
     // Appends a zero-filled channel and returns it; the reference holds until the next call.
     channel& add(std::string name, scalar type, int components = 1) {
+        channels.push_back({std::move(name), type, components, {}});
+        channels.back().data.resize(num_bytes(type, components), std::byte{0});
+        return channels.back();
+    }
+
+    // The same with bytes of any value, for those who write every one of them.
+    channel& add_unset(std::string name, scalar type, int components = 1) {
         channels.push_back({std::move(name), type, components, {}});
         channels.back().data.resize(num_bytes(type, components));
         return channels.back();

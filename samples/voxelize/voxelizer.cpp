@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "voxelizer.hpp"
 
+#include "backend_estimate.hpp"
 #include "cuda_device.hpp"
 #include "padding.hpp"
 #include "pipeline.hpp"
@@ -99,7 +100,18 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
 // The GPU, where it can be used: stats.no_cuda says why where it cannot.
 std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_stats& stats) {
     const auto start = std::chrono::steady_clock::now();
-    const cuda_facts facts = look_for_cuda();
+    if (request.backend == backend_choice::automatic && built_with_cuda()) {
+        const work_size work =
+            work_of(request, static_cast<double>(model.triangle_count()), static_cast<double>(model_bytes(model)));
+        const double on_cpu = cpu_milliseconds(work, thread_count(request.threads));
+        const double on_cuda = cuda_milliseconds(work, request.cuda ? request.cuda->milliseconds_ago() : 0);
+        stats.estimate = in_words(on_cpu, on_cuda);
+        if (on_cpu <= on_cuda) {
+            stats.no_cuda = "the CPU is quicker here: " + stats.estimate;
+            return std::nullopt;
+        }
+    }
+    const cuda_facts facts = request.cuda ? request.cuda->facts() : look_for_cuda();
     stats.no_cuda = why_not(facts);
     if (!stats.no_cuda.empty()) {
         if (request.strategy != voxelpipe::strategy::automatic)

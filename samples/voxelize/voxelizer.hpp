@@ -16,6 +16,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -27,6 +28,8 @@ enum class backend_choice : std::uint8_t { automatic, cpu, cuda };
 
 // What a BLEND material's alpha means: the weight of its colour, a cut at one half as by MASK, or nothing.
 enum class blend_alpha : std::uint8_t { weight, cutoff, ignore };
+
+class cuda_start; // cuda_device.hpp
 
 struct voxelize_request {
     voxelpipe::grid grid;
@@ -42,6 +45,7 @@ struct voxelize_request {
     // suits the backend and the run's memory.
     std::uint64_t work_memory = 0;
     std::uint64_t device_memory = 0;      // most bytes to take of a GPU's memory; 0: all that is free
+    std::shared_ptr<cuda_start> cuda;     // if CUDA is starting already; otherwise it starts when it is wanted
     std::function<void(double)> progress; // called with 0..1, one call at a time; may be empty
 };
 
@@ -50,6 +54,7 @@ struct voxelize_stats {
     std::string device;                  // the GPU's name
     voxelpipe::strategy_choice strategy; // of the last call on a GPU
     std::string no_cuda;                 // why the choice between the two fell on the CPU
+    std::string estimate;                // what the choice between the two went by; empty where there was none
     std::uint64_t device_memory = 0;     // the most that was held there, in bytes
     int threads = 0;                     // on the CPU
     int slabs = 0;
@@ -70,9 +75,9 @@ struct backend_error : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-// Consumes the scene: its arrays move to the backend. The backend `automatic` is the first GPU where that can be used,
-// the CPU otherwise, with a warning where only the GPU's memory was too small. Throws memory_error, backend_error, and
-// std::runtime_error for what the library refuses.
+// Consumes the scene: its arrays move to the backend. The backend `automatic` is the first GPU where that can be used
+// and the work takes longer on the CPU, by backend_estimate.hpp; a warning where only the GPU's memory was too small.
+// Throws memory_error, backend_error, and std::runtime_error for what the library refuses.
 [[nodiscard]] volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
 
 // Why no voxel is covered, one line; for stats that count none.

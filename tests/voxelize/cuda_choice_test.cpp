@@ -5,6 +5,7 @@
 #include "tool_runner.hpp"
 #include "tool_scenes.hpp"
 
+#include <backend_estimate.hpp>
 #include <cuda_device.hpp>
 
 #include <gtest/gtest.h>
@@ -81,6 +82,53 @@ TEST(CudaFacts, AModelLargerThanTheGpusMemoryIsSeenBeforehand) {
     EXPECT_EQ("", why_too_large(facts, model, request));
 }
 
+// What auto decides by: whole orders, not milliseconds.
+TEST(BackendEstimate, CountsTheWork) {
+    voxelize::voxelize_request request;
+    const auto both = [&](int n, double triangles, bool shaded, int threads, double started = 0) {
+        request.grid.extent = glm::ivec3(n);
+        request.targets = {shaded ? voxelize::target::color : voxelize::target::occupancy};
+        const voxelize::work_size work = voxelize::work_of(request, triangles, 50 * triangles);
+        return std::pair{cpu_milliseconds(work, threads), cuda_milliseconds(work, started)};
+    };
+    const auto quicker_on_cpu = [&](int n, double triangles, bool shaded, int threads, double started = 0) {
+        const auto [cpu, cuda] = both(n, triangles, shaded, threads, started);
+        return cpu < cuda;
+    };
+    EXPECT_TRUE(quicker_on_cpu(128, 1e4, false, 2));
+    EXPECT_TRUE(quicker_on_cpu(512, 7e4, false, 16));
+    EXPECT_FALSE(quicker_on_cpu(1024, 7e6, true, 2));
+    EXPECT_FALSE(quicker_on_cpu(512, 7e4, true, 2));
+    EXPECT_FALSE(quicker_on_cpu(512, 7e6, false, 1));
+    // Once CUDA has started, far less work pays.
+    EXPECT_TRUE(quicker_on_cpu(200, 1e5, true, 16, 0));
+    EXPECT_FALSE(quicker_on_cpu(200, 1e5, true, 2, 1000));
+    // More threads, less time; more work, more.
+    EXPECT_GT(both(256, 1e6, true, 1).first, 1.9 * both(256, 1e6, true, 2).first);
+    EXPECT_LT(both(256, 1e6, false, 1).first, both(256, 1e6, true, 1).first);
+    EXPECT_LT(both(256, 1e6, true, 1).second, both(1024, 1e6, true, 1).second);
+    EXPECT_EQ("about 12 ms on the CPU, about 255 ms with CUDA, its start included", voxelize::in_words(12.2, 254.9));
+}
+
+TEST(BackendEstimate, CudaStartsEarlyOnlyWhereItMayPay) {
+    voxelize::voxelize_request request;
+    request.threads = 2;
+    voxelize::grid_request grid;
+    EXPECT_FALSE(voxelize::cuda_may_pay(grid, request, 1e5));
+    EXPECT_TRUE(voxelize::cuda_may_pay(grid, request, 130e6));
+    grid.resolution = 2048;
+    EXPECT_TRUE(voxelize::cuda_may_pay(grid, request, 1e5));
+    request.threads = 64;
+    EXPECT_FALSE(voxelize::cuda_may_pay(grid, request, 1e5));
+}
+
+TEST(CudaStart, FindsWhatALookFinds) {
+    voxelize::cuda_start start;
+    EXPECT_EQ(why_not(voxelize::look_for_cuda()), why_not(start.facts()));
+    EXPECT_TRUE(start.ready());
+    EXPECT_LE(0, start.milliseconds_ago());
+}
+
 TEST(CudaFacts, SlabsAreAQuarterOfTheFreeMemoryWithinBounds) {
     voxelize::cuda_facts facts = good_facts();
     EXPECT_EQ(std::uint64_t{1} << 30, default_work_memory(facts));
@@ -96,7 +144,9 @@ void expect_no_cuda(const std::string& reason) {
     const scratch_folder folder;
     const std::string model = folder / "m.glb";
     gltf_test::small_world().write_glb(model);
-    const std::vector<std::string> common{"-r", "20", "-q", "-t", "occupancy,color,triangle"};
+    // A large grid with little in it: auto expects the CPU to take long, and looks for a GPU.
+    const std::vector<std::string> common{
+        "--origin", "-1,-1,0", "--voxel-size", "0.001", "--extent", "3000,3000,1", "-q", "-t", "occupancy,triangle"};
     const auto arguments = [&](const std::string& out, const std::string& backend) {
         std::vector<std::string> list{model, "-o", out, "--backend", backend};
         list.insert(list.end(), common.begin(), common.end());

@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <map>
+#include <span>
 #include <sstream>
 
 namespace {
@@ -75,7 +76,7 @@ TEST(Models, EveryFileVoxelizesOrSaysWhyNot) {
 }
 
 // 64-bit FNV-1a.
-std::uint64_t hash(const std::vector<std::byte>& bytes) {
+std::uint64_t hash(std::span<const std::byte> bytes) {
     std::uint64_t h = 0xCBF29CE484222325;
     for (const std::byte b : bytes) h = (h ^ std::to_integer<std::uint64_t>(b)) * 0x100000001B3;
     return h;

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <map>
 #include <set>
 #include <sstream>
@@ -252,6 +253,29 @@ TEST(Tool, MergeAndPointsChangeTheFilesThatTheyName) {
     EXPECT_EQ(size(".xyz", {"--merge"}), size(".xyz", {}));
     EXPECT_NE(size(".ply", {"--points"}), size(".ply", {}));
     EXPECT_EQ(size(".glb", {"--points"}), size(".glb", {}));
+}
+
+// The stages add up to the time that the program took, and little of it is in none of them.
+TEST(Tool, StatsAccountForTheTime) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    for (const char* extension : {".npz", ".vox", ".png", ".glb"}) {
+        const auto start = std::chrono::steady_clock::now();
+        const outcome result =
+            run(folder, {folder / "m.glb", "-q", "-r", "200", "-o", folder / ("o" + std::string(extension)),
+                         "--image-size", "320x240", "--stats", "json"});
+        const double wall = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        ASSERT_EQ(0, result.code) << result.err;
+        const auto ms = gltf_test::json::parse(result.out)["ms"];
+        double sum = 0;
+        for (const auto& [stage, time] : ms.items())
+            if (stage != "total") sum += time.get<double>();
+        EXPECT_NEAR(sum, ms["total"], 1e-6);
+        EXPECT_LE(sum, wall);
+        EXPECT_LT(ms["other"], 0.25 * sum + 20) << extension;
+        for (const char* stage : {"options", "read", "place", "write", "release"})
+            EXPECT_TRUE(ms.contains(stage)) << stage;
+    }
 }
 
 TEST(Tool, CompressionIsAChoice) {

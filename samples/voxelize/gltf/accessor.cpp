@@ -92,6 +92,17 @@ std::span<const std::byte> accessor_reader::view(std::size_t index) const {
     return bytes_.buffer(static_cast<std::size_t>(view.buffer)).subspan(view.byteOffset, view.byteLength);
 }
 
+std::optional<accessor_reader::elements_in_place> accessor_reader::in_place(std::size_t index) const {
+    const tinygltf::Accessor& accessor = model_.accessors[index];
+    if (draco_accessors_.contains(index) || document_.zero_base[index] || accessor.sparse.isSparse ||
+        accessor.count == 0)
+        return std::nullopt;
+    const auto view_index = static_cast<std::size_t>(accessor.bufferView);
+    std::size_t stride = document_.view_strides[view_index];
+    if (stride == 0) stride = component_count(accessor) * component_size(accessor.componentType);
+    return elements_in_place{view(view_index).subspan(accessor.byteOffset).data(), stride};
+}
+
 std::vector<std::byte> accessor_reader::packed(std::size_t index, std::size_t element_bytes,
                                                const std::string& user) const {
     const tinygltf::Accessor& accessor = model_.accessors[index];

@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,6 +32,14 @@ public:
     // count * components numbers of accessor INDEX, which must not be a matrix. Integers as they are, or with
     // NORMALIZED as glTF maps them to [0, 1] or [-1, 1]. USER is named in errors.
     [[nodiscard]] std::vector<double> numbers(std::size_t index, bool normalized, const std::string& user) const;
+
+    // Where the elements of accessor INDEX lie in the file, one every `stride` bytes; nothing for an accessor that is
+    // sparse or without a buffer view, whose elements lie nowhere.
+    struct elements_in_place {
+        const std::byte* first;
+        std::size_t stride;
+    };
+    [[nodiscard]] std::optional<elements_in_place> in_place(std::size_t index) const;
 
     // The values of an unsigned scalar accessor.
     [[nodiscard]] std::vector<std::uint32_t> indices(std::size_t index, const std::string& user) const;

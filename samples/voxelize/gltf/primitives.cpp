@@ -5,7 +5,9 @@
 #include "text.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -101,24 +103,71 @@ primitive_reader::read_part primitive_reader::read(const shown_mesh& shown, std:
         known = read_posed(result, source, shown, where);
     else
         known.unit = read_positions(result, source, where);
-    {
-        const budget::scope temporary{memory_};
-        std::vector<std::uint32_t> indices;
-        if (source.indices >= 0) indices = accessors_.indices(static_cast<std::size_t>(source.indices), where);
-        for (std::size_t i = 0; i < indices.size(); ++i)
-            if (indices[i] >= vertices)
-                throw gltf_error(where + ": index " + std::to_string(indices[i]) + " at place " + std::to_string(i) +
-                                 " is out of range, there are " + std::to_string(vertices) + " vertices");
-        result.triangles = unrolled(source.mode, indices, count);
-        if (known.mirrored)
-            for (glm::uvec3& triangle : result.triangles) std::swap(triangle.y, triangle.z);
-    }
+    read_triangles(result, source, vertices, where);
+    if (known.mirrored)
+        for (glm::uvec3& triangle : result.triangles) std::swap(triangle.y, triangle.z);
     read_texcoords(result, source, where);
     read_colors(result, source, where);
     if (result.triangles.empty()) return {};
     known.primitive = static_cast<std::uint32_t>(scene_.primitives.size());
     scene_.primitives.push_back(std::move(result));
     return known;
+}
+
+void primitive_reader::read_triangles(primitive& result, const tinygltf::Primitive& source, std::size_t vertices,
+                                      const std::string& where) const {
+    const budget::scope temporary{memory_};
+    const auto out_of_range = [&](std::uint32_t index, std::size_t place) {
+        return gltf_error(where + ": index " + std::to_string(index) + " at place " + std::to_string(place) +
+                          " is out of range, there are " + std::to_string(vertices) + " vertices");
+    };
+    const auto accessor = static_cast<std::size_t>(source.indices);
+    if (source.mode == TINYGLTF_MODE_TRIANGLES && source.indices >= 0)
+        if (const auto in_place = accessors_.in_place(accessor)) {
+            // Straight from the file, in blocks. Of several faults the first in the file is named.
+            const std::size_t count = model_.accessors[accessor].count;
+            result.triangles.resize(count / 3);
+            const auto read = [&](auto component) {
+                using index_type = decltype(component);
+                const auto at = [&](std::size_t i) {
+                    index_type value;
+                    std::memcpy(&value, in_place->first + i * in_place->stride, sizeof(value));
+                    return static_cast<std::uint32_t>(value);
+                };
+                std::atomic<std::size_t> first_fault{count};
+                for_each_block(count / 3, [&](std::size_t begin, std::size_t end) {
+                    std::uint32_t greatest = 0;
+                    for (std::size_t t = begin; t < end; ++t) {
+                        const glm::uvec3 corners(at(3 * t), at(3 * t + 1), at(3 * t + 2));
+                        result.triangles[t] = corners;
+                        greatest = std::max({greatest, corners.x, corners.y, corners.z});
+                    }
+                    if (greatest < vertices) return;
+                    std::size_t fault = 3 * begin;
+                    while (at(fault) < vertices) ++fault;
+                    std::size_t known = first_fault;
+                    while (fault < known && !first_fault.compare_exchange_weak(known, fault)) {
+                    }
+                });
+                for (std::size_t i = count / 3 * 3; i < count; ++i) // left over, but checked
+                    if (at(i) >= vertices && first_fault == count) first_fault = i;
+                if (first_fault != count) throw out_of_range(at(first_fault), first_fault);
+            };
+            switch (model_.accessors[accessor].componentType) {
+            case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+                return read(std::uint8_t{});
+            case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+                return read(std::uint16_t{});
+            default:
+                return read(std::uint32_t{});
+            }
+        }
+    std::vector<std::uint32_t> indices;
+    if (source.indices >= 0) indices = accessors_.indices(accessor, where);
+    for (std::size_t i = 0; i < indices.size(); ++i)
+        if (indices[i] >= vertices) throw out_of_range(indices[i], i);
+    const std::uint64_t count = source.indices >= 0 ? indices.size() : vertices;
+    result.triangles = unrolled(source.mode, indices, count);
 }
 
 // Positions that a node bends. Those of a skin are in the world; far from its origin they are kept relative to a place
@@ -171,6 +220,26 @@ double primitive_reader::read_positions(primitive& result, const tinygltf::Primi
     check_position_type(accessor, where);
     memory_.charge(accessor.count, sizeof(glm::vec3), where);
     const budget::scope temporary{memory_};
+    const auto warn_unusable = [&](std::uint64_t unusable) {
+        if (unusable != 0)
+            counted_["vertices at positions that are not finite: their triangles will be dropped"] += unusable;
+    };
+    if (const auto in_place = accessors_.in_place(index);
+        in_place && accessor.componentType == TINYGLTF_COMPONENT_TYPE_FLOAT) {
+        result.positions.resize(accessor.count);
+        std::atomic<std::uint64_t> unusable{0};
+        for_each_block(accessor.count, [&](std::size_t begin, std::size_t end) {
+            std::uint64_t found = 0;
+            for (std::size_t i = begin; i < end; ++i) {
+                glm::vec3& p = result.positions[i];
+                std::memcpy(&p, in_place->first + i * in_place->stride, sizeof(p));
+                found += std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) ? 0 : 1;
+            }
+            unusable += found;
+        });
+        warn_unusable(unusable);
+        return 1;
+    }
     // Integers of at most 16 bits are floats as they stand. Their fractions are not: the transform divides.
     const std::vector<double> local = accessors_.numbers(index, false, where);
     double least = -std::numeric_limits<double>::infinity();
@@ -192,8 +261,7 @@ double primitive_reader::read_positions(primitive& result, const tinygltf::Primi
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) ++unusable;
         result.positions.push_back(p);
     }
-    if (unusable != 0)
-        counted_["vertices at positions that are not finite: their triangles will be dropped"] += unusable;
+    warn_unusable(unusable);
     return unit;
 }
 
@@ -224,16 +292,26 @@ void primitive_reader::read_texcoords(primitive& result, const tinygltf::Primiti
         throw gltf_error(where + ": " + name + " is not a VEC2 of floats or of 8 or 16 bit integers");
     memory_.charge(accessor->count, sizeof(glm::vec2), where);
     const budget::scope temporary{memory_};
-    const std::vector<double> uv =
-        accessors_.numbers(static_cast<std::size_t>(source.attributes.at(name)), accessor->normalized, where);
     const std::array<double, 6>& m = wanted->m;
-    result.texcoords.reserve(accessor->count);
-    for (std::size_t i = 0; i < accessor->count; ++i) {
-        const double u = uv[2 * i];
-        const double v = uv[2 * i + 1];
-        result.texcoords.emplace_back(static_cast<float>(std::fma(m[0], u, std::fma(m[1], v, m[2]))),
-                                      static_cast<float>(std::fma(m[3], u, std::fma(m[4], v, m[5]))));
+    const auto place = [&m](double u, double v) {
+        return glm::vec2(static_cast<float>(std::fma(m[0], u, std::fma(m[1], v, m[2]))),
+                         static_cast<float>(std::fma(m[3], u, std::fma(m[4], v, m[5]))));
+    };
+    const auto index = static_cast<std::size_t>(source.attributes.at(name));
+    result.texcoords.resize(accessor->count);
+    if (const auto in_place = accessors_.in_place(index);
+        in_place && accessor->componentType == TINYGLTF_COMPONENT_TYPE_FLOAT) {
+        for_each_block(accessor->count, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                glm::vec2 uv;
+                std::memcpy(&uv, in_place->first + i * in_place->stride, sizeof(uv));
+                result.texcoords[i] = place(static_cast<double>(uv.x), static_cast<double>(uv.y));
+            }
+        });
+        return;
     }
+    const std::vector<double> uv = accessors_.numbers(index, accessor->normalized, where);
+    for (std::size_t i = 0; i < accessor->count; ++i) result.texcoords[i] = place(uv[2 * i], uv[2 * i + 1]);
 }
 
 void primitive_reader::read_colors(primitive& result, const tinygltf::Primitive& source,

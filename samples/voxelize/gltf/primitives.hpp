@@ -9,10 +9,12 @@
 #include "pose.hpp"
 
 #include "../affine.hpp"
+#include "../parallel.hpp"
 #include "../scene.hpp"
 
 #include <tiny_gltf.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -35,8 +37,9 @@ namespace voxelize::gltf {
 class primitive_reader {
 public:
     primitive_reader(const tinygltf::Model& model, const accessor_reader& accessors, material_reader& materials,
-                     const pose_reader& poses, budget& memory, scene& result)
-        : model_{model}, accessors_{accessors}, materials_{materials}, poses_{poses}, memory_{memory}, scene_{result} {}
+                     const pose_reader& poses, budget& memory, scene& result, int threads)
+        : model_{model}, accessors_{accessors},
+          materials_{materials}, poses_{poses}, memory_{memory}, scene_{result}, threads_{thread_count(threads)} {}
 
     // Shows primitive PART of the mesh of SHOWN once more. The first call for it (where a node poses it: for it and the
     // node) appends it to the scene, or warns where it has no triangles.
@@ -60,6 +63,15 @@ private:
                                                       std::size_t vertices, const std::string& where) const;
     // Gives the unit.
     double read_positions(primitive& result, const tinygltf::Primitive& source, const std::string& where);
+    // WORK(begin, end) for blocks of 0 .. COUNT, on all threads.
+    template <class Work>
+    void for_each_block(std::size_t count, const Work& work) const {
+        constexpr std::size_t block = std::size_t{1} << 16;
+        parallel_for((count + block - 1) / block, threads_,
+                     [&](std::size_t b) { work(b * block, std::min(count, (b + 1) * block)); });
+    }
+    void read_triangles(primitive& result, const tinygltf::Primitive& source, std::size_t vertices,
+                        const std::string& where) const;
     void read_texcoords(primitive& result, const tinygltf::Primitive& source, const std::string& where);
     void read_colors(primitive& result, const tinygltf::Primitive& source, const std::string& where) const;
     [[nodiscard]] std::uint32_t material_index(const tinygltf::Primitive& source);
@@ -70,6 +82,7 @@ private:
     const pose_reader& poses_;
     budget& memory_;
     scene& scene_;
+    int threads_;
     // By mesh, part, and the node that poses it or -1.
     std::map<std::tuple<std::size_t, std::size_t, std::int32_t>, read_part> known_;
     std::map<std::string, std::uint64_t> counted_; // warning -> how often

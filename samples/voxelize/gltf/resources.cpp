@@ -142,7 +142,7 @@ gltf_file_reader folder_reader(std::filesystem::path folder) {
     };
 }
 
-std::vector<std::byte> read_whole_file(const std::filesystem::path& file, std::uint64_t max_bytes) {
+std::size_t checked_file_size(const std::filesystem::path& file, std::uint64_t max_bytes) {
     std::error_code error;
     const std::filesystem::file_status status = std::filesystem::status(file, error);
     if (!std::filesystem::exists(status)) throw gltf_error("no such file");
@@ -152,8 +152,13 @@ std::vector<std::byte> read_whole_file(const std::filesystem::path& file, std::u
     if (size > max_bytes)
         throw gltf_error("has " + std::to_string(size) + " bytes, more than the " + std::to_string(max_bytes) +
                          " allowed");
+    return static_cast<std::size_t>(size);
+}
+
+std::vector<std::byte> read_whole_file(const std::filesystem::path& file, std::uint64_t max_bytes) {
+    const std::size_t size = checked_file_size(file, max_bytes);
     std::ifstream stream(file, std::ios::binary);
-    std::vector<std::byte> bytes(static_cast<std::size_t>(size));
+    std::vector<std::byte> bytes(size);
     if (!stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)) && size != 0)
         throw gltf_error("cannot be read");
     return bytes;

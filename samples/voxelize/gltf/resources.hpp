@@ -58,6 +58,9 @@ private:
 // Reads files below FOLDER, which need not exist for files that name no others.
 [[nodiscard]] gltf_file_reader folder_reader(std::filesystem::path folder);
 
+// Bytes of FILE; throws gltf_error where it is no regular file or larger than MAX_BYTES.
+[[nodiscard]] std::size_t checked_file_size(const std::filesystem::path& file, std::uint64_t max_bytes);
+
 // The whole of FILE, refused by name where it is no regular file or larger than MAX_BYTES.
 [[nodiscard]] std::vector<std::byte> read_whole_file(const std::filesystem::path& file, std::uint64_t max_bytes);
 
