@@ -100,7 +100,8 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
 // The GPU, where it can be used: stats.no_cuda says why where it cannot.
 std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_stats& stats) {
     const auto start = std::chrono::steady_clock::now();
-    if (request.backend == backend_choice::automatic && built_with_cuda()) {
+    const bool is_forced = request.strategy != voxelpipe::strategy::automatic; // how a GPU draws
+    if (request.backend == backend_choice::automatic && !is_forced && built_with_cuda()) {
         const work_size work =
             work_of(request, static_cast<double>(model.triangle_count()), static_cast<double>(model_bytes(model)));
         const double on_cpu = cpu_milliseconds(work, thread_count(request.threads));
@@ -114,7 +115,7 @@ std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_
     const cuda_facts facts = request.cuda ? request.cuda->facts() : look_for_cuda();
     stats.no_cuda = why_not(facts);
     if (!stats.no_cuda.empty()) {
-        if (request.strategy != voxelpipe::strategy::automatic)
+        if (is_forced)
             throw backend_error(std::string("--strategy ") + to_string(request.strategy) +
                                 " needs a GPU: " + stats.no_cuda);
         if (request.backend == backend_choice::cuda)
@@ -129,7 +130,7 @@ std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_
         if (request.work_memory == 0) request.work_memory = default_work_memory(facts);
         return run_on_cuda(facts, model, request, stats);
     } catch (const device_memory_error& error) {
-        if (request.backend == backend_choice::cuda)
+        if (request.backend == backend_choice::cuda || is_forced)
             throw memory_error(std::string("--backend cuda: ") + error.what() + "; use --backend cpu");
         stats = before;
         stats.no_cuda = error.what();
