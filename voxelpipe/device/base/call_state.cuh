@@ -11,54 +11,55 @@
 
 namespace voxelpipe::device {
 
-// In global memory, zeroed when a call starts. Totals go on counting past a capacity, so that they say what is needed.
+// Lies in global memory and is zero when a call starts. Totals go on counting past a capacity, so they say how much is
+// needed.
 struct pipeline_state {
     unsigned long long nonfinite, too_far, zero_area, outside, drawn;
     unsigned long long fragments, discarded, voxels;
     unsigned long long tile_pairs, tile_records;         // coarse raster
     unsigned long long list_fragments, fragment_records; // A-buffer
     unsigned long long list_voxels;
-    unsigned long long filtered, kept; // of listed fragments: those that the shader discards, and all others
+    unsigned long long filtered, kept; // listed fragments that the shader discards, and all others
     unsigned int index_error;
     unsigned int num_items, num_splits, num_images; // tile split
     unsigned int next_item;                         // fine raster
-    unsigned int num_ordered[5];                    // fragment order: order_lists
-    unsigned long long longest_run;                 // of those, fragments of a voxel that no block takes
+    unsigned int num_ordered[5];                    // fragment order: lengths of order_lists
+    unsigned long long longest_run; // of those, the longest run of one voxel that is too long for a block
     struct {
         unsigned long long split, lengths[4];
-        unsigned long long set_up; // of what is split, what all its pieces need
+        unsigned long long set_up; // split triangles whose setup is kept (split_setup)
         [[nodiscard]] VOXELPIPE_HD bool are_none() const {
             return (split | lengths[0] | lengths[1] | lengths[2] | lengths[3]) == 0;
         }
-        // How many there are that a first kernel by itself would be left with at its end, or ~0 where some are more
-        // than little work for one thread. Thin tiny ones wait for others of their warp only.
+        // Triangles that would be left to a deferred pass, or ~0 if any is more than little work for one thread. Tiny
+        // thin triangles only wait for others of their warp, so they do not count.
         [[nodiscard]] VOXELPIPE_HD unsigned long long num_deferred(coverage rule) const {
             if ((split | lengths[2] | lengths[3]) != 0) return ~0ull;
             return rule == coverage::thin ? lengths[1] : lengths[0] + lengths[1];
         }
-    } deferred; // direct raster, of one draw: deferred_triangles
+    } deferred; // one draw's triangles that the first pass leaves (deferred_triangles)
 
-    // See capacities: 0 where the windows put all voxels in order, 1 where a block takes the longest that they leave.
+    // For capacities::longest_ordered: 0 if the windows order all voxels, 1 if a block can take the longest that they
+    // leave.
     [[nodiscard]] VOXELPIPE_HD unsigned long long longest_ordered() const {
         return longest_run != 0 ? longest_run : (num_ordered[0] | num_ordered[1] | num_ordered[2]) != 0 ? 1 : 0;
     }
 };
 
-// How many elements the arrays of a call have. What does not fit is counted, not written.
+// Lengths of a call's arrays. Elements that do not fit are counted but not written.
 struct capacities {
     unsigned long long tile_pairs, tile_records, fragments, fragment_records;
-    // What a call is launched without, for the one before it hardly needed that: kernels for voxels of more fragments,
-    // and a second kernel of a draw.
+    // What calls like this one hardly needed before, and so is not launched: kernels for voxels of more fragments than
+    // longest_ordered, and the deferred pass.
     unsigned long long longest_ordered = ~0ull;
-    unsigned long long skips_deferred_pass =
-        0; // or 1: the first kernel does it all. As wide as the rest, see call_bytes
+    unsigned long long skips_deferred_pass = 0; // or 1. As wide as the rest, so that there is no padding (call_bytes)
 };
 
-// Whether triangles were handed on to a kernel that has not been launched.
+// True if triangles were deferred and no deferred pass was launched.
 [[nodiscard]] VOXELPIPE_HD inline bool misses_deferred(const pipeline_state& s, const capacities& c) {
     return c.skips_deferred_pass != 0 && !s.deferred.are_none();
 }
-// Whether the call must not write anything: a bad index, or something that did not fit.
+// True if the call must not write its targets: an index is out of range, or something did not fit.
 [[nodiscard]] VOXELPIPE_HD inline bool has_failed(const pipeline_state& s, const capacities& c) {
     return s.index_error != 0 || s.tile_pairs > c.tile_pairs || s.tile_records > c.tile_records ||
            s.list_fragments > c.fragments || s.fragment_records > c.fragment_records ||

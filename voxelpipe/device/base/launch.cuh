@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Kernels one behind the other on a stream, the next of which is set up while the one before it ends (programmatic
-// dependent launch, from compute capability 9.0 on). A kernel that launch_behind starts calls await_stream before it
-// touches what a kernel of the same call writes; everywhere else, both are an ordinary launch and nothing.
+// Kernel launches. On a stream, each kernel may be set up while the one before it ends (programmatic dependent launch,
+// compute capability 9.0 and later). A kernel started by launch_behind calls await_stream before it touches memory that
+// another kernel of the call writes. On older devices await_stream does nothing and the launch is an ordinary one.
 
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/device/base/kernel_library.cuh>
@@ -18,8 +18,8 @@
 
 namespace voxelpipe::device {
 
-// All threads come here: what the stream had before is done, and can be seen, and the next kernel may be set up. Since
-// that is said only now, a kernel that runs early finds all done but the work of the one kernel before it.
+// Waits until all earlier work on the stream is finished and visible, then allows the next kernel to start. So at any
+// time at most one earlier kernel is unfinished. All threads call it.
 __device__ VOXELPIPE_INLINE void await_stream() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
     asm volatile("griddepcontrol.wait;" ::: "memory");
@@ -27,18 +27,18 @@ __device__ VOXELPIPE_INLINE void await_stream() {
 #endif
 }
 
-// The architectures that a unit is compiled for. A type, and a parameter of what launches: units of one program may be
-// compiled for others, the library's (base/kernel_library.cuh) among them, and each asks for its own.
+// The architectures that a translation unit is compiled for. A template parameter of whatever launches kernels, because
+// units of one program, the library's among them (base/kernel_library.cuh), may be compiled for different ones.
 template <int...>
 struct architectures {};
-#if defined(__CUDA_ARCH_LIST__) && CUDART_VERSION >= 12030 // from here on graphs capture early launches
+#if defined(__CUDA_ARCH_LIST__) && CUDART_VERSION >= 12030 // graphs capture early launches from 12.3 on
 using compiled_for = architectures<__CUDA_ARCH_LIST__>;
 #else
 using compiled_for = architectures<>;
 #endif
 
-// Whether the code that the current device runs waits in await_stream. Not so where it is made from PTX of before: only
-// an exact match of a compiled architecture with the device tells.
+// True if the code that the current device runs waits in await_stream. Code compiled from older PTX does not, so only
+// an exact match of device and compiled architecture counts.
 template <int... Compiled>
 [[nodiscard]] bool can_launch_early(architectures<Compiled...>) {
     if constexpr (sizeof...(Compiled) == 0) {
@@ -52,7 +52,7 @@ template <int... Compiled>
     }
 }
 
-// Starts a kernel, early where the device can. shared_bytes: of dynamic shared memory.
+// Starts a kernel, early if the device can. shared_bytes: dynamic shared memory of a block.
 template <class CompiledFor = compiled_for, class... Parameters, class... Arguments>
 void launch_kernel(bool early, void (*kernel)(Parameters...), unsigned blocks, unsigned threads,
                    std::size_t shared_bytes, cudaStream_t stream, stage where, Arguments&&... arguments) {
@@ -85,7 +85,7 @@ void launch_behind(void (*kernel)(Parameters...), unsigned blocks, unsigned thre
 
 inline constexpr int threads_per_block = 256; // of kernels that have no tuning of their own
 
-// Of a kernel with a thread an item.
+// Blocks of a kernel with one thread per item.
 [[nodiscard]] inline unsigned num_blocks(std::uint64_t items) {
     VOXELPIPE_ASSERT(items <= std::numeric_limits<std::uint32_t>::max()); // validated: see core::max_numbered
     return core::blocks_for_each(static_cast<std::uint32_t>(items), threads_per_block);
@@ -98,7 +98,7 @@ inline constexpr int threads_per_block = 256; // of kernels that have no tuning 
     return count;
 }
 
-// Of the current device: 90 for 9.0.
+// The current device's compute capability: 90 for 9.0.
 [[nodiscard]] inline int compute_capability() {
     int device = 0, major = 0, minor = 0;
     check(cudaGetDevice(&device));
@@ -107,21 +107,21 @@ inline constexpr int threads_per_block = 256; // of kernels that have no tuning 
     return 10 * major + minor;
 }
 
-// Blocks of a grid-stride or persistent kernel: enough to fill the device, no more than there is work.
+// Blocks of a grid-stride or persistent kernel: enough to fill the device, but no more than there is work for.
 [[nodiscard]] inline unsigned fill_device(std::uint64_t items, unsigned blocks_per_multiprocessor = 8) {
     return core::blocks_to_fill(items, threads_per_block, static_cast<std::uint32_t>(num_multiprocessors()),
                                 blocks_per_multiprocessor);
 }
 
-// ---- kernels of any call
-// -----------------------------------------------------------------------------------------------
+// ---- kernels of every call
+// -------------------------------------------------------------------------------------------
 
-// Where a call starts that leaves no zeros for the next: the start of its memory, whole uint4s. By a kernel, for the
-// next one can begin early behind a kernel, and not behind cudaMemsetAsync.
+// Zeroes `bytes` of memory, a multiple of 16. A kernel instead of cudaMemsetAsync, because a kernel can start early
+// only behind another kernel.
 VOXELPIPE_DECLARES_KERNELS void zero_memory(void* memory, std::size_t bytes, cudaStream_t stream);
 
-// Copies a few host values to the device as kernel arguments: no host memory has to outlive the call, and a captured
-// graph replays it.
+// Host values, passed to the device as kernel arguments: no host memory has to outlive the call, and a captured graph
+// replays them.
 template <class T, int N>
 struct argument_chunk {
     T items[N];

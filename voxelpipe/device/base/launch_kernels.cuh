@@ -10,7 +10,7 @@
 
 namespace voxelpipe::device {
 
-// Writes zeros. A template, as all kernels in headers are: any number of units may hold it.
+// A template, like all kernels in headers, so that several translation units may hold it.
 template <class Word>
 __global__ void zero_kernel(Word* memory, std::uint64_t words) {
     await_stream();

@@ -2,9 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Device memory of the CUDA backend: where it comes from (memory_resource), who owns it (device_block), how one block
-// is carved into named arrays (arena), and how CUDA errors become exceptions inside the backend and a status at its
-// surface.
+// Device memory of the CUDA backend: where it comes from (memory_resource), who owns it (device_block), and how one
+// block is divided into arrays (arena). CUDA errors are exceptions inside the backend and a status at its surface.
 
 #include <voxelpipe/status.hpp>
 
@@ -21,7 +20,7 @@ namespace voxelpipe {
 
 namespace device {
 
-// Carries a CUDA error and the stage that met it from where it happened to the status of the call.
+// A CUDA error and the stage in which it occurred, on its way to the status of the call.
 struct cuda_failure {
     cudaError_t error;
     stage where;
@@ -29,7 +28,7 @@ struct cuda_failure {
 
 inline void check(cudaError_t error, stage where = stage::validate) {
     if (error == cudaSuccess) return;
-    cudaGetLastError(); // a failed launch leaves its error behind; it is reported here, once
+    cudaGetLastError(); // a failed launch leaves its error behind: it is reported here, once
     throw cuda_failure{error, where};
 }
 
@@ -55,11 +54,11 @@ inline void check(cudaError_t error, stage where = stage::validate) {
 
 } // namespace device
 
-// Where a cuda_backend takes its memory from, in stream order. Refers to a resource that must outlive it; the default
-// is the current device's cudaMallocAsync pool. Any object will do that has
+// Where a cuda_backend takes its memory from, in stream order. The default is the current device's cudaMallocAsync
+// pool. Refers to a resource, which must outlive it. A resource is any object with
 //   void* allocate_async(bytes, alignment, stream)      and deallocate_async(pointer, bytes, alignment, stream), or
 //   void* allocate(stream, bytes, alignment)            and deallocate(stream, pointer, bytes, alignment),
-// where stream is made from a cudaStream_t: cuda::mr resources of CCCL 2 and 3, and wrappers of other allocators.
+// whose stream can be made from a cudaStream_t: cuda::mr resources of CCCL 2 and 3, and wrappers of other allocators.
 class memory_resource {
 public:
     static constexpr std::size_t alignment = 256;
@@ -101,7 +100,7 @@ public:
         if (deallocate_ != nullptr)
             deallocate_(object_, pointer, bytes, stream);
         else
-            cudaFreeAsync(pointer, stream); // fails only where the context is gone, and the memory with it
+            cudaFreeAsync(pointer, stream); // fails only if the context is gone, and the memory with it
     }
 
 private:
@@ -110,13 +109,13 @@ private:
     void (*deallocate_)(void*, void*, std::size_t, cudaStream_t) = nullptr;
 };
 
-// A stream and the memory that is taken in its order: a cuda_backend is one.
+// A stream and the resource for memory in its order. cuda_backend derives from it.
 struct stream_memory {
     cudaStream_t stream = nullptr; // not owned
     memory_resource resource;      // where all memory comes from
 };
 
-// Owns one block of device memory, freed in the order of its stream. Moves, is never shared.
+// Owns one block of device memory, freed in the order of its stream. Movable, not copyable.
 class device_block {
 public:
     device_block() = default;
@@ -147,8 +146,8 @@ private:
 
 namespace device {
 
-// One block of memory as a row of arrays, each aligned to 256 bytes. With a null base it only adds up the bytes, so
-// that the same code plans and carves.
+// Divides one block of memory into consecutive arrays, each aligned to 256 bytes. With a null base it only adds up the
+// bytes, so the same code computes the size and carves the arrays.
 class arena {
 public:
     explicit arena(void* base = nullptr) : base_(static_cast<std::byte*>(base)) {}

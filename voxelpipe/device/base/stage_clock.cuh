@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// stage_clock: CUDA events on a call's stream at the borders of its stages, and their distances as stage_times. Only a
-// call that is asked for its times has one; it never waits before it is read.
+// stage_clock: CUDA events at the stage boundaries of a call, read as stage_times. Only a timed call has one. Recording
+// never waits.
 
 #include <voxelpipe/device/base/memory.cuh>
 #include <voxelpipe/stage_times.hpp>
@@ -24,12 +24,12 @@ public:
         for (const border& b : borders_) cudaEventDestroy(b.event);
     }
 
-    // What comes next is timed; what lies between the last border and here is not.
+    // Starts timing the next stage. Work since the last boundary is not counted.
     void start() { mark(nullptr); }
-    // Since the last border it was this stage.
+    // Ends this stage: the time since the last boundary is its.
     void end(field stage_field) { mark(stage_field); }
 
-    // Adds up the times between the borders, after the stream has passed the last one: waits until it has.
+    // Waits for the last boundary, then adds the measured times.
     void read(stage_times& times) const {
         if (borders_.empty()) return;
         check(cudaEventSynchronize(borders_.back().event));
@@ -44,7 +44,7 @@ public:
 private:
     struct border {
         cudaEvent_t event;
-        field stage_field; // what ends here; null where nothing that counts does
+        field stage_field; // the stage that ends here; null if the time before it does not count
     };
     void mark(field stage_field) {
         cudaEvent_t event = nullptr;
@@ -56,7 +56,7 @@ private:
     std::vector<border> borders_;
 };
 
-// A border where there is a clock.
+// Ends a stage if there is a clock.
 inline void end_stage(stage_clock* clock, stage_clock::field stage_field) {
     if (clock != nullptr) clock->end(stage_field);
 }

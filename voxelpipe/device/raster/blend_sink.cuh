@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The sink of the immediate strategy: fragments go straight into the render targets.
+// The sink of the immediate strategy: blends fragments straight into the render targets.
 
 #include <voxelpipe/device/raster/deferred_triangles.cuh>
 #include <voxelpipe/device/raster/mark_boxes.cuh>
@@ -18,15 +18,15 @@
 
 namespace voxelpipe::device {
 
-// Fragments go into the targets.
 template <class Call>
 struct blending_sink : sink_base<Call> {
     static constexpr bool stages_in_shared = false;
-    static constexpr bool merges_equal_voxels = !Call::output::defers; // one() wants to be told apart
+    static constexpr bool merges_equal_voxels = !Call::output::defers; // only then is one() called
     static constexpr bool splits_long_rows = merges_equal_voxels;
     struct memory {};
 
-    // Fragments and first touches of one thread, which cannot write 2^32 before the largest list ends.
+    // Counts of one thread's fragments and first touches. They fit 32 bits: the largest list ends before a thread has
+    // written 2^32.
     struct totals {
         unsigned fragments = 0, touched = 0;
     };
@@ -36,7 +36,8 @@ struct blending_sink : sink_base<Call> {
         : sink_base<Call>{call, dropped} {}
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool check(const glm::uvec3&) { return true; }
     __device__ VOXELPIPE_INLINE static void begin(std::uint32_t) {}
-    // Where there are marks: what a triangle may touch that is not large, what is touched of one that is.
+    // If the output has marks: marks the chunks that a triangle may touch, or, of a split triangle, those that it does
+    // touch.
     __device__ VOXELPIPE_INLINE void mark_boxes(bool wanted, const int32_triangle& r) const {
         if constexpr (Call::output::has_marks)
             if (this->call.out.marks.words != nullptr) device::mark_boxes<Call::rule>(this->call.out.marks, wanted, r);
@@ -49,7 +50,7 @@ struct blending_sink : sink_base<Call> {
         if constexpr (merges_equal_voxels && Call::output::has_marks)
             if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_brick(corner, lane);
     }
-    // In the voxels x0 + i of a row, for the bits i of the mask.
+    // Blends the voxels x0 + i of a row, for the bits i of the mask.
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
         mine.fragments += static_cast<unsigned>(__popc(mask));
@@ -82,11 +83,11 @@ struct blending_sink : sink_base<Call> {
     }
     __device__ VOXELPIPE_INLINE void emit_line(word_place first, const word_place& step, unsigned count) {
         mine.fragments += count;
-        // Read once: behind each reduction, what is not in a register may have changed.
+        // Loaded once: the compiler reloads after each reduction whatever is not in a register.
         word* const words = voxelpipe::get<0>(this->call.out.fb.targets).elements;
         for (; count != 0; --count, first = first + step) reduce_or(words + first.number(), first.bit());
     }
-    // As in blend_cube.
+    // Voxels as in blend_cube.
     __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word voxels) {
         mine.fragments += static_cast<unsigned>(__popc(voxels));
         each_target([&]<std::size_t K>(const auto& t, immediate_mode mode) VOXELPIPE_INLINE_LAMBDA {
@@ -96,15 +97,15 @@ struct blending_sink : sink_base<Call> {
                 mine.touched += blend_cube(t, x, y, z, voxels, value_of<K>(), mode);
         });
     }
-    // Voxels that are drawn by other means.
+    // Counts voxels that are drawn by other means.
     __device__ VOXELPIPE_INLINE void count(word voxels) { mine.fragments += static_cast<unsigned>(__popc(voxels)); }
-    // As in blend_slim.
+    // Rows as in blend_slim.
     __device__ VOXELPIPE_INLINE void slim(int x, int y, int z, const core::slim_rows& rows) {
         mine.fragments += static_cast<unsigned>(__popc(rows.bits));
         each_target([&]<std::size_t K>(const auto& t, immediate_mode mode)
                         VOXELPIPE_INLINE_LAMBDA { mine.touched += blend_slim(t, x, y, z, rows, value_of<K>(), mode); });
     }
-    // One voxel. Lanes that come here together may have the same.
+    // One voxel. Lanes that call this together may have the same one.
     __device__ VOXELPIPE_INLINE void one(int x, int y, int z) {
         ++mine.fragments;
         each_target([&]<std::size_t K>(const auto& t, immediate_mode mode) VOXELPIPE_INLINE_LAMBDA {
@@ -115,7 +116,7 @@ struct blending_sink : sink_base<Call> {
                 mine.touched += blend_shared(t, x, y, z, value, mode);
         });
     }
-    // The voxels place_of(i) for the bits i of a mask, of four.
+    // The voxels place_of(i) for the bits i of a mask of four.
     template <class Place>
     __device__ VOXELPIPE_INLINE void voxels(word bits, const Place& place_of) {
         mine.fragments += static_cast<unsigned>(__popc(bits));
@@ -123,13 +124,13 @@ struct blending_sink : sink_base<Call> {
             mine.touched += blend_voxels(t, bits, place_of, value_of<K>(), mode);
         });
     }
-    // From one sink of a thread to another.
+    // Moves counts from one sink of a thread to another.
     [[nodiscard]] __device__ VOXELPIPE_INLINE totals end() const { return mine; }
     __device__ VOXELPIPE_INLINE void take_over(const totals& other) {
         mine.fragments += other.fragments;
         mine.touched += other.touched;
     }
-    // Adds up; all threads of the block take part.
+    // Adds the block's counts to the state. All threads of the block call it.
     __device__ void finish(pipeline_state* state) const {
         const auto add = [](unsigned one, unsigned long long* total) {
             const unsigned long long sum = block_sum(one);
@@ -171,23 +172,23 @@ struct framebuffer_output {
     template <class Call>
     using deferred_sink = sink<Call>;
     static constexpr bool defers = has_only_bits<Framebuffer>; // otherwise raster/block_pass.cuh
-    // Targets are written while triangles are drawn: none may be missing at the end.
+    // Targets are written while triangles are drawn, so no triangle may be missing at the end.
     static constexpr bool can_skip_deferred_pass = false;
-    // Known to the compiler: all targets are in use, and all values true, or the mode of all is to blend.
+    // Facts for the compiler: all targets are in use, and all values are true, or the mode of all is to blend.
     static constexpr bool only_sets = false;
     static constexpr bool only_blends = false;
-    static constexpr bool has_marks = true; // or may have
+    static constexpr bool has_marks = true; // the output may have marks
     Framebuffer fb;
     Values values;
     immediate_modes<targets_of<Framebuffer>::count> modes;
     chunk_marks marks; // of targets that hold values
 
-    __device__ VOXELPIPE_INLINE static void prepare(std::uint64_t, std::uint64_t) {} // for what comes afterwards
-    // Whether check_indices has run; otherwise the sink looks at all indices.
+    __device__ VOXELPIPE_INLINE static void prepare(std::uint64_t, std::uint64_t) {} // work for a later kernel
+    // True if check_indices has run; otherwise the sink checks all indices.
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return true; }
 };
 
-// Of targets that have rows of values.
+// All targets have rows of values.
 template <class Framebuffer>
 inline constexpr bool has_only_values = false;
 template <class... Targets>

@@ -2,11 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Direct raster for targets that hold values. Where bits are tested before they are written, and mostly are set
-// already, a value takes an atomic for every fragment: neighbouring triangles have to be drawn at about the same time,
-// while their voxels are in the cache. So one kernel does all small triangles, and those of a kind wait within the
-// block until there is a full warp of them; only what is more than one thread's work is handed on
-// (raster/deferred_triangles.cuh).
+// First pass for targets that hold values. Bits are tested before they are written and mostly are set already, but a
+// value takes an atomic for every fragment: neighbouring triangles must be drawn at about the same time, while their
+// voxels are in the cache. So one kernel draws all small triangles, and a warp queues those of a class until it has 32.
+// Only triangles that are more than one thread's work are deferred (raster/deferred_triangles.cuh).
 
 #include <voxelpipe/device/raster/deferred_triangles.cuh>
 #include <voxelpipe/device/raster/small_triangles.cuh>
@@ -14,21 +13,21 @@
 
 namespace voxelpipe::device {
 
-inline constexpr int block_min_blocks = 5; // per multiprocessor: registers for that many
+inline constexpr int block_min_blocks = 5; // per multiprocessor: bounds the registers
 
 // Triangles by their vertices, each in a column of words.
 struct triangle_queue {
     std::int32_t q[9][queue_places];
 };
 
-// What one warp keeps in shared memory.
+// Shared memory of one warp.
 struct warp_queues {
-    triangle_queue tiny_queue, small_queue;  // bounding boxes as for raster_tiny; other small ones
-    std::uint32_t large_queue[queue_places]; // numbers of triangles that are loaded again
+    triangle_queue tiny_queue, small_queue;  // boxes for raster_tiny; other small ones
+    std::uint32_t large_queue[queue_places]; // numbers of triangles, which are loaded again
 };
 
-// The work of a warp, from the mesh to a sink. Every warp has its own queues: no thread waits for another warp, and the
-// numbers that wait are registers that all lanes agree on.
+// The work of one warp, from the mesh to a sink. Every warp has its own queues, so no thread waits for another warp.
+// The queue lengths are registers with the same value in all lanes.
 template <class Call>
 struct block_warp {
     static constexpr bool thin = Call::rule == coverage::thin;
@@ -40,7 +39,7 @@ struct block_warp {
     kept_rows& kept; // of the warp
     coming_corners<typename Call::source_type>& corners;
     sink_type& sink;
-    std::uint32_t* oversized; // for oversized triangles, of the block
+    std::uint32_t* oversized; // the block's oversized triangles
     unsigned& num_oversized;
     int lane = static_cast<int>(threadIdx.x) % 32;
     int num_tinies = 0, num_smalls = 0, num_larges = 0;
@@ -55,8 +54,8 @@ struct block_warp {
         r.find_box(call.in.fraction);
         return r;
     }
-    // The lane's triangle i, where there is one, whose corners have been fetched. Then those of the next are, which has
-    // these vertices.
+    // Draws or queues the lane's triangle i, if valid; its corners have been fetched. Then fetches those of the next
+    // one, which has these vertices.
     __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, bool valid, bool has_next, const glm::uvec3& next) {
         bool waits = false, is_oversized = false;
         int inside = 0, most = 0;
@@ -92,8 +91,8 @@ struct block_warp {
             if (kind == size_class::tiny) push(queues.tiny_queue, tiny_at, r);
             const int small_at = take_place(kind == size_class::thread, num_smalls);
             if (kind == size_class::thread) push(queues.small_queue, small_at, r);
-            // Of a mesh with a round for each block at most, which may leave multiprocessors without one, these are
-            // for the whole device.
+            // If each block has at most one round of the mesh, some multiprocessors may have no block: these triangles
+            // go to the whole device.
             const bool is_spread =
                 kind == size_class::thread_heavy && call.in.num_triangles <= gridDim.x * raster_threads;
             const bool is_large = kind == size_class::thread_heavy && !is_spread;
@@ -101,21 +100,21 @@ struct block_warp {
             if (is_large) queues.large_queue[large_at] = i;
             call.lists.push(size_class::warp_group, is_spread || kind == size_class::warp_group, i);
             if (is_oversized)
-                oversized[atomicAdd(&num_oversized, 1u)] = i; // no call of a function here: its registers would spill
+                oversized[atomicAdd(&num_oversized, 1u)] = i; // a function call here would spill the caller's registers
         }
         __syncwarp();
     }
 
-    // All batches of this warp, the lane's first with this index, then what is left in the queues of the block's warps,
-    // together. All threads of the block take part. Returns how many triangles the warp looked at.
+    // Draws all batches of this warp (`index`: the vertices of the lane's first triangle), then what is left in the
+    // queues of all warps of the block. All threads of the block call it. Returns how many triangles the warp read.
     template <int Warps>
     __device__ VOXELPIPE_INLINE unsigned run(glm::uvec3 index, const warp_queues (&all)[Warps], int (&left)[3][Warps]) {
         const std::uint32_t step = gridDim.x * Warps * 32;
         const std::uint32_t begin = blockIdx.x * Warps * 32 + threadIdx.x / 32 * 32;
-        // One loop for what waits while the mesh is read and what is left then: twice the code, with that of the sink
-        // in every place, and warps wait for instructions.
+        // One loop for triangles queued during the mesh and those left at the end: separate loops would double the
+        // code, the sink's included, and warps would wait for instructions.
         const int own = static_cast<int>(warp_in_block());
-        int ended = 0; // kinds of which the rest is done
+        int ended = 0; // classes whose rest is done
         const auto triangle = [&](std::uint32_t first)
                                   VOXELPIPE_INLINE_LAMBDA { return first + static_cast<unsigned>(lane); };
         const std::uint32_t num_triangles = call.in.num_triangles;
@@ -133,7 +132,7 @@ struct block_warp {
                 at = (num_larges -= 32) + lane;
                 is_large = true;
             } else if (first < num_triangles) {
-                // While a batch is worked on, the corners of the next one are on their way, and the indices of the one
+                // While a batch is drawn, the corners of the next one are being fetched, and the indices of the one
                 // after that.
                 const glm::uvec3 second = load_index(call.in, triangle(first + 2 * step));
                 batch(triangle(first), triangle(first) < num_triangles, triangle(first + step) < num_triangles, index);
@@ -151,7 +150,7 @@ struct block_warp {
                 }
                 if (ended == 2) break;
                 is_tiny = ended == 0;
-                at = static_cast<int>(threadIdx.x); // fewer than 32 a warp are left
+                at = static_cast<int>(threadIdx.x); // fewer than 32 per warp are left
                 for (w = 0; w < Warps && at >= left[ended][w];) at -= left[ended][w++];
                 ++ended;
             }
@@ -168,7 +167,7 @@ struct block_warp {
             }
             __syncwarp();
         }
-        // A lane each, the larger ones would keep a few lanes busy long after all others.
+        // One lane each, the larger triangles would keep a few lanes busy long after all others.
         int num = 0;
         for (const int n : left[2]) num += n;
         for (int start = 0; start < num; start += Warps * 32 / group_lanes) {

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The second kernel of direct raster: what the first left (raster/raster.cuh), in warps of 32 triangles of a kind each,
-// and large triangles piece by piece.
+// The deferred pass: draws what the first pass left (raster/raster.cuh), in warps of 32 triangles of one class, and
+// split triangles by work items.
 
 #include <voxelpipe/device/raster/blend_sink.cuh>
 #include <voxelpipe/device/raster/deferred_triangles.cuh>
@@ -14,14 +14,14 @@
 
 namespace voxelpipe::device {
 
-// Blocks per multiprocessor that registers are kept for.
+// Blocks per multiprocessor: bounds the registers.
 template <class Call>
 inline constexpr int deferred_min_blocks = Call::sink::stages_in_shared   ? 4
                                            : Call::rule == coverage::thin ? 6
                                                                           : 5;
 
-// All records, in registers of their own: what they need is not kept for the other triangles. Nobody waits for the
-// block's other warps at its end.
+// Draws all work items. Out of line, so that their registers are not reserved while other triangles are drawn. Does not
+// wait for other warps of the block.
 template <class Call>
 __device__ __noinline__ typename Call::deferred_sink::totals
 raster_all_work_items(const Call& call, unsigned* dropped, brick_memory<Call::rule>& bricks,
@@ -32,7 +32,7 @@ raster_all_work_items(const Call& call, unsigned* dropped, brick_memory<Call::ru
     return sink.end();
 }
 
-// The warp's share of what records need (raster/split_triangles.cuh).
+// Sets up the warp's share of the split triangles (raster/split_triangles.cuh).
 template <class Call>
 __device__ __noinline__ void keep_setups(const Call& call, unsigned warp, unsigned warps) {
     const split_work_items all(call.lists);
@@ -40,13 +40,13 @@ __device__ __noinline__ void keep_setups(const Call& call, unsigned warp, unsign
         split_setup<Call::rule>::keep(call, warp, warps, static_cast<std::uint32_t>(all.triangles));
 }
 
-// What a warp of the second kernel knows of its place.
+// A warp's position in the deferred pass.
 struct warp_place {
-    unsigned warp, warps; // of the grid
+    unsigned warp, warps; // of the whole launch
     unsigned lane;
 };
 
-// The triangles of a list from number `first` on, by group_lanes lanes each.
+// Draws the triangles of one list from number `first` on, by group_lanes lanes each.
 template <class Call, class Sink>
 __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std::uint32_t first,
                                                  const warp_place& place, const lane_rows& kept, Sink& sink) {
@@ -62,24 +62,24 @@ __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std
     }
 }
 
-// The lists of large, small and tiny triangles by a thread each, neighbours, which are alike, in neighbouring lanes;
-// but what does not fill a warp, and whole lists that would not fill the device, by group_lanes lanes each. All lists
-// advance together, part by part (list_walk): they are in the order of the mesh, nearly, so that voxels are in the
-// cache while triangles of all kinds meet them.
+// Draws the lists of tiny and small triangles, one thread each; neighbours in a list are alike, and lie in neighbouring
+// lanes. What does not fill a warp, and lists too short to fill the device, are drawn by group_lanes lanes each. All
+// lists advance together, part by part (list_walk): they are nearly in the order of the mesh, so voxels are in the
+// cache while triangles of all classes touch them.
 template <class Call, class Rows, class Sink>
 __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place& place, const lane_rows& kept,
                                               Rows& rows, Sink& sink) {
-    constexpr int kinds = size_class::warp_group; // what comes before
+    constexpr int kinds = size_class::warp_group; // those before warp_group
     std::uint32_t chunks[kinds];
     for (int k = 0; k < kinds; ++k) {
         const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[k]));
         const bool few = k != size_class::tiny && length / 64 * group_lanes < place.warps;
         chunks[k] = few ? 0 : length / 32;
-        const unsigned from_last = place.warps - 1 - place.warp; // the first ones have whole chunks to do
+        const unsigned from_last = place.warps - 1 - place.warp; // warps at the end have fewer whole chunks
         raster_by_lanes(call, k, chunks[k] * 32, {few ? place.warp : from_last, place.warps, place.lane}, kept, sink);
     }
-    // Of a chunk that comes next, the triangles' numbers are loaded while the one before the last is worked on, and
-    // their vertices' while the last one is.
+    // While a chunk is drawn, the vertex numbers of the next one and the triangle numbers of the one after that are
+    // being loaded.
     using walk_type = core::list_walk<kinds>;
     using chunk = typename walk_type::chunk;
     walk_type walk(chunks, place.warp, place.warps);
@@ -133,8 +133,7 @@ __global__ __launch_bounds__(raster_threads,
                                                                                   pipeline_state* state) {
     using sink_type = typename Call::deferred_sink;
     constexpr bool thin = Call::rule == coverage::thin;
-    // Of a warp: what its large triangles want, or the rest. More shared memory would leave less to the cache of
-    // vertices.
+    // A warp needs one of the two at a time. More shared memory would leave less to the vertex cache.
     __shared__ union {
         brick_memory<Call::rule> bricks;
         kept_rows rows;
@@ -153,14 +152,14 @@ __global__ __launch_bounds__(raster_threads,
     const warp_place place{blockIdx.x * raster_warps + in_block, gridDim.x * raster_warps, threadIdx.x % 32};
     typename sink_type::memory& memory = memories[in_block];
     const bool has_records = uniform(*call.lists.next) != 0;
-    // Parts of few large triangles go to different multiprocessors.
+    // Work items of few split triangles go to different multiprocessors.
     const unsigned warp_of_records = thin ? place.warp : in_block * gridDim.x + blockIdx.x;
     const auto draw_records = [&]() VOXELPIPE_INLINE_LAMBDA {
         return raster_all_work_items(call, dropped, memory_of_warps[in_block].bricks, memory, warp_of_records,
                                      place.warps);
     };
-    // Thin records come last: what they need is there when all else is drawn. Conservative ones take longest, and other
-    // warps had better have the rest.
+    // Thin work items come last: their setups are ready when all else is drawn. Conservative ones take longest, so they
+    // come first, while other warps draw the rest.
     typename sink_type::totals of_records{};
     if (has_records) {
         keep_setups(call, warp_of_records, place.warps);
@@ -178,13 +177,13 @@ __global__ __launch_bounds__(raster_threads,
     }
     if constexpr (thin) {
         if (has_records) {
-            (void)sink.end(); // the memory is another sink's
+            (void)sink.end(); // flushes; the memory becomes another sink's
             sink.take_over(draw_records());
         }
     }
     sink.finish(state);
     __syncthreads();
-    if (threadIdx.x == 0) { // the first kernel took them for drawn
+    if (threadIdx.x == 0) { // the first pass has counted them as drawn
         const unsigned none = count_dropped(dropped, state);
         if (none != 0) atomicAdd(&state->drawn, 0ull - none);
     }

@@ -2,9 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Triangles that one kernel hands on to the next, by what they cost: lists in global memory, in order of arrival,
-// filled by warps that first gather 32 of a kind in shared memory, so that neither an atomic nor a store is for one
-// triangle.
+// Triangles that one kernel leaves to the next, in one list per size class in global memory. Warps first gather many of
+// a class in shared memory, so that neither an atomic nor a store serves a single triangle.
 
 #include <voxelpipe/device/base/call_state.cuh>
 #include <voxelpipe/device/base/launch.cuh>
@@ -17,7 +16,8 @@ namespace voxelpipe::device {
 
 inline constexpr int num_triangle_classes = 5;
 
-// Adds up what the sinks of a block dropped, by triangle_class, and says how many that were. By one thread.
+// Adds a block's counts of dropped triangles, by triangle_class, to the state, and returns their sum. One thread calls
+// it.
 __device__ inline unsigned count_dropped(const unsigned (&dropped)[num_triangle_classes], pipeline_state* state) {
     using core::triangle_class;
     const auto number = [&](triangle_class kind, unsigned long long* total) {
@@ -28,7 +28,7 @@ __device__ inline unsigned count_dropped(const unsigned (&dropped)[num_triangle_
     return number(triangle_class::nonfinite, &state->nonfinite) + number(triangle_class::too_far, &state->too_far) +
            number(triangle_class::zero_area, &state->zero_area) + number(triangle_class::outside, &state->outside);
 }
-// The same, and the triangles that are drawn, from what each warp looked at. All threads take part.
+// The same, and counts all other triangles that the warps read as drawn. All threads call it.
 __device__ inline void count_looked_at(unsigned looked_at, const unsigned (&dropped)[num_triangle_classes],
                                        pipeline_state* state) {
     const unsigned long long all = block_sum(threadIdx.x % 32 == 0 ? looked_at : 0);
@@ -37,14 +37,14 @@ __device__ inline void count_looked_at(unsigned looked_at, const unsigned (&drop
     if (all != none) atomicAdd(&state->drawn, all - none);
 }
 
-// The triangles of a warp whose blocks of raster_threads go through the mesh one after the other, round by round. In
-// 16 bits: 32 times the number of the round, and the lane. What it takes is there anyway, and in no register meanwhile.
+// Encodes the triangles that a warp reads in 16 bits: 32 x round + lane, where the blocks of raster_threads go through
+// the mesh round by round. Decoding needs only blockIdx and threadIdx, so no register is held.
 struct warp_triangles {
     static constexpr std::uint32_t max_rounds = 1u << 11;
     [[nodiscard]] __device__ VOXELPIPE_INLINE static std::uint32_t of(std::uint32_t code) {
         return of(code, threadIdx.x / 32);
     }
-    // Of another warp of the block.
+    // A triangle of another warp of the block.
     [[nodiscard]] __device__ VOXELPIPE_INLINE static std::uint32_t of(std::uint32_t code, unsigned warp) {
         return (code / 32 * gridDim.x + blockIdx.x) * raster_threads + warp * 32 + code % 32;
     }
@@ -56,29 +56,28 @@ struct deferred_triangles {
     unsigned long long* lengths; // [size_class::count]
     std::uint32_t capacity;      // of an array
 
-    // Triangles that are split into pieces, each with the number of its first record of them: a warp finds the
-    // triangle of a record by bisection. `next` packs how many triangles and records there are, so that one atomic
-    // places both.
+    // Split triangles, each with the number of its first work item: a warp finds the triangle of a work item by
+    // bisection. `next` packs the numbers of triangles and work items, so that one atomic reserves both.
     static constexpr int work_item_bits = 36;
     std::uint32_t* split;
     unsigned long long* first_work_items;
     unsigned long long* next;
 
-    // What the records of a triangle need of it (raster/split_triangles.cuh), where that is kept for all: room for so
-    // many, and how many are there.
+    // Setups of split triangles (raster/split_triangles.cuh), if they are kept: room for num_setups, and how many are
+    // ready.
     static constexpr std::size_t max_setups = 1u << 14, setup_bytes = 384;
     std::byte* setups;
     unsigned long long* set_up;
     std::uint32_t num_setups;
 
-    // Those that a block of the first kernel leaves until its end; each has a part of its own. Then, where set-ups are
-    // kept, for each record whose it is.
+    // Oversized triangles that a block of the first pass leaves until its end, in a part of the array for each block.
+    // Later, if setups are kept: the setup of each work item.
     std::uint32_t* oversized;
     std::uint64_t oversized_capacity;
 
     [[nodiscard]] static deferred_triangles take(arena& memory, std::size_t num_triangles) {
         deferred_triangles l{};
-        // Parts are whole batches of all threads of a persistent kernel.
+        // A block's part holds whole batches of all threads of a persistent kernel.
         const std::size_t threads = std::max(static_cast<std::size_t>(num_multiprocessors()) * 2048,
                                              num_triangles / warp_triangles::max_rounds + raster_threads);
         l.oversized_capacity = num_triangles + std::min(threads, num_triangles + 2048);
@@ -91,7 +90,7 @@ struct deferred_triangles {
         l.setups = memory.take<std::byte>(l.num_setups * setup_bytes);
         return l;
     }
-    // With its counters, which are zeroed.
+    // Sets the pointers to the counters, which must be zero.
     [[nodiscard]] deferred_triangles with(pipeline_state* state) const {
         deferred_triangles l = *this;
         l.lengths = state->deferred.lengths;
@@ -107,7 +106,7 @@ struct deferred_triangles {
         std::uint32_t* const array = arrays[kind / 2];
         return kind % 2 == 0 ? array[i] : array[capacity - 1 - i];
     }
-    // A triangle of each lane that wants it in a list. All lanes take part.
+    // Appends a triangle of each lane that wants it to a list. All lanes call it.
     __device__ VOXELPIPE_INLINE void push(int kind, bool wanted, std::uint32_t triangle) const {
         const unsigned who = __ballot_sync(0xffffffffu, wanted);
         if (who == 0) return;
@@ -117,7 +116,7 @@ struct deferred_triangles {
         first = __shfl_sync(0xffffffffu, first, 0);
         if (wanted) at(kind, first + static_cast<unsigned>(__popc(who & ((1u << lane) - 1)))) = triangle;
     }
-    // The triangle of each lane that has records for it. All lanes take part.
+    // Appends a split triangle of each lane that has work items. All lanes call it.
     __device__ void push_split(std::uint32_t triangle, unsigned long long records) const {
         const unsigned lane = threadIdx.x % 32;
         const unsigned long long mine = (records != 0 ? 1ull << work_item_bits : 0) + records;
@@ -136,9 +135,10 @@ struct deferred_triangles {
     }
 };
 
-inline constexpr int queue_places = 64; // up to 31 wait when a warp brings up to 32 more
+inline constexpr int queue_places = 64; // up to 31 wait when a warp adds up to 32
 
-// The place of a lane that wants one behind the `count` that wait; adds the newcomers. All lanes take part.
+// Returns the slot of a lane that wants one, behind the `count` that wait, and adds the new ones to count. All lanes
+// call it.
 __device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
     const unsigned who = __ballot_sync(0xffffffffu, wanted);
     const int place = count + __popc(who & ((1u << threadIdx.x % 32) - 1));
@@ -146,10 +146,10 @@ __device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
     return place;
 }
 
-// What of each kind waits in a warp for its list, by warp_triangles; the numbers are registers that all lanes agree on.
-// The lengths of the lists are the same words for all warps of the device, and an atomic that brings them back keeps
-// that part of L2 from what else lies there: with one for 32 triangles, first kernels waited for it, and took some 20 %
-// more or less by where the state and the target lay.
+// A warp's triangles that wait for their lists, by warp_triangles; the counts are registers with the same value in all
+// lanes. All warps of the device add to the same list lengths. An atomic that returns them blocks that part of L2 for
+// whatever else lies there: with one per 32 triangles, first passes took some 20 % more or less, depending on where
+// state and target lay.
 struct class_queues {
     static constexpr int places = 128, at_once = places - 32;
     std::uint16_t triangles[size_class::count][places];
@@ -160,9 +160,9 @@ struct class_writer {
     class_queues& queues;
     int waiting[size_class::count] = {};
 
-    // Every lane with a kind from 0 on adds its triangle. All lanes take part.
+    // Queues the triangle of every lane whose size class is not negative. All lanes call it.
     __device__ VOXELPIPE_INLINE void push(int kind, std::uint32_t code) {
-        const unsigned kinds = __reduce_or_sync(0xffffffffu, kind < 0 ? 0 : 1u << kind); // one or two, mostly
+        const unsigned kinds = __reduce_or_sync(0xffffffffu, kind < 0 ? 0 : 1u << kind); // mostly one or two
         for (int k = 0; k < size_class::count; ++k) {
             if ((kinds >> k & 1u) == 0) continue;
             const int place = take_place(kind == k, waiting[k]);
@@ -174,14 +174,14 @@ struct class_writer {
             __syncwarp();
         }
     }
-    // How much waits in the queues of all warps of a block: noted in shared memory for each. All threads take part;
-    // then the block has to meet.
+    // Stores how much waits in the warp's queues to shared memory, for the whole block, which must synchronise next.
+    // All threads call it.
     template <int Warps>
     __device__ VOXELPIPE_INLINE void note(unsigned (&places)[size_class::count][Warps]) const {
         if (threadIdx.x % 32 == 0)
             for (int k = 0; k < size_class::count; ++k) places[k][threadIdx.x / 32] = static_cast<unsigned>(waiting[k]);
     }
-    // The same as a number, or `many` or more, as where some of it is large. All threads meet.
+    // How many triangles wait in the block, or at least `many` if some of them are large. Synchronises the block.
     static constexpr int many = 32;
     [[nodiscard]] __device__ VOXELPIPE_INLINE int count() const {
         const bool has_large = (waiting[size_class::thread_heavy] | waiting[size_class::warp_group]) != 0;
@@ -189,7 +189,8 @@ struct class_writer {
                   small = waiting[size_class::tiny] + waiting[size_class::thread];
         return __syncthreads_count(has_large || lane < small);
     }
-    // Hands on what has been noted, for which the block takes room together. All threads take part.
+    // Appends the queued triangles to the lists. The block reserves room for all of its warps at once. All threads call
+    // it.
     template <int Warps>
     __device__ VOXELPIPE_INLINE void finish(unsigned (&places)[size_class::count][Warps]) {
         const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32;
@@ -201,7 +202,7 @@ struct class_writer {
             }
             if (n == 0) continue;
             __syncwarp();
-            const auto first = static_cast<unsigned>(take(k, n)); // there are fewer than 2^32
+            const auto first = static_cast<unsigned>(take(k, n)); // fewer than 2^32 exist
             if (lane < Warps) places[k][lane] = first + before;
         }
         __syncthreads();
@@ -210,13 +211,13 @@ struct class_writer {
     }
 
 private:
-    // What waits from `at` on, n of a kind, into its list from place `first` on.
+    // Stores n queued triangles of a class, from `at` on, to slots `first` and on of its list.
     __device__ VOXELPIPE_INLINE void write(int kind, unsigned long long first, int at, int n) const {
 #pragma unroll 1
         for (int i = static_cast<int>(threadIdx.x) % 32; i < n; i += 32)
             lists.at(kind, first + static_cast<unsigned>(i)) = warp_triangles::of(queues.triangles[kind][at + i]);
     }
-    // Room for n of a kind.
+    // Reserves room for n triangles.
     [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long take(int kind, unsigned n) const {
         unsigned long long first = 0;
         if (threadIdx.x % 32 == 0) first = atomicAdd(&lists.lengths[kind], static_cast<unsigned long long>(n));

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The way of one of many workers through several lists, chunk by chunk, as plain arithmetic. All lists advance
-// together, part by part, the last list first in each; every worker has every num_workers-th chunk.
+// The path of one of many workers through several lists, chunk by chunk. All lists advance together, part by part, the
+// last list first in each part; a worker takes every num_workers-th chunk.
 
 #include <voxelpipe/config.hpp>
 
@@ -15,11 +15,11 @@ template <int Lists>
 class list_walk {
 public:
     struct chunk {
-        int list; // below 0: there is none
+        int list; // negative if there is none
         std::uint32_t number;
     };
 
-    // chunks: how many a list has. Fewer than 2^32 - num_workers in all; num_workers is below 2^29.
+    // chunks: the lengths of the lists, in chunks; fewer than 2^32 - num_workers in all. num_workers is below 2^29.
     VOXELPIPE_HD VOXELPIPE_INLINE list_walk(const std::uint32_t (&chunks)[Lists], std::uint32_t worker,
                                             std::uint32_t num_workers)
         : at_(worker), step_(num_workers) {
@@ -30,7 +30,7 @@ public:
         }
         while (part_bits_ < max_part_bits && all >> part_bits_ >= 8 * num_workers) ++part_bits_;
     }
-    // This worker's next one; none ever after where there is none.
+    // This worker's next chunk. After the last, always none.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE chunk next() {
         while (at_ >= end_) {
             if (list_ == 0) {
@@ -39,7 +39,7 @@ public:
                 list_ = Lists;
             }
             --list_;
-            std::uint32_t chunks = chunks_[0]; // without an index, for which it would have to lie in memory
+            std::uint32_t chunks = chunks_[0]; // selected without an index, which would force the array into memory
             for (int k = 1; k < Lists; ++k) chunks = list_ == k ? chunks_[k] : chunks;
             const std::uint32_t begin = begin_of(part_, chunks);
             shift_ = begin - end_;
@@ -51,14 +51,15 @@ public:
     }
 
 private:
-    static constexpr int max_part_bits = 6; // of how many parts there are, each of four chunks or more for a worker
+    static constexpr int max_part_bits = 6; // log2 of the number of parts; a worker has at least four chunks of each
 
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t begin_of(std::uint32_t part, std::uint32_t chunks) const {
         return static_cast<std::uint32_t>(static_cast<std::uint64_t>(chunks) * part >> part_bits_);
     }
     std::uint32_t chunks_[Lists];
     int part_bits_ = 0;
-    // Chunks are numbered as they come: those of part_ and list_ end at end_, and number n is the list's n + shift_.
+    // Chunks are numbered in the order of the walk: those of part_ and list_ end at end_, and number n is the list's n
+    // + shift_.
     std::uint32_t at_, step_, part_ = 0, end_ = 0, shift_ = 0;
     int list_ = Lists;
 };

@@ -9,9 +9,9 @@
 
 namespace voxelpipe::device {
 
-// The chunks of each lane's bounding box where the lane wants that: a box of up to 32 voxels a side, not outside the
-// grid. All lanes take part. Triangles next to each other mostly lie within two chunks along each axis, all of which
-// are marked then, and otherwise mostly share a word, which is written once; without a look, that all would wait for.
+// Marks the chunks of each lane's bounding box, if `wanted`: at most 32 voxels a side, not outside the grid. All lanes
+// call it. Triangles of a warp mostly lie within two chunks along each axis: then all of these are marked. Otherwise
+// they mostly share words, each of which is written once. Nothing is read first: all lanes would wait for it.
 template <coverage Rule>
 __device__ VOXELPIPE_INLINE void mark_boxes(const chunk_marks& marks, bool wanted, const int32_triangle& r) {
     constexpr int beyond = Rule == coverage::thin ? 1 : 0; // a thin fragment may lie one voxel beyond the triangle
@@ -37,7 +37,7 @@ __device__ VOXELPIPE_INLINE void mark_boxes(const chunk_marks& marks, bool wante
                       (num_of_all[0] == 2 ? 3u : 1u) << first[0] % 32);
         return;
     }
-    // Chunk by chunk of the box: two or three along x at most, which may lie in two words.
+    // One word at a time. A box spans at most three chunks along x, which may lie in two words.
     const int nx = hi[0] - lo[0] + 1, ny = hi[1] - lo[1] + 1, nz = hi[2] - lo[2] + 1;
     const int first_word = lo[0] / 32, num_words = hi[0] / 32 - first_word + 1;
     const word low_bits = nx >= 32 ? ~0u : (1u << nx) - 1;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The sink of the occupancy mask: sets a bit for each voxel that has a fragment, whatever the targets are.
+// The sink of the occupancy mask: sets one bit for each voxel that has a fragment, whatever the targets are.
 
 #include <voxelpipe/device/raster/blend_sink.cuh>
 
@@ -29,7 +29,7 @@ struct mask_output : framebuffer_output<framebuffer_view<mask_target>, core::pac
 
     std::uint32_t num_vertices;
     pipeline_state* state;
-    bool checked; // whether check_indices has run
+    bool checked; // check_indices has run
 
     mask_output(word* words, const glm::ivec3& extent, std::uint32_t num_vertices_, pipeline_state* state_,
                 bool checked_)
@@ -40,7 +40,7 @@ struct mask_output : framebuffer_output<framebuffer_view<mask_target>, core::pac
         t.extent = extent;
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_checked() const { return checked; }
-    // Whether all three are vertices; says so where they are not.
+    // True if all three indices name vertices; otherwise notes the error.
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(const glm::uvec3& index) const {
         const bool ok = index.x < num_vertices && index.y < num_vertices && index.z < num_vertices;
         if (!ok) atomicOr(&state->index_error, 1u);
@@ -48,7 +48,7 @@ struct mask_output : framebuffer_output<framebuffer_view<mask_target>, core::pac
     }
 };
 
-// A framebuffer of one target that is laid out as they are, and takes true as they do.
+// A single target with the mask's own layout and blend: the mask is the target.
 template <class Framebuffer>
 inline constexpr bool is_mask_itself = false;
 template <class Target>

@@ -2,11 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Direct raster: fragments go straight from their triangle into the render targets, without tiles, where the shader is
-// constant and every target takes a fragment by one atomic (targets/global_target.cuh). Coarse raster, sort and tile
-// images cost a small triangle more than the few voxels that it touches. A first kernel reads the mesh once, does at
-// once what costs next to nothing, and hands the rest on by what it costs (raster/deferred_triangles.cuh), so that the
-// second kernel's warps have 32 triangles of a kind each.
+// Raster without tiles: fragments go from their triangle straight to a sink. Coarse raster, sort and tile images cost a
+// small triangle more than the few voxels that it touches. The first pass reads the mesh once, draws what costs next to
+// nothing, and defers the rest by size class (raster/deferred_triangles.cuh), so that warps of the deferred pass have
+// 32 triangles of a class.
 
 #include <voxelpipe/device/raster/blend_sink.cuh>
 #include <voxelpipe/device/raster/block_pass.cuh>
@@ -18,34 +17,35 @@
 
 namespace voxelpipe::device {
 
-// ---- the first kernel: every triangle -------------------------------------------------------------------------------
+// ---- the first pass: every triangle ---------------------------------------------------------------------------------
 
-// Blocks per multiprocessor that registers are kept for.
+// Blocks per multiprocessor: bounds the registers.
 template <class Call>
 inline constexpr int first_min_blocks = Call::rule == coverage::thin || Call::sink::stages_in_shared ? 6 : 8;
 
-// Thin triangles of up to 2 x 2 x 2 voxels that wait for integers, each in a column of words: those that floats are not
-// sure of, and those of warps that have few.
+// Thin triangles of up to 2 x 2 x 2 voxels that are redone in integers: those that floats cannot decide, and those of
+// warps with few. Each takes a column of words.
 struct cube_queue {
     std::int32_t q[9][queue_places];
     std::uint32_t triangle[queue_places]; // by warp_triangles
 };
 struct no_queue {};
-// Of thin coverage: the cubes, and when none waits any more, what draw_left wants.
+// For thin coverage: the cubes, and when none waits, the rows for draw_left.
 union cubes_or_rows {
     cube_queue cubes;
     kept_rows rows;
 };
 
-// Of a warp's 32 triangles, so many whose boxes are three voxels long at least are drawn where they are read, with all
-// smaller ones, by instructions that cost half as much again as without them; fewer are handed on.
+// Use the slim-box code if at least this many of the warp's triangles have a box three voxels long; it draws the
+// smaller ones too, with 1.5 x the instructions of the cube code. Fewer are deferred.
 inline constexpr int min_slim = 3;
-// Of a mesh that is finer than the grid few triangles are handed on: where there were so many on average for each of
-// the first kernel's blocks, each can draw its own at its end, and takes no more than a second kernel does to begin.
-inline constexpr std::uint64_t max_left_of_block = 14, max_left_blocks = 6; // a multiprocessor
-inline constexpr int oversized_side = 64; // of what is split into pieces: beyond max_group_side
+// Deferred triangles per block, on average, up to which a call is launched without a deferred pass: each block draws
+// its own at its end. A mesh finer than the grid defers few, and drawing them takes no longer than a second kernel
+// takes to start.
+inline constexpr std::uint64_t max_left_of_block = 14, max_left_blocks = 6; // blocks a multiprocessor
+inline constexpr int oversized_side = 64; // stands for triangles to split: larger than max_group_side
 
-// What one warp of the first kernel keeps in shared memory.
+// Shared memory of one warp of the first pass.
 template <class Call>
 struct first_memory {
     class_queues kinds;
@@ -53,38 +53,39 @@ struct first_memory {
     typename Call::sink::memory sink;
 };
 
-// Whether a first kernel can set close cubes together (raster/warp_combine.cuh).
+// True if the first pass can set close cubes together (raster/warp_combine.cuh).
 template <class Call>
 inline constexpr bool has_close_cubes = Call::output::only_sets && (Call::rule == coverage::conservative);
 
-// A warp of the first kernel. Every warp has its own queues: no thread waits for another warp. Alone: whether there is
-// no second kernel (raster_first). Close: whether batches are looked at for close cubes.
+// A warp of the first pass. Every warp has its own queues, so no thread waits for another warp. Alone: there is no
+// deferred pass (raster_first). Close: batches are tried as close cubes.
 template <class Call, bool Alone, bool Close>
 struct first_warp {
     static constexpr bool thin = Call::rule == coverage::thin;
     using triangle_class = core::triangle_class;
     using sink_type = typename Call::sink;
     using corners_type = loaded_corners<typename Call::source_type>;
-    // Whether a batch's vertices are loaded before the fragments of the batch before it are blended. Where conservative
-    // coverage looks at words of bits, those wait behind the vertices: 5 % slower.
+    // True if the vertices of a batch are loaded before the fragments of the previous one are blended. Not for
+    // conservative coverage of bits, which first reads words: they would wait behind the vertices (5 % slower).
     static constexpr bool loads_ahead = thin || sink_type::stages_in_shared;
 
     const Call& call;
     first_memory<Call>& memory;
     sink_type& sink;
     class_writer& writer;
-    std::uint32_t* oversized; // triangles, of the block
+    std::uint32_t* oversized; // the block's oversized triangles
     unsigned& num_oversized;
-    int num_cubes = 0;                                   // that wait, of thin ones
-    static constexpr std::uint32_t not_close = 1u << 31; // of a code, which has 16 bits: the batch before was not
+    int num_cubes = 0; // thin triangles that wait
+    static constexpr std::uint32_t not_close =
+        1u << 31; // flag of a code, which has 16 bits: the previous batch was not close
 
-    // The lane's triangle i, where there is one, of this code, maybe with its mark: near() gives it. load_next() is
-    // called between coverage and blending, where few registers are in use.
+    // Draws, queues or defers the lane's triangle i, if valid; near() loads it. code: by warp_triangles, possibly with
+    // not_close. load_next() is called between coverage and blending, while few registers are in use.
     template <class Near, class LoadNext>
     __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, std::uint32_t& code, bool valid, const Near& near,
                                            const LoadNext& load_next) {
-        // Of what is left to do, the longest side of the bounding box, or oversized_side. Not a few bools (see
-        // inside()).
+        // Longest side of the bounding box of a triangle still to draw, oversized_side, or 0. An int instead of several
+        // bools (see inside()).
         int side = 0, inside = 0;
         int32_triangle r;
         if (valid) {
@@ -136,7 +137,7 @@ struct first_warp {
         }
         if (__any_sync(0xffffffffu, side != 0)) {
             writer.push(side != 0 && side != oversized_side ? size_class_of<Call::rule>(r, side) : -1, code);
-            // No call of a function here: its registers would spill.
+            // A function call here would spill the caller's registers.
             if (side == oversized_side) oversized[atomicAdd(&num_oversized, 1u)] = i;
         }
         __syncwarp();
@@ -144,8 +145,8 @@ struct first_warp {
             if (num_cubes >= 32) drain_cubes<true>();
     }
 
-    // Whether this warp has set what find_cube has found. Where one batch does not lie close together, 15 after it are
-    // not looked at.
+    // Tries to set what find_cube found, for the whole warp; returns true if it did. After a batch that is not close,
+    // 15 are not tried.
     __device__ VOXELPIPE_INLINE bool sets_close_cubes(std::uint32_t& code, const int32_triangle& r, word bits) {
         const bool looks = (code & not_close) == 0 || code / 32 % 16 == 0;
         if (looks && set_close_cubes(voxelpipe::get<0>(call.out.fb.targets), r.lo, bits)) {
@@ -157,7 +158,8 @@ struct first_warp {
         return false;
     }
 
-    // Whether this warp has drawn what has slim boxes: conservative triangles, where it has some of three voxels.
+    // Tries to draw triangles with slim boxes, for conservative coverage; returns false, with nothing done, if the warp
+    // has too few that are three voxels long.
     template <class LoadNext>
     __device__ VOXELPIPE_INLINE bool draws_slim(std::uint32_t i, const int32_triangle& r, int inside, int& side,
                                                 const LoadNext& load_next) {
@@ -175,7 +177,7 @@ struct first_warp {
         return true;
     }
 
-    // The last 32 cubes that wait; where these may be fewer, and are all, not AllLanes.
+    // Draws the last 32 waiting cubes; all of them, possibly fewer, if not AllLanes.
     template <bool AllLanes>
     __device__ VOXELPIPE_INLINE void drain_cubes() {
         const int lane = static_cast<int>(threadIdx.x) % 32;
@@ -194,12 +196,13 @@ struct first_warp {
         __syncwarp();
     }
 
-    // All batches of this warp, the lane's first with this index. Returns how many triangles it looked at.
+    // Draws all batches of this warp; `index`: the vertices of the lane's first triangle. Returns how many triangles it
+    // read.
     __device__ VOXELPIPE_INLINE unsigned run(glm::uvec3 index) {
         const unsigned lane = threadIdx.x % 32;
         const std::uint32_t step = gridDim.x * raster_threads, num = call.in.num_triangles;
         const std::uint32_t begin = blockIdx.x * raster_threads + warp_in_block() * 32;
-        // The indices of a batch are loaded a batch ahead, or two, where vertices are loaded ahead too.
+        // Indices are loaded one batch ahead, or two if vertices are loaded ahead too.
         if constexpr (loads_ahead) {
             bool valid = begin + lane < num && sink.check(index);
             corners_type corners;
@@ -226,7 +229,7 @@ struct first_warp {
         }
         if constexpr (thin && Alone) {
             if (num_cubes != 0) drain_cubes<false>();
-        } else if constexpr (thin) { // the rest of the cubes is handed on
+        } else if constexpr (thin) { // defers the remaining cubes
             const int at = static_cast<int>(lane);
             writer.push(at < num_cubes ? static_cast<int>(size_class::tiny) : -1, memory.thin.cubes.triangle[at]);
         }
@@ -236,7 +239,8 @@ struct first_warp {
     }
 };
 
-// The n triangles that wait in a block's queues, up to 32, none of which is large, by one warp, a thread each.
+// Draws the n triangles, at most 32 and none of them large, that wait in the block's queues, by one warp, a thread
+// each.
 template <class Call>
 __device__ __noinline__ typename Call::sink::totals
 draw_left(const Call& call, unsigned* dropped, first_memory<Call> (&memories)[raster_warps],
@@ -271,9 +275,10 @@ draw_left(const Call& call, unsigned* dropped, first_memory<Call> (&memories)[ra
     return sink.end();
 }
 
-// The first kernel. Alone: there is no second one, since nothing is handed on for all that is known. What a block would
-// hand on at its end is drawn there then, where it is little; what is handed on all the same is not drawn. `again` is
-// the call once more, for functions that are called: what has its address taken is read anew behind each reduction.
+// The first pass. Alone: no deferred pass follows, because calls like this one deferred little. Each block then draws
+// its own deferred triangles at its end if they are few; if not, they are missing, and the call fails. `again`: a copy
+// of the call for out-of-line functions. If its own address were taken, the compiler would reload the call after each
+// reduction.
 template <class Call, bool Alone, bool Close>
 __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& again, pipeline_state* state) {
     using sink_type = typename Call::sink;
@@ -308,7 +313,7 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
     if (left >= class_writer::many) {
         writer.finish(places);
     } else if (left != 0 && threadIdx.x < 32) {
-        (void)sink.end(); // the memory is another sink's
+        (void)sink.end(); // flushes; the memory becomes another sink's
         sink.take_over(draw_left(again, dropped, memories, places, static_cast<unsigned>(left)));
     }
     sink.finish(state);
@@ -331,25 +336,24 @@ __global__ __launch_bounds__(raster_threads,
 
 // ---- host -----------------------------------------------------------------------------------------------------------
 
-// Blocks of the first kernel: what fits the device at once, but more where it is so small that there would be more
-// rounds of them than warp_triangles can number.
+// Blocks of the first pass: as many as fit the device at once, but no fewer than warp_triangles needs to number their
+// rounds.
 [[nodiscard]] inline unsigned raster_blocks(std::uint32_t num_triangles, int per_multiprocessor) {
     const std::uint32_t batches = core::blocks_for_each(num_triangles, raster_threads);
     const auto at_once = static_cast<std::uint32_t>(num_multiprocessors() * per_multiprocessor);
     return std::min(batches, std::max(at_once, core::blocks_for_each(batches, warp_triangles::max_rounds)));
 }
 
-// Whether a call of one draw may be launched without its second kernel, where others like it num_deferred so many
-// triangles.
+// True if a call of one draw may be launched without a deferred pass, if calls like it deferred `left` triangles.
 [[nodiscard]] inline bool leaves_few(std::size_t num_triangles, std::uint64_t left) {
     const std::uint64_t batches = core::blocks_for_each(num_triangles, raster_threads);
     const auto at_once = static_cast<std::uint64_t>(num_multiprocessors()) * max_left_blocks;
     return left <= std::min(batches, at_once) * max_left_of_block;
 }
 
-// is_first: whether these are a call's first kernels. They read indices before they await the stream, which the
-// caller's own kernel in front of them may still write. skips_deferred_pass: whether the first kernel does it all, for
-// all that is known; what it hands on all the same is not drawn.
+// is_first: these are a call's first kernels. They read indices before they wait for the stream, so they must not start
+// early: a kernel of the caller may still be writing them. skips_deferred_pass: triangles that the first pass defers
+// all the same are not drawn, and the call fails.
 template <class Call>
 void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
                    bool skips_deferred_pass = false) {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Classes of triangles by what they cost, and the sizes that part them.
+// Size classes of triangles: what a triangle costs, and who draws it.
 
 #include <voxelpipe/device/scene/triangle_source.cuh>
 
@@ -10,15 +10,15 @@ namespace voxelpipe::device {
 
 inline constexpr int raster_threads = 128; // of a block
 inline constexpr int raster_warps = raster_threads / 32;
-// A bounding box of so many voxels a side is done without a loop over it (raster_tiny).
+// Longest side of a bounding box that is drawn without a loop (raster_tiny).
 template <coverage Rule>
 inline constexpr int max_tiny_side = Rule == coverage::thin ? 2 : 3;
-inline constexpr int most_side = 8;      // a bounding box of so many voxels a side has rows of a byte
-inline constexpr int max_long_side = 16; // one has rows of 16 bits
-inline constexpr int max_cells = 1024;   // one of so many voxels is one thread's work
-inline constexpr int small_cells = 27;   // one of so many voxels waits apart from the larger ones
+inline constexpr int most_side = 8;      // longest side of a box whose rows fit a byte
+inline constexpr int max_long_side = 16; // longest side of a box whose rows fit 16 bits
+inline constexpr int max_cells = 1024;   // most voxels of a box that one thread draws
+inline constexpr int small_cells = 27;   // most voxels of size_class::thread
 inline constexpr int small_columns = 12; // the same for thin coverage, in columns of voxels
-inline constexpr int max_columns = 192;  // thin: one thread's work
+inline constexpr int max_columns = 192;  // thin: most columns that one thread draws
 
 // Classes of triangles by the cost of their bounding boxes. Larger ones are split into work items
 // (split_triangles.cuh).
@@ -26,14 +26,14 @@ struct size_class {
     enum : int {
         tiny,         // one thread, without a loop (raster_tiny)
         thread,       // one thread
-        thread_heavy, // one thread, much work: drawn apart from the others, so that lanes of a warp end together
+        thread_heavy, // one thread, much work: drawn apart from the others, so that lanes of a warp finish together
         warp_group,   // group_lanes lanes
         count
     };
 };
 
-// What a triangle costs: voxels of its bounding box, or for thin coverage the columns that it can touch at most.
-// `most`: the box's longest side.
+// Classifies a triangle by its cost: voxels of its bounding box, or for thin coverage the most columns that it can
+// touch. `most`: the box's longest side.
 template <coverage Rule>
 [[nodiscard]] __device__ VOXELPIPE_INLINE int size_class_of(const int32_triangle& r, int most) {
     constexpr bool thin = Rule == coverage::thin;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Raster of one small triangle, by a thread or by eight lanes. Its fragments go to a sink (raster/sink.cuh).
+// Raster of one small triangle, by one thread or by eight lanes. Fragments go to a sink (raster/sink.cuh).
 
 #include <voxelpipe/core/brick_triangle.hpp>
 #include <voxelpipe/core/corner_signs.hpp>
@@ -19,16 +19,17 @@ namespace voxelpipe::device {
 
 // ---- small triangles ------------------------------------------------------------------------------------------------
 
-// The longest side of its bounding box, in voxels: what 32 bits hold.
+// Longest side of a bounding box, in voxels, for which 32 bits suffice.
 [[nodiscard]] __device__ VOXELPIPE_INLINE int max_group_side(int fraction) { return fraction < 16 ? 32 : 16; }
 static_assert(core::small_voxels(16) == 16 && core::small_voxels(15) == 32 && core::small_voxels(12) == 32);
 
-// What the threads of one warp keep of a triangle each (small_conservative::rows_of_16, small_thin::columns), a column
-// for each lane.
+// Storage for a warp: each lane has a column of words for its triangle (small_conservative::rows_of_16,
+// small_thin::columns).
 struct kept_rows {
     word words[max_long_side][32];
 };
-// The lane's, by an address that the compiler cannot see through: it would find it anew each time, in ten instructions.
+// One lane's column. The address is hidden from the compiler, which would otherwise recompute it each time, in ten
+// instructions.
 struct lane_rows {
     std::uint32_t first;
 
@@ -47,20 +48,20 @@ struct lane_rows {
 };
 static_assert(sizeof(kept_rows::words[0]) == 128);
 struct no_rows {};
-// A part of at most 32 x 32 columns by group_lanes lanes, or of max_columns by one, has so few rows along its shorter
-// side.
+// A part of at most 32 x 32 columns by group_lanes lanes, or of max_columns by one, has at most max_long_side rows
+// along its shorter side.
 static_assert(max_columns < max_long_side * max_long_side && 32 / group_lanes <= max_long_side);
 
-// The columns of a small triangle that thin coverage wants, rows along the longer side of what is wanted of its box,
-// and where their voxels lie, which is linear in u, v and w.
+// The columns of a small triangle for thin coverage: rows along the longer side of the box, and the position of their
+// voxels, which is linear in u, v and w.
 template <class Place>
 struct thin_columns {
     core::small_thin s;
     core::triple<std::int32_t> begin, end; // along u, v, w
-    int lowest, depth;                     // along w: voxels of the grid before the box, and of the grid
+    int lowest, depth;                     // along w: voxels of the grid before the box; voxels of the grid
     Place origin, by_u, by_v, by_w;
 
-    // False where the triangle has no area.
+    // Returns false if the triangle has no area.
     template <class Source, class Sink>
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool find(const raster_input<Source>& call, const core::small_triangle& t,
                                                         const std::int32_t (&lo)[3], const core::small_box& box,
@@ -80,14 +81,14 @@ struct thin_columns {
         depth = axis == 0 ? call.extent.x : axis == 1 ? call.extent.y : call.extent.z;
         lowest = axis == 0 ? lo[0] : axis == 1 ? lo[1] : lo[2];
         const auto step_along = [&](int k) VOXELPIPE_INLINE_LAMBDA { return sink.place(k == 0, k == 1, k == 2); };
-        const int next = axis == 2 ? 0 : axis + 1, last = axis == 0 ? 2 : axis - 1; // along u and v
+        const int next = axis == 2 ? 0 : axis + 1, last = axis == 0 ? 2 : axis - 1; // axes of u and v
         origin = sink.place(lo[0], lo[1], lo[2]);
         by_u = step_along(swapped ? last : next);
         by_v = step_along(swapped ? next : last);
         by_w = step_along(axis);
         return true;
     }
-    // Whether every column's voxel lies in the grid: one may lie beyond the box on both sides of it.
+    // True if every column's voxel lies in the grid: it may lie one beyond the box on either side.
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_inside() const {
         return lowest >= 1 && lowest + end[2] + 1 < depth;
     }
@@ -96,7 +97,7 @@ struct thin_columns {
 template <class Sink>
 using place_of_sink = decltype(std::declval<const Sink&>().place(0, 0, 0));
 
-// Thin fragments of the columns in rows first, first + step, ... of a small triangle; false where it has no area.
+// Emits the thin fragments of the columns in rows first, first + step, ...; returns false if the triangle has no area.
 template <class Source, class Kept, class Sink>
 __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, const core::small_triangle& t,
                                              const std::int32_t (&lo)[3], const core::small_box& box, int first,
@@ -114,8 +115,8 @@ __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, c
     return true;
 }
 
-// The same for a warp whose lanes have a triangle each and give their fragments one at a time, for a sink that wants
-// to know how many they are. All lanes take part; false where that cannot be known: nothing has been done then.
+// The same for a warp that passes fragments in rounds, to a sink that needs their number first. All lanes call it.
+// Returns false, with nothing done, if the number cannot be known.
 template <class Source, class Kept, class Sink>
 [[nodiscard]] __device__ VOXELPIPE_INLINE bool raster_thin_by_rounds(const raster_input<Source>& call,
                                                                      const int32_triangle& r, Kept&& kept, Sink& sink) {
@@ -141,17 +142,17 @@ template <class Source, class Kept, class Sink>
     return true;
 }
 
-// Of a warp's 32 triangles, so many thin boxes of two voxels a side at least are done where they are read; fewer are
-// gathered, so that all lanes have one.
+// Draw thin boxes of at most two voxels a side as soon as they are read, if a warp's 32 triangles have at least this
+// many; fewer are queued until all lanes have one.
 inline constexpr int min_thin_cubes = 16;
 
-// Thin fragments of a bounding box of at most two voxels a side, all columns at once. Most triangles of a fine mesh are
-// of this kind.
+// Emits the thin fragments of a bounding box of at most two voxels a side, all columns at once: the common case of a
+// fine mesh.
 template <class Source, class Sink>
 __device__ VOXELPIPE_INLINE void emit_thin_cube(const raster_input<Source>& call, const int32_triangle& r,
                                                 const core::thin_cube& cube, Sink& sink) {
     const int axis = cube.axis;
-    // A voxel beyond the box on both sides of it counts.
+    // The voxel may lie one beyond the box on either side.
     const bool inside = (r.lo[0] - 1 | r.lo[1] - 1 | r.lo[2] - 1 | (call.extent.x - 3 - r.lo[0]) |
                          (call.extent.y - 3 - r.lo[1]) | (call.extent.z - 3 - r.lo[2])) >= 0;
     word columns = cube.columns;
@@ -168,7 +169,7 @@ __device__ VOXELPIPE_INLINE void emit_thin_cube(const raster_input<Source>& call
         return below + by_u * (column & 1) + by_v * (column >> 1) + by_w * cube.depth(column);
     });
 }
-// False where the triangle has no area.
+// Returns false if the triangle has no area.
 template <class Source, class Sink>
 __device__ VOXELPIPE_INLINE bool raster_thin_cube(const raster_input<Source>& call, const int32_triangle& r,
                                                   Sink& sink) {
@@ -178,9 +179,9 @@ __device__ VOXELPIPE_INLINE bool raster_thin_cube(const raster_input<Source>& ca
     return true;
 }
 
-// Conservative fragments within a box of at most 32 voxels a side, by group_lanes neighbouring lanes that all take
-// part. Of 8 x 8 rows along x, those of one y or of one z at a time, whichever of these have fewer that something is
-// left of: a floor has rows of one y, a wall may have rows of one z.
+// Emits the conservative fragments within a box of at most 32 voxels a side; group_lanes neighbouring lanes call it
+// together. Takes 8 x 8 rows along x at a time, by rows of equal y or of equal z, whichever has fewer non-empty ones: a
+// floor has rows of one y, a wall may have rows of one z.
 template <class Sink>
 __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s, const std::int32_t (&lo)[3],
                                               const core::small_box& box, Sink& sink) {
@@ -202,7 +203,7 @@ __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s,
                 const int y = first_y + (by_y ? one : lane), z = first_z + (by_y ? lane : one);
                 const word bits = limit == 0 || !s.meets_row(y, z) ? 0 : s.plane_bits(x0, y, z, limit);
                 if constexpr (Sink::splits_long_rows) {
-                    if (by_y && __popc(ys) <= group_lanes / 4) { // few long rows: each by all lanes
+                    if (by_y && __popc(ys) <= group_lanes / 4) { // few long rows: all lanes draw each
                         word rows = __ballot_sync(group, bits != 0) >> first_of_group;
                         const unsigned longest = __reduce_max_sync(group, static_cast<unsigned>(__popc(bits)));
                         if (static_cast<unsigned>(__popc(rows)) * 5 <= longest * 3) {
@@ -221,19 +222,20 @@ __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s,
     }
 }
 
-// Of the voxels of 2 x 2 x 2, bit x + 2 y + 4 z, those that a box has.
+// The voxels of 2 x 2 x 2, bit x + 2 y + 4 z, that lie in a box.
 [[nodiscard]] __device__ VOXELPIPE_INLINE word cube_part(const core::small_box& box) {
     return (box.lo[0] == 0 ? 0xffu : 0xaau) & (box.hi[0] == 1 ? 0xffu : 0x55u) & (box.lo[1] == 0 ? 0xffu : 0xccu) &
            (box.hi[1] == 1 ? 0xffu : 0x33u) & (box.lo[2] == 0 ? 0xffu : 0xf0u) & (box.hi[2] == 1 ? 0xffu : 0x0fu);
 }
-// Conservative fragments within a bounding box of at most two voxels a side, most triangles of a fine mesh, of each
-// lane that wants them, as emit_cube takes them. None where telling them takes more bits than a float has, or where
-// none lie in the grid: then raster_tiny. `inside`: of int32_triangle. All lanes take part.
+// Conservative coverage of a bounding box of at most two voxels a side, the common case of a fine mesh, for each lane
+// that wants it; the result is for emit_cube. 0 if floats cannot decide, or if nothing lies in the grid: then
+// raster_tiny. `inside`: of int32_triangle. All lanes call it.
 template <class Source>
 [[nodiscard]] __device__ VOXELPIPE_INLINE word find_cube(const raster_input<Source>& call, bool wanted,
                                                          const int32_triangle& r, int inside) {
     word bits = 0;
-    const int wide = wanted ? r.last[0] + r.last[1] + r.last[2] : 0; // along how many axes
+    const int wide =
+        wanted ? r.last[0] + r.last[1] + r.last[2] : 0; // number of axes along which the box has two voxels
     const bool all_ways = __any_sync(0xffffffffu, wide == 3);
     if (wanted) {
         if (wide < 2) { // a line is covered whole
@@ -258,7 +260,7 @@ __device__ VOXELPIPE_INLINE void emit_cube(const int32_triangle& r, word bits, S
     sink.cube(r.lo[0], r.lo[1], r.lo[2], bits);
 }
 
-// A triangle by group_lanes neighbouring lanes, where it is wanted. All lanes of the warp take part.
+// Draws one triangle by group_lanes neighbouring lanes, if wanted. All lanes of the warp call it.
 template <coverage Rule, class Source, class Sink>
 __device__ VOXELPIPE_INLINE void raster_by_group(const raster_input<Source>& call, bool wanted, std::uint32_t triangle,
                                                  const lane_rows& kept, Sink& sink) {
@@ -279,7 +281,7 @@ __device__ VOXELPIPE_INLINE void raster_by_group(const raster_input<Source>& cal
     });
 }
 
-// A bounding box of at most two voxels a side, or three for conservative coverage, by one thread.
+// Draws a bounding box of at most two voxels a side, or three for conservative coverage, by one thread.
 template <coverage Rule, class Source, class Sink>
 __device__ VOXELPIPE_INLINE void raster_tiny(const raster_input<Source>& call, const int32_triangle& r, Sink& sink) {
     if constexpr (Rule == coverage::thin) {
@@ -298,8 +300,8 @@ __device__ VOXELPIPE_INLINE void raster_tiny(const raster_input<Source>& call, c
     }
 }
 
-// Conservative fragments of the triangles of one list by a warp whose lanes have one each and give their rows one at a
-// time. tiny: whether the boxes are of at most three voxels a side, or of at most max_long_side. All lanes take part.
+// Conservative coverage for a warp that passes rows in rounds: one triangle a lane, all of one list. tiny: boxes of at
+// most three voxels a side; otherwise at most max_long_side. All lanes call it.
 template <class Source, class Kept, class Sink>
 __device__ VOXELPIPE_INLINE void raster_rows_by_rounds(const raster_input<Source>& call, const int32_triangle& r,
                                                        bool tiny, Kept&& kept, Sink& sink) {
@@ -332,7 +334,7 @@ __device__ VOXELPIPE_INLINE void raster_rows_by_rounds(const raster_input<Source
                         VOXELPIPE_INLINE_LAMBDA { rows.template next<true>(s, kept, emit_to(emit)); });
 }
 
-// Any small triangle, by one thread. Apart: in a kernel that keeps nothing else in registers meanwhile. kept:
+// Draws any small triangle, by one thread. Apart: the kernel holds nothing else in registers meanwhile. kept:
 // lane_rows, or no_rows for conservative boxes of at most most_side voxels a side.
 template <coverage Rule, bool Apart, class Source, class Kept, class Sink>
 __device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, const int32_triangle& r,

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Raster of large triangles without tiles: each is split into pieces that warps share out, whatever triangles they
-// belong to. Conservative coverage finds the bricks (core/brick_triangle.hpp) that a triangle meets, then the voxels of
-// each; thin coverage takes rows of 16 columns. What all pieces of a triangle need of it is found once where there are
-// many (split_setup). A triangle that the 64-bit path cannot hold goes through 128 bits.
+// Raster of large triangles without tiles: each is split into work items, which warps share out, whatever triangles
+// they belong to. Conservative coverage finds the bricks (core/brick_triangle.hpp) that a triangle meets, then the
+// voxels of each; thin coverage takes rows of 16 columns. If triangles have many work items, each is set up once
+// (split_setup). A triangle too large for 64 bits goes through 128.
 
 #include <voxelpipe/device/raster/deferred_triangles.cuh>
 #include <voxelpipe/device/raster/small_triangles.cuh>
@@ -21,24 +21,24 @@ namespace voxelpipe::device {
 inline constexpr int max_immediate_extent = 1 << 16; // bricks are numbered with 16 bits, voxels with 32
 static_assert((std::int64_t{max_immediate_extent} / core::brick_size + 1) * (max_immediate_extent + 1) < 1u << 31);
 
-// How a large triangle's box of voxels is split into pieces, a lane each, some to a record, which is a warp's.
-// Conservative: columns of bricks along the dominant axis, few, for the bricks of a column keep eight lanes busy, and
-// the last warp to end is one with a floor or a wall. Thin: rows of 16 columns of voxels, along that axis of the other
-// two which makes fewer of them.
+// Splits a large triangle's box of voxels into pieces, one per lane, and groups these into work items, one per warp.
+// Conservative: columns of bricks along the dominant axis, few per work item, because the bricks of a column keep eight
+// lanes busy, and a floor or a wall would otherwise make one warp finish last. Thin: rows of 16 columns of voxels,
+// along the one of the other two axes that makes fewer of them.
 template <coverage Rule>
 struct split_pieces {
     static constexpr int across = Rule == coverage::thin ? 1 : core::brick_size; // voxels along v
     static constexpr int per_record = Rule == coverage::thin ? 32 : 8;
     core::row_axes axes;
-    core::triple<std::int64_t> lo, hi;            // uvw by these axes, the box
-    std::int64_t first_u, first_v, per_row, rows; // 32 bits number pieces (max_immediate_extent)
+    core::triple<std::int64_t> lo, hi;            // the box, as uvw of these axes
+    std::int64_t first_u, first_v, per_row, rows; // 32 bits can number the pieces (max_immediate_extent)
 
     split_pieces() = default;
     VOXELPIPE_HD split_pieces(const core::voxel_box& box, int dominant)
         : split_pieces(box, core::row_axes{dominant, false}) {
         if constexpr (Rule == coverage::thin) {
             const split_pieces by_v(box, core::row_axes{dominant, true});
-            // Columns along x may be set by one word.
+            // A row of columns along x is set by one word, so it counts 3/4.
             const std::int64_t mine = count() * (axes.are_along_x() ? 3 : 4),
                                other = by_v.count() * (by_v.axes.are_along_x() ? 3 : 4);
             if (other < mine) *this = by_v;
@@ -46,15 +46,15 @@ struct split_pieces {
     }
     [[nodiscard]] VOXELPIPE_HD std::int64_t count() const { return per_row * rows; }
     [[nodiscard]] VOXELPIPE_HD std::int64_t records() const { return (count() + per_record - 1) / per_record; }
-    // The lowest voxel of piece i along u and v, maybe outside the box.
+    // The lowest voxel of piece i along u and v, possibly outside the box.
     [[nodiscard]] VOXELPIPE_HD std::int64_t u(std::int64_t i) const {
         return (first_u + static_cast<std::uint32_t>(i) % static_cast<std::uint32_t>(per_row)) << core::log2_brick;
     }
     [[nodiscard]] VOXELPIPE_HD std::int64_t v(std::int64_t i) const {
         return (first_v + static_cast<std::uint32_t>(i) / static_cast<std::uint32_t>(per_row)) * across;
     }
-    // A piece by several lanes: whether part `part` of lanes_each has rows within the box, and these as a box of
-    // voxels.
+    // Piece i divided among lanes_each lanes: has_rows is true if part `part` has rows within the box, piece returns
+    // them as a box of voxels.
     static constexpr int lanes_each = 32 / per_record;
     [[nodiscard]] VOXELPIPE_HD bool has_rows(std::int64_t i, unsigned part) const {
         return first_row(i, part) <= hi[1] && first_row(i, part + 1) > lo[1];
@@ -66,7 +66,7 @@ struct split_pieces {
         return {axes.from_rows(inside(u0, 0), inside(v0, 1), lo[2]),
                 axes.from_rows(inside(u1, 0), inside(v1, 1), hi[2])};
     }
-    // The most records that a triangle can have in a grid.
+    // The most work items that a triangle can have in a grid of this extent.
     [[nodiscard]] static std::uint64_t max_records(glm::ivec3 extent) {
         const auto of = [](std::int64_t along, std::int64_t rest) {
             const std::int64_t pieces = (along / core::brick_size + 1) * (rest / across + 1);
@@ -86,17 +86,17 @@ private:
         return v(i) + part * (across / lanes_each);
     }
 };
-// Whichever rule.
+// For either rule.
 [[nodiscard]] inline std::uint64_t max_work_items(glm::ivec3 extent) {
     return std::max(split_pieces<coverage::thin>::max_records(extent),
                     split_pieces<coverage::conservative>::max_records(extent));
 }
 
-// A triangle in full width, and what it may touch.
+// A triangle in full width, and the voxels that it may touch.
 template <class Call>
 struct located_triangle {
     core::snapped_position a, b, c;
-    core::voxel_box reach{}; // what of the grid, where it is drawn
+    core::voxel_box reach{}; // within the grid, if it is drawn
     core::triangle_class kind;
 
     __device__ VOXELPIPE_INLINE located_triangle(const Call& call, std::uint32_t triangle) {
@@ -107,13 +107,13 @@ struct located_triangle {
         const core::voxel_box grid{{{0, 0, 0}}, {{call.in.extent.x - 1, call.in.extent.y - 1, call.in.extent.z - 1}}};
         kind = core::classify<Call::rule>(a, b, c, call.in.fraction, grid, reach);
     }
-    // How it is split, where it is drawn.
+    // How it is split, if it is drawn.
     [[nodiscard]] __device__ VOXELPIPE_INLINE split_pieces<Call::rule> pieces(int fraction) const {
         return {reach, core::dominant_axis(a, b, c, fraction)};
     }
 };
 
-// Decides about a triangle; records: how many it has, where it is drawn.
+// Classifies a triangle; if it is drawn, `records` becomes its number of work items.
 template <class Call>
 __device__ inline core::triangle_class find_records(const Call& call, std::uint32_t triangle,
                                                     unsigned long long& records) {
@@ -124,7 +124,7 @@ __device__ inline core::triangle_class find_records(const Call& call, std::uint3
     return t.kind;
 }
 
-// The oversized triangles that a block left until its end, by all its threads.
+// Splits the oversized triangles that a block left until its end. All of its threads call it.
 template <class Call, class Sink>
 __device__ VOXELPIPE_INLINE void split_oversized(const Call& call, Sink& sink, const std::uint32_t* oversized,
                                                  unsigned num_oversized) {
@@ -141,17 +141,17 @@ __device__ VOXELPIPE_INLINE void split_oversized(const Call& call, Sink& sink, c
     }
 }
 
-// What all records of a large triangle need of it.
+// Values of a split triangle that all of its work items need.
 template <coverage Rule>
 struct alignas(16) split_setup {
-    std::conditional_t<Rule == coverage::thin, core::brick_thin, core::brick_triangle> bricks; // where is_narrow
-    core::voxel_box box, reach; // of the triangle; what of it lies in the grid
+    std::conditional_t<Rule == coverage::thin, core::brick_thin, core::brick_triangle> bricks; // set if is_narrow
+    core::voxel_box box, reach; // of the triangle; its part within the grid
     split_pieces<Rule> pieces;
-    unsigned long long first_record; // of all, the triangle's first one
+    unsigned long long first_record; // number of the triangle's first work item
     std::uint32_t triangle;
-    std::uint32_t is_narrow; // or the 64-bit path cannot hold it
+    std::uint32_t is_narrow; // 0 if the 64-bit path cannot hold it
 
-    // Of a triangle that has records, this one of those. By one thread.
+    // Computes the setup of split triangle `number`. One thread calls it.
     template <class Call>
     __device__ VOXELPIPE_INLINE void find(const Call& call, std::uint32_t number) {
         const int fraction = call.in.fraction;
@@ -171,8 +171,8 @@ struct alignas(16) split_setup {
         else
             bricks = core::brick_triangle(t.a, t.b, t.c, whole, fraction);
     }
-    // Those that this warp keeps for all warps, a lane each, so that all warps have one to do before any has two; and
-    // for each of their records, whose it is.
+    // Computes this warp's share of the setups, one per lane, strided so that all warps have one before any has two.
+    // Stores for each of their work items which setup it needs.
     template <class Call>
     __device__ VOXELPIPE_INLINE static void keep(const Call& call, unsigned warp, unsigned warps, std::uint32_t num) {
         const unsigned lane = threadIdx.x % 32;
@@ -200,8 +200,8 @@ struct alignas(16) split_setup {
         __syncwarp();
         if (lane == 0 && kept != 0) atomicAdd(call.lists.set_up, static_cast<unsigned long long>(kept));
     }
-    // Whether all `num` are there, soon: nobody waits long, for there may be blocks that have not begun. All lanes take
-    // part.
+    // True if all `num` setups are ready. Polls for a short time only: there may be blocks that have not begun. All
+    // lanes call it.
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool are_kept(const deferred_triangles& lists, std::uint32_t num) {
         ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device> kept(*lists.set_up);
         bool all = false;
@@ -213,7 +213,7 @@ struct alignas(16) split_setup {
         __threadfence();
         return all;
     }
-    // Begins to bring one of those to this place in shared memory; to wait for it is the caller's. All lanes take part.
+    // Starts to copy a setup to this place in shared memory; the caller waits for it. All lanes call it.
     __device__ VOXELPIPE_INLINE void fetch(const deferred_triangles& lists, std::uint32_t number) {
         constexpr unsigned parts = sizeof(split_setup) / sizeof(uint4);
         static_assert(parts <= 32 && sizeof(split_setup) <= deferred_triangles::setup_bytes);
@@ -229,11 +229,12 @@ private:
     }
 };
 
-// Rows of bits along x from spans of columns: columns next to each other with one voxel at the same depth become one.
+// Makes rows of bits along x from spans of columns: neighbouring columns with one voxel at the same depth become one
+// row.
 template <class Sink>
 struct span_writer {
     Sink& sink;
-    int x = 0, y = 0, z = 0; // of the row that waits
+    int x = 0, y = 0, z = 0; // of the pending row
     word mask = 0;
 
     __device__ VOXELPIPE_INLINE void flush() {
@@ -267,8 +268,8 @@ struct span_writer {
     }
 };
 
-// The last of n ascending numbers, n > 0, that is at most `number`; the first is. All lanes of a warp take part, with
-// the same arguments: each probes a place, so that few loads wait for one another.
+// Index of the last of n > 0 ascending numbers that is at most `number`; the first one must be. All lanes of a warp
+// call it with the same arguments; each probes one element, so that few loads wait for one another.
 [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned find_last(const unsigned long long* numbers, unsigned n,
                                                              unsigned long long number) {
     const unsigned lane = threadIdx.x % 32;
@@ -285,17 +286,18 @@ struct span_writer {
 
 inline constexpr int max_bricks = 64;
 
-// What one warp keeps in shared memory for a large triangle.
+// Shared memory of one warp for split triangles.
 template <coverage Rule>
 struct brick_memory {
-    split_setup<Rule> setups[2]; // of a record and of the next one
-    std::uint32_t next;          // the number of the next one's, or of the one after that
-    // Those that wait, in bricks of the grid.
+    split_setup<Rule> setups[2]; // of a work item and of the next one
+    std::uint32_t next;          // the setup's number of the next work item, or of the one after that
+    // Bricks that wait, by their position in the grid.
     std::int16_t bricks[Rule == coverage::thin ? 1 : 3][max_bricks];
 };
 
-// Into how many parts, a power of two, a record is split. A warp goes through the bricks of its columns four at a time:
-// where there are few records, more warps with less each end sooner. Thin pieces are a lane's own.
+// Number of parts, a power of two, that a work item is divided into. A warp goes through the bricks of its columns four
+// at a time: if there are few work items, more warps with less work finish sooner. A thin piece is one lane's, so it is
+// not divided.
 template <coverage Rule>
 [[nodiscard]] VOXELPIPE_HD inline unsigned parts_of_record(unsigned long long records, unsigned warps) {
     unsigned parts = 1;
@@ -304,17 +306,17 @@ template <coverage Rule>
     return parts;
 }
 
-// A lane's piece of a large thin triangle: a row of columns, and where its voxels lie (see thin_columns).
+// A lane's piece of a split thin triangle: a row of columns, and the position of its voxels (see thin_columns).
 template <class Place>
 struct thin_piece {
     core::brick_row row;
     core::row_axes axes;
-    int u, v;            // of the row's first column; its depths count from
-    std::int32_t w;      // this one
-    std::int32_t lo, hi; // depths of the grid that the triangle can have, from the same
+    int u, v;            // of the row's first column
+    std::int32_t w;      // depths count from here
+    std::int32_t lo, hi; // depths of the grid that the triangle can have
     Place origin, by_u, by_w;
 
-    // No columns where it is not `wanted`.
+    // Has no columns if not `wanted`.
     template <class Sink>
     __device__ VOXELPIPE_INLINE thin_piece(const split_setup<coverage::thin>& t, std::int64_t piece, bool wanted,
                                            const Sink& sink)
@@ -323,7 +325,7 @@ struct thin_piece {
         const auto& last = t.bricks.last;
         const auto low = [&](int k) { return static_cast<std::int32_t>(t.pieces.lo[k]); };
         const auto high = [&](int k) { return static_cast<std::int32_t>(t.pieces.hi[k]); };
-        wanted = wanted && v >= first[1] && v <= last[1]; // the box within the grid is a voxel wider
+        wanted = wanted && v >= first[1] && v <= last[1]; // the box within the grid is one voxel wider
         if (wanted && t.bricks.meets_row(u - first[0], v - first[1]))
             row = core::brick_row(t.bricks, u - first[0], v - first[1],
                                   core::max3(u, first[0], low(0)) - u, // columns of the bounding box, within the grid
@@ -340,14 +342,14 @@ struct thin_piece {
         by_w = place(0, 0, 1);
     }
 
-    // To a sink that shares out what all lanes have, 32 columns at a time whosever row they are in; false where that
-    // cannot be, for some may lie outside of the grid. All lanes take part, with rows of one triangle.
+    // Passes the fragments to a sink that distributes them over all lanes, 32 columns at a time from any lanes' rows.
+    // Returns false, with nothing done, if some may lie outside the grid. All lanes call it, with rows of one triangle.
     template <class Sink>
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool emit_by_group(const split_setup<coverage::thin>& t,
                                                                  Sink& sink) const {
         constexpr int most = core::brick_size + 1; // slopes are at most one
         if (!__all_sync(0xffffffffu, row.columns == 0 || (lo <= -most && hi >= most))) return false;
-        const int first = row.columns != 0 ? row.first_column() : 0; // of no lane that has none is anything asked
+        const int first = row.columns != 0 ? row.first_column() : 0; // lanes without columns are not asked
         sink.share(__popc(row.columns), [&](unsigned lane, unsigned i) VOXELPIPE_INLINE_LAMBDA {
             constexpr unsigned all = 0xffffffffu;
             core::brick_row of_lane;
@@ -360,8 +362,8 @@ struct thin_piece {
         });
         return true;
     }
-    // Run by run of columns that have one depth. ByPlace: those that do not lie along x go to where they lie; otherwise
-    // all are rows, of which the sink is told.
+    // Emits runs of columns with equal depth. ByPlace: runs that do not lie along x are emitted by position; otherwise
+    // all are rows, which are marked too.
     template <bool ByPlace, class Sink>
     __device__ VOXELPIPE_INLINE void emit(const split_setup<coverage::thin>& t, Sink& sink) const {
         if (row.columns == 0) return;
@@ -389,7 +391,7 @@ struct thin_piece {
     }
 };
 
-// How many records there are, and triangles that have some.
+// The numbers of work items and of split triangles.
 struct split_work_items {
     unsigned long long records, triangles;
 
@@ -398,15 +400,15 @@ struct split_work_items {
         records = packed & ((1ull << deferred_triangles::work_item_bits) - 1);
         triangles = packed >> deferred_triangles::work_item_bits;
     }
-    // Whether all triangles are set up first, for whoever has one of their records: where warps have several.
+    // True if all triangles are set up before their work items are drawn: if each warp has several.
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool want_setups(const deferred_triangles& lists, unsigned warps) const {
         return triangles <= lists.num_setups && records >= 3 * warps && records <= lists.oversized_capacity;
     }
 };
 
-// The pieces of all triangles in call.lists.split, a lane each; parts warp, warp + warps, ... of the
-// records are this warp's. Conservative: the lanes find the bricks that the triangle meets in their columns, and
-// group_lanes of them then take a brick each.
+// Draws the pieces of all split triangles; parts warp, warp + warps, ... of the work items are this warp's, a piece per
+// lane. Conservative: the lanes find the bricks that the triangle meets in their columns, and group_lanes of them then
+// draw a brick each.
 template <class Call, class Sink>
 __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink, brick_memory<Call::rule>& memory,
                                                    unsigned warp, unsigned warps) {
@@ -419,8 +421,8 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
     const unsigned long long records = all.records;
     const unsigned parts = parts_of_record<Call::rule>(records, warps);
     using setup_type = split_setup<Call::rule>;
-    // What is kept comes while the record before is drawn, and the number of a record's, while the one before that is;
-    // in registers they would be waited for.
+    // A kept setup is fetched while the previous work item is drawn, and its number while the one before that is; into
+    // registers, they would have to be waited for.
     const bool are_kept = all.want_setups(call.lists, warps) &&
                           setup_type::are_kept(call.lists, static_cast<std::uint32_t>(all.triangles));
     const auto fetch_number = [&](unsigned long long record) VOXELPIPE_INLINE_LAMBDA {
@@ -435,8 +437,8 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
     unsigned which = 0;
     for (unsigned long long i = uniform(warp); i < records * parts; i += warps, which ^= are_kept ? 1u : 0u) {
         const unsigned long long r = i / parts;
-        __syncwarp(); // lanes that the last pieces kept apart come together; nobody reads the last setup any more
-        // Records whose triangles are kept have one part.
+        __syncwarp(); // lanes that diverged in the last pieces meet; nobody reads the last setup any longer
+        // Work items with kept setups have one part.
         if (are_kept) {
             await_copies();
             __syncwarp();
@@ -487,7 +489,7 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
                     emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
                         if (at >= n) return;
                         std::int32_t corner[3]; // in the grid
-                        int from[3];            // the same from the bounding box
+                        int from[3];            // the same, from the bounding box
                         core::small_box part;
                         for (int k = 0; k < 3; ++k) {
                             corner[k] = memory.bricks[k][at] * core::brick_size;
@@ -503,7 +505,7 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
                 }
                 __syncwarp();
             };
-            int w = 0, w_end = -1; // bricks, of which each of a piece's lanes has some
+            int w = 0, w_end = -1; // bricks along w; each of a piece's lanes has every lanes_each-th
             const std::int64_t u0 = pieces.u(piece), v0 = pieces.v(piece);
             if (valid) {
                 const auto origin = core::to_uvw(axis, box.lo[0], box.lo[1], box.lo[2]);

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Words of bits that a warp sets together. Neighbouring triangles, which are a warp's, touch the same words again and
-// again: of hairball's thin fragments in 1024^3, 76 in 100 are the first of their triangle in a word, but 17 in 100 the
-// first of 32 triangles. So a warp gathers bits in shared memory, by the number of their word, and each word takes one
-// reduction in L2. For thin coverage only: conservative rows, of 1.8 bits on average there, have gathered some already,
-// and to gather more takes more instructions than it saves.
+// Words of bits that a warp sets together. Neighbouring triangles, which a warp has, touch the same words repeatedly:
+// of hairball's thin fragments in 1024^3, 76 in 100 are the first of their triangle in a word, but only 17 in 100 are
+// the first of 32 triangles. So a warp gathers bits in shared memory, by word number, and each word takes one reduction
+// in L2. Only for thin coverage: conservative rows, of 1.8 bits on average there, have gathered some already, and
+// gathering more takes more instructions than it saves.
 
 #include <voxelpipe/core/triangle_setup.hpp>
 #include <voxelpipe/device/targets/global_target.cuh>
@@ -16,19 +16,19 @@
 
 namespace voxelpipe::device {
 
-// What one warp keeps: places by a hash of a word's number. What finds its place taken by another word goes to memory
+// Shared memory of one warp: slots by a hash of the word's number. A word whose slot is taken by another goes to memory
 // at once.
 struct word_places {
     static constexpr int log2_count = 8, count = 1 << log2_count;
     static constexpr std::uint32_t none = ~0u; // no target that is blended by 32-bit numbers has that word
-    uint2 places[count];                       // the number of a word, its bits
+    uint2 places[count];                       // number of a word, its bits
 
-    // All lanes take part, here and below; nothing waits.
+    // All lanes call it.
     __device__ VOXELPIPE_INLINE void start() {
         for (int i = static_cast<int>(threadIdx.x) % 32; i < count; i += 32) places[i] = uint2{none, 0};
         __syncwarp();
     }
-    // By any lanes. In assembly, so that no compiler provides for memory that is not shared.
+    // Any lanes call it. In assembly, so that the compiler does not provide for addresses outside shared memory.
     __device__ VOXELPIPE_INLINE void set(word* words, std::uint32_t number, word bits) {
         const std::uint32_t place = number * 0x9e3779b1u >> (32 - log2_count);
         const auto at = static_cast<std::uint32_t>(__cvta_generic_to_shared(places + place));
@@ -56,13 +56,13 @@ struct word_places {
 
 struct no_words {};
 
-// Whether a call gathers its thin fragments so: those of one target of bits that true sets, by 32-bit numbers.
+// True if a call gathers its thin fragments: it has one target of bits, set to true, with 32-bit word numbers.
 template <class Call>
 inline constexpr bool combines_words = Call::output::only_sets && (Call::rule == coverage::thin);
 template <class Call>
 using warp_words = std::conditional_t<combines_words<Call>, word_places, no_words>;
 
-// Takes the place of the sink that it is made from, for fragments one by one.
+// Replaces the sink that it is made from, for single fragments.
 template <class Call>
 struct combining_sink : Call::sink {
     word_places& words;
@@ -80,31 +80,31 @@ struct combining_sink : Call::sink {
     __device__ VOXELPIPE_INLINE void flush() { words.flush(voxelpipe::get<0>(this->call.out.fb.targets).elements); }
 };
 
-// ---- close cubes
-// -----------------------------------------------------------------------------------------------------
+// ---- close cubes ----------------------------------------------------------------------------------------------------
 
-// Bits of a batch of triangles that all lie within a few voxels, by their warp at once. Of the finest meshes 32
-// neighbours touch two words or three, all over again, and warps that look at those one by one wait for one another.
+// Bits of a batch of triangles that all lie within a few voxels, set by their warp at once. On the finest meshes 32
+// neighbours touch two or three words again and again, and warps that test those one by one wait for one another.
 
-// Whether batches of a mesh are likely to lie within 4 x 4 x 4 voxels, as far as the host knows: otherwise to ask costs
-// more than it gains. Of a surface as large as three of the grid's faces 32 triangles then cover five voxels or fewer.
+// True if batches of a mesh are likely to lie within 4 x 4 x 4 voxels, as far as the host knows; otherwise the test
+// costs more than it gains. On a surface as large as three faces of the grid, 32 triangles then cover at most five
+// voxels.
 [[nodiscard]] inline bool may_be_close(std::uint32_t num_triangles, const glm::ivec3& extent) {
-    constexpr std::uint64_t least = 6; // triangles for each voxel of those faces
+    constexpr std::uint64_t least = 6; // triangles per voxel of those faces
     const std::uint64_t x = static_cast<std::uint32_t>(extent.x), y = static_cast<std::uint32_t>(extent.y),
                         z = static_cast<std::uint32_t>(extent.z);
     return num_triangles >= least * (x * y + y * z + z * x);
 }
 
-// Sets the cubes of 2 x 2 x 2 voxels of a warp's lanes, where they lie within 4 x 4 x 4: two numbers hold all of them.
-// Of each lane the voxels x + 2 y + 4 z from lo on, which is anything where there are none; none lies outside of the
-// target. Returns whether they lie so; otherwise nothing is done. All lanes take part.
+// Sets the 2 x 2 x 2 cubes of a warp's lanes if all lie within 4 x 4 x 4 voxels, so that two words hold them. Each lane
+// has the voxels x + 2 y + 4 z from lo on; lo is arbitrary if there are none, and no voxel lies outside the target.
+// Returns false, with nothing done, if they do not lie so. All lanes call it.
 template <class Target>
 [[nodiscard]] __device__ VOXELPIPE_INLINE bool set_close_cubes(const target_view<Target>& t,
                                                                const std::int32_t (&lo)[3], word voxels) {
     constexpr unsigned all = 0xffffffffu;
     constexpr int middle_lane = 16; // its cube is to be in the middle
     const auto lane = static_cast<int>(threadIdx.x) % 32;
-    std::int32_t begin[3]; // maybe outside of the grid
+    std::int32_t begin[3]; // possibly outside the grid
     std::uint32_t from[3];
     for (int k = 0; k < 3; ++k) {
         const auto mine = static_cast<std::uint32_t>(lo[k]), first = __shfl_sync(all, mine, middle_lane) - 1;
@@ -122,7 +122,8 @@ template <class Target>
         const auto shift = static_cast<unsigned>(begin[0] & 31);
         const std::uint32_t number = word_of(t, begin[0], begin[1] + lane % 4, begin[2] + lane / 4);
         word missing = row << shift;
-        if (missing != 0) missing &= ~__ldca(word_at(t, number)); // maybe an old word: what has changed stays so
+        if (missing != 0)
+            missing &= ~__ldca(word_at(t, number)); // the word may be stale: bits are never cleared, so that is safe
         reduce_word<Target>(word_at(t, number), missing);
         if (shift > 28) reduce_word<Target>(word_at(t, number + 1), row >> (32 - shift));
     }

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Indices that are looked at before a call writes anything, and once for all calls (check_indices of the backend).
+// Checks of vertex indices: in a call, before it writes anything, or once for all calls (check_indices of the backend).
 
 #include <voxelpipe/device/base/kernel_library.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
@@ -11,11 +11,11 @@
 
 namespace voxelpipe::device {
 
-// Sets state->index_error where an index is not one of a vertex.
+// Sets state->index_error if an index is not below num_vertices.
 VOXELPIPE_DECLARES_KERNELS void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangles,
                                               std::uint64_t num_vertices, pipeline_state* state, cudaStream_t stream);
 
-// The greatest index of some triangles, none of which there may be; *most is 0 before.
+// The largest index of some triangles, possibly none. *max must be 0 before.
 VOXELPIPE_DECLARES_KERNELS void find_most_index(const array_view<const glm::uvec3>& triangles, std::uint32_t* most,
                                                 cudaStream_t stream);
 

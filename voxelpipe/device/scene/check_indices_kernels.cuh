@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The kernels that look at indices (scene/check_indices.cuh), and their launches.
+// Kernels and launches of scene/check_indices.cuh.
 
 #include <voxelpipe/device/scene/check_indices.cuh>
 
@@ -10,7 +10,6 @@
 
 namespace voxelpipe::device {
 
-// Before anything is written: whether every index is one of a vertex.
 template <class Index>
 __global__ void check_indices_kernel(const Index* indices, std::uint64_t count, Index num_vertices,
                                      pipeline_state* state) {
@@ -30,7 +29,7 @@ __global__ void check_indices_kernel(const Index* indices, std::uint64_t count, 
     if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, 1u);
 }
 
-// The greatest index, where `most` was 0.
+// *max must be 0 before.
 template <class Index>
 __global__ void max_index_kernel(const Index* indices, std::uint64_t count, Index* most) {
     await_stream();

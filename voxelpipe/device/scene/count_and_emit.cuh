@@ -2,33 +2,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Sharing out triangles of very different size. A triangle that may touch few cells (tiles or voxels) is one thread's
-// work. A larger one is cut into chunks, sub-boxes of its box of cells, which a warp takes 32 at a time: coverage is
-// exact within any box, so the pieces give exactly the whole. Every stage that turns triangles into cells is two
-// passes, count and emit, with a prefix sum between: cells come out by ascending primitive, whatever the launch order.
+// Distributes triangles of very different size. A triangle that may touch few cells (tiles or voxels) is one thread's
+// work. A larger one is divided into chunks, sub-boxes of its box of cells, of which a warp takes 32 at a time.
+// Coverage is exact within any box, so the chunks give exactly the whole. Every stage that turns triangles into cells
+// has two passes, count and emit, with a prefix sum between: cells come out by ascending primitive, whatever the launch
+// order.
 
 #include <voxelpipe/device/scene/cub_sort.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
 
 namespace voxelpipe::device {
 
-inline constexpr int chunk_columns = 16;     // of a large triangle's chunk: a row of so many
-inline constexpr int share_min_blocks = 3;   // per multiprocessor: registers for that many
-inline constexpr int chunks_per_record = 32; // one a lane
+inline constexpr int chunk_columns = 16;     // a chunk of a large triangle is a row of this many columns
+inline constexpr int share_min_blocks = 3;   // per multiprocessor: bounds the registers
+inline constexpr int chunks_per_record = 32; // one per lane
 
-// 32 chunks of a large triangle.
+// 32 consecutive chunks of a large triangle.
 struct chunk_record {
     std::uint32_t primitive;
-    std::uint32_t first; // 32nd chunks: chunk number / 32
+    std::uint32_t first; // chunk number / 32
 };
 
-// Whether a box of cells is one thread's work: at most so many columns, whichever the dominant axis.
+// True if a box of cells is one thread's work: at most max_columns columns, whichever the dominant axis.
 [[nodiscard]] VOXELPIPE_HD inline bool is_small(const core::voxel_box& box, std::int64_t max_columns) {
     const std::int64_t x = box.hi[0] - box.lo[0] + 1, y = box.hi[1] - box.lo[1] + 1, z = box.hi[2] - box.lo[2] + 1;
     return core::max3(x * y, y * z, z * x) <= max_columns;
 }
 
-// The chunks of a box of cells: rows of up to 16 columns in the plane of u and v, all of w.
+// Divides a box of cells into chunks: rows of up to 16 columns in the plane of u and v, over the whole depth along w.
 struct chunk_grid {
     int axis;
     core::triple<std::int64_t> lo, hi; // uvw
@@ -50,7 +51,7 @@ struct chunk_grid {
     }
 };
 
-// Where the passes keep their numbers. counts and offsets have an element per primitive.
+// Arrays of the two passes. counts and offsets have an element per primitive.
 struct share_buffers {
     std::uint32_t* counts;
     unsigned long long* offsets;
@@ -60,7 +61,7 @@ struct share_buffers {
     unsigned long long* num_cells;
 };
 
-// All but the counters.
+// The counters num_records and num_cells are left null.
 [[nodiscard]] inline share_buffers take_share(arena& memory, std::uint32_t num_primitives,
                                               unsigned long long record_capacity) {
     share_buffers b{};
@@ -71,25 +72,26 @@ struct share_buffers {
     return b;
 }
 
-// All threads of the block take part.
+// Adds the block's discarded cells to the state. All threads call it.
 __device__ inline void count_discarded(std::uint64_t discarded, pipeline_state* state) {
     if (__syncthreads_or(static_cast<int>(discarded != 0)) == 0) return;
     const unsigned long long sum = block_sum(discarded);
     if (threadIdx.x == 0) atomicAdd(&state->discarded, sum);
 }
 
-// Of a triangle within a box.
+// Cells of a triangle within a box.
 struct cell_counts {
-    std::uint32_t kept = 0, discarded = 0; // cells that are stored, and others
+    std::uint32_t kept = 0, discarded = 0; // stored cells, and discarded ones
 };
 
 // Op is the stage:
-//   static constexpr coverage rule;   std::int64_t small_columns (what one thread takes)
-//     bool counts_triangles (whether this stage fills the triangle counters)
-//   voxel_box cells(voxel_box reach)                          voxels to cells
-//   count(geometry, triangle, primitive, box, whole)           the cells of the triangle within the box; whole: the box
-//                                                             is all of the triangle's
-//   emit(geometry, triangle, primitive, box, whole, place)    stores those that count() counts from this place on
+//   static constexpr coverage rule;   std::int64_t small_columns (most columns of one thread's triangle)
+//     bool counts_triangles (true if this stage fills the triangle counters)
+//   voxel_box cells(voxel_box reach)                          converts a box of voxels to cells
+//   count(geometry, triangle, primitive, box, whole)          counts the triangle's cells within the box; whole: the
+//   box
+//                                                             is the triangle's own
+//   emit(geometry, triangle, primitive, box, whole, offset)   stores the cells that count() counts, from offset on
 template <class Op>
 __global__ __launch_bounds__(threads_per_block,
                              share_min_blocks) void share_count_small(const __grid_constant__ geometry geo,
@@ -149,7 +151,7 @@ __global__ __launch_bounds__(threads_per_block,
     count_discarded(discarded, state);
 }
 
-// A warp takes a record, a lane a chunk of it.
+// Calls visit for each record, in a warp; each lane has one of its chunks.
 template <class Op, class Visit>
 __device__ void for_each_record(const geometry& geo, const Op& op, const share_buffers& b, Visit&& visit) {
     const unsigned long long num = *b.num_records < b.record_capacity ? *b.num_records : b.record_capacity;
@@ -207,8 +209,8 @@ __global__ __launch_bounds__(threads_per_block,
     op.emit(geo, t, id, box, true, b.offsets[i]);
 }
 
-// counts become what of a primitive is not yet placed: its records take their places in any order, which a later stable
-// sort by cell does not show, because a primitive meets a cell once.
+// counts[i] is decremented to what remains of primitive i. A primitive's records take their offsets in any order: the
+// later stable sort by cell hides it, because a primitive meets a cell once.
 template <class Op>
 __global__ __launch_bounds__(threads_per_block,
                              share_min_blocks) void share_emit_large(const __grid_constant__ geometry geo,
@@ -220,7 +222,7 @@ __global__ __launch_bounds__(threads_per_block,
                         std::uint32_t n = 0;
                         if (valid) n = op.count(geo, t, id, box, false).kept;
                         const unsigned lane = threadIdx.x % 32;
-                        std::uint32_t before = n; // inclusive sum over the lanes
+                        std::uint32_t before = n; // inclusive prefix sum over the lanes
                         for (unsigned step = 1; step < 32; step *= 2) {
                             const std::uint32_t other = __shfl_up_sync(0xffffffffu, before, step);
                             if (lane >= step) before += other;
@@ -235,7 +237,7 @@ __global__ __launch_bounds__(threads_per_block,
                     });
 }
 
-// Counts the cells of the large primitives, then where every primitive's cells begin.
+// Counts the cells of the large primitives, then computes the offsets of all.
 template <class Op>
 void share_count_rest(const geometry& geo, const Op& op, const share_buffers& b, pipeline_state* state,
                       void* scan_storage, std::size_t scan_bytes, stage where, cudaStream_t stream) {
@@ -244,7 +246,7 @@ void share_count_rest(const geometry& geo, const Op& op, const share_buffers& b,
     sum_counts(b.counts, b.offsets, geo.num_primitives, scan_storage, scan_bytes, where, stream);
 }
 
-// Counts the cells of every primitive and where each one's begin.
+// Counts the cells of every primitive and computes their offsets.
 template <class Op>
 void share_count(const geometry& geo, const Op& op, const share_buffers& b, pipeline_state* state, void* scan_storage,
                  std::size_t scan_bytes, stage where, cudaStream_t stream) {

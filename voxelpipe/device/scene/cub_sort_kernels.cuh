@@ -68,7 +68,7 @@ VOXELPIPE_DEFINES_KERNELS void sum_counts(const std::uint32_t* counts, unsigned 
           where);
 }
 
-// Whether a fragment is the first of its voxel, of sorted ones.
+// True if fragment i of the sorted ones is the first of its voxel.
 template <class Key>
 struct is_first_of_voxel {
     const Key* keys;

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Fragment shade: every fragment of one primitive within a box, with what the fragment shader is given and what it
-// returns (paper section 3, fragment shader); and one fragment alone, for targets that need only the last one.
+// Fragment shade: runs the fragment shader on every fragment of one primitive within a box (paper section 3, fragment
+// shader), or on a single fragment, for targets that need only the last one.
 
 #include <voxelpipe/device/scene/int128_coverage.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
@@ -13,7 +13,7 @@
 
 namespace voxelpipe::device {
 
-// The fields of a fragment that its triangle gives, and the shader to call.
+// The fragment's fields that depend on its triangle, and the shader to call.
 template <class Scene>
 struct fragment_source {
     using varyings = typename Scene::varyings;
@@ -58,8 +58,8 @@ struct fragment_source {
     }
 };
 
-// Calls visit(x, y, z, fragment shader's output) for every fragment of the primitive within `box` (voxels of the
-// computed part). What the shader does not read costs nothing: all of it is inlined.
+// Calls visit(x, y, z, fragment shader's output) for every fragment of the primitive within `box`, in voxels of the
+// computed part. Everything is inlined, so fields that the shader does not read cost nothing.
 template <coverage Rule, class Scene, class Visit>
 __device__ VOXELPIPE_INLINE void shade_fragments(const Scene& s, const loaded_triangle& tri, std::uint32_t id,
                                                  const core::voxel_box& box, Visit&& visit) {
@@ -89,7 +89,7 @@ __device__ VOXELPIPE_INLINE void shade_fragments(const Scene& s, const loaded_tr
     }
 }
 
-// The output of the primitive's fragment in voxel (x, y, z), which it covers.
+// The shader's output for the primitive's fragment in voxel (x, y, z), which it covers.
 template <class Scene>
 __device__ auto shade_fragment(const Scene& s, std::uint32_t id, int x, int y, int z) {
     const loaded_triangle tri = s.geo.load(id);
@@ -113,10 +113,10 @@ __device__ __noinline__ auto shade_fragment_apart(const Scene& s, std::uint32_t 
     return shade_fragment(s, id, x, y, z);
 }
 
-// The same where most triangles are small: those in 32 bits. AllSmall: all are, and the others' code is left out.
+// The same, faster for triangles that fit 32 bits. AllSmall: all do, and the code for others is left out.
 template <bool AllSmall, class Scene>
 __device__ VOXELPIPE_INLINE auto shade_small_fragment(const Scene& s, std::uint32_t id, int x, int y, int z) {
-    loaded_triangle tri; // but for its positions
+    loaded_triangle tri; // positions are not set
     tri.draw = s.geo.find_draw(id);
     const draw_geometry& d = s.geo.draw(tri.draw);
     tri.triangle = id - d.first_primitive;

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The 128-bit path of coverage, for the few triangles that are too large for 64 bits: out of line, so that its
-// registers and its code are not paid for by all others. Spans come a handful at a time.
+// Coverage in 128 bits, for the few triangles that are too large for 64. Out of line, so that other triangles pay
+// neither its registers nor its code. Spans come in batches.
 
 #include <voxelpipe/core/interpolate.hpp>
 #include <voxelpipe/core/primitive.hpp>
@@ -12,7 +12,7 @@ namespace voxelpipe::device {
 
 struct wide_span {
     int u, v, w_first, w_last;
-    glm::vec3 barycentric; // at the column's centre
+    glm::vec3 barycentric; // at the centre of the column
 };
 
 struct wide_triangle {
@@ -23,7 +23,7 @@ struct wide_triangle {
 
 inline constexpr int wide_batch = 8;
 
-// Spans number `skip` and on within `box`; returns how many it wrote, fewer than wide_batch at the end.
+// Writes the spans within `box` from number `skip` on. Returns how many; fewer than wide_batch at the end.
 template <core::span_rule Rule>
 __device__ __noinline__ int wide_spans(core::snapped_position a, core::snapped_position b, core::snapped_position c,
                                        int fraction, const core::voxel_box& box, int skip,
@@ -51,7 +51,7 @@ __device__ __noinline__ glm::vec3 wide_barycentric(Position a, Position b, Posit
     return core::barycentric(core::make_frame<int128>(a, b, c, fraction), u, v);
 }
 
-// Calls visit(axis, span) for every span of a triangle that fits_narrow refuses.
+// Calls visit(span) for every span of a triangle that fits_narrow refuses.
 template <core::span_rule Rule, class Visit>
 __device__ void for_each_wide_span(core::snapped_position a, core::snapped_position b, core::snapped_position c,
                                    int fraction, const core::voxel_box& box, Visit&& visit) {

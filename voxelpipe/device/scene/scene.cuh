@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the kernels know of a call: geometry (triangles and snapped positions, all that the coarse stages read), scene
-// (geometry with the draws' shaders and varyings), and pipeline_state, the counters and flags of a call in progress.
+// What kernels know of a call: geometry (triangles and snapped positions: all that the coarse stages read) and scene
+// (geometry with the draws' shaders and varyings).
 
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/device/base/call_state.cuh>
@@ -17,11 +17,11 @@
 
 namespace voxelpipe::device {
 
-// A snapped position in 32 bits, where it is no further than 2^30 units from the first voxel of what is rasterised. One
-// load of 16 bytes, where the position has three of 8.
+// A snapped position in 32 bits, valid if it is at most 2^30 units from the first voxel of the computed part. One
+// 16-byte load instead of three of 8.
 struct __align__(16) int32_position {
     std::int32_t q[3];
-    std::uint32_t is_near; // or 0, and then q holds nothing
+    std::uint32_t is_near; // 0 if q is not valid
 
     [[nodiscard]] VOXELPIPE_HD static int32_position of(const core::snapped_position& p) {
         constexpr std::int64_t limit = std::int64_t{1} << 30;
@@ -30,7 +30,7 @@ struct __align__(16) int32_position {
         return {{static_cast<std::int32_t>(p.x), static_cast<std::int32_t>(p.y), static_cast<std::int32_t>(p.z)}, near};
     }
 };
-// The positions that vertex_shade leaves, in both forms.
+// The output positions of vertex_shade, in both forms.
 struct vertex_positions {
     core::snapped_position* exact;
     int32_position* near;
@@ -39,7 +39,7 @@ struct vertex_positions {
         core::snapped_position* const exact = memory.take<core::snapped_position>(num_vertices);
         return {exact, memory.take<int32_position>(num_vertices)};
     }
-    // Those of a mesh whose first vertex is this one of all. With an arena that only adds up, nothing.
+    // The positions from this vertex on. Stays null if the arena only adds up bytes.
     [[nodiscard]] vertex_positions from(std::size_t vertex) const {
         return exact == nullptr ? *this : vertex_positions{exact + vertex, near + vertex};
     }
@@ -55,11 +55,11 @@ struct loaded_triangle {
     std::uint32_t draw, triangle;
     glm::uvec3 index;
     bool index_ok;
-    core::snapped_position a, b, c; // unset where the index is not ok
+    core::snapped_position a, b, c; // unset unless index_ok
 };
 
 struct geometry {
-    draw_geometry one;         // the draw, where there is only one
+    draw_geometry one;         // the draw, if there is only one
     const draw_geometry* many; // otherwise all of them
     std::uint32_t num_draws, num_primitives;
     core::snap_transform snap;
@@ -71,7 +71,7 @@ struct geometry {
 
     [[nodiscard]] VOXELPIPE_HD std::uint32_t find_draw(std::uint32_t primitive) const {
         std::uint32_t lo = 0,
-                      hi = num_draws; // the last draw that begins at or before the primitive; empty draws precede
+                      hi = num_draws; // the last draw that begins at or before the primitive; empty draws precede it
         while (hi - lo > 1) {
             const std::uint32_t middle = lo + (hi - lo) / 2;
             if (draw(middle).first_primitive <= primitive)
@@ -105,7 +105,7 @@ struct geometry {
 template <class FragmentShader, class Varyings>
 struct draw_shading {
     FragmentShader fragment_shader;
-    const Varyings* varyings; // per vertex; null where there are none
+    const Varyings* varyings; // per vertex; null if there are none
 };
 
 template <class FragmentShader, class Varyings>
@@ -124,7 +124,7 @@ struct scene {
     [[nodiscard]] VOXELPIPE_HD const shading& draw(std::uint32_t d) const { return many != nullptr ? many[d] : one; }
 };
 
-// A voxel of the computed part, and which one has a number: x first, then y, then z.
+// A voxel of the computed part, from its linear number: x fastest, then y, then z.
 struct voxel_place {
     int x, y, z;
 };

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the calls into framebuffers and A-buffers share on the host: the draws' geometry and shading on the device.
+// Device memory for the draws' geometry and shading, for calls into framebuffers and A-buffers.
 
 #include <voxelpipe/device/scene/vertex_shade.cuh>
 
@@ -12,7 +12,6 @@
 
 namespace voxelpipe::device {
 
-// Geometry and shading of the draws, and where they lie on the device.
 template <class Mesh, class VertexShader, class FragmentShader>
 struct scene_memory {
     using varyings = typename core::shaded<Mesh, VertexShader>::varyings;
@@ -21,7 +20,7 @@ struct scene_memory {
 
     vertex_positions positions;
     varyings* vertex_varyings;
-    draw_geometry* geometries; // null where there is one draw
+    draw_geometry* geometries; // null if there is one draw
     typename scene_type::shading* shadings;
 
     scene_memory(arena& memory, std::span<const draw_type> draws) {
@@ -33,7 +32,7 @@ struct scene_memory {
         shadings = memory.take<typename scene_type::shading>(draws.size() > 1 ? draws.size() : 0);
     }
 
-    // Runs the vertex shaders and gives the scene that the other stages read.
+    // Runs the vertex shaders and returns the scene that the other stages read.
     [[nodiscard]] scene_type shade(std::span<const draw_type> draws, const grid& g, cudaStream_t stream) const {
         scene_type s{};
         s.geo.num_draws = static_cast<std::uint32_t>(draws.size());
@@ -85,7 +84,7 @@ private:
            static_cast<std::uint64_t>(g.extent.z);
 }
 
-// Vertex shaders that cost no more than reading what they made: they run once a corner instead of once a vertex.
+// Vertex shaders that cost no more than reading their result: they run once per corner instead of once per vertex.
 template <class VertexShader>
 inline constexpr bool is_cheap = std::is_same_v<VertexShader, passthrough> || std::is_same_v<VertexShader, transform>;
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Triangles on their way from the mesh to a raster without tiles: where their vertices come from, as numbers of 32 bits
-// where they are near enough, with their bounding box; and how the next ones are fetched while others are drawn.
+// Loads triangles for a raster without tiles: vertices from the mesh or from vertex_shade, positions in 32 bits if they
+// fit, bounding boxes, and prefetching of the next triangles.
 
 #include <voxelpipe/core/small_triangle.hpp>
 #include <voxelpipe/device/scene/scene.cuh>
@@ -14,9 +14,10 @@
 
 namespace voxelpipe::device {
 
-// ---- where they come from -------------------------------------------------------------------------------------------
+// ---- sources of vertices
+// ---------------------------------------------------------------------------------------------
 
-// The mesh, shaded on the spot: for vertex shaders that are cheap and make no varyings.
+// Shades the mesh's vertices when they are loaded: for cheap vertex shaders without varyings.
 template <class Mesh, class VertexShader>
 struct shading_source {
     Mesh mesh;
@@ -28,9 +29,9 @@ struct shading_source {
         const auto result = shader(core::fetch_vertex(mesh, vertex, draw));
         return core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result).position;
     }
-    using loaded = glm::vec3; // a vertex on its way from memory
+    using loaded = glm::vec3; // a vertex as loaded from memory
     [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(std::uint32_t vertex) const { return shade(vertex); }
-    // The same in two steps, for shaders that look at positions alone, as all do that are cheap.
+    // Loading in two steps, for shaders that read positions only, as all cheap ones do.
     using stored = glm::vec3;
     [[nodiscard]] __device__ VOXELPIPE_INLINE const stored* address(std::uint32_t vertex) const {
         return mesh.positions.data() + vertex;
@@ -49,7 +50,7 @@ struct shading_source {
     [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const { return mesh.triangles[i]; }
 };
 
-// The positions that vertex_shade left.
+// Reads the positions that vertex_shade stored.
 struct stored_source {
     draw_geometry geometry;
 
@@ -74,7 +75,7 @@ struct stored_source {
     }
 };
 
-// What a kernel is given of one draw.
+// One draw, as a raster kernel is given it.
 template <class Source>
 struct raster_input {
     Source source;
@@ -82,46 +83,47 @@ struct raster_input {
     int fraction;
     glm::ivec3 extent;
 };
-// The vertices of triangle i; any where there is none.
+// The vertices of triangle i; zeros beyond the last.
 template <class Source>
 [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 load_index(const raster_input<Source>& in, std::uint32_t i) {
     return i < in.num_triangles ? in.source.triangle(i) : glm::uvec3(0);
 }
 
-// ---- near ones ------------------------------------------------------------------------------------------------------
+// ---- triangles in 32 bits
+// --------------------------------------------------------------------------------------------
 
-// A triangle whose vertices are less than 2^30 units from the grid's origin, and its bounding box.
+// A triangle whose vertices are within 2^30 units of the first voxel, with its bounding box.
 struct int32_triangle {
-    std::int32_t q[3][3]; // [vertex][axis], in units of 2^-F voxel from the first voxel of what is rasterised
+    std::int32_t q[3][3]; // [vertex][axis], in units of 2^-F voxel from the first voxel of the computed part
     std::int32_t lo[3];   // lowest voxel of the bounding box
-    std::int32_t hi[3];   // its highest voxel
-    int last[3];          // the same, counted from the lowest
-    bool is_near;         // otherwise nothing above holds
+    std::int32_t hi[3];   // highest voxel
+    int last[3];          // highest voxel, counted from the lowest
+    bool is_near;         // otherwise no other member is valid
 
     __device__ VOXELPIPE_INLINE void find_box(int fraction) {
         for (int k = 0; k < 3; ++k) {
             const std::int32_t low = core::min3(q[0][k], q[1][k], q[2][k]),
                                high = core::max3(q[0][k], q[1][k], q[2][k]);
-            // ceil - 1: a face touches both sides. Unsigned, for whatever is not near.
+            // ceil - 1: a face touches both sides. Unsigned, so that invalid positions do not overflow.
             lo[k] = static_cast<std::int32_t>(static_cast<std::uint32_t>(low) - 1u) >> fraction;
             hi[k] = high >> fraction;
             last[k] = hi[k] - lo[k];
         }
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE int most() const { return core::max3(last[0], last[1], last[2]) + 1; }
-    // Negative where some of the box lies outside of the grid. Not a bool, which a register would be filled from and
-    // compared with zero, too, as often as it is asked for.
+    // Negative if some of the box lies outside the grid. An int instead of a bool, which would take two more
+    // instructions at each use.
     [[nodiscard]] __device__ VOXELPIPE_INLINE int inside(const glm::ivec3& extent) const {
         return lo[0] | lo[1] | lo[2] | (extent.x - 1 - hi[0]) | (extent.y - 1 - hi[1]) | (extent.z - 1 - hi[2]);
     }
-    // Whether no voxel of the grid can be covered; a thin fragment may lie one voxel beyond the triangle's own depths.
+    // True if no voxel of the grid can be covered. A thin fragment may lie one voxel beyond the triangle's own depths.
     template <coverage Rule>
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_outside(const glm::ivec3& extent) const {
         constexpr int beyond = Rule == coverage::thin ? 1 : 0;
         return lo[0] - beyond >= extent.x || lo[1] - beyond >= extent.y || lo[2] - beyond >= extent.z ||
                hi[0] + beyond < 0 || hi[1] + beyond < 0 || hi[2] + beyond < 0;
     }
-    // What of the box lies in the grid; 1 > 0 along an axis where nothing does.
+    // The part of the box within the grid; along an axis without any, lo = 1 and hi = 0.
     [[nodiscard]] __device__ VOXELPIPE_INLINE core::small_box part(const glm::ivec3& extent) const {
         core::small_box box;
         for (int k = 0; k < 3; ++k) {
@@ -167,8 +169,8 @@ template <class Source>
     return make_near(call, load_corners(call, index));
 }
 
-// A word, or four where both places are multiples of 16 bytes, on its way to shared memory, by an address there: no
-// register holds it meanwhile. await_copies: the thread's own are there.
+// Copy a word, or four if both addresses are multiples of 16 bytes, to an address in shared memory, asynchronously and
+// through no register. await_copies waits for the thread's own copies.
 __device__ VOXELPIPE_INLINE void copy_word(std::uint32_t to, const std::uint32_t* from) {
     asm volatile("cp.async.ca.shared.global [%0], [%1], 4;" ::"r"(to), "l"(__cvta_generic_to_global(from)) : "memory");
 }
@@ -177,8 +179,8 @@ __device__ VOXELPIPE_INLINE void copy_four_words(std::uint32_t to, const uint4* 
 }
 __device__ VOXELPIPE_INLINE void await_copies() { asm volatile("cp.async.wait_all;" ::: "memory"); }
 
-// The corners of a warp's next triangles, on their way from memory while the ones before are drawn: registers would not
-// hold them that long. A lane's column of words is its own, so that no lane waits for another.
+// Prefetches the corners of a warp's next triangles into shared memory, while the previous ones are drawn: there are
+// too few registers to hold them so long. Each lane has its own column of words, so no lane waits for another.
 template <class Source>
 struct coming_corners {
     using stored = typename Source::stored;
@@ -197,7 +199,7 @@ struct coming_corners {
             for (std::uint32_t k = 0; k < words_each; ++k) copy_word(to + 128 * (v * words_each + k), from + k);
         }
     }
-    // Those that were fetched last.
+    // The corners that were fetched last.
     [[nodiscard]] __device__ VOXELPIPE_INLINE int32_triangle take(const raster_input<Source>& call) const {
         await_copies();
         loaded_corners<Source> corners;

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Vertex shade: runs the vertex shader once a vertex and snaps its position. Takes one draw's mesh and shader; gives
-// snapped positions and, where the shader makes any, varyings, in the mesh's order (paper section 3, vertex shader).
+// Vertex shade: runs the vertex shader once per vertex and snaps the position. Input is one draw's mesh and shader;
+// output are snapped positions and varyings, if the shader has any, in the mesh's order (paper section 3, vertex
+// shader).
 
 #include <voxelpipe/device/scene/scene.cuh>
 
@@ -27,7 +28,7 @@ __global__ void vertex_shade_kernel(const __grid_constant__ Mesh mesh, const __g
     if constexpr (!std::is_empty_v<Varyings>) varyings[i] = o.varyings;
 }
 
-// positions and varyings have one element per vertex of the mesh; varyings may be null where the type is empty.
+// positions and varyings have one element per vertex of the mesh; varyings may be null if the type is empty.
 template <class Mesh, class VertexShader, class Varyings>
 void vertex_shade(const Mesh& mesh, const VertexShader& shader, const core::snap_transform& snap, std::uint32_t draw,
                   const vertex_positions& positions, Varyings* varyings, cudaStream_t stream) {
