@@ -12,10 +12,10 @@
 
 namespace voxelpipe::device {
 
-inline constexpr unsigned counting_items = 8; // fragments of a thread that do not wait for one another
+inline constexpr unsigned counting_items = 8; // independent fragments of a thread
 inline constexpr unsigned counting_threads = 1024;
 
-// Numbers each fragment within its voxel, and counts.
+// Numbers each fragment within its voxel, and counts each voxel's fragments.
 template <class Count>
 __global__ __launch_bounds__(threads_per_block) void number_fragments_kernel(
     const std::uint32_t* voxels, const __grid_constant__ Count count, const __grid_constant__ counting_memory m) {
@@ -33,7 +33,7 @@ __global__ __launch_bounds__(threads_per_block) void number_fragments_kernel(
         for (unsigned k = 0; k < items; ++k) voxel[k] = first + 32 * k < n ? voxels[first + 32 * k] : ~0u;
 #pragma unroll
         for (unsigned k = 0; k < items; ++k) {
-            same[k] = __match_any_sync(0xffffffffu, voxel[k]); // neighbours in the list are often of one voxel
+            same[k] = __match_any_sync(0xffffffffu, voxel[k]); // neighbours in the list often share a voxel
             number[k] = 0;
             if ((same[k] & below) == 0 && voxel[k] != ~0u)
                 number[k] = atomicAdd(&m.counts[voxel[k]], static_cast<std::uint32_t>(__popc(same[k])));
@@ -46,7 +46,7 @@ __global__ __launch_bounds__(threads_per_block) void number_fragments_kernel(
     }
 }
 
-// Sums over the lanes before this one, and in `all` over all of them.
+// Prefix sum over the lanes before this one; `all`: the sum over all lanes.
 [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long sum_before(unsigned long long own,
                                                                         unsigned long long& all) {
     unsigned long long up_to = own;
@@ -59,19 +59,19 @@ __global__ __launch_bounds__(threads_per_block) void number_fragments_kernel(
     return up_to - own;
 }
 
-// What a tile tells those behind: fragments and, from bit `voxels` on, voxels that have some.
+// Words that tiles publish for later tiles: numbers of fragments and, from bit `voxels` on, of voxels that have some.
 struct tile_sums {
     static constexpr int voxels = 31;
     static constexpr unsigned long long own = 1ull << 62, all = 2ull << 62, value = own - 1, low = (1ull << voxels) - 1;
 
-    // The sums of the tiles before this one, whose own are given. By all lanes of one warp. See count_before.
+    // The sums of all earlier tiles; `sums` are this tile's. All lanes of one warp call it. See count_before.
     [[nodiscard]] __device__ static unsigned long long before(unsigned long long* words, std::uint32_t tile,
                                                               unsigned long long sums) {
         using word = ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device>;
         const auto lane = threadIdx.x % 32;
         if (lane == 0 && tile != 0) word(words[tile]).store(own | sums, ::cuda::memory_order_relaxed);
         unsigned long long sum = 0;
-        for (std::int64_t last = std::int64_t{tile} - 1; tile != 0; last -= 32) { // lane k looks at tile last - k
+        for (std::int64_t last = std::int64_t{tile} - 1; tile != 0; last -= 32) { // lane k reads tile last - k
             const std::int64_t mine = last - lane;
             unsigned long long w = all; // before the first tile
             if (mine >= 0) do
@@ -90,7 +90,7 @@ struct tile_sums {
     }
 };
 
-// Makes of each voxel's count where its first fragment goes, and lists the voxels that have any.
+// Turns each voxel's count into the offset of its first fragment, and lists the voxels that have any.
 template <class Memory>
 __global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __grid_constant__ order_buffers b,
                                                                         const __grid_constant__ Memory m,
@@ -99,8 +99,8 @@ __global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __
     constexpr int shift = tile_sums::voxels;
     __shared__ unsigned long long of_warps[warps];
     __shared__ unsigned long long before_tile;
-    // Of the tile's long voxels that go to a list of voxels, how many; then where the next one goes. One atomic of the
-    // device for each list: all tiles ask for the same words.
+    // Long voxels of the tile by list: their number, later the slot of the next one. One global atomic per list and
+    // tile, because all tiles update the same words.
     constexpr int lists = order_lists::block_list + 1;
     __shared__ unsigned num_long[lists], next_long[lists];
     if (threadIdx.x < lists) num_long[threadIdx.x] = 0;
@@ -110,7 +110,7 @@ __global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __
     const auto n = static_cast<std::uint32_t>(state->list_fragments);
     if (n == 0) return;
     const std::uint32_t lane = threadIdx.x % 32, warp = warp_in_block(), tile = blockIdx.x;
-    // A warp's voxels are neighbours, in each round a lane's four.
+    // A warp's voxels are neighbours; in each round a lane has four.
     const std::uint32_t first_four = tile * (Memory::tile / 4) + warp * (32 * rounds) + lane;
     uint4* const mine = reinterpret_cast<uint4*>(m.counts) + first_four;
     uint4 four[rounds];
@@ -182,7 +182,7 @@ __global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __
     }
 }
 
-// Puts each fragment's primitive where it belongs.
+// Writes each fragment's primitive to its position.
 template <class Count>
 __global__ __launch_bounds__(threads_per_block) void place_fragments_kernel(const std::uint32_t* voxels,
                                                                             const std::uint32_t* values,
@@ -221,7 +221,7 @@ VOXELPIPE_DEFINES_KERNELS void order_by_counting(order_buffers b, const counted_
     if (num_primitives <= std::uint64_t{dense_part} * max_dense_parts)
         b.lists.num_primitives = static_cast<std::uint32_t>(num_primitives);
     capacities of_lists = limits;
-    of_lists.longest_ordered = ~0ull; // what is found out about voxels must not stop these
+    of_lists.longest_ordered = ~0ull; // properties of voxels must not stop these kernels
     const sort_count count{state, of_lists};
     launch_behind(number_fragments_kernel<sort_count>, blocks, threads_per_block, stream, where, pairs.voxels, count,
                   m);

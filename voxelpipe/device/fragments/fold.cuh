@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Targets that no atomic can serve (order-dependent blends of the user's, large order-free ones): their fragments are
-// listed with all shader outputs, ordered by (voxel, primitive), and each voxel is folded in triangle order, as
-// core/blend defines every blend. A thread takes a voxel. One of very many fragments is its block's: each thread folds
-// a part where the blend is order-free; where it is not, the fold of a voxel is serial by definition, and the block
-// only fetches for the one thread that does it.
+// Targets that no atomic can serve (order-dependent user-defined blends, large order-free ones): their fragments are
+// listed with all shader outputs and ordered by (voxel, primitive), and each voxel is folded in triangle order, as
+// core/blend defines every blend. A thread takes a voxel. A block shares a voxel of very many fragments: if the blend
+// is order-free, each thread folds a part; otherwise the fold is serial by definition, and the block only fetches for
+// one thread.
 
 #include <voxelpipe/device/fragments/fragment_lists.cuh>
 #include <voxelpipe/device/targets/target_traits.cuh>
@@ -15,11 +15,11 @@
 
 namespace voxelpipe::device {
 
-inline constexpr std::uint32_t max_folded_alone = 1024; // fragments of a voxel that a thread takes
-inline constexpr unsigned max_long_in_order = 32;       // voxels of a block beyond that; more are quicker side by side
-inline constexpr int fold_bytes = 8 * 1024;             // of shared memory, for values of fragments
+inline constexpr std::uint32_t max_folded_alone = 1024; // most fragments of a voxel that one thread folds
+inline constexpr unsigned max_long_in_order =
+    32; // most longer voxels of a block that are folded one by one; more are quicker side by side
+inline constexpr int fold_bytes = 8 * 1024; // of shared memory, for values of fragments
 
-// The fragments of a voxel.
 struct voxel_fragments {
     std::uint64_t first = 0, last = 0;
     int x = 0, y = 0, z = 0;
@@ -50,7 +50,7 @@ struct target_fold {
     using value = std::remove_cvref_t<decltype(voxelpipe::get<K>(std::declval<const Values&>()))>;
     static constexpr bool any_order =
         traits::order_free && (core::user_blend<blend_type, value> || core::user_blend_template<blend_type, value>);
-    // Values that the block's memory takes at once; 0 where a voxel is always a thread's.
+    // Values that fit the block's memory at once; 0 if a voxel is always one thread's.
     static constexpr unsigned places = alignof(value) > 16 ? 0
                                                            : (fold_bytes / sizeof(value) < threads_per_block
                                                                   ? fold_bytes / sizeof(value)
@@ -66,19 +66,19 @@ struct target_fold {
         else
             view.store(f.x, f.y, f.z, traits::end(a));
     }
-    // By one thread.
+    // One thread calls it.
     __device__ void alone(const voxel_fragments& f) const {
         auto a = traits::begin(view(f.x, f.y, f.z));
         for (std::uint64_t i = f.first; i < f.last; ++i) traits::apply(a, get(i));
         store(f, a);
     }
-    // By all threads of the block; `memory` is free before and after.
+    // All threads of the block call it; `memory` is unused before and after.
     __device__ void together(const voxel_fragments& f, unsigned char* memory) const {
         value* const values = reinterpret_cast<value*>(memory);
         const unsigned mine = threadIdx.x;
         auto a = traits::begin(view(f.x, f.y, f.z));
         if constexpr (any_order) {
-            // A part each, then half of the parts onto the other half.
+            // Each thread folds a part; then half of the parts are folded onto the other half.
             if (mine < places && f.first + mine < f.last) {
                 value part = get(f.first + mine);
                 for (std::uint64_t i = f.first + mine + places; i < f.last; i += places) traits::apply(part, get(i));
@@ -141,7 +141,7 @@ __global__ void fold_kernel(const __grid_constant__ fragment_lists<Key, Values> 
             }
         };
         (fold.template operator()<I>(), ...);
-        __syncthreads(); // all have read num_long
+        __syncthreads(); // all threads have read num_long
     }
 }
 

@@ -2,12 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A-buffer: every fragment, ordered by (voxel, primitive). Fragments are counted, given their places by a
-// scan and written by ascending primitive; those of one draw are listed in one pass, in any order
-// (fragments/list_sink.cuh), where its shader is constant or discards nothing. A stable radix sort by voxel over just
-// the bits in use follows, and the first fragment of each voxel is selected; what was listed in any order is put in
-// order within each voxel on the way (fragments/order_voxels.cuh), and shaded then. Memory is in proportion to the
-// fragments (paper section 3, A-buffer).
+// Fragment lists: every fragment, ordered by (voxel, primitive) (paper section 3, A-buffer). In general fragments are
+// counted, given offsets by a scan, and written by ascending primitive. Those of one draw are listed in one pass, in
+// any order (fragments/list_sink.cuh), if its shader is constant or discards nothing. A stable radix sort by voxel over
+// just the bits in use follows, and each voxel's first fragment is selected. Fragments listed in any order are ordered
+// within each voxel on the way (fragments/order_voxels.cuh), and shaded then. Memory is proportional to the fragments.
 
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/fragments/counting_sort.cuh>
@@ -24,8 +23,8 @@
 
 namespace voxelpipe::device {
 
-// Fragments as cells of work_share: the voxel is the key; the value is the primitive or, where there are payloads, the
-// fragment's place among them.
+// Fragments as cells of count_and_emit: the voxel is the key; the value is the primitive or, if there are payloads, the
+// fragment's offset among them.
 template <coverage Rule, class Scene, class Payload, class MakePayload>
 struct fragment_cells {
     static constexpr coverage rule = Rule;
@@ -33,11 +32,11 @@ struct fragment_cells {
     static constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
 
     Scene s;
-    void* keys; // std::uint64_t where they are wide, otherwise std::uint32_t: one kernel for both
+    void* keys; // std::uint64_t if are_wide, otherwise std::uint32_t: one kernel for both
     bool are_wide;
     std::uint32_t* values;
-    std::uint32_t* primitives; // by place, where there are payloads
-    Payload* payloads;         // by place
+    std::uint32_t* primitives; // by offset, if there are payloads
+    Payload* payloads;         // by offset
     bool counts_triangles;
 
     [[nodiscard]] __device__ core::voxel_box cells(const core::voxel_box& reach) const { return reach; }
@@ -90,17 +89,17 @@ struct list_buffers {
     Key* keys[2];
     std::uint32_t* values[2];
     int bits;                      // of a voxel
-    sort_memory sort;              // where are_sorted_here,
-    counting_memory counting;      // or this, where it is in use
-    std::uint32_t* primitives;     // by place; null without payloads of fragments
-    Payload* payloads;             // by place; null likewise
-    std::uint64_t* first_of_voxel; // fragment numbers, ascending; list_voxels of them, and room for one more
-    list_places* places;           // where the lists are to go
+    sort_memory sort;              // used if are_sorted_here,
+    counting_memory counting;      // unless this is in use
+    std::uint32_t* primitives;     // by offset; null without payloads
+    Payload* payloads;             // by offset; null without payloads
+    std::uint64_t* first_of_voxel; // fragment numbers, ascending: list_voxels of them, and room for one more
+    list_places* places;           // output pointers of the call
     void* storage;
     std::size_t storage_bytes;
 };
 
-// Whether keys of this type, so many at most, are sorted by fragments/radix_sort.cuh: what is longer goes to cub.
+// True if up to `capacity` keys of this type are sorted by fragments/radix_sort.cuh; otherwise cub sorts them.
 template <class Key>
 [[nodiscard]] VOXELPIPE_HD constexpr bool are_sorted_here(std::uint64_t capacity) {
     return sizeof(Key) == sizeof(std::uint32_t) && capacity < max_sorted;
@@ -124,7 +123,7 @@ struct list_memory {
     }
 };
 
-// The sorted lists, where they came to lie.
+// The sorted lists, in the memory of the call.
 template <class Key, class Payload>
 struct fragment_lists {
     const Key* keys;
@@ -133,10 +132,10 @@ struct fragment_lists {
     const std::uint32_t* primitives; // null: a value is a primitive
     const Payload* payloads;         // null: all are `payload`
     const std::uint64_t* first_of_voxel;
-    const list_places* places; // where the lists are to go
+    const list_places* places; // output pointers of the call
     Payload payload;
-    bool are_placed;        // all but the payloads are there, and nowhere else
-    bool payloads_in_order; // payloads are by fragment, not by place
+    bool are_placed;        // all but the payloads are at the output pointers, and only there
+    bool payloads_in_order; // payloads are by fragment, not by offset
 
     [[nodiscard]] __device__ std::uint64_t voxel(std::uint64_t i) const {
         return voxels != nullptr ? voxels[i] : keys[first_of_voxel[i]];
@@ -150,12 +149,12 @@ struct fragment_lists {
     }
 };
 
-// Does what the preparation wants and, where the capacity is sorted by cub, fills it up beyond the fragments.
+// Runs the preparation. If cub sorts, fills the capacity beyond the fragments.
 template <class Key>
 void prepare_sort(Key* keys, std::uint32_t* values, std::uint64_t capacity, const sort_preparation& preparation,
                   const pipeline_state* state, const capacities& limits, cudaStream_t stream);
 
-// What has to be done for the lists of a call before they are sorted.
+// The preparation that a call's lists need before they are sorted.
 template <class Key, class Payload>
 [[nodiscard]] sort_preparation prepare_lists(const list_buffers<Key, Payload>& b, const output_pointers& asked,
                                              const tile_counts& tiles, const capacities& limits) {
@@ -176,7 +175,7 @@ struct sorted_pairs {
     Key *keys, *spare_keys;
     std::uint32_t *values, *spare_values;
 };
-// Sorts what was listed by voxel, stably, for which `preparation` is to be done, if that is wanted.
+// Sorts listed fragments by voxel, stably, after `preparation`, if that is wanted.
 template <class Key, class Payload>
 [[nodiscard]] sorted_pairs<Key> sort_by_voxel(const list_buffers<Key, Payload>& b, const sort_preparation& preparation,
                                               pipeline_state* state, const capacities& limits, cudaStream_t stream,
@@ -195,7 +194,7 @@ template <class Key, class Payload>
     return {b.keys[at], b.keys[1 - at], b.values[at], b.values[1 - at]};
 }
 
-// What was listed, sorted by voxel, and the first fragment of each.
+// Sorts listed fragments by voxel and selects the first fragment of each voxel.
 template <class Key, class Payload>
 [[nodiscard]] fragment_lists<Key, Payload> sort_lists(const list_buffers<Key, Payload>& b, const output_pointers& asked,
                                                       pipeline_state* state, const capacities& limits,
@@ -214,9 +213,9 @@ template <class Key, class Payload>
     return lists;
 }
 
-// The same for primitives that were listed in any order; the lists are then where they are to go. The raster has done
-// what sort_preparation says, but for fillers. spare: room for limits.fragments, where the sorted voxels are wanted
-// afterwards; otherwise null.
+// The same for primitives listed in any order, and writes the lists to the output pointers. The raster has run the
+// preparation, except for fillers. spare: room for limits.fragments if the sorted voxels are needed afterwards;
+// otherwise null.
 template <class Payload>
 [[nodiscard]] fragment_lists<std::uint32_t, Payload>
 sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const output_pointers& asked,
@@ -229,7 +228,7 @@ sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory
     if (b.counting.is_used()) {
         VOXELPIPE_ASSERT(spare == nullptr);
         here.narrow_voxels = b.keys[1];
-        here.primitives = b.values[0]; // once they have been read
+        here.primitives = b.values[0]; // after they have been read
         order_by_counting({nullptr, b.values[1], b.keys[0], b.places, here, order.tiles, order.lists.with(state)},
                           {b.keys[0], b.values[0]}, b.counting, num_primitives, state, limits, stream, clock);
     } else {
@@ -252,17 +251,17 @@ sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory
     return lists;
 }
 
-// Fragments as they were listed.
+// Fragments in the order in which they were listed.
 struct listed_fragments {
     std::uint32_t *voxels, *primitives;
 };
 
-// Shades fragments that are listed in any order, to leave out those that are discarded.
+// Shades listed fragments and copies those that are not discarded.
 template <class Scene>
 __global__ __launch_bounds__(threads_per_block, 4) void filter_lists_kernel(const __grid_constant__ Scene s,
                                                                             listed_fragments from, listed_fragments to,
                                                                             pipeline_state* state, capacities limits) {
-    constexpr int rounds = 4; // of a warp, for one atomic
+    constexpr int rounds = 4; // fragments of a lane for one atomic of its warp
     await_stream();
     if (has_failed(*state, limits)) return;
     const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::max_numbered
@@ -303,10 +302,10 @@ __global__ __launch_bounds__(threads_per_block, 4) void filter_lists_kernel(cons
         atomicAdd(&state->discarded, sum);
     }
 }
-// Behind it: the list is what was kept.
+// Sets the length of the list to what filter_lists_kernel kept.
 VOXELPIPE_DECLARES_KERNELS void end_filter(pipeline_state* state, const capacities& limits, cudaStream_t stream);
 
-// Leaves fragments out that are discarded. The buffers' first arrays hold what there is, before and after.
+// Removes fragments that are discarded. The first arrays of `b` hold the list before and after.
 template <class Scene, class Payload>
 void filter_lists(const Scene& s, list_buffers<std::uint32_t, Payload>& b, pipeline_state* state,
                   const capacities& limits, cudaStream_t stream) {
@@ -318,8 +317,8 @@ void filter_lists(const Scene& s, list_buffers<std::uint32_t, Payload>& b, pipel
     std::swap(b.values[0], b.values[1]);
 }
 
-// Shades fragments in their lists: payloads[i] is fragment i's, where there are payloads. Counts those that are
-// discarded, whose lists are not what the call is to give.
+// Shades sorted fragments: payloads[i] becomes fragment i's, if there are payloads. Counts discarded ones; if there are
+// any, the lists are not the call's result.
 template <class MakePayload, class Scene, class Payload>
 __global__ __launch_bounds__(threads_per_block, 4) void shade_lists_kernel(
     const __grid_constant__ Scene s, const __grid_constant__ fragment_lists<std::uint32_t, Payload> lists,
@@ -354,12 +353,12 @@ build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const list_memo
 
 // ---- into an A-buffer -----------------------------------------------------------------------------------------------
 
-// What became of the lists, for readers on the device: both 0 where the call failed.
+// Lengths of the lists, for readers on the device: both 0 if the call failed.
 struct list_counts {
     std::uint64_t voxels, fragments;
 };
 
-// By all threads of a grid. What is where it is to go stays there.
+// Copies the lists, or only the payloads if the rest is in place. All threads of the launch call it.
 template <class Key, class Payload>
 __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint64_t num_voxels,
                            std::uint64_t num_fragments, std::uint64_t* voxels, std::uint64_t* offsets,
@@ -386,7 +385,7 @@ __global__ void copy_lists_kernel(fragment_lists<Key, Payload> lists, std::uint6
     copy_lists(lists, num_voxels, num_fragments, voxels, offsets, primitives, payloads);
 }
 
-// The same with the numbers that the state holds, to where the lists are to go, if there is room for so many voxels.
+// The same to the output pointers, with the lengths in the state, if there is room for the voxels.
 template <class Key, class Payload>
 __global__ void place_lists_kernel(const __grid_constant__ fragment_lists<Key, Payload> lists,
                                    const pipeline_state* state, capacities limits) {
@@ -405,7 +404,7 @@ void place_lists(const fragment_lists<Key, Payload>& lists, const pipeline_state
     end_stage(clock, &stage_times::abuffer_emit);
 }
 
-// The same, for as many voxels as there are fragments. Leaves the numbers in the counters.
+// The same, with room for as many voxels as fragments. Publishes the lengths.
 template <class Key, class Payload>
 __global__ void publish_lists_kernel(fragment_lists<Key, Payload> lists, pipeline_state* state, capacities limits,
                                      list_counts* counts, std::uint64_t* voxels, std::uint64_t* offsets,
@@ -416,14 +415,14 @@ __global__ void publish_lists_kernel(fragment_lists<Key, Payload> lists, pipelin
     const std::uint64_t num_fragments = failed ? 0 : state->list_fragments;
     if (blockIdx.x == 0 && threadIdx.x == 0) {
         *counts = {num_voxels, num_fragments};
-        state->voxels = num_voxels; // has_failed reads neither of the two
+        state->voxels = num_voxels; // has_failed reads neither
         state->fragments = num_fragments;
     }
     copy_lists(lists, num_voxels, num_fragments, voxels, offsets, primitives, payloads);
 }
 
-// Fragment lists with payloads of one type. Where all fragments have one payload, it takes no memory. may_count:
-// whether they may be sorted by counting, which leaves no sorted keys.
+// Takes fragment lists with payloads of one type. one_payload: all fragments have the same payload, which takes no
+// memory. may_count: they may be sorted by counting, which leaves no sorted keys.
 template <class Key, class Payload>
 [[nodiscard]] list_buffers<Key, Payload> take_lists(arena& memory, std::uint64_t num_voxels,
                                                     unsigned long long capacity, bool one_payload = false,

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The kernels of fragment lists that depend on no shader (fragments/fragment_lists.cuh), and their launches.
+// Kernels and launches of fragments/fragment_lists.cuh that depend on no shader.
 
 #include <voxelpipe/device/fragments/fragment_lists.cuh>
 
@@ -33,7 +33,7 @@ void prepare_sort(Key* keys, std::uint32_t* values, std::uint64_t capacity, cons
                   values, capacity, preparation, state, limits);
 }
 
-// One thread.
+// One thread runs it.
 template <class State>
 __global__ void end_filter_kernel(State* state, capacities limits) {
     await_stream();

@@ -2,18 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Fragment lists: raster/raster.cuh with a sink that appends what it finds to one list, in any order. One pass: no
-// fragment is counted before it is written, and none is shaded. A warp gathers fragments in shared memory and takes
-// room in the list for all of them at once.
+// Fragment lists: raster/raster.cuh with a sink that appends fragments to one list, in any order. One pass: no fragment
+// is counted before it is written, and none is shaded. A warp gathers fragments in shared memory and reserves room in
+// the list for all of them at once.
 
 #include <voxelpipe/device/fragments/order_memory.cuh>
 #include <voxelpipe/device/raster/raster.cuh>
 
 namespace voxelpipe::device {
 
-// Room: fragments that may wait in a warp's shared memory. FlushAt: from how many on they go to the list, by an atomic
-// on the same word for all warps of the device (see class_queues), so that there should be many; what 32 triangles
-// bring should fit behind what is less, or they have to come twice.
+// Room: fragments that fit a warp's shared memory. FlushAt: number from which on they are written to the list. That
+// takes an atomic on a word shared by all warps of the device (see class_queues), so batches should be large; but the
+// fragments of 32 triangles should fit in the rest, or they must be emitted twice.
 template <class Call, unsigned Room, unsigned FlushAt>
 struct listing_sink : sink_base<Call> {
     static constexpr bool stages_in_shared = true;
@@ -42,7 +42,7 @@ struct listing_sink : sink_base<Call> {
         primitive_ = this->call.out.first_primitive + triangle;
     }
     __device__ VOXELPIPE_INLINE void drop(core::triangle_class kind) {
-        if (!bypasses_staging_) sink_base<Call>::drop(kind); // once, where a triangle comes twice
+        if (!bypasses_staging_) sink_base<Call>::drop(kind); // only once if the triangle is emitted twice
     }
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
@@ -61,7 +61,7 @@ struct listing_sink : sink_base<Call> {
     __device__ VOXELPIPE_INLINE void emit_line(std::uint32_t first, std::uint32_t step, unsigned count) {
         for (unsigned at = atomicAdd(&m_.n, count), end = at + count; at < end; ++at, first += step) write(at, first);
     }
-    // They go to the list at once: neighbours, as the lanes that give one.
+    // Writes them to the list at once: lanes with a fragment write neighbouring elements.
     template <class IsDone, class Next>
     __device__ VOXELPIPE_INLINE void rounds(std::uint32_t count, IsDone&& is_done, Next&& next) {
         const unsigned all = __reduce_add_sync(0xffffffffu, count), before = (1u << threadIdx.x % 32) - 1;
@@ -83,8 +83,8 @@ struct listing_sink : sink_base<Call> {
             __syncwarp();
         }
     }
-    // The same for fragments that all lanes share out, up to 31 each: of(lane, i) is the voxel of a lane's number i.
-    // All lanes call it.
+    // The same for up to 31 fragments per lane, distributed over all lanes: of(lane, i) is the voxel of a lane's
+    // fragment i. All lanes call it.
     template <class Of>
     __device__ VOXELPIPE_INLINE void share(std::uint32_t count, Of&& of) {
         const unsigned begin = sum_before<0, 5>(count), all = __shfl_sync(0xffffffffu, begin + count, 31);
@@ -94,7 +94,7 @@ struct listing_sink : sink_base<Call> {
                                                                          this->call.out.primitives + first;
         for (unsigned given = 0; given < all; given += 32) {
             const unsigned at = given + threadIdx.x % 32, number = at < all ? at : all - 1;
-            unsigned lane = 0; // the last that begins here or before
+            unsigned lane = 0; // the last lane that begins here or before
 #pragma unroll
             for (unsigned step = 16; step != 0; step /= 2)
                 lane += __shfl_sync(0xffffffffu, begin, lane + step) <= number ? step : 0;
@@ -105,7 +105,7 @@ struct listing_sink : sink_base<Call> {
             }
         }
     }
-    // They wait with what waits already; where there is no room for a round, that goes to the list first.
+    // Stages the rows of a round. If there is no room for it, what is staged is written to the list first.
     template <class IsDone, class Next>
     __device__ VOXELPIPE_INLINE void row_rounds(IsDone&& is_done, Next&& next) {
         static_assert(room >= 32 * max_long_side);
@@ -128,7 +128,7 @@ struct listing_sink : sink_base<Call> {
                 __syncwarp();
             }
             if (mask != 0) {
-                first += static_cast<unsigned>(__ffs(static_cast<int>(mask)) - 1); // one run
+                first += static_cast<unsigned>(__ffs(static_cast<int>(mask)) - 1); // a run of consecutive voxels
                 at += kept_;
                 for (const unsigned end = at + length; at < end; ++at, ++first) {
                     m_.voxels[at] = first;
@@ -156,8 +156,8 @@ struct listing_sink : sink_base<Call> {
             write(at++, first + (i & 3u) + ((i & 4u) != 0 ? odd : 0) + i / 8 * even);
         }
     }
-    // Between triangles, by all lanes. True: the shared memory was too small for what came since the last time; it has
-    // been counted and has to come once more, to be written to the list at once.
+    // Call between triangles, by all lanes. Returns true if the shared memory was too small for the fragments since the
+    // last call: they have been counted, and must be emitted again, straight to the list.
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool commit() {
         const unsigned n = m_.n;
         __syncwarp();
@@ -214,14 +214,14 @@ private:
             this->call.out.primitives[base_ + at] = primitive_;
         }
     }
-    // Room in the list for n fragments; what is beyond its capacity is counted only.
+    // Reserves n elements of the list; beyond its capacity, fragments are only counted.
     [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long take(unsigned n) const {
         unsigned long long first = 0;
         if (threadIdx.x % 32 == 0)
             first = atomicAdd(&this->call.out.state->list_fragments, static_cast<unsigned long long>(n));
         return __shfl_sync(0xffffffffu, first, 0);
     }
-    // How many fragments there is room for from number `first` on.
+    // Elements that the list has from number `first` on.
     [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long room_from(unsigned long long first) const {
         const unsigned long long capacity = this->call.out.capacity;
         return first < capacity ? capacity - first : 0;
@@ -234,7 +234,7 @@ private:
             this->call.out.primitives[first + i] = m_.primitives[i];
         }
     }
-    // Of numbers below 32, the bits from Begin on and before End: their sum over the lanes before this one.
+    // Prefix sum over the lanes before this one of the bits [Begin, End) of a number below 32.
     template <int Begin, int End>
     [[nodiscard]] __device__ VOXELPIPE_INLINE static unsigned sum_before(unsigned number) {
         const unsigned before = (1u << threadIdx.x % 32) - 1;
@@ -251,14 +251,15 @@ private:
     }
 
     memory& m_;
-    unsigned kept_ = 0;             // of the memory; what lies behind belongs to this round
-    bool bypasses_staging_ = false; // this round goes to the list at once,
+    unsigned kept_ = 0;             // staged fragments; later ones belong to this round
+    bool bypasses_staging_ = false; // this round is written straight to the list,
     unsigned long long base_ = 0;   // from here on
     std::uint32_t primitive_ = 0;
 };
 
 struct list_output {
-    // With the queues, less than 48 KB for a block. Of 2 x 2 x 2 voxels a triangle has up to eight, a thin one four.
+    // With the queues, less than 48 KB for a block. A box of 2 x 2 x 2 voxels has at most eight fragments, four of a
+    // thin triangle.
     template <class Call>
     using sink = listing_sink<Call, 448, Call::rule == coverage::thin ? 448 - 32 * 4 : 448 - 32 * 8>;
     template <class Call>
@@ -281,14 +282,14 @@ struct list_output {
     }
 };
 
-// Whether the fragments of a draw can be listed this way.
+// True if the fragments of a draw can be listed this way.
 [[nodiscard]] inline bool is_listable(std::uint64_t num_triangles, int fraction, glm::ivec3 extent) {
     return core::small_voxels(fraction) > 0 && std::max({extent.x, extent.y, extent.z}) <= max_immediate_extent &&
            deferred_triangles::holds(num_triangles, max_work_items(extent));
 }
 
-// Appends the fragments of a draw to two arrays of limits.fragments elements each; counts them in the state.
-// first_primitive: of the draw. Does what `preparation` says, if that is wanted.
+// Appends the fragments of a draw to two arrays of limits.fragments elements each, and counts them in the state.
+// first_primitive: of the draw. Runs `preparation`, if it is wanted.
 template <coverage Rule, class Source>
 void list_raster(const raster_input<Source>& in, std::uint32_t num_vertices, std::uint32_t first_primitive,
                  const deferred_triangles& deferred, std::uint32_t* voxels, std::uint32_t* primitives,

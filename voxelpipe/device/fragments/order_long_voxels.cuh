@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Long voxels: the fragments of a voxel that are more than a window holds (fragments/order_voxels.cuh) are sorted by a
-// warp or a block; what is more than that was cut into runs, which are sorted and merged.
+// Long voxels: those with more fragments than a window holds (fragments/order_voxels.cuh). A warp or a block sorts such
+// a voxel; a longer one is divided into runs, which are sorted and merged.
 
 #include <voxelpipe/device/fragments/order_memory.cuh>
 #include <voxelpipe/device/fragments/warp_sort.cuh>
@@ -14,15 +14,15 @@
 
 namespace voxelpipe::device {
 
-// Numbers of a block, on their way from one lane to another. Those of a warp lie apart; a word more for 32, so that
-// lanes meet no bank twice.
+// Numbers of a block while lanes exchange them. Each warp has its own part, with a padding word for every 32, so that
+// lanes do not conflict in a bank.
 struct sort_exchange {
     static constexpr std::uint32_t of_warp = max_of_warp + max_of_warp / 32;
     std::uint32_t numbers[block_sort_threads / 32 * of_warp];
     static_assert(block_sort_threads / 32 * of_warp >= max_of_block);
 };
 
-// Writes the first n numbers of a warp, of which a lane has Items neighbours.
+// Writes the first n numbers of a warp; a lane has Items consecutive ones.
 template <int Items>
 __device__ VOXELPIPE_INLINE void store_warp(const std::uint32_t (&w)[Items], sort_exchange& exchange, std::uint32_t* to,
                                             std::uint32_t n) {
@@ -37,8 +37,8 @@ __device__ VOXELPIPE_INLINE void store_warp(const std::uint32_t (&w)[Items], sor
     __syncwarp();
 }
 
-// The voxels of a list by a warp each, the first one by the first warp of block `start`. What is beyond the fragments
-// of a voxel is more than any primitive, or equal to the last.
+// Sorts the voxels of a list, one per warp, starting with the first warp of block `start`. Elements beyond a voxel's
+// fragments are larger than any primitive, or equal to the last.
 template <int List>
 __device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uint32_t* to, sort_exchange& exchange,
                                                 unsigned start) {
@@ -59,13 +59,13 @@ __device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uin
     }
 }
 
-// Sorts the numbers of a block, of which a thread has Items neighbours: the network of sort_warp, in which warps
-// exchange theirs through shared memory.
+// Sorts the numbers of a block; a thread has Items consecutive ones. The network of sort_warp, in which warps exchange
+// numbers through shared memory.
 template <int Items>
 __device__ VOXELPIPE_INLINE void sort_block(std::uint32_t (&w)[Items], sort_exchange& exchange) {
     constexpr int of_warp = 32 * Items, all = block_sort_threads * Items;
     sort_warp(w);
-    // Number k of this thread with that of another, whose number differs by the bits of `threads`.
+    // Compares this thread's numbers with those of the thread whose number differs in the bits `threads`.
     const auto compare = [&](unsigned threads, unsigned lower_bit, bool mirrored) VOXELPIPE_INLINE_LAMBDA {
         __syncthreads();
 #pragma unroll
@@ -87,7 +87,7 @@ __device__ VOXELPIPE_INLINE void sort_block(std::uint32_t (&w)[Items], sort_exch
     }
 }
 
-// A run of at most Items * block_sort_threads primitives.
+// Sorts a run of at most Items * block_sort_threads primitives.
 template <int Items>
 __device__ VOXELPIPE_INLINE void order_run(const std::uint32_t* from, std::uint32_t* to, std::uint32_t length,
                                            sort_exchange& exchange) {
@@ -98,13 +98,13 @@ __device__ VOXELPIPE_INLINE void order_run(const std::uint32_t* from, std::uint3
         w[k] = i < length ? from[i] : ~0u;
     }
     sort_block(w, exchange);
-    __syncthreads(); // nobody reads what others wrote into the exchange
+    __syncthreads(); // nobody reads the exchange any longer
     const std::uint32_t first = warp_in_block() * 32 * Items;
     if (first < length) store_warp(w, exchange, to + first, length - first);
     __syncthreads();
 }
 
-// By a block each: voxels, and runs of one, which go back to where they were.
+// Sorts, one per block, voxels, and runs of longer voxels, which are sorted in place.
 __device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::uint32_t* primitives,
                                                  sort_exchange& exchange) {
     constexpr int max_items = max_of_block / block_sort_threads;
@@ -127,7 +127,7 @@ __global__ __launch_bounds__(block_sort_threads, 4) void order_long_kernel(const
     __shared__ sort_exchange exchange;
     await_stream();
     std::uint32_t* const to = b.places().primitives;
-    // Where there are few, each list has blocks of its own.
+    // If there are few blocks' worth, each list has blocks of its own.
     order_by_warps<0>(b, to, exchange, gridDim.x / 3);
     order_by_warps<1>(b, to, exchange, gridDim.x / 3 * 2);
     static_assert(num_warp_sorts == 2);
@@ -135,13 +135,13 @@ __global__ __launch_bounds__(block_sort_threads, 4) void order_long_kernel(const
     order_by_blocks(b, to, exchange);
 }
 
-// Dense voxels: a block sets a bit for each primitive of its part that it meets in a voxel, and counts those of the
-// parts before.
+// Sorts dense voxels: a block sets a bit for each primitive of its part that occurs in a voxel, and counts the
+// primitives of earlier parts.
 template <class Buffers>
 __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid_constant__ Buffers b) {
     using scan = cub::BlockScan<std::uint32_t, dense_threads, cub::BLOCK_SCAN_WARP_SCANS>;
     constexpr std::uint32_t num_words = dense_part / 32;
-    constexpr unsigned at_once = 4; // loads that do not wait for one another
+    constexpr unsigned at_once = 4; // loads in flight
     static_assert(num_words == dense_threads);
     __shared__ std::uint32_t words[num_words], places[num_words], all_before;
     __shared__ typename scan::TempStorage storage;
@@ -156,7 +156,7 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
         words[threadIdx.x] = 0;
         if (threadIdx.x == 0) all_before = 0;
         __syncthreads();
-        // Fours of neighbours, aligned, some of which may lie outside of the voxel.
+        // Aligned groups of four; some elements may lie outside the voxel.
         std::uint32_t before = 0;
         const std::uint32_t end_four = (begin + length + 3) / 4;
         for (std::uint32_t i = begin / 4 + threadIdx.x; i < end_four; i += at_once * dense_threads) {
@@ -188,7 +188,7 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
         scan(storage).ExclusiveSum(place, place);
         places[threadIdx.x] = place;
         __syncthreads();
-        // A warp a word, so that neighbours are written by neighbours.
+        // One word per warp, so that neighbouring lanes write neighbouring elements.
         std::uint32_t* const to = primitives + run.begin + all_before;
         const unsigned below = (1u << lane) - 1;
 #pragma unroll(4)
@@ -217,9 +217,10 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
     return lo;
 }
 
-// Merges up to merge_ways sorted runs of `length` each: a primitive's place is the sum of how many are less in each. A
-// thread takes one fragment, a warp 32 neighbours of a run: each lane finds where those begin and end in another run,
-// and all search between. Last: the rest of the voxel in one go, however many runs that is.
+// Merges up to merge_ways sorted runs of `length` each: a primitive's position is the sum, over the runs, of how many
+// primitives are smaller. A thread takes one fragment, a warp 32 neighbours of a run: each lane finds the range of
+// these in one of the other runs, and all lanes search within the ranges. Last: merges the rest of the voxel, however
+// many runs that is.
 template <class Buffers>
 __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::uint32_t* from, std::uint32_t* to,
                                   std::uint64_t length, bool last) {
@@ -230,11 +231,11 @@ __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::
     for (std::uint64_t r = blockIdx.x; r < n; r += gridDim.x) {
         const voxel_run entry = b.lists.runs[r / parts];
         const fragment_run voxel = entry.voxel;
-        if (voxel.length <= length) continue; // was done by the merge before
+        if (voxel.length <= length) continue; // done by the previous merge
         const std::uint64_t i = r % parts * threads_per_block + threadIdx.x;
-        if (i - lane >= entry.run.length) continue; // no lane has one
+        if (i - lane >= entry.run.length) continue; // no lane has a fragment
         const std::uint64_t group_length = last ? voxel.length : length * merge_ways;
-        // Within the voxel. Lanes beyond the last fragment take that.
+        // Within the voxel. Lanes beyond the last fragment take the last.
         const std::uint64_t at = entry.run.begin - voxel.begin + (i < entry.run.length ? i : entry.run.length - 1);
         const std::uint64_t group = at / group_length * group_length, own = at / length * length;
         const std::uint64_t end = group + group_length < voxel.length ? group + group_length : voxel.length;
@@ -245,7 +246,7 @@ __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::
         std::uint64_t place = voxel.begin + group + (at - own);
         for (std::uint64_t start = group; start < end; start += 32 * length) {
             const std::uint64_t mine = start + lane * length;
-            std::uint32_t low = 0, high = 0; // of the run's numbers, those before `least` and before `most`
+            std::uint32_t low = 0, high = 0; // how many of the run's numbers are below `least`, and below `most`
             if (mine < end && mine != own) {
                 const auto of_run = static_cast<std::uint32_t>(end - mine < length ? end - mine : length);
                 low = count_less(numbers + mine, of_run, least);

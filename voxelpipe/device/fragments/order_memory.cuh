@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the order of fragments (fragments/order_voxels.cuh) keeps in memory: lists of long voxels, what tiles tell one
-// another, where the result goes, and what has to be zero before.
+// Memory of the fragment order (fragments/order_voxels.cuh): lists of long voxels, words that tiles publish, output
+// pointers, and what must be zero before.
 
 #include <voxelpipe/device/fragments/radix_sort.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
@@ -13,50 +13,50 @@
 
 namespace voxelpipe::device {
 
-inline constexpr std::uint32_t window_length = 192; // a warp takes the voxels that begin in so many fragments
-inline constexpr std::uint32_t max_of_window = 256; // fragments of a voxel
+inline constexpr std::uint32_t window_length = 192; // a warp takes the voxels that begin in this many fragments
+inline constexpr std::uint32_t max_of_window = 256; // most fragments of a voxel that a window orders
 inline constexpr int num_warp_sorts = 2;            // with 16 or 32 fragments a lane
 inline constexpr std::uint32_t max_of_warp = 32 * 32;
 inline constexpr std::uint32_t max_of_block = 4096;
-inline constexpr int narrow_primitive_bits = 24; // beside the rank of a voxel in its window, in 32
+inline constexpr int narrow_primitive_bits = 24; // in 32 bits, beside the rank of a voxel in its window
 inline constexpr int order_warps = 4;            // of a block that takes windows
-inline constexpr int order_blocks = 8;           // on a multiprocessor
+inline constexpr int order_blocks = 8;           // per multiprocessor
 inline constexpr int block_sort_threads = 256;
 inline constexpr int dense_threads = 1024;
 inline constexpr std::uint32_t merge_ways = 64; // runs that one merge takes
-// A voxel of more than max_of_block fragments whose primitives are dense among all: a bit for each of those, by blocks
-// for so many bits each, all of which read the whole voxel. At least one bit in 64 is set then, so that all bits of a
-// call are a few words a fragment.
+// A voxel of more than max_of_block fragments is dense if at least one in min_dense of all primitives is in it. Then a
+// bit for each primitive orders it, by blocks for dense_part bits each, all of which read the whole voxel. So all bits
+// of a call are a few words per fragment.
 inline constexpr std::uint32_t dense_part = 1u << 15, max_dense_parts = 64, min_dense = 64;
-inline constexpr std::uint64_t only_dense = max_of_block + 1; // as the longest: there are such voxels, but no runs
+inline constexpr std::uint64_t only_dense = max_of_block + 1; // as longest_ordered: there are dense voxels, but no runs
 
-// A stretch of fragments.
+// A range of fragments.
 struct fragment_run {
     unsigned long long begin, length;
 };
-// A run of at most max_of_block fragments, of a voxel that has more.
+// A run of at most max_of_block fragments, and the longer voxel that it belongs to.
 struct voxel_run {
     fragment_run run, voxel;
 };
 
-// Voxels that are too long for a window, by how they are sorted. The lists cannot overflow: a voxel in one of them has
-// so many fragments.
+// Voxels that are too long for a window, by how they are sorted. The lists cannot overflow: each voxel in them has more
+// fragments than the list has slots for.
 struct order_lists {
     static constexpr int block_list = num_warp_sorts, dense_list = num_warp_sorts + 1, run_list = num_warp_sorts + 2,
                          num_lists = num_warp_sorts + 3;
-    fragment_run* voxels[num_warp_sorts + 2]; // of a warp; of a block; dense ones
+    fragment_run* voxels[num_warp_sorts + 2]; // for warps; for blocks; dense ones
     voxel_run* runs;
-    std::uint32_t num_primitives = 0; // of a call where a voxel may be dense, or 0
-    unsigned int* counts;             // of all lists; zeroed
-    unsigned long long* longest_run;  // of the voxels; zeroed
+    std::uint32_t num_primitives = 0; // if a voxel of the call may be dense; otherwise 0
+    unsigned int* counts;             // of all lists; zero before
+    unsigned long long* longest_run;  // of the voxels; zero before
 
     [[nodiscard]] static order_lists take(arena& memory, std::uint64_t capacity) {
         order_lists w{};
         for (int k = 0; k < num_lists - 1; ++k) w.voxels[k] = memory.take<fragment_run>(capacity / (max_below(k) + 1));
-        w.runs = memory.take<voxel_run>(2 * (capacity / max_of_block)); // each voxel's last may be short
+        w.runs = memory.take<voxel_run>(2 * (capacity / max_of_block)); // each voxel's last run may be short
         return w;
     }
-    // With its counters.
+    // Sets the pointers to the counters.
     [[nodiscard]] order_lists with(pipeline_state* state) const {
         static_assert(sizeof(state->num_ordered) == num_lists * sizeof(*counts));
         order_lists w = *this;
@@ -68,23 +68,23 @@ struct order_lists {
     [[nodiscard]] VOXELPIPE_HD static constexpr std::uint32_t max_below(int k) {
         return k == 0 ? max_of_window : k == 1 ? 32 * 16 : k == 2 ? max_of_warp : max_of_block;
     }
-    [[nodiscard]] VOXELPIPE_HD std::uint32_t dense_parts() const { // of a voxel
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t dense_parts() const { // per voxel
         return (num_primitives + dense_part - 1) / dense_part;
     }
-    // The list of a voxel that is neither run nor dense, or -1.
+    // The list of a voxel that is neither divided into runs nor dense, or -1.
     [[nodiscard]] VOXELPIPE_HD static constexpr int list_of(unsigned long long length) {
         return length > max_of_block || length <= max_of_window ? -1
                : length > max_below(2)                          ? 2
                : length > max_below(1)                          ? 1
                                                                 : 0;
     }
-    // Puts a voxel at a place that was taken for it in list_of(length).
+    // Stores a voxel in a slot that was reserved for it in list_of(length).
     __device__ VOXELPIPE_INLINE void add(unsigned at, unsigned long long begin, unsigned long long length) const {
 #pragma unroll
-        for (int k = 0; k <= block_list; ++k) // an index that is no constant would put the pointers in local memory
+        for (int k = 0; k <= block_list; ++k) // an index that is not constant would put the pointers into local memory
             if (list_of(length) == k) voxels[k][at] = {begin, length};
     }
-    // A voxel that begins at `begin`. By one thread.
+    // Appends a voxel that begins at `begin` to its list. One thread calls it.
     __device__ void push(unsigned long long begin, unsigned long long length) const {
         const bool is_dense = length > max_of_block && num_primitives != 0 && length >= num_primitives / min_dense;
         if (is_dense) {
@@ -107,8 +107,9 @@ struct order_lists {
     }
 };
 
-// Arrays for lists: the voxels, ascending, in one of two, where their fragments begin, and one place more that says how
-// many fragments there are; voxels beyond the room are counted, not written. The primitives by voxel, and payloads.
+// Output arrays of lists: the voxels, ascending, in either of two types; the offset of each voxel's first fragment, and
+// one more element with the number of fragments; the primitives by voxel; payloads. Voxels beyond `room` are counted,
+// not written.
 struct list_places {
     std::uint64_t* voxels = nullptr; // or
     std::uint32_t* narrow_voxels = nullptr;
@@ -118,14 +119,14 @@ struct list_places {
     void* payloads = nullptr;
 };
 
-// Where the lists are to go: null where they come to lie. With a page, which the device can read, what it says when the
-// call runs, so that a call that is kept as a graph finds new arrays.
+// Output pointers of a call; null if the lists stay in the call's memory. With a page, which the device can read, the
+// pointers are read from it when the call runs, so that a call kept as a graph finds new arrays.
 struct output_pointers {
     list_places value;
     const list_places* page = nullptr;
 };
 
-// How many voxels begin in each tile of windows, passed on from tile to tile: one word each, zeroed before.
+// Number of voxels that begin in each tile of windows, published for later tiles: one word each, zero before.
 struct tile_counts {
     static constexpr std::uint32_t length = order_warps * window_length; // fragments of a tile
     static constexpr unsigned long long own = 1ull << 62, all = 2ull << 62, value = own - 1;
@@ -136,19 +137,19 @@ struct tile_counts {
     }
 };
 
-// Memory of a counting sort (fragments/counting_sort.cuh), in place of a sort_memory.
+// Memory of a counting sort (fragments/counting_sort.cuh), which replaces sort_memory.
 struct counting_memory {
     static constexpr std::uint32_t tile = 16384;                        // voxels
     static constexpr std::uint64_t max_voxels = std::uint64_t{1} << 21; // of a grid: the counters fit the cache
 
-    std::uint64_t num_voxels = 0;        // of the grid, up to whole tiles; 0 where there is no counting sort
-    std::uint64_t capacity = 0;          // fragments
-    std::uint32_t* counts = nullptr;     // of each voxel; then where its first fragment goes. Zeroed
-    std::uint32_t* numbers = nullptr;    // of each fragment within its voxel
-    std::uint32_t* starts = nullptr;     // a bit for each place where a voxel begins, and behind the last one. Zeroed
-    unsigned long long* tiles = nullptr; // what tiles of voxels tell one another. Zeroed
+    std::uint64_t num_voxels = 0;     // of the grid, rounded up to whole tiles; 0 if there is no counting sort
+    std::uint64_t capacity = 0;       // fragments
+    std::uint32_t* counts = nullptr;  // of each voxel; then the offset of its first fragment. Zero before
+    std::uint32_t* numbers = nullptr; // of each fragment within its voxel
+    std::uint32_t* starts = nullptr; // one bit per offset at which a voxel begins, and one behind the last. Zero before
+    unsigned long long* tiles = nullptr; // words that tiles of voxels publish. Zero before
 
-    // Whether a grid's fragments, so many at most, can be sorted by counting, with counters that are few beside them.
+    // True if up to `capacity` fragments of a grid can be sorted by counting, with few counters per fragment.
     [[nodiscard]] static bool suits(std::uint64_t num_voxels, std::uint64_t capacity) {
         return num_voxels <= max_voxels && num_voxels <= 8 * capacity && capacity < max_sorted;
     }
@@ -164,9 +165,9 @@ struct counting_memory {
     }
     [[nodiscard]] VOXELPIPE_HD bool is_used() const { return num_voxels != 0; }
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_tiles() const { return num_voxels / tile; }
-    // Words of `starts`: windows look beyond the last fragment.
+    // Words of `starts`: windows read beyond the last fragment.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_starts() const { return (capacity / 1024 + 3) * 32; }
-    // What has to be zero before. By all threads of a grid.
+    // Zeros what must be zero before. All threads of a launch call it.
     __device__ void zero(std::uint64_t thread, std::uint64_t threads) const {
         for (std::uint64_t i = thread; i < num_voxels / 4; i += threads) reinterpret_cast<uint4*>(counts)[i] = {};
         for (std::uint64_t i = thread; i < num_starts() / 4; i += threads) reinterpret_cast<uint4*>(starts)[i] = {};
@@ -174,19 +175,19 @@ struct counting_memory {
     }
 };
 
-// What the sort and the order of a call's fragments want before they begin, which the raster that lists them does on
-// its way: zeros, and the page's word of where the lists are to go.
+// Work that the sort and the order of a call's fragments need before they begin. The raster that lists the fragments
+// does it on its way: zeroing, and reading the output pointers from the page.
 struct sort_preparation {
     bool is_wanted = false;
-    bool sorts = false;         // by sort_fragments, or,
-    counting_memory counting{}; // where it is in use, by counting
+    bool sorts = false;         // sort_fragments will run, unless
+    counting_memory counting{}; // this is in use: then the counting sort
     sort_memory sort{};
     std::uint64_t capacity = 0;    // fragments
-    tile_counts tiles{};           // or none
-    list_places* places = nullptr; // or none
+    tile_counts tiles{};           // may be empty
+    list_places* places = nullptr; // may be null
     output_pointers asked;
 
-    // By all threads of a grid.
+    // All threads of a launch call it.
     __device__ VOXELPIPE_INLINE void run(std::uint64_t thread, std::uint64_t threads) const {
         if (places != nullptr && thread == 0) *places = asked.page != nullptr ? *asked.page : asked.value;
         if (tiles.words != nullptr)
@@ -198,7 +199,7 @@ struct sort_preparation {
     }
 };
 
-// Memory for the order of so many fragments.
+// Memory for the order of up to `capacity` fragments.
 struct order_memory {
     tile_counts tiles;
     order_lists lists;
@@ -211,9 +212,10 @@ struct order_memory {
     }
 };
 
-// keys: the voxels of the fragments, ascending, or null where a counting sort has listed the voxels, and `starts` is
-// its own; from: their primitives, in any order within a voxel, overwritten; spare: room for as many, which may be
-// where the keys are. The lists go where `asked` says, in device memory, or `here` where that has no voxels.
+// Arrays of the fragment order. keys: the voxels of the fragments, ascending; null if a counting sort has listed the
+// voxels, which then made `starts`. from: their primitives, in any order within a voxel; overwritten. spare: room for
+// as many; may alias keys. The lists go to the pointers *asked, which lie in device memory, or to `here` if these are
+// null.
 struct order_buffers {
     const std::uint32_t* keys;
     std::uint32_t* from;

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Fragment order: fragments that were found in any order and then sorted by voxel are put in order of their primitives
-// within each voxel, and the voxels are listed with where their fragments begin. A warp takes a window of fragments, in
-// which it sorts all voxels of some hundred fragments at once; longer ones are a warp's or a block's each, and what is
-// more than that is cut into runs that are sorted and merged (fragments/order_long_voxels.cuh). How many fragments
-// there are is known on the device alone.
+// Fragment order: fragments that were found in any order and sorted by voxel are ordered by primitive within each
+// voxel, and the voxels are listed with the offsets of their fragments. A warp takes a window of fragments and sorts
+// all of its voxels, some hundred fragments, at once. A warp or a block each sorts longer voxels, and still longer ones
+// are divided into runs, which are sorted and merged (fragments/order_long_voxels.cuh). Only the device knows the
+// number of fragments.
 
 #include <voxelpipe/device/base/kernel_library.cuh>
 #include <voxelpipe/device/fragments/order_memory.cuh>
@@ -15,8 +15,8 @@
 
 namespace voxelpipe::device {
 
-// What capacities::longest_ordered is to be for calls like one with this pipeline_state::longest_ordered(): the most
-// that the same kernels do.
+// The capacities::longest_ordered for calls like one that had this pipeline_state::longest_ordered(): the largest for
+// which the same kernels are launched.
 [[nodiscard]] inline std::uint64_t longest_like(std::uint64_t longest) {
     constexpr std::uint64_t block = max_of_block, ways = merge_ways;
     for (const std::uint64_t most : {std::uint64_t{0}, block, only_dense, block * ways, block * ways * ways})
@@ -24,8 +24,8 @@ namespace voxelpipe::device {
     return ~std::uint64_t{0};
 }
 
-// Puts b.from in order and lists the voxels; counts them in the state. No voxel of more than limits.longest_ordered
-// fragments, but then the state has_failed.
+// Orders b.from, lists the voxels and counts them in the state. Does not order voxels of more than
+// limits.longest_ordered fragments; then the state has_failed.
 VOXELPIPE_DECLARES_KERNELS void order_fragments(order_buffers b, std::uint64_t num_primitives, pipeline_state* state,
                                                 capacities limits, cudaStream_t stream);
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The kernels of the fragment order (fragments/order_voxels.cuh), and their launches.
+// Kernels and launches of the fragment order (fragments/order_voxels.cuh).
 
 #include <voxelpipe/device/fragments/order_long_voxels.cuh>
 #include <voxelpipe/device/fragments/order_voxels.cuh>
@@ -16,22 +16,22 @@
 
 namespace voxelpipe::device {
 
-// ---- what tiles tell one another ------------------------------------------------------------------------------------
+// ---- words that tiles publish ---------------------------------------------------------------------------------------
 
 using tile_word = ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device>;
 
-// Says how many voxels begin in this tile, for those behind. By one thread.
+// Publishes for later tiles how many voxels begin in this one. One thread calls it.
 __device__ VOXELPIPE_INLINE void publish(const tile_counts& tiles, std::uint32_t tile, unsigned long long count) {
     if (tile != 0) tile_word(tiles.words[tile]).store(tile_counts::own | count, ::cuda::memory_order_relaxed);
 }
-// How many voxels begin in the tiles before this one, in which `count` do, as has been published. By all lanes of
-// one warp. Blocks begin in the order of their tiles, so those before are under way.
+// Number of voxels that begin in earlier tiles; `count` begin in this one, as published. All lanes of one warp call it.
+// Blocks start in the order of their tiles, so all earlier ones are running or done.
 [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long count_before(const tile_counts& tiles, std::uint32_t tile,
                                                                           unsigned long long count) {
     const auto lane = threadIdx.x % 32;
     unsigned long long sum = 0;
     if (tile != 0) {
-        for (std::int64_t last = std::int64_t{tile} - 1;; last -= 32) { // lane k looks at tile last - k
+        for (std::int64_t last = std::int64_t{tile} - 1;; last -= 32) { // lane k reads tile last - k
             const std::int64_t mine = last - lane;
             unsigned long long w = tile_counts::all; // before the first tile
             if (mine >= 0) do
@@ -52,14 +52,14 @@ __device__ VOXELPIPE_INLINE void publish(const tile_counts& tiles, std::uint32_t
 
 // ---- windows --------------------------------------------------------------------------------------------------------
 
-// What a warp keeps of its window: the voxels that begin in it, and where.
+// A warp's window: the voxels that begin in it, and their offsets.
 struct order_window {
     std::uint32_t voxels[window_length], first[window_length];
 };
 
-// Which of a lane's Items neighbouring places begin another voxel than was before, or none: bit k the place k. voxels:
-// of n fragments, from the window's first, those of the lane are left in `voxel`; before: the voxel of the one before,
-// or ~0.
+// Bit k of the result: element k of the lane's Items neighbours begins another voxel than the element before, or lies
+// beyond the n fragments. voxels: the keys from the window's first fragment on; `voxel` receives the lane's. before:
+// the key before the window, or ~0.
 template <int Items>
 [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned find_starts(const std::uint32_t* voxels, std::uint32_t n,
                                                                std::uint32_t before, std::uint32_t (&voxel)[Items]) {
@@ -75,7 +75,7 @@ template <int Items>
     }
     return starts;
 }
-// The same from a bit for each place, of a window that begins at `begin`, a multiple of 32.
+// The same from one bit per element, for a window that begins at `begin`, a multiple of 32.
 template <int Items>
 [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned load_starts(const std::uint32_t* starts, std::uint32_t begin) {
     using bits = std::conditional_t<Items == 8, std::uint8_t, std::uint16_t>;
@@ -83,13 +83,14 @@ template <int Items>
     return reinterpret_cast<const bits*>(starts)[begin / Items + threadIdx.x % 32];
 }
 
-// The voxels of a window of 32 * Items places, which count from its first; a lane has Items neighbours.
+// The voxels of a window of 32 * Items elements, counted from its first; a lane has Items neighbours.
 template <int Items>
 struct window_voxels {
     static constexpr std::uint32_t places = 32 * Items;
-    unsigned starts;    // bit k: another voxel begins at the lane's place k than was before, or none
-    unsigned begins;    // the same of voxels that begin within window_length and before n
-    std::uint32_t rank; // of them, how many before this lane's places
+    unsigned starts;    // bit k: the lane's element k begins another voxel than the element before, or lies beyond the
+                        // fragments
+    unsigned begins;    // the same for voxels that begin within window_length and before n
+    std::uint32_t rank; // voxels that begin in the window before this lane's elements
 
     __device__ VOXELPIPE_INLINE window_voxels(unsigned starts_, std::uint32_t n) : starts(starts_) {
         const std::uint32_t lane = threadIdx.x % 32, first = lane * Items;
@@ -105,7 +106,7 @@ struct window_voxels {
         rank -= static_cast<std::uint32_t>(__popc(begins));
     }
 
-    // The first and the last of the places that are set in `bits` of any lane, of which there are some.
+    // The first and the last element with a bit in any lane's `bits`; there must be one.
     [[nodiscard]] static __device__ VOXELPIPE_INLINE std::uint32_t first_of(unsigned bits) {
         const int lane = __ffs(static_cast<int>(__ballot_sync(0xffffffffu, bits != 0))) - 1;
         return static_cast<std::uint32_t>(lane * Items + __ffs(static_cast<int>(__shfl_sync(0xffffffffu, bits, lane))) -
@@ -116,9 +117,9 @@ struct window_voxels {
         return static_cast<std::uint32_t>(lane * Items + 31 -
                                           __clz(static_cast<int>(__shfl_sync(0xffffffffu, bits, lane))));
     }
-    // No voxel between two starts has more fragments.
+    // An upper bound of the fragments of any voxel between two starts.
     [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t longest() const {
-        constexpr unsigned within = Items - 1; // of a lane
+        constexpr unsigned within = Items - 1; // within one lane
         const unsigned next = __shfl_down_sync(0xffffffffu, starts, 1);
         const unsigned across = starts != 0 && next != 0 && threadIdx.x % 32 != 31
                                     ? static_cast<unsigned>(__ffs(static_cast<int>(next)) - 1 + Items - 31 +
@@ -127,20 +128,20 @@ struct window_voxels {
         unsigned most = __reduce_max_sync(0xffffffffu, across);
         const unsigned lanes = __ballot_sync(0xffffffffu, starts != 0);
         unsigned empty = ~lanes & (0u - (lanes & (0u - lanes))) & ~0u >> __clz(static_cast<int>(lanes));
-        if (empty != 0) { // lanes between others within which no voxel begins
+        if (empty != 0) { // lanes between others in which no voxel begins
             for (most = 2 * Items - 1; empty != 0; empty &= empty << 1) most += Items;
         }
         return most < within ? within : most;
     }
 };
 
-// Writes the primitives of the window's places begin .. end - 1 in order, within which whole voxels lie. A fragment's
-// number in the sort is its voxel's rank within the window and then its primitive, in primitive_bits.
+// Writes the window's primitives [begin, end), whole voxels, in order. A fragment is sorted by its voxel's rank within
+// the window, then by its primitive, of primitive_bits bits.
 template <class Word, int Items>
 __device__ VOXELPIPE_INLINE void order_places(const std::uint32_t (&primitive)[Items], std::uint32_t* to,
                                               const window_voxels<Items>& window, std::uint32_t begin,
                                               std::uint32_t end, int primitive_bits) {
-    constexpr std::uint32_t few = Items <= 8 ? 6 * Items : 0; // beyond, the network for any order takes less
+    constexpr std::uint32_t few = Items <= 8 ? 6 * Items : 0; // for longer runs the general network is cheaper
     const std::uint32_t first = threadIdx.x % 32 * Items;
     Word w[Items], rank = static_cast<Word>(window.rank) - 1;
 #pragma unroll
@@ -162,11 +163,12 @@ __device__ VOXELPIPE_INLINE void order_places(const std::uint32_t (&primitive)[I
     store_neighbours(to, first, begin, end, sorted);
 }
 
-// Of n voxels of fragments, ascending: the first from `at` on that is not this one, where all before are. By all lanes.
+// The first of n ascending voxels, from `at` on, that differs from `voxel`; all before it are equal. All lanes call it.
 [[nodiscard]] __device__ inline std::uint32_t find_end(const std::uint32_t* voxels, std::uint32_t n,
                                                        std::uint32_t voxel, std::uint32_t at) {
     const std::uint64_t lane = threadIdx.x % 32;
-    const auto same_strides = [&](std::uint64_t first, std::uint64_t stride) { // of 32, how many are this voxel's
+    const auto same_strides = [&](std::uint64_t first,
+                                  std::uint64_t stride) { // of 32 strides, how many lie within the voxel
         const std::uint64_t last = first + lane * stride + stride - 1;
         return static_cast<std::uint64_t>(__popc(__ballot_sync(0xffffffffu, last < n && voxels[last] == voxel)));
     };
@@ -180,7 +182,8 @@ __device__ VOXELPIPE_INLINE void order_places(const std::uint32_t (&primitive)[I
     return static_cast<std::uint32_t>(end);
 }
 
-// The window of n fragments from `begin` on, by all lanes of a warp. ByStarts: where voxels begin is known.
+// The window of n fragments from `begin` on, ordered by one warp. ByStarts: a counting sort has found where voxels
+// begin.
 template <bool ByStarts>
 struct order_of_window {
     static constexpr int items = 8, wide_items = 16;
@@ -189,10 +192,10 @@ struct order_of_window {
     static_assert(voxels_type::places >= window_length && wide_type::places >= window_length - 1 + max_of_window);
 
     const order_buffers& b;
-    std::uint32_t begin, n, before; // n counts from the window's first, as all places do; the voxel before it
-    std::uint32_t primitive[items]{}, voxel[items]; // voxels by keys only
+    std::uint32_t begin, n, before; // n counts from the window's first, as all indices do; the voxel before it
+    std::uint32_t primitive[items]{}, voxel[items]; // `voxel` is set by keys only
     voxels_type voxels;
-    std::uint32_t count; // of voxels that begin in it
+    std::uint32_t count; // voxels that begin in the window
 
     __device__ VOXELPIPE_INLINE order_of_window(const order_buffers& buffers, std::uint32_t begin_, std::uint32_t n_)
         : b(buffers), begin(begin_), n(n_ - begin_), before(ByStarts || begin_ == 0 ? ~0u : b.keys[begin_ - 1]),
@@ -212,7 +215,7 @@ struct order_of_window {
             }
     }
 
-    // Puts its voxels in order, but for one that is too long, which goes to its list.
+    // Orders the window's voxels. The last one, if it is too long, goes to its list.
     template <bool Narrow>
     __device__ VOXELPIPE_INLINE void order(std::uint32_t* to) const {
         if (count == 0) return;
@@ -225,7 +228,7 @@ struct order_of_window {
         else
             whole -= find_last(end);
         to += begin;
-        if (end - skipped <= whole) { // a fragment each, or nothing
+        if (end - skipped <= whole) { // one fragment each, or nothing
             store_neighbours(to, threadIdx.x % 32 * items, skipped, end, primitive);
             return;
         }
@@ -240,8 +243,7 @@ struct order_of_window {
         };
         if constexpr (Narrow)
             order.template operator()<std::uint32_t>(narrow_primitive_bits);
-        else if (b.primitive_bits < 32 &&
-                 count <= 1u << (32 - b.primitive_bits)) // few voxels, as where triangles are tiny
+        else if (b.primitive_bits < 32 && count <= 1u << (32 - b.primitive_bits)) // few voxels, as with tiny triangles
             order.template operator()<std::uint32_t>(b.primitive_bits);
         else
             order.template operator()<std::uint64_t>(32);
@@ -255,11 +257,11 @@ private:
         else
             return find_starts(b.keys + begin, n, before, voxel_of);
     }
-    // Where the last voxel ends, which does so at `end` or beyond. Returns 1 where it is too long: then `end` is where
-    // it begins.
+    // Finds the end of the last voxel, which lies at `end` or beyond. Returns 1 if it is too long; then `end` is its
+    // beginning.
     [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t find_last(std::uint32_t& end) const {
         const std::uint32_t lane = threadIdx.x % 32, last = voxels_type::last_of(voxels.begins);
-        if constexpr (ByStarts) { // who found the starts has put it into its list
+        if constexpr (ByStarts) { // the counting sort has put it into its list
             const unsigned word = b.starts[(begin + end) / 32 + lane];
             const unsigned lanes = __ballot_sync(0xffffffffu, word != 0);
             if (lanes != 0) {
@@ -289,7 +291,7 @@ private:
     }
 };
 
-// Narrow: primitives have narrow_primitive_bits.
+// Narrow: primitives have at most narrow_primitive_bits bits.
 template <bool Narrow>
 __global__ __launch_bounds__(32 * order_warps,
                              order_blocks) void order_windows_kernel(const __grid_constant__ order_buffers b,
@@ -305,7 +307,7 @@ __global__ __launch_bounds__(32 * order_warps,
     const std::uint32_t tile = blockIdx.x; // see count_before
     const std::uint64_t first = std::uint64_t{tile} * tile_counts::length, begin = first + warp * window_length;
     if (first >= n) return;
-    // Where the tile has no such window, one behind the last fragment, in which nothing begins.
+    // A warp without a window takes one behind the last fragment, in which nothing begins.
     const order_of_window<false> window(b, static_cast<std::uint32_t>(begin < n ? begin : n), n);
     if (lane == 0) counts[warp] = window.count;
     __syncthreads();
@@ -314,7 +316,7 @@ __global__ __launch_bounds__(32 * order_warps,
         earlier += w < warp ? counts[w] : 0;
         all += counts[w];
     }
-    if (threadIdx.x == 0) publish(b.tiles, tile, all); // before the sort, for the tiles behind
+    if (threadIdx.x == 0) publish(b.tiles, tile, all); // before the sort, so that later tiles need not wait
     window.keep(windows[warp]);
     window.template order<Narrow>(to.primitives);
     if (warp == 0) {
@@ -338,7 +340,7 @@ __global__ __launch_bounds__(32 * order_warps,
     }
 }
 
-// The same where a counting sort has listed the voxels, and those that are long.
+// The same if a counting sort has listed the voxels, long ones included.
 template <bool Narrow>
 __global__ __launch_bounds__(32 * order_warps,
                              order_blocks) void order_starts_kernel(const __grid_constant__ order_buffers b,
@@ -361,7 +363,7 @@ VOXELPIPE_DEFINES_KERNELS void order_fragments(order_buffers b, std::uint64_t nu
     limits.longest_ordered = ~0ull; // what the windows find out must not stop them
     const bool by_starts = b.starts != nullptr;
     for (const std::uint32_t* numbers : {b.keys, static_cast<const std::uint32_t*>(b.from)})
-        VOXELPIPE_ASSERT(reinterpret_cast<std::uintptr_t>(numbers) % 16 == 0); // load_neighbours
+        VOXELPIPE_ASSERT(reinterpret_cast<std::uintptr_t>(numbers) % 16 == 0); // for load_neighbours
     if (num_primitives <= std::uint64_t{dense_part} * max_dense_parts)
         b.lists.num_primitives = static_cast<std::uint32_t>(num_primitives);
     b.primitive_bits = num_primitives < 2 ? 1 : static_cast<int>(std::bit_width(num_primitives - 1));

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Fragment sort: a stable radix sort of (voxel, value) pairs whose number is known on the device alone. One kernel
-// counts the digits of all passes, then each pass reads and writes every pair once: a tile learns where its digits go
-// from the tiles before it (decoupled look-back: Merrill and Garland 2016, Adinets and Merrill 2022). cub's sort has to
-// be told the number, so that the whole capacity would be sorted, fillers included, and takes 8 bits a pass: the 30
-// bits of a voxel of 1024^3 are three passes of ten here and four there. Between passes a key lies next to its value: a
-// pass writes short runs, and 16 pairs in a row lie in fewer sectors of the cache than 16 keys and 16 values elsewhere.
+// Fragment sort: a stable radix sort of (voxel, value) pairs whose number only the device knows. One kernel counts the
+// digits of all passes; then each pass reads and writes every pair once, and a tile learns from earlier tiles where its
+// digits go (decoupled look-back: Merrill and Garland 2016, Adinets and Merrill 2022). cub's sort needs the number on
+// the host, so it would sort the whole capacity, and it takes 8 bits a pass: the 30 bits of a voxel of 1024^3 are three
+// passes of ten here and four there. Between passes a key is stored next to its value: a pass writes short runs, and 16
+// consecutive pairs occupy fewer cache sectors than 16 keys and 16 values apart.
 
 #include <voxelpipe/device/base/kernel_library.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
@@ -17,13 +17,13 @@
 
 namespace voxelpipe::device {
 
-inline constexpr int sort_threads = 512; // of a block, which takes a tile
-inline constexpr int sort_items = 16;    // pairs of a thread
-inline constexpr int few_sort_items = 8; // where the device takes all tiles at once: shorter ones are done sooner
+inline constexpr int sort_threads = 512; // of a block, which sorts a tile
+inline constexpr int sort_items = 16;    // pairs per thread
+inline constexpr int few_sort_items = 8; // if the device runs all tiles at once, because shorter tiles finish sooner
 [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t sort_tile(int items) {
     return static_cast<std::uint32_t>(sort_threads * items);
 }
-[[nodiscard]] VOXELPIPE_HD constexpr int sort_blocks(int items) { // of a multiprocessor, at once
+[[nodiscard]] VOXELPIPE_HD constexpr int sort_blocks(int items) { // per multiprocessor, at once
     return items == few_sort_items ? 3 : 2;
 }
 inline constexpr int digit_count_threads = 1024;
@@ -31,9 +31,9 @@ inline constexpr int most_digit_bits = 10;
 inline constexpr int max_digit_passes = 4;
 inline constexpr std::uint64_t max_sorted = std::uint64_t{1} << 30; // pairs: two bits of a tile's words are flags
 
-// How keys of so many bits are cut into digits, lowest first: as few as can be, all of one size.
+// How keys of so many bits are divided into digits, lowest first: as few as possible, all of one size.
 struct digit_plan {
-    int passes, bits; // of a digit
+    int passes, bits; // bits of a digit
 
     VOXELPIPE_HD constexpr explicit digit_plan(int key_bits)
         : passes(key_bits == 0 ? 1 : (key_bits + most_digit_bits - 1) / most_digit_bits),
@@ -41,11 +41,11 @@ struct digit_plan {
     [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t num_digits() const { return 1u << bits; }
 };
 
-// Pairs: keys and values apart or, where there are no values, joined from keys[0] on, in the same memory.
+// Pairs: keys and values apart or, if values is null, interleaved from keys[0] on, in the same memory.
 struct pair_array {
     std::uint32_t *keys, *values;
 
-    // Calls use(std::bool_constant<are they joined>): asked once, not for each pair, so that loads are not held up.
+    // Calls use(std::bool_constant<interleaved>). Tested once and not for each pair, so that loads are not delayed.
     template <class Use>
     __device__ VOXELPIPE_INLINE void ask_once(Use&& use) const {
         if (values == nullptr)
@@ -71,7 +71,7 @@ struct pair_array {
     }
 };
 
-// The two places between which a sort moves its pairs, apart: values begin where the room for keys ends.
+// The two buffers between which a sort moves its pairs. Values begin where the room for keys ends.
 struct sort_pairs {
     std::uint32_t *keys[2]{}, *values[2]{};
 
@@ -84,7 +84,7 @@ struct sort_pairs {
         }
         return p;
     }
-    // For keys: values begin at a whole 256 bytes too.
+    // Room for keys, such that values begin at a multiple of 256 bytes too.
     [[nodiscard]] static constexpr std::uint64_t room_for(std::uint64_t capacity) { return (capacity + 63) / 64 * 64; }
     [[nodiscard]] pair_array joined(int i) const { return {keys[i], nullptr}; }
     [[nodiscard]] pair_array apart(int i) const { return {keys[i], values[i]}; }
@@ -92,19 +92,20 @@ struct sort_pairs {
 
 // Memory of a sort.
 struct sort_memory {
-    // A tile's word for a digit: how many pairs have it, in the tile, or in all up to it.
+    // Flags of a tile's word for a digit: it counts the pairs with the digit in the tile, or in all tiles up to it.
     static constexpr std::uint32_t own = 1u << 30, all = 2u << 30, value = own - 1;
     struct totals {
-        std::uint32_t digits[max_digit_passes][1 << most_digit_bits]; // how many; then where the first one goes
+        std::uint32_t digits[max_digit_passes]
+                            [1 << most_digit_bits]; // counts; then the offset of each digit's first pair
         std::uint32_t blocks_done;
         std::uint32_t num; // pairs
     };
     totals* all_tiles = nullptr;
-    std::uint32_t* words[2]{}; // [tile][digit], of passes in turn: each zeroes those of the next
+    std::uint32_t* words[2]{}; // [tile][digit], used by alternate passes: each pass zeros those of the next
     digit_plan plan{1};
-    int items = sort_items; // of a thread
+    int items = sort_items; // per thread
 
-    // Pairs of a thread where there are so many in all, at most.
+    // Pairs per thread for up to `capacity` pairs.
     [[nodiscard]] static int items_for(std::uint64_t capacity) {
         const std::uint64_t at_once =
             static_cast<std::uint64_t>(num_multiprocessors()) * static_cast<unsigned>(sort_blocks(few_sort_items));
@@ -124,7 +125,7 @@ struct sort_memory {
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_tiles(std::uint64_t num) const {
         return (num + sort_tile(items) - 1) / sort_tile(items);
     }
-    // What has to be zero when a sort of num pairs starts. By all threads of a grid.
+    // Zeros what must be zero before a sort of num pairs. All threads of a launch call it.
     __device__ void zero(std::uint64_t num, std::uint64_t thread, std::uint64_t threads) const {
         const std::uint64_t tiles = num_tiles(num);
         for (std::uint64_t i = thread; i < tiles * plan.num_digits(); i += threads) words[0][i] = 0;
@@ -133,7 +134,7 @@ struct sort_memory {
     }
 };
 
-// How many pairs a call sorts: none where it has failed.
+// Number of pairs that a call sorts: 0 if it has failed.
 struct sort_count {
     const pipeline_state* state;
     capacities limits;
@@ -142,8 +143,8 @@ struct sort_count {
     }
 };
 
-// Sorts the pairs in keys[0] and values[0]; at most `capacity`, which is below max_sorted and for which both were
-// taken. The memory's zeros are there (sort_memory::zero). Returns where the sorted pairs are: 0 or 1.
+// Sorts the pairs in keys[0] and values[0]: at most `capacity`, which is below max_sorted and for which both were
+// taken. sort_memory::zero must have run. Returns the index of the sorted pairs: 0 or 1.
 VOXELPIPE_DECLARES_KERNELS [[nodiscard]] int sort_fragments(const sort_pairs& pairs, const sort_count& count,
                                                             std::uint64_t capacity, const sort_memory& m,
                                                             cudaStream_t stream);

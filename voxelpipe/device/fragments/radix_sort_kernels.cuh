@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The kernels of the fragment sort (fragments/radix_sort.cuh), and their launches.
+// Kernels and launches of the fragment sort (fragments/radix_sort.cuh).
 
 #include <voxelpipe/device/fragments/radix_sort.cuh>
 
@@ -26,13 +26,13 @@ struct digit_of {
     }
 };
 
-// Counts the digits of all passes, and then says where the first pair of each goes.
+// Counts the digits of all passes, and computes the offset of each digit's first pair.
 template <class Count>
 __global__ __launch_bounds__(digit_count_threads) void count_digits_kernel(const std::uint32_t* keys,
                                                                            const __grid_constant__ Count count,
                                                                            const __grid_constant__ sort_memory m) {
     using scan = cub::BlockScan<std::uint32_t, digit_count_threads>;
-    constexpr int at_once = 4; // loads that do not wait for one another
+    constexpr int at_once = 4; // loads in flight
     static_assert(digit_count_threads >= 1 << most_digit_bits);
     __shared__ std::uint32_t digits[max_digit_passes][1 << most_digit_bits];
     __shared__ typename scan::TempStorage storage;
@@ -86,8 +86,8 @@ __global__ __launch_bounds__(digit_count_threads) void count_digits_kernel(const
     }
 }
 
-// Numbers of a thread's digits, one or two neighbours, side by side: of a warp of a tile 16 bits each, of a tile 32,
-// whose flags are the same, for they are stored at once.
+// Counts of a thread's digits, one or two neighbours, packed: 16 bits each for a warp, 32 bits each for a tile, whose
+// flags are equal because they are stored at once.
 template <int DigitsEach>
 struct digit_group {
     static_assert(DigitsEach == 1 || DigitsEach == 2);
@@ -106,16 +106,16 @@ struct digit_group {
     }
 };
 
-// How many pairs with each of a thread's digits there are in the tiles before this one. mine: the thread's word of this
-// tile; so many, `apart`, from tile to tile. Blocks begin in the order of their numbers, as cub's scan takes for
-// granted too, so those before are under way. (A tile's number from a counter took a tenth of the pass.)
+// Number of pairs in earlier tiles with each of the thread's digits. mine: the thread's word of this tile; words of
+// consecutive tiles are `apart` words apart. Blocks start in the order of their numbers, which cub's scan relies on
+// too, so all earlier ones are running or done. (Taking the tile's number from a counter cost a tenth of the pass.)
 template <int DigitsEach>
 [[nodiscard]] __device__ VOXELPIPE_INLINE typename digit_group<DigitsEach>::word
 count_before(typename digit_group<DigitsEach>::word* mine, std::uint32_t tile, std::uint32_t apart) {
     using group = digit_group<DigitsEach>;
     using word = typename group::word;
     using atomic_word = ::cuda::atomic_ref<word, ::cuda::thread_scope_device>;
-    constexpr int at_once = 4; // loads that do not wait for one another
+    constexpr int at_once = 4; // loads in flight
     constexpr word all = group::each(sort_memory::all), value = group::each(sort_memory::value);
     word sum = 0;
     for (std::int64_t last = std::int64_t{tile} - 1;;) {
@@ -137,20 +137,20 @@ count_before(typename digit_group<DigitsEach>::word* mine, std::uint32_t tile, s
     }
 }
 
-// What a block keeps in shared memory: first how many pairs of each digit its warps have, then the pairs of its tile.
+// Shared memory of a block: first the number of each digit's pairs in its warps, then the pairs of its tile.
 template <int DigitsEach, int Items>
 union sort_tile_memory {
     std::uint16_t counts[sort_threads / 32][DigitsEach * sort_threads];
     uint2 pairs[sort_tile(Items)];
 };
 
-// Pass `pass` over the digits; a thread has DigitsEach digits to see to. A template, as all kernels in headers are.
+// Pass `pass` over the digits; each thread handles DigitsEach digits. A template, like all kernels in headers.
 template <class Memory, int DigitsEach, int Items>
 __global__ __launch_bounds__(sort_threads,
                              sort_blocks(Items)) void sort_pass_kernel(const __grid_constant__ pair_array from,
                                                                        const __grid_constant__ pair_array to,
                                                                        const __grid_constant__ Memory m, int pass) {
-    using scan = cub::BlockScan<std::uint32_t, sort_threads, cub::BLOCK_SCAN_WARP_SCANS>; // in few registers
+    using scan = cub::BlockScan<std::uint32_t, sort_threads, cub::BLOCK_SCAN_WARP_SCANS>; // needs few registers
     using group = digit_group<DigitsEach>;
     using word = typename group::word;
     using atomic_word = ::cuda::atomic_ref<word, ::cuda::thread_scope_device>;
@@ -162,7 +162,7 @@ __global__ __launch_bounds__(sort_threads,
     static_assert(items % 2 == 0 && most < 1 << 16);
     extern __shared__ __align__(16) unsigned char dynamic_memory[];
     auto& shared = *reinterpret_cast<tile_memory*>(dynamic_memory);
-    // Of each digit, in the tile; then what takes it to its end.
+    // Of each digit: offset within the tile, later what turns it into the global offset.
     __shared__ std::uint32_t places[DigitsEach * sort_threads];
     __shared__ typename scan::TempStorage storage;
     const digit_of digit(m.plan, pass);
@@ -175,9 +175,9 @@ __global__ __launch_bounds__(sort_threads,
     const std::uint32_t n = m.all_tiles->num, begin = tile * most;
     if (begin >= n) return;
     const std::uint32_t length = n - begin < most ? n - begin : most;
-    // A lane has every 32nd pair of its warp's. What is beyond the last counts as one with the last digit.
+    // A lane has every 32nd pair of its warp's. Elements beyond the last count as pairs with the last digit.
     const std::uint32_t first = warp * 32 * items + lane;
-    std::uint32_t key[items], value[items], place[items / 2]; // two places in each
+    std::uint32_t key[items], value[items], place[items / 2]; // two offsets in each
     from.ask_once([&]<class Joined>(Joined) VOXELPIPE_INLINE_LAMBDA {
 #pragma unroll
         for (std::uint32_t i = 0; i < items; ++i) {
@@ -199,11 +199,11 @@ __global__ __launch_bounds__(sort_threads,
         __syncwarp();
         place[i / 2] = i % 2 == 0 ? own : place[i / 2] | own << 16;
     }
-    // The counts' addresses are found again below: kept until then, they would not fit the registers.
+    // Makes the compiler recompute the counts' addresses below: held until then, they would not fit the registers.
 #pragma unroll
     for (std::uint32_t i = 0; i < items; ++i) asm volatile("" : "+r"(key[i]));
     __syncthreads();
-    // Of the thread's digits: how many there are in the warps before each, and in all.
+    // For the thread's digits: prefix sums over the warps, and totals.
     const std::uint32_t first_digit = DigitsEach * threadIdx.x;
     const bool has_digits = first_digit < num_digits;
     const std::uint32_t apart = num_digits / DigitsEach;
@@ -216,7 +216,7 @@ __global__ __launch_bounds__(sort_threads,
         counts& of_warp = *reinterpret_cast<counts*>(&shared.counts[w][first_digit]);
         const counts count = of_warp;
         of_warp = sum;
-        sum = static_cast<counts>(sum + count); // of each less than 2^16
+        sum = static_cast<counts>(sum + count); // each less than 2^16
     }
     const word own = group::widen(sum);
 #pragma unroll

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Fragment resolve: shades fragments that are listed and sorted by voxel (fragments/list_sink.cuh,
-// fragments/radix_sort.cuh) and blends those of each voxel, for shaders that compute and blends that any order serves.
-// A lane has a fragment; partial results (targets/shared_blend.cuh, cells) are merged by a prefix sum over the lanes
-// that starts anew where a voxel begins. A warp takes runs of fragments: what a run has of a voxel that began before
-// it, or that goes on behind it, is merged by a second kernel, so that a voxel of a million fragments is many warps'.
+// Segmented reduce: shades fragments that are listed and sorted by voxel (fragments/list_sink.cuh,
+// fragments/radix_sort.cuh) and blends those of each voxel, for shaders that compute and blends that allow any order. A
+// lane has a fragment; partial results (cells of targets/shared_blend.cuh) are merged by a segmented prefix sum over
+// the lanes. A warp takes runs of fragments. A second kernel merges a run's part of a voxel that begins before it or
+// continues behind it, so that many warps share a voxel of a million fragments.
 
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/scene/fragment_shade.cuh>
@@ -18,10 +18,10 @@
 
 namespace voxelpipe::device {
 
-inline constexpr std::uint32_t resolve_run = 256; // fragments
+inline constexpr std::uint32_t resolve_run = 256; // fragments of a run
 inline constexpr std::size_t max_cell_bytes = 128;
 
-// ---- what the fragments of a voxel come to --------------------------------------------------------------------------
+// ---- cells ----------------------------------------------------------------------------------------------------------
 
 // The bit of a voxel as a cell.
 template <class Blend>
@@ -36,7 +36,7 @@ struct bit_cell {
     }
     __device__ static void merge(cell& a, cell b) { bit_blend<Blend>::merge(a, b); }
 };
-// Of targets whose last fragment wins: voxel_cells has that.
+// For targets whose last fragment wins: voxel_cells holds the winner.
 struct no_cell {
     struct cell {};
     template <class Value>
@@ -56,7 +56,8 @@ struct target_cell<Target, blend_method::bits> : bit_cell<typename Target::blend
 template <class Target>
 struct target_cell<Target, blend_method::winner> : no_cell {};
 
-// Of some fragments in one voxel: the cell of each target, and the last primitive + 1. Order-free.
+// The combined fragments of one voxel, or some of them: the cell of each target, and the last primitive + 1.
+// Order-free.
 template <class Framebuffer>
 struct voxel_cells;
 template <class... Targets>
@@ -83,7 +84,7 @@ struct voxel_cells<framebuffer_view<Targets...>> {
         });
         if constexpr (has_winner) winner = other.winner > winner ? other.winner : winner;
     }
-    // Into the voxel.
+    // Stores the cells to the voxel's targets.
     template <class Scene>
     __device__ VOXELPIPE_INLINE void store(const Scene& s, const framebuffer_view<Targets...>& fb,
                                            const voxel_place& at) const {
@@ -115,7 +116,7 @@ struct voxel_cells<framebuffer_view<Targets...>> {
     }
 };
 
-// Whether the fragments of such a framebuffer can be resolved here.
+// True if the fragments of such a framebuffer can be reduced here.
 template <class Framebuffer>
 inline constexpr bool is_resolvable = false;
 template <class... Targets>
@@ -123,11 +124,11 @@ requires((method_of<Targets>() != blend_method::ordered) &&
          ...) inline constexpr bool is_resolvable<framebuffer_view<Targets...>> =
     sizeof(voxel_cells<framebuffer_view<Targets...>>) <= max_cell_bytes;
 
-// Cells that a lane has, or none where no fragment was kept.
+// Cells of a lane, or none if no fragment was kept.
 template <class Cells>
 struct some_cells {
     Cells cells;
-    word any; // or 0
+    word any; // 0: none
 
     __device__ VOXELPIPE_INLINE void merge(const some_cells& other) {
         if (other.any == 0) return;
@@ -137,7 +138,7 @@ struct some_cells {
             cells = other.cells;
         any = 1;
     }
-    // Words of the cells that another lane has, by `shuffle`. All lanes take part.
+    // The cells of another lane, transferred word by word with `shuffle`. All lanes call it.
     template <class Shuffle>
     [[nodiscard]] __device__ VOXELPIPE_INLINE some_cells from(const Shuffle& shuffle) const {
         constexpr std::size_t num = (sizeof(Cells) + sizeof(word) - 1) / sizeof(word);
@@ -154,11 +155,12 @@ struct some_cells {
 
 // ---- runs of fragments ----------------------------------------------------------------------------------------------
 
-// What runs leave to others: the first voxel's cells where it began before the run, the last one's where it goes on.
+// Parts of voxels that runs share: a run's cells of its first voxel if that began before the run, and of its last voxel
+// if that continues behind it.
 template <class Cells>
 struct run_ends {
-    static constexpr std::uint32_t goes_on = 1; // the last voxel goes on behind the run
-    static constexpr std::uint32_t through = 2; // it is the first one too, and began before
+    static constexpr std::uint32_t goes_on = 1; // the last voxel continues behind the run
+    static constexpr std::uint32_t through = 2; // and it is also the first one, and began before
     some_cells<Cells>*heads, *tails;
     std::uint32_t* flags; // of each run
 
@@ -174,7 +176,7 @@ struct run_ends {
     }
 };
 
-// Fragments by voxel, ascending, in any order within one.
+// Fragments by ascending voxel, in any order within one.
 struct sorted_fragments {
     const std::uint32_t *voxels, *primitives;
 };
@@ -194,13 +196,13 @@ __global__ __launch_bounds__(threads_per_block, 4) void resolve_runs_kernel(
     std::uint32_t kept = 0, discarded = 0, touched = 0;
     for (std::uint32_t run = blockIdx.x * (threads_per_block / 32) + warp_in_block(); run < runs; run += warps) {
         const std::uint32_t begin = run * resolve_run, end = n - begin < resolve_run ? n : begin + resolve_run;
-        std::uint32_t before = begin == 0 ? ~0u : f.voxels[begin - 1]; // the voxel of the fragment before
-        const std::uint32_t behind = end < n ? f.voxels[end] : ~0u;    // that of the fragment behind the run
+        std::uint32_t before = begin == 0 ? ~0u : f.voxels[begin - 1]; // voxel of the fragment before
+        const std::uint32_t behind = end < n ? f.voxels[end] : ~0u;    // voxel of the fragment behind the run
         some_cells<cells> carried{};                                   // of the last voxel, in this run
-        bool has_begun = false;                                        // whether any voxel has, in this run
+        bool has_begun = false;                                        // a voxel has begun in this run
         std::uint32_t flags = 0;
-        // What a lane has next is loaded while it works on what it has.
-        std::uint32_t next_voxel = begin + lane < end ? f.voxels[begin + lane] : ~0u; // which is no voxel
+        // A lane's next fragment is loaded while it works on the current one.
+        std::uint32_t next_voxel = begin + lane < end ? f.voxels[begin + lane] : ~0u; // ~0 is no voxel
         std::uint32_t next_primitive = begin + lane < end ? f.primitives[begin + lane] : 0;
         for (std::uint32_t first = begin; first < end; first += 32) {
             const std::uint32_t i = first + lane;
@@ -263,8 +265,8 @@ __global__ __launch_bounds__(threads_per_block, 4) void resolve_runs_kernel(
     if (count_voxels && all_touched != 0) atomicAdd(&state->voxels, all_touched);
 }
 
-// The voxels that are in more than one run. A lane has the run in which one begins; where it goes through others, all
-// lanes of the warp merge those.
+// Merges the voxels that lie in more than one run. A lane has the run in which such a voxel begins; if it covers whole
+// runs, all lanes of the warp merge those.
 template <class Scene, class Framebuffer>
 __global__ __launch_bounds__(threads_per_block) void resolve_ends_kernel(
     const __grid_constant__ Scene s, const __grid_constant__ Framebuffer fb, const __grid_constant__ sorted_fragments f,
@@ -318,8 +320,8 @@ __global__ __launch_bounds__(threads_per_block) void resolve_ends_kernel(
     if (threadIdx.x == 0 && all_touched != 0) atomicAdd(&state->voxels, all_touched);
 }
 
-// Shades and blends the fragments of a call into its targets, which hold their clear values already; counts fragments,
-// and voxels where that is wanted. Of the limits, `fragments` counts.
+// Shades and blends the fragments of a call into its targets, which already hold their clear values. Counts fragments
+// and, if wanted, voxels. Uses limits.fragments.
 template <class Scene, class Framebuffer>
 void resolve_fragments(const Scene& s, const Framebuffer& fb, const sorted_fragments& f,
                        const run_ends<voxel_cells<Framebuffer>>& ends, bool count_voxels, pipeline_state* state,

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Numbers of a warp in order, in its registers: sorting networks, and neighbours from and to memory.
+// Sorting the numbers of a warp in registers: sorting networks, and loads and stores of neighbours.
 
 #include <voxelpipe/device/scene/scene.cuh>
 
@@ -17,8 +17,8 @@ __device__ VOXELPIPE_INLINE void put_in_order(Word& low, Word& high) {
     high = max(a, b);
 }
 
-// The numbers of a warp, of which a lane has Items neighbours, by a bitonic network: those of runs of 2 * apart numbers
-// that are each less than all behind them, or more, once those apart have been compared.
+// Bitonic merge of a warp's numbers; a lane has Items consecutive ones. Sorts runs of 2 * apart numbers, each of which
+// is less than all later runs, or becomes so when numbers `apart` from each other have been compared.
 template <class Word, int Items>
 __device__ VOXELPIPE_INLINE void merge_warp(Word (&w)[Items], int apart) {
     const int lane = static_cast<int>(threadIdx.x % 32);
@@ -39,7 +39,8 @@ __device__ VOXELPIPE_INLINE void merge_warp(Word (&w)[Items], int apart) {
     }
 }
 
-// Sorts them. Each run of numbers is compared with its mirror image first, so that all comparisons go the same way.
+// Sorts a warp's numbers. Each run is first compared with its mirror image, so that all comparisons go in the same
+// direction.
 template <class Word, int Items>
 __device__ VOXELPIPE_INLINE void sort_warp(Word (&w)[Items]) {
     const int lane = static_cast<int>(threadIdx.x % 32);
@@ -64,8 +65,8 @@ __device__ VOXELPIPE_INLINE void sort_warp(Word (&w)[Items]) {
     }
 }
 
-// Sorts them where they are made of runs of at most `longest` numbers, each run less than the next: neighbours by
-// neighbours, even and odd ones in turn, which takes as many rounds as the longest run has numbers.
+// Sorts a warp's numbers that consist of runs of at most `longest`, each run less than the next: odd-even
+// transposition, which takes as many rounds as the longest run has numbers.
 template <class Word, int Items>
 __device__ VOXELPIPE_INLINE void sort_runs_of_warp(Word (&w)[Items], std::uint32_t longest) {
     static_assert(Items % 2 == 0);
@@ -82,7 +83,7 @@ __device__ VOXELPIPE_INLINE void sort_runs_of_warp(Word (&w)[Items], std::uint32
     }
 }
 
-// A lane's neighbours of n numbers, from number `first` on; ~0 beyond. numbers: aligned to 16 bytes.
+// Loads a lane's Items neighbours of n numbers, from number `first` on; ~0 beyond. numbers: aligned to 16 bytes.
 template <int Items>
 __device__ VOXELPIPE_INLINE void load_neighbours(const std::uint32_t* numbers, std::uint32_t first, std::uint32_t n,
                                                  std::uint32_t (&to)[Items]) {
@@ -101,7 +102,7 @@ __device__ VOXELPIPE_INLINE void load_neighbours(const std::uint32_t* numbers, s
         for (std::uint32_t k = 0; k < Items; ++k) to[k] = first + k < n ? numbers[first + k] : ~0u;
     }
 }
-// Those of places begin .. end - 1 go where they belong.
+// Stores those with index in [begin, end).
 template <int Items>
 __device__ VOXELPIPE_INLINE void store_neighbours(std::uint32_t* numbers, std::uint32_t first, std::uint32_t begin,
                                                   std::uint32_t end, const std::uint32_t (&from)[Items]) {

@@ -171,7 +171,7 @@ struct framebuffer_output {
     using sink = blending_sink<Call>;
     template <class Call>
     using deferred_sink = sink<Call>;
-    static constexpr bool defers = has_only_bits<Framebuffer>; // otherwise raster/block_pass.cuh
+    static constexpr bool defers = has_only_bits<Framebuffer>; // otherwise raster/block_pass.cuh draws
     // Targets are written while triangles are drawn, so no triangle may be missing at the end.
     static constexpr bool can_skip_deferred_pass = false;
     // Facts for the compiler: all targets are in use, and all values are true, or the mode of all is to blend.

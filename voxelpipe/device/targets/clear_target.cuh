@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Clears render targets, padding included (padding bits become 0), unless the call has failed: then nothing is written.
+// Clears render targets, including padding (padding bits become 0). Writes nothing if the call has failed.
 
 #include <voxelpipe/device/scene/scene.cuh>
 
@@ -17,14 +17,15 @@ struct fill_pattern {
     Element value;
 };
 
-// A block fills 16 KB and ends: 4 GiB take 0.92 ms so, and 1.0 by blocks that go on as long as there is something left.
-inline constexpr unsigned fill_stores = 4; // of 16 bytes a thread, a block's width apart
+// A block fills 16 KB and ends: 4 GiB take 0.92 ms, against 1.0 ms with persistent blocks.
+inline constexpr unsigned fill_stores = 4; // 16-byte stores of a thread, a block's width apart
 
-// Bits that are longer than the cache go past it (Streams), so that it keeps what it has of the mesh: calls at 1024^3
-// took 0.3 to 2 % less on average. Values are written as they come: with 512 MB it was the same, with 4 GiB 1 % more.
+// Bit targets within these sizes, which exceed the cache, are written past it (Streams), so that it keeps what it has
+// of the mesh: calls at 1024^3 took 0.3 to 2 % less on average. Values are written through the cache: streaming made no
+// difference at 512 MB and cost 1 % at 4 GiB.
 inline constexpr std::uint64_t min_streamed = std::uint64_t{64} << 20, max_streamed = std::uint64_t{256} << 20;
 
-// Elements of 1, 2, 4, 8 or 16 bytes go out 16 bytes at a time.
+// Elements of 1, 2, 4, 8 or 16 bytes are stored 16 bytes at a time.
 template <bool Streams, class Element>
 __global__ void fill_kernel(Element* to, std::uint64_t count, const __grid_constant__ fill_pattern<Element> pattern,
                             const pipeline_state* state, capacities limits) {
@@ -58,7 +59,7 @@ __global__ void fill_kernel(Element* to, std::uint64_t count, const __grid_const
         to[i] = pattern.value;
 }
 
-// Rows of set bits end within a word; bricks too.
+// Sets all bits of a target to 1. Rows end within a word, and bricks may too.
 template <class Target>
 __global__ void fill_bits_kernel(const __grid_constant__ target_view<Target> t, const pipeline_state* state,
                                  capacities limits) {
@@ -76,7 +77,7 @@ __global__ void fill_bits_kernel(const __grid_constant__ target_view<Target> t, 
     }
 }
 
-// `count` elements. Streams: past the cache.
+// Fills `count` elements. Streams: stores bypass the cache.
 template <bool Streams, class Element>
 void fill_elements(Element* to, std::uint64_t count, const fill_pattern<Element>& pattern, const pipeline_state* state,
                    const capacities& limits, cudaStream_t stream) {
@@ -114,8 +115,8 @@ void clear_target(const target_view<Target>& t, const pipeline_state* state, con
     }
 }
 
-// Clears the targets that are to be cleared, without a call that draws: `state` is zeros. A log of changes starts anew,
-// since it may know another value.
+// Clears the targets whose load operation is clear, without a call that draws; `state` is zero. Resets the log of
+// changes, which may know another value.
 template <class... Targets>
 void clear_framebuffer(const framebuffer_view<Targets...>& fb, const pipeline_state* state, cudaStream_t stream) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {

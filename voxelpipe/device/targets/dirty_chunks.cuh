@@ -3,8 +3,8 @@
 #pragma once
 
 // Marks for the parts of a grid that triangles may touch, so that a last pass over a large target need not read all of
-// it: 4 GiB against 0.2 GB for the chunks of the dragon in 1024^3. The raster marks the chunks of a small triangle's
-// bounding box, and of what it draws of a large one; more than what is touched may be marked, never less.
+// it: 4 GiB, against 0.2 GB for the chunks of the dragon in 1024^3. The raster marks the chunks of a small triangle's
+// bounding box, and those that it draws of a split one. Marks may cover more than what is touched, never less.
 
 #include <voxelpipe/core/brick_triangle.hpp>
 #include <voxelpipe/core/change_log.hpp>
@@ -21,7 +21,7 @@ using core::chunk_x, core::chunk_yz, core::log2_chunk_x, core::log2_chunk_yz;
 
 // The words of the marks (core/change_log.hpp).
 struct chunk_marks {
-    word* words = nullptr; // none: nothing is marked
+    word* words = nullptr; // null: nothing is marked
     glm::ivec3 extent{};   // of the grid
     core::chunk_rows rows;
 
@@ -31,12 +31,12 @@ struct chunk_marks {
         return {memory.take<word>(core::chunk_rows(extent).num_words()), extent};
     }
 
-    // Of a row of chunks, by their numbers along y and z.
+    // A row of chunks, by its chunk numbers along y and z.
     [[nodiscard]] __device__ VOXELPIPE_INLINE word* row(int y, int z) const {
         return words + (static_cast<std::size_t>(z) * static_cast<unsigned>(rows.y) + static_cast<unsigned>(y)) *
                            static_cast<unsigned>(rows.words);
     }
-    // The brick (core/brick_triangle.hpp) whose lowest voxel this is, by group_lanes lanes.
+    // Marks the brick (core/brick_triangle.hpp) with this lowest voxel; group_lanes lanes call it.
     __device__ VOXELPIPE_INLINE void mark_brick(const std::int32_t (&corner)[3], unsigned lane) const {
         constexpr unsigned across = core::brick_size / chunk_yz;
         static_assert(core::brick_size % chunk_yz == 0 && chunk_x % core::brick_size == 0 &&
@@ -45,7 +45,7 @@ struct chunk_marks {
                   z = corner[2] + static_cast<int>(lane / across) * chunk_yz;
         if (lane < across * across && y < extent.y && z < extent.z) mark_row(corner[0], corner[0], y, z);
     }
-    // Voxels x0 to x1 of a row, at most 32, by any lane.
+    // Marks voxels x0 to x1 of a row, at most 32. Any lanes call it.
     __device__ VOXELPIPE_INLINE void mark_row(int x0, int x1, int y, int z) const {
         word* const at = row(y >> log2_chunk_yz, z >> log2_chunk_yz);
         for (int chunk = x0 >> log2_chunk_x; chunk <= x1 >> log2_chunk_x; ++chunk) {
@@ -55,18 +55,19 @@ struct chunk_marks {
     }
 };
 
-// ---- going through chunks -------------------------------------------------------------------------------------------
+// ---- iteration over chunks
+// -------------------------------------------------------------------------------------------
 
-// Places one above the other along y: up to chunk_yz.
+// Up to chunk_yz elements in consecutive rows along y.
 template <class Place>
 struct column_of_places {
     Place* first;
-    std::size_t step; // places from one row to the next
+    std::size_t step; // distance from one row to the next, in elements
     int rows;
 };
 
-// The chunks with marks of a target in rows along x. Each lane gets columns of places, 16 bytes or one element each,
-// beside those of its neighbours.
+// Calls f for the marked chunks of a target in rows along x. Each lane gets columns of 16 bytes or of one element, next
+// to those of its neighbours.
 template <class Place, class Element, class F>
 __device__ VOXELPIPE_INLINE void for_each_marked(Element* elements, const chunk_marks& marks, F&& f) {
     constexpr int per_place = static_cast<int>(sizeof(Place) / sizeof(Element));
@@ -95,7 +96,7 @@ __device__ VOXELPIPE_INLINE void for_each_marked(Element* elements, const chunk_
     }
 }
 
-// Whether rows can go 16 bytes at a time.
+// True if rows can be accessed 16 bytes at a time.
 template <class Element>
 [[nodiscard]] __device__ VOXELPIPE_INLINE bool has_wide_rows(const Element* elements, const chunk_marks& marks) {
     return reinterpret_cast<std::uintptr_t>(elements) % 16 == 0 &&

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Framebuffers that depend only on which voxels are touched: one constant in all draws, and blends for which its second
-// fragment in a voxel changes nothing, as bits, replace, min and max. The touched voxels are set in bits of the call's
-// own memory, whatever the targets are, and last passes give every target its values, each element once, count the
-// voxels and leave zeros for the next call. Nothing of a target is written before all triangles have been seen, so that
-// no index need be checked before that: to read them all once more took a fifth of the time of a mesh of 7 million
-// triangles.
+// Last passes of the occupancy mask. It serves framebuffers that depend only on which voxels are touched: all draws
+// have one constant value, and a second fragment in a voxel changes nothing (bits, replace, min and max). The raster
+// sets touched voxels in bits of the call's own memory. The passes here write every target's values from these bits,
+// each element once, count the voxels, and zero the bits for the next call. No target is written before all triangles
+// have been read, so indices are checked on the way: a separate pass over them took a fifth of the time of a mesh of 7
+// million triangles.
 
 #include <voxelpipe/device/targets/clear_target.cuh>
 #include <voxelpipe/device/targets/target_traits.cuh>
@@ -21,7 +21,7 @@
 
 namespace voxelpipe::device {
 
-// What fragments of a value make of a voxel that holds another.
+// The value of a voxel that held `old`, after fragments of `value`.
 template <class Target>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE typename Target::value_type
 blended_once(const typename Target::value_type& old, const typename Target::value_type& value) {
@@ -30,15 +30,15 @@ blended_once(const typename Target::value_type& old, const typename Target::valu
     return typename Target::value_type(Target::traits::end(a));
 }
 
-// How the values of a target are ended: `touched` gives bit x of a row of words, `made` is what the fragments' value
-// makes of a cleared voxel. By all threads of a grid.
+// Writes the values of a target. Bit x of a row of `touched` says whether voxel x has a fragment of `value`. All
+// threads of the launch call it.
 template <class Target>
 struct value_writer {
     using map = typename Target::map;
     using value_type = typename Target::value_type;
     static constexpr bool goes_wide =
         !map::bricks && !map::planes && sizeof(value_type) <= 16 && 16 % sizeof(value_type) == 0;
-    static constexpr unsigned batch = 4; // loads that go out together
+    static constexpr unsigned batch = 4; // loads in flight
 
     const word* touched;
     const target_view<Target>& t;
@@ -46,7 +46,7 @@ struct value_writer {
     std::uint32_t nx = static_cast<std::uint32_t>(t.extent.x), ny = static_cast<std::uint32_t>(t.extent.y);
     std::uint32_t words_x = (nx + 31) / 32, rows = ny * static_cast<std::uint32_t>(t.extent.z);
 
-    // A cleared target of rows whose values fill 16 bytes, in order.
+    // Writes a cleared target whose rows are multiples of 16 bytes, in the order of memory.
     __device__ VOXELPIPE_INLINE void fill_wide() const {
         constexpr unsigned per_store = 16 / sizeof(value_type);
         const value_type made = blended_once<Target>(t.clear_value, value);
@@ -77,8 +77,8 @@ struct value_writer {
             }
         }
     }
-    // Any other: with `fill`, voxels that are not touched get the clear value. A warp takes 32 words at once. Where
-    // there are marks, what is touched is marked.
+    // Writes any other target; with `fill`, voxels that are not touched get the clear value. A warp takes 32 words at a
+    // time. Marks what is touched if there are marks.
     __device__ VOXELPIPE_INLINE void write(bool fill, const chunk_marks& marks) const {
         const std::uint64_t words = std::uint64_t{rows} * words_x, threads = std::uint64_t{gridDim.x} * blockDim.x;
         const std::uint32_t lane = threadIdx.x % 32;
@@ -126,14 +126,14 @@ __global__ __launch_bounds__(threads_per_block) void fill_values_kernel(
     }
     w.write(is_filled, marks);
 }
-// Of a target that is not cleared by chunks; bricks that are cleared have been, with their padding.
+// Fills a target that is not cleared by chunks. Bricks that are to be cleared have been, with their padding.
 template <class Target, class Tracking>
 void fill_values(const word* touched, const target_view<Target>& t, const typename Target::value_type& value,
                  const Tracking& tracking, const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
-    // By blocks that end, as in clear_target.
+    // Blocks write a fixed part and end, as in clear_target.
     const std::uint64_t bytes = Target::map::elements(t.extent) * sizeof(typename Target::element_type),
                         blocks = std::min(bytes / (16 * fill_stores * threads_per_block) + 1, core::max_blocks);
-    // Where other targets are cleared by chunks, the log will know nothing of this one.
+    // If other targets are cleared by chunks, the log will not know this one.
     const bool fills = t.load == load_operation::clear && !Target::map::bricks,
                marks = !fills && !tracking.changes_known;
     launch_behind(fill_values_kernel<Target>, static_cast<unsigned>(blocks), threads_per_block, stream,
@@ -141,36 +141,36 @@ void fill_values(const word* touched, const target_view<Target>& t, const typena
                   limits);
 }
 
-// ---- of chunks alone ------------------------------------------------------------------------------------------------
+// ---- by chunks ------------------------------------------------------------------------------------------------------
 
-// What voxels hold that are not touched, and what those do that are.
+// The values of voxels that are not touched, and of those that are.
 template <class Element>
 struct cleared_and_drawn {
     Element cleared, drawn;
 };
 
-// What a clear and the fragments leave, each element written once: in chunks that are marked or touched where the log
-// knows that the target holds what it is cleared to, otherwise in all. A block takes a word of marks, a warp what lies
-// at one z of it. The elements are those of one plane, or of all; with keeps_marks, what is touched is marked from then
-// on, and nothing else.
+// Writes what a clear and the fragments leave, each element once. If the log knows that the target holds its clear
+// value, only chunks that are marked or touched are written, otherwise all. A block takes one word of marks, a warp its
+// chunks at one z. The elements are those of one plane, or of all planes. keeps_marks: afterwards exactly the touched
+// chunks are marked.
 template <class Element>
 __global__ __launch_bounds__(threads_per_block) void fill_chunks_kernel(
     const word* touched, Element* to, cleared_and_drawn<Element> values, const __grid_constant__ chunk_marks marks,
     const word* known, const __grid_constant__ core::change_log::known wanted, bool keeps_marks,
     const pipeline_state* state, capacities limits) {
-    constexpr int warps = chunk_yz, rows = chunk_yz; // of a warp
+    constexpr int warps = chunk_yz, rows = chunk_yz; // rows per warp
     static_assert(threads_per_block == 32 * warps && chunk_x == 32);
     __shared__ word bits[warps][rows][32];
-    __shared__ word touched_by[warps], old; // chunks
+    __shared__ word touched_by[warps], old; // touched chunks
     await_stream();
     if (state->index_error != 0 || misses_deferred(*state, limits)) return;
     const bool is_known = is_known_as(known, wanted);
     const int lane = static_cast<int>(threadIdx.x) % 32, warp = static_cast<int>(threadIdx.x) / 32;
-    // As numbers, of which the touched bits choose by arithmetic.
+    // Elements as unsigned numbers, selected by the touched bits with arithmetic.
     using number = std::conditional_t<sizeof(Element) % 4 == 0, std::uint32_t,
                                       std::conditional_t<sizeof(Element) % 2 == 0, std::uint16_t, std::uint8_t>>;
     constexpr int numbers = sizeof(Element) / sizeof(number);
-    number cleared[numbers], changed[numbers]; // what the fragments change of it
+    number cleared[numbers], changed[numbers]; // bits in which drawn and cleared differ
     memcpy(cleared, &values.cleared, sizeof(cleared));
     memcpy(changed, &values.drawn, sizeof(changed));
     for (int k = 0; k < numbers; ++k) changed[k] = static_cast<number>(changed[k] ^ cleared[k]);
@@ -214,10 +214,10 @@ __global__ __launch_bounds__(threads_per_block) void fill_chunks_kernel(
                         return place;
                     });
                 });
-        __syncthreads(); // before shared memory is written to again
+        __syncthreads(); // before shared memory is written again
     }
 }
-// Of target K, which is cleared by chunks.
+// Fills target K, which is cleared by chunks.
 template <std::size_t K, class Target, class Tracking>
 void fill_chunks(const word* touched, const target_view<Target>& t, const typename Target::value_type& value,
                  const Tracking& tracking, const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
@@ -243,7 +243,7 @@ void fill_chunks(const word* touched, const target_view<Target>& t, const typena
 
 // ---- the last passes ------------------------------------------------------------------------------------------------
 
-// Whether the second fragment of one value changes nothing.
+// True if a second fragment of the same value changes nothing.
 template <class Target>
 inline constexpr bool is_blended_once = std::is_same_v<typename Target::blend_type, blend::replace> ||
                                         (Target::map::is_bit ? bit_blend<typename Target::blend_type>::sets ||
@@ -254,7 +254,7 @@ inline constexpr bool depends_on_mask = false;
 template <class... Targets>
 inline constexpr bool depends_on_mask<framebuffer_view<Targets...>> = (is_blended_once<Targets> && ...);
 
-// Whether some target is written from end to end anyway.
+// True if some target of values is cleared, and so written from end to end anyway.
 template <class... Targets>
 [[nodiscard]] bool clears_values(const framebuffer_view<Targets...>& fb) {
     bool any = false;
@@ -265,7 +265,7 @@ template <class... Targets>
     return any;
 }
 
-// What a word of a target becomes, of which these bits are touched by fragments of this value.
+// The new word of a target whose bits `touched` have fragments of this value.
 template <class Target>
 __device__ VOXELPIPE_INLINE word fill_word(word old, word touched, bool value) {
     using blend_type = bit_blend<typename Target::blend_type>;
@@ -273,13 +273,13 @@ __device__ VOXELPIPE_INLINE word fill_word(word old, word touched, bool value) {
     return blend_type::sets ? old : old & ~touched;
 }
 
-// The words of a target of bits at words `first` to first + 3 of the grid's, of which there are `num`.
+// Writes the words of a target of bits at words first to first + 3 of the mask, which has `num`.
 template <class Target>
 __device__ VOXELPIPE_INLINE void fill_words(const target_view<Target>& t, std::uint64_t first, std::uint64_t num,
                                             const uint4& touched, bool value) {
     using map = typename Target::map;
     const word bits[4] = {touched.x, touched.y, touched.z, touched.w};
-    const bool is_cleared = t.load == load_operation::clear && !map::bricks; // those of bricks have been
+    const bool is_cleared = t.load == load_operation::clear && !map::bricks; // bricks have been cleared
     if (!is_cleared && (touched.x | touched.y | touched.z | touched.w) == 0) return;
     if constexpr (!map::bricks) {
         if (is_cleared && !t.clear_value && first + 4 <= num &&
@@ -315,7 +315,7 @@ __global__ __launch_bounds__(threads_per_block) void fill_bits_kernel(uint4* tou
                                                                       const __grid_constant__ Values values,
                                                                       bool count_voxels, pipeline_state* state,
                                                                       capacities limits) {
-    constexpr unsigned batch = 4; // loads that go out together
+    constexpr unsigned batch = 4; // loads in flight
     await_stream();
     const bool failed = state->index_error != 0 || misses_deferred(*state, limits);
     const std::uint64_t num = (num_words + 3) / 4, threads = std::uint64_t{gridDim.x} * blockDim.x;
@@ -348,7 +348,7 @@ __global__ __launch_bounds__(threads_per_block) void fill_bits_kernel(uint4* tou
     if (threadIdx.x == 0 && sum != 0) atomicAdd(&state->voxels, sum);
 }
 
-// Ends a call: touched voxels become values of the targets, and zeros.
+// The last passes of a call: writes the targets from the mask, and zeros the mask.
 template <class... Targets, class Values>
 void fill_from_mask(word* touched, const framebuffer_view<Targets...>& fb,
                     const change_tracking<framebuffer_view<Targets...>>& tracking, const Values& values,
@@ -357,7 +357,7 @@ void fill_from_mask(word* touched, const framebuffer_view<Targets...>& fb,
         using target = typename core::pack_element<K, Targets...>::type;
         using map = typename target::map;
         const auto& t = voxelpipe::get<K>(fb.targets);
-        if constexpr (map::bricks) // whose padding has no places in rows
+        if constexpr (map::bricks) // padding of bricks has no position in rows
             if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
         if constexpr (!map::is_bit) {
             const auto value = static_cast<typename target::value_type>(voxelpipe::get<K>(values));

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Counted targets of a call without tiles: cleared ones whose fragments all have one value. During the raster the
-// target's own memory holds how many fragments each voxel has got; a last pass makes the values of these numbers. So a
-// sum of floats need not be exact in its type, and voxels are counted where no atomic tells first touches. Here: which
-// targets of a call are counted (plan_immediate), and the last pass (finalize_counts).
+// Counted targets of a call without tiles: cleared ones whose fragments all have one value. During the raster, the
+// target's own memory holds the number of fragments of each voxel; a last pass turns numbers into values. So a sum of
+// floats need not be exact in its type, and voxels can be counted without an atomic that reports first touches. Here
+// are the decision which targets are counted (immediate_plan) and the last pass (finalize_counts).
 
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/targets/dirty_chunks.cuh>
@@ -24,8 +24,8 @@ struct immediate_plan {
     bool possible = true; // every target can be blended or counted in place
     bool is_cheap = true; // the last pass costs less than tiles would
     immediate_modes<N> modes;
-    int voxels_of = -1; // which counted target tells at the end how many voxels are touched
-    int bits_of = -1;   // which target of bits does
+    int voxels_of = -1; // counted target whose last pass counts the touched voxels; -1: none
+    int bits_of = -1;   // target of bits that counts them; -1: none
 
     [[nodiscard]] bool counts(std::size_t k) const { return modes.of[k] == immediate_mode::count; }
     [[nodiscard]] bool any_counted() const { return first_counted() >= 0; }
@@ -42,11 +42,11 @@ struct immediate_plan {
     }
 };
 
-// A target of so many bytes is worth marks: reading it takes longer than they do.
+// A target of this many bytes is worth marks: reading it takes longer than marking.
 inline constexpr std::uint64_t marked_bytes = std::uint64_t{32} << 20;
 
-// Whether the last pass of a target goes by marks, which then are wanted: where it is large, and what is not touched
-// has the bits of a number of none already.
+// True if the last pass of a target uses marks: the target is large, and voxels without fragments already have their
+// final bits, zero.
 template <class Target>
 [[nodiscard]] bool ends_by_marks(const target_view<Target>& t) {
     using map = typename Target::map;
@@ -61,27 +61,27 @@ template <class Target>
 
 // ---- the last pass --------------------------------------------------------------------------------------------------
 
-// Rare numbers: out of line, for the registers.
+// Large, rare numbers: out of line, to save registers.
 template <class Fold>
 __device__ __noinline__ auto fold_many(const Fold& fold, std::uint32_t n) {
     return fold(n);
 }
 
-// What numbers of fragments become.
+// Converts numbers of fragments to values.
 template <class Fold, class T>
 struct count_values {
     using number = unsigned_word<T>;
     static constexpr int per_load = 16 / sizeof(T);
     const Fold& fold;
-    const number* known;            // for small numbers, of the block
-    unsigned long long touched = 0; // voxels so far that have fragments
+    const number* known;            // values of small numbers, shared by the block
+    unsigned long long touched = 0; // voxels with fragments, so far
 
     [[nodiscard]] __device__ VOXELPIPE_INLINE number of(number n) {
         touched += static_cast<unsigned>(n != 0);
         return n < threads_per_block ? known[n]
                                      : core::bit_cast<number>(fold_many<Fold>(fold, static_cast<std::uint32_t>(n)));
     }
-    // Nothing is written where voxels without fragments have the bits that they should end with.
+    // Does not write voxels without fragments if they already have their final bits.
     __device__ VOXELPIPE_INLINE void end(uint4* at, const uint4& v) {
         if ((v.x | v.y | v.z | v.w) == 0 && known[0] == 0) return;
         number numbers[per_load];
@@ -93,20 +93,21 @@ struct count_values {
     }
 };
 
-// Numbers of fragments become values, padding included; with marks, of what is marked. Not where the call has failed.
+// Turns numbers of fragments into values, padding included; only marked chunks, if there are marks. Does nothing if the
+// call has failed.
 template <class Fold, class T>
 __global__ __launch_bounds__(threads_per_block) void finalize_counts_kernel(
     unsigned_word<T>* at, std::uint64_t num_elements, const __grid_constant__ chunk_marks marks,
     const __grid_constant__ Fold fold, bool count_voxels, pipeline_state* state, capacities limits) {
     using number = unsigned_word<T>;
-    constexpr int per_load = 16 / sizeof(T), batch = 4; // loads that go out together
+    constexpr int per_load = 16 / sizeof(T), batch = 4; // loads in flight
     __shared__ number known[threads_per_block];
     await_stream();
     if (has_failed(*state, limits)) return;
     known[threadIdx.x] = core::bit_cast<number>(fold(threadIdx.x));
     __syncthreads();
     count_values<Fold, T> values{fold, known};
-    // place(i) for i = 0, 1, ... below `count`
+    // Ends place(i) for i in [0, count).
     const auto end_all = [&](std::uint64_t count, const auto& place) {
         for (std::uint64_t first = 0; first < count; first += batch) {
             uint4 loaded[batch];
@@ -146,7 +147,7 @@ __global__ __launch_bounds__(threads_per_block) void finalize_counts_kernel(
     }
 }
 
-// Counts the voxels of a target whose bits are no longer its clear value. Padding is zero.
+// Counts the voxels of a target whose bit is no longer its clear value. Padding is zero.
 template <class Target>
 __global__ __launch_bounds__(threads_per_block) void count_bits_kernel(const __grid_constant__ target_view<Target> t,
                                                                        pipeline_state* state, capacities limits) {
@@ -174,7 +175,7 @@ __global__ __launch_bounds__(threads_per_block) void count_bits_kernel(const __g
     atomicAdd(&state->voxels, t.clear_value ? all - sum : sum);
 }
 
-// Ends the counted targets of a call, whose draws give these values, by marks where there are any, and counts voxels.
+// Ends the counted targets of a call whose draws give these values, by marks if there are any, and counts voxels.
 template <class... Targets, class Values>
 void finalize_counts(const immediate_plan<sizeof...(Targets)>& plan, const framebuffer_view<Targets...>& fb,
                      const Values& values, const chunk_marks& marks, pipeline_state* state, const capacities& limits,
@@ -191,7 +192,7 @@ void finalize_counts(const immediate_plan<sizeof...(Targets)>& plan, const frame
             using value_type = typename target::value_type;
             using fold_type = core::repeated_fold<typename target::blend_type, value_type>;
             const auto& t = voxelpipe::get<K>(fb.targets);
-            value_type value{}; // count has none
+            value_type value{}; // a count needs none
             if constexpr (!std::is_same_v<typename target::blend_type, blend::count>) value = voxelpipe::get<K>(values);
             const std::uint64_t count = target::map::elements(t.extent);
             launch_behind(finalize_counts_kernel<fold_type, value_type>,

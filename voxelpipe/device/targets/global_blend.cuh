@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What one atomic on global memory does for a blend, of integers and of sums whose every partial sum is exact.
+// Blends that one atomic on global memory performs: those of integers, and sums whose every partial sum is exact.
 
 #include <voxelpipe/device/targets/repeated_fold.hpp>
 #include <voxelpipe/device/targets/shared_blend.cuh>
@@ -15,9 +15,9 @@
 
 namespace voxelpipe::device {
 
-// An or, an and on a word of bits, a sum, whose old value nobody needs. Written out, so that no compiler merges it with
-// the one that returns something, nor provides for memory that is not global, as it does for sums of floating types:
-// a warp would wait for the answer.
+// Or, and, and add without a result. Written in assembly, so that the compiler neither turns them into atomics that
+// return a value, for which a warp would wait, nor handles addresses that are not global, as it does for floating-point
+// sums.
 __device__ VOXELPIPE_INLINE void reduce_or(word* at, word bits) {
     asm volatile("red.relaxed.gpu.global.or.b32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(bits) : "memory");
 }
@@ -30,7 +30,7 @@ __device__ VOXELPIPE_INLINE void reduce_add(float* at, float v) {
 __device__ VOXELPIPE_INLINE void reduce_add(double* at, double v) {
     asm volatile("red.relaxed.gpu.global.add.f64 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "d"(v) : "memory");
 }
-// The same where it is wanted, without a branch.
+// The same if wanted, without a branch.
 __device__ VOXELPIPE_INLINE void reduce_add_where(float* at, float v, bool wanted) {
     asm volatile("{ .reg .pred p; setp.ne.u32 p, %2, 0; @p red.relaxed.gpu.global.add.f32 [%0], %1; }" ::"l"(
                      __cvta_generic_to_global(at)),
@@ -50,9 +50,9 @@ __device__ VOXELPIPE_INLINE void reduce_add(unsigned long long* at, unsigned lon
     asm volatile("red.relaxed.gpu.global.add.u64 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "l"(n) : "memory");
 }
 
-// global_blend<Blend, T>: one fragment with value v into a stored T.
-//   available     allowed(value, target, most): whether up to `most` fragments of this value give the blend's bits
-//   apply(T*, v)  apply_first(T*, v): whether the voxel had no fragment yet; count has it, where tells_first holds
+// global_blend<Blend, T>: blends a fragment of value v into a stored T.
+//   available     allowed(value, target, most): true if up to `most` fragments of this value give the blend's bits
+//   apply(T*, v)  apply_first(T*, v): true if it was the voxel's first fragment; count has it, if tells_first holds
 //   apply_many(T*, v, n): n fragments at once, n > 0
 template <class Blend, class T>
 struct global_blend {
@@ -89,7 +89,7 @@ struct global_blend<blend::count, T> {
     __device__ static void apply_many(T* at, const V&, unsigned n) {
         atomicAdd(reinterpret_cast<unsigned_word<T>*>(at), unsigned_word<T>{n});
     }
-    // Whether the voxel had no fragment yet. Written out, as reduce_or is.
+    // Returns true if it was the voxel's first fragment. In assembly, like reduce_or.
     template <class V>
     __device__ static bool apply_first(T* at, const V&) {
         if constexpr (sizeof(T) == 4) {
@@ -110,7 +110,7 @@ struct global_blend<blend::count, T> {
     }
 };
 
-// Blends that may always be done in place, and never tell.
+// Base of blends that are always allowed, and never report first fragments.
 template <class T>
 struct always_immediate {
     static constexpr bool available = true;
@@ -124,7 +124,7 @@ struct always_immediate {
     }
 };
 
-// The integer blends that one atomic does.
+// Integer blends that are one atomic.
 template <class Blend, class T>
 struct global_integer_blend : always_immediate<T> {
     __device__ static void apply(T* at, T v) {
@@ -173,9 +173,9 @@ requires is_atomic_integer<T>
 struct global_blend<blend::bit_xor, T> : global_integer_blend<blend::bit_xor, T> {
 };
 
-// Whether clear, clear + value, ..., clear + most * value are all exact in T and none of the terms is rounded by the
-// reproducible sum (quantum 2^Log2Quantum): then addition in T, in any order, is that sum. Zero and what is not finite
-// are left out, for their signs and marks.
+// True if clear, clear + value, ..., clear + most * value are all exact in T, and the reproducible sum (quantum
+// 2^Log2Quantum) rounds none of the terms. Then addition in T, in any order, gives that sum. Zero and non-finite values
+// are excluded, because of signs and marks.
 template <class T>
 [[nodiscard]] bool sums_are_exact(T value, T clear, std::uint64_t most, int log2_quantum) {
     constexpr int digits = std::numeric_limits<T>::digits;
@@ -191,7 +191,7 @@ template <class T>
     const int of_clear = clear == 0 ? of_value : lowest_bit(clear);
     const int unit = of_value < of_clear ? of_value : of_clear;
     if (unit < log2_quantum || unit < -100) return false;
-    // Terms count as infinite from here on.
+    // Terms count as infinite from this exponent on.
     const int log2_limit = log2_quantum + (sizeof(T) == sizeof(float) ? 63 : 127);
     // In units of 2^unit: |clear| + most * |value| <= 2^digits. The doubles are exact below 2^53 and only grow beyond.
     const double max_units = std::ldexp(std::abs(static_cast<double>(clear)), -unit) +
@@ -220,7 +220,7 @@ requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct global_bl
 template <int Log2Quantum>
 struct global_blend<blend::add_quantum<Log2Quantum>, float> : global_sum<float, Log2Quantum> {};
 
-// Order is free by definition.
+// Any order is right by definition.
 template <class T>
 requires(std::is_same_v<T, float> || std::is_same_v<T, double>) struct global_blend<blend::add_unordered, T>
     : always_immediate<T> {

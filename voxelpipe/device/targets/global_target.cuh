@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Render targets that fragments can be blended into where they lie, by one atomic on global memory: bits, and integers
-// whose stored value is what the blend accumulates. Sums of floats belong to them only where every partial sum is
-// exact, which a shader with constant values lets the host prove; then no order of additions can change a bit. Other
-// sums, where all draws give one constant, are counted: a cleared target holds the number of fragments of each voxel
-// until the end of the call (targets/finalize_counts.cuh).
+// Render targets that fragments are blended into in place, by one atomic on global memory: bits, and integers whose
+// stored value is the blend's accumulator. Sums of floats qualify only if every partial sum is exact, which the host
+// can prove for a shader with constant values; then no order of additions can change a bit. Other sums, if all draws
+// give one constant, are counted: a cleared target holds the number of each voxel's fragments until the end of the call
+// (targets/finalize_counts.cuh).
 
 #include <voxelpipe/core/slim_box.hpp>
 #include <voxelpipe/device/targets/global_blend.cuh>
@@ -20,12 +20,12 @@
 
 namespace voxelpipe::device {
 
-// How the fragments of a call go into one of its targets.
+// How the fragments of a call enter one of its targets.
 enum class immediate_mode : std::uint32_t {
-    blend,       // where they lie; a target of bits in rows has fewer than 2^30 words then
-    blend_far,   // where they lie, in any number of words
-    count_first, // the same, and voxels that had no fragment yet are counted, where tells_first holds
-    count        // the target holds a number of fragments for each voxel
+    blend,       // in place; a target of bits in rows has fewer than 2^30 words
+    blend_far,   // in place, with any number of words
+    count_first, // in place, and counts voxels without earlier fragments; needs tells_first
+    count        // the target holds each voxel's number of fragments
 };
 template <std::size_t N>
 struct immediate_modes {
@@ -44,15 +44,15 @@ template <class Target>
                global_blend<typename Target::blend_type, typename Target::value_type>::available;
 }
 
-// Whether a number of fragments fits a voxel's place, and says what the voxel becomes. A constant, not a function:
-// device code asks for it.
+// True if a number of fragments fits a voxel's storage and determines the voxel's value. A constant instead of a
+// function, because device code uses it.
 template <class Target>
 inline constexpr bool is_countable = false;
 template <class Target>
 requires(!Target::map::is_bit && is_immediate<Target>()) inline constexpr bool is_countable<Target> =
     core::repeated_fold<typename Target::blend_type, typename Target::value_type>::available;
 
-// Whether this target, with up to `most` fragments of this value, may be blended in place.
+// True if this target may be blended in place with up to `most` fragments of this value.
 template <class Target, class Value>
 [[nodiscard]] bool can_be_immediate(const target_view<Target>& t, const Value& value, std::uint64_t most) {
     if (t.load == load_operation::off) return true;
@@ -62,7 +62,7 @@ template <class Target, class Value>
         return global_blend<typename Target::blend_type, typename Target::value_type>::allowed(value, t, most);
 }
 
-// Whether blending in place tells which voxels are touched for the first time.
+// True if blending in place reports which voxels are touched for the first time.
 template <class Target, class Value>
 [[nodiscard]] bool tells_first(const target_view<Target>& t, const Value& value, std::uint64_t most) {
     if (t.load == load_operation::off) return false;
@@ -80,7 +80,7 @@ template <class Target, class Value>
     }
 }
 
-// n fragments of one value into the voxel at `at`, n > 0; with `One`, n is 1.
+// Blends n > 0 fragments of one value into the voxel at `at`; with `One`, n is 1.
 template <class Target, bool One, class Value>
 __device__ VOXELPIPE_INLINE void blend_value(typename Target::element_type* at, const Value& value, unsigned n,
                                              immediate_mode mode) {
@@ -98,12 +98,12 @@ __device__ VOXELPIPE_INLINE void blend_value(typename Target::element_type* at, 
         method::apply_many(at, value, n);
 }
 
-// Rows of bits of which fragments change words at once: by an or, or by an and.
+// True for rows of bits whose words fragments change by one or, or by one and.
 template <class Target>
 inline constexpr bool has_word_rows =
     Target::map::is_bit && !Target::map::bricks &&
     (bit_blend<typename Target::blend_type>::sets || bit_blend<typename Target::blend_type>::clears);
-// Whether fragments of this value change such rows at all.
+// True if fragments of this value change such rows at all.
 template <class Target, class Value>
 [[nodiscard]] __device__ VOXELPIPE_INLINE bool changes_bits(const Value& value) {
     if constexpr (std::is_same_v<typename Target::blend_type, blend::count>)
@@ -111,7 +111,7 @@ template <class Target, class Value>
     else
         return value == bit_blend<typename Target::blend_type>::sets;
 }
-// Changes the bits of a word, where there are any, without a branch.
+// Changes these bits of a word, if any, without a branch.
 template <class Target>
 __device__ VOXELPIPE_INLINE void reduce_word(word* at, word bits) {
     if constexpr (bit_blend<typename Target::blend_type>::sets)
@@ -125,7 +125,7 @@ __device__ VOXELPIPE_INLINE void reduce_word(word* at, word bits) {
                      "r"(bits), "r"(~bits)
                      : "memory");
 }
-// The number of a voxel's word, of fewer than 2^30 in rows, modulo 2^32: it may lie outside of the extent.
+// Number of a voxel's word in rows with fewer than 2^30 words, modulo 2^32: the voxel may lie outside the extent.
 template <class Target>
 [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t word_of(const target_view<Target>& t, int x, int y, int z) {
     const auto words_x = static_cast<std::uint32_t>((t.extent.x + 31) / 32);
@@ -133,12 +133,12 @@ template <class Target>
                words_x +
            static_cast<std::uint32_t>(x >> 5);
 }
-// The word of a number, of fewer than 2^30: 32 bits are enough for its place in bytes.
+// The word with this number, below 2^30: its byte offset fits 32 bits.
 template <class Target>
 [[nodiscard]] __device__ VOXELPIPE_INLINE word* word_at(const target_view<Target>& t, std::uint32_t number) {
     return reinterpret_cast<word*>(reinterpret_cast<char*>(t.elements) + 4u * number);
 }
-// Where a voxel lies among them, as something linear: the number of its row's first word, and x; modulo 2^32.
+// Position of a voxel in such rows, as a linear quantity: the number of its row's first word, and x; both modulo 2^32.
 struct word_place {
     std::uint32_t row, x;
     [[nodiscard]] __device__ VOXELPIPE_INLINE word_place operator+(const word_place& other) const {
@@ -159,8 +159,8 @@ template <class Target>
     return p;
 }
 
-// Fragments of one value in the voxels x0 + i of a row, for the bits i of `mask`; x0 + 31 may lie beyond the extent.
-// Returns how many voxels were touched for the first time, where tells_first holds and the mode asks.
+// Blends fragments of one value into the voxels x0 + i of a row, for the bits i of `mask`; x0 + 31 may lie beyond the
+// extent. Returns how many voxels were touched for the first time, if tells_first holds and the mode is count_first.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int x0, int y, int z, word mask,
                                                const Value& value, immediate_mode mode) {
@@ -188,7 +188,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
                     reduce_or(w, bits);
                     return;
                 }
-                const word seen = __ldca(w); // maybe an old one: bits that are set stay set
+                const word seen = __ldca(w); // possibly stale: bits that are set stay set
                 if ((bits & ~seen) != 0) first += static_cast<unsigned>(__popc(bits & ~atomicOr(w, bits)));
             } else if constexpr (blend_type::clears) {
                 if (v) return;
@@ -223,8 +223,8 @@ __device__ VOXELPIPE_INLINE unsigned blend_row(const target_view<Target>& t, int
     return first;
 }
 
-// Fragments of one value in the voxels of 2 x 2 x 2 from (x, y, z) on, x + 2 y + 4 z for the bits of `voxels`, some of
-// which may lie outside of the extent. The rows' loads go out together.
+// Blends fragments of one value into 2 x 2 x 2 voxels from (x, y, z) on; bit x + 2 y + 4 z of `voxels` says which.
+// Voxels without a bit may lie outside the extent. The rows' loads are in flight together.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, int x, int y, int z, word voxels,
                                                 const Value& value, immediate_mode mode) {
@@ -240,12 +240,12 @@ __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, in
             word missing[4];
             for (int k = 0; k < 4; ++k) missing[k] = (voxels >> 2 * k & 3u) << shift;
             for (int k = 0; k < 4; ++k)
-                if (missing[k] != 0) { // maybe an old word: what has changed stays so
+                if (missing[k] != 0) { // the word may be stale: changed bits stay changed
                     const word seen = __ldca(at[k]);
                     missing[k] &= sets ? ~seen : seen;
                 }
             for (int k = 0; k < 4; ++k) reduce_word<Target>(at[k], missing[k]);
-            if (shift == 31 && (voxels & 0xaau) != 0) { // the words after them
+            if (shift == 31 && (voxels & 0xaau) != 0) { // the following words
                 const std::uint32_t next = first + 1;
                 reduce_word<Target>(t.elements + next, voxels >> 1 & 1u);
                 reduce_word<Target>(t.elements + (next + row), voxels >> 3 & 1u);
@@ -271,8 +271,8 @@ __device__ VOXELPIPE_INLINE unsigned blend_cube(const target_view<Target>& t, in
     return touched;
 }
 
-// Fragments of one value in rows of a slim box from (x, y, z) on, all of which lies in the extent. The rows' loads go
-// out together.
+// Blends fragments of one value into rows of a slim box from (x, y, z) on, within the extent. The rows' loads are in
+// flight together.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_slim(const target_view<Target>& t, int x, int y, int z,
                                                 const core::slim_rows& rows, const Value& value, immediate_mode mode) {
@@ -293,13 +293,13 @@ __device__ VOXELPIPE_INLINE unsigned blend_slim(const target_view<Target>& t, in
                 missing[k] = (rows.bits >> 4 * k & 15u) << shift;
             }
             for (int k = 0; k < count; ++k)
-                if (missing[k] != 0) { // maybe an old word: what has changed stays so
+                if (missing[k] != 0) { // the word may be stale: changed bits stay changed
                     const word seen = __ldca(at[k]);
                     missing[k] &= sets ? ~seen : seen;
                 }
             for (int k = 0; k < count; ++k) reduce_word<Target>(at[k], missing[k]);
             const word beyond = rows.bits & (shift < 30 ? 0u : shift == 30 ? 0x444444u : 0x666666u);
-            if (beyond != 0) { // in the words after them
+            if (beyond != 0) { // the following words
 #pragma unroll 1
                 for (unsigned k = 0; k < count; ++k)
                     reduce_word<Target>(word_at(t, first + k / 2 * even + k % 2 * odd + 1),
@@ -320,23 +320,23 @@ __device__ VOXELPIPE_INLINE unsigned blend_slim(const target_view<Target>& t, in
     return touched;
 }
 
-// ---- targets of values that the compiler knows to be blended in place -----------------------------------------------
+// ---- targets of values, all blended in place ------------------------------------------------------------------------
 
-// Values that lie along x: those of a row are neighbours in memory. What follows is for calls whose modes are all to
-// blend (blended_output).
+// True if values of a row along x are neighbours in memory. The functions below are for calls whose modes are all blend
+// (blended_output).
 template <class Target>
 inline constexpr bool has_value_rows = !Target::map::is_bit && !Target::map::bricks && is_immediate<Target>();
 
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE void add_where(typename Target::element_type* at, const Value& value, bool wanted) {
     using value_type = typename Target::value_type;
-    if constexpr (std::is_floating_point_v<value_type>) { // all that is direct are sums
+    if constexpr (std::is_floating_point_v<value_type>) { // all floating-point blends in place are sums
         reduce_add_where(at, value, wanted);
     } else if (wanted) {
         global_blend<typename Target::blend_type, value_type>::apply(at, value);
     }
 }
-// As blend_row, for a mask whose bits are neighbours mostly.
+// As blend_row; fastest if the set bits are neighbours.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE void add_row(const target_view<Target>& t, int x0, int y, int z, word mask,
                                          const Value& value) {
@@ -350,7 +350,7 @@ __device__ VOXELPIPE_INLINE void add_row(const target_view<Target>& t, int x0, i
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE void add_cube(const target_view<Target>& t, int x, int y, int z, word voxels,
                                           const Value& value) {
-    // The first one may lie outside, before the target's elements too.
+    // The first voxel may lie outside, even before the target's elements.
     const std::int64_t row = t.extent.x, slice = row * t.extent.y, first = (std::int64_t{z} * t.extent.y + y) * row + x;
     for (unsigned k = 0; k < 4; ++k) {
         auto* const at = t.elements + (first + (k % 2 != 0 ? row : 0) + (k / 2 != 0 ? slice : 0));
@@ -358,8 +358,8 @@ __device__ VOXELPIPE_INLINE void add_cube(const target_view<Target>& t, int x, i
     }
 }
 
-// One voxel of a target of values, for every lane that is here: those that have the same one, as neighbours in a fine
-// mesh often do, are counted and take one atomic together.
+// Blends one voxel of a target of values, for every lane that calls it. Lanes with the same voxel, as neighbours in a
+// fine mesh often have, are counted and take one atomic together.
 template <class Target, class Value>
 __device__ VOXELPIPE_INLINE unsigned blend_shared(const target_view<Target>& t, int x, int y, int z, const Value& value,
                                                   immediate_mode mode) {
@@ -372,8 +372,8 @@ __device__ VOXELPIPE_INLINE unsigned blend_shared(const target_view<Target>& t, 
     return 0;
 }
 
-// Up to four voxels, position(i) for the bits i of `wanted`, whose loads go out together. Where the mode is to blend
-// rows of bits, positions may be places of words.
+// Blends up to four voxels, position(i) for the bits i of `wanted`; their loads are in flight together. If the mode is
+// to blend rows of bits, positions may be word_places.
 template <class Target, class Value, class Position>
 __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, word wanted, const Position& position,
                                                   const Value& value, immediate_mode mode) {
@@ -389,7 +389,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, 
                 missing[k] = (wanted >> k & 1u) != 0 ? p.bit() : 0;
             }
             for (int k = 0; k < 4; ++k)
-                if (missing[k] != 0) { // maybe an old word: what has changed stays so
+                if (missing[k] != 0) { // the word may be stale: changed bits stay changed
                     const word seen = __ldca(at[k]);
                     missing[k] &= sets ? ~seen : seen;
                 }

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What n fragments of one value make of a cleared voxel, without n folds: the bits of blend_traits folded n times, for
-// the blends that have such a form. add_unordered, whose additions come in any order, gives the exact sum but for
-// one rounding of a double and one to its type.
+// The value of a cleared voxel after n fragments of one value, without n folds: the same bits as folding blend_traits n
+// times, for blends with such a closed form. add_unordered, which allows any order, gives the exact sum, rounded once
+// to double and once to its type.
 
 #include <voxelpipe/blend.hpp>
 
@@ -61,7 +61,7 @@ private:
     T clear_, value_;
 };
 
-// Integers: sums wrap, exclusive or goes by parity, of the others a repetition changes nothing.
+// Integers: sums wrap, exclusive or depends on parity, and for the others a repetition changes nothing.
 template <class Blend>
 inline constexpr bool is_repeated_once = std::is_same_v<Blend, blend::min> || std::is_same_v<Blend, blend::max> ||
                                          std::is_same_v<Blend, blend::bit_and> || std::is_same_v<Blend, blend::bit_or>;

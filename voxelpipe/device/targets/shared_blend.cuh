@@ -6,8 +6,9 @@
 // a fragment, an exact merge of two partial results, and the final value. The words are order-free, so any order of
 // fragments, blocks and merges ends in the bits that core/blend's fold in triangle order defines.
 //
-// Words of 32 bits lie in planes, one word of every voxel of the tile after the other: native 32-bit shared-memory
-// atomics wherever the blend allows (64-bit ones are compare-and-swap loops), floats through order-keeping integers.
+// Words of 32 bits lie in planes: one word of every voxel of the tile, then the next. Native 32-bit shared-memory
+// atomics serve wherever the blend allows (64-bit ones are compare-and-swap loops); floats become integers of the same
+// order.
 
 #include <voxelpipe/blend.hpp>
 #include <voxelpipe/core/bits.hpp>
@@ -20,7 +21,7 @@
 
 namespace voxelpipe::device {
 
-// The plane of 64-bit cells at an 8-byte aligned plane of words.
+// A plane of words, aligned to 8 bytes, as 64-bit cells.
 template <class Cell>
 [[nodiscard]] __device__ VOXELPIPE_INLINE Cell* as_cells(word* plane) {
     static_assert(sizeof(Cell) == 8);
@@ -32,9 +33,9 @@ template <class Cell>
     return reinterpret_cast<const Cell*>(plane);
 }
 
-// scalar_blend<Blend, S>: available (an atomic exists), words per voxel, and with `n` voxels in the tile
-//   clear(plane, i, n)   accumulate(plane, i, n, value)   cell load(plane, i, n)   merge(cell&, cell)   finish(cell,
-//   stored)   cell cell_of(value), of one fragment
+// scalar_blend<Blend, S>: available (an atomic exists), words per voxel, and for a tile of n voxels
+//   clear(plane, i, n)   accumulate(plane, i, n, value)   cell load(plane, i, n)   merge(cell&, cell)
+//   finish(cell, stored)   cell cell_of(value), of one fragment
 template <class Blend, class S>
 struct scalar_blend {
     static constexpr bool available = false;
@@ -42,7 +43,7 @@ struct scalar_blend {
 
 // ---- min and max ----------------------------------------------------------------------------------------------------
 
-// Values as integers of the same order, 32 or 64 bits, and back.
+// Maps values to integers of the same order, 32 or 64 bits, and back.
 template <class S>
 struct key_map {
     using key = std::conditional_t<
@@ -78,7 +79,7 @@ struct extremum {
         if constexpr (words == 2)
             return as_cells<cell>(plane) + i;
         else
-            return reinterpret_cast<cell*>(plane) + i; // int and unsigned alias
+            return reinterpret_cast<cell*>(plane) + i; // int and unsigned may alias
     }
     __device__ static void clear(word* plane, int i, int) { *at(plane, i) = neutral(); }
     __device__ static cell load(const word* plane, int i, int) { return *at(const_cast<word*>(plane), i); }
@@ -106,7 +107,7 @@ requires(core::is_integer<S> || core::is_floating<S>) struct scalar_blend<blend:
 
 // ---- bitwise and wrapping -------------------------------------------------------------------------------------------
 
-// Bits of one voxel do not meet bits of another place: 64-bit values are two words with an operation each.
+// Bits do not affect each other, so a 64-bit value is two words with one operation each.
 template <class Blend, class S>
 struct bitwise {
     static constexpr bool available = true;
@@ -153,7 +154,7 @@ requires core::is_integer<S>
 struct scalar_blend<blend::bit_xor, S> : bitwise<blend::bit_xor, S> {
 };
 
-// A sum modulo 2^64 as two words with a carry: two native atomics, where one of 64 bits would be a loop.
+// Adds modulo 2^64 to two words with a carry: two native atomics instead of a compare-and-swap loop.
 __device__ VOXELPIPE_INLINE void add_two_words(word* plane, int i, int n, std::uint64_t v) {
     const auto low = static_cast<word>(v);
     const word old = low != 0 ? atomicAdd(plane + i, low) : 0;
@@ -193,7 +194,7 @@ struct scalar_blend<blend::add, S> {
     }
 };
 
-// Fragments of one voxel in one work item are fewer than 2^32, so a word counts them for any type.
+// A voxel has fewer than 2^32 fragments in one work item, so one word counts them for any type.
 template <class S>
 requires core::is_integer<S>
 struct scalar_blend<blend::count, S> {
@@ -219,9 +220,9 @@ struct scalar_blend<blend::count, S> {
 
 // ---- exact sums -----------------------------------------------------------------------------------------------------
 
-// core::wide_sum as words: the limbs, then one word that holds the top (29 bits: a work item has fewer than 2^28
-// fragments a voxel) and the three marks. A term is turned into limbs by core's own function; a carry or a mark is
-// rare, so a fragment costs about two native atomics a limb.
+// core::wide_sum as words: the limbs, then one word with the top (29 bits: a work item has fewer than 2^28 fragments a
+// voxel) and the three marks. core's own function turns a term into limbs. Carries and marks are rare, so a fragment
+// costs about two native atomics a limb.
 template <class Traits, class S>
 struct wide_sum_blend {
     using cell = typename Traits::accumulator;
@@ -240,7 +241,7 @@ struct wide_sum_blend {
 #pragma unroll
         for (int k = 0; k < 2 * limbs; ++k) {
             const auto part = static_cast<word>(term.limb[k / 2] >> (k % 2 * 32));
-            const word add = part + carry; // wraps only where part is all ones: then the carry moves on
+            const word add = part + carry; // wraps only if part is all ones: then the carry moves on
             const word passed = static_cast<word>(add < part);
             const word old = add != 0 ? atomicAdd(plane + k * n + i, add) : 0;
             carry = passed + static_cast<word>(add != 0 && old + add < add);
@@ -291,7 +292,8 @@ requires(core::is_integer<S>&& std::is_signed_v<S>) struct scalar_blend<blend::a
     : wide_sum_blend<core::blend_traits<blend::add_saturate, S>, S> {
 };
 
-// Unsigned saturation: the exact sum of up to 2^32 terms of 32 bits is 64 bits; of 64-bit terms, clamped at each step.
+// Unsigned saturation: the exact sum of up to 2^32 terms of 32 bits fits 64 bits; 64-bit terms are clamped at each
+// step.
 template <class S>
 requires(core::is_integer<S>&& std::is_unsigned_v<S>) struct scalar_blend<blend::add_saturate, S> {
     static constexpr bool available = true;
@@ -333,7 +335,7 @@ requires(core::is_integer<S>&& std::is_unsigned_v<S>) struct scalar_blend<blend:
 
 // ---- sums in any order ----------------------------------------------------------------------------------------------
 
-// half sums in float and rounds once.
+// half is summed in float and rounded once.
 template <class S>
 requires core::is_floating<S>
 struct scalar_blend<blend::add_unordered, S> {
@@ -351,7 +353,7 @@ struct scalar_blend<blend::add_unordered, S> {
     }
 };
 
-// ---- a blend of the user's ------------------------------------------------------------------------------------------
+// ---- user-defined blends --------------------------------------------------------------------------------------------
 
 // Order-free and at most 8 bytes: compare-and-swap. combine(identity(), v) must be v.
 template <class Blend, class T>
@@ -403,11 +405,11 @@ struct swap_blend {
 
 // ---- targets --------------------------------------------------------------------------------------------------------
 
-// How a target's fragments meet on the device.
+// How a target's fragments are combined on the device.
 enum class blend_method : std::uint8_t {
     atomic,  // value_blend's words
     bits,    // one bit a voxel
-    winner,  // replace: the highest primitive wins a word, its fragment is shaded again at the end
+    winner,  // replace: the highest primitive wins a word; its fragment is shaded again at the end
     ordered, // everything else: folded in primitive order through lists of fragments
 };
 
@@ -465,7 +467,7 @@ requires(!core::user_blend<Blend, glm::vec<N, S, Q>> && !core::user_blend_templa
     }
 };
 
-// One bit a voxel: what a fragment with value v does to the voxel's bit of a word, as an or, and, or xor.
+// Bits: what a fragment of value v does to the voxel's bit, as an or, and, or xor of a word.
 template <class Blend>
 struct bit_blend {
     static constexpr bool is_and = std::is_same_v<Blend, blend::bit_and>;

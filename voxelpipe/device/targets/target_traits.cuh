@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the targets of a framebuffer are: their types, the bits that a voxel takes in a tile, which targets the tile
-// passes draw together, and how one finished voxel is stored.
+// Compile-time facts about the targets of a framebuffer: their types, the bits of a voxel in a tile, and the groups
+// that the tile passes draw together; and how one finished voxel is stored.
 
 #include <voxelpipe/device/scene/scene.cuh>
 #include <voxelpipe/device/targets/shared_blend.cuh>
@@ -26,7 +26,7 @@ struct targets_of<framebuffer_view<Targets...>> {
     using at = typename core::pack_element<I, Targets...>::type;
 };
 
-// Bits of a tile that one voxel of the target takes, in a tile image.
+// Bits of a tile image that one voxel of the target takes.
 template <class Target>
 [[nodiscard]] VOXELPIPE_HD constexpr int bits_per_voxel() {
     if constexpr (method_of<Target>() == blend_method::atomic)
@@ -37,10 +37,10 @@ template <class Target>
         return 0; // winners share one plane
 }
 
-// ---- targets into groups --------------------------------------------------------------------------------------------
+// ---- groups of targets ----------------------------------------------------------------------------------------------
 
-// Which targets the tile passes draw together, by compile-time greed: a group is closed where one more target would not
-// fit into the shared memory of the smallest tile. Group `ordered` is not drawn in tiles.
+// Groups of targets that the tile passes draw together, assigned greedily: a group is closed when one more target would
+// not fit into the shared memory of the smallest tile. Group `ordered` is not drawn in tiles.
 template <class Framebuffer>
 struct target_groups {
     static constexpr std::size_t count = targets_of<Framebuffer>::count;
@@ -104,7 +104,7 @@ struct target_groups {
     template <int Group>
     using indices = decltype(sequence<Group>(std::make_index_sequence<size_of(Group)>{}));
 
-    // Bits of a voxel in the largest group: what the tile size follows from, for all groups share one coarse pass.
+    // Bits of a voxel in the largest group. The tile size follows from it, because all groups share one coarse pass.
     static constexpr int max_bits() {
         int most = 1;
         for (int g = 0; g < num_groups(); ++g) {
@@ -125,7 +125,7 @@ struct target_groups {
 
 // ---- one voxel ------------------------------------------------------------------------------------------------------
 
-// Sets or clears one bit of a target, while other threads may be at other bits of the word.
+// Sets or clears one bit of a target, while other threads may change other bits of the word.
 template <class Target>
 __device__ void store_bit(const target_view<Target>& t, int x, int y, int z, bool v) {
     word* const w = t.elements + Target::map::cell(t.extent, x, y, z);
@@ -136,7 +136,7 @@ __device__ void store_bit(const target_view<Target>& t, int x, int y, int z, boo
         atomicAnd(w, ~mask);
 }
 
-// A touched voxel of an atomic target.
+// Stores a touched voxel of an atomic target.
 template <class Target, class Cell>
 __device__ void store_cell(const target_view<Target>& view, const voxel_place& at, const Cell& cell) {
     if (view.load == load_operation::off) return;
@@ -145,7 +145,7 @@ __device__ void store_cell(const target_view<Target>& view, const voxel_place& a
                value_blend<typename Target::blend_type, typename Target::value_type>::finish(cell, stored));
 }
 
-// A touched voxel of a target whose last fragment wins: that fragment's value.
+// Stores a touched voxel of a target whose last fragment wins: that fragment's value.
 template <class Target, class Value>
 __device__ void store_winner(const target_view<Target>& view, const voxel_place& at, const Value& value) {
     if (view.load == load_operation::off) return;
@@ -155,7 +155,7 @@ __device__ void store_winner(const target_view<Target>& view, const voxel_place&
         view.store(at.x, at.y, at.z, core::canonical(value));
 }
 
-// The bits of an occupancy mask lie like those of this target.
+// An occupancy mask is laid out like this target.
 using mask_target = target<bit, blend::bit_or>;
 
 } // namespace voxelpipe::device

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Clears of targets whose framebuffer tracks its changes (framebuffer::track_changes): where a target is known to hold
-// the value that it is cleared to but for some chunks (core/change_log.hpp), those alone are written. What is known
-// lies on the device, so that a call that failed, or was captured in a graph and launched again, leaves it right.
+// Clears of targets whose framebuffer tracks its changes (framebuffer::track_changes). If a target is known to hold its
+// clear value except in some chunks (core/change_log.hpp), only those are written. This knowledge lies on the device,
+// so it stays right if a call fails, or is captured in a graph and launched again.
 
 #include <voxelpipe/device/targets/clear_target.cuh>
 #include <voxelpipe/device/targets/finalize_counts.cuh>
@@ -15,7 +15,7 @@
 
 namespace voxelpipe::device {
 
-// Whether a log says of such a target what it was cleared to. Smaller ones are cleared sooner than chunks are found.
+// True if a log may know the value of such a target. Smaller ones are cleared sooner than chunks are found.
 template <class Target>
 [[nodiscard]] bool can_be_known(const target_view<Target>& t) {
     using map = typename Target::map;
@@ -25,7 +25,7 @@ template <class Target>
         return map::elements(t.extent) * sizeof(typename Target::element_type) >= marked_bytes;
 }
 
-// Whether a log can say anything of a framebuffer.
+// True if a log can know some target of the framebuffer.
 template <class... Targets>
 [[nodiscard]] bool can_be_known(const framebuffer_view<Targets...>& fb) {
     bool any = false;
@@ -42,16 +42,16 @@ struct change_tracking<framebuffer_view<Targets...>> {
     static constexpr std::size_t count = sizeof...(Targets);
     using known = core::change_log::known;
 
-    word* log = nullptr; // null: nothing
+    word* log = nullptr; // null: nothing is tracked
     glm::ivec3 extent{};
-    bool by_chunks[count] = {}; // which targets are cleared so
+    bool by_chunks[count] = {}; // targets that are cleared by chunks
     int last_by_chunks = -1;
-    bool changes_known = false; // whether any target is cleared of which the log may know what it was
+    bool changes_known = false; // some cleared target may be known to the log
     known after[count];         // what is known of each target when all are cleared
 
-    change_tracking() = default; // of a call that does not mark what it draws
-    // Of a call that marks all that it draws, where it is_tracked. may_end(t, k): whether what the call does not draw
-    // ends with the bits that target k is cleared to.
+    change_tracking() = default; // for a call that does not mark what it draws
+    // For a call that marks all that it draws, if is_tracked. may_end(t, k): true if voxels that the call does not draw
+    // end with the bits of target k's clear value.
     template <class MayEnd>
     change_tracking(const framebuffer_view<Targets...>& fb, bool is_tracked, const MayEnd& may_end)
         : log(is_tracked ? fb.changes : nullptr), extent(fb.extent) {
@@ -68,14 +68,14 @@ struct change_tracking<framebuffer_view<Targets...>> {
             }
         });
     }
-    // With words where the call has to mark what it draws.
+    // Has words only if the call must mark what it draws.
     [[nodiscard]] chunk_marks marks() const {
         return log == nullptr ? chunk_marks{} : chunk_marks{log + core::change_log::header_words, extent};
     }
     [[nodiscard]] word* known_of(std::size_t k) const { return log + k * core::change_log::known_words; }
 };
 
-// Whether this is what a log knows. All lanes of a warp take part.
+// True if the log knows exactly `wanted`. All lanes of a warp call it.
 [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_known_as(const word* known, const core::change_log::known& wanted) {
     constexpr int known_words = core::change_log::known_words;
     static_assert(known_words <= 32);
@@ -94,8 +94,9 @@ struct chunk_filler {
     Place* to;
     glm::ivec3 extent;
 
-    // What lies at this z of the chunks that a word marks: by one warp, whose lanes write a place each. (x0, y0): the
-    // lowest voxel of the word's first chunk; place_at(x, row) gives what begins at x of the row y0 + row.
+    // Writes the part at this z of the chunks that are marked in one word; a warp calls it, and each lane writes one
+    // Place at a time. (x0, y0): the lowest voxel of the word's first chunk. place_at(x, row): the elements from x on
+    // in row y0 + row.
     template <class PlaceAt>
     __device__ VOXELPIPE_INLINE void fill(int x0, int y0, int z, word marked, PlaceAt&& place_at) const {
         const int lane = static_cast<int>(threadIdx.x) % 32, rows = min(chunk_yz, extent.y - y0);
@@ -118,7 +119,7 @@ struct chunk_filler {
         }
     }
 };
-// f(filler), 16 bytes at a time where rows allow that.
+// Calls f(filler), with a filler of 16 bytes if rows allow it.
 template <class Element, class F>
 __device__ VOXELPIPE_INLINE void with_chunk_filler(Element* elements, const chunk_marks& marks, F&& f) {
     if constexpr (sizeof(Element) <= 16 && 16 % sizeof(Element) == 0) {
@@ -130,7 +131,7 @@ __device__ VOXELPIPE_INLINE void with_chunk_filler(Element* elements, const chun
     f(chunk_filler<Element, Element>{elements, marks.extent});
 }
 
-// One target, to the value that the log may know.
+// Clears one target to the value that the log may know.
 template <class Element>
 __global__ __launch_bounds__(threads_per_block) void clear_chunks_kernel(
     Element* elements, const __grid_constant__ chunk_marks marks, const word* known,
@@ -145,7 +146,7 @@ __global__ __launch_bounds__(threads_per_block) void clear_chunks_kernel(
             for (Element& e : lanes) e = pattern.value;
             Place place;
             memcpy(&place, lanes, sizeof(place));
-            // A warp takes what lies at one z of a row of chunks.
+            // A warp takes one z of a row of chunks.
             const unsigned warps = gridDim.x * (blockDim.x / 32);
             const auto rows_y = static_cast<unsigned>(marks.rows.y);
             const std::size_t slices = std::size_t{rows_y} * static_cast<unsigned>(marks.extent.z);
@@ -159,7 +160,7 @@ __global__ __launch_bounds__(threads_per_block) void clear_chunks_kernel(
         });
 }
 
-// What of a plane of a target is marked, or all of it where the log does not know it as `wanted`.
+// Clears the marked part of a plane of a target, or all of it if the log does not know it as `wanted`.
 template <class Element>
 void clear_chunks(Element* to, const chunk_marks& marks, const word* known, const core::change_log::known& wanted,
                   const fill_pattern<Element>& pattern, const pipeline_state* state, const capacities& limits,
@@ -170,7 +171,7 @@ void clear_chunks(Element* to, const chunk_marks& marks, const word* known, cons
                   stage::fine_raster, to, marks, known, wanted, pattern, state, limits);
 }
 
-// What is known from now on; with `wipes`, nothing is marked.
+// What is known from now on. `wipes`: no chunk stays marked.
 template <std::size_t N>
 struct known_targets {
     core::change_log::known of[N];
@@ -194,8 +195,8 @@ void note_known(word* log, const known_targets<N>& after, const chunk_marks& mar
     launch_behind(note_clears_kernel<N>, wipes ? fill_device(marks.rows.num_words()) : 1, threads_per_block, stream,
                   stage::fine_raster, log, after, marks, wipes, state, limits);
 }
-// When all targets are cleared. The log knows nothing of those that the call does not clear by chunks: the marks are
-// those of all.
+// Updates the log when all targets are cleared. It knows nothing of targets that the call does not clear by chunks,
+// because all targets share the marks.
 template <class... Targets>
 void note_clears(const change_tracking<framebuffer_view<Targets...>>& tracking, bool wipes, const pipeline_state* state,
                  const capacities& limits, cudaStream_t stream) {
@@ -207,7 +208,7 @@ void note_clears(const change_tracking<framebuffer_view<Targets...>>& tracking, 
     note_known(tracking.log, after, marks, wipes, state, limits, stream);
 }
 
-// Clears what the tracking says, by chunks, and notes that.
+// Clears by chunks the targets that `tracking` names, and updates the log.
 template <class... Targets>
 void clear_by_chunks(const change_tracking<framebuffer_view<Targets...>>& tracking,
                      const framebuffer_view<Targets...>& fb, const pipeline_state* state, const capacities& limits,
@@ -234,7 +235,7 @@ void clear_by_chunks(const change_tracking<framebuffer_view<Targets...>>& tracki
     note_clears(tracking, true, state, limits, stream);
 }
 
-// Marks the chunks of voxels that are listed, neighbours mostly in one.
+// Marks the chunks of listed voxels; neighbours in the list mostly share one.
 template <class Voxel>
 __global__
 __launch_bounds__(threads_per_block) void mark_voxels_kernel(const Voxel* voxels, const unsigned long long* num,
@@ -256,7 +257,7 @@ void mark_listed(const Voxel* voxels, const unsigned long long* num, std::uint64
     launch_behind(mark_voxels_kernel<Voxel>, fill_device(room), threads_per_block, stream, stage::tile_resolve, voxels,
                   num, marks, state, limits);
 }
-// Where the call has to: `num` of the state's counters says how many there are, room is no less.
+// Marks listed voxels if the call must. *num: how many there are, at most `room`.
 template <class Tracking, class Voxel>
 void mark_voxels(const Tracking& tracking, const Voxel* voxels, const unsigned long long* num, std::uint64_t room,
                  const pipeline_state* state, const capacities& limits, cudaStream_t stream) {

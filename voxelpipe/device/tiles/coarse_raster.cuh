@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Coarse raster: triangles -> (tile, primitive) pairs, by ascending primitive; counts triangles and why any is dropped
-// (paper section 4, coarse raster). A tile is a voxel of a coarser grid, so the same exact coverage decides.
+// Coarse raster: triangles -> (tile, primitive) pairs, by ascending primitive. Counts triangles, and the reasons why
+// others are dropped (paper section 4, coarse raster). A tile is a voxel of a coarser grid, so the same exact coverage
+// decides.
 
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/scene/int128_coverage.cuh>
@@ -34,8 +35,8 @@ struct tile_cells {
 private:
     static constexpr unsigned long long nothing = ~0ull;
 
-    // Goes through the tiles of the triangle within the box, stores them from `at` on, unless that is `nothing`, and
-    // says how many they are. One function out of line for all kernels of the coarse raster: it is most of their code.
+    // Visits the triangle's tiles within the box and returns their number. Stores them from `at` on, unless `at` is
+    // `nothing`. Out of line and shared by all kernels of the coarse raster: it is most of their code.
     __device__ __noinline__ std::uint32_t walk(int fraction, const loaded_triangle& t, std::uint32_t primitive,
                                                const core::voxel_box& box, bool whole, unsigned long long at) const {
         constexpr auto cells_rule = Rule == coverage::thin ? core::span_rule::columns : core::span_rule::conservative;
@@ -53,7 +54,7 @@ private:
                 visit(tiles.index(p[0], p[1], p[2]));
             }
         };
-        // A triangle that lies in one tile needs no test; a chunk of a larger one does.
+        // A triangle within one tile needs no test; a chunk of a larger one does.
         if (whole && box.lo[0] == box.hi[0] && box.lo[1] == box.hi[1] && box.lo[2] == box.hi[2]) {
             visit(tiles.index(box.lo[0], box.lo[1], box.lo[2]));
         } else if (core::fits_narrow(t.a, t.b, t.c, fraction)) {

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Fine raster: persistent blocks take work items (a tile and a run of its triangles), keep the tile in shared memory,
-// shade and blend atomically, and store it, or leave an image of it where the tile is split (paper section 4, fine
-// raster). Small triangles leave their fragments in a queue, from which every thread shades one at a time; larger ones
-// are cut into units of about the same cost, and threads take units: one triangle that fills the tile and a thousand in
-// one voxel keep the block equally busy.
+// Fine raster: persistent blocks take work items (a tile and a run of its triangles), hold the tile in shared memory,
+// shade and blend atomically, and store it, or leave an image of it if the tile is split (paper section 4, fine
+// raster). Small triangles put their fragments in a queue, from which every thread shades one at a time; larger ones
+// are divided into units of about equal cost, one per thread. So one triangle that fills the tile and a thousand in one
+// voxel keep the block equally busy.
 
 #include <voxelpipe/device/raster/small_triangles.cuh>
 #include <voxelpipe/device/scene/count_and_emit.cuh>
@@ -16,18 +16,18 @@
 
 namespace voxelpipe::device {
 
-inline constexpr int unit_columns = 32; // columns of a unit, about
+inline constexpr int unit_columns = 32; // approximate columns of a unit
 
-// A triangle's part of a tile, cut into units: rows of columns in the plane of u and v. A small part is one unit, the
-// whole tile box.
+// The part of a triangle within a tile, divided into units: rows of columns in the plane of u and v. A small part is
+// one unit, the whole tile box.
 struct unit_list {
-    static constexpr int whole = 3; // as axis: not cut
-    std::uint32_t packed;           // axis 2, u 5, v 5, columns - 1 5, rows - 1 5, rows a unit - 1 5
+    static constexpr int whole = 3; // as axis: not divided
+    std::uint32_t packed;           // bits: axis 2, u 5, v 5, columns - 1 5, rows - 1 5, rows per unit - 1 5
 
     [[nodiscard]] VOXELPIPE_HD int axis() const { return static_cast<int>(packed & 3); }
     [[nodiscard]] VOXELPIPE_HD int field(int i) const { return static_cast<int>(packed >> (2 + 5 * i) & 31); }
 
-    // `box` is the part of the triangle's reach within the tile that begins at `tile`; never empty.
+    // `box`: the triangle's reach within `tile`, not empty.
     [[nodiscard]] VOXELPIPE_HD static unit_list make(const loaded_triangle& t, int fraction,
                                                      const core::voxel_box& tile, const core::voxel_box& box,
                                                      int& num_units) {
@@ -61,7 +61,7 @@ struct unit_list {
     }
 };
 
-// Inclusive prefix sum over the block into `sums`, which the block may read after the call.
+// Inclusive prefix sum over the block into `sums`, which all threads may read afterwards.
 template <int Threads>
 __device__ void block_prefix(int value, int* sums) {
     __shared__ int warp_sums[32];
@@ -81,10 +81,10 @@ __device__ void block_prefix(int value, int* sums) {
 
 // ---- small triangles ------------------------------------------------------------------------------------------------
 
-inline constexpr int fragment_places = 4096; // of the queue
-inline constexpr int max_queue_cells = 1024; // voxels of a bounding box within the tile, for its fragments to go there
+inline constexpr int fragment_places = 4096; // capacity of the queue
+inline constexpr int max_queue_cells = 1024; // most voxels of a bounding box within the tile whose fragments are queued
 
-// A triangle's bounding box, and the part of it that lies in a tile.
+// A triangle's bounding box, and its part within a tile.
 template <coverage Rule>
 struct small_part {
     raster_input<stored_source> in;
@@ -115,7 +115,7 @@ struct small_part {
             struct sink {
                 const core::voxel_box& tile;
                 Row& to;
-                // The depth of a thin fragment is its own; the columns are the tile's.
+                // The columns are the tile's, but a thin fragment's depth may lie outside.
                 __device__ VOXELPIPE_INLINE void row(int x, int y, int z, word bits) {
                     if (x >= tile.lo[0] && x <= tile.hi[0] && y >= tile.lo[1] && y <= tile.hi[1] && z >= tile.lo[2] &&
                         z <= tile.hi[2])
@@ -133,7 +133,8 @@ struct small_part {
                 __device__ VOXELPIPE_INLINE void set(int i, word w) { words[i] = w; }
                 [[nodiscard]] __device__ VOXELPIPE_INLINE word get(int i) const { return words[i]; }
             } kept;
-            (void)raster_thin(in, t.relative(in.fraction), t.lo, box, 0, 1, kept, within); // a zero area is in no tile
+            (void)raster_thin(in, t.relative(in.fraction), t.lo, box, 0, 1, kept,
+                              within); // triangles of zero area are in no tile
         } else {
             if (box.empty()) return;
             const core::small_conservative s(t.relative(in.fraction), in.fraction);
@@ -150,20 +151,20 @@ struct small_part {
 
 // ---- all triangles of a work item -----------------------------------------------------------------------------------
 
-// What a block keeps of a batch of as many triangles as it has threads.
+// Shared memory of a block, for a batch of as many triangles as it has threads.
 template <int Threads>
 struct batch_memory {
     int sums[Threads];
     std::uint32_t ids[Threads];
     unit_list lists[Threads];
-    std::uint32_t fragments[fragment_places]; // voxel of the tile, 15 bits, and the triangle's place in the batch
-    std::uint8_t in_units[Threads];           // whether the fragments of the triangle come from its units
+    std::uint32_t fragments[fragment_places]; // voxel of the tile, 15 bits, and the triangle's index in the batch
+    std::uint8_t in_units[Threads];           // 1: the triangle's fragments come from its units
     int num_fragments;
 };
 static_assert(sizeof(batch_memory<256>) + 1024 <= tuning::batch_bytes);
 
-// Calls visit(i, primitive, output) for every fragment of the item's triangles in the tile, with the voxel's number in
-// it; all threads of the block take part.
+// Calls visit(i, primitive, output) for every fragment of the item's triangles in the tile; i is the voxel's number in
+// the tile. All threads of the block call it.
 template <coverage Rule, int Log2Size, int Threads, class Scene, class Visit>
 __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, const std::uint32_t* primitives,
                                   std::uint32_t count, Visit&& visit) {
@@ -180,7 +181,7 @@ __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, c
         if (mine < count) {
             const std::uint32_t id = primitives[mine];
             const small_part<Rule> part(s.geo, tile, id);
-            bool whole = part.is_small; // all of it is in the queue
+            bool whole = part.is_small; // all of its fragments are in the queue
             if (whole)
                 part.rows(tile, [&](int x, int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
                     const auto from = static_cast<std::uint32_t>(place(x, y, z)) | threadIdx.x << 15;
@@ -198,7 +199,7 @@ __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, c
                 if (!reach.empty()) m.lists[threadIdx.x] = unit_list::make(t, fraction, tile, reach, units);
             }
         }
-        block_prefix<Threads>(units, m.sums); // all fragments are there then as well
+        block_prefix<Threads>(units, m.sums); // also makes all queued fragments visible
         const int waiting = m.num_fragments < fragment_places ? m.num_fragments : fragment_places;
         for (int f = static_cast<int>(threadIdx.x); f < waiting; f += Threads) {
             const std::uint32_t packed = m.fragments[f];
@@ -234,7 +235,7 @@ struct fine_raster_input {
     word* images; // of split tiles
     core::tile_grid tiles;
     bool track;           // keep the touched bits
-    bool count_fragments; // add to the fragment counters: one pass of a call does
+    bool count_fragments; // add to the fragment counters; one pass of a call does
     bool count_voxels;
 };
 

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The words of one tile for a group of render targets: where each target's planes lie, how a fragment enters them, and
-// how a finished tile is written to the framebuffer. The same words lie in shared memory (fine raster) and in global
-// memory (images of split tiles).
+// The words of one tile for a group of render targets: the position of each target's planes, how a fragment is blended
+// into them, and how a finished tile is written to the framebuffer. The same layout serves shared memory (fine raster)
+// and global memory (images of split tiles).
 
 #include <voxelpipe/device/scene/fragment_shade.cuh>
 #include <voxelpipe/device/targets/shared_blend.cuh>
@@ -16,7 +16,7 @@
 namespace voxelpipe::device {
 
 // Targets I... of a framebuffer, in one tile of 2^(3 * Log2Size) voxels:
-//   planes of the atomic targets, words of the bit targets, the winner plane, a bit a voxel that is touched.
+//   planes of the atomic targets, words of the bit targets, the winner plane, one touched bit per voxel.
 template <int Log2Size, class Framebuffer, std::size_t... I>
 struct tile_image {
     static constexpr int log2_size = Log2Size;
@@ -49,7 +49,7 @@ struct tile_image {
         (each.template operator()<I>(), ...);
     }
 
-    // All threads of the block; a barrier must follow.
+    // All threads of the block call it; a barrier must follow.
     __device__ static void clear(word* tile) {
         for_each_target([&]<std::size_t K>() {
             using t = target<K>;
@@ -67,7 +67,7 @@ struct tile_image {
             tile[i] = 0;
     }
 
-    // One fragment in voxel i of the tile. Winners keep primitive + 1; 0 is none.
+    // Blends one fragment into voxel i of the tile. The winner plane holds primitive + 1; 0 is none.
     template <class Values>
     __device__ VOXELPIPE_INLINE static void blend(word* tile, int i, std::uint32_t primitive, const Values& values,
                                                   bool track) {
@@ -104,7 +104,7 @@ template <class Image>
 template <class Image>
 inline constexpr int rows_per_word = 32 / Image::size; // of a tile's bits
 
-// Row r of the tile for bit target K, of which `bits` is the whole word that the row is in.
+// Stores row r of the tile for bit target K; `bits` is the whole word that holds the row.
 template <class Image, std::size_t K, class Framebuffer>
 __device__ void store_bit_row(const Framebuffer& fb, const core::voxel_box& box, int r, word bits) {
     using t = typename Image::template target<K>;
@@ -124,7 +124,7 @@ __device__ void store_bit_row(const Framebuffer& fb, const core::voxel_box& box,
     stored = static_cast<bit_row<size>>(value);
 }
 
-// A touched voxel of all targets whose last fragment wins: shades that fragment. winner: its primitive + 1.
+// Stores a touched voxel of all targets whose last fragment wins: shades that fragment. winner: its primitive + 1.
 template <class Image, class Scene, class Framebuffer>
 __device__ void store_winners(const Scene& s, const Framebuffer& fb, const voxel_place& at, word winner) {
     const auto out = shade_fragment(s, winner - 1, at.x, at.y, at.z);
@@ -134,8 +134,8 @@ __device__ void store_winners(const Scene& s, const Framebuffer& fb, const voxel
     });
 }
 
-// Writes every touched voxel of a tile that is not split, from its image in shared memory, and returns how many voxels
-// this thread found touched. All threads of the block take part.
+// Writes every touched voxel of a tile that is not split from its image in shared memory. Returns how many touched
+// voxels this thread found. All threads of the block call it.
 template <class Image, class Scene, class Framebuffer>
 __device__ std::uint32_t store_tile(const Scene& s, const Framebuffer& fb, const core::voxel_box& box, const word* tile,
                                     bool track) {

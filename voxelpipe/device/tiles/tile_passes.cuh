@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The two passes that draw in tiles, for voxelize and for a driver of one's own. A coarse pass (coarse raster, tile
-// sort, tile split) turns triangles into work items; a fine pass (fine raster, tile resolve) draws these into the
-// targets of a framebuffer. What a coarse pass gives depends on triangles, coverage and tile size alone: one serves any
-// number of fine passes, each with shaders and targets of its own. Nothing here waits or allocates.
+// The two passes that draw in tiles, for voxelize and for other drivers. A coarse pass (coarse raster, tile sort, tile
+// split) turns triangles into work items; a fine pass (fine raster, tile resolve) draws these into the targets of a
+// framebuffer. The result of a coarse pass depends on triangles, coverage and tile size alone: it serves any number of
+// fine passes, each with its own shaders and targets. Nothing here waits or allocates.
 
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/scene/count_and_emit.cuh>
@@ -20,8 +20,7 @@
 
 namespace voxelpipe::device {
 
-// ---- images of target groups
-// -----------------------------------------------------------------------------------------
+// ---- images of target groups ----------------------------------------------------------------------------------------
 
 template <int Log2Size, class Framebuffer, std::size_t... I>
 tile_image<Log2Size, Framebuffer, I...> image_type(std::index_sequence<I...>);
@@ -31,7 +30,7 @@ template <int Log2Size, class Framebuffer, int Group>
 using group_image =
     decltype(image_type<Log2Size, Framebuffer>(typename target_groups<Framebuffer>::template indices<Group>{}));
 
-// Words of the largest image of a framebuffer's groups; 0 where none is drawn in tiles.
+// Words of the largest image of a framebuffer's groups; 0 if none is drawn in tiles.
 template <int Log2Size, class Framebuffer>
 [[nodiscard]] constexpr int max_image_words() {
     int most = 0;
@@ -46,13 +45,13 @@ template <int Log2Size, class Framebuffer>
 
 // ---- the coarse pass ------------------------------------------------------------------------------------------------
 
-// Pairs of a work item, so that there are enough items for the device and few images of split tiles.
+// Most pairs of a work item: makes enough items for the device, and few images of split tiles.
 [[nodiscard]] inline std::uint32_t default_pairs_per_item(std::uint64_t pair_capacity) {
     return static_cast<std::uint32_t>(std::max<std::uint64_t>(512, pair_capacity / 1024));
 }
 
-// Arrays of a coarse pass, and room for the images of split tiles, which the fine passes leave there one after the
-// other. Of the limits, tile_pairs and tile_records count.
+// Arrays of a coarse pass, and memory for the images of split tiles, which the fine passes use one after the other.
+// Uses limits.tile_pairs and limits.tile_records.
 struct tile_memory {
     core::tile_grid tiles;
     share_buffers share;
@@ -82,27 +81,28 @@ struct tile_memory {
     }
 };
 
-// What a coarse pass leaves for fine passes: sorted pairs and work items. Their numbers are in the state.
+// Output of a coarse pass for fine passes: sorted pairs and work items. Their numbers are in the state.
 struct tile_work {
     const std::uint32_t* tile_numbers = nullptr; // of the sorted pairs
     fine_raster_input in{nullptr, nullptr, nullptr, {glm::ivec3(1), 3}, false, false, false};
     const split_tile* splits = nullptr;
 };
 
-// Counts triangles in the state, which is zeroed beforehand.
+// Counts triangles in the state, which must be zero before.
 template <coverage Rule>
 [[nodiscard]] tile_work coarse_pass(const geometry& geo, const tile_memory& m, pipeline_state* state,
                                     const capacities& limits, cudaStream_t stream, stage_clock* clock = nullptr);
 
 // ---- a fine pass ----------------------------------------------------------------------------------------------------
 
-// What a fine pass adds to the state's counters. Of several over the same triangles, one counts the fragments.
+// The counters of the state that a fine pass adds to. Of several passes over the same triangles, one counts the
+// fragments.
 struct pass_counters {
     bool fragments = true;
     bool voxels = true;
 };
 
-// The targets of one group.
+// Draws the targets of one group.
 template <coverage Rule, tuning::fine_raster_policy Policy, int Group, class Scene, class Framebuffer>
 void draw_group(const Scene& s, const Framebuffer& fb, const tile_work& work, const pass_counters& counted,
                 pipeline_state* state, const capacities& limits, cudaStream_t stream, stage_clock* clock) {
@@ -115,9 +115,9 @@ void draw_group(const Scene& s, const Framebuffer& fb, const tile_work& work, co
                                                                                 Policy.blocks_per_sm, stream, clock);
 }
 
-// Draws the work items into all targets but those that are folded in order (fragments/fold.cuh), group by group.
-// Cleared targets hold their clear values already (targets/clear_target.cuh). The policy's tile size is that of the
-// coarse pass.
+// Draws the work items into all targets except those that are folded in order (fragments/fold.cuh), group by group.
+// Cleared targets already hold their clear values (targets/clear_target.cuh). The policy's tile size must be that of
+// the coarse pass.
 template <coverage Rule, tuning::fine_raster_policy Policy, class Scene, class Framebuffer>
 void fine_pass(const Scene& s, const Framebuffer& fb, const tile_work& work, const pass_counters& counted,
                pipeline_state* state, const capacities& limits, cudaStream_t stream, stage_clock* clock = nullptr) {

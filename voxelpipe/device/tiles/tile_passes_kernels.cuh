@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The coarse pass (tiles/tile_passes.cuh) and its kernels: they depend on no shader and no target.
+// The coarse pass (tiles/tile_passes.cuh) and its kernels, which depend on no shader and no target.
 
 #include <voxelpipe/device/tiles/coarse_raster.cuh>
 #include <voxelpipe/device/tiles/tile_passes.cuh>
@@ -19,7 +19,7 @@ __global__ void tile_split_kernel(const std::uint32_t* keys, Buffers out, pipeli
     if (i >= num_pairs) return;
     const std::uint32_t tile = keys[i];
     if (i != 0 && keys[i - 1] == tile) return;
-    // First position after the run: doubling steps from its start, then halving.
+    // Finds the end of the run: doubling steps from its start, then bisection.
     const auto first = static_cast<std::uint32_t>(i);
     std::uint64_t lo = first, step = 1;
     while (lo + step < num_pairs && keys[lo + step] == tile) {
@@ -57,7 +57,6 @@ VOXELPIPE_DEFINES_KERNELS void tile_split(const std::uint32_t* keys, const split
     check(cudaGetLastError(), stage::tile_split);
 }
 
-// Makes the fine raster of another group of targets start again.
 template <class State>
 __global__ void restart_items_kernel(State* state) {
     state->next_item = 0;

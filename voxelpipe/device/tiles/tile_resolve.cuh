@@ -3,8 +3,7 @@
 #pragma once
 
 // Tile resolve: merges the images of every split tile, before any rounding, and stores the tile. A block takes 32
-// voxels of a tile; its warps share out the images, so that a tile of a thousand images is no more than a few reads a
-// thread.
+// voxels of a tile; its warps share the images, so a tile of a thousand images costs a thread only a few reads.
 
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/tiles/fine_raster.cuh>
@@ -12,7 +11,7 @@
 
 namespace voxelpipe::device {
 
-// The images of one split tile, as 32 voxels of it see them: those of one word of the touched bits.
+// The images of one split tile, restricted to 32 voxels: one word of the touched bits.
 template <class Image>
 struct image_column {
     const word* images;
@@ -21,7 +20,7 @@ struct image_column {
 
     [[nodiscard]] __device__ const word* image(std::uint32_t k) const { return images + std::size_t{k} * Image::words; }
 
-    // The lane's voxel merged over the images first, first + step, ... that touched it; false where none did.
+    // Merges the lane's voxel over the images first, first + step, ... that touched it; returns false if none did.
     template <class Blend>
     __device__ bool cell(int offset, unsigned first, unsigned step, typename Blend::cell& merged) const {
         const int i = 32 * group + static_cast<int>(threadIdx.x % 32);
@@ -43,12 +42,12 @@ struct image_column {
 inline constexpr int resolve_warps = threads_per_block / 32;
 inline constexpr int resolve_bytes = 16 * 1024; // shared memory for partial cells, one target after the other
 
-// Combines one word of every thread of the block into a word that all of them get.
+// Combines one word of every thread of the block; all threads get the result.
 template <class Combine>
 __device__ word combine_block(word v, const Combine& combine) {
     __shared__ word partial[resolve_warps];
     for (unsigned step = 16; step > 0; step /= 2) combine(v, __shfl_xor_sync(0xffffffffu, v, step));
-    __syncthreads(); // the last use of `partial` is over
+    __syncthreads(); // the previous use of `partial` is over
     if (threadIdx.x % 32 == 0) partial[threadIdx.x / 32] = v;
     __syncthreads();
     v = partial[0];
@@ -56,8 +55,8 @@ __device__ word combine_block(word v, const Combine& combine) {
     return v;
 }
 
-// The 32 voxels from all images: gives `store` the merged cell of each voxel that is touched, in warp 0. All threads of
-// the block take part.
+// Merges the 32 voxels over all images, and calls `store` in warp 0 with the merged cell of each touched voxel. All
+// threads of the block call it.
 template <class Blend, class Image, class Store>
 __device__ void merge_cells(const image_column<Image>& column, int offset, unsigned char* memory, Store&& store) {
     using cell = typename Blend::cell;
@@ -67,7 +66,7 @@ __device__ void merge_cells(const image_column<Image>& column, int offset, unsig
     __shared__ unsigned founds[resolve_warps];
     cell* const cells = reinterpret_cast<cell*>(memory);
     const unsigned warp = warp_in_block(), lane = threadIdx.x % 32;
-    __syncthreads(); // the last use of the memory is over
+    __syncthreads(); // the previous use of the memory is over
     cell merged{};
     if (warp < ways) {
         const bool found = column.template cell<Blend>(offset, warp, ways, merged);
@@ -89,7 +88,7 @@ __device__ void merge_cells(const image_column<Image>& column, int offset, unsig
     if (found) store(merged);
 }
 
-// The highest primitive + 1 of a voxel, among a tile's images.
+// Merges winners: the highest primitive + 1 of a voxel among a tile's images.
 struct winner_merge {
     using cell = word;
     __device__ static cell load(const word* plane, int i, int) { return plane[i]; }
@@ -107,7 +106,7 @@ __global__ __launch_bounds__(threads_per_block) void tile_resolve_kernel(const _
     __shared__ __align__(16) unsigned char memory[resolve_bytes];
     const unsigned lane = threadIdx.x % 32;
     const std::uint64_t work = std::uint64_t{state->num_splits} * groups;
-    std::uint64_t touched = 0; // thread 0's
+    std::uint64_t touched = 0; // in thread 0
     for (std::uint64_t job = blockIdx.x; job < work; job += gridDim.x) {
         const split_tile split = splits[job / groups];
         const auto group = static_cast<int>(job % groups);
@@ -166,7 +165,7 @@ void draw_tiles(const Scene& s, const Framebuffer& fb, const fine_raster_input& 
                 pipeline_state* state, const capacities& limits, int blocks_per_sm, cudaStream_t stream,
                 stage_clock* clock = nullptr) {
     const auto kernel = fine_raster_kernel<Rule, Image, Threads, MinBlocks, Scene, Framebuffer>;
-    if (Image::bytes > 16 * 1024) // static shared memory counts too, and 48 KB need no asking
+    if (Image::bytes > 16 * 1024) // 48 KB need no attribute, but static shared memory counts too
         check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(Image::bytes)),
               stage::fine_raster);
     int blocks = 0;

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Tile split: runs of equal tile -> work items of at most `pairs_per_item` pairs. A tile with more becomes several
-// items (the paper's virtual tiles), each with an image of its own that tile_resolve merges. All on the device.
+// Tile split: runs of equal tile -> work items of at most `pairs_per_item` pairs. A tile with more pairs becomes
+// several items (the paper's virtual tiles), each with its own image, which tile_resolve merges. Runs on the device.
 
 #include <voxelpipe/device/base/kernel_library.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
@@ -26,7 +26,7 @@ struct split_buffers {
     std::uint32_t pairs_per_item;
 };
 
-// Upper bounds, for allocation: an item per occupied tile, and the items of split tiles, each more than half full.
+// Upper bounds, for allocation: one item per occupied tile, plus the items of split tiles, each more than half full.
 [[nodiscard]] inline std::uint64_t max_images(std::uint64_t pair_capacity, std::uint32_t pairs_per_item) {
     return 2 * pair_capacity / pairs_per_item + 1;
 }
@@ -35,11 +35,11 @@ struct split_buffers {
     return (num_tiles < pair_capacity ? num_tiles : pair_capacity) + max_images(pair_capacity, pairs_per_item);
 }
 
-// Cuts the runs of sorted keys, state->tile_pairs of them, into work items.
+// Divides the runs of sorted keys, state->tile_pairs of them, into work items.
 VOXELPIPE_DECLARES_KERNELS void tile_split(const std::uint32_t* keys, const split_buffers& out, pipeline_state* state,
                                            const capacities& limits, cudaStream_t stream);
 
-// Makes the fine raster of another group of targets start again.
+// Resets the item counter, for the fine raster of another group of targets.
 VOXELPIPE_DECLARES_KERNELS void restart_items(pipeline_state* state, cudaStream_t stream);
 
 } // namespace voxelpipe::device
