@@ -4,7 +4,7 @@
 
 // voxelize_async into fragment lists: an A-buffer call that never waits and never allocates. The lists and their counts
 // lie in the caller's workspace, so a CUDA graph can capture the call and replay it with changed vertices. Capacities
-// are fixed beforehand; where the fragments do not fit, the lists are empty, and read_status says what was needed.
+// are fixed beforehand; if the fragments do not fit, the lists are empty, and read_status reports what was needed.
 
 #include <voxelpipe/device/voxelize_async.cuh>
 
@@ -12,20 +12,20 @@ namespace voxelpipe {
 
 using device::list_counts;
 
-// Lists in device memory, laid out as in abuffer. Filled in by voxelize_async: the pointers go into its workspace and
-// hold for as long as that is used for the same call; what they point to is there when the stream has passed the call.
+// Lists in device memory, laid out like an abuffer. voxelize_async sets the pointers: they point into its workspace,
+// stay valid as long as that serves the same call, and may be read once the stream has passed the call.
 template <class Payload = void>
 struct abuffer_view {
     using payload_type = payload_storage<Payload>;
 
-    const list_counts* counts = nullptr;       // how many voxels and fragments there are; none where the call failed
+    const list_counts* counts = nullptr;       // numbers of voxels and fragments; both 0 if the call failed
     const std::uint64_t* voxels = nullptr;     // occupied voxels, ascending
-    const std::uint64_t* offsets = nullptr;    // one more than voxels, where there are any
+    const std::uint64_t* offsets = nullptr;    // one more than voxels, if there are any
     const std::uint32_t* primitives = nullptr; // one per fragment
-    const payload_type* payloads = nullptr;    // one per fragment; null where Payload is void
+    const payload_type* payloads = nullptr;    // one per fragment; null if Payload is void
     glm::ivec3 extent{0};
 
-    // Copies, then waits. Throws std::runtime_error with the CUDA error.
+    // Copies to the host and waits. Throws std::runtime_error with the CUDA error.
     [[nodiscard]] host_abuffer<Payload> to_host(cuda_backend& backend) const {
         host_abuffer<Payload> h;
         h.extent = extent;
@@ -53,11 +53,11 @@ struct abuffer_view {
 
 namespace device {
 
-// Carves the memory and, with Run, launches every stage and sets the view. What can be written where it is to go at
-// once is.
+// Carves the memory and, with Run, launches every stage and sets the view. Stages write straight to the final arrays if
+// they can.
 template <coverage Rule, bool Run, class Key, class Payload, class Call>
 void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
-    arena behind = memory; // what the stages take
+    arena behind = memory; // behind the memory of the stages
     call.template plan_memory<Key>(behind);
     const std::size_t room = call.limits.fragments;
     auto* const counts = behind.take<list_counts>(1);
@@ -67,7 +67,7 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
     auto* const payloads = std::is_void_v<Payload> ? nullptr : behind.take<payload_storage<Payload>>(room);
     if constexpr (Run) {
         arena start = memory;
-        auto* const state = start.take<pipeline_state>(1); // what the call takes first
+        auto* const state = start.take<pipeline_state>(1); // first in the call's memory
         zero_memory(state, start.used() - memory.used(), stream);
         output_pointers asked;
         asked.value.voxels = voxels;
@@ -76,7 +76,7 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
         asked.value.primitives = primitives;
         asked.value.payloads = payloads;
         const auto sorted = call.template launch<Rule, Key>(memory, stream, asked);
-        const bool are_done = sorted.are_placed && std::is_void_v<Payload>; // only their numbers are left
+        const bool are_done = sorted.are_placed && std::is_void_v<Payload>; // only the lengths are missing
         launch_behind(publish_lists_kernel<Key, payload_storage<Payload>>, are_done ? 1 : fill_device(room),
                       threads_per_block, stream, stage::abuffer_emit, sorted, state, call.limits, counts, voxels,
                       offsets, primitives, payloads);
@@ -107,8 +107,8 @@ struct empty_lists {
     list_counts counts;
 };
 
-// With lists_fragments, one draw of a shader that computes is listed by the raster; what it discards has to fit too.
-// How many voxels there will be nobody knows: small triangles are taken to share them.
+// With lists_fragments, the raster lists one draw of a shader that computes; discarded fragments must fit too. The
+// number of voxels is unknown: small triangles are assumed to share them.
 template <class Draw, class Payload>
 [[nodiscard]] abuffer_call<Draw, payload_storage<Payload>>
 make_list_call(std::span<const Draw> draws, const grid& g, std::uint64_t triangles, const workspace_limits& limits) {
@@ -124,8 +124,8 @@ make_list_call(std::span<const Draw> draws, const grid& g, std::uint64_t triangl
 
 } // namespace device
 
-// Bytes that voxelize_async needs for such a call; 0 where the arguments are refused. Of the limits, only `fragments`,
-// `fragment_records` and `lists_fragments` count here.
+// Bytes that voxelize_async needs for such a call; 0 if the arguments are invalid. Uses limits.fragments,
+// fragment_records and lists_fragments only.
 template <class Mesh, class VertexShader, class FragmentShader, class Payload>
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                           const grid& g, const abuffer_view<Payload>& lists,
@@ -143,8 +143,8 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
 }
 
 // Puts the call on the backend's stream, sets `lists` to where its results will be, and returns. A status other than ok
-// means that nothing was launched, or that a launch failed; what the device finds out is in read_status. With
-// a coverage between angle brackets, as for voxelize.
+// means that nothing was launched, or that a launch failed; read_status reports what the device finds out. A coverage
+// may be given between angle brackets, as for voxelize.
 template <coverage... Known, class Mesh, class VertexShader, class FragmentShader, class Payload>
 [[nodiscard]] status
 voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// cuda_backend: the pipeline on an NVIDIA GPU, with the bits of cpu_backend. All work, copies and memory go through one
-// stream of the current device; a call to voxelize waits once, for the counters in its status, unless it has to run
-// again.
+// cuda_backend: the pipeline on an NVIDIA GPU, with the same bits as cpu_backend. All work, copies and memory go
+// through one stream of the current device. A call of voxelize waits once, for the counters in its status, and once
+// more for each try that did not fit.
 
 #include <voxelpipe/device/base/device_buffer.cuh>
 #include <voxelpipe/device/call/abuffer_call.cuh>

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The kernels that depend on no type of the program, unless voxelpipe::cuda_kernels has them (base/kernel_library.cuh).
+// Includes the kernels that depend on no type of the program, unless voxelpipe::cuda_kernels holds them
+// (base/kernel_library.cuh).
 
 #if !defined(VOXELPIPE_LINKS_CUDA_KERNELS)
 #include <voxelpipe/device/base/launch_kernels.cuh>

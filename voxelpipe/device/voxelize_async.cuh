@@ -3,35 +3,33 @@
 #pragma once
 
 // voxelize_async: a framebuffer call that never waits and never allocates. It works in the caller's memory, so a CUDA
-// graph can capture it and replay it with changed vertices. Capacities are fixed beforehand; what does not fit leaves
-// every target as it was, and read_status says what would have been needed.
+// graph can capture it and replay it with changed vertices. Capacities are fixed beforehand; a call that does not fit
+// leaves every target as it was, and read_status reports what was needed.
 
 #include <voxelpipe/device/backend.cuh>
 
 namespace voxelpipe {
 
-// How much a call may hold. tile_pairs: (tile, triangle) pairs; fragments: only for targets with blends that need
-// triangle order, or with lists_fragments; the records are pieces of large triangles, 512 columns of tiles (or voxels)
-// each.
+// Capacities of a call. tile_pairs: (tile, triangle) pairs. fragments: only for targets whose blend needs triangle
+// order, or with lists_fragments. The records are parts of large triangles, 512 columns of tiles or voxels each.
 struct workspace_limits {
     std::uint64_t tile_pairs = 0;
     std::uint64_t tile_records = 0;
     std::uint64_t fragments = 0;
     std::uint64_t fragment_records = 0;
-    // Whether shaders that compute may have their fragments listed and sorted by voxel, instead of being drawn in tiles
-    // (cuda_backend::lists_fragments): then `fragments` is what has to suffice, in place of tile_pairs. Up to 2^28.
+    // Fragments of shaders that compute may be listed and sorted by voxel instead of drawn in tiles (strategies
+    // sorted_reduce and sorted_fold). Then `fragments` must suffice, at most 2^28, instead of tile_pairs.
     bool lists_fragments = false;
-    // Of calls that list fragments: whether voxels of more than 256 may come. Without, the kernels that put those in
-    // order are left out, which takes some 10 us off a short call; one that meets such a voxel all the same fails for
-    // its capacity.
+    // For calls that list fragments: voxels may have more than 256. Without it, the kernels that order those are left
+    // out, which saves some 10 us of a short call; a call that meets such a voxel then fails for its capacity.
     bool orders_long_voxels = true;
-    // Of calls without tiles: whether there may be more than a few triangles whose bounding boxes have more than two
-    // voxels a side, or three where coverage is conservative. Without, the kernel for those is left out, which takes
-    // some 3 to 6 us off the call of a mesh that is finer than the grid; a few in a hundred may be larger, but none by
-    // much. A call that meets more all the same fails for its capacity and writes no target. Calls of several draws,
-    // and the strategies that write targets at once (immediate, tiled), keep the kernel.
+    // For calls without tiles of one draw: more than a few triangles may have bounding boxes of more than two voxels a
+    // side, or three for conservative coverage. Without it, the deferred pass for those is left out, which saves 3 to 6
+    // us for a mesh that is finer than the grid. A few in a hundred may then be larger, none by much; a call that meets
+    // more fails for its capacity and writes no target. Calls of several draws, and the strategies immediate and tiled,
+    // keep the pass.
     bool expects_deferred = true;
-    // How the call is drawn, as cuda_backend::strategy.
+    // As cuda_backend::strategy.
     voxelpipe::strategy strategy = voxelpipe::strategy::automatic;
 
     // A start for a mesh whose triangles are mostly smaller than a tile.
@@ -40,10 +38,9 @@ struct workspace_limits {
     }
 };
 
-// Memory of the caller's, at least workspace_bytes(...) of it, aligned to 256 bytes, in use from the call until the
-// stream has passed it: by one call at a time. Calls on other streams or threads have other workspaces; one workspace
-// may serve calls that follow each other on one stream, and a captured graph may be launched by any thread, one at a
-// time.
+// The caller's memory: at least workspace_bytes(...), aligned to 256 bytes. One call at a time uses it, from the call
+// until the stream has passed it. Calls on different streams or threads need different workspaces; calls that follow
+// each other on one stream may share one. Any thread may launch a captured graph, one at a time.
 struct workspace_view {
     void* memory = nullptr;
     std::size_t bytes = 0;
@@ -93,7 +90,7 @@ template <class... Targets>
 
 } // namespace device
 
-// Bytes that voxelize_async needs for such a call on the current device; 0 where the arguments are refused.
+// Bytes that voxelize_async needs for such a call on the current device; 0 if the arguments are invalid.
 template <class Mesh, class VertexShader, class FragmentShader, class... Targets>
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                           const grid& g, const framebuffer_view<Targets...>& fb,
@@ -110,7 +107,8 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
 }
 
 // Puts the call on the backend's stream and returns. A status other than ok means that nothing was launched, or that a
-// launch failed; what the device finds out is in read_status. With a coverage between angle brackets, as for voxelize.
+// launch failed; read_status reports what the device finds out. A coverage may be given between angle brackets, as for
+// voxelize.
 template <coverage... Known, class Mesh, class VertexShader, class FragmentShader, class... Targets>
 [[nodiscard]] status
 voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
@@ -141,7 +139,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                     core::known_coverage<Known...>::dispatch(
                         options.rule, [&]<coverage Rule>() { call.template launch<Rule>(memory, backend.stream); });
                     if (!workspace.limits.expects_deferred &&
-                        call.plan.limits.skips_deferred_pass == 0) { // none is missing
+                        call.plan.limits.skips_deferred_pass == 0) { // no triangle is missing
                         auto* const state = static_cast<device::pipeline_state*>(workspace.memory);
                         device::check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), backend.stream));
                     }
@@ -157,10 +155,10 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
     }
 }
 
-// Waits for the stream and says how the last call in this workspace went. Where it was too small (capacity_exceeded),
-// `need`, if given, receives limits with which the same call succeeds, or comes closer: a pass that had no room for its
-// records has not seen all of its pairs. A CUDA error that shows only here has no stage (validate): it may be of any
-// work that the stream had before.
+// Waits for the stream and returns the status of the last call in this workspace. If it was too small
+// (capacity_exceeded) and `need` is not null, *need receives limits with which the same call succeeds or comes closer:
+// a pass without room for its records has not counted all of its pairs. A CUDA error that shows only here has stage
+// validate: it may stem from any earlier work of the stream.
 [[nodiscard]] inline status read_status(cuda_backend& backend, const workspace_view& workspace,
                                         workspace_limits* need = nullptr) {
     device::pipeline_state state{};

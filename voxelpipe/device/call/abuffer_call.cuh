@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Host side of an A-buffer call, as call/framebuffer_call.cuh: what memory its stages take, and their launches.
+// Host side of an A-buffer call, like call/framebuffer_call.cuh: the memory of its stages, and their launches.
 
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/call/graph_cache.cuh>
@@ -17,8 +17,8 @@
 
 namespace voxelpipe::device {
 
-// Fragments a voxel, on average, from which on they are sorted by counting: with 16 and 21, as on hairball, that took
-// 1 to 3 % longer than the radix sort, and with 35 and more 9 to 19 % less (whole calls at 128^3 on an H200).
+// Fragments per voxel, on average, from which on they are sorted by counting. With 16 and 21, as on hairball, that took
+// 1 to 3 % longer than the radix sort; with 35 and more, 9 to 19 % less (whole calls at 128^3 on an H200).
 inline constexpr std::uint64_t min_counted = 24;
 
 template <class Draw, class Payload>
@@ -34,12 +34,12 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     std::uint32_t num_primitives;
     capacities limits;
     stage_clock* clock = nullptr;
-    // Whether fragments may be shaded when they are listed: in the finished lists, and then these are not what is
-    // wanted if any was discarded; with `filters`, before that as well.
+    // may_shade_late: fragments may be shaded in the finished lists; if any is discarded then, the lists are not the
+    // result. filters: they are also shaded before the sort, to remove discarded ones.
     bool may_shade_late = false, filters = false;
-    bool has_few_a_voxel = false; // fragments: see min_counted
+    bool has_few_a_voxel = false; // fragments; see min_counted
 
-    // All that the launches of this call depend on, where it is plain bytes.
+    // Everything that this call's launches depend on, if it is trivially copyable.
     static constexpr bool has_bytes = std::is_trivially_copyable_v<draw_type>;
     template <coverage Rule, class Key>
     [[nodiscard]] call_bytes bytes(const void* workspace, const void* page) const {
@@ -54,27 +54,27 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
         b.add(has_few_a_voxel);
         return b;
     }
-    // Whether fragments are listed by the raster, and shaded afterwards where the shader is not constant.
+    // True if the raster lists the fragments, and a shader that is not constant runs afterwards.
     template <class Key>
     [[nodiscard]] bool is_listed_call() const {
         return sizeof(Key) == sizeof(std::uint32_t) && (core::is_constant<FragmentShader> || may_shade_late) &&
                draws.size() == 1 && is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
     }
-    // As framebuffer_call's.
+    // See framebuffer_call.
     [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t left) const { return leaves_few(num_primitives, left); }
     template <class Key>
     [[nodiscard]] bool shades_late() const {
         return !core::is_constant<FragmentShader> && is_listed_call<Key>();
     }
 
-    // Takes the memory of the call, and nothing else.
+    // Takes the call's memory from an arena.
     template <class Key>
     void plan_memory(arena& memory) const {
         (void)memory.take<pipeline_state>(1);
         with_lists<Key>([&]<class Lists>() { Lists(*this, memory); });
     }
-    // Launches the stages up to the sorted lists, which may be where they are asked for already (are_placed): there is
-    // room for limits.fragments primitives. The state comes first in the memory, and must be zero on entry.
+    // Launches the stages up to the sorted lists, which may already be at the output pointers `asked` (are_placed):
+    // these have room for limits.fragments primitives. The state comes first in the memory and must be zero on entry.
     template <coverage Rule, class Key>
     [[nodiscard]] fragment_lists<Key, Payload> launch(arena& memory, cudaStream_t stream,
                                                       const output_pointers& asked = {}) const {
@@ -86,14 +86,14 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     }
 
 private:
-    // By counting, unless voxels are known to have so many fragments that atomics wait for one another, or so few that
-    // each is by itself.
+    // True if fragments may be sorted by counting: voxels are not known to have so many fragments that atomics wait for
+    // each other, nor so few that counting gains nothing.
     [[nodiscard]] bool may_count() const {
         return !has_few_a_voxel && (limits.longest_ordered <= max_of_block || limits.longest_ordered == ~0ull);
     }
 
-    // Fragments are counted, given their places by a scan, and written by ascending primitive: any number of draws,
-    // voxels and triangles.
+    // Fragments are counted, get offsets from a scan, and are written by ascending primitive. Serves any number of
+    // draws, voxels and triangles.
     template <class Key>
     struct counted_lists {
         const abuffer_call& call;
@@ -114,7 +114,7 @@ private:
         }
     };
 
-    // The raster lists the fragments of one draw of a constant shader, in any order.
+    // The raster lists the fragments of one draw with a constant shader, in any order.
     struct constant_lists {
         static constexpr bool shades_in_raster =
             is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
@@ -158,8 +158,7 @@ private:
         }
     };
 
-    // The same for any other shader, which runs when the lists are sorted; what it discards is filtered out before, if
-    // that is wanted.
+    // The same for any other shader, which runs on the sorted lists; with `filters`, also before the sort.
     struct shaded_lists {
         static constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
         const abuffer_call& call;

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Room for arrays whose lengths a call finds out on the device: the host has to say beforehand how much there is, what
-// does not fit costs a second run, and what is too much costs time too, where a sort is as long as its room.
+// Guesses the capacities of arrays whose lengths only the device finds out. Too little capacity costs a second run; too
+// much costs time where a sort works on the whole capacity.
 
 #include <voxelpipe/device/base/launch_size.hpp>
 
@@ -15,7 +15,8 @@
 
 namespace voxelpipe::core {
 
-// Key: what the host knows of a call, compared by ==. N arrays, numbered with 32 bits where `is_numbered` says so.
+// Key: what the host knows of a call, compared by ==. N arrays; elements of those with `is_numbered` are numbered with
+// 32 bits.
 template <class Key, std::size_t N>
 class capacity_history {
 public:
@@ -23,8 +24,8 @@ public:
 
     explicit capacity_history(const std::array<bool, N>& is_numbered) : is_numbered_(is_numbered) {}
 
-    // For a call. One like the last gets a little more than such calls have needed so far; any other gets `first`, what
-    // a call needs of which nothing is known, or more where an earlier one did not fit.
+    // Capacities for a call. A call like the last one gets a little more than such calls have needed so far. Any other
+    // gets `first`, or more if an earlier call did not fit.
     [[nodiscard]] lengths guess(const Key& key, const lengths& first) const {
         const bool known = last_ == key;
         lengths room{};
@@ -33,20 +34,20 @@ public:
                                                           : std::max(most_[k], first[k]));
         return room;
     }
-    // For the next try of a call that did not fit.
+    // Raises the capacities for the next try of a call that did not fit.
     void raise(lengths& room, const lengths& needed) {
         for (std::size_t k = 0; k < N; ++k) {
             if (needed[k] > room[k]) room[k] = limited(k, needed[k] + needed[k] / 16);
             most_[k] = std::max(most_[k], room[k]);
         }
     }
-    // Of a call that fitted. The key does not tell all calls apart: one of several gets what the largest needed.
+    // Records a call that fitted. The key does not distinguish all calls: equal keys share the largest need.
     void fitted(const Key& key, const lengths& needed) {
         for (std::size_t k = 0; k < N; ++k) needed_[k] = last_ == key ? std::max(needed_[k], needed[k]) : needed[k];
         last_ = key;
     }
 
-    // The most of array k that calls like the last one have needed, where this is one of them.
+    // The most elements of array k that calls with this key have needed; nullopt if the last call had another key.
     [[nodiscard]] std::optional<std::uint64_t> max_needed(const Key& key, std::size_t k) const {
         return last_ == key ? std::optional(needed_[k]) : std::nullopt;
     }

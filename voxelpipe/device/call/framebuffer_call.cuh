@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Host side of a framebuffer call: chooses the strategy once, says how much memory it takes (plan_memory), and launches
-// its kernels on one stream without a wait (launch). voxelize reads the counters at the end; voxelize_async leaves them
-// on the device.
+// Host side of a framebuffer call: chooses the strategy once, computes its memory (plan_memory), and launches its
+// kernels on one stream without waiting (launch). voxelize reads the counters at the end; voxelize_async leaves them on
+// the device.
 
 #include <voxelpipe/device/call/graph_cache.cuh>
 #include <voxelpipe/device/call/immediate_strategy.cuh>
@@ -21,7 +21,7 @@
 
 namespace voxelpipe::device {
 
-// Which strategies these types allow.
+// The strategies that these types allow.
 template <class FragmentShader, class Framebuffer>
 inline constexpr possible_strategies strategies_of{};
 template <class FragmentShader, class... Targets>
@@ -32,8 +32,8 @@ inline constexpr possible_strategies strategies_of<FragmentShader, framebuffer_v
     target_groups<framebuffer_view<Targets...>>::has_ordered,
 };
 
-// Everything that the launches of a call depend on but its draws. With the bytes of the draws these bytes are the key
-// of a kept graph (call/graph_cache.cuh): a field that is added here is part of the key.
+// Everything that the launches of a call depend on, except its draws. These bytes and those of the draws are the key of
+// a kept graph (call/graph_cache.cuh): any field that is added here becomes part of the key.
 template <class Framebuffer>
 struct framebuffer_plan {
     grid g;
@@ -42,7 +42,7 @@ struct framebuffer_plan {
     std::uint32_t num_primitives;
     capacities limits;
     const strategy_rule* rule;
-    immediate_plan<targets_of<Framebuffer>::count> targets; // of a constant shader
+    immediate_plan<targets_of<Framebuffer>::count> targets; // for constant shaders
 };
 
 template <class Draw, class Framebuffer, tuning::fine_raster_policy Policy>
@@ -78,19 +78,19 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         if constexpr (possible.immediate) plan_immediate(draws, fb, num_primitives, options.count_voxels, plan.targets);
     }
 
-    // Chooses how the call is drawn, by the table or as it is forced. False if a forced strategy cannot serve the call;
-    // then nothing may be launched. may_list: there is memory for lists of fragments.
+    // Chooses the strategy, by the table or as forced. Returns false if a forced strategy cannot serve the call; then
+    // nothing may be launched. may_list: there is memory for lists of fragments.
     [[nodiscard]] bool choose(strategy forced, bool may_list) {
         plan.rule = choose_rule(facts(may_list), forced);
         return plan.rule != nullptr;
     }
     [[nodiscard]] strategy chosen() const { return plan.rule->value; }
-    // The memory of the call grows with its fragments.
+    // True if the call's memory grows with its fragments.
     [[nodiscard]] bool lists_fragments() const {
         return chosen() == strategy::sorted_reduce || chosen() == strategy::sorted_fold;
     }
-    // True if the deferred pass may be left out, where calls like this one deferred so many triangles. Safe, because
-    // these strategies write no target before all triangles are drawn: a wrong guess costs time only.
+    // True if the deferred pass may be skipped, given that calls like this one deferred num_deferred triangles. Safe:
+    // these strategies write no target before all triangles are drawn, so a wrong guess only costs time.
     [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t num_deferred) const {
         if (draws.size() != 1 || !leaves_few(max_triangles(), num_deferred)) return false;
         return chosen() == strategy::occupancy_mask || lists_fragments();
@@ -103,7 +103,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         with_strategy([&]<class Strategy>() { Strategy(*this, memory); });
         return memory.used();
     }
-    // Bytes at the start of the workspace that must be zero on entry. A finished call leaves them zero, but for the
+    // Bytes at the start of the workspace that must be zero on entry. A finished call leaves them zero, except for the
     // state.
     [[nodiscard]] std::size_t zeroed_bytes() const {
         arena memory;
@@ -111,15 +111,15 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         if (chosen() == strategy::occupancy_mask) (void)memory.take<word>(mask_target::map::elements(plan.g.extent));
         return memory.used();
     }
-    // Launches every kernel of the call. Whatever can fail is known before the first voxel is written.
+    // Launches every kernel of the call. Anything that can make it fail is known before the first voxel is written.
     template <coverage Rule>
     void launch(arena& memory, cudaStream_t stream) const {
         pipeline_state* const state = memory.take<pipeline_state>(1);
-        if (can_be_known(plan.fb) && !is_tracked()) // what the log says of the targets will not hold
+        if (can_be_known(plan.fb) && !is_tracked()) // the log will not describe the targets any longer
             check(cudaMemsetAsync(plan.fb.changes, 0, core::change_log::header_words * sizeof(word), stream));
         with_strategy([&]<class Strategy>() { Strategy(*this, memory).template launch<Rule>(state, stream); });
     }
-    // The stage that a failure is put down to that shows only at the end of the call.
+    // The stage that a failure is attributed to if it shows only at the end of the call.
     [[nodiscard]] stage last_stage() const {
         switch (chosen()) {
         case strategy::occupancy_mask:
@@ -131,7 +131,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         }
     }
 
-    // All that the launches depend on, if it is plain bytes.
+    // Everything that the launches depend on, if it is trivially copyable.
     static constexpr bool has_bytes =
         std::is_trivially_copyable_v<draw_type> && std::is_trivially_copyable_v<Framebuffer>;
     template <coverage Rule>
@@ -143,11 +143,11 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         return b;
     }
 
-    // ---- what the strategies ask ------------------------------------------------------------------------------------
+    // ---- for the strategies -----------------------------------------------------------------------------------------
 
-    // All that the call draws is marked in the framebuffer's log of changes. Tiles mark nothing.
+    // True if all that the call draws is marked in the framebuffer's log of changes. Tiles mark nothing.
     [[nodiscard]] bool is_tracked() const { return can_be_known(plan.fb) && chosen() != strategy::tiled; }
-    // Tracking of a call that knows what a voxel ends with when it is drawn.
+    // Tracking for strategies that know a drawn voxel's final value when they draw it.
     [[nodiscard]] tracking_type track() const {
         return {plan.fb, is_tracked(), [](const auto&, std::size_t) { return true; }};
     }
@@ -165,7 +165,8 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         for (const draw_type& d : draws) most = std::max(most, d.mesh.positions.size());
         return most;
     }
-    // The raster shades vertices itself if that costs no more than to read them: once a corner, not once a vertex.
+    // The raster shades vertices itself if that costs no more than reading them: once per corner instead of once per
+    // vertex.
     static constexpr bool shades_in_raster =
         is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
 
@@ -183,7 +184,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
                 raster(d, shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, number}, i == 0);
             } else {
                 vertex_shade(d.mesh, d.vertex_shader, snap, number, positions, static_cast<no_varyings*>(nullptr),
-                             stream); // nobody reads them
+                             stream); // there are no varyings
                 end_stage(clock, &stage_times::vertex_shade);
                 raster(d,
                        stored_source{{d.mesh.triangles.data(), positions, 0,
@@ -200,7 +201,8 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     void clear_targets(const tracking_type& tracking, const pipeline_state* state, cudaStream_t stream) const {
         core::for_each_index<groups::count>([&]<std::size_t K>() {
             auto t = voxelpipe::get<K>(plan.fb.targets);
-            if (chosen() == strategy::immediate && plan.targets.counts(K)) t.clear_value = {}; // no fragments
+            if (chosen() == strategy::immediate && plan.targets.counts(K))
+                t.clear_value = {}; // the number of fragments
             if (t.load == load_operation::clear && !tracking.by_chunks[K]) clear_target(t, state, plan.limits, stream);
         });
         clear_by_chunks(tracking, plan.fb, state, plan.limits, stream);
@@ -231,7 +233,7 @@ private:
         return f;
     }
 
-    // Calls f with the type of the chosen strategy: only those that the program's types allow are instantiated.
+    // Calls f with the type of the chosen strategy. Only strategies that the program's types allow are instantiated.
     template <class F>
     void with_strategy(const F& f) const {
         switch (chosen()) {
@@ -249,7 +251,7 @@ private:
             break;
         case strategy::automatic:
         case strategy::tiled:
-            // Voxel ids of 32 bits keep the lists of ordered targets small wherever the grid allows.
+            // 32-bit voxel ids, if the grid allows them, keep the lists of ordered targets small.
             if (!groups::has_ordered || num_voxels(plan.g) < max_listed_voxels)
                 f.template operator()<tiled_strategy<framebuffer_call, std::uint32_t>>();
             else if constexpr (groups::has_ordered)
@@ -258,7 +260,7 @@ private:
     }
 };
 
-// Calls f with the call whose policy is the selector's for the current device.
+// Calls f with a call whose policy the selector picks for the current device.
 template <class Selector, class Draw, class Framebuffer, class F>
 auto with_framebuffer_call(std::span<const Draw> draws, const grid& g, const Framebuffer& fb,
                            const voxelize_options& options, std::uint64_t triangles, const capacities& limits,

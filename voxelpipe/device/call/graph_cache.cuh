@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A call that comes again with the same arguments, as one CUDA graph: to launch six kernels takes the host 25 us, and
-// the device waits for them; as a graph 10. What a call's launches depend on is its arguments' bytes (call_bytes), in
-// which meshes and targets are pointers: what lies there may change from call to call.
+// Keeps a repeated call as one CUDA graph: launching six kernels takes the host 25 us, during which the device waits;
+// as a graph, 10 us. A call's launches depend on the bytes of its arguments only (call_bytes). Meshes and targets are
+// pointers among these: their contents may change from call to call.
 
 #include <voxelpipe/device/base/memory.cuh>
 
@@ -16,8 +16,8 @@
 
 namespace voxelpipe::device {
 
-// The arguments of a call, as bytes: equal bytes, equal launches. Padding counts, so that equal arguments may be told
-// apart; then the call is launched like any other.
+// The arguments of a call, as bytes: equal bytes mean equal launches. Padding counts, so equal arguments may compare
+// unequal; then the call is launched without a graph.
 class call_bytes {
 public:
     template <class T>
@@ -33,14 +33,14 @@ private:
     std::vector<std::byte> bytes_;
 };
 
-// An address for each list of types.
+// A distinct address for each list of types.
 template <class... Types>
 [[nodiscard]] const void* tag_of_call() {
     static constexpr char tag = 0;
     return &tag;
 }
 
-// A start for the bytes of a call: its type, the device, and the memory that it works in.
+// Begins the bytes of a call: its type, the device, and the memory that it works in.
 template <class... Types>
 [[nodiscard]] call_bytes bytes_of_call(const void* workspace, const void* page) {
     int device = 0;
@@ -53,7 +53,7 @@ template <class... Types>
     return b;
 }
 
-// The last call, and its graph once it has come often enough. Belongs to one device; moves, is never shared.
+// The last call, and its graph once it has been repeated often enough. Belongs to one device. Movable, not copyable.
 class call_graph {
 public:
     call_graph() = default;
@@ -63,10 +63,10 @@ public:
         return *this;
     }
     ~call_graph() {
-        if (graph_ != nullptr) cudaGraphExecDestroy(graph_); // what still runs ends first, without a wait here
+        if (graph_ != nullptr) cudaGraphExecDestroy(graph_); // a running graph finishes first; this does not wait
     }
 
-    // Puts on the stream what launch_all(stream) puts there, which depends on the arguments alone.
+    // Launches what launch_all(stream) launches, which must depend on the arguments alone.
     template <class F>
     void launch(const call_bytes& arguments, cudaStream_t stream, const F& launch_all) {
         if (arguments == arguments_) {
@@ -83,9 +83,9 @@ public:
     }
 
 private:
-    static constexpr int worth_a_graph = 3; // calls: a graph costs as much as ten of them save
+    static constexpr int worth_a_graph = 3; // calls: a graph costs as much as ten calls save
 
-    // On a stream of its own: the caller's may be one that cannot be captured. Null where there is no graph of it.
+    // Captures on a separate stream: the caller's may not allow capture. Returns null if there is no graph.
     template <class F>
     [[nodiscard]] static cudaGraphExec_t record(const F& launch_all) {
         cudaStream_t stream = nullptr;
@@ -96,7 +96,7 @@ private:
                 bool launched = true;
                 try {
                     launch_all(stream);
-                } catch (const cuda_failure&) { // the launches by themselves will tell
+                } catch (const cuda_failure&) { // the ordinary launches will report it
                     launched = false;
                 }
                 if (cudaStreamEndCapture(stream, &graph) != cudaSuccess) graph = nullptr;
@@ -115,7 +115,7 @@ private:
         std::swap(graph_, other.graph_);
     }
     call_bytes arguments_;
-    int times_ = 0; // that it has come, up to worth_a_graph
+    int times_ = 0; // number of equal calls, up to worth_a_graph
     cudaGraphExec_t graph_ = nullptr;
 };
 

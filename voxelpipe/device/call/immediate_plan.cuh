@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Which targets of a call of constant shaders are blended in place, and which count their fragments (plan_immediate).
+// Decides, for calls of constant shaders, which targets are blended in place and which count their fragments.
 
 #include <voxelpipe/device/targets/finalize_counts.cuh>
 
@@ -12,13 +12,13 @@
 
 namespace voxelpipe::device {
 
-// Without marks the last pass goes through the whole grid, the tiles only through what is touched: they take over where
-// the counted targets have more bytes than this for each triangle, beyond what takes some microseconds. At 4 TB/s these
-// are 4 ns, which a few fragments cost in the tiles.
+// Tiles take over if the counted targets without marks have more bytes than counted_bytes plus this per triangle: their
+// last pass reads the whole grid, but tiles only what is touched. At 4 TB/s these bytes take 4 ns, as much as a few
+// fragments cost in tiles.
 inline constexpr std::uint64_t counted_bytes_per_triangle = 16384, counted_bytes = marked_bytes;
 
-// Bits are counted when all is drawn, which takes as long as the clear did: the atomics that tell first touches make
-// every warp wait for them. Beyond so many bytes they tell it in less time.
+// Bits up to this size are counted after drawing, which takes as long as the clear. Atomics that report first touches
+// would make every warp wait; beyond this size they take less time than counting.
 inline constexpr std::uint64_t max_counted_bits = std::uint64_t{256} << 20;
 
 template <std::size_t K, class Target, class Draw>
@@ -27,7 +27,7 @@ template <std::size_t K, class Target, class Draw>
         if (t.load != load_operation::clear) return false;
         if constexpr (!std::is_same_v<typename Target::blend_type, blend::count>) {
             const auto& first = voxelpipe::get<K>(draws[0].fragment_shader.values);
-            for (const Draw& d : draws) // numbers, whose equal bytes are equal values
+            for (const Draw& d : draws) // numbers: equal bytes are equal values
                 if (std::memcmp(&first, &voxelpipe::get<K>(d.fragment_shader.values), sizeof(first)) != 0) return false;
         }
         return true;
@@ -44,16 +44,16 @@ template <class... Targets>
     return all;
 }
 
-// Fills in how a call of constant shaders does without tiles. The modes of `plan` are those of a new one. Writes
-// members only, and leaves padding as it is: the bytes are part of a graph's key. A target is counted only where
-// blending it in place would not give its blend's bits, or where nothing else tells how many voxels are touched.
+// Fills in how a call of constant shaders does without tiles; plan.modes must be new. A target is counted only if
+// blending in place would not give its blend's bits, or if no other target can report how many voxels are touched.
+// Assigns members one by one, because the bytes, padding included, are part of a graph's key.
 template <class Draw, class... Targets>
 void plan_immediate(std::span<const Draw> draws, const framebuffer_view<Targets...>& fb, std::uint64_t num_primitives,
                     bool count_voxels, immediate_plan<sizeof...(Targets)>& plan) {
     plan.possible = plan.is_cheap = true;
     plan.voxels_of = plan.bits_of = -1;
-    int telling = -1, countable = -1; // the first target that tells first touches, that may be counted
-    int telling_bits = -1;            // that tells them by its bits when all is drawn
+    int telling = -1, countable = -1; // the first target that reports first touches; that may be counted
+    int telling_bits = -1;            // the first target that shows them by its bits after drawing
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
         const auto& t = voxelpipe::get<K>(fb.targets);
         bool in_place = true, tells = true;

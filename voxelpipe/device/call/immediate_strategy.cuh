@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Strategy immediate: the raster blends each fragment into the targets where they lie; counted targets get their values
-// in a last pass.
+// Strategy immediate: the raster blends each fragment into the targets in place. Counted targets get their values in a
+// last pass.
 
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/call/immediate_plan.cuh>
@@ -24,7 +24,7 @@ struct immediate_strategy {
 
     const Call& call;
     tracking_type tracking;
-    bool has_own_marks; // chunks that are touched are marked for the last pass alone, not for the framebuffer's log
+    bool has_own_marks; // touched chunks are marked for the last pass only, not for the framebuffer's log
     chunk_marks marks;
     vertex_positions positions;
     deferred_triangles deferred;
@@ -38,7 +38,7 @@ struct immediate_strategy {
             has_own_marks =
                 has_own_marks || (c.plan.targets.counts(K) && ends_by_marks(voxelpipe::get<K>(c.plan.fb.targets)));
         });
-        has_own_marks = has_own_marks && !is_tracked(); // the log's marks hold what these would
+        has_own_marks = has_own_marks && !is_tracked(); // the log's marks hold the same
         if (has_own_marks) marks = chunk_marks::take(memory, c.plan.g.extent);
         positions = vertex_positions::take(memory, Call::shades_in_raster ? 0 : c.max_vertices());
         deferred = deferred_triangles::take(memory, c.max_triangles());
@@ -47,14 +47,14 @@ struct immediate_strategy {
     template <coverage Rule>
     void launch(pipeline_state* state, cudaStream_t stream) const {
         if (has_own_marks) check(cudaMemsetAsync(marks.words, 0, marks.rows.num_words() * sizeof(word), stream));
-        // Fragments go straight into targets: a bad index has to be known before.
+        // Fragments go straight into targets, so a bad index must be found before.
         for (const auto& d : call.draws)
             if (!d.mesh.has_checked_indices())
                 check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);
         if (!call.has_checked_indices()) end_stage(call.clock, &stage_times::coarse_raster);
         call.clear_targets(tracking, state, stream);
-        // Without a check and a clear these may be the first kernels, but then nobody writes to the indices
-        // (mesh_view::checked).
+        // Without a check and a clear these may be the call's first kernels. They may still start early: nobody writes
+        // checked indices (mesh_view::checked).
         call.raster_draws(positions, state, stream, [&](const auto& d, const auto& source, bool) {
             raster_draw<Rule>(d, source, state, stream);
         });
@@ -66,10 +66,10 @@ struct immediate_strategy {
     }
 
 private:
-    // While a framebuffer's changes are tracked, its log has the marks.
+    // A framebuffer with tracked changes has marks in its log.
     [[nodiscard]] bool is_tracked() const { return tracking.marks().words != nullptr; }
 
-    // One draw, by the kernels that know most of the targets.
+    // Rasters one draw, by the most specialised kernels for its targets.
     template <coverage Rule, class Source>
     void raster_draw(const typename Call::draw_type& d, const Source& source, pipeline_state* state,
                      cudaStream_t stream) const {

@@ -2,18 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What voxelpipe::cuda_kernels holds of function templates whose kernels depend on types that the library names itself:
-// rasters into a list or a mask of voxels, clears of common elements, whole calls of constants. Each macro is a list of
-// explicit instantiations: HOW is `extern template` in a program that links the library, and `template` in the file of
-// the library that has them (voxelpipe/cuda_kernels/). The functions are on the host, and none is inline: a program
-// compiles neither them nor their kernels, and does not link without the library.
+// Function templates that voxelpipe::cuda_kernels instantiates for types that the library names itself: rasters into a
+// list or a mask of voxels, clears of common elements, whole calls of constants. Each macro is a list of explicit
+// instantiations. HOW is `extern template` in a program that links the library, and `template` in the library's own
+// file (voxelpipe/cuda_kernels/). The functions run on the host and are not inline: a program compiles neither them nor
+// their kernels, and does not link without the library.
 
 #include <voxelpipe/device/call/abuffer_call.cuh>
 #include <voxelpipe/device/call/framebuffer_call.cuh>
 
 #include <cstdint>
 
-// In namespace voxelpipe::device, here and below. Vertices that a kernel has shaded, and those that need none.
+// In namespace voxelpipe::device, up to the calls. Vertex shades by a kernel, for the library's vertex shaders.
 #define VOXELPIPE_VERTEX_SHADES(HOW)                                                                                   \
     HOW void vertex_shade(const mesh_view<>&, const passthrough&, const core::snap_transform&, std::uint32_t,          \
                           const vertex_positions&, no_varyings*, cudaStream_t);                                        \
@@ -64,8 +64,8 @@
     HOW void mark_listed(const std::uint32_t*, const unsigned long long*, std::uint64_t, const chunk_marks&,           \
                          const pipeline_state*, const capacities&, cudaStream_t);
 
-// In namespace voxelpipe: calls of voxelize and voxelize_async whose every type the library names: bits of a surface,
-// sums of a number, and the primitives of each voxel. One of voxelize with a known coverage takes no kernels of its
+// In namespace voxelpipe: calls of voxelize and voxelize_async whose types are all the library's: bits of a surface,
+// sums of a number, and the primitives of each voxel. A call of voxelize with a known coverage takes no kernels of its
 // own.
 #define VOXELPIPE_DRAWS(VALUE) std::span<const draw<mesh_view<>, passthrough, constant_output<VALUE>>>
 #define VOXELPIPE_CALL(HOW, VALUE, COVERAGE, ...)                                                                      \

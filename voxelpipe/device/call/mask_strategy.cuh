@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Strategy occupancy_mask: the raster sets a bit for each touched voxel, a last pass fills all targets from these bits.
+// Strategy occupancy_mask: the raster sets a bit for each touched voxel; last passes fill all targets from these bits.
 
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/raster/mask_sink.cuh>
@@ -17,7 +17,7 @@ namespace voxelpipe::device {
 template <class Call>
 struct mask_strategy {
     const Call& call;
-    word* mask; // the first of the call's memory after the state: both are zero on entry
+    word* mask; // first in the call's memory after the state: both are zero on entry
     vertex_positions positions;
     deferred_triangles deferred;
 

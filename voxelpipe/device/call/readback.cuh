@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What passes between host and device in a call, beside its memory: the state on its way back, and where lists are to
-// go.
+// Data that host and device exchange in a call: the state, on its way back, and the output pointers of lists.
 
 #include <voxelpipe/device/base/call_state.cuh>
 #include <voxelpipe/device/base/launch.cuh>
@@ -20,23 +19,23 @@
 
 namespace voxelpipe::device {
 
-// A state on its way to the host, in words of which each says that it has arrived: whoever finds `arrived` in all of
-// them has the state, in whatever order they came, and sees all that the stream did before. No store waits for another.
+// A state on its way to the host. Each word carries a flag that it has arrived: a reader that finds all flags has the
+// state, in whatever order the words came, and sees all earlier work of the stream. No store waits for another.
 template <class State>
 struct sent_state {
     static_assert(sizeof(State) % sizeof(std::uint32_t) == 0);
     static constexpr unsigned count = sizeof(State) / sizeof(std::uint32_t);
-    static constexpr std::uint64_t arrived = std::uint64_t{1} << 32; // beside 32 bits of the state
+    static constexpr std::uint64_t arrived = std::uint64_t{1} << 32; // above 32 bits of the state
     std::uint64_t words[count];
 };
 
-// Sends the state to memory that the host sees, and leaves zeros for the next call.
+// Writes the state to memory that the host can read, and zeros it for the next call.
 VOXELPIPE_DECLARES_KERNELS void send_state(pipeline_state* state, sent_state<pipeline_state>* to, cudaStream_t stream);
 
-// Brings the state of a call to the host. Into ordinary memory the driver copies it; from the second call on a page of
-// host memory is locked, which a kernel writes in less time: 10 us of a call that takes 60. The host looks at the page
-// then instead of waiting for the stream, which takes 2 us more. Unlocking waits for the whole device, so what is used
-// once locks nothing. The page also says where the call's lists are to go.
+// Brings the state of a call to the host. The first call copies it by the driver. From the second call on, a kernel
+// writes it to a page of locked host memory, which saves 10 us of a call that takes 60; the host polls the page,
+// because waiting for the stream takes 2 us more. Unlocking waits for the whole device, so a backend that is used once
+// locks nothing. The page also holds the call's output pointers.
 class readback {
 public:
     readback() = default;
@@ -50,29 +49,29 @@ public:
         ::operator delete(page_, page_bytes);
     }
 
-    // Before each call.
+    // Call before each voxelize call.
     void prepare(bool may_lock) {
         if (may_lock && was_used_ && page_ == nullptr) lock();
         was_used_ = true;
     }
-    // What the device knows the page by, null where there is none.
+    // The page's address on the device; null if there is none.
     [[nodiscard]] void* page() const { return on_device_; }
-    // Before the launches of a call, if it ends with `send`.
+    // Call before the launches of a call that ends with `send`.
     void expect() {
         if (page_ != nullptr) page_->state = {};
     }
-    // Before the launches of a call: where its lists are to go.
+    // Sets the output pointers; call before the launches.
     [[nodiscard]] output_pointers ask(const list_places& places) const {
         if (on_device_ == nullptr) return {places, nullptr};
         std::memcpy(&page_->places, &places, sizeof(places));
         return {places, &on_device_->places};
     }
-    // The last that a call puts on its stream. With a page, the state is zeroed then.
+    // The last work that a call puts on its stream. With a page, it zeros the state.
     void send(pipeline_state* state, cudaStream_t stream) const {
         if (on_device_ == nullptr) return;
         send_state(state, &on_device_->state, stream);
     }
-    // What was sent, once all that the stream had before is done.
+    // Waits for the stream and returns the state.
     [[nodiscard]] pipeline_state receive(const pipeline_state* state, cudaStream_t stream) const {
         pipeline_state copy{};
         if (on_device_ == nullptr) {
@@ -80,8 +79,8 @@ public:
             check(cudaStreamSynchronize(stream));
             return copy;
         }
-        // What has failed never arrives: the stream is asked now and then, and at once, for drivers that keep launches
-        // back until they are asked. A call of milliseconds is waited for.
+        // A failed call never arrives, so the stream is queried now and then; first at once, because some drivers hold
+        // launches back until queried. Calls of milliseconds block.
         if (may_spin_)
             for (unsigned i = 0; i < max_looks; ++i) {
                 if (arrives(copy)) return copy;
@@ -95,7 +94,7 @@ public:
 
 private:
     static constexpr std::align_val_t page_bytes{4096};
-    static constexpr unsigned max_looks = 1u << 20, looks_between = 1u << 14; // a look takes a nanosecond or two
+    static constexpr unsigned max_looks = 1u << 20, looks_between = 1u << 14; // a look takes one or two nanoseconds
     using sent = sent_state<pipeline_state>;
     struct contents {
         sent state;
@@ -103,7 +102,7 @@ private:
     };
     static_assert(sizeof(contents) <= static_cast<std::size_t>(page_bytes));
 
-    // Whether all of the state is there.
+    // True if all of the state has arrived.
     [[nodiscard]] bool arrives(pipeline_state& state) const {
         std::uint32_t words[sent::count];
         for (unsigned i = sent::count; i-- > 0;) {
@@ -115,7 +114,7 @@ private:
         return true;
     }
 
-    // Once: where that cannot be had, copies do.
+    // Tries once; if it fails, the driver keeps copying.
     void lock() {
         constexpr auto bytes = static_cast<std::size_t>(page_bytes);
         page_ = new (::operator new(bytes, page_bytes)) contents{};
@@ -123,7 +122,7 @@ private:
             void* on_device = nullptr;
             if (cudaHostGetDevicePointer(&on_device, page_, 0) == cudaSuccess) {
                 on_device_ = static_cast<contents*>(on_device);
-                // A program that wants its threads to sleep or to yield meanwhile has said so.
+                // The program may ask for threads that sleep or yield instead of spinning.
                 unsigned flags = 0;
                 may_spin_ = cudaGetDeviceFlags(&flags) == cudaSuccess &&
                             (flags & (cudaDeviceScheduleYield | cudaDeviceScheduleBlockingSync)) == 0;
@@ -140,7 +139,7 @@ private:
         std::swap(may_spin_, other.may_spin_);
     }
     contents* page_ = nullptr;
-    contents* on_device_ = nullptr; // the page, where it is locked
+    contents* on_device_ = nullptr; // the page, if it is locked
     bool was_used_ = false;
     bool may_spin_ = false;
 };

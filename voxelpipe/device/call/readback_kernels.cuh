@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The kernel of call/readback.cuh, and its launch.
+// Kernel and launch of call/readback.cuh.
 
 #include <voxelpipe/device/call/readback.cuh>
 
@@ -10,7 +10,7 @@
 
 namespace voxelpipe::device {
 
-// Sends the state to memory that the host sees, and leaves zeros for the next call. One warp.
+// One warp runs it.
 template <class State>
 __global__ void send_state_kernel(State* state, sent_state<State>* to) {
     await_stream();

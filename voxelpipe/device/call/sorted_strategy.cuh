@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Strategies sorted_reduce and sorted_fold: the raster lists (voxel, primitive) pairs, a sort brings those of a voxel
-// together, and they are shaded and blended then: in any order (reduce), or by ascending primitive (fold).
+// Strategies sorted_reduce and sorted_fold: the raster lists (voxel, primitive) pairs, and a sort groups them by voxel.
+// Then they are shaded and blended, in any order (reduce) or by ascending primitive (fold).
 
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/fragments/fold.cuh>

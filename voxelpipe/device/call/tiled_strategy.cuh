@@ -3,8 +3,8 @@
 #pragma once
 
 // Strategy tiled: the pipeline of the paper (section 4). Vertex shade, coarse raster, tile sort and tile split turn
-// triangles into work items; fine raster draws these in shared memory, tile resolve writes the targets. Targets whose
-// blend depends on the order are folded from lists of fragments, which are counted before they are written.
+// triangles into work items; fine raster draws these in shared memory, and tile resolve writes the targets. Targets
+// whose blend depends on the order are folded from lists of fragments, which are counted before they are written.
 
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/fragments/fold.cuh>
@@ -18,7 +18,7 @@
 
 namespace voxelpipe::device {
 
-// Key: of a voxel in the lists of ordered targets.
+// Key: voxel id in the lists of ordered targets.
 template <class Call, class Key>
 struct tiled_strategy {
     using framebuffer_type = typename Call::framebuffer_type;
