@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The A-buffer: every fragment kept, bucketed by voxel (paper section 3, "A-buffer"). CSR: occupied voxel ids
-// ascending, offsets, and for each voxel its fragments by ascending primitive number, each with the payload that the
-// fragment shader gave (its one output), or the number alone where Payload is void: the triangle lists of a ray-tracing
+// The A-buffer: keeps every fragment, grouped by voxel (paper section 3, "A-buffer"). The layout is CSR: occupied voxel
+// ids, ascending; offsets; and for each voxel its fragments by ascending primitive number, each with its payload, the
+// fragment shader's one output. If Payload is void there are only the numbers: the triangle lists of a ray-tracing
 // grid.
 
 #include <voxelpipe/core/index_iterator.hpp>
@@ -26,10 +26,10 @@ struct no_payload {};
 template <class Payload>
 using payload_storage = std::conditional_t<std::is_void_v<Payload>, no_payload, Payload>;
 
-// Host copy of an A-buffer. voxels[i] is a linear id, (z * ny + y) * nx + x, within the computed part of the grid: in a
-// crop it counts from the crop's corner, as a framebuffer does, while fragment::voxel counts in the whole grid. Its
-// fragments are [offsets[i], offsets[i + 1]). payloads is empty where Payload is void.
-// A random-access range of its occupied voxels, ascending; each has a random-access range of its fragments.
+// Host copy of an A-buffer: a random-access range of occupied voxels, ascending, each of which has a random-access
+// range of its fragments. voxels[i] is a linear id, (z * ny + y) * nx + x, within the computed part of the grid: in a
+// crop it counts from the crop's corner, as in a framebuffer, while fragment::voxel counts in the whole grid. Its
+// fragments are [offsets[i], offsets[i + 1]). payloads is empty if Payload is void.
 template <class Payload>
 class host_abuffer {
 public:
@@ -39,8 +39,8 @@ public:
     std::vector<payload_storage<Payload>> payloads;
     glm::ivec3 extent{0};
 
-    // A fragment unpacks as [primitive, value]; the value of a void payload is no_payload. The primitive counts on
-    // through all draws of the call: primitive_map gives the draw and the triangle.
+    // A fragment unpacks as [primitive, value]; the value of a void payload is no_payload. Primitives are numbered
+    // through all draws of the call; primitive_map gives the draw and the triangle.
     struct fragment_entry {
         std::uint32_t primitive;
         [[no_unique_address]] payload_storage<Payload> value;
@@ -86,7 +86,7 @@ public:
     [[nodiscard]] auto begin() const { return core::index_iterator(voxel_at{this}, 0); }
     [[nodiscard]] auto end() const { return core::index_iterator(voxel_at{this}, size()); }
 
-    // The fragments of a voxel, found by bisection: none, if it is not occupied.
+    // The fragments of a voxel, found by bisection; empty if the voxel is not occupied or outside the extent.
     [[nodiscard]] fragment_range find(const glm::ivec3& voxel) const {
         for (int a = 0; a < 3; ++a)
             if (voxel[a] < 0 || voxel[a] >= extent[a]) return {};
@@ -96,7 +96,7 @@ public:
         return fragment_range(*this, offsets[i], offsets[i + 1]);
     }
 
-    // Fragment i of all.
+    // Fragment i of all voxels together.
     [[nodiscard]] fragment_entry fragment(std::size_t i) const {
         if constexpr (std::is_void_v<Payload>)
             return {primitives[i], {}};
@@ -104,7 +104,7 @@ public:
             return {primitives[i], payloads[i]};
     }
 
-    // A voxel's linear id, and back.
+    // Converts a voxel to its linear id, and back.
     [[nodiscard]] std::uint64_t id(const glm::ivec3& voxel) const {
         const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
         return (wide(voxel.z) * wide(extent.y) + wide(voxel.y)) * wide(extent.x) + wide(voxel.x);
@@ -121,8 +121,9 @@ private:
     };
 };
 
-// Owns its lists on `Backend`; voxelize makes them as long as they must be. Empty before the first voxelize; after one
-// that failed they are as they were. So the new lists are made before the old ones go, and memory has to hold both.
+// Owns its lists on `Backend`; voxelize gives them the lengths that they need. Empty before the first voxelize. A
+// failed voxelize leaves them unchanged, so memory must hold the old and the new lists at once. Members and to_host
+// throw what Backend::buffer throws.
 template <class Backend, class Payload = void>
 class abuffer {
     static_assert(std::is_void_v<Payload> || std::is_trivially_copyable_v<Payload>,
@@ -140,15 +141,15 @@ public:
         : voxels(backend, 0), offsets(backend, 0), primitives(backend, 0), payloads(backend, 0) {}
 
     buffer<std::uint64_t> voxels;     // occupied voxels, ascending
-    buffer<std::uint64_t> offsets;    // one more than voxels; empty where there are none
+    buffer<std::uint64_t> offsets;    // one more than voxels; empty if there are none
     buffer<std::uint32_t> primitives; // one per fragment
-    buffer<payload_type> payloads;    // one per fragment; empty where Payload is void
+    buffer<payload_type> payloads;    // one per fragment; empty if Payload is void
     glm::ivec3 extent{0};             // of the grid of the last voxelize
 
     [[nodiscard]] std::size_t num_voxels() const { return voxels.size(); }
     [[nodiscard]] std::size_t num_fragments() const { return primitives.size(); }
 
-    // Copies, then waits.
+    // Copies to the host and waits.
     [[nodiscard]] host_abuffer<Payload> to_host(Backend& backend) const {
         host_abuffer<Payload> h;
         h.voxels = voxels.to_host(backend);

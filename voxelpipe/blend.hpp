@@ -2,12 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Blend modes: how the fragments of one voxel become one value (paper section 3, render targets). Every result is
-// defined by the fragments alone, never by a race: see docs/design.md, "Blending".
+// Blend modes: how the fragments of one voxel become one value (paper section 3, render targets). The fragments alone
+// determine every result, never a race: see docs/design.md, "Blending".
 //
-// A blend of your own is a functor with   static constexpr bool order_free;  T identity() const;  T combine(T, T) const
-// (or templates of them), and without data members: the library makes one wherever it needs it. One that is not
-// order-free is folded in triangle order.
+// A user-defined blend is a functor with   static constexpr bool order_free;  T identity() const;  T combine(T, T)
+// const
+// (or templates of them), and without data members: the library constructs one wherever it needs it. A blend that is
+// not order-free is folded in triangle order.
 
 #include <voxelpipe/core/pack.hpp>
 #include <voxelpipe/core/reproducible_sum.hpp>
@@ -35,7 +36,7 @@ struct max {};
 struct bit_and {};
 struct bit_or {};
 struct bit_xor {};
-struct count {}; // adds 1 a fragment whatever the shader gives; wraps
+struct count {}; // adds 1 per fragment, whatever the shader returns; wraps
 
 // add for float with a quantum of 2^Log2Quantum instead of 2^-32: terms from 2^(63 + Log2Quantum) on are infinite.
 template <int Log2Quantum>
@@ -59,7 +60,7 @@ concept user_blend_template = requires(const Blend& f, T a, T b) {
     { f.combine(a, b) } -> std::same_as<T>;
 };
 
-// Whether a class is meant as a blend of your own: it has one of the members.
+// True if a class is meant as a user-defined blend: it has one of the members.
 template <class Blend>
 concept has_blend_member = requires {
     Blend::order_free;
@@ -68,8 +69,8 @@ concept has_blend_member = requires {
 || requires { &Blend::combine; }
 || requires { &Blend::template identity<float>; };
 
-// Whether Blend can be a user's blend of T; otherwise the first thing that is wrong with it is one line of the
-// compiler's.
+// True if Blend can be a user-defined blend of T. Otherwise the compiler reports the first thing that is wrong with it,
+// in one line.
 template <class Blend, class T>
 [[nodiscard]] constexpr bool check_user_blend() {
     constexpr bool empty = std::is_empty_v<Blend>;
@@ -119,7 +120,7 @@ template <class Blend, class T>
     return false;
 }
 
-// Stands in for the traits of a blend that is refused, so that the reason is the only error.
+// Replaces the traits of a refused blend, so that the reason is the only error.
 template <class T>
 struct refused_blend {
     static constexpr bool available = false;
@@ -133,8 +134,8 @@ struct refused_blend {
 };
 
 // blend_traits<Blend, T>: accumulator, identity(), begin(stored value), apply(accumulator, value), end(accumulator).
-// Folding begin, apply..., end in triangle order is the meaning of every blend; where order_free holds, any order gives
-// the same bits. T is a scalar here; vectors go component by component below.
+// The result of a blend is defined as begin, apply..., end in triangle order; if order_free, any order gives the same
+// bits. T is a scalar here; vectors are blended component by component below.
 template <class Blend, class T>
 struct blend_traits : refused_blend<T> {};
 
@@ -235,7 +236,7 @@ requires(is_integer<T> || std::is_same_v<T, bool>) struct blend_traits<blend::ad
     }
 };
 
-// A shader's value for a count target is ignored, whatever its type.
+// The shader's value for a count target is ignored, whatever its type.
 template <class T>
 requires(is_integer<T> || std::is_same_v<T, bool>) struct blend_traits<blend::count, T> : in_place_blend<T> {
     VOXELPIPE_HD
@@ -301,7 +302,7 @@ struct blend_traits<blend::add_unordered, T> : in_place_blend<T> {
     }
 };
 
-// Unsigned sums only grow, so clamping at each step is clamping the exact sum.
+// Unsigned sums only grow, so clamping at each step clamps the exact sum.
 template <class T>
 requires(std::is_unsigned_v<T>) struct blend_traits<blend::add_saturate, T> : in_place_blend<T> {
     VOXELPIPE_HD
@@ -314,7 +315,7 @@ requires(std::is_unsigned_v<T>) struct blend_traits<blend::add_saturate, T> : in
             a = static_cast<T>(a + v) < a ? core::greatest<T> : static_cast<T>(a + v);
     }
 };
-// Signed ones go up and down: sum first, clamp at the end.
+// Signed sums may shrink again, so they are clamped at the end.
 template <class T>
 requires(is_integer<T>&& std::is_signed_v<T>) struct blend_traits<blend::add_saturate, T> {
     static constexpr bool available = true;
@@ -406,8 +407,8 @@ requires(user_blend<Blend, T> || user_blend_template<Blend, T>) struct blend_tra
     static void apply(T& a, const T& v) { a = Blend{}.combine(a, v); }
 };
 
-// True; where Blend is a user's and cannot be used, it does not compile, and one line says why. A blend of a vector's
-// components is a blend of the vector too, which blend_traits knows.
+// Returns true. Does not compile if Blend is a user-defined blend that cannot be used; one line says why. A blend of a
+// vector's components is a blend of the vector too, which blend_traits knows.
 template <class Blend, class T>
 [[nodiscard]] constexpr bool explain_user_blend() {
     if constexpr (has_blend_member<Blend> && !(blend_traits<Blend, T>::available && std::is_empty_v<Blend>))

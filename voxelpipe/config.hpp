@@ -21,8 +21,8 @@
 #endif
 
 #if defined(__CUDACC__)
-// Before any other header includes GLM: versions before 1.0.0 put __host__ __device__ on defaulted functions, of which
-// nvcc warns 84 times a file.
+// Included before any other header includes GLM: versions before 1.0.0 put __host__ __device__ on defaulted functions,
+// for which nvcc warns 84 times a file.
 #pragma nv_diagnostic push
 #pragma nv_diag_suppress 20012
 #include <glm/fwd.hpp>
@@ -39,8 +39,8 @@
 #endif
 #endif
 #define VOXELPIPE_HD __host__ __device__
-// Before a function template of both that calls what it is given, which may be the host's or the device's only; and
-// around a lambda that does.
+// VOXELPIPE_ANY_CALLABLE goes before a __host__ __device__ function template that calls its argument, which may run on
+// one side only; VOXELPIPE_CALLS_ANY and _END go around a lambda that does.
 #define VOXELPIPE_ANY_CALLABLE _Pragma("nv_exec_check_disable")
 #define VOXELPIPE_CALLS_ANY _Pragma("nv_diagnostic push") _Pragma("nv_diag_suppress 20013, 20014, 20015")
 #define VOXELPIPE_CALLS_ANY_END _Pragma("nv_diagnostic pop")
@@ -51,9 +51,9 @@
 #define VOXELPIPE_CALLS_ANY_END
 #endif
 
-// Forced only where the compiler optimises, and always in device code: with the sanitizers' checks in every copy a file
-// would take nearly three times as long to compile. Both may be defined beforehand, as the presets `fuzz` and `tsan`
-// do.
+// Inlining is forced only if the compiler optimises, and always in device code: with sanitizer checks in every copy, a
+// file would take nearly three times as long to compile. Both macros may be defined beforehand, as the presets `fuzz`
+// and `tsan` do.
 #if !defined(VOXELPIPE_INLINE)
 #if (defined(__GNUC__) || defined(__clang__)) && (defined(__OPTIMIZE__) || defined(__CUDA_ARCH__))
 #define VOXELPIPE_INLINE inline __attribute__((always_inline))
@@ -64,13 +64,13 @@
 #endif
 #endif
 
-// An error of ours, not of the caller: compiled out with NDEBUG.
+// An internal error, not the caller's. Compiled out with NDEBUG.
 #if !defined(VOXELPIPE_ASSERT)
 #define VOXELPIPE_ASSERT(condition) assert(condition)
 #endif
 
-// A precondition of an accessor that returns no status. Checked on the host, compiled out with NDEBUG; kernels would
-// pay for it in every debug build.
+// A precondition of an accessor that returns no status. Checked on the host only, because it would slow kernels of
+// every debug build; compiled out with NDEBUG.
 #if !defined(VOXELPIPE_EXPECTS)
 #if defined(__CUDA_ARCH__)
 #define VOXELPIPE_EXPECTS(condition) static_cast<void>(0)

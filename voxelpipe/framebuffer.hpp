@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Render targets and framebuffers: target<T, Blend, Layout> says what a voxel holds and how fragments meet there,
-// framebuffer<Backend, Targets...> owns up to 8 of them, framebuffer_view names memory that someone else owns.
+// Render targets and framebuffers: target<T, Blend, Layout> says what a voxel holds and how fragments are combined,
+// framebuffer<Backend, Targets...> owns up to 8 targets, framebuffer_view refers to memory that someone else owns.
 
 #include <voxelpipe/blend.hpp>
 #include <voxelpipe/core/change_log.hpp>
@@ -25,7 +25,7 @@
 namespace voxelpipe {
 
 // T: bit, an integer, half, float, double, a glm vector of 2 to 4 of them, or a trivially copyable struct with
-// blend::replace or a blend of your own. One fragment shader output per target, of type T (bool for bit).
+// blend::replace or a user-defined blend. The fragment shader has one output per target, of type T (bool for bit).
 template <class T, class Blend, class Layout = layout::linear>
 struct target {
     using map = core::storage_map<T, Layout>;
@@ -46,8 +46,8 @@ struct target {
         "or bit, add_saturate integers, add_unordered floating types, a user struct its own blend)");
 };
 
-// What a voxel holds before the first fragment: a value, or what the memory already has. off: the target takes no part
-// (its memory is neither read nor written and may be absent), so that one compiled pipeline serves any subset of
+// The value of a voxel before its first fragment: a clear value, or what the memory holds. off: the target takes no
+// part; its memory is neither read nor written and may be absent, so one compiled pipeline serves any subset of
 // targets.
 enum class load_operation : std::uint8_t { clear, load, off };
 
@@ -63,7 +63,7 @@ struct target_view {
     load_operation load = load_operation::clear;
     value_type clear_value = Target::traits::identity();
 
-    // (x, y, z) is in the extent, there is memory, and the caller can read and write it.
+    // (x, y, z) must be in the extent, and the caller must be able to access the memory.
     [[nodiscard]] VOXELPIPE_HD value_type operator()(int x, int y, int z) const {
         VOXELPIPE_EXPECTS(has(x, y, z));
         return map::load(elements, extent, x, y, z);
@@ -86,8 +86,8 @@ struct framebuffer_view {
 
     glm::ivec3 extent{0};
     core::pack<target_view<Targets>...> targets;
-    // A view of memory that the caller owns, one pointer per target, all cleared by the next call; a null pointer turns
-    // its target off.
+    // A view of memory that the caller owns, one pointer per target. The next call clears all of them; a null pointer
+    // turns its target off.
     [[nodiscard]] static framebuffer_view on(glm::ivec3 extent, typename Targets::element_type*... elements) {
         const auto view_of = [&]<class Target>(std::type_identity<Target>, typename Target::element_type* p) {
             return target_view<Target>{p, extent, p == nullptr ? load_operation::off : load_operation::clear};
@@ -95,15 +95,15 @@ struct framebuffer_view {
         return {extent, core::make_pack(view_of(std::type_identity<Targets>{}, elements)...)};
     }
 
-    // Where what is drawn is kept account of (framebuffer::track_changes): change_words(extent) words on the backend,
-    // zeros before the first call, not written to by anybody but the calls. Null: nowhere.
+    // Log of what is drawn (framebuffer::track_changes): change_words(extent) words on the backend, zero before the
+    // first call, written by calls only. Null: no log.
     std::uint32_t* changes = nullptr;
 };
 
-// Words that framebuffer_view::changes has.
+// Number of words of framebuffer_view::changes.
 [[nodiscard]] inline std::size_t change_words(const glm::ivec3& extent) { return core::change_log::num_words(extent); }
 
-// Whether a target of this extent can be addressed at all.
+// True if a target of this extent can be addressed.
 template <class Target>
 [[nodiscard]] constexpr bool fits_memory(glm::ivec3 extent) {
     if (extent.x <= 0 || extent.y <= 0 || extent.z <= 0) return true;
@@ -113,14 +113,14 @@ template <class Target>
     return bytes <= static_cast<uint128>(std::numeric_limits<std::ptrdiff_t>::max());
 }
 
-// Owns the memory of its targets on `Backend`. The constructor allocates (throws std::bad_alloc, or std::length_error
-// where the size cannot be addressed) and does not initialise: the first voxelize clears, unless told to load.
+// Owns the memory of its targets on `Backend`. The constructor allocates and does not initialise: the first voxelize
+// clears, unless told to load. Throws std::bad_alloc, or std::length_error if the size cannot be addressed.
 template <class Backend, class... Targets>
 class framebuffer {
 public:
     using view_type = framebuffer_view<Targets...>;
 
-    // `enabled`: targets that are not start as load_operation::off and get no memory.
+    // Targets that are not `enabled` start as load_operation::off and get no memory.
     framebuffer(Backend& backend, glm::ivec3 extent,
                 std::bitset<sizeof...(Targets)> enabled = ~std::bitset<sizeof...(Targets)>{})
         : view_{extent, {}}, storage_(make_storage(backend, extent, enabled, std::index_sequence_for<Targets...>{})) {
@@ -143,14 +143,14 @@ public:
     // at most 32 bytes a value, in calls that need no tiles; everything else is cleared as a whole. A call that clears
     // only some targets tracks those. Throws std::bad_alloc.
     void track_changes(Backend& backend) { forget_changes(backend); }
-    // Says that the targets may hold anything, as before the first call. Earlier views become invalid.
+    // Declares that the targets may hold anything, as before the first call. Earlier views become invalid.
     void forget_changes(Backend& backend) {
         const std::vector<std::uint32_t> zeros(change_words(view_.extent));
         changes_ = std::make_unique<buffer<std::uint32_t>>(backend, array_view<const std::uint32_t>(zeros));
         view_.changes = changes_->data();
     }
 
-    // One target of a framebuffer that cannot be changed: vp::get<I>(fb) of a const fb.
+    // One target of a const framebuffer: vp::get<I>(fb).
     template <std::size_t I>
     class const_reference {
     public:
@@ -158,7 +158,7 @@ public:
         explicit const_reference(const framebuffer& owner) : owner_(owner) {}
 
         [[nodiscard]] const target_view<target_type>& view() const { return get<I>(owner_.view_.targets); }
-        // Raw elements in the target's layout; copies, then waits. None, if the framebuffer was made without the
+        // Copies the raw elements, in the target's layout, and waits. Empty if the framebuffer was made without the
         // target.
         [[nodiscard]] std::vector<typename target_type::element_type> to_host(Backend& backend) const {
             return get<I>(owner_.storage_).to_host(backend);
@@ -167,7 +167,7 @@ public:
         [[nodiscard]] host_target<target_type> to_host_target(Backend& backend) const {
             return {to_host(backend), owner_.view_.extent};
         }
-        // The part [begin, begin + size), addressed by the voxels of the whole; copies little more than that, then
+        // The part [begin, begin + size), addressed by the voxels of the whole. Copies little more than that, and
         // waits. Throws std::out_of_range if the part is not within the extent.
         [[nodiscard]] host_region<target_type> to_host_region(Backend& backend, glm::ivec3 begin,
                                                               glm::ivec3 size) const {
@@ -193,15 +193,15 @@ public:
         using target_type = typename core::pack_element<I, Targets...>::type;
         explicit reference(framebuffer& owner) : const_reference<I>(owner), owner_(owner) {}
 
-        // Before the next voxelize: every voxel is `value`, which blends like a first fragment's.
+        // The next voxelize starts every voxel with `value`, which blends like a first fragment's.
         void clear(const typename target_type::value_type& value) {
             auto& t = get<I>(owner_.view_.targets);
             t.load = load_operation::clear;
             t.clear_value = value;
         }
-        // Blend onto what the memory holds.
+        // The next voxelize blends onto what the memory holds.
         void load() { get<I>(owner_.view_.targets).load = load_operation::load; }
-        // Take no part in the next voxelize.
+        // The next voxelize ignores this target.
         void off() { get<I>(owner_.view_.targets).load = load_operation::off; }
 
     private:

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Where the voxels lie in space: extent, origin and voxel size, all run-time values, no power of two, no cube.
-// fit() makes a grid around positions; grid::crop() names a part of a grid whose result is the crop of the whole.
+// The position of the voxels in space: extent, origin and voxel size are run-time values, and need be neither powers of
+// two nor cubic. fit() makes a grid around positions; grid::crop() selects a part of a grid, whose result is the crop
+// of the whole.
 
 #include <voxelpipe/core/exact.hpp>
 #include <voxelpipe/core/fixed_point.hpp>
@@ -23,17 +24,17 @@ namespace voxelpipe {
 // Voxel (i, j, k) is the closed box from origin + (i, j, k) * voxel_size to origin + (i + 1, j + 1, k + 1) *
 // voxel_size.
 struct grid {
-    static constexpr int max_extent = 1 << core::max_log2_extent; // voxels an axis
+    static constexpr int max_extent = 1 << core::max_log2_extent; // voxels per axis
 
     glm::dvec3 origin{0.0};     // world position of the whole grid's lowest corner
     glm::dvec3 voxel_size{1.0}; // world units, per axis, > 0
     glm::ivec3 extent{0};       // voxels to compute: the framebuffer's size
-    glm::ivec3 offset{0};       // of those voxels in the whole grid; 0 unless cropped
-    glm::ivec3 whole{0};        // extent of the whole grid, which sets the snapping; 0 = the same as `extent`
+    glm::ivec3 offset{0};       // position of those voxels in the whole grid; 0 unless cropped
+    glm::ivec3 whole{0};        // extent of the whole grid, which determines the snapping; 0: the same as `extent`
 
-    // The part [begin, begin + size) of this grid. Its voxels, fragments and shader inputs are exactly those of the
-    // whole grid there (fragment::voxel stays an index of the whole grid): slabs for several devices or out-of-core
-    // runs.
+    // The part [begin, begin + size) of this grid, for slabs on several devices or out-of-core runs. Its voxels,
+    // fragments and shader inputs are exactly those of the whole grid; fragment::voxel remains an index of the whole
+    // grid.
     [[nodiscard]] grid crop(glm::ivec3 begin, glm::ivec3 size) const {
         grid part = *this;
         part.whole = whole_extent();
@@ -44,7 +45,7 @@ struct grid {
 
     [[nodiscard]] glm::ivec3 whole_extent() const { return whole == glm::ivec3(0) ? extent : whole; }
 
-    // The grid that this one was cropped from; itself, if it is no crop. Its voxels are numbered as fragment::voxel is.
+    // The grid that this one was cropped from, or this one. Its voxels are numbered like fragment::voxel.
     [[nodiscard]] grid uncropped() const {
         grid all = *this;
         all.extent = whole_extent();
@@ -55,8 +56,8 @@ struct grid {
     // World position of the computed part's lowest corner.
     [[nodiscard]] glm::dvec3 part_origin() const { return origin + glm::dvec3(offset) * voxel_size; }
 
-    // World and voxels. Voxels are numbered as framebuffers and A-buffers number them, from the corner of the computed
-    // part; in a crop, uncropped() has the same functions for fragment::voxel.
+    // Conversions between world and voxels. Voxels are numbered as in framebuffers and A-buffers, from the corner of
+    // the computed part; for fragment::voxel in a crop, use those of uncropped().
 
     // World position of continuous voxel coordinates, in which voxel (i, j, k) is the box from (i, j, k) to (i + 1,
     // j + 1, k + 1).
@@ -64,7 +65,7 @@ struct grid {
         return {exact::fma(offset.x + p.x, voxel_size.x, origin.x), exact::fma(offset.y + p.y, voxel_size.y, origin.y),
                 exact::fma(offset.z + p.z, voxel_size.z, origin.z)};
     }
-    // Continuous voxel coordinates of a world position: the inverse, up to rounding.
+    // Continuous voxel coordinates of a world position: the inverse of to_world, up to rounding.
     [[nodiscard]] VOXELPIPE_HD glm::dvec3 to_voxels(const glm::dvec3& world) const {
         return {(world.x - origin.x) / voxel_size.x - offset.x, (world.y - origin.y) / voxel_size.y - offset.y,
                 (world.z - origin.z) / voxel_size.z - offset.z};
@@ -73,14 +74,14 @@ struct grid {
     [[nodiscard]] VOXELPIPE_HD glm::dvec3 voxel_center(const glm::ivec3& voxel) const {
         return to_world({voxel.x + 0.5, voxel.y + 0.5, voxel.z + 0.5});
     }
-    // The voxel that holds a world position, the upper one on a face between two. Outside the computed part it is an
-    // index that contains() refuses. Positions must be finite and within 2^31 voxels of the part's corner.
+    // The voxel that contains a world position; of two that share a face, the upper one. Outside the computed part the
+    // result is an index that contains() refuses. Positions must be finite and within 2^31 voxels of the part's corner.
     [[nodiscard]] glm::ivec3 voxel_at(const glm::dvec3& world) const {
         const glm::dvec3 p = to_voxels(world);
         return {static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)),
                 static_cast<int>(std::floor(p.z))};
     }
-    // Whether the computed part has this voxel.
+    // True if the computed part has this voxel.
     [[nodiscard]] VOXELPIPE_HD bool contains(const glm::ivec3& voxel) const {
         return voxel.x >= 0 && voxel.y >= 0 && voxel.z >= 0 && voxel.x < extent.x && voxel.y < extent.y &&
                voxel.z < extent.z;
@@ -89,7 +90,7 @@ struct grid {
     friend bool operator==(const grid&, const grid&) = default;
 };
 
-// Checks everything about a grid that does not need a mesh; see status_code.
+// Checks everything about a grid that needs no mesh; see status_code.
 [[nodiscard]] inline status validate(const grid& g) {
     const auto fail = [](status_code code) {
         status s;
@@ -103,7 +104,7 @@ struct grid {
         if (g.offset[a] < 0 || g.offset[a] > whole[a] - g.extent[a]) return fail(status_code::bad_crop);
         if (!std::isfinite(g.origin[a])) return fail(status_code::bad_origin);
         if (!std::isfinite(g.voxel_size[a]) || !(g.voxel_size[a] > 0.0)) return fail(status_code::bad_voxel_size);
-        // The scale is 2^F / voxel_size with F from 1 to 16: both ends must be ordinary numbers.
+        // The scale is 2^F / voxel_size with F from 1 to 16: both extremes must be normal numbers.
         if (!std::isnormal(65536.0 / g.voxel_size[a]) || !std::isnormal(1.0 / g.voxel_size[a]))
             return fail(status_code::bad_voxel_size);
     }
@@ -112,7 +113,7 @@ struct grid {
 
 namespace core {
 
-// g is valid. The three numbers that decide a position's snapped place are rounded here, once.
+// g must be valid. The three numbers that determine a snapped position are rounded here, once.
 [[nodiscard]] inline snap_transform make_snap_transform(const grid& g) {
     const glm::ivec3 whole = g.whole_extent();
     snap_transform t{};
@@ -126,8 +127,8 @@ namespace core {
     return t;
 }
 
-// Normals of grid space become world normals by these factors (the other two voxel sizes, relative to the largest).
-// Exactly 1 where voxels are cubes.
+// Factors that turn normals of grid space into world normals: products of the other two voxel sizes, relative to the
+// largest. Exactly 1 if voxels are cubes.
 [[nodiscard]] inline triple<double> normal_factors(const grid& g) {
     const double m = std::max({g.voxel_size.x, g.voxel_size.y, g.voxel_size.z});
     const double x = g.voxel_size.x / m, y = g.voxel_size.y / m, z = g.voxel_size.z / m;
@@ -136,7 +137,7 @@ namespace core {
 
 } // namespace core
 
-// A box in world coordinates. Empty where a `low` is above its `high`, as it is by default.
+// A box in world coordinates. Empty if a `low` is above its `high`, as by default.
 struct bounding_box {
     glm::dvec3 low{std::numeric_limits<double>::infinity()};
     glm::dvec3 high{-std::numeric_limits<double>::infinity()};
@@ -145,7 +146,7 @@ struct bounding_box {
     friend bool operator==(const bounding_box&, const bounding_box&) = default;
 };
 
-// The box of the finite ones of positions in host memory.
+// The bounding box of positions in host memory; those that are not finite are ignored.
 [[nodiscard]] inline bounding_box bounds(array_view<const glm::vec3> positions) {
     bounding_box box;
     for (const glm::vec3& p : positions) {
@@ -158,8 +159,8 @@ struct bounding_box {
     return box;
 }
 
-// A grid of cubic voxels, `extent` of them, around a box, centred. Along the tightest axis (1 + 2 * margin) times the
-// box fits exactly. A box without size, or an empty one, gets unit voxels.
+// A centred grid of `extent` cubic voxels around a box. Along the tightest axis the grid is (1 + 2 * margin) times the
+// box. A box without size, or an empty one, gets unit voxels.
 [[nodiscard]] inline grid fit(const bounding_box& box, glm::ivec3 extent, double margin = 1e-4) {
     const glm::dvec3 lo = box.empty() ? glm::dvec3(0.0) : box.low, hi = box.empty() ? glm::dvec3(0.0) : box.high;
     double size = 0.0;
@@ -176,8 +177,8 @@ struct bounding_box {
     return g;
 }
 
-// A grid of n cubic voxels along the longest side of a box, and along the others as few as hold it, centred; with the
-// margin of fit(). n < 1 gives a grid that calls refuse as bad_extent.
+// A centred grid of n cubic voxels along the longest side of a box, and as few as hold the box along the others; with
+// the margin of fit(). n < 1 gives a grid that calls refuse as bad_extent.
 [[nodiscard]] inline grid fit_longest(const bounding_box& box, int n, double margin = 1e-4) {
     const glm::dvec3 side = box.empty() ? glm::dvec3(0.0) : (box.high - box.low) * std::fma(2.0, margin, 1.0);
     const double longest = std::max({side.x, side.y, side.z});
@@ -188,11 +189,11 @@ struct bounding_box {
     return fit(box, extent, margin);
 }
 
-// A grid of voxels of this size, world units per axis, on the lattice of the size's multiples: the voxels that the box
-// spans, and at least one an axis. What snaps to a face of the lattice counts as lying in it, and a box that ends there
-// gets the voxel within alone: a side from 0 to 0.6f is 6 voxels of 0.1. Conservative coverage of a surface in that
-// face touches the next layer too; `padding` adds voxels at either end. A size that is not positive, or that needs more
-// than grid::max_extent voxels, gives a grid that calls refuse.
+// A grid of voxels of this size, in world units per axis, on the lattice of the size's multiples: the voxels that the
+// box spans, at least one per axis. A side that snaps to a face of the lattice counts as lying in it, and a box that
+// ends there gets only the voxel inside: a side from 0 to 0.6f is 6 voxels of 0.1. Conservative coverage of a surface
+// in that face touches the next layer too; `padding` adds voxels at either end. A size that is not positive, or that
+// needs more than grid::max_extent voxels, gives a grid that calls refuse.
 [[nodiscard]] inline grid fit_voxel_size(const bounding_box& box, glm::dvec3 voxel_size, int padding = 0) {
     const auto fit_with = [&](double tolerance) {
         grid g;
@@ -207,7 +208,7 @@ struct bounding_box {
         }
         return g;
     };
-    const grid g = fit_with(0.0); // two voxels an axis too large at most, so that its units are at most twice as large
+    const grid g = fit_with(0.0); // at most two voxels per axis too large, so its units are at most twice as large
     if (!validate(g).ok()) return g;
     const int bits = core::fraction_bits(std::max({g.extent.x, g.extent.y, g.extent.z}));
     return fit_with(0.25 / static_cast<double>(std::int64_t{1} << bits));
@@ -216,19 +217,19 @@ struct bounding_box {
     return fit_voxel_size(box, glm::dvec3(voxel_size), padding);
 }
 
-// The same around the finite ones of positions in host memory.
+// The same around positions in host memory; those that are not finite are ignored.
 [[nodiscard]] inline grid fit(array_view<const glm::vec3> positions, glm::ivec3 extent, double margin = 1e-4) {
     return fit(bounds(positions), extent, margin);
 }
 
-// Around positions in the memory of a backend, such as mesh::view().positions: they are copied to the host, once for
-// all that is asked of the box.
+// Around positions in the memory of a backend, such as mesh::view().positions. Copies them to the host; use the box for
+// several grids.
 template <class Backend>
 [[nodiscard]] bounding_box bounds(Backend& backend, backend_view<const glm::vec3> positions) {
     return bounds(backend.read(positions));
 }
 
-// Instead of reading a backend's memory on the host.
+// Refuses positions in a backend's memory, which the host may not be able to read.
 template <class T>
 void bounds(backend_view<T>) {
     static_assert(core::never<T>, "voxelpipe: these positions may be in device memory: use bounds(backend, positions)");

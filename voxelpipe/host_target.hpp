@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Targets on the host: host_target is a copy of a whole target, host_region of a box of it, both addressed by voxel
-// whatever the layout. for_each_voxel and for_each_occupied go through either.
+// Targets on the host: host_target is a copy of a whole target, host_region of a box of it. Both are addressed by
+// voxel, whatever the layout. for_each_voxel and for_each_occupied visit either.
 
 #include <voxelpipe/core/layout.hpp>
 
@@ -19,8 +19,8 @@ namespace voxelpipe {
 
 namespace core {
 
-// A box in an array of rows and slices: where it starts, how many elements a row of it has, how many rows and slices,
-// and how far apart those are in the array. All in elements.
+// A box in an array of rows and slices: its first element, the elements of a row of it, its rows and slices, and the
+// distances between these in the array. All in elements.
 struct element_box {
     std::size_t first = 0, row = 0, rows = 0, slices = 0;
     std::size_t row_pitch = 0, slice_pitch = 0;
@@ -28,7 +28,7 @@ struct element_box {
     [[nodiscard]] std::size_t count() const { return row * rows * slices; }
 };
 
-// Voxels that a copy of elements can tell apart: bits come by words of 32, tiles by bricks.
+// The smallest box of voxels that a copy of elements can select: bits come in words of 32, tiles in bricks.
 template <class Map>
 [[nodiscard]] constexpr glm::ivec3 copied_unit() {
     if constexpr (Map::bricks) return {Map::brick_x, 8, 8};
@@ -46,19 +46,18 @@ struct host_target {
     std::vector<typename Target::element_type> elements;
     glm::ivec3 extent{0};
 
-    // (x, y, z) is in the extent, and the target was not off.
+    // (x, y, z) must be in the extent, and the target must not have been off.
     [[nodiscard]] value_type operator()(int x, int y, int z) const {
         VOXELPIPE_EXPECTS(x >= 0 && y >= 0 && z >= 0 && x < extent.x && y < extent.y && z < extent.z);
         VOXELPIPE_EXPECTS(elements.size() == map::elements(extent));
         return map::load(elements.data(), extent, x, y, z);
     }
-    // The voxels that there are: from first() to last(), which is not among them.
+    // The voxels [first(), last()).
     [[nodiscard]] glm::ivec3 first() const { return glm::ivec3(0); }
     [[nodiscard]] glm::ivec3 last() const { return elements.empty() ? glm::ivec3(0) : extent; }
 };
 
-// A copy of the box from first() to last(), which is not in it, in host memory. Voxels keep the numbers that they have
-// in the framebuffer.
+// A host copy of the box [first(), last()). Voxels keep the indices that they have in the framebuffer.
 template <class Target>
 class host_region {
 public:
@@ -66,7 +65,8 @@ public:
     using value_type = typename Target::value_type;
     using map = typename Target::map;
 
-    // No elements yet. The box must lie in `extent`, and the target must not be off, or the region is empty.
+    // Elements are zero until fill(). The box must lie in `extent`. For a target that is off, use the default
+    // constructor.
     host_region(glm::ivec3 extent, glm::ivec3 begin, glm::ivec3 size) : first_(begin), last_(begin + size) {
         const glm::ivec3 unit = core::copied_unit<map>();
         for (int a = 0; a < 3; ++a) {
@@ -78,7 +78,7 @@ public:
     }
     host_region() = default;
 
-    // (x, y, z) is in the box.
+    // (x, y, z) must be in the box.
     [[nodiscard]] value_type operator()(int x, int y, int z) const {
         VOXELPIPE_EXPECTS(x >= first_.x && y >= first_.y && z >= first_.z && x < last_.x && y < last_.y && z < last_.z);
         return map::load(elements_.data(), copied_extent_, x - copied_first_.x, y - copied_first_.y,
@@ -87,7 +87,7 @@ public:
     [[nodiscard]] glm::ivec3 first() const { return first_; }
     [[nodiscard]] glm::ivec3 last() const { return last_; }
 
-    // For whoever fills it: calls copy(box, to) for each box of a target's elements that belongs at `to`.
+    // Calls copy(box, to) for each box of a target's elements, which belongs at `to`.
     template <class Copy>
     void fill(glm::ivec3 extent, Copy&& copy) {
         if (elements_.empty()) return;
@@ -116,7 +116,7 @@ private:
 
 namespace core {
 
-// Whether two values are the same bits. A struct is compared by its operator==, since its padding says nothing.
+// True if two values have the same bits. Structs are compared by their operator==, because of padding.
 template <class T>
 [[nodiscard]] bool is_same_value(const T& a, const T& b) {
     if constexpr (is_scalar<T> || vector_traits<T>::components > 1 || std::is_same_v<T, bool>)
@@ -137,8 +137,8 @@ void for_each_voxel(const Host& host, F&& f) {
 }
 
 // The same for the voxels that do not hold `empty`, the value that the target was cleared to: by default its blend's
-// identity, as framebuffers clear. A voxel whose fragments blend to that very value is not told apart from one without.
-// Values that are structs need an operator==.
+// identity, as framebuffers clear. A voxel whose fragments blend to that very value counts as empty. Structs need an
+// operator==.
 template <class Host, class F>
 void for_each_occupied(const Host& host, F&& f,
                        const typename Host::value_type& empty = Host::target_type::traits::identity()) {

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Indexed triangle meshes: mesh_view names memory that someone else owns, mesh<Backend> owns it on that backend.
-// Positions are float32 in world (or object) space; a triangle is three vertex indices, counter-clockwise seen from its
-// front; attributes are any number of per-vertex arrays of trivially copyable types, for the vertex shader.
+// Indexed triangle meshes: mesh_view refers to memory that someone else owns, mesh<Backend> owns it on that backend.
+// Positions are float32 in world (or object) space. A triangle is three vertex indices, counter-clockwise seen from its
+// front. Attributes are any number of per-vertex arrays of trivially copyable types, for the vertex shader.
 
 #include <voxelpipe/core/pack.hpp>
 #include <voxelpipe/mesh_source.hpp>
@@ -20,12 +20,12 @@
 
 namespace voxelpipe {
 
-// What is known of the indices of some triangles, so that calls need not read them all once more. Holds as long as
-// nobody writes to them.
+// What is known about the indices of some triangles, so that calls need not read them again. Valid as long as nobody
+// writes to them.
 struct checked_indices {
-    const glm::uvec3* triangles = nullptr; // the first `count` from here; null: nothing is known
+    const glm::uvec3* triangles = nullptr; // start of the `count` checked triangles; null: nothing is known
     std::size_t count = 0;
-    std::uint64_t bound = 0; // above every index
+    std::uint64_t bound = 0; // greater than every index
 };
 
 template <class... Attributes>
@@ -37,19 +37,19 @@ struct mesh_view {
     backend_view<const glm::vec3> positions;                     // one per vertex
     backend_view<const glm::uvec3> triangles;                    // vertex indices
     core::pack<array_view<const Attributes>...> attributes = {}; // each as long as positions
-    // By check_indices, or by mesh. Ignored if it describes a different triangle array.
+    // From check_indices or mesh. Ignored if it describes a different triangle array.
     checked_indices checked = {};
 
-    // Whether all indices are known to name vertices. Otherwise calls look at each of them, and say where one does not.
+    // True if all indices are known to name vertices. Otherwise calls check each of them.
     [[nodiscard]] bool has_checked_indices() const {
         return checked.triangles == triangles.data() && checked.count >= triangles.size() &&
                checked.bound <= positions.size();
     }
 };
 
-// Reads the indices of triangles on the backend, waiting for what its stream has before, for mesh_view::checked: worth
-// it for triangles that are drawn more than once, since a cuda_backend's calls read them all once more before they
-// write to anything. Throws std::bad_alloc, or the backend's error.
+// Reads the indices of triangles on the backend, after earlier work of its stream, and waits. Set mesh_view::checked to
+// the result if triangles are drawn more than once: otherwise each call of a cuda_backend reads all indices before it
+// writes anything. Throws std::bad_alloc, or the backend's error.
 template <class Backend>
 [[nodiscard]] checked_indices check_indices(Backend& backend, array_view<const glm::uvec3> triangles) {
     return {triangles.data(), triangles.size(),
@@ -58,7 +58,7 @@ template <class Backend>
 
 namespace core {
 
-// Of triangles in host memory; 0 where there are none.
+// The largest index of triangles in host memory; 0 if there are none.
 [[nodiscard]] inline std::uint32_t max_index(array_view<const glm::uvec3> triangles) {
     std::uint32_t most = 0;
     for (const glm::uvec3& t : triangles) most = std::max({most, t.x, t.y, t.z});
@@ -67,10 +67,11 @@ namespace core {
 
 } // namespace core
 
-// Owns its arrays, in Backend::buffer<T>. The constructor copies them from what mesh_source.hpp names: ranges of
-// glm::vec3 and glm::uvec3, interleaved vertices, flat or short indices, or none; also from memory of the backend. It
-// throws std::bad_alloc (or the backend's error) if there is no memory, and std::invalid_argument for indices that are
-// no multiple of 3. The indices are checked here, once for all calls; calls report one that names no vertex.
+// Owns its arrays, in Backend::buffer<T>. The constructor copies from the sources of mesh_source.hpp: ranges of
+// glm::vec3 and glm::uvec3, interleaved vertices, flat or short indices, or none; also from memory of the backend.
+// Throws std::bad_alloc (or the backend's error) if there is no memory, and std::invalid_argument if the number of
+// indices is no multiple of 3. The indices are checked here, once for all calls; a call reports an index that names no
+// vertex.
 template <class Backend, class... Attributes>
 class mesh {
 public:

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a mesh can be made from: vertex data in arrays of their own or interleaved, and indices as triangles, flat, of
-// 8, 16 or 32 bits, or none. mesh converts on the host when it is constructed; views, calls and kernels know one form
-// only, glm::vec3 and glm::uvec3, so that none of this costs compile time or kernels.
+// Sources of a mesh: vertex data in separate arrays or interleaved; indices as triangles, flat, of 8, 16 or 32 bits, or
+// none. mesh converts them on the host when it is constructed. Views, calls and kernels know only glm::vec3 and
+// glm::uvec3, so other forms cost neither compile time nor kernels.
 
 #include <voxelpipe/core/pack.hpp>
 
@@ -21,8 +21,8 @@
 
 namespace voxelpipe {
 
-// `count` values of T in host memory, `stride` bytes apart: a member of the vertices of an interleaved array. Does not
-// own.
+// `count` values of T in host memory, `stride` bytes apart, such as a member of the vertices of an interleaved array.
+// Does not own them.
 template <class T>
 struct strided_view {
     using value_type = T;
@@ -47,11 +47,11 @@ template <class Range, class Vertex, class T>
     return {std::size(vertices) == 0 ? nullptr : &(first->*member), std::size(vertices), sizeof(Vertex)};
 }
 
-// Indices of a mesh whose every three vertices are a triangle: vp::mesh{backend, positions, vp::no_indices{}}.
+// For a mesh in which every three consecutive vertices are a triangle: vp::mesh{backend, positions, vp::no_indices{}}.
 struct no_indices {};
 
-// Flat indices as triangles, where they lie, for a mesh_view: three indices each, in the memory of any backend. The
-// number of indices must be a multiple of 3 (std::invalid_argument).
+// Views flat indices as triangles, three indices each, in the memory of any backend, for a mesh_view. Throws
+// std::invalid_argument if the number of indices is no multiple of 3.
 [[nodiscard]] inline backend_view<const glm::uvec3> as_triangles(array_view<const std::uint32_t> indices) {
     static_assert(sizeof(glm::uvec3) == 3 * sizeof(std::uint32_t) && alignof(glm::uvec3) == alignof(std::uint32_t));
     if (indices.size() % 3 != 0) throw std::invalid_argument("voxelpipe: the number of indices is no multiple of 3");
@@ -95,7 +95,7 @@ public:
         for (std::size_t i = 0; i < strided.count; ++i) copy_.push_back(strided[i]);
         view_ = copy_;
     }
-    vertex_source(const vertex_source&) = delete; // view_ may be of copy_
+    vertex_source(const vertex_source&) = delete; // view_ may refer to copy_
     vertex_source& operator=(const vertex_source&) = delete;
 
     [[nodiscard]] array_view<const T> view() const { return view_; }
@@ -105,10 +105,9 @@ private:
     array_view<const T> view_;
 };
 
-// Triangles for a mesh: glm::uvec3 in a contiguous range, which are taken as they lie; triples of other integers of up
-// to 32 bits, flat integers, three a triangle, or no_indices. Negative indices are out of range like ones that are too
-// large. Throws std::invalid_argument if the number of flat indices, or of vertices without indices, is no multiple
-// of 3.
+// Triangles for a mesh: glm::uvec3 in a contiguous range, which are used in place; triples of other integers of up to
+// 32 bits; flat integers, three per triangle; or no_indices. Negative indices are out of range, like too large ones.
+// Throws std::invalid_argument if the number of flat indices, or of vertices without indices, is no multiple of 3.
 class triangle_source {
 public:
     triangle_source() = default;
@@ -137,10 +136,10 @@ public:
         view_ = copy_;
     }
     triangle_source(no_indices) : counts_vertices_(true) {} // NOLINT(*-explicit-*)
-    triangle_source(const triangle_source&) = delete;       // view_ may be of copy_
+    triangle_source(const triangle_source&) = delete;       // view_ may refer to copy_
     triangle_source& operator=(const triangle_source&) = delete;
 
-    // Of a mesh with so many vertices.
+    // The triangles of a mesh with this many vertices.
     [[nodiscard]] array_view<const glm::uvec3> view(std::size_t num_vertices) {
         if (counts_vertices_ && copy_.empty()) {
             copy_.reserve(check_triples(num_vertices));
@@ -152,7 +151,7 @@ public:
         }
         return view_;
     }
-    // Whether the host may not read them.
+    // True if the host may be unable to read them.
     [[nodiscard]] bool is_in_backend() const { return is_in_backend_; }
 
 private:

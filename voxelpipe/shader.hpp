@@ -38,8 +38,8 @@ struct no_varyings {};
 template <class... Attributes>
 struct vertex {
     std::uint32_t index; // in its mesh
-    std::uint32_t draw;  // which draw of the call
-    glm::vec3 position;  // as the mesh has it
+    std::uint32_t draw;  // number of the draw in the call
+    glm::vec3 position;  // as in the mesh
     core::pack<Attributes...> attributes;
 };
 
@@ -57,7 +57,7 @@ struct vertex_output {
 template <class Varyings>
 vertex_output(glm::vec3, Varyings) -> vertex_output<Varyings>;
 
-// Positions as they are, no varyings.
+// Returns positions unchanged; no varyings.
 struct passthrough {
     template <class Vertex>
     VOXELPIPE_HD glm::vec3 operator()(const Vertex& v) const {
@@ -65,7 +65,7 @@ struct passthrough {
     }
 };
 
-// Affine transform of a position, p.x * c0 + p.y * c1 + p.z * c2 + c3, as three fused steps a component.
+// Affine transform of a position, p.x * c0 + p.y * c1 + p.z * c2 + c3, as three fused steps per component.
 [[nodiscard]] VOXELPIPE_HD inline glm::vec3 transform_point(const glm::mat4& m, const glm::vec3& p) {
     const auto row = [&](int i) {
         return exact::fma(m[2][i], p.z, exact::fma(m[1][i], p.y, exact::fma(m[0][i], p.x, m[3][i])));
@@ -73,7 +73,7 @@ struct passthrough {
     return {row(0), row(1), row(2)};
 }
 
-// Vertex shader that places a mesh by an affine matrix (last row 0 0 0 1); no varyings.
+// Transforms a mesh by an affine matrix (last row 0 0 0 1); no varyings.
 struct transform {
     glm::mat4 matrix{1.0f};
     template <class Vertex>
@@ -84,19 +84,19 @@ struct transform {
 
 // ---- fragment shader ------------------------------------------------------------------------------------------------
 
-// One triangle in one voxel. Barycentrics, varyings and depth-like values are taken at the centre of the voxel's column
-// along the triangle's dominant axis, projected onto the triangle's plane: they extrapolate where that centre lies
-// outside the triangle, and the clamped variants lie on it.
+// One triangle in one voxel. Barycentrics and varyings are evaluated at the centre of the voxel's column along the
+// triangle's dominant axis, projected onto the triangle's plane. They extrapolate if that centre lies outside the
+// triangle; the clamped variants lie on it.
 template <class Varyings = no_varyings>
 struct fragment {
     std::uint32_t triangle;  // in its mesh
-    std::uint32_t draw;      // which draw of the call
-    std::uint32_t primitive; // counts on through all draws: what replace and the A-buffer order by
+    std::uint32_t draw;      // number of the draw in the call
+    std::uint32_t primitive; // numbered through all draws: the order of replace and of A-buffers
     int axis;                // dominant axis: 0 x, 1 y, 2 z
-    bool front_facing;       // counter-clockwise seen from +infinity on the dominant axis; true where the area is zero
+    bool front_facing;       // counter-clockwise seen from +infinity on the dominant axis; true if the area is zero
     glm::ivec3 voxel;        // index in the whole grid
-    glm::vec3 barycentric;   // weights of the triangle's three vertices; 1/3 each where the area is zero
-    glm::vec3 normal;        // unit, world space, right-handed winding; 0 where the area is zero
+    glm::vec3 barycentric;   // weights of the triangle's three vertices; 1/3 each if the area is zero
+    glm::vec3 normal;        // unit, world space, right-handed winding; 0 if the area is zero
     Varyings varyings;       // interpolated by `barycentric`
 
     const Varyings* vertex_varyings[3]; // of the triangle's vertices
@@ -108,13 +108,13 @@ struct fragment {
     }
 };
 
-// What a fragment shader returns: one value per render target, in order; or nothing, where it discards the fragment.
+// The result of a fragment shader: one value per render target, in order. The fragment is discarded unless `keep`.
 template <class... Ts>
 struct output {
     core::pack<Ts...> values;
     bool keep = true;
 
-    // The same values, thrown away where `condition` holds.
+    // The same values, discarded if `condition` holds.
     [[nodiscard]] VOXELPIPE_HD constexpr output discard_if(bool condition) const {
         return {values, keep && !condition};
     }
@@ -125,7 +125,7 @@ template <class... Ts>
     return {core::make_pack(values...)};
 }
 
-// Fragment shader that gives every fragment the same values: constant_output<bool>{true}, or constant(1.0f, 1u).
+// Fragment shader that returns the same values for every fragment: constant_output<bool>{true}, or constant(1.0f, 1u).
 template <class... Ts>
 struct constant_output {
     core::pack<Ts...> values;
@@ -168,7 +168,7 @@ inline constexpr bool is_output = false;
 template <class... Ts>
 inline constexpr bool is_output<output<Ts...>> = true;
 
-// What a fragment shader gives; nothing, if it returns void, so that nothing but the check of shaders complains.
+// Output type of a fragment shader; output<> if it returns void, so that only the check of shaders reports an error.
 template <class T>
 using output_or_none = std::conditional_t<std::is_void_v<T>, output<>, T>;
 
@@ -184,7 +184,7 @@ struct mesh_vertex<mesh_view<Attributes...>> {
     using type = vertex<Attributes...>;
 };
 
-// What a vertex shader makes from a mesh's vertices, and what a fragment shader makes of that; only for shaders that
+// Output of a vertex shader for a mesh's vertices, and of a fragment shader for these; only for shaders that
 // check_shaders accepts.
 template <class Mesh, class VertexShader>
 using shaded_vertex =
@@ -197,8 +197,8 @@ template <class Mesh, class VertexShader, class FragmentShader>
 using shader_output = std::remove_cvref_t<
     std::invoke_result_t<const FragmentShader&, const fragment<typename shaded<Mesh, VertexShader>::varyings>&>>;
 
-// True where both shaders can be used with the mesh; otherwise one readable line says why not: nothing that depends on
-// a failed check is instantiated.
+// Returns true if both shaders can be used with the mesh. Otherwise one readable line says why not: nothing that
+// depends on a failed check is instantiated.
 template <class Mesh, class VertexShader>
 [[nodiscard]] constexpr bool check_vertex_shader() {
     using vertex_type = typename mesh_vertex<Mesh>::type;
@@ -263,7 +263,7 @@ template <class... Attributes>
 
 // ---- draws ----------------------------------------------------------------------------------------------------------
 
-// A mesh with its shaders: the two functors carry the transform and the shader data. Does not own the mesh.
+// A mesh with its shaders; the functors carry the transform and the shader data. Does not own the mesh.
 template <class Mesh, class VertexShader, class FragmentShader>
 struct draw {
     Mesh mesh;
@@ -271,14 +271,14 @@ struct draw {
     FragmentShader fragment_shader;
 };
 
-// Which draw of a call a triangle was in, and which triangle of its mesh.
+// The draw of a call and the triangle of its mesh.
 struct draw_triangle {
     std::uint32_t draw = 0, triangle = 0;
     friend bool operator==(const draw_triangle&, const draw_triangle&) = default;
 };
 
-// The way back from fragment::primitive, which is what A-buffers keep, to draw and triangle. On the host; knows the
-// draws as they were when it was made, and refers to nothing.
+// Maps fragment::primitive, which A-buffers store, back to draw and triangle. On the host. Holds the draws' sizes at
+// its construction, and refers to nothing.
 class primitive_map {
 public:
     template <class Mesh, class VertexShader, class FragmentShader>
@@ -290,9 +290,9 @@ public:
     explicit primitive_map(const std::vector<draw<Mesh, VertexShader, FragmentShader>>& draws)
         : primitive_map(std::span<const draw<Mesh, VertexShader, FragmentShader>>(draws)) {}
 
-    // How many primitives there are.
+    // Number of primitives.
     [[nodiscard]] std::uint64_t size() const { return ends_.empty() ? 0 : ends_.back(); }
-    // `primitive` is below size().
+    // `primitive` must be below size().
     [[nodiscard]] draw_triangle operator()(std::uint32_t primitive) const {
         VOXELPIPE_EXPECTS(primitive < size());
         const auto at = std::upper_bound(ends_.begin(), ends_.end(), std::uint64_t{primitive});

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How long each stage of a call took: what a backend adds up where its `times` points. What a backend does not do as a
-// stage of its own stays 0 (docs/pipeline.md, "Stage times").
+// Durations of the stages of a call, which a backend adds to what its `times` points to. Stages that a backend does not
+// run separately stay 0 (docs/pipeline.md, "Stage times").
 
 #include <array>
 #include <utility>

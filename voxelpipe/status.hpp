@@ -2,10 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a voxelize call reports: success, or which check failed at which stage, with counts. Calls do not throw on bad
-// input; or_throw() turns a status into an exception for those who like exceptions. Constructors, which have no status
-// to return, throw: std::bad_alloc or the backend's error, and std::length_error for a framebuffer too large to
-// address.
+// The result of a voxelize call: success, or which check failed at which stage, with counts. Calls do not throw on bad
+// input; or_throw() turns a status into an exception. Constructors return no status, so they throw: std::bad_alloc or
+// the backend's error, and std::length_error for a framebuffer too large to address.
 
 #include <cstdint>
 #include <stdexcept>
@@ -24,12 +23,12 @@ enum class status_code : std::uint8_t {
     extent_too_large,   // an extent above grid::max_extent
     bad_origin,         // NaN or infinite
     bad_voxel_size,     // zero, negative, NaN, infinite, or so small or large that the snapping scale is no number
-    extent_mismatch,    // the framebuffer is not as large as the grid
+    extent_mismatch,    // framebuffer and grid differ in extent
     size_overflow,      // a buffer would have more bytes than this machine can address
     too_many_triangles, // more than 2^32 - 1 in all draws together
     out_of_memory,
     capacity_exceeded,    // the caller's workspace is too small; `required` says what is needed
-    strategy_unavailable, // the strategy that the backend was told to use cannot serve the call
+    strategy_unavailable, // the forced strategy cannot serve the call
     bad_solid_options,    // an option of voxelize_solid is out of its range
     crop_without_whole,   // repair::exterior of a crop: what lies outside follows from the whole grid
     no_device,
@@ -47,8 +46,8 @@ enum class stage : std::uint8_t {
     abuffer_emit,
 };
 
-// What went through the pipeline. A triangle is counted in exactly one of the fields from `triangles_outside` to
-// `triangles_drawn`; a fragment in exactly one of `fragments` and `fragments_discarded`.
+// Counts of one call. A triangle is in exactly one of the fields from triangles_nonfinite to triangles_drawn, a
+// fragment in exactly one of fragments and fragments_discarded.
 struct counters {
     std::uint64_t triangles_in = 0;
     std::uint64_t triangles_nonfinite = 0; // dropped: a position that is NaN or infinite
@@ -58,7 +57,7 @@ struct counters {
     std::uint64_t triangles_drawn = 0;
     std::uint64_t fragments = 0;           // shaded and blended (or kept, in an A-buffer)
     std::uint64_t fragments_discarded = 0; // by the fragment shader
-    std::uint64_t voxels = 0;              // that got at least one fragment; 0 where counting was switched off
+    std::uint64_t voxels = 0;              // with at least one fragment; 0 if counting was switched off
 
     [[nodiscard]] std::uint64_t triangles_dropped() const { return triangles_nonfinite + triangles_too_far; }
     friend bool operator==(const counters&, const counters&) = default;
@@ -82,7 +81,7 @@ struct solid_counters {
     friend bool operator==(const solid_counters&, const solid_counters&) = default;
 };
 
-// Sizes that a caller's workspace must have; filled where `code` is capacity_exceeded.
+// Sizes that a caller's workspace must have; set if `code` is capacity_exceeded.
 struct required_sizes {
     std::uint64_t tile_pairs = 0;
     std::uint64_t fragments = 0;

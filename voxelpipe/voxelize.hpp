@@ -26,20 +26,20 @@
 
 namespace voxelpipe {
 
-// Written {.rule = coverage::thin, .count_voxels = false}. Where a call takes options, a coverage is enough.
+// Options of voxelize, as {.rule = coverage::thin, .count_voxels = false}. A coverage alone may be given instead.
 struct voxelize_options {
     coverage rule = coverage::conservative;
-    bool count_voxels = true; // fill counters::voxels; costs a bit per voxel of a tile, or reading a target once
+    bool count_voxels = true; // fills counters::voxels; costs one bit per voxel of a tile, or reading a target once
 };
 
 namespace core {
 
-// The coverage of a call where the program's text says it, voxelize<coverage::thin>(...), or <>: only the call's
-// options do, and both are compiled.
+// Coverage known at compile time, as in voxelize<coverage::thin>(...). Empty: the call's options decide, and both are
+// compiled.
 template <coverage... Known>
 struct known_coverage {
     static_assert(sizeof...(Known) <= 1, "voxelpipe: a call has one coverage");
-    // f.operator()<Rule>().
+    // Calls f.operator()<Rule>().
     template <class F>
     static decltype(auto) dispatch(coverage rule, F&& f) {
         if constexpr (sizeof...(Known) != 0)
@@ -52,7 +52,7 @@ struct known_coverage {
     static void set(voxelize_options& options) { ((options.rule = Known), ...); }
 };
 
-// Checks of shaders against what they draw into. Each stops at its first mistake and what depends on it is not
+// Checks of shaders against what they draw into. Each stops at its first mistake, and nothing that depends on it is
 // instantiated, so that a mistake is one line of the compiler's output.
 template <class Output>
 struct output_check;
@@ -74,7 +74,7 @@ struct output_check<output<Ts...>> {
         if constexpr (one_each) return (matches<Ts, Targets>() && ...);
         return false;
     }
-    // Where the payload is void, values are ignored; discard still counts.
+    // If the payload is void, values are ignored; discarding still works.
     template <class Payload>
     static constexpr bool fits_payload() {
         if constexpr (std::is_void_v<Payload>) {
@@ -114,7 +114,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
     return s;
 }
 
-// Everything about the draws that can be told without reading their arrays. Fills counts.triangles_in.
+// Checks everything about the draws that needs no access to their arrays. Fills counts.triangles_in.
 template <class Mesh, class VertexShader, class FragmentShader>
 [[nodiscard]] status validate_draws(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws) {
     std::uint64_t triangles = 0;
@@ -165,8 +165,8 @@ template <class... Targets>
     return code == status_code::ok ? status{} : failure(code);
 }
 
-// Names the first triangle with an index out of range in the status of a call that met one; reads the indices once
-// more. Where they cannot be read, nothing is named.
+// Adds the first triangle with an index out of range to the status of a call that met one; reads the indices again.
+// Adds nothing if they cannot be read.
 template <class Backend, class Mesh, class VertexShader, class FragmentShader>
 [[nodiscard]] status name_bad_triangle(Backend& backend,
                                        std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, status s) {
@@ -188,7 +188,7 @@ template <class Backend, class Mesh, class VertexShader, class FragmentShader>
     return s;
 }
 
-// A contiguous range of draws that is not the span that voxelize takes.
+// A contiguous range of draws, other than the span that voxelize takes.
 template <class Range>
 using draw_of = std::remove_cvref_t<decltype(*std::data(std::declval<const Range&>()))>;
 template <class T>
@@ -204,8 +204,8 @@ concept draw_range = requires(const Range& r) {
 
 } // namespace core
 
-// Clears the targets of a framebuffer that are to be cleared, to their clear values, as a call that draws nothing does:
-// those that load keep what they hold. Returns after the work is done.
+// Clears the targets whose load operation is clear to their clear values, like a call that draws nothing; targets that
+// load keep their contents. Returns after the work is done.
 template <class Backend, class... Targets>
 [[nodiscard]] status clear(Backend& backend, const framebuffer_view<Targets...>& fb) {
     grid g;
@@ -219,11 +219,11 @@ template <class Backend, class... Targets>
     return clear(backend, fb.view());
 }
 
-// Draws meshes into render targets. The draws share one type of mesh, vertex and fragment shader; their data differ.
-// Draw i's triangles come before draw i + 1's: that is the order of blend::replace. Returns after the work is done; on
-// a GPU backend that is one wait. Without any triangles it clears, as vp::clear does, and is a success.
-// With a coverage between angle brackets, as voxelize<coverage::thin>(...), the call has that one whatever its options
-// say, and the other is not compiled.
+// Draws meshes into render targets. The draws share one type of mesh, vertex shader and fragment shader; their data
+// differ. Draw i's triangles come before draw i + 1's, which is the order of blend::replace. Returns after the work is
+// done; on a GPU backend that is one wait. Without any triangles it clears, like vp::clear, and succeeds. A coverage
+// between angle brackets, as in voxelize<coverage::thin>(...), overrides the options, and the other coverage is not
+// compiled.
 template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, const framebuffer_view<Targets...>& fb, voxelize_options options = {}) {
@@ -248,7 +248,7 @@ template <coverage... Known, class Backend, class Mesh, class VertexShader, clas
     return voxelize<Known...>(backend, draws, g, fb.view(), options);
 }
 
-// Draws meshes into an A-buffer. The fragment shader's one output is the payload; values are ignored where it is void.
+// Draws meshes into an A-buffer. The fragment shader's one output is the payload; it is ignored if the payload is void.
 template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class Payload>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, abuffer<Backend, Payload>& lists, voxelize_options options = {}) {

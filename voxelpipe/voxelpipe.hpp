@@ -3,8 +3,8 @@
 #pragma once
 
 // The whole library: mesh -> vertex shader -> triangle setup -> coarse raster -> tile sort -> tile split -> fine raster
-// -> blend -> framebuffer / A-buffer. A plain C++20 compiler gets everything but the GPU; the CPU backend is
-// <cpu_ref/backend.hpp>; nvcc gets cuda_backend too.
+// -> blend -> framebuffer / A-buffer. Any C++20 compiler gets everything except the GPU, nvcc gets cuda_backend too.
+// The CPU backend is <cpu_ref/backend.hpp>.
 
 #include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/blend.hpp>
