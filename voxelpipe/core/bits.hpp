@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What <bit> and <limits> have, for device code too: the standard library's constexpr functions are the host's only,
-// unless nvcc is told --expt-relaxed-constexpr.
+// Parts of <bit> and <limits> for device code: the standard library's constexpr functions are host-only unless nvcc
+// gets --expt-relaxed-constexpr.
 
 #include <voxelpipe/config.hpp>
 
@@ -18,7 +18,7 @@ template <class To, class From>
     return __builtin_bit_cast(To, from);
 }
 
-// Of an arithmetic type: constants, which device code may read.
+// Limits of an arithmetic type, as constants, which device code may read.
 template <class T>
 inline constexpr T greatest = std::numeric_limits<T>::max();
 template <class T>

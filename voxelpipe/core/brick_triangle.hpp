@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Conservative coverage of a large triangle brick by brick, 16 voxels a side: a test that tells which bricks it can
-// have voxels in, and for one of them the 32-bit coverage of small_triangle.hpp. Within a brick a half-plane's value
-// moves by less than 2^29, so that its constant may be cut to +-2^30 without changing a sign.
+// Conservative coverage of a large triangle brick by brick, 16 voxels a side: a test for the bricks in which it can
+// have voxels, and for one brick the 32-bit coverage of small_triangle.hpp. Within a brick a half-plane's value changes
+// by less than 2^29, so its constant may be clamped to +-2^30 without changing a sign.
 
 #include <voxelpipe/core/small_conservative.hpp>
 #include <voxelpipe/core/small_thin.hpp>
@@ -21,11 +21,11 @@ struct brick_half_plane {
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::int64_t at(int x, int y) const {
         return static_cast<std::int64_t>(a) * x + static_cast<std::int64_t>(b) * y + c;
     }
-    // Whether any voxel of the brick's square, lowest at (x, y), is inside.
+    // True if any voxel of the brick's square, lowest at (x, y), is inside.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr bool meets(int x, int y) const {
         return at(x, y) + std::int64_t{brick_size - 1} * ((a > 0 ? a : 0) + (b > 0 ? b : 0)) >= 0;
     }
-    // The same half-plane with (x, y) as the origin, exact in its signs for voxels -1 .. 16.
+    // The same half-plane with (x, y) as the origin; its signs are exact for voxels -1 to 16.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr small_half_plane from(int x, int y) const {
         constexpr std::int64_t limit = std::int64_t{1} << 30;
         const std::int64_t value = at(x, y);
@@ -34,7 +34,8 @@ struct brick_half_plane {
 };
 static_assert(narrow_edge_bits(16) <= 24, "a brick's half-planes would overflow 32 bits");
 
-// A triangle that fits_narrow, relative to the lowest voxel of its bounding box, as are all voxels below.
+// A triangle that fits_narrow, relative to the lowest voxel of its bounding box. All voxels below are relative to that
+// too.
 struct brick_triangle {
     brick_half_plane xy[3], yz[3], zx[3];
     std::int64_t n[3];         // normal
@@ -65,7 +66,7 @@ struct brick_triangle {
         above = static_cast<std::int64_t>(exact::floor_shift(at_plane, fraction)) - negative;
     }
 
-    // Whether the triangle can have voxels in the brick whose lowest voxel is (x, y, z); true wherever it has.
+    // True if the triangle can have voxels in the brick whose lowest voxel is (x, y, z); never false if it has some.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets(int x, int y, int z) const {
         bool all = true;
         for (int i = 0; i < 3; ++i) all = all && xy[i].meets(x, y) && yz[i].meets(y, z) && zx[i].meets(z, x);
@@ -78,8 +79,8 @@ struct brick_triangle {
         return high + below >= 0 && above - low >= 0;
     }
 
-    // The voxels of axis w that the plane can pass within the square of a brick column (u, v), widened by a voxel; for
-    // choosing what to test, so that its roundings do not matter. u = w + 1, v = w + 2 (mod 3).
+    // The range of voxels along axis w in which the plane can pass the square of a brick column (u, v), widened by one
+    // voxel. It only selects what to test, so its roundings do not matter. u = w + 1, v = w + 2 (mod 3).
     VOXELPIPE_HD VOXELPIPE_INLINE void depths(int w, int u, int v, double& first, double& last) const {
         const std::int64_t nu = w == 0   ? n[1]
                                 : w == 1 ? n[2]
@@ -104,7 +105,7 @@ struct brick_triangle {
         last = (from < to ? to : from) + 1.0;
     }
 
-    // Coverage within the brick, whose lowest voxel becomes the origin.
+    // Coverage within the brick, with its lowest voxel as the origin.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE small_conservative at(int x, int y, int z) const {
         small_conservative s;
         const std::int64_t depth = n[0] * x + n[1] * y + n[2] * z;
@@ -137,12 +138,12 @@ private:
     }
 };
 
-// How the rows of columns of a large thin triangle lie: along u of its dominant axis, or along v.
+// Direction of the rows of columns of a large thin triangle: along u of its dominant axis, or along v.
 struct row_axes {
     int dominant;
     bool along_v;
 
-    // (x, y, z) -> along rows, across them, along the dominant axis; and back.
+    // Converts (x, y, z) to (along rows, across rows, along the dominant axis), and back.
     template <class T>
     [[nodiscard]] VOXELPIPE_HD constexpr triple<T> to_rows(const T& x, const T& y, const T& z) const {
         const triple<T> uvw = to_uvw(dominant, x, y, z);
@@ -155,13 +156,13 @@ struct row_axes {
     [[nodiscard]] VOXELPIPE_HD constexpr bool are_along_x() const { return dominant == (along_v ? 1 : 2); }
 };
 
-// The same for thin coverage, in rows of 16 columns of the dominant axis. For triangles that have an area. Here and in
+// The same for thin coverage, in rows of 16 columns of the dominant axis. For triangles with an area. Here and in
 // brick_row, u is the axis along the rows.
 struct brick_thin {
     brick_half_plane uv[3];
     std::int64_t nu, nv, nw, depth; // as in small_thin
     row_axes axes;
-    std::int32_t first[3], last[3]; // the bounding box by these axes: 32 bits hold one that meets a grid
+    std::int32_t first[3], last[3]; // the bounding box by these axes: fits 32 bits if it meets a grid
 
     brick_thin() = default;
     VOXELPIPE_HD brick_thin(const snapped_position& a, const snapped_position& b, const snapped_position& c,
@@ -200,7 +201,7 @@ struct brick_thin {
                                fraction));
     }
 
-    // Columns count from (u, v) in what this gives.
+    // Coverage with columns counted from (u, v).
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE small_thin from(int u, int v) const {
         small_thin s;
         s.axis = axes.dominant;
@@ -211,7 +212,7 @@ struct brick_thin {
         s.depth = depth - 2 * (nu * u + nv * v);
         return s;
     }
-    // Whether any of the 16 columns from (u, v) on may be touched.
+    // True if any of the 16 columns from (u, v) on may be touched.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets_row(int u, int v) const {
         bool all = true;
         for (int i = 0; i < 3; ++i)
@@ -220,19 +221,19 @@ struct brick_thin {
     }
 };
 
-// The covered columns of a row of at most brick_size, which are next to each other, and their depths, which ascend or
-// descend. What the triangle's other rows have too is asked of it.
+// The covered columns of a row of at most brick_size, which are consecutive, and their depths, which ascend or descend.
+// Values that are equal for all rows of the triangle are passed to its functions.
 struct brick_row {
-    std::int64_t plane = 0;    // small_thin::depth; columns and depths count from the row's place
-    float by_u = 0, first = 0; // depths in floats: of the next column, of column 0
-    std::uint32_t columns = 0; // as bits
-    std::int32_t base = 0;     // the row's place: a depth that its first column's is near, from the bounding box
+    std::int64_t plane = 0;    // small_thin::depth; columns and depths are relative to the row's position
+    float by_u = 0, first = 0; // depths in floats: slope per column; depth of column 0
+    std::uint32_t columns = 0; // bit mask
+    std::int32_t base = 0;     // the row's position: a depth near its first column's, from the bounding box
 
-    brick_row() = default; // none
-    // Columns from .. to, of which none is beyond brick_size, from (u, v) on.
+    brick_row() = default; // no columns
+    // Columns from .. to, at most brick_size of them, from (u, v) on.
     VOXELPIPE_HD VOXELPIPE_INLINE brick_row(const brick_thin& t, int u, int v, int from, int to) {
         small_thin s = t.from(u, v);
-        // Floats tell depths of up to some twenty voxels. Whatever is within a voxel or two does, as this is: a
+        // Floats resolve depths of up to some twenty voxels. Any base within a voxel or two will do, and this one is: a
         // triangle that fits_narrow has up to 2^11 voxels a side, of which three roundings lose less than 2^-8.
         base = static_cast<std::int32_t>(exact::mul(static_cast<float>(s.depth - s.nu - s.nv),
                                                     exact::mul(0.5f, exact::near_inverse(static_cast<float>(s.nw)))));
@@ -250,15 +251,15 @@ struct brick_row {
     }
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE int first_column() const { return exact::lowest_one(columns); }
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE int last_column() const { return exact::highest_one(columns); }
-    // From `base`. Here and below, of the row's triangle.
+    // Relative to `base`. Here and below, t is the row's triangle.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t depth(const brick_thin& t, int column) const {
         return small_thin::depth_of(t.nu, t.nv, t.nw, plane, by_u, first, column, 0);
     }
-    // The last column, up to `last`, that has the depth of this one.
+    // The last column, up to `last`, with the same depth as this one.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE int last_of_depth(const brick_thin& t, std::int32_t of_column,
                                                                   int column, int last) const {
         if (depth(t, last) == of_column) return last;
-        // Where the next depth begins in floats, or near it.
+        // About where the next depth begins, in floats.
         const float edge = exact::sub(static_cast<float>(of_column + (by_u > 0.0f ? 1 : 0)), first),
                     at = exact::mul(edge, exact::near_inverse(by_u));
         auto end = static_cast<int>(

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a framebuffer knows of what has been drawn into it (framebuffer::track_changes): which of its targets hold their
-// clear value wherever nothing has been drawn, and where something may have been. It lies in words beside the targets.
+// The log of changes of a framebuffer (framebuffer::track_changes): which of its targets hold their clear value
+// wherever nothing has been drawn, and where something may have been drawn. It lies in memory next to the targets.
 
 #include <voxelpipe/config.hpp>
 
@@ -16,13 +16,13 @@
 
 namespace voxelpipe::core {
 
-// A chunk is a box of voxels: a few lines of memory in each row of a target. Each has a bit, 32 along x to a word; each
-// row of chunks along x begins a word.
+// A chunk is a box of voxels: a few cache lines in each row of a target. Each has a bit, 32 along x to a word; each row
+// of chunks along x begins a new word.
 inline constexpr int log2_chunk_x = 5, log2_chunk_yz = 3;
 inline constexpr int chunk_x = 1 << log2_chunk_x, chunk_yz = 1 << log2_chunk_yz;
 
 struct chunk_rows {
-    int words = 0;    // of a row
+    int words = 0;    // per row
     int y = 0, z = 0; // rows along these axes
 
     chunk_rows() = default;
@@ -41,15 +41,14 @@ private:
     }
 };
 
-// The words of a log: for each target what it was cleared to, where that is known, then a bit for each chunk that may
-// have been drawn into since. Of a target that is known to hold its clear value, voxels in chunks without a bit do. All
-// zeros: nothing is known.
+// The words of a log: for each target its clear value, if known, then one bit for each chunk that may have been drawn
+// into since. A target that is known holds its clear value in all chunks without a bit. All zeros: nothing is known.
 struct change_log {
-    static constexpr std::size_t max_targets = 8, most_bytes = 32; // of a value
+    static constexpr std::size_t max_targets = 8, most_bytes = 32; // most_bytes: of a value
     static constexpr std::size_t known_words = 1 + most_bytes / sizeof(std::uint32_t);
     static constexpr std::size_t header_words = max_targets * known_words;
 
-    // What a target was cleared to: 1 and the bytes of the value, or zeros.
+    // A target's clear value: 1 and the bytes of the value; zeros if unknown.
     struct known {
         std::uint32_t words[known_words] = {};
 
@@ -65,7 +64,7 @@ struct change_log {
     [[nodiscard]] static std::size_t num_words(const glm::ivec3& extent) {
         return header_words + chunk_rows(extent).num_words();
     }
-    // On the host, of memory that it can write to.
+    // Resets a log in memory that the host can write.
     static void forget(std::uint32_t* words) { std::fill_n(words, header_words, 0u); }
 };
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Coverage: which voxels a triangle gives fragments in, as spans along its dominant axis. Exact: integers only, no
+// Coverage: the voxels in which a triangle has fragments, as spans along its dominant axis. Exact: integers only, no
 // epsilon (docs/design.md, "Conservative" and "Thin"; paper section 4).
 
 #include <voxelpipe/core/triangle_setup.hpp>
@@ -11,8 +11,8 @@
 
 namespace voxelpipe::core {
 
-// floor(numerator / divisor) stepped along a row: each step adds `delta`, |delta| <= divisor, so that one correction is
-// enough and a row costs one division.
+// floor(numerator / divisor), stepped along a row: each step adds `delta`, |delta| <= divisor, so one correction
+// suffices and a row costs one division.
 template <class Int>
 struct stepped_floor {
     Int quotient, remainder, divisor;
@@ -35,8 +35,8 @@ struct stepped_floor {
     }
 };
 
-// Narrows [lo, hi] to the x for which a*x + b*y + c >= 0, for all three half-planes. What they leave of a row is an
-// interval, so a short one is narrowed from its ends; a long one is solved by division.
+// Narrows [lo, hi] to the x with a*x + b*y + c >= 0 for all three half-planes. The result is an interval, so a short
+// row is narrowed from its ends; a long one is solved by division.
 template <class Int>
 VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row(const half_plane<Int> (&h)[3], Int y, std::int64_t& lo,
                                                         std::int64_t& hi) {
@@ -72,8 +72,8 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row(const half_plane<Int> (&
     while (lo < hi && !inside(hi)) --hi;
 }
 
-// Calls emit(u, v, w_first, w_last) for every column that holds covered voxels inside `clip` (x y z, in voxels of the
-// setup's fraction). u, v and w are absolute voxel indices. Spans of one triangle do not overlap.
+// Calls emit(u, v, w_first, w_last) for every column with covered voxels inside `clip` (x y z, in voxels of the setup's
+// fraction). u, v and w are absolute voxel indices. Spans of one triangle do not overlap.
 VOXELPIPE_ANY_CALLABLE
 template <span_rule Rule, class Int, class Emit>
 VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<Int>& t, const voxel_box& clip,
@@ -92,11 +92,11 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<
     if (hi[0] < lo[0] || hi[1] < lo[1] || hi[2] < lo[2]) return;
 
     if (t.zero_area) {
-        // A segment or a point. Walking its longest axis, each step touches a handful of voxels.
+        // A segment or a point. Each step along its longest axis touches a handful of voxels.
         if constexpr (Rule == span_rule::conservative) {
             for (std::int64_t w = lo[2]; w <= hi[2]; ++w) {
                 std::int64_t v_lo = lo[1], v_hi = hi[1], u_lo = lo[0], u_hi = hi[0];
-                // Rows run along the first coordinate of a projection, so (v, w) fits as it is and (w, u) is turned.
+                // Rows run along the first coordinate of a projection: (v, w) fits, (w, u) has to be swapped.
                 narrow_row(t.vw, Int{w}, v_lo, v_hi);
                 half_plane<Int> uw[3] = {{t.wu[0].b, t.wu[0].a, t.wu[0].c},
                                          {t.wu[1].b, t.wu[1].a, t.wu[1].c},
@@ -120,7 +120,7 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<
         narrow_row(t.uv, Int{v}, u_lo, u_hi);
         if (u_lo > u_hi) continue;
         if constexpr (Rule == span_rule::thin) {
-            // floor of the plane's depth at the column's centre, everything doubled
+            // floor of the plane's depth at the column's centre, all terms doubled
             stepped_floor<Int> depth(t.plane_high - nu * (2 * Int{u_lo} + 1) - nv * (2 * Int{v} + 1), 2 * nw);
             for (std::int64_t u = u_lo;; ++u) {
                 if (depth.quotient >= lo[2] && depth.quotient <= hi[2]) {
@@ -131,12 +131,12 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<
                 depth.step(-2 * nu);
             }
         } else {
-            // Voxels whose slab the plane can pass within the column's square, whose corners decide: w from
+            // Voxels whose slab the plane can pass within the column's square, decided by the square's corners: w from
             // floor((low - 1) / nw) to floor(high / nw).
             const Int row = nu * u_lo + nv * v;
             Int low = t.plane_low - row - positive_part(nu) - positive_part(nv);
             Int high = t.plane_high - row - negative_part(nu) - negative_part(nv);
-            // The other two projections at (v, w) and (w, u): what depends on v is fixed here, what depends on u steps.
+            // The other two projections at (v, w) and (w, u): terms in v are fixed here, terms in u are stepped.
             Int r[3]{}, s[3]{};
             if constexpr (Rule == span_rule::conservative) {
                 for (int i = 0; i < 3; ++i) {
@@ -144,7 +144,7 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<
                     s[i] = t.wu[i].b * u_lo + t.wu[i].c;
                 }
             }
-            // All of the numbers or-ed are non-negative iff no sign bit is set.
+            // The result is non-negative iff all of these numbers are.
             const auto sides = [&](Int w) VOXELPIPE_INLINE_LAMBDA {
                 return (t.vw[0].b * w + r[0]) | (t.vw[1].b * w + r[1]) | (t.vw[2].b * w + r[2]) |
                        (t.wu[0].a * w + s[0]) | (t.wu[1].a * w + s[1]) | (t.wu[2].a * w + s[2]);
@@ -156,7 +156,7 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<
             };
             VOXELPIPE_CALLS_ANY_END
             if (Rule == span_rule::conservative && hi[2] - lo[2] < 4) {
-                // Few voxels deep: asking each end whether the plane passes it costs less than two divisions.
+                // Few voxels deep: testing each end against the plane costs less than two divisions.
                 for (std::int64_t u = u_lo; u <= u_hi; ++u) {
                     const auto inside = [&](Int w) VOXELPIPE_INLINE_LAMBDA {
                         const Int depth = nw * w;
@@ -181,7 +181,7 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<
                 if (w0 < lo[2]) w0 = lo[2];
                 if (w1 > hi[2]) w1 = hi[2];
                 if constexpr (Rule == span_rule::conservative) {
-                    // The sides cut at most a voxel or two off the ends.
+                    // The sides cut at most one or two voxels off the ends.
                     while (w0 <= w1 && sides(w0) < 0) ++w0;
                     while (w0 < w1 && sides(w1) < 0) --w1;
                     for (int i = 0; i < 3; ++i) s[i] += t.wu[i].b;
@@ -199,8 +199,8 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<
     return c == coverage::thin ? span_rule::thin : span_rule::conservative;
 }
 
-// Whole path for one triangle: picks the integer width, sets up, enumerates. emit(setup, u, v, w_first, w_last) is
-// called with either width of setup.
+// The whole path for one triangle: picks the integer width, sets up, enumerates. Calls emit(setup, u, v, w_first,
+// w_last) with either width of setup.
 VOXELPIPE_ANY_CALLABLE
 template <span_rule Rule, class Emit>
 VOXELPIPE_HD constexpr void rasterize(const snapped_position& a, const snapped_position& b, const snapped_position& c,

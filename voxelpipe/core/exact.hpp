@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Arithmetic with written-out roundings: the same bits from g++, clang and nvcc, host and device, under every
-// contraction flag and under -use_fast_math. The rule that a reviewer can see: no product feeds a bare + or -; it feeds
-// an fma. On the device the operations are inline PTX, which no compiler flag turns into approximate or flushing ones.
-// Also: exact integer helpers (floor division, floor shift) and conversions between integers and floats.
+// Arithmetic with explicit roundings: the same bits from g++, clang and nvcc, on host and device, under every
+// contraction flag and under -use_fast_math. The rule for reviewers: no product feeds a bare + or -; it feeds an fma.
+// On the device the operations are inline PTX, which no compiler flag makes approximate or flushing. Also exact integer
+// helpers (floor division, floor shift) and conversions between integers and floats.
 
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/core/bits.hpp>
@@ -102,7 +102,7 @@ namespace exact {
 #endif
 }
 
-// Square root without a call that may set errno, so that an unused result costs nothing.
+// Square root without a call that may set errno, so an unused result costs nothing.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double sqrt(double a) {
 #if defined(__CUDA_ARCH__)
     return __dsqrt_rn(a);
@@ -145,7 +145,7 @@ namespace exact {
 #endif
 }
 
-// Nearest integer, ties to even. |a| < 2^63; the host runs in the default rounding mode.
+// Nearest integer, ties to even. |a| < 2^63; the host must be in the default rounding mode.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int64_t round_to_int64(double a) {
 #if defined(__CUDA_ARCH__)
     return __double2ll_rn(a);
@@ -156,8 +156,8 @@ namespace exact {
 #endif
 }
 
-// About 1 / a, to 2^-22 of itself, for magnitudes from 2^-126 to 2^126; infinity for zero. Not the same everywhere: for
-// what is proved to be near enough.
+// 1 / a with relative error 2^-22, for magnitudes from 2^-126 to 2^126; infinity for zero. Differs between machines:
+// use it only if that precision is proved to suffice.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float near_inverse(float a) {
 #if defined(__CUDA_ARCH__)
     float r;
@@ -168,7 +168,7 @@ namespace exact {
 #endif
 }
 
-// fma, kept from 0 to 1; 0 for what is no number.
+// fma, clamped to [0, 1]; 0 for NaN.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float fma_saturated(float a, float b, float c) {
 #if defined(__CUDA_ARCH__)
     float r;
@@ -180,7 +180,7 @@ namespace exact {
 #endif
 }
 
-// a * b + c rounded once, to an integer above and below it; c must be one, and the sum at most 2^21.
+// a * b + c, rounded once to an integer, up or down; c must be an integer, and |sum| <= 2^21.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float fma_up(float a, float b, float c) {
 #if defined(__CUDA_ARCH__)
     float sum;
@@ -220,14 +220,14 @@ namespace exact {
     return a < 0 ? -a : a;
 #endif
 }
-// An integer as what it is; |a| <= 2^21.
+// Converts a float that is an integer; |a| <= 2^21.
 inline constexpr std::int32_t integer_shift = 0x4b400000;
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t to_integer(float a) {
     return core::bit_cast<std::int32_t>(add(a, 12582912.0f)) - integer_shift;
 }
 
-// The greatest integer that is not above a, for |a| <= 2^21, and by how much a is above it; anything for other numbers.
-// By a sum with 1.5 * 2^23, whose last mantissa bits are the integer: conversions run at a fraction of that rate.
+// floor(a) and a - floor(a), for |a| <= 2^21; arbitrary for other numbers. Uses a sum with 1.5 * 2^23, whose last
+// mantissa bits are the integer: conversion instructions run at a fraction of that rate.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t integer_below(float a, float& over) {
 #if defined(__CUDA_ARCH__)
     float sum;
@@ -241,15 +241,15 @@ inline constexpr std::int32_t integer_shift = 0x4b400000;
 #endif
 }
 
-// The same minus an even offset below 2^40, modulo 2^32, for |a| <= 2^30: by the sum with 1.5 * 2^52 - offset, whose
-// last mantissa bits are the integer. One addition, where a conversion runs at a fraction of that rate on a GPU; an odd
-// offset would turn ties to odd.
+// round_to_int64(a) minus an even offset below 2^40, modulo 2^32, for |a| <= 2^30. Uses the sum with 1.5 * 2^52 -
+// offset, whose last mantissa bits are the integer: one addition, whereas conversions run at a fraction of that rate on
+// a GPU. An odd offset would turn ties to odd.
 [[nodiscard]] constexpr double rounding_shift(std::int64_t offset) { return 0x1.8p52 - static_cast<double>(offset); }
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t round_to_int32(double a, double shift) {
 #if defined(__CUDA_ARCH__)
     return __double2loint(__dadd_rn(a, shift));
 #else
-    const auto offset = static_cast<std::int64_t>(0x1.8p52 - shift); // unsigned below, for an `a` out of range
+    const auto offset = static_cast<std::int64_t>(0x1.8p52 - shift); // unsigned below, in case `a` is out of range
     return static_cast<std::int32_t>(
         static_cast<std::uint32_t>(static_cast<std::uint64_t>(round_to_int64(a)) - static_cast<std::uint64_t>(offset)));
 #endif
@@ -278,7 +278,7 @@ template <class V>
 // floor(a / 2^bits)
 template <class Int>
 [[nodiscard]] VOXELPIPE_HD constexpr Int floor_shift(Int a, int bits) {
-    return a >> bits; // arithmetic in C++20
+    return a >> bits; // arithmetic shift in C++20
 }
 
 // ceil(a / 2^bits)
@@ -309,7 +309,7 @@ template <class Int>
 #endif
 }
 
-// Place of the highest bit that is set; a != 0. One instruction less than the lowest on a GPU.
+// Index of the highest bit set; a != 0. One instruction less than the lowest on a GPU.
 [[nodiscard]] VOXELPIPE_HD inline int highest_one(std::uint32_t a) {
 #if defined(__CUDA_ARCH__)
     return 31 - __clz(static_cast<int>(a));
@@ -326,7 +326,7 @@ template <class Int>
 #endif
 }
 
-// Place of the lowest bit that is set; a != 0.
+// Index of the lowest bit set; a != 0.
 [[nodiscard]] VOXELPIPE_HD inline int lowest_one(std::uint32_t a) {
 #if defined(__CUDA_ARCH__)
     return __ffs(static_cast<int>(a)) - 1;
@@ -356,15 +356,15 @@ template <class Int>
     return quotient + static_cast<uint128>(rest > half || (rest == half && (quotient & 1) != 0));
 }
 
-// magnitude * 2^exponent rounded once (to nearest, ties to even) to a float with `mantissa_bits` stored mantissa bits
-// and `exponent_bits` exponent bits; returns the bit pattern without sign. Overflow gives infinity, underflow is
+// magnitude * 2^exponent, rounded once (to nearest, ties to even) to a float with `mantissa_bits` stored mantissa bits
+// and `exponent_bits` exponent bits. Returns the bit pattern without sign. Overflow gives infinity, underflow is
 // gradual. 16-bit: (10, 5), float: (23, 8), double: (52, 11).
 [[nodiscard]] VOXELPIPE_HD inline std::uint64_t round_to_binary(uint128 magnitude, int exponent, int mantissa_bits,
                                                                 int exponent_bits) {
     if (magnitude == 0) return 0;
     const int bias = (1 << (exponent_bits - 1)) - 1;
     const int width = bit_width(magnitude);
-    // Value is 1.xxx * 2^e; below the normal range the last place is fixed at 2^(1 - bias - mantissa_bits).
+    // The value is 1.xxx * 2^e; below the normal range the last place is fixed at 2^(1 - bias - mantissa_bits).
     const int e = width - 1 + exponent;
     const int last_place = (e > 1 - bias ? e : 1 - bias) - mantissa_bits;
     const int shift = last_place - exponent;
@@ -373,14 +373,14 @@ template <class Int>
         mantissa = magnitude << -shift;
     else if (shift < 128)
         mantissa = shift_right_rne(magnitude, shift);
-    // A mantissa with its top bit set carries the exponent by plain addition; so does a carry out of the rounding.
+    // A mantissa with its top bit set adds 1 to the exponent; so does a carry out of the rounding.
     const std::uint64_t biased = e > 1 - bias ? static_cast<std::uint64_t>(e + bias - 1) : 0;
     const std::uint64_t bits = (biased << mantissa_bits) + static_cast<std::uint64_t>(mantissa);
     const std::uint64_t infinity = ((std::uint64_t{1} << exponent_bits) - 1) << mantissa_bits;
     return bits < infinity ? bits : infinity;
 }
 
-// Nearest double, ties to even, of a wide integer (compilers and devices differ in how they convert __int128).
+// Nearest double, ties to even, of a wide integer. Compilers and devices differ in how they convert __int128.
 [[nodiscard]] VOXELPIPE_HD inline double to_double(int128 a) {
     const bool negative = a < 0;
     const uint128 magnitude = negative ? uint128{0} - static_cast<uint128>(a) : static_cast<uint128>(a);

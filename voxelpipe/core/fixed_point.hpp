@@ -3,8 +3,8 @@
 #pragma once
 
 // World positions become fixed point here, once; from then on only integers decide coverage (docs/design.md,
-// "Snapping"). Holds the sub-voxel format, the snapping formula and the table of integer widths that the rest of core/
-// relies on.
+// "Snapping"). Defines the sub-voxel format, the snapping formula and the table of integer widths that the rest of
+// core/ relies on.
 
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/core/bits.hpp>
@@ -14,7 +14,7 @@
 
 namespace voxelpipe::core {
 
-// A position in units of 2^-F voxel. A vertex that cannot be drawn holds one of the two marks in x.
+// A position in units of 2^-F voxel. For a vertex that cannot be drawn, x holds one of the two marks.
 struct snapped_position {
     std::int64_t x, y, z;
 };
@@ -26,8 +26,8 @@ inline constexpr std::int64_t too_far_mark = INT64_MIN + 1;
 // triangle's normal component is twice the area of its projection, hence at most the area of the projected box: 2e
 // bits. In voxel units the plane at a voxel needs 3 * 2^(2e) * 2^e / 2^F, doubled for the voxel centre: 3e - F + 2.6
 // bits.
-inline constexpr int max_log2_extent = 20;   // a million voxels an axis
-inline constexpr int coordinate_bits = 40;   // |q| <= 2^40: beyond, a position is "too far"
+inline constexpr int max_log2_extent = 20;   // a million voxels per axis
+inline constexpr int coordinate_bits = 40;   // |q| <= 2^40: positions beyond are "too far"
 inline constexpr int narrow_plane_bits = 62; // the 64-bit path keeps a bit to spare
 
 [[nodiscard]] VOXELPIPE_HD constexpr int ceil_log2(std::int64_t n) {
@@ -36,14 +36,14 @@ inline constexpr int narrow_plane_bits = 62; // the 64-bit path keeps a bit to s
     return bits;
 }
 
-// F = min(16, 24 - L): a float32 position has no more than this left at the far end of such a grid.
+// F = min(16, 24 - L): float32 positions have no more precision than this at the far end of such a grid.
 [[nodiscard]] VOXELPIPE_HD constexpr int fraction_bits(int largest_extent) {
     const int l = ceil_log2(largest_extent);
     return l < 8 ? 16 : 24 - l;
 }
 
-// The largest e for which the 64-bit path is exact. Bounds below: edge functions (2e + 2 bits, before the shift by F),
-// barycentric numerators (2e + 4 bits, exact in a double as well), the plane (3e - F + 2.6 bits).
+// The largest e for which the 64-bit path is exact. The bounds: edge functions (2e + 2 bits, before the shift by F),
+// barycentric numerators (2e + 4 bits, exact in a double too), the plane (3e - F + 2.6 bits).
 [[nodiscard]] VOXELPIPE_HD constexpr int narrow_edge_bits(int fraction) {
     const int plane = (narrow_plane_bits - 3 + fraction) / 3;
     return plane < 24 ? plane : 24;
@@ -75,7 +75,7 @@ static_assert(narrow_edge_bits(14) == 24 && narrow_edge_bits(13) == 24 && narrow
 struct snap_transform {
     double origin[3];
     double scale[3];        // 2^F / voxel_size, rounded once
-    std::int64_t offset[3]; // first voxel of the part of the grid that is rasterised, in sub-voxel units
+    std::int64_t offset[3]; // first voxel of the rasterised part of the grid, in sub-voxel units
     int fraction;           // F
     double shift[3];        // exact::rounding_shift of the offsets
 };
@@ -84,11 +84,11 @@ struct snap_transform {
     return (core::bit_cast<std::uint32_t>(a) & 0x7f800000u) != 0x7f800000u;
 }
 
-// The snapped position relative to the rasterised part's first voxel, or a mark where it cannot be drawn.
+// The snapped position relative to the first voxel of the rasterised part, or a mark if it cannot be drawn.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE snapped_position snap(const snap_transform& t, float x, float y, float z) {
     constexpr double limit = static_cast<double>(std::int64_t{1} << coordinate_bits);
     if (!(is_finite(x) && is_finite(y) && is_finite(z))) return {nonfinite_mark, 0, 0};
-    // A subtraction that feeds a product cannot be contracted, so the two roundings stay two under every flag.
+    // A subtraction that feeds a product cannot be contracted, so these remain two roundings under every flag.
     const double a = exact::mul(exact::to_double(x) - t.origin[0], t.scale[0]);
     const double b = exact::mul(exact::to_double(y) - t.origin[1], t.scale[1]);
     const double c = exact::mul(exact::to_double(z) - t.origin[2], t.scale[2]);
@@ -98,9 +98,9 @@ struct snap_transform {
             exact::round_to_int64(c) - t.offset[2]};
 }
 
-// snap() in 32 bits, relative to the part's first voxel: false where a coordinate of the whole grid reaches 2^30 units
-// or is not a number, which snap() then tells apart. An offset lies in the grid, below 2^25, for F + L <= 24; it is
-// even, for F > 0.
+// snap() in 32 bits, relative to the part's first voxel. Returns false if a coordinate of the whole grid reaches 2^30
+// units or is NaN; snap() then distinguishes these. An offset lies in the grid, so it is below 2^25, because F + L <=
+// 24; it is even, because F > 0.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool snap_near(const snap_transform& t, float x, float y, float z,
                                                            std::int32_t (&q)[3]) {
     const double a = exact::mul(exact::to_double(x) - t.origin[0], t.scale[0]);
@@ -109,8 +109,8 @@ struct snap_transform {
     q[0] = exact::round_to_int32(a, t.shift[0]);
     q[1] = exact::round_to_int32(b, t.shift[1]);
     q[2] = exact::round_to_int32(c, t.shift[2]);
-    // Magnitudes in the order of their high words without the sign, where infinities and NaNs come last. Doubled: a
-    // product of integers leaves the unit alone that does all other bits, and first kernels are bound by that.
+    // Compares magnitudes by their high words without the sign; infinities and NaNs are largest. The shift by one is a
+    // multiplication, because first passes are bound by the unit that does all other bit operations.
     constexpr std::uint32_t limit = 0x41d00000u * 2u; // 2^30
     const std::uint32_t ha = exact::high_word(a) * 2u, hb = exact::high_word(b) * 2u, hc = exact::high_word(c) * 2u;
     const std::uint32_t most = ha > hb ? ha : hb;

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// half: IEEE 754 binary16 storage with exact conversions (to nearest, ties to even), the same bits on every compiler.
-// It stores and converts; arithmetic is done in float by the caller.
+// half: IEEE 754 binary16 storage with exact conversions (to nearest, ties to even), with the same bits on every
+// compiler. Arithmetic is done in float by the caller.
 
 #include <voxelpipe/core/bits.hpp>
 #include <voxelpipe/core/exact.hpp>
@@ -48,7 +48,7 @@ private:
         const auto sign = static_cast<std::uint16_t>((raw >> 16) & 0x8000u);
         const std::uint32_t exponent = (raw >> 23) & 0xffu;
         const std::uint32_t mantissa = raw & 0x7fffffu;
-        if (exponent == 255) // a NaN stays one even where its payload does not fit
+        if (exponent == 255) // a NaN stays a NaN even if its payload does not fit
             return static_cast<std::uint16_t>(sign | 0x7c00u | (mantissa != 0 ? 0x200u | (mantissa >> 13) : 0u));
         if (exponent == 0) return sign; // below 2^-126, far under the smallest half
         const uint128 significand = mantissa | 0x800000u;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A random-access iterator over whatever gives its elements by number, for ranges that make them as they are read.
+// A random-access iterator for ranges that compute their elements by index.
 
 #include <voxelpipe/config.hpp>
 
@@ -13,14 +13,14 @@
 
 namespace voxelpipe::core {
 
-// Elements element(i), of a copy of `element`, which mostly refers to what must outlive the iterator.
+// Yields element(i) of a copy of `element`, which usually refers to an object that must outlive the iterator.
 template <class Element>
 class index_iterator {
 public:
     using value_type = std::invoke_result_t<const Element&, std::size_t>;
     using difference_type = std::ptrdiff_t;
     using iterator_concept = std::random_access_iterator_tag;
-    using iterator_category = std::input_iterator_tag; // elements are no references
+    using iterator_category = std::input_iterator_tag; // elements are not references
 
     index_iterator() = default;
     index_iterator(const Element& element, std::size_t i) : element_(element), i_(i) {}

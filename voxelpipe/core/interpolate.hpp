@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the fragment shader is given, from exact integers: barycentrics at the column's centre, varyings, the normal.
-// These functions are forced inline, so that what a shader does not read is not computed.
-// Varyings are aggregates whose members are float, glm::vec2/3/4, std::array<float, N> (interpolated) or flat<T> (taken
-// from the triangle's first vertex); up to 12 members.
+// Inputs of the fragment shader, from exact integers: barycentrics at the column's centre, varyings, the normal. These
+// functions are forced inline, so values that a shader does not read are not computed.
+// Varyings are aggregates of float, glm::vec2/3/4, std::array<float, N> (interpolated) or flat<T> (taken from the
+// triangle's first vertex), with up to 12 members.
 
 #include <voxelpipe/core/pack.hpp>
 #include <voxelpipe/core/small_triangle.hpp>
@@ -38,7 +38,7 @@ struct member_traits<float> {
     static constexpr bool allowed = true;
     VOXELPIPE_HD
     static float mix(float a, float b, float c, float t1, float t2) {
-        // Constant where the vertices agree; two roundings beside the differences.
+        // Constant if the vertices agree; two roundings besides the differences.
         return exact::fma(t2, exact::sub(c, a), exact::fma(t1, exact::sub(b, a), a));
     }
 };
@@ -57,7 +57,7 @@ template <std::size_t N>
 struct member_traits<std::array<float, N>> {
     static constexpr bool allowed = true;
     using array = std::array<float, N>;
-    struct plain { // std::array's functions are the host's
+    struct plain { // std::array's functions are host-only
         float f[N];
     };
     VOXELPIPE_HD
@@ -75,10 +75,10 @@ struct member_traits<flat<T>> {
     static flat<T> mix(const flat<T>& a, const flat<T>&, const flat<T>&, float, float) { return a; }
 };
 
-// How many members an aggregate has, by asking how many initialisers it takes.
+// The number of members of an aggregate: the largest number of initialisers that it takes.
 struct any_member {
     template <class T>
-    constexpr operator T() const; // NOLINT(*-explicit-*): never called, only asked for
+    constexpr operator T() const; // NOLINT(*-explicit-*): never called
 };
 template <class V, class... Init>
 consteval std::size_t num_members() {
@@ -90,7 +90,7 @@ consteval std::size_t num_members() {
 
 inline constexpr std::size_t max_varyings_members = 12;
 
-// References to the members, in order.
+// Pointers to the members, in order.
 template <class V>
 VOXELPIPE_HD constexpr auto tie_members(V& s) {
     constexpr std::size_t n = num_members<std::remove_const_t<V>>();
@@ -142,7 +142,7 @@ struct all_allowed : std::false_type {};
 template <class... Ms>
 struct all_allowed<pack<Ms*...>> : std::bool_constant<(member_traits<Ms>::allowed && ...)> {};
 
-// Whether a struct has no more members than varyings may have, as far as they can be counted.
+// True if a struct has at most as many members as varyings may have, as far as they can be counted.
 template <class V>
 consteval bool has_few_members() {
     if constexpr (std::is_aggregate_v<V>) return num_members<V>() <= max_varyings_members;
@@ -151,7 +151,7 @@ consteval bool has_few_members() {
 
 template <class V>
 consteval bool is_varyings() {
-    // Two conditions: the second must not be asked of what is no aggregate.
+    // Two conditions: the second is invalid for a type that is not an aggregate.
     if constexpr (!std::is_aggregate_v<V> || !std::is_trivially_copyable_v<V>)
         return false; // NOLINT(bugprone-branch-clone)
     else if constexpr (num_members<V>() > max_varyings_members)
@@ -160,7 +160,7 @@ consteval bool is_varyings() {
         return all_allowed<decltype(tie_members(std::declval<V&>()))>::value;
 }
 
-// a + t1 * (b - a) + t2 * (c - a), member by member, float, two fused steps each.
+// a + t1 * (b - a) + t2 * (c - a), member by member, in float, two fused steps each.
 template <class V>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE V mix(const V& a, const V& b, const V& c, float t1, float t2) {
     if constexpr (std::is_empty_v<V>) {
@@ -179,12 +179,13 @@ template <class V>
 }
 
 // Barycentrics at the centre of column (u, v) (absolute voxel indices): quotients of exact integers, rounded to double
-// and then to float. Outside the triangle some are negative. A zero-area triangle has 1/3 everywhere.
+// and then to float. Outside the triangle some are negative. 1/3 each for a zero-area triangle.
 template <class Int>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE glm::vec3 barycentric(const triangle_frame<Int>& t, std::int64_t u,
                                                                   std::int64_t v) {
     if (t.zero_area) return glm::vec3(1.0f / 3.0f);
-    const Int x = static_cast<Int>(2 * (u - t.origin[0]) + 1) << t.fraction; // doubled, so that the half stays whole
+    const Int x = static_cast<Int>(2 * (u - t.origin[0]) + 1)
+                  << t.fraction; // doubled, so that the half remains an integer
     const Int y = static_cast<Int>(2 * (v - t.origin[1]) + 1) << t.fraction;
     const double area = exact::to_double(2 * t.normal[2]);
     const auto weight = [&](const triple<Int>& p, const triple<Int>& q) VOXELPIPE_INLINE_LAMBDA {
@@ -194,7 +195,7 @@ template <class Int>
     return {weight(t.p[1], t.p[2]), weight(t.p[2], t.p[0]), weight(t.p[0], t.p[1])};
 }
 
-// The same for a small triangle; (u, v) counts from the lowest voxel of its bounding box, and lies in that box.
+// The same for a small triangle; (u, v) is relative to the lowest voxel of its bounding box, and lies in that box.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE glm::vec3 barycentric(const small_frame& t, int u, int v) {
     if (t.zero_area) return glm::vec3(1.0f / 3.0f);
     const std::int32_t x = (2 * u + 1) << t.fraction, y = (2 * v + 1) << t.fraction;
@@ -207,16 +208,16 @@ template <class Int>
     return {weight(t.p[1], t.p[2]), weight(t.p[2], t.p[0]), weight(t.p[0], t.p[1])};
 }
 
-// Negative weights to 0, then scaled to sum 1: a point on the triangle.
+// Sets negative weights to 0 and scales to sum 1: a point on the triangle.
 [[nodiscard]] VOXELPIPE_HD inline glm::vec3 clamp_barycentric(const glm::vec3& b) {
     const float x = b.x > 0.0f ? b.x : 0.0f, y = b.y > 0.0f ? b.y : 0.0f, z = b.z > 0.0f ? b.z : 0.0f;
     const float sum = exact::add(exact::add(x, y), z);
     return {exact::div(x, sum), exact::div(y, sum), exact::div(z, sum)};
 }
 
-// Unit normal in world space, (p1 - p0) x (p2 - p0) direction; zero for a zero-area triangle. Exact integers, then
-// double: scale by the voxels' shape, length by three fused steps, quotients rounded to float. Frame: triangle_frame or
-// small_frame.
+// Unit normal in world space, in the direction of (p1 - p0) x (p2 - p0); zero for a zero-area triangle. Exact integers,
+// then double: scaled by the voxels' shape, length by three fused steps, quotients rounded to float. Frame:
+// triangle_frame or small_frame.
 template <class Frame>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE glm::vec3 unit_normal(const Frame& t, const triple<double>& factors) {
     if (t.zero_area) return glm::vec3(0.0f);

@@ -26,8 +26,8 @@ struct tiled {};
 
 namespace core {
 
-// The storage of a target of T (`bit` for bits): how many elements of which type, and how a voxel is read and written.
-// Sizes are 64-bit: nx * ny * nz may pass 2^32.
+// The storage of a target of T (`bit` for bits): number and type of its elements, and access to a voxel. Sizes are
+// 64-bit: nx * ny * nz may exceed 2^32.
 template <class T, class Layout>
 struct storage_map {
     static constexpr bool is_bit = std::is_same_v<T, bit>;
@@ -41,7 +41,7 @@ struct storage_map {
 
     static constexpr int brick_x = is_bit ? 32 : 8;
 
-    // Elements of one row, slice or brick count; `cells` are voxels, or words of 32 voxels for bits.
+    // Number of voxels, or of words of 32 voxels for bits, padding included.
     [[nodiscard]] VOXELPIPE_HD static constexpr std::size_t cells(glm::ivec3 extent) {
         const auto x = static_cast<std::size_t>(extent.x), y = static_cast<std::size_t>(extent.y),
                    z = static_cast<std::size_t>(extent.z);
@@ -54,7 +54,7 @@ struct storage_map {
         return cells(extent) * (planes ? components : 1);
     }
 
-    // Cell of a voxel.
+    // Index of a voxel's cell.
     [[nodiscard]] VOXELPIPE_HD static constexpr std::size_t cell(glm::ivec3 extent, int x, int y, int z) {
         const int column = is_bit ? x >> 5 : x;
         if constexpr (bricks) {
@@ -66,7 +66,7 @@ struct storage_map {
             const int inside = is_bit ? (z & 7) * 8 + (y & 7) : ((z & 7) * 8 + (y & 7)) * 8 + (x & 7);
             return brick * (is_bit ? 64 : 512) + static_cast<std::size_t>(inside);
         } else {
-            const auto wide = [](int a) { return std::size_t{static_cast<std::uint32_t>(a)}; }; // no sign to extend
+            const auto wide = [](int a) { return std::size_t{static_cast<std::uint32_t>(a)}; }; // no sign extension
             const std::size_t row = wide(is_bit ? (extent.x + 31) / 32 : extent.x);
             return (wide(z) * wide(extent.y) + wide(y)) * row + wide(column);
         }

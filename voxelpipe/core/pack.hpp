@@ -19,7 +19,7 @@ namespace core {
 template <class... Ts>
 struct pack {};
 
-// No [[no_unique_address]]: nvcc 13.0 lays such members out differently on the host and on the device.
+// No [[no_unique_address]]: nvcc 13.0 lays out such members differently on host and device.
 template <class First>
 struct pack<First> {
     First first;
@@ -46,7 +46,7 @@ template <std::size_t I, class... Ts>
 [[nodiscard]] VOXELPIPE_HD constexpr auto& get(core::pack<Ts...>& p) {
     static_assert(I < sizeof...(Ts), "voxelpipe::get: index past the end");
     if constexpr (I >= sizeof...(Ts))
-        return p; // does not compile; without a second error
+        return p; // does not compile; avoids a second error
     else if constexpr (I == 0)
         return p.first;
     else
@@ -57,7 +57,7 @@ template <std::size_t I, class... Ts>
 [[nodiscard]] VOXELPIPE_HD constexpr const auto& get(const core::pack<Ts...>& p) {
     static_assert(I < sizeof...(Ts), "voxelpipe::get: index past the end");
     if constexpr (I >= sizeof...(Ts))
-        return p; // does not compile; without a second error
+        return p; // does not compile; avoids a second error
     else if constexpr (I == 0)
         return p.first;
     else
@@ -94,10 +94,10 @@ VOXELPIPE_HD constexpr void for_each_index(F&& f) {
 
 namespace core {
 template <class T>
-inline constexpr bool never = false; // in the static_assert of a function that must not be used
+inline constexpr bool never = false; // for the static_assert of a function that must not be used
 } // namespace core
 
-// A non-owning array; T may be const. Unlike std::span it can be used in device code without flags.
+// A non-owning array; T may be const. Unlike std::span it works in device code without flags.
 template <class T>
 struct array_view {
     T* elements = nullptr;
@@ -106,7 +106,7 @@ struct array_view {
     constexpr array_view() = default;
     VOXELPIPE_HD
     constexpr array_view(T* elements_, std::size_t count_) : elements(elements_), count(count_) {}
-    // From any contiguous container of T on the host (std::vector, std::array, std::span). Does not own.
+    // Refers to a contiguous container of T on the host (std::vector, std::array, std::span).
     template <class Range>
     requires(!std::is_same_v<std::remove_cvref_t<Range>, array_view> &&
              requires(Range && r) {
@@ -126,8 +126,8 @@ struct array_view {
     [[nodiscard]] VOXELPIPE_HD constexpr T* end() const { return elements + count; }
 };
 
-// An array in the memory of a backend, which the host may not be able to read. The same for host memory, where the
-// backend runs on the host.
+// An array in the memory of a backend, which the host may be unable to read. If the backend runs on the host, this is
+// host memory.
 template <class T>
 struct backend_view : array_view<T> {
     using array_view<T>::array_view;

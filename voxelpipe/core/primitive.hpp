@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the backends do alike with one triangle outside the raster itself: whether it is drawn and if not why, which
-// tiles it has work in, and the voxels of a tile.
+// Work on one triangle that all backends share, outside the raster itself: whether it is drawn and if not why, the
+// tiles in which it has work, and the voxels of a tile.
 
 #include <voxelpipe/core/coverage.hpp>
 #include <voxelpipe/core/tile_grid.hpp>
@@ -14,7 +14,7 @@ namespace voxelpipe::core {
 
 enum class triangle_class : std::uint8_t { drawn, nonfinite, too_far, zero_area, outside };
 
-// Whether a triangle is drawn, and if not why. `reach` receives the voxels that it may touch, cut to the grid.
+// Classifies a triangle: drawn, or why not. `reach` receives the voxels that it may touch, clipped to the grid.
 template <coverage Rule>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE triangle_class classify(const snapped_position& a,
                                                                     const snapped_position& b,
@@ -36,7 +36,7 @@ template <coverage Rule>
     return reach.empty() ? triangle_class::outside : triangle_class::drawn;
 }
 
-// After snapping; the vertices are drawable.
+// Zero area after snapping; the vertices must be drawable.
 [[nodiscard]] VOXELPIPE_HD inline bool has_zero_area(const snapped_position& a, const snapped_position& b,
                                                      const snapped_position& c) {
     const std::int64_t e1[3] = {b.x - a.x, b.y - a.y, b.z - a.z};
@@ -47,7 +47,7 @@ template <coverage Rule>
     return equal(1, 2) && equal(2, 0) && equal(0, 1);
 }
 
-// A box of voxels in units of 2^log2_size voxels.
+// Converts a box of voxels to units of 2^log2_size voxels.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr voxel_box coarsen(const voxel_box& box, int log2_size) {
     voxel_box r{};
     for (int i = 0; i < 3; ++i) {
@@ -57,13 +57,13 @@ template <coverage Rule>
     return r;
 }
 
-// Calls emit(tile) for each tile within `box` (tiles) that the triangle has work in: exactly the tiles whose closed box
-// it meets (conservative), or the tiles that its plane passes within its columns (thin).
+// Calls emit(tile) for each tile within `box` (tiles) in which the triangle has work: exactly the tiles whose closed
+// box it meets (conservative), or the tiles that its plane passes within its columns (thin).
 VOXELPIPE_ANY_CALLABLE
 template <coverage Rule, class Emit>
 VOXELPIPE_HD void for_each_tile_in(const snapped_position& a, const snapped_position& b, const snapped_position& c,
                                    int fraction, const voxel_box& box, const tile_grid& tiles, Emit&& emit) {
-    // A tile is a voxel of a coarser grid: the same exact coverage, 2^log2_size times larger.
+    // A tile is a voxel of a coarser grid, so the same exact coverage applies, 2^log2_size times larger.
     constexpr auto rule = Rule == coverage::thin ? span_rule::columns : span_rule::conservative;
     VOXELPIPE_CALLS_ANY
     rasterize<rule>(a, b, c, fraction + tiles.log2_size, box,
@@ -76,8 +76,8 @@ VOXELPIPE_HD void for_each_tile_in(const snapped_position& a, const snapped_posi
     VOXELPIPE_CALLS_ANY_END
 }
 
-// The same for all of the triangle's `reach` (voxels). One that lies in one tile needs no test, nor does one whose
-// bounding box is a line of tiles (is_line_of_voxels). Inlined, because most triangles do lie in one tile.
+// The same for all of the triangle's `reach` (voxels). A triangle within one tile needs no test, nor does one whose
+// bounding box is a line of tiles (is_line_of_voxels). Inlined, because most triangles lie in one tile.
 VOXELPIPE_ANY_CALLABLE
 template <coverage Rule, class Emit>
 VOXELPIPE_HD VOXELPIPE_INLINE void for_each_tile(const snapped_position& a, const snapped_position& b,
@@ -99,7 +99,7 @@ VOXELPIPE_HD VOXELPIPE_INLINE void for_each_tile(const snapped_position& a, cons
     for_each_tile_in<Rule>(a, b, c, fraction, box, tiles, emit);
 }
 
-// The voxels of a tile, cut to the extent.
+// The voxels of a tile, clipped to the extent.
 [[nodiscard]] VOXELPIPE_HD inline voxel_box tile_box(const tile_grid& tiles, std::uint64_t tile, glm::ivec3 extent) {
     const glm::ivec3 p = tiles.position(tile);
     voxel_box box{};
@@ -112,7 +112,7 @@ VOXELPIPE_HD VOXELPIPE_INLINE void for_each_tile(const snapped_position& a, cons
     return box;
 }
 
-// The dominant axis as setup_triangle finds it, without the rest of the set-up.
+// The dominant axis that setup_triangle would find, without the rest of the setup.
 [[nodiscard]] VOXELPIPE_HD inline int dominant_axis(const snapped_position& a, const snapped_position& b,
                                                     const snapped_position& c, int fraction) {
     const auto pick = [&](auto zero) {

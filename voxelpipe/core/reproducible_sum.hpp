@@ -17,7 +17,7 @@ inline constexpr std::uint32_t sum_positive_infinity = 1;
 inline constexpr std::uint32_t sum_negative_infinity = 2;
 inline constexpr std::uint32_t sum_nan = 4;
 
-// 64 * Limbs + 32 bits, two's complement, with the marks of terms that are no finite numbers.
+// 64 * Limbs + 32 bits, two's complement, with marks for terms that are not finite.
 template <int Limbs>
 struct wide_sum {
     std::uint64_t limb[Limbs];
@@ -42,8 +42,8 @@ inline void add_term(wide_sum<2>& s, int128 term) {
     s.top += static_cast<std::int32_t>(sum < low) - static_cast<std::int32_t>(term < 0);
 }
 
-// n times a sum, marks included; exact where the product has the sum's width. Two's complement: a product of words,
-// modulo 2^(64 * Limbs + 32).
+// n times a sum, marks included; exact if the product fits the sum's width. Two's complement: a product of words modulo
+// 2^(64 * Limbs + 32).
 template <int Limbs>
 [[nodiscard]] VOXELPIPE_HD inline wide_sum<Limbs> repeat_sum(const wide_sum<Limbs>& s, std::uint32_t n) {
     wide_sum<Limbs> r{};
@@ -72,8 +72,8 @@ VOXELPIPE_HD inline void add_sum(wide_sum<Limbs>& s, const wide_sum<Limbs>& othe
     s.marks |= other.marks;
 }
 
-// |sum| as magnitude * 2^exponent; bits that fall off the end of 128 are kept as a sticky last bit, which no rounding
-// to 53 bits or fewer can tell from the real ones.
+// |sum| as magnitude * 2^exponent. Bits beyond 128 are merged into a sticky last bit, which is exact for any rounding
+// to 53 bits or fewer.
 struct sum_magnitude {
     bool negative;
     uint128 magnitude;
@@ -155,7 +155,7 @@ VOXELPIPE_HD inline void add_double(wide_sum<2>& s, double term) {
         s.marks |= sum_nan;
         return;
     }
-    // |term| = significand * 2^(exponent - 1075); in quanta a shift by that much less the quantum.
+    // |term| = significand * 2^(exponent - 1075); in quanta, a shift by that exponent minus the quantum's.
     const int shift = exponent - 1075 - Log2Quantum;
     if (shift > 127 - 53) {
         s.marks |= negative ? sum_negative_infinity : sum_positive_infinity;
@@ -172,7 +172,7 @@ VOXELPIPE_HD inline void add_double(wide_sum<2>& s, double term) {
     return (marks & sum_nan) != 0 || (marks & 3u) == 3u;
 }
 
-// The sum rounded once: bit pattern of a format with the given mantissa and exponent bits.
+// The sum, rounded once, as the bit pattern of a format with the given mantissa and exponent bits.
 template <int Limbs>
 [[nodiscard]] VOXELPIPE_HD inline std::uint64_t round_sum(const wide_sum<Limbs>& s, int log2_quantum, int mantissa_bits,
                                                           int exponent_bits) {
@@ -186,7 +186,7 @@ template <int Limbs>
            (m.negative ? sign : 0);
 }
 
-// The same to a float, mostly by one conversion: a sum that fits 64 bits, without marks. Its last place is a normal
+// The same for float, usually by one conversion: if the sum fits 64 bits and has no marks. Its last place is a normal
 // float, so the product is exact.
 template <int Log2Quantum>
 [[nodiscard]] VOXELPIPE_HD inline float round_sum_to_float(const wide_sum<1>& s) {

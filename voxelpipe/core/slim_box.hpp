@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Conservative coverage of a slim bounding box, of at most two voxels a side but three along one axis, by the signs at
-// its inner corners (corner_signs.hpp): the centre of 2 x 2 x 2 voxels, and where the box is three voxels long the next
-// corner along that axis. Those of a triangle's vertices are the same differences, one voxel further on.
+// Conservative coverage of a slim bounding box, of at most two voxels a side but possibly three along one axis, by the
+// signs at its inner corners (corner_signs.hpp): the centre of 2 x 2 x 2 voxels and, if the box is three voxels long,
+// the next corner along that axis. Values at the next corner follow from the same vertex differences, one voxel
+// further.
 
 #include <voxelpipe/core/corner_signs.hpp>
 
@@ -17,24 +18,23 @@ namespace voxelpipe::core {
     return max3(last[0], last[1], last[2]) <= 2 && (in_two & 2) == 0;
 }
 
-// The covered voxels of a slim box, in rows along x of four bits each, row i from bit 4 i on. Rows are those of 2 x 2
-// in y + 2 z, or where the box is long along z of 2 x 3; where it is long along y those of 2 x 3 in z + 2 y.
+// The covered voxels of a slim box, in rows along x of four bits each; row i starts at bit 4 i. Row numbers are y + 2
+// z; if the box is long along y, z + 2 y.
 struct slim_rows {
-    std::uint32_t bits; // none where a float has too few bits to tell
+    std::uint32_t bits; // 0 if floats cannot decide
     bool along_y;
     static constexpr int count = 6;
 };
 
-// q: the vertices in units of 2^-fraction voxel, lo: the box's lowest voxel, last: its highest, counted from that, of a
-// slim box. fraction <= 20. Rounding is what it is in a box of three voxels a side (rule_out_by_signs), or less.
+// q: vertices in units of 2^-fraction voxel; lo: the box's lowest voxel; last: its highest, relative to lo. The box
+// must be slim. fraction <= 20. Rounding errors are at most those in a box of three voxels a side (rule_out_by_signs).
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE slim_rows slim_rows_by_signs(const std::int32_t (&q)[3][3],
                                                                          const std::int32_t (&lo)[3],
                                                                          const int (&last)[3], int fraction) {
-    // The axes in another order, a being the long one and, where that is not x, c x. Coverage does not know whether a
-    // triangle is seen in a mirror.
+    // Permutes the axes: a is the long one and, unless that is x, c is x. Coverage is the same for a mirrored triangle.
     const bool along_x = last[0] == 2, along_y = last[1] == 2;
-    float d[3][3]; // [axis][vertex]: from the lowest inner corner
-    int side[3];   // of the box, in voxels, less one
+    float d[3][3]; // [axis][vertex], relative to the lowest inner corner
+    int side[3];   // of the box, in voxels, minus one
     {
         const std::int32_t corner[3] = {(lo[0] + 1) << fraction, (lo[1] + 1) << fraction, (lo[2] + 1) << fraction};
         const auto a_of = [&](std::int32_t x, std::int32_t y, std::int32_t z) VOXELPIPE_INLINE_LAMBDA {
@@ -57,15 +57,15 @@ struct slim_rows {
                has_abc = has_ab & (side[2] != 0);
     const float one = power_of_two(fraction), limit = power_of_two(2 * fraction - 16),
                 plane_limit = power_of_two(3 * fraction - 12);
-    float least = 2 * limit, min_plane = 2 * plane_limit; // of what signs depend on
-    // What is ruled out behind the first corner and behind the next one, a + 2 b + 4 c from each, in every byte.
+    float least = 2 * limit, min_plane = 2 * plane_limit; // smallest magnitudes that a sign depends on
+    // Voxels ruled out behind the first corner and behind the next one, a + 2 b + 4 c from each, in every byte.
     std::uint32_t first = 0, next = 0;
     const auto rule_out = [&](const corner_edges& e, bool wanted, std::uint32_t lower_of_first,
                               std::uint32_t lower_of_second) VOXELPIPE_INLINE_LAMBDA {
         least = min_magnitude(least, wanted ? e.least() : 2 * limit);
         first |= behind_centre(e, lower_of_first, lower_of_second) & (wanted ? ~0u : 0u);
     };
-    // The edges at the next corner are `step` times `along` more than at the first.
+    // Edge values at the next corner are those at the first plus `step` times `along`.
     const auto rule_out_next = [&](const corner_edges& e, bool wanted, float step, const float(&along)[3],
                                    std::uint32_t lower_of_first,
                                    std::uint32_t lower_of_second) VOXELPIPE_INLINE_LAMBDA {
@@ -83,7 +83,8 @@ struct slim_rows {
     rule_out_next(ab, has_ab & is_long, -one, ab.along_b, lower_x, lower_y);
     rule_out_next(ca, has_ca & is_long, one, ca.along_a, lower_z, lower_x);
     const auto rule_out_by_plane = [&](float at, bool wanted, std::uint32_t& out) VOXELPIPE_INLINE_LAMBDA {
-        const std::uint32_t above = sign_word(at); // the corner: then the voxel behind is the upper one
+        const std::uint32_t above =
+            sign_word(at); // the plane is above the corner: then the voxel behind is the upper one
         min_plane = min_magnitude(min_plane, wanted ? at : 2 * plane_limit);
         out |= (bc.turned ^ above ^ lower_x) & (ca.turned ^ above ^ lower_y) & (ab.turned ^ above ^ lower_z) &
                (wanted ? 0xffu : 0u);
@@ -93,7 +94,7 @@ struct slim_rows {
     rule_out_by_plane(exact::fma(-one, bc.normal, plane), has_abc & is_long, next);
     const bool sure = least > limit && min_plane > plane_limit;
 
-    // Both as a + 4 b + 8 c, each in 16 bits, then together.
+    // Both as a + 4 b + 8 c, each in 16 bits, then combined.
     std::uint32_t w = ((first | first >> 16) & 0xffffu) | ((next | next << 16) & 0xffff0000u);
     w = (w | w >> 8) & 0x00ff00ffu;
     w = (w & 0x000f000fu) | (w & 0x00f000f0u) << 4;

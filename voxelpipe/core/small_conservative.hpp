@@ -10,11 +10,11 @@
 
 namespace voxelpipe::core {
 
-// What the plane of a small triangle leaves of a row of voxels, in floats. With S = |n.x| + |n.y| + |n.z| voxels that
-// meet the plane are within S / 2 of `middle`, and up to 32 voxels from the corner all that is added, by five
-// roundings, stays below 66 S: less than 2^-15.3 S is lost, and 2^-15 S left for it on both sides.
+// The plane of a small triangle, clipping rows of voxels in floats. With S = |n.x| + |n.y| + |n.z|, voxels that meet
+// the plane are within S / 2 of `middle`. Up to 32 voxels from the corner every term of a sum, with five roundings,
+// stays below 66 S: the error is less than 2^-15.3 S, and the tests leave a margin of 2^-15 S on both sides.
 struct near_plane {
-    float n[3], middle;  // along x from x0 on; where rows are to be clipped turned so that n[0] >= 0
+    float n[3], middle;  // along x from x0 on; negated if rows are to be clipped and n[0] < 0
     float half, inverse; // S / 2; 1 / (64 n[0])
 
     VOXELPIPE_HD VOXELPIPE_INLINE near_plane(const std::int64_t (&normal)[3], std::int64_t below, std::int64_t above,
@@ -28,15 +28,15 @@ struct near_plane {
         }
         inverse = exact::near_inverse(exact::mul(64.0f, n[0]));
     }
-    // Whether the voxels from and to of a row, from x0 on, surely meet the plane, and so all between them.
+    // True if the voxels `from` and `to` of a row, counted from x0, and so all between them, certainly meet the plane.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets(int from, int to, int y, int z) const {
         const float row = row_at(y, z), in = exact::mul(half, 1.0f - 0x1p-14f);
         const float a = exact::fma(n[0], small_to_float(from), row), b = exact::fma(n[0], small_to_float(to), row);
         return a < in && -a < in && b < in && -b < in;
     }
-    // Of the voxels from..to of a row, from x0 on, those that are left; `sure`: whether this is so. Along x the plane
-    // comes nearer and goes: it leaves what is between two numbers, which are rounded inwards and then looked at: the
-    // voxel that is in has to be so surely, and the one before it surely out.
+    // The voxels from..to of a row, counted from x0, that meet the plane; `sure` is false if rounding may matter. The
+    // plane leaves an interval along x, whose ends are rounded inwards and then tested: the first voxel inside must be
+    // certainly in, and the one before it certainly out.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t clip(int from_x, int to_x, int y, int z,
                                                                    bool& sure) const {
         const float row = row_at(y, z);
@@ -65,10 +65,10 @@ private:
 struct small_conservative {
     small_half_plane xy[3], yz[3], zx[3];
     std::int64_t n[3]; // normal
-    // A voxel's lowest corner c meets the plane where n . c + below >= 0 and above - n . c >= 0.
+    // A voxel with lowest corner c meets the plane iff n . c + below >= 0 and above - n . c >= 0.
     std::int64_t below, above;
 
-    small_conservative() = default; // for brick_triangle to fill
+    small_conservative() = default; // brick_triangle sets the members
     VOXELPIPE_HD VOXELPIPE_INLINE small_conservative(const small_triangle& t, int fraction) {
         const triple<std::int64_t> normal = small_normal(t);
         small_projection<0, 1>(t, normal[2] < 0, fraction, xy);
@@ -110,8 +110,9 @@ struct small_conservative {
         return bits;
     }
 
-    // What the xy projection leaves of the voxels x0 .. x1 at y, what the zx projection leaves of them at z, whether
-    // the yz projection leaves the row (y, z), and what the plane leaves of `limit` in it: a row is the four together.
+    // Parts of a row's coverage, which is the conjunction of all: voxels x0 .. x1 within the xy projection at y, those
+    // within the zx projection at z, whether the row (y, z) is within the yz projection, and the voxels of `limit` that
+    // meet the plane.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t limit_at_y(int x0, int x1, int y) const {
         return line(xy[0].at(x0, y), xy[1].at(x0, y), xy[2].at(x0, y), xy[0].a, xy[1].a, xy[2].a, x1 - x0);
     }
@@ -121,8 +122,7 @@ struct small_conservative {
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets_row(int y, int z) const {
         return (yz[0].at(y, z) | yz[1].at(y, z) | yz[2].at(y, z)) >= 0;
     }
-    // `limit` is one run of bits, as what projections leave is, and so is what the plane leaves of it: its ends are
-    // tested, and mostly nothing else.
+    // `limit` is one run of bits, as projections give, and the result is one too: usually only its ends are tested.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t plane_bits(int x0, int y, int z,
                                                                          std::uint32_t limit) const {
         if (limit == 0) return 0;
@@ -141,11 +141,10 @@ struct small_conservative {
         return first <= last ? ((2u << last) - 1) & ~((1u << first) - 1) : 0;
     }
 
-    // Calls emit(y, z, bits) for the rows of a box of at most 8 voxels along x that two projections and the plane leave
-    // something of; bit 0 is box.lo[0]. What the xy and the zx projection leave depends on y or on z alone, so that is
-    // found once and not once a row, and the yz projection tells which rows are wanted at all: threads that have a
-    // triangle each then go through as many rows as they emit, not through their boxes. 8 x 8 rows of 8 bits at once.
-    // Clips: see plane_bits.
+    // Calls emit(y, z, bits) for the rows of a box of at most 8 voxels along x in which two projections and the plane
+    // leave something; bit 0 is box.lo[0]. Coverage by the xy and the zx projection depends on y or on z alone, so it
+    // is computed once instead of once per row, and the yz projection selects rows: threads with a triangle each visit
+    // as many rows as they emit, not their whole boxes. Takes 8 x 8 rows of 8 bits at a time. Clips: see plane_bits.
     template <bool Clips, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void rows(const small_box& box, Emit&& emit) const {
         if (box.hi[0] < box.lo[0]) return;
@@ -168,7 +167,7 @@ struct small_conservative {
             return r;
         }
         [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_done() const { return met_ == 0; }
-        // The next row, which nothing may be left of: then it is not emitted.
+        // Emits the next row, unless it is empty.
         template <bool Clips, class Emit>
         VOXELPIPE_HD VOXELPIPE_INLINE void next(const small_conservative& s, Emit&& emit) {
             const int at = exact::lowest_one(met_), y = at % 8, z = at / 8;
@@ -183,7 +182,7 @@ struct small_conservative {
         near_plane plane_;
         int x0_, y0_ = 0, z0_ = 0;
         std::uint32_t along_, across_ = 0;
-        std::uint64_t by_y_ = 0, by_z_ = 0, met_ = 0; // met: rows, bit y + 8 z
+        std::uint64_t by_y_ = 0, by_z_ = 0, met_ = 0; // rows, bit y + 8 z
 
         VOXELPIPE_HD VOXELPIPE_INLINE row_walk_8(const small_conservative& s, const small_box& box, bool clips)
             : plane_(s.n, s.below, s.above, box.lo[0], clips), x0_(box.lo[0]),
@@ -244,9 +243,9 @@ struct small_conservative {
                 }
             }
         }
-        // Whether there is a row here, among the next four z.
+        // True if the current four z have a row left.
         [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_here() const { return met_[0] != 0; }
-        // Leaves these z behind; false where no row is left.
+        // Advances to the next four z; false if no row is left.
         VOXELPIPE_HD VOXELPIPE_INLINE bool advance() {
             if ((met_[1] | met_[2] | met_[3]) == 0) return false;
             for (int k = 1; k < 4; ++k) met_[k - 1] = met_[k];
@@ -254,13 +253,13 @@ struct small_conservative {
             first_z_ += 4;
             return true;
         }
-        // Otherwise there is a row here.
+        // Advances to the next row; true if there is none.
         [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_done() {
             while (!is_here())
                 if (!advance()) return true;
             return false;
         }
-        // The next row, as of row_walk_8, where there is one here.
+        // Emits the next row, as row_walk_8 does, if is_here().
         template <bool Clips, class Limits, class Emit>
         VOXELPIPE_HD VOXELPIPE_INLINE void next(const small_conservative& s, Limits&& limits, Emit&& emit) {
             const int at = exact::lowest_one(met_[0]), y = at % 16, z = first_z_ + at / 16;
@@ -291,8 +290,8 @@ struct small_conservative {
     }
 
 private:
-    // The same, from what floats say where they are sure: of whatever the plane leaves, or only whether that is all,
-    // which takes fewer registers.
+    // plane_bits by floats, if they are sure. Clips: they clip; otherwise they only test whether the plane leaves
+    // everything, which takes fewer registers.
     template <bool Clips>
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t plane_bits(const near_plane& plane, int x0, int y, int z,
                                                                          std::uint32_t limit) const {
@@ -305,8 +304,8 @@ private:
             sure = plane.meets(first, last, y, z);
         return sure ? bits : plane_bits(x0, y, z, limit);
     }
-    // What the xy projection leaves of the voxels from x - Length + 1 to x at y, the zx projection of them at z, and
-    // the yz projection of the rows from y - Length + 1 to y at z.
+    // Coverage by one projection: xy for the voxels x - Length + 1 to x at y; zx for these at z; yz for the rows y -
+    // Length + 1 to y at z.
     template <int Length>
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t limits_at_y(int x, int y) const {
         return small_line<Length>(xy[0].at(x, y), xy[1].at(x, y), xy[2].at(x, y), xy[0].a, xy[1].a, xy[2].a);
@@ -319,7 +318,7 @@ private:
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t rows_at_z(int y, int z) const {
         return small_line<Length>(yz[0].at(y, z), yz[1].at(y, z), yz[2].at(y, z), yz[0].a, yz[1].a, yz[2].a);
     }
-    // Bit x where three values, stepped x times, are all >= 0; x = 0 .. last.
+    // Bit x is set if three values, stepped x times, are all >= 0; x = 0 .. last.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE static std::uint32_t line(std::int32_t e0, std::int32_t e1,
                                                                           std::int32_t e2, std::int32_t s0,
                                                                           std::int32_t s1, std::int32_t s2, int last) {

@@ -17,7 +17,7 @@ struct small_thin {
     // The depth at a column's centre is (depth - nu (2u + 1) - nv (2v + 1)) / (2 nw).
     std::int64_t nu, nv, nw, depth;
 
-    small_thin() = default; // for brick_thin to fill
+    small_thin() = default; // brick_thin sets the members
 
     VOXELPIPE_HD VOXELPIPE_INLINE small_thin(const small_triangle& t, const triple<std::int64_t>& normal, int axis_,
                                              int fraction)
@@ -37,7 +37,7 @@ struct small_thin {
         depth = exact::floor_shift(2 * (nu * turned.p[0][0] + nv * turned.p[0][1] + nw * turned.p[0][2]), fraction);
     }
 
-    // u and v for each other: `columns` and uv then have them the other way round.
+    // Swaps u and v, also for uv and `columns`.
     VOXELPIPE_HD VOXELPIPE_INLINE void swap_uv() {
         for (small_half_plane& e : uv) e = {e.b, e.a, e.c};
         const std::int64_t u = nu;
@@ -45,15 +45,15 @@ struct small_thin {
         nv = u;
     }
 
-    // Covered columns, row by row, of which some may have been passed.
+    // A position in the covered columns, row by row.
     struct walk {
-        float by_u, by_v, first, of_row; // depths: steps, at the centre of (0, 0), and of this row's first column
-        std::uint32_t rows, row;         // what is left: rows, as bits, and columns of this one
+        float by_u, by_v, first, of_row; // depths: steps; at the centre of (0, 0); at this row's first column
+        std::uint32_t rows, row;         // remaining rows, as bits; remaining columns of this row
         int u0, v0, step, v;
         [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_done() const { return (rows | row) == 0; }
     };
-    // The covered columns of the rows v0, v0 + step, ... up to v1, of at most 32 columns each. `kept` holds a word for
-    // each of the rows, at most 32: get(i), set(i, word). Adds how many columns they are to `count`.
+    // Finds the covered columns of the rows v0, v0 + step, ... up to v1, with at most 32 columns each. `kept` holds a
+    // word for each of the at most 32 rows: get(i), set(i, word). Adds the number of columns to `count`.
     template <class Kept>
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE walk find_columns(int u0, int u1, int v0, int v1, int step, Kept&& kept,
                                                                   std::uint32_t& count) const {
@@ -77,7 +77,8 @@ struct small_thin {
         k.step = step;
         return k;
     }
-    // The next column of a walk that is not done: emit(u, w), and begin_row(v) before the first of a row.
+    // Visits the next column of a walk that is not done: calls emit(u, w), and begin_row(v) before the first column of
+    // a row.
     template <class Kept, class BeginRow, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void next_column(walk& k, Kept&& kept, BeginRow&& begin_row, Emit&& emit) const {
         if (k.row == 0) {
@@ -92,21 +93,20 @@ struct small_thin {
         k.row ^= 1u << i;
         emit(u, depth_of(nu, nv, nw, depth, k.by_u, k.of_row, u, k.v));
     }
-    // The depth of the touched column u of row v of a plane as above, in floats first + by_u u.
+    // The depth of touched column u of row v; first + by_u * u is about that, in floats.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE static std::int32_t depth_of(std::int64_t nu, std::int64_t nv,
                                                                              std::int64_t nw, std::int64_t depth,
                                                                              float by_u, float first, int u, int v) {
-        // Slopes are at most one, and depths from -1 to 33, so that `first` is below 100, and what is lost on the way
-        // below 2^-14 voxel.
+        // Slopes are at most one and depths from -1 to 33, so `first` is below 100 and the error below 2^-14 voxel.
         float over = 0;
         const std::int32_t w = exact::integer_below(exact::fma(by_u, static_cast<float>(u), first), over);
         if (over >= 0x1p-12f && over <= 1.0f - 0x1p-12f) return w;
-        const std::int64_t divisor = 2 * nw; // at most one off
+        const std::int64_t divisor = 2 * nw; // w is at most one off
         const std::int64_t remainder = depth - times(nu, 2 * u + 1) - times(nv, 2 * v + 1) - w * divisor;
         return w + static_cast<std::int32_t>(remainder >= divisor) - static_cast<std::int32_t>(remainder < 0);
     }
-    // All of them, for threads that have a triangle each, as small_conservative::rows. First all rows, then one loop
-    // over the columns that are left.
+    // Visits all covered columns, for threads with a triangle each, as small_conservative::rows does: first all rows,
+    // then one loop over the remaining columns.
     template <class Kept, class BeginRow, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void columns(int u0, int u1, int v0, int v1, int step, Kept&& kept,
                                                BeginRow&& begin_row, Emit&& emit) const {
@@ -117,8 +117,8 @@ struct small_thin {
 };
 
 // The depths of the columns (u, v) of 2 x 2 of a bounding box that is at most two voxels deep: w + 1 in two bits, at 2
-// u + 4 v. Only for columns that the triangle touches, whose depth at their centre is within a voxel of the triangle's
-// own: no division.
+// u + 4 v. Valid for columns that the triangle touches: their depth at the centre is within a voxel of the triangle's
+// own depths, so no division is needed.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t cube_depths(const small_thin& s) {
     const std::int64_t divisor = 2 * s.nw, first = s.depth - s.nu - s.nv;
     std::uint32_t packed = 0;

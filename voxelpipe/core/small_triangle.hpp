@@ -3,10 +3,10 @@
 #pragma once
 
 // Coverage of a small triangle in 32-bit integers: the sets of coverage.hpp for a triangle whose bounding box is a few
-// voxels, with coordinates that count from that box. Here is what both kinds of coverage share (small_conservative.hpp,
-// small_thin.hpp). Only the set-up multiplies in 64 bits, and the plane, whose normal is an area, is kept in 64.
+// voxels, with coordinates relative to that box. This header has what both coverages share (small_conservative.hpp,
+// small_thin.hpp). Only the setup multiplies in 64 bits, and the plane, whose normal is an area, is kept in 64.
 // Conservative coverage comes as rows of bits along x, whatever the dominant axis: the separating axes (bounding box,
-// plane, three projections) do not know one. Nothing branches on the triangle's shape.
+// plane, three projections) do not depend on it. Nothing branches on the triangle's shape.
 
 #include <voxelpipe/core/triangle_setup.hpp>
 
@@ -21,7 +21,7 @@ namespace voxelpipe::core {
 inline constexpr int small_edge_bits = 20;
 inline constexpr int small_most_voxels = 32; // a row is one word
 
-// How many voxels a side of a small triangle's bounding box may have.
+// The most voxels along a side of a small triangle's bounding box.
 [[nodiscard]] VOXELPIPE_HD constexpr int small_voxels(int fraction) {
     if (2 * small_edge_bits + 3 - fraction > 31) return 0;
     const int n = 1 << (fraction < small_edge_bits ? small_edge_bits - fraction : 0);
@@ -35,7 +35,7 @@ struct small_triangle {
     std::int32_t p[3][3]; // [vertex][axis]
 };
 
-// The part of the bounding box that is wanted, inclusive, relative to its lowest voxel.
+// The wanted part of the bounding box, inclusive, relative to its lowest voxel.
 struct small_box {
     int lo[3], hi[3];
     [[nodiscard]] VOXELPIPE_HD constexpr bool empty() const { return hi[0] < lo[0] || hi[1] < lo[1] || hi[2] < lo[2]; }
@@ -46,8 +46,8 @@ struct small_half_plane {
     [[nodiscard]] VOXELPIPE_HD constexpr std::int32_t at(int x, int y) const { return a * x + b * y + c; }
 };
 
-// The three half-planes of the projection on axes (X, Y). Edges are turned by the sign of the projected area; where
-// that is zero, the closed chain of edges runs along one line both ways, which leaves exactly that line.
+// The three half-planes of the projection on axes (X, Y). The sign of the projected area orients the edges. If the area
+// is zero, the closed chain of edges runs along one line in both directions, so exactly that line is left.
 template <int X, int Y>
 VOXELPIPE_HD VOXELPIPE_INLINE constexpr void small_projection(const small_triangle& t, bool negative, int fraction,
                                                               small_half_plane (&out)[3]) {
@@ -64,7 +64,7 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void small_projection(const small_triang
     }
 }
 
-// The voxels of 2 x 2 that three half-planes leave, bit x + 2 y.
+// The voxels of 2 x 2 inside three half-planes, bit x + 2 y.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::uint32_t quad_bits(const small_half_plane (&e)[3]) {
     std::uint32_t out = 0;
     for (int y = 0; y < 2; ++y)
@@ -82,14 +82,14 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void small_projection(const small_triang
     return {{e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x}};
 }
 
-// The dominant axis: of the largest component, the first of equals; -1 where the area is zero.
+// The dominant axis: that of the largest component, the first of equals; -1 if the area is zero.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr int small_axis(const triple<std::int64_t>& normal) {
     const std::int64_t x = magnitude(normal[0]), y = magnitude(normal[1]), z = magnitude(normal[2]);
     return (x | y | z) == 0 ? -1 : x >= y && x >= z ? 0 : y >= z ? 1 : 2;
 }
 
-// What a fragment's position on a small triangle, and its normal, follow from: triangle_frame in fewer bits, relative
-// to the lowest voxel of the bounding box.
+// Determines a fragment's position on a small triangle, and its normal: triangle_frame in fewer bits, relative to the
+// lowest voxel of the bounding box.
 struct small_frame {
     int axis, fraction;
     bool zero_area;
@@ -111,10 +111,10 @@ struct small_frame {
     }
 };
 
-// Bit x where three linear functions of x are all >= 0, for x = 0 .. Length - 1; e: their values at x = Length - 1, s:
-// what a step adds. Without a branch, and from the last one down, so that each sign goes to its bit by one shift of two
-// words. What is more than the row is for the caller to mask; up to 63 voxels from the corner of a box of at most 32
-// the values stay below 2^28.
+// Bit x is set if three linear functions of x are all >= 0, for x = 0 .. Length - 1. e: their values at x = Length - 1;
+// s: their steps. Without branches, and from the last one down, so that one shift of two words moves each sign to its
+// bit. The caller masks bits beyond the row; up to 63 voxels from the corner of a box of at most 32, values stay below
+// 2^28.
 template <int Length>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::uint32_t
 small_line(std::int32_t e0, std::int32_t e1, std::int32_t e2, std::int32_t s0, std::int32_t s1, std::int32_t s2) {
@@ -127,15 +127,15 @@ small_line(std::int32_t e0, std::int32_t e1, std::int32_t e2, std::int32_t s0, s
     }
     return ~outside;
 }
-// Where rows of at most 32 columns enter and leave three half-planes, row after row. A half-plane e + a u ends at u =
-// -e / a, and wanted is the integer beyond that: the integer next to it in floats is tested by one product, which tells
-// it from its neighbour. |e| < 2^28, so a quotient from -16 to 48, which is all that is looked at, is off by less than
-// 2^-15.
+// The columns in which rows of at most 32 enter and leave three half-planes, row after row. A half-plane e + a u ends
+// at u = -e / a; wanted is the next integer beyond. The nearest integer, by floats, is tested by one product, which
+// distinguishes it from its neighbour. |e| < 2^28, so a quotient from -16 to 48, the range of interest, is off by less
+// than 2^-15.
 struct small_row_ends {
-    std::int32_t at[3], step[3], slope[3]; // of the next row's first column; to the row after it; to the next column
+    std::int32_t at[3], step[3], slope[3]; // at the next row's first column; from row to row; from column to column
     float inverse[3];                      // -1 / (64 slope); a slope of zero ends at infinity
 
-    // Rows v0, v0 + row_step, ... from the column u0 on, of half-planes on (u, v), or, turned, on (v, u).
+    // Rows v0, v0 + row_step, ... from column u0 on, of half-planes on (u, v) or, if `turned`, on (v, u).
     VOXELPIPE_HD VOXELPIPE_INLINE small_row_ends(const small_half_plane (&e)[3], bool turned, int u0, int v0,
                                                  int row_step) {
         for (int i = 0; i < 3; ++i) {
@@ -146,7 +146,7 @@ struct small_row_ends {
             inverse[i] = -exact::near_inverse(exact::mul(64.0f, static_cast<float>(slope[i])));
         }
     }
-    // The columns 0 .. last that the row has, last < 32.
+    // The covered columns of the next row, within 0 .. last, last < 32.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t next(int last) {
         std::int32_t first = 0;
         for (int i = 0; i < 3; ++i) {
@@ -165,12 +165,12 @@ struct small_row_ends {
     }
 };
 
-// a * b for 0 <= b < 2^32, modulo 2^64: two multiplications of 32 bits.
+// a * b for 0 <= b < 2^32, modulo 2^64: two 32-bit multiplications.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::int64_t times(std::int64_t a, int b) {
     return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) * static_cast<std::uint32_t>(b));
 }
 
-// Exact for |a| < 2^22, by an addition of integers and one of floats.
+// Exact for |a| < 2^22; one integer addition and one of floats.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float small_to_float(std::int32_t a) {
     constexpr std::uint32_t shift = 0x4b400000u; // 1.5 * 2^23
     return exact::sub(core::bit_cast<float>(shift + static_cast<std::uint32_t>(a)), 12582912.0f);

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Thin coverage of a bounding box of at most two voxels a side, all columns at once: in single precision with a word on
-// whether rounding can have changed anything (corner_signs.hpp has the conservative part of that), and in integers for
-// what is not sure. The columns along the dominant axis are the cells of its projection, of which edges rule out one
-// only by the centre of the box. The depth is that of the plane at a column's centre, in floats the nearest to a
-// quotient whose error grows with the box's area over the triangle's.
+// Thin coverage of a bounding box of at most two voxels a side, all columns at once: in single precision with a flag
+// that is false if rounding may matter (corner_signs.hpp has the conservative part), and in integers for the rest. The
+// columns along the dominant axis are the cells of its projection; edges rule one out only by the centre of the box.
+// The depth is the plane's at a column's centre; in floats it is a quotient whose error grows with the ratio of the
+// box's area to the triangle's.
 
 #include <voxelpipe/core/corner_signs.hpp>
 #include <voxelpipe/core/small_thin.hpp>
@@ -16,25 +16,25 @@
 namespace voxelpipe::core {
 
 // Voxels of a box of 2 x 2 x 2 and its neighbours along `axis`: the columns u + 2 v, where u and v are the other two
-// axes in the order x, y, z, and of each column the depth w + 1, from 0 to 3, in two bits at 2 (u + 2 v).
+// axes in the order x, y, z, and for each column its depth w + 1, 0 to 3, in two bits at 2 (u + 2 v).
 struct thin_cube {
-    int axis; // -1 where the triangle has no area: then nothing else holds
+    int axis; // -1 if the triangle has no area: then the other members are meaningless
     std::uint32_t columns, depths;
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE int depth(int column) const {
         return static_cast<int>(depths >> 2 * column & 3u) - 1;
     }
-    // Along x, y and z, counted from the box's lowest voxel.
+    // Voxel (x, y, z) of a column, relative to the box's lowest voxel.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE triple<int> voxel(int column) const {
         const int u = column & 1, v = column >> 1, w = depth(column);
         return {axis == 0 ? w : u, axis == 0 ? u : axis == 1 ? w : v, axis == 2 ? w : v};
     }
 };
-// Of the columns, those that a box of `last_u` + 1 by `last_v` + 1 has.
+// The columns of a box of `last_u` + 1 by `last_v` + 1.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t quad_of(int last_u, int last_v) {
     return (last_u != 0 ? 15u : 5u) & (last_v != 0 ? 15u : 3u);
 }
 
-// t: relative to the box's lowest voxel; last: its highest, counted from that, 0 or 1 each.
+// t: relative to the box's lowest voxel; last: its highest voxel, relative to that, 0 or 1 each.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE thin_cube thin_cube_by_integers(const small_triangle& t,
                                                                             const int (&last)[3], int fraction) {
     const triple<std::int64_t> normal = small_normal(t);
@@ -46,20 +46,20 @@ struct thin_cube {
         columns = (columns & 9u) | (columns << 1 & 4u) | (columns >> 1 & 2u);
         depths = (depths & 0xc3u) | (depths << 2 & 0x30u) | (depths >> 2 & 0x0cu);
     }
-    // Not last[an index that differs by lane]: that keeps boxes in local memory.
+    // No index that differs by lane, last[...]: that would put boxes into local memory.
     const int last_u = axis == 0 ? last[1] : last[0], last_v = axis == 2 ? last[1] : last[2];
     return {axis, columns & quad_of(last_u, last_v), depths};
 }
 
-// The same from vertices in units of 2^-fraction voxel, lo: the box's lowest voxel. Without area it is never sure.
-// 12 <= fraction <= 20.
-// Rounding, with vertices d from the centre, |d| <= 2^F, and E = 2^(2F - 22): a component of the normal is a product of
-// sides up to 2^(F + 1), rounded, and their difference, at most 2^(2F + 2) by what it is, rounded, so off by E at most;
-// which of two is larger takes 2 E and the rounding of their difference. Where the dominant one, n_w, is the largest, a
-// slope n_u / n_w is off by 2 E / |n_w| and 2^-21 for the reciprocal and the product; the depth at a column's centre,
-// where u and v are at most 1.5 voxels from the vertex, by three times as much for each of the two, 2^-21 for the sum
-// at the box's centre, which is below 4 voxels, and 2^-20 for the way from there: 12 E / |n_w| + 2^-18. The depth is
-// sure where it is further than that from an integer.
+// The same from vertices in units of 2^-fraction voxel; lo: the box's lowest voxel. Never sure for a triangle without
+// area. 12 <= fraction <= 20.
+// Rounding, with vertices d relative to the centre, |d| <= 2^F, and E = 2^(2F - 22): a component of the normal is a
+// rounded product of sides up to 2^(F + 1) subtracted from another, at most 2^(2F + 2) by its meaning, and rounded, so
+// it is off by at most E. Which of two components is larger needs 2 E and the rounding of their difference. If the
+// dominant one, n_w, is the largest, a slope n_u / n_w is off by 2 E / |n_w| plus 2^-21 for the reciprocal and the
+// product. The depth at a column's centre, where u and v are at most 1.5 voxels from the vertex, is off by three times
+// as much for each of the two, 2^-21 for the sum at the box's centre, which is below 4 voxels, and 2^-20 for the step
+// from there: 12 E / |n_w| + 2^-18. The depth is sure if it is further than that from an integer.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE thin_cube thin_cube_by_signs(const std::int32_t (&q)[3][3],
                                                                          const std::int32_t (&lo)[3],
                                                                          const int (&last)[3], int fraction,
@@ -104,7 +104,7 @@ struct thin_cube {
     const float at[4] = {exact::fma(-0.5f, by_u, low), exact::fma(0.5f, by_u, low), exact::fma(-0.5f, by_u, high),
                          exact::fma(0.5f, by_u, high)};
     std::uint32_t depths = 0;
-    float furthest = 0; // of touched columns, from half a voxel between two integers
+    float furthest = 0; // distance of touched columns' depths from the middle between two integers
     for (int i = 0; i < 4; ++i) {
         float over = 0;
         const std::int32_t depth = exact::integer_below(at[i], over);

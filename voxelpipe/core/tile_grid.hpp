@@ -12,7 +12,7 @@
 
 namespace voxelpipe::core {
 
-// A regular division of the extent into cubic tiles of 2^log2_size voxels, numbered x fastest.
+// Divides the extent into cubic tiles of 2^log2_size voxels a side, numbered x fastest.
 struct tile_grid {
     int log2_size;
     glm::ivec3 tiles;

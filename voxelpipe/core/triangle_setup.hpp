@@ -23,8 +23,9 @@ enum class coverage : std::uint8_t { thin, conservative };
 
 namespace core {
 
-// What for_each_span enumerates. columns: for each touched column all voxels that the plane may pass at any point of
-// the column's square; it holds the thin voxels of every finer grid, and is what coarse raster uses for thin coverage.
+// The spans that for_each_span enumerates. columns: for each touched column all voxels that the plane may pass at any
+// point of the column's square. These include the thin voxels of every finer grid, so coarse raster uses them for thin
+// coverage.
 enum class span_rule : std::uint8_t { thin, conservative, columns };
 
 template <class T>
@@ -36,7 +37,7 @@ struct triple {
     constexpr const T& operator[](int i) const { return v[i]; }
 };
 
-// Inclusive box of voxels, x y z; empty where hi < lo.
+// Inclusive box of voxels, x y z; empty if hi < lo.
 struct voxel_box {
     triple<std::int64_t> lo, hi;
     [[nodiscard]] VOXELPIPE_HD constexpr bool empty() const { return hi[0] < lo[0] || hi[1] < lo[1] || hi[2] < lo[2]; }
@@ -51,7 +52,7 @@ struct voxel_box {
     return r;
 }
 
-// (x, y, z) -> (u, v, w). Written as selects, so that a device compiler keeps everything in registers.
+// (x, y, z) -> (u, v, w). Written as selects, so that device compilers keep everything in registers.
 template <class T>
 [[nodiscard]] VOXELPIPE_HD constexpr triple<T> to_uvw(int axis, const T& x, const T& y, const T& z) {
     return {axis == 0 ? y : axis == 1 ? z : x, axis == 0 ? z : axis == 1 ? x : y, axis == 0 ? x : axis == 1 ? y : z};
@@ -100,16 +101,16 @@ template <class T>
     return r;
 }
 
-// A bounding box one voxel wide along two axes: then every voxel of it is covered conservatively, because the triangle
-// is connected and reaches both ends.
+// True for a bounding box one voxel wide along two axes. Then every voxel of it is covered conservatively, because the
+// triangle is connected and reaches both ends.
 [[nodiscard]] VOXELPIPE_HD constexpr bool is_line_of_voxels(const voxel_box& bounding_box) {
     int wide = 0;
     for (int i = 0; i < 3; ++i) wide += bounding_box.hi[i] != bounding_box.lo[i] ? 1 : 0;
     return wide <= 1;
 }
 
-// Whether the 64-bit path is exact for this triangle (fixed_point.hpp, table of widths). Only its size counts, not its
-// place.
+// True if the 64-bit path is exact for this triangle (fixed_point.hpp, table of widths). Depends on its size only, not
+// its position.
 [[nodiscard]] VOXELPIPE_HD constexpr bool fits_narrow(const snapped_position& a, const snapped_position& b,
                                                       const snapped_position& c, int fraction) {
     const std::int64_t limit = std::int64_t{1} << narrow_edge_bits(fraction < 16 ? fraction : 16);
@@ -123,13 +124,13 @@ struct half_plane {
     [[nodiscard]] VOXELPIPE_HD constexpr Int at(Int x, Int y) const { return a * x + b * y + c; }
 };
 
-// What a fragment's position on its triangle, and the triangle's normal, follow from.
+// Determines a fragment's position on its triangle, and the triangle's normal.
 template <class Int>
 struct triangle_frame {
-    int axis;                    // w; of a zero-area triangle: its longest side
+    int axis;                    // w; the longest side of a zero-area triangle
     int fraction;                // F
     bool zero_area;              // after snapping
-    triple<std::int64_t> origin; // voxel that holds the local origin, uvw order: the bounding box's first
+    triple<std::int64_t> origin; // voxel of the local origin, uvw order: the bounding box's first
     triple<Int> p[3];            // vertices relative to origin, sub-voxel units, uvw order; each > 0
     triple<Int> normal;          // (p1 - p0) x (p2 - p0), uvw order
 };
@@ -152,8 +153,8 @@ template <class Int>
     return {a, b, c};
 }
 
-// The three half-planes of the triangle's projection on axes (x, y); `area` is the doubled signed area of it.
-// A projection without area is a segment or a point: then two half-planes hold its line, and the third is always true.
+// The three half-planes of the triangle's projection on axes (x, y); `area` is its doubled signed area. A projection
+// without area is a segment or a point: then two half-planes enclose its line, and the third is always true.
 template <class Int>
 VOXELPIPE_HD constexpr void projection(const triple<Int> (&p)[3], int x, int y, Int area, int fraction,
                                        half_plane<Int> (&out)[3]) {
@@ -164,7 +165,7 @@ VOXELPIPE_HD constexpr void projection(const triple<Int> (&p)[3], int x, int y, 
         out[2] = edge(p[2][x], p[2][y], p[0][x], p[0][y], sign, fraction);
         return;
     }
-    // All edges lie on one line; any edge that is not a point gives it.
+    // All edges lie on one line; any edge that is not a point defines it.
     const bool first = p[0][x] != p[1][x] || p[0][y] != p[1][y];
     const triple<Int>& s = first ? p[0] : p[1];
     const triple<Int>& t = first ? p[1] : p[2];
@@ -173,14 +174,14 @@ VOXELPIPE_HD constexpr void projection(const triple<Int> (&p)[3], int x, int y, 
     out[2] = {Int{0}, Int{0}, Int{0}};
 }
 
-// floor((n . p) / 2^shift) in 128 bits whatever Int is: the one wide product of a triangle.
+// n . p in 128 bits, whatever Int is: the one wide product of a triangle.
 template <class Int>
 [[nodiscard]] VOXELPIPE_HD constexpr int128 dot128(const triple<Int>& n, const triple<Int>& p) {
     return static_cast<int128>(n[0]) * p[0] + static_cast<int128>(n[1]) * p[1] + static_cast<int128>(n[2]) * p[2];
 }
 
-// Sets a frame up. Int = std::int64_t where fits_narrow, int128 otherwise. Vertices are drawable; fraction >= 1.
-// box: bounds(a, b, c, fraction).
+// Sets up a frame. Int: std::int64_t if fits_narrow, otherwise int128. Vertices must be drawable; fraction >= 1. box:
+// bounds(a, b, c, fraction).
 template <class Int>
 VOXELPIPE_HD constexpr void set_up_frame(triangle_frame<Int>& t, const voxel_box& box, const snapped_position& a,
                                          const snapped_position& b, const snapped_position& c, int fraction) {
@@ -214,11 +215,11 @@ make_frame(const snapped_position& a, const snapped_position& b, const snapped_p
     return t;
 }
 
-// Of a triangle as above.
+// The arguments are those of set_up_frame.
 template <span_rule Rule, class Int>
 [[nodiscard]] VOXELPIPE_HD constexpr triangle_setup<Int>
 setup_triangle(const snapped_position& a, const snapped_position& b, const snapped_position& c, int fraction) {
-    triangle_setup<Int> t; // every field that the rule uses is set below
+    triangle_setup<Int> t; // every member that the rule uses is set below
     const voxel_box box = bounds(a, b, c, fraction);
     set_up_frame(t, box, a, b, c, fraction);
     t.last = to_uvw(t.axis, box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);

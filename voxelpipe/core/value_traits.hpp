@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a value type of a render target is: components, the bits of its NaN, and its order.
+// Properties of a render target's value type: its components, its canonical NaN, and its order.
 
 #include <voxelpipe/core/bits.hpp>
 #include <voxelpipe/core/half.hpp>
@@ -16,7 +16,7 @@
 
 namespace voxelpipe {
 
-// Value type tag of a target with one bit a voxel, 32 to a word along x. Shaders give it a bool.
+// Value type tag of a target with one bit per voxel, 32 to a word along x. Shaders return a bool for it.
 struct bit {};
 
 namespace core {
@@ -58,7 +58,7 @@ struct float_bits<double> {
 };
 
 // Every NaN that reaches a target of a built-in type is stored as the one positive quiet NaN: machines differ in which
-// NaN an operation gives.
+// NaN an operation returns.
 template <class T>
 [[nodiscard]] VOXELPIPE_HD T canonical(T v) {
     if constexpr (is_floating<T>) {
@@ -74,7 +74,7 @@ template <class T>
     }
 }
 
-// Integers in the order of the floats: for shared-memory atomics on integers, and for min and max here.
+// Maps floats to integers of the same order, for shared-memory atomics on integers and for min and max.
 template <class T>
 [[nodiscard]] VOXELPIPE_HD auto order_key(T v) {
     using bits = typename float_bits<T>::type;

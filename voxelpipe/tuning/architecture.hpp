@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What GPU architectures offer, and which of the architectures that a program is compiled for a device runs: policies
-// are chosen by that, on the host, since the host's code is compiled once for all of them. Plain C++, numbers only.
+// Limits of GPU architectures, and which of the compiled architectures a device runs. Policies depend on that and are
+// chosen on the host, whose code is compiled once for all architectures. Plain C++, numbers only.
 
 #include <array>
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace voxelpipe::tuning {
 struct architecture {
     int capability;       // 90 for 9.0
     int shared_per_sm;    // shared memory of a multiprocessor; each block takes 1 KB more than it asks for
-    int shared_per_block; // the most that one block can ask for
+    int shared_per_block; // the most that one block can request
     int threads_per_sm;
 };
 
@@ -24,7 +24,7 @@ inline constexpr std::array architectures{
     architecture{100, 228 * 1024, 227 * 1024, 2048}, architecture{120, 100 * 1024, 99 * 1024, 1536},
 };
 
-// The last entry of an ascending list that is not above `capability`; the first where all are.
+// Index of the last entry of an ascending list that is not above `capability`; 0 if all are above.
 template <class List>
 [[nodiscard]] constexpr std::size_t last_not_above(const List& list, int capability) {
     std::size_t found = 0;
@@ -37,7 +37,7 @@ template <class List>
     return architectures[last_not_above(architectures, capability)];
 }
 
-// The least shared memory that a block can have on every architecture.
+// The least maximum of shared memory per block over all architectures.
 [[nodiscard]] constexpr int portable_shared_per_block() {
     int least = architectures[0].shared_per_block;
     for (const architecture& a : architectures) least = a.shared_per_block < least ? a.shared_per_block : least;
@@ -48,8 +48,8 @@ struct compiled_architecture {
     int capability;
 };
 
-// What this translation unit is compiled for, ascending: nvcc gives 800,900 for sm_80 and sm_90. A program compiles all
-// of its units for the same list. Without nvcc: the oldest.
+// The architectures that this translation unit is compiled for, ascending: nvcc passes 800,900 for sm_80 and sm_90. All
+// units of a program must be compiled for the same list. Without nvcc: the oldest.
 #if defined(__CUDA_ARCH_LIST__)
 [[nodiscard]] constexpr auto compiled_architectures() {
     constexpr int list[] = {__CUDA_ARCH_LIST__};
@@ -63,8 +63,9 @@ struct compiled_architecture {
 }
 #endif
 
-// Whose code a device runs: machine code of its own architecture or an older one of the same generation, otherwise the
-// newest PTX that it can translate. In each case the newest of the list that is not newer than the device.
+// The architecture whose code a device runs: machine code of its own architecture or an older one of the same
+// generation, otherwise the newest PTX that it can translate. In each case the newest of the list that is not newer
+// than the device.
 [[nodiscard]] constexpr int compiled_for(int device_capability) {
     constexpr auto list = compiled_architectures();
     return list[last_not_above(list, device_capability)].capability;

@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Tile size and block size of the fine raster, from the bits of shared memory that a voxel's targets need and from the
-// architecture. Numbers only. Results do not depend on them; a backend may be given another selector: a constexpr
-// functor (bits of a voxel, compute capability) -> policy, or (bits of a voxel) -> policy for all architectures.
+// Tile size and block size of the fine raster, chosen by the bits of shared memory that a voxel's targets need and by
+// the architecture. Results do not depend on them. A backend may be given another selector: a constexpr functor (bits
+// of a voxel, compute capability) -> policy, or (bits of a voxel) -> policy for all architectures.
 //
-// A policy is part of a kernel's type, all but blocks_per_sm, so it is chosen at compile time for each architecture of
-// the program's list, and at run time among those by the device (with_policy). Architectures with equal policies share
-// one kernel.
+// A policy, except blocks_per_sm, is part of a kernel's type. So it is chosen at compile time for each architecture of
+// the program, and at run time among those by the device (with_policy). Architectures with equal policies share one
+// kernel.
 
 #include <voxelpipe/tuning/architecture.hpp>
 
@@ -22,19 +22,19 @@ namespace voxelpipe::tuning {
 struct fine_raster_policy {
     int threads_per_block; // a multiple of 32, at most 1024
     int log2_tile_size;    // 3, 4 or 5: a tile is a cube of 8, 16 or 32 voxels
-    int min_blocks_per_sm; // what the registers have to leave room for
+    int min_blocks_per_sm; // bounds the registers
     int blocks_per_sm = 0; // persistent blocks that the host starts on a multiprocessor; 0: as many as fit
 
     friend constexpr bool operator==(const fine_raster_policy&, const fine_raster_policy&) = default;
 };
 
-// What is chosen for voxels of so many bits, a bit included that says whether one is touched.
+// Choice for voxels of a number of bits, including one that says whether the voxel is touched.
 struct fine_raster_numbers_of_bits {
     int threads_per_block;
     int min_blocks_per_sm;
     int tile_bytes; // the tile is the largest that needs no more than this
 };
-// One row an architecture. Beside a row stands what it was measured on.
+// One row per architecture; the comment beside it says what was measured.
 struct fine_raster_numbers {
     int capability;
     fine_raster_numbers_of_bits one_bit, more; // a target of bits alone; any others
@@ -60,8 +60,8 @@ inline constexpr std::array fine_raster_table{
     return fine_raster_table[last_not_above(fine_raster_table, capability)];
 }
 
-// Targets that need more than this together are drawn in several fine passes over the same tiles: 8^3 voxels of 150
-// bytes are 75 KB, which a block can have on every architecture beside what it needs for a batch of triangles.
+// Targets that together need more than this are drawn in several fine passes over the same tiles: 8^3 voxels of 150
+// bytes are 75 KB, which a block can have on every architecture in addition to a batch of triangles.
 inline constexpr int max_bits_per_voxel = 150 * 8;
 inline constexpr int batch_bytes = 22 * 1024; // of shared memory, at 256 threads a block
 static_assert(max_bits_per_voxel / 8 * 512 <= portable_shared_per_block() - batch_bytes);
@@ -76,7 +76,7 @@ struct fine_raster_selector {
     }
 };
 
-// The policy that a selector gives, whichever arguments it takes.
+// Calls a selector with the arguments that it takes.
 template <class Selector>
 [[nodiscard]] constexpr fine_raster_policy select_policy(int bits_per_voxel, int capability) {
     if constexpr (std::is_invocable_v<const Selector&, int, int>)
@@ -85,8 +85,8 @@ template <class Selector>
         return Selector{}(bits_per_voxel);
 }
 
-// Calls f.template operator()<Policy>() with the policy for the code that a device of this compute capability runs. On
-// the host. I: entries of the list that are still to be looked at, from its end, less one.
+// Calls f.template operator()<Policy>() with the policy of the code that a device of this compute capability runs. On
+// the host. I: index of the list's entry to test; entries above it have been tested.
 template <class Selector, int BitsPerVoxel, std::size_t I = compiled_architectures().size() - 1, class F>
 auto with_policy(int device_capability, const F& f) {
     constexpr int capability = compiled_architectures()[I].capability;
