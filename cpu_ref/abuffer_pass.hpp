@@ -30,8 +30,16 @@ struct row_segment {
     std::uint64_t num_fragments;
 };
 
+// What one thread has made of the lists.
 template <class Payload>
-struct abuffer_scratch {
+struct list_part {
+    bucket_store<Payload> store;
+    std::vector<row_segment> segments;
+    counters counts{};
+};
+
+template <class Payload>
+struct abuffer_scratch : list_part<Payload> {
     struct emitted {
         std::uint32_t primitive;
         std::uint16_t voxel; // within the tile
@@ -40,9 +48,6 @@ struct abuffer_scratch {
     std::vector<emitted> fragments; // of one tile, as they come
     std::array<std::uint32_t, tile_voxels> count{};
     std::array<std::uint32_t, tile_rows> touched{};
-    bucket_store<Payload> store;
-    std::vector<row_segment> segments;
-    counters counts{};
 };
 
 // `primitives` are `stride` bytes apart: those of sorted pairs, whatever their key's type.
@@ -117,6 +122,76 @@ void bucket_tile(const Scene& s, const core::tile_grid& tiles, std::uint64_t til
     }
 }
 
+// Puts the threads' parts together: rows of voxels in the order of the whole grid. `parts` are pointers to what derives
+// from list_part; they lose their segments. `result` gets the counts of fragments and voxels.
+template <class Parts, class Backend, class Payload>
+[[nodiscard]] status emit_lists(const execution& how, Backend& backend, glm::ivec3 extent, const Parts& parts,
+                                status result, abuffer<Backend, Payload>& lists) {
+    using payload = payload_storage<Payload>;
+    const core::tile_grid tiles(extent, log2_tile_size);
+    how.enter(stage::abuffer_emit);
+    const stopwatch watch(how.times, &stage_times::abuffer_emit);
+    std::size_t num_segments = 0;
+    for (const auto& w : parts) num_segments += w->segments.size();
+    raw_array<row_segment> segments(num_segments);
+    row_segment* next_segment = segments.begin();
+    for (const auto& w : parts) {
+        next_segment = std::copy(w->segments.begin(), w->segments.end(), next_segment);
+        w->segments = {};
+        result.counts.fragments += w->counts.fragments;
+        result.counts.fragments_discarded += w->counts.fragments_discarded;
+    }
+    const std::uint64_t keys = static_cast<std::uint64_t>(extent.z) * static_cast<std::uint64_t>(extent.y) *
+                               static_cast<std::uint64_t>(tiles.tiles.x);
+    radix_sort(how.threads, segments, static_cast<int>(std::bit_width(keys - 1)));
+    // Each segment's place in the result; the counts of the whole follow.
+    struct place {
+        std::uint64_t voxel, fragment;
+    };
+    std::vector<place> places(segments.size());
+    place total{0, 0};
+    for (std::size_t i = 0; i < segments.size(); ++i) {
+        places[i] = total;
+        total.voxel += segments[i].num_voxels;
+        total.fragment += segments[i].num_fragments;
+    }
+    using lists_type = abuffer<Backend, Payload>;
+    typename Backend::template buffer<std::uint64_t> voxels(backend, total.voxel);
+    typename Backend::template buffer<std::uint64_t> offsets(backend, total.voxel == 0 ? 0 : total.voxel + 1);
+    typename Backend::template buffer<std::uint32_t> primitives(backend, total.fragment);
+    typename Backend::template buffer<payload> payloads(backend, lists_type::has_payload ? total.fragment : 0);
+
+    const auto nx = static_cast<std::uint64_t>(extent.x), tiles_x = static_cast<std::uint64_t>(tiles.tiles.x);
+    constexpr std::size_t block = 1024;
+    parallel_for(how.threads, (segments.size() + block - 1) / block, [&](unsigned, std::size_t b) {
+        const std::size_t last = std::min(segments.size(), (b + 1) * block);
+        for (std::size_t i = b * block; i < last; ++i) {
+            const row_segment& g = segments[i];
+            const bucket_store<payload>& from = parts[g.worker]->store;
+            const std::uint64_t row_start = g.key / tiles_x * nx + g.key % tiles_x * tile_size;
+            std::uint64_t at = places[i].fragment;
+            for (std::uint32_t v = 0; v < g.num_voxels; ++v) {
+                voxels.data()[places[i].voxel + v] = row_start + from.columns[g.voxel + v];
+                offsets.data()[places[i].voxel + v] = at;
+                at += from.counts[g.voxel + v];
+            }
+            const auto first = static_cast<std::ptrdiff_t>(g.fragment),
+                       n = static_cast<std::ptrdiff_t>(g.num_fragments);
+            std::copy_n(from.primitives.begin() + first, n, primitives.data() + places[i].fragment);
+            if constexpr (lists_type::has_payload)
+                std::copy_n(from.payloads.begin() + first, n, payloads.data() + places[i].fragment);
+        }
+    });
+    if (total.voxel != 0) offsets.data()[total.voxel] = total.fragment;
+    result.counts.voxels = total.voxel;
+    lists.voxels = std::move(voxels);
+    lists.offsets = std::move(offsets);
+    lists.primitives = std::move(primitives);
+    lists.payloads = std::move(payloads);
+    lists.extent = extent;
+    return result;
+}
+
 template <coverage Rule, class Key, class Scene, class Backend, class Payload>
 [[nodiscard]] status draw_abuffer(const execution& how, Backend& backend, const Scene& s,
                                   abuffer<Backend, Payload>& lists) {
@@ -148,68 +223,7 @@ template <coverage Rule, class Key, class Scene, class Backend, class Payload>
         });
     }
     coarse.pairs = {};
-
-    how.enter(stage::abuffer_emit);
-    const stopwatch watch(how.times, &stage_times::abuffer_emit);
-    std::size_t num_segments = 0;
-    for (const auto& w : scratch) num_segments += w->segments.size();
-    raw_array<row_segment> segments(num_segments);
-    row_segment* next_segment = segments.begin();
-    for (const auto& w : scratch) {
-        next_segment = std::copy(w->segments.begin(), w->segments.end(), next_segment);
-        w->segments = {};
-        result.counts.fragments += w->counts.fragments;
-        result.counts.fragments_discarded += w->counts.fragments_discarded;
-    }
-    const std::uint64_t keys = static_cast<std::uint64_t>(s.where.extent.z) *
-                               static_cast<std::uint64_t>(s.where.extent.y) * static_cast<std::uint64_t>(tiles.tiles.x);
-    radix_sort(how.threads, segments, static_cast<int>(std::bit_width(keys - 1)));
-    // Each segment's place in the result; the counts of the whole follow.
-    struct place {
-        std::uint64_t voxel, fragment;
-    };
-    std::vector<place> places(segments.size());
-    place total{0, 0};
-    for (std::size_t i = 0; i < segments.size(); ++i) {
-        places[i] = total;
-        total.voxel += segments[i].num_voxels;
-        total.fragment += segments[i].num_fragments;
-    }
-    using lists_type = abuffer<Backend, Payload>;
-    typename Backend::template buffer<std::uint64_t> voxels(backend, total.voxel);
-    typename Backend::template buffer<std::uint64_t> offsets(backend, total.voxel == 0 ? 0 : total.voxel + 1);
-    typename Backend::template buffer<std::uint32_t> primitives(backend, total.fragment);
-    typename Backend::template buffer<payload> payloads(backend, lists_type::has_payload ? total.fragment : 0);
-
-    const auto nx = static_cast<std::uint64_t>(s.where.extent.x), tiles_x = static_cast<std::uint64_t>(tiles.tiles.x);
-    constexpr std::size_t block = 1024;
-    parallel_for(how.threads, (segments.size() + block - 1) / block, [&](unsigned, std::size_t b) {
-        const std::size_t last = std::min(segments.size(), (b + 1) * block);
-        for (std::size_t i = b * block; i < last; ++i) {
-            const row_segment& g = segments[i];
-            const bucket_store<payload>& from = scratch[g.worker]->store;
-            const std::uint64_t row_start = g.key / tiles_x * nx + g.key % tiles_x * tile_size;
-            std::uint64_t at = places[i].fragment;
-            for (std::uint32_t v = 0; v < g.num_voxels; ++v) {
-                voxels.data()[places[i].voxel + v] = row_start + from.columns[g.voxel + v];
-                offsets.data()[places[i].voxel + v] = at;
-                at += from.counts[g.voxel + v];
-            }
-            const auto first = static_cast<std::ptrdiff_t>(g.fragment),
-                       n = static_cast<std::ptrdiff_t>(g.num_fragments);
-            std::copy_n(from.primitives.begin() + first, n, primitives.data() + places[i].fragment);
-            if constexpr (lists_type::has_payload)
-                std::copy_n(from.payloads.begin() + first, n, payloads.data() + places[i].fragment);
-        }
-    });
-    if (total.voxel != 0) offsets.data()[total.voxel] = total.fragment;
-    result.counts.voxels = total.voxel;
-    lists.voxels = std::move(voxels);
-    lists.offsets = std::move(offsets);
-    lists.primitives = std::move(primitives);
-    lists.payloads = std::move(payloads);
-    lists.extent = s.where.extent;
-    return result;
+    return emit_lists(how, backend, s.where.extent, scratch, result, lists);
 }
 
 } // namespace voxelpipe::cpu

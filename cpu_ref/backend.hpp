@@ -7,6 +7,7 @@
 
 #include <cpu_ref/abuffer_pass.hpp>
 #include <cpu_ref/framebuffer_pass.hpp>
+#include <cpu_ref/solid.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <cstddef>
@@ -84,21 +85,21 @@ public:
     template <class Draws, class Output, class Coverage = core::known_coverage<>>
     [[nodiscard]] status run(const Draws& draws, const grid& g, Output& out, const voxelize_options& options,
                              std::uint64_t triangles_in, Coverage = {}) {
-        stage at = stage::validate;
-        const cpu::execution how = execution(&at);
-        const auto out_of_memory = [&] {
-            status failed = core::failure(status_code::out_of_memory, at);
-            failed.counts.triangles_in = triangles_in;
-            return failed;
-        };
-        try {
+        return guarded(triangles_in, [&](const cpu::execution& how) {
             const auto s = cpu::make_scene(how, draws, g);
             return Coverage::dispatch(options.rule, [&]<coverage Rule>() { return pass<Rule>(how, s, out, options); });
-        } catch (const std::bad_alloc&) {
-            return out_of_memory();
-        } catch (const std::length_error&) { // a vector longer than can be: the same thing
-            return out_of_memory();
-        }
+        });
+    }
+
+    // What voxelize_solid calls, likewise.
+    template <class Draw, class Output>
+    [[nodiscard]] status run_solid(std::span<const Draw> draws, const grid& g, Output& out,
+                                   const solid_options& options, std::uint64_t triangles_in) {
+        return guarded(triangles_in, [&](const cpu::execution& how) {
+            return cpu::run_solid(how, draws, g, options, [&](const auto& sweep, const status& result) {
+                return solid_pass(how, sweep, draws, g, options, out, result);
+            });
+        });
     }
 
     // What vp::clear calls, and voxelize without triangles; arguments are validated.
@@ -117,6 +118,23 @@ private:
     [[nodiscard]] cpu::execution execution(stage* at) const {
         return {threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency()), times, &progress, at};
     }
+    // Runs work(execution); memory that is not there becomes a status.
+    template <class Work>
+    status guarded(std::uint64_t triangles_in, const Work& work) {
+        stage at = stage::validate;
+        const auto out_of_memory = [&] {
+            status failed = core::failure(status_code::out_of_memory, at);
+            failed.counts.triangles_in = triangles_in;
+            return failed;
+        };
+        try {
+            return work(execution(&at));
+        } catch (const std::bad_alloc&) {
+            return out_of_memory();
+        } catch (const std::length_error&) { // a vector longer than can be: the same thing
+            return out_of_memory();
+        }
+    }
     // Tile numbers of 32 bits keep the tile pairs small. A grid with more tiles than that has 2^47 voxels, more than
     // any framebuffer holds, though not more than an A-buffer may span.
     static bool has_small_keys(const grid& g) {
@@ -133,6 +151,17 @@ private:
                 const voxelize_options&) {
         return has_small_keys(s.where) ? cpu::draw_abuffer<Rule, std::uint32_t>(how, *this, s, lists)
                                        : cpu::draw_abuffer<Rule, std::uint64_t>(how, *this, s, lists);
+    }
+    template <class Sweep, class Draw, class... Targets>
+    static status solid_pass(const cpu::execution& how, const Sweep& sweep, std::span<const Draw> draws, const grid& g,
+                             const solid_options& options, const framebuffer_view<Targets...>& fb,
+                             const status& result) {
+        return cpu::draw_solid(how, sweep, draws, g, options, fb, result);
+    }
+    template <class Sweep, class Draw, class Payload>
+    status solid_pass(const cpu::execution& how, const Sweep& sweep, std::span<const Draw> draws, const grid& g,
+                      const solid_options&, abuffer<cpu_backend, Payload>& lists, const status& result) {
+        return cpu::list_solid(how, *this, sweep, draws, g, lists, result);
     }
 };
 

@@ -81,52 +81,71 @@ void cover_tile(const geometry& s, const core::voxel_box& tile, const std::uint3
     scratch.counts.fragments += fragments;
 }
 
+// One target and the value that every fragment has: folds it into words of 32 voxels along x.
+template <class Target>
+class constant_folder {
+public:
+    using value_type = typename Target::value_type;
+
+    constant_folder(const target_view<Target>& t, const value_type& value) : t_(t), value_(value) {
+        if constexpr (by_words) {
+            from_zero_ = fold(false, 1) ? ~0u : 0u;
+            from_one_ = fold(true, 1) ? ~0u : 0u;
+        }
+    }
+
+    // Voxels x + i for the ones i of `word`; x is a multiple of 32. Voxel x + i has repeats[i] fragments; one, where
+    // `repeats` is null or a repetition changes nothing.
+    void apply(int x, int y, int z, std::uint32_t word, const std::uint32_t* repeats) {
+        if constexpr (by_words) {
+            std::uint32_t& stored = t_.elements[map::cell(t_.extent, x, y, z)];
+            stored = (stored & ~word) | (word & ((stored & from_one_) | (~stored & from_zero_)));
+        } else {
+            for (; word != 0; word &= word - 1) {
+                const int column = std::countr_zero(word);
+                const std::uint32_t n = target_folds_once<Target> || repeats == nullptr ? 1 : repeats[column];
+                t_.store(x + column, y, z,
+                         t_.load == load_operation::clear ? onto_clear(n) : fold(t_(x + column, y, z), n));
+            }
+        }
+    }
+
+private:
+    using map = typename Target::map;
+    using traits = typename Target::traits;
+    // What becomes of a 0 and of a 1 goes for all voxels of a word at once.
+    static constexpr bool by_words = map::is_bit && target_folds_once<Target>;
+    // A target that was cleared needs not be read, and has few different results.
+    static constexpr std::uint32_t num_known = target_folds_once<Target> ? 2 : 16;
+
+    [[nodiscard]] value_type fold(const value_type& stored, std::uint32_t n) const {
+        auto a = traits::begin(stored);
+        for (std::uint32_t i = 0; i < n; ++i) traits::apply(a, value_);
+        return traits::end(a);
+    }
+    [[nodiscard]] value_type onto_clear(std::uint32_t n) {
+        if (n >= num_known) return fold(t_.clear_value, n);
+        for (; known_end_ <= n; ++known_end_) known_[known_end_] = fold(t_.clear_value, known_end_);
+        return known_[n];
+    }
+
+    const target_view<Target>& t_;
+    const value_type& value_;
+    std::uint32_t from_zero_ = 0, from_one_ = 0;
+    std::array<value_type, num_known> known_{};
+    std::uint32_t known_end_ = 0;
+};
+
 template <class Target>
 void resolve_constant_target(const core::voxel_box& tile, const target_view<Target>& t,
                              const typename Target::value_type& value, const constant_scratch& scratch) {
-    using map = typename Target::map;
-    using traits = typename Target::traits;
     const auto x0 = static_cast<int>(tile.lo[0]), y0 = static_cast<int>(tile.lo[1]), z0 = static_cast<int>(tile.lo[2]);
-    [[maybe_unused]] std::uint32_t from_zero = 0, from_one = 0;
-    if constexpr (map::is_bit && target_folds_once<Target>) {
-        // A row of a tile is a word of the target: what becomes of a 0 and of a 1 goes for all its voxels at once.
-        const auto folded = [&](bool stored) {
-            auto a = traits::begin(stored);
-            traits::apply(a, value);
-            return traits::end(a) ? ~0u : 0u;
-        };
-        from_zero = folded(false);
-        from_one = folded(true);
-    }
-    const auto fold = [&](const typename Target::value_type& stored, std::uint32_t n) {
-        auto a = traits::begin(stored);
-        for (std::uint32_t i = 0; i < n; ++i) traits::apply(a, value);
-        return traits::end(a);
-    };
-    // A target that was cleared needs not be read, and has few different results.
-    constexpr std::uint32_t num_known = target_folds_once<Target> ? 2 : 16;
-    [[maybe_unused]] std::array<typename Target::value_type, num_known> known{};
-    [[maybe_unused]] std::uint32_t known_end = 0;
-    [[maybe_unused]] const auto onto_clear = [&](std::uint32_t n) {
-        if (n >= num_known) return fold(t.clear_value, n);
-        for (; known_end <= n; ++known_end) known[known_end] = fold(t.clear_value, known_end);
-        return known[n];
-    };
+    constant_folder<Target> folder(t, value);
     for (std::size_t row = 0; row < tile_rows; ++row) {
-        std::uint32_t word = scratch.touched[row];
+        const std::uint32_t word = scratch.touched[row];
         if (word == 0) continue;
         const int y = y0 + static_cast<int>(row) % tile_size, z = z0 + static_cast<int>(row) / tile_size;
-        if constexpr (map::is_bit && target_folds_once<Target>) {
-            std::uint32_t& stored = t.elements[map::cell(t.extent, x0, y, z)];
-            stored = (stored & ~word) | (word & ((stored & from_one) | (~stored & from_zero)));
-        } else {
-            for (; word != 0; word &= word - 1) {
-                const int column = std::countr_zero(word), x = x0 + column;
-                const std::uint32_t n =
-                    target_folds_once<Target> ? 1 : scratch.repeats[row * tile_size + static_cast<std::size_t>(column)];
-                t.store(x, y, z, t.load == load_operation::clear ? onto_clear(n) : fold(t(x, y, z), n));
-            }
-        }
+        folder.apply(x0, y, z, word, scratch.repeats == nullptr ? nullptr : scratch.repeats.get() + row * tile_size);
     }
 }
 

@@ -81,19 +81,19 @@ struct shaded_vertices {
 template <class Mesh, class VertexShader, class FragmentShader>
 using draw_varyings = typename core::shaded<Mesh, VertexShader>::varyings;
 
-template <class Mesh, class VertexShader, class FragmentShader>
-[[nodiscard]] auto vertex_shade(const execution& how, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
-                                const core::snap_transform& snap) {
-    using varyings = draw_varyings<Mesh, VertexShader, FragmentShader>;
+// Varyings: what the vertex shader makes, or no_varyings, which leaves its varyings out.
+template <class Varyings, class Mesh, class VertexShader, class FragmentShader>
+[[nodiscard]] auto shade_vertices(const execution& how, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
+                                  const core::snap_transform& snap) {
     how.enter(stage::vertex_shade);
     const stopwatch watch(how.times, &stage_times::vertex_shade);
-    std::vector<shaded_vertices<varyings>> shaded(draws.size());
+    std::vector<shaded_vertices<Varyings>> shaded(draws.size());
     for (std::size_t d = 0; d < draws.size(); ++d) {
         const auto& in = draws[d];
         auto& out = shaded[d];
         const std::size_t n = in.mesh.positions.size();
         out.positions = std::make_unique_for_overwrite<core::snapped_position[]>(n);
-        if constexpr (!std::is_empty_v<varyings>) out.varyings = std::make_unique_for_overwrite<varyings[]>(n);
+        if constexpr (!std::is_empty_v<Varyings>) out.varyings = std::make_unique_for_overwrite<Varyings[]>(n);
         constexpr std::size_t block = 16384;
         parallel_for(how.threads, (n + block - 1) / block, [&](unsigned, std::size_t b) {
             const std::size_t last = std::min(n, (b + 1) * block);
@@ -104,11 +104,17 @@ template <class Mesh, class VertexShader, class FragmentShader>
                 using widen = core::vertex_result<std::remove_cvref_t<decltype(result)>>;
                 const auto& o = widen::widen(result);
                 out.positions[i] = core::snap(snap, o.position.x, o.position.y, o.position.z);
-                if constexpr (!std::is_empty_v<varyings>) out.varyings[i] = o.varyings;
+                if constexpr (!std::is_empty_v<Varyings>) out.varyings[i] = o.varyings;
             }
         });
     }
     return shaded;
+}
+
+template <class Mesh, class VertexShader, class FragmentShader>
+[[nodiscard]] auto vertex_shade(const execution& how, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
+                                const core::snap_transform& snap) {
+    return shade_vertices<draw_varyings<Mesh, VertexShader, FragmentShader>>(how, draws, snap);
 }
 
 // ---- the scene as the raster stages see it --------------------------------------------------------------------------

@@ -1,0 +1,164 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The crossings of a solid call, sorted by row, and the numbers that rows have: rows lie in beams of 32 x 32, a row of
+// tiles along x each, which are the pieces of work. Nothing here depends on the user's types.
+
+#include <cpu_ref/pipeline.hpp>
+#include <voxelpipe/core/crossing.hpp>
+#include <voxelpipe/solid.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe::cpu {
+
+// The triangles of a solid call: those of the draws, and cones that close their holes.
+struct solid_geometry : geometry {
+    std::vector<std::uint32_t> body; // per part: the draw that it belongs to; 0 where all are one body
+    std::vector<bool> is_repair;     // per part: cones, which are not counted
+    std::vector<shaded_vertices<no_varyings>> vertices; // owns the positions of the draws
+    std::vector<std::vector<core::snapped_position>> repair_positions;
+    std::vector<std::vector<glm::uvec3>> repair_triangles;
+    std::uint64_t triangles_in = 0;
+};
+
+// The number of a row: its beam (tiles.y * tile z + tile y), then its place in the beam.
+struct row_numbers {
+    core::tile_grid tiles;
+    glm::ivec3 extent;
+
+    explicit row_numbers(glm::ivec3 grid_extent) : tiles(grid_extent, log2_tile_size), extent(grid_extent) {}
+    [[nodiscard]] std::uint64_t num_beams() const {
+        return static_cast<std::uint64_t>(tiles.tiles.y) * static_cast<std::uint64_t>(tiles.tiles.z);
+    }
+    [[nodiscard]] std::uint64_t number(std::int64_t y, std::int64_t z) const {
+        const auto beam = (z >> log2_tile_size) * tiles.tiles.y + (y >> log2_tile_size);
+        const auto place = (z & (tile_size - 1)) << log2_tile_size | (y & (tile_size - 1));
+        return static_cast<std::uint64_t>(beam) * tile_rows + static_cast<std::uint64_t>(place);
+    }
+    [[nodiscard]] int y(std::uint64_t row) const {
+        return static_cast<int>(row / tile_rows % static_cast<std::uint64_t>(tiles.tiles.y)) * tile_size +
+               static_cast<int>(row % tile_size);
+    }
+    [[nodiscard]] int z(std::uint64_t row) const {
+        return static_cast<int>(row / tile_rows / static_cast<std::uint64_t>(tiles.tiles.y)) * tile_size +
+               static_cast<int>(row / tile_size % tile_size);
+    }
+    [[nodiscard]] std::size_t words() const { return static_cast<std::size_t>(tiles.tiles.x); }
+};
+
+// Where a row crosses a triangle: the first voxel beyond it, from 0 to the extent, and twice that if it enters, one
+// more if it leaves. One body needs no draw; 32 bits number the rows of every grid that a framebuffer holds.
+struct call_crossing {
+    std::uint32_t key; // row number
+    std::uint32_t at;
+    static constexpr std::uint32_t draw = 0;
+    call_crossing() = default;
+    call_crossing(std::uint64_t row, std::uint32_t at_, std::uint32_t)
+        : key(static_cast<std::uint32_t>(row)), at(at_) {}
+};
+struct draw_crossing {
+    std::uint64_t key;
+    std::uint32_t at;
+    std::uint32_t draw;
+    draw_crossing() = default;
+    draw_crossing(std::uint64_t row, std::uint32_t at_, std::uint32_t draw_) : key(row), at(at_), draw(draw_) {}
+};
+[[nodiscard]] constexpr std::uint32_t crossing_voxel(std::uint32_t at) { return at >> 1; }
+[[nodiscard]] constexpr int crossing_winding(std::uint32_t at) { return (at & 1) != 0 ? -1 : 1; }
+
+template <class Crossing>
+struct crossing_list {
+    status_code code = status_code::ok;
+    counters counts{};             // of the draws' triangles
+    raw_array<Crossing> crossings; // by row, and in a row by primitive, hence by body
+};
+
+// Reads every triangle once: counts it, and finds its crossings with the rows of the grid.
+template <class Crossing>
+[[nodiscard]] crossing_list<Crossing> find_crossings(const execution& how, const solid_geometry& s) {
+    how.enter(stage::coarse_raster);
+    crossing_list<Crossing> all;
+    const row_numbers rows(s.where.extent);
+    {
+        const stopwatch watch(how.times, &stage_times::coarse_raster);
+        constexpr std::size_t block = 8192;
+        const std::size_t n = s.first_primitive.back();
+        const std::size_t blocks = (n + block - 1) / block;
+        const core::voxel_box whole = s.whole_box();
+        struct block_result {
+            status_code code = status_code::ok;
+            counters counts{};
+            std::vector<Crossing> crossings;
+        };
+        std::vector<block_result> parts(blocks);
+        parallel_for(how.threads, blocks, [&](unsigned, std::size_t b) {
+            block_result& part = parts[b];
+            std::vector<Crossing> found;
+            counters counts{};
+            const std::size_t last = std::min(n, (b + 1) * block);
+            for (std::size_t i = b * block; i < last; ++i) {
+                const auto tri = s.find(static_cast<std::uint32_t>(i));
+                const geometry::part& in = s.parts[tri.draw];
+                if (tri.index.x >= in.num_vertices || tri.index.y >= in.num_vertices ||
+                    tri.index.z >= in.num_vertices) {
+                    part.code = status_code::index_out_of_range;
+                    return;
+                }
+                const core::snapped_position &a = in.positions[tri.index.x], &b_ = in.positions[tri.index.y],
+                                             &c = in.positions[tri.index.z];
+                const bool counted = !s.is_repair[tri.draw];
+                if (!core::is_drawable(a) || !core::is_drawable(b_) || !core::is_drawable(c)) {
+                    const bool nonfinite =
+                        a.x == core::nonfinite_mark || b_.x == core::nonfinite_mark || c.x == core::nonfinite_mark;
+                    ++(nonfinite ? counts.triangles_nonfinite : counts.triangles_too_far);
+                    continue;
+                }
+                if (!core::meets_rows(a, b_, c, s.snap.fraction, whole)) {
+                    counts.triangles_outside += counted ? 1 : 0;
+                    continue;
+                }
+                counts.triangles_drawn += counted ? 1 : 0;
+                const core::row_box box = core::rows_within<0>(a, b_, c, s.snap.fraction, whole);
+                core::for_each_crossing<0, core::centre_offset<>>(
+                    a, b_, c, s.snap.fraction, box,
+                    [&](std::int64_t y, std::int64_t z, std::int64_t first, int winding) {
+                        const auto x = static_cast<std::uint32_t>(std::clamp<std::int64_t>(first, 0, s.where.extent.x));
+                        found.emplace_back(rows.number(y, z), 2 * x + (winding > 0 ? 0 : 1), s.body[tri.draw]);
+                    });
+            }
+            part.crossings = std::move(found);
+            part.counts = counts;
+        });
+
+        std::vector<std::size_t> first(blocks + 1, 0);
+        for (std::size_t b = 0; b < blocks; ++b) {
+            const block_result& part = parts[b];
+            if (part.code != status_code::ok) {
+                all.code = part.code;
+                return all;
+            }
+            all.counts.triangles_nonfinite += part.counts.triangles_nonfinite;
+            all.counts.triangles_too_far += part.counts.triangles_too_far;
+            all.counts.triangles_outside += part.counts.triangles_outside;
+            all.counts.triangles_drawn += part.counts.triangles_drawn;
+            first[b + 1] = first[b] + part.crossings.size();
+        }
+        all.counts.triangles_in = s.triangles_in;
+        all.crossings = raw_array<Crossing>(first[blocks]);
+        parallel_for(how.threads, blocks, [&](unsigned, std::size_t b) {
+            std::copy(parts[b].crossings.begin(), parts[b].crossings.end(), all.crossings.begin() + first[b]);
+            parts[b].crossings = {};
+        });
+    }
+    how.enter(stage::tile_sort);
+    const stopwatch watch(how.times, &stage_times::tile_sort);
+    radix_sort(how.threads, all.crossings, static_cast<int>(std::bit_width(rows.num_beams() * tile_rows - 1)));
+    return all;
+}
+
+} // namespace voxelpipe::cpu
