@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Four integers side by side, of 32 or 64 bits: plain, and in SSE2 registers where the compiler has them. All that
-// coverage needs of them: sums, linear functions, and which are not negative. Host code.
+// Four integers of 32 or 64 bits in parallel: plain, and in SSE2 registers if the compiler has them. Supports what
+// coverage needs: sums, linear functions, and tests for non-negative lanes. Host code.
 
 #include <cstdint>
 
@@ -27,7 +27,7 @@ struct plain_lanes {
     [[nodiscard]] friend constexpr plain_lanes operator-(const plain_lanes& a, const plain_lanes& b) {
         return {{a.v[0] - b.v[0], a.v[1] - b.v[1], a.v[2] - b.v[2], a.v[3] - b.v[3]}};
     }
-    // Bit i is set where lane i is >= 0 in all arguments.
+    // Bit i is set if lane i is >= 0 in all arguments.
     [[nodiscard]] friend constexpr std::uint32_t nonnegative(const plain_lanes& a, const plain_lanes& b) {
         std::uint32_t bits = 0;
         for (int i = 0; i < 4; ++i) bits |= static_cast<std::uint32_t>((a.v[i] | b.v[i]) >= 0) << i;
@@ -74,7 +74,7 @@ struct sse2_lanes64 {
     [[nodiscard]] friend sse2_lanes64 operator-(const sse2_lanes64& a, const sse2_lanes64& b) {
         return {{_mm_sub_epi64(a.v[0], b.v[0]), _mm_sub_epi64(a.v[1], b.v[1])}};
     }
-    // The sign bits are gathered in one register: the upper halves of all four lanes.
+    // Gathers the sign bits in one register: the upper halves of all four lanes.
     [[nodiscard]] friend std::uint32_t nonnegative(const sse2_lanes64& a, const sse2_lanes64& b) {
         const __m128 lo = _mm_castsi128_ps(_mm_or_si128(a.v[0], b.v[0])),
                      hi = _mm_castsi128_ps(_mm_or_si128(a.v[1], b.v[1]));

@@ -3,7 +3,7 @@
 #pragma once
 
 // Threads of the CPU backend: a parallel loop over items that any thread may take, and a stable radix sort. Results
-// never depend on the number of threads: items are fixed pieces of work with places of their own in the output.
+// never depend on the number of threads: items are fixed pieces of work, each with its own part of the output.
 
 #include <algorithm>
 #include <atomic>
@@ -20,7 +20,7 @@
 
 namespace voxelpipe::cpu {
 
-// parallel_for for work(context, worker, item).
+// Implements parallel_for, for work(context, worker, item).
 inline void parallel_items(unsigned num_threads, std::size_t num_items,
                            void (*work)(const void*, unsigned, std::size_t), const void* context) {
     const auto workers = static_cast<unsigned>(std::min<std::size_t>(num_threads, num_items));
@@ -40,8 +40,8 @@ inline void parallel_items(unsigned num_threads, std::size_t num_items,
             if (!error) error = std::current_exception();
         }
     };
-    // Where the machine gives no more threads, or no memory for one, those that are there do the work: so a loop whose
-    // items need no memory cannot fail for want of it.
+    // If the machine grants no more threads, or no memory for one, the existing ones do the work: a loop whose items
+    // need no memory cannot fail for lack of it.
     std::vector<std::thread> threads;
     try {
         threads.reserve(workers - 1);
@@ -55,8 +55,8 @@ inline void parallel_items(unsigned num_threads, std::size_t num_items,
 }
 
 // Calls work(worker, item) for item = 0 .. num_items - 1, each once, on up to num_threads threads; worker <
-// num_threads. The first exception is rethrown here after all threads have stopped. Items are pieces of work that a
-// call through a pointer costs nothing against; so the threads' code is compiled once, not once a loop.
+// num_threads. Rethrows the first exception after all threads have stopped. A call through a pointer is cheap compared
+// with an item, so the threads' code is compiled once instead of once per loop.
 template <class Work>
 void parallel_for(unsigned num_threads, std::size_t num_items, const Work& work) {
     const auto call = [](const void* w, unsigned worker, std::size_t item) {
@@ -65,7 +65,7 @@ void parallel_for(unsigned num_threads, std::size_t num_items, const Work& work)
     parallel_items(num_threads, num_items, call, &work);
 }
 
-// A fixed number of values that start uninitialised: they are all written, by several threads, before they are read.
+// A fixed number of uninitialised values. Several threads write all of them before they are read.
 template <class T>
 class raw_array {
 public:

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Conservative coverage of a triangle whose bounding box is small: the sets of coverage.hpp, as rows of bits along x,
-// without a dominant axis, a division or a branch on the data but one loop's end. A voxel of the bounding box is
-// covered iff it passes the three projections and the plane (triangle_setup.hpp): three tables of rows, and two linear
-// functions along x. Host code: what pays on a CPU.
+// Conservative coverage of a triangle with a small bounding box: the sets of coverage.hpp, as rows of bits along x,
+// without a dominant axis, divisions, or branches on the data except the end of one loop. A voxel of the bounding box
+// is covered iff it passes the three projections and the plane (triangle_setup.hpp): three tables of rows, and two
+// linear functions along x. Host code, tuned for CPUs.
 
 #include <cpu_ref/lanes.hpp>
 #include <voxelpipe/core/triangle_setup.hpp>
@@ -15,13 +15,13 @@
 
 namespace voxelpipe::core {
 
-// Whether all sides of a bounding box are at most `size` voxels.
+// True if all sides of a bounding box are at most `size` voxels.
 [[nodiscard]] VOXELPIPE_HD constexpr bool is_within(const voxel_box& box, int size) {
     return max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) < size;
 }
 
 // One projection of a small triangle onto (x, y): bits along x of the rows y = 0 .. Size - 1. Coordinates are relative
-// to the bounding box; `negative` is -1 where the projection's area is negative, else 0.
+// to the bounding box; `negative` is -1 if the projection's area is negative, else 0.
 template <int Size, class Lanes>
 VOXELPIPE_INLINE void small_projection(const std::int32_t (&x)[3], const std::int32_t (&y)[3], std::int32_t negative,
                                        int fraction, std::uint32_t (&rows)[Size]) {
@@ -45,12 +45,12 @@ VOXELPIPE_INLINE void small_projection(const std::int32_t (&x)[3], const std::in
     }
 }
 
-// Calls emit(y, z, bits) for rows of voxels within `clip`; bits along x, which may be none. y, z and the bits count
-// from clip's lowest corner; clip is at most 32 voxels a side. all = bounds(a, b, c, fraction) is within Size. Returns
-// false, and emits nothing, where a projection has no area. Widths, for Size = 8 and F <= 16: positions and edges are
-// at most 2^19 units; a normal's component, twice the area of a projection, at most 2^38; its product with a position
-// at most 2^57, three of them below 2^59. A projection's row: a, b at most 2^19, c at most 2^40 / 2^16 + 2^20, a and b
-// times a coordinate of at most 8 at most 2^22: 27 bits.
+// Calls emit(y, z, bits) for rows of voxels within `clip`, with bits along x, possibly none. y, z and the bits are
+// relative to clip's lowest corner; clip is at most 32 voxels a side. all = bounds(a, b, c, fraction) must be within
+// Size. Returns false, without emitting, if a projection has no area.
+// Widths, for Size = 8 and F <= 16: positions and edges are at most 2^19 units; a normal's component, twice the area of
+// a projection, at most 2^38; its product with a position at most 2^57, three of them below 2^59. A projection's row:
+// a, b at most 2^19, c at most 2^40 / 2^16 + 2^20, a and b times a coordinate of at most 8 at most 2^22: 27 bits.
 template <int Size, class Lanes = lanes32, class WideLanes = lanes64, class Emit>
 VOXELPIPE_INLINE bool for_each_small_row(const snapped_position& a, const snapped_position& b,
                                          const snapped_position& c, int fraction, const voxel_box& all,
@@ -71,7 +71,8 @@ VOXELPIPE_INLINE bool for_each_small_row(const snapped_position& a, const snappe
     small_projection<Size, Lanes>(x, z, ~sign(ny), fraction, xz); // (x, z) is left-handed
     small_projection<Size, Lanes>(y, z, sign(nx), fraction, yz);
 
-    // low <= n . corner + what the voxel's furthest corner adds, and the same from above.
+    // Bounds of the plane: low + n . corner >= 0 and high - n . corner >= 0, with the voxel's furthest corners
+    // included.
     const std::int64_t d = nx * x[0] + ny * y[0] + nz * z[0];
     const std::int64_t negatives = (nx & (nx >> 63)) + (ny & (ny >> 63)) + (nz & (nz >> 63));
     const std::int64_t positives = nx + ny + nz - negatives;

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What every device stage must output, one function a stage, on one thread and for any tile size: a failing device test
-// compares with these and names the stage. The data flow is the pipeline's own:
+// Expected output of every device stage, one function per stage, on one thread and for any tile size: a failing device
+// test compares with these and names the stage. The data flow is the pipeline's own:
 //
 //   vertex_shade -> tile_pairs -> sorted_tile_pairs -> tile_ranges -> work_items -> fragments
 //
-// Pairs and fragments are compared as sorted lists: a device may emit them in any order.
+// Pairs and fragments are compared as sorted lists, because a device may emit them in any order.
 
 #include <cpu_ref/pipeline.hpp>
 
@@ -18,8 +18,8 @@
 
 namespace voxelpipe::cpu_stages {
 
-// Snapped positions of each draw's vertices after its vertex shader, relative to the computed part of the grid.
-// g is valid (voxelpipe::validate).
+// Snapped positions of each draw's vertices after its vertex shader, relative to the computed part of the grid. g must
+// be valid (voxelpipe::validate).
 template <class Mesh, class VertexShader, class FragmentShader>
 [[nodiscard]] std::vector<std::vector<core::snapped_position>>
 vertex_shade(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g) {
@@ -38,15 +38,15 @@ struct tile_pair {
 };
 
 struct coarse_output {
-    status_code code = status_code::ok; // index_out_of_range: no pairs
-    counters counts{};                  // triangles_* are filled
-    std::vector<tile_pair> pairs;       // by primitive
+    status_code code = status_code::ok; // no pairs if index_out_of_range
+    counters counts{};                  // triangles_* are set
+    std::vector<tile_pair> pairs;       // by ascending primitive
 };
 
-// Coarse raster with tiles of 2^log2_tile_size voxels. A triangle whose reach (its bounding box, for thin coverage one
-// voxel wider, cut to the grid) lies in one tile is paired with that tile. Any other, conservative: with exactly the
-// tiles of its reach whose closed box it meets; thin: with the tiles of its reach that its plane passes within its
-// columns of tiles. Zero-area triangles have no thin pairs.
+// Coarse raster with tiles of 2^log2_tile_size voxels. A triangle whose reach (its bounding box, one voxel wider for
+// thin coverage, clipped to the grid) lies in one tile is paired with that tile. Otherwise it is paired with the tiles
+// of its reach whose closed box it meets (conservative), or that its plane passes within its columns of tiles (thin).
+// Zero-area triangles have no thin pairs.
 template <class Mesh, class VertexShader, class FragmentShader>
 [[nodiscard]] coarse_output tile_pairs(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                                        coverage rule, int log2_tile_size) {
@@ -63,7 +63,7 @@ template <class Mesh, class VertexShader, class FragmentShader>
     return out;
 }
 
-// Tile sort: by tile, and within a tile by primitive.
+// Tile sort: by tile, then by primitive.
 [[nodiscard]] inline std::vector<tile_pair> sorted_tile_pairs(std::vector<tile_pair> pairs) {
     std::sort(pairs.begin(), pairs.end());
     return pairs;
@@ -85,8 +85,7 @@ struct tile_range {
     return out;
 }
 
-// Tile split: no work item has more than max_pairs (1 or more) pairs; a tile with more becomes several virtual tiles,
-// in order.
+// Tile split: work items have at most max_pairs >= 1 pairs; a tile with more becomes several virtual tiles, in order.
 [[nodiscard]] inline std::vector<tile_range> work_items(std::span<const tile_range> ranges, std::uint64_t max_pairs) {
     std::vector<tile_range> out;
     for (const tile_range& r : ranges)
@@ -95,7 +94,8 @@ struct tile_range {
     return out;
 }
 
-// A fragment that was not discarded: linear voxel id within the computed part of the grid, (z * ny + y) * nx + x.
+// A fragment that was not discarded, with its linear voxel id within the computed part of the grid, (z * ny + y) * nx +
+// x.
 struct covered_voxel {
     std::uint64_t voxel;
     std::uint32_t primitive;

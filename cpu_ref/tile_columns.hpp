@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Coverage within a box of at most 32 voxels a side, as columns of bits: the sets of coverage.hpp, found from tables
-// instead of voxel by voxel. Each of the three projections cuts the voxels of a row to an interval that depends on that
-// row alone, so a column (u, v) is the intersection of three: of the (v, w) projection at v, of the (w, u) projection
-// at u, and of the voxels that the plane passes in the column. Small rows are tested voxel by voxel without branches.
-// Host code: what pays on a CPU.
+// Coverage within a box of at most 32 voxels a side, as columns of bits: the sets of coverage.hpp, from tables instead
+// of voxel by voxel. Each of the three projections restricts the voxels of a row to an interval that depends on that
+// row alone, so a column (u, v) is the intersection of three: the (v, w) projection at v, the (w, u) projection at u,
+// and the voxels that the plane passes in the column. Short rows are tested voxel by voxel without branches. Host code,
+// tuned for CPUs.
 
 #include <cpu_ref/lanes.hpp>
 #include <voxelpipe/core/coverage.hpp>
@@ -20,7 +20,7 @@ namespace voxelpipe::core {
     return static_cast<std::uint32_t>((std::uint64_t{1} << n) - 1);
 }
 
-// Three half-planes along a row: value at x is k * x + r.
+// Three half-planes along a row; the values at x are k * x + r.
 template <class Int>
 struct row_lines {
     Int k[3], r[3];
@@ -31,7 +31,7 @@ struct row_lines {
     }
 };
 
-// Bit x is set where all three are >= 0, for x = 0 .. n - 1, 1 <= n <= 32. The bits are an interval.
+// Bit x is set if all three are >= 0, for x = 0 .. n - 1, 1 <= n <= 32. The bits are an interval.
 template <class Int>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::uint32_t row_bits(const row_lines<Int>& h, int n) {
     std::uint32_t bits = 0;
@@ -65,8 +65,8 @@ template <class Int>
     return low_bits(static_cast<int>(last) + 1) & ~low_bits(static_cast<int>(first));
 }
 
-// row_bits for `rows` rows, each a step after the one before. Where `small`, all values up to three beyond the ends of
-// the rows and one row beyond the last are below 2^31 in magnitude, and four voxels are tested at once.
+// row_bits for `rows` rows, each one step after the previous. `small`: all values up to three beyond the ends of the
+// rows, and one row beyond the last, are below 2^31 in magnitude; then four voxels are tested at once.
 template <class Lanes = lanes32, class Int>
 inline void row_bits_of(row_lines<Int> h, const Int (&step)[3], int rows, int n, bool small, std::uint32_t* out) {
     if (!small) {
@@ -88,15 +88,15 @@ inline void row_bits_of(row_lines<Int> h, const Int (&step)[3], int rows, int n,
     }
 }
 
-// Whether that holds for a bounding box with these last voxels: edges are below 2^22 units, their products by a
-// position of at most as much, two of them, below 2^45, hence c below 2^29 + 2^23; a and b times a coordinate of at
-// most 66 are below 2^29 each.
+// True if a bounding box with these last voxels has `small` rows: edges are below 2^22 units, the sum of two products
+// with positions of the same size below 2^45, hence c below 2^29 + 2^23; a and b times a coordinate of at most 66 are
+// below 2^29 each.
 [[nodiscard]] VOXELPIPE_HD constexpr bool has_small_rows(std::int64_t last_x, std::int64_t last_y, int fraction) {
     return last_x < 64 && last_y < 64 && fraction <= 16;
 }
 
-// floor(numerator / divisor) along a line of equal steps. A step upwards is one whole and a step downwards, so that one
-// correction without a branch is enough: |delta| <= divisor.
+// floor(numerator / divisor) along a line of equal steps, |delta| <= divisor. An upward step is one whole minus a
+// downward step, so one branchless correction suffices.
 template <class Int>
 struct floor_line {
     Int quotient, remainder;
@@ -118,8 +118,8 @@ struct floor_step {
     }
 };
 
-// Calls emit(u, v, bits) for every column that holds covered voxels of `clip` (x y z, at most 32 voxels a side). u, v
-// and the bits (along w) count from clip's lowest corner. Each column comes once.
+// Calls emit(u, v, bits) for every column with covered voxels of `clip` (x y z, at most 32 voxels a side). u, v and the
+// bits (along w) are relative to clip's lowest corner. Each column is emitted once.
 template <span_rule Rule, class Int, class Emit>
 VOXELPIPE_INLINE void for_each_column(const triangle_setup<Int>& t, const voxel_box& clip, Emit&& emit) {
     static_assert(Rule != span_rule::columns);
@@ -169,9 +169,9 @@ VOXELPIPE_INLINE void for_each_column(const triangle_setup<Int>& t, const voxel_
         rows(t.wu, true, 2, 0, count[0], count[2], wu_bits);
     }
 
-    // Depth of the plane, in voxels of the part. Thin: at the column's centre, everything doubled. Conservative: the
-    // lowest voxel whose slab the plane can pass within the column's square; the highest is
-    // floor((numerator + spread) / nw), and spread <= 2 nw + 1.
+    // Depth of the plane, in voxels of the part. Thin: at the column's centre, all terms doubled. Conservative: the
+    // lowest voxel whose slab the plane can pass within the column's square; the highest is floor((numerator + spread)
+    // / nw), and spread <= 2 nw + 1.
     constexpr int twice = thin ? 2 : 1;
     const Int divisor = twice * nw;
     const Int numerator = thin ? t.plane_high - nu * (2 * at[0] + 1) - nv * (2 * at[1] + 1)
@@ -181,7 +181,7 @@ VOXELPIPE_INLINE void for_each_column(const triangle_setup<Int>& t, const voxel_
 
     const floor_step<Int> step_u(-twice * nu, divisor), step_v(-twice * nv, divisor);
     floor_line<Int> row(numerator, divisor);
-    row.quotient -= at[2]; // which may be far from the bounding box where thin: no factor of a product
+    row.quotient -= at[2]; // at[2] may be far from the bounding box for thin coverage, so it is no factor of a product
     for (int v = 0; v < count[1]; ++v, step_v(row)) {
         const std::uint32_t columns = uv_bits[v];
         std::uint32_t row_limit = 0;
@@ -211,8 +211,9 @@ VOXELPIPE_INLINE void for_each_column(const triangle_setup<Int>& t, const voxel_
     }
 }
 
-// A bounding box one voxel thick along an axis: -1 where there is none. Then a voxel is covered exactly where, seen
-// along that axis, its square meets the projected triangle, since the triangle lies within the voxel's thickness.
+// The axis along which a bounding box is one voxel thick; -1 if there is none. A voxel of such a box is covered iff,
+// seen along that axis, its square meets the projected triangle, because the triangle lies within the voxel's
+// thickness.
 [[nodiscard]] VOXELPIPE_HD constexpr int slab_axis(const voxel_box& bounding_box) {
     for (int i = 2; i >= 0; --i)
         if (bounding_box.hi[i] == bounding_box.lo[i]) return i;
@@ -220,8 +221,8 @@ VOXELPIPE_INLINE void for_each_column(const triangle_setup<Int>& t, const voxel_
 }
 
 // Conservative coverage of such a triangle within `clip` (at most 32 voxels a side): calls emit(q, bits) for every row
-// of covered voxels, bits along p. (p, q) are (y, z), (x, z) or (x, y) for axis = x, y, z; both count from clip's
-// lowest corner. Int is wide enough for the triangle.
+// of covered voxels, with bits along p. (p, q) are (y, z), (x, z) or (x, y) for axis = x, y, z; both are relative to
+// clip's lowest corner. Int must be wide enough for the triangle.
 template <class Int, class Emit>
 VOXELPIPE_INLINE void for_each_slab_row(const snapped_position& a, const snapped_position& b, const snapped_position& c,
                                         int fraction, int axis, const voxel_box& bounding_box, const voxel_box& clip,

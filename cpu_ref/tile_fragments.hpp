@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// One primitive in one tile: its fragments, shaded; or, where the shader gives every fragment the same values, its
-// coverage alone as rows and columns of bits. Positions count from the tile's lowest voxel. A row of a tile is
-// y + tile_size * z, its bits run along x.
+// One primitive in one tile: its shaded fragments or, if the shader gives every fragment the same values, its coverage
+// alone as rows and columns of bits. Positions are relative to the tile's lowest voxel. A row of a tile is y +
+// tile_size * z, its bits run along x.
 
 #include <cpu_ref/pipeline.hpp>
 #include <cpu_ref/small_box.hpp>
@@ -29,7 +29,7 @@ private:
           c(s.parts[p.draw].positions[p.index.z]) {}
 };
 
-// The voxels of one triangle in the tile, each once: calls along_x(row, bits) with an interval of bits, or
+// Visits the voxels of one triangle in the tile, each once: calls along_x(row, bits) with an interval of bits, or
 // across(row, stride, x, bits), which means bit x of the rows row + i * stride for the ones i of an interval of bits.
 // An interval may be empty.
 template <coverage Rule, class AlongX, class Across>
@@ -60,7 +60,7 @@ VOXELPIPE_INLINE void cover_in_tile(const gathered_triangle& tri, int fraction, 
             if (core::for_each_small_row<8>(tri.a, tri.b, tri.c, fraction, all, tile, small_row)) return;
         }
         const int axis = core::slab_axis(all);
-        if (axis >= 0 && core::fits_narrow(tri.a, tri.b, tri.c, fraction)) { // needs no plane
+        if (axis >= 0 && core::fits_narrow(tri.a, tri.b, tri.c, fraction)) { // needs no plane test
             if (here.empty()) return;
             const auto level = static_cast<int>(here.lo[axis] - tile.lo[axis]);
             core::for_each_slab_row<std::int64_t>(tri.a, tri.b, tri.c, fraction, axis, all, tile,
@@ -91,14 +91,14 @@ VOXELPIPE_INLINE void cover_in_tile(const gathered_triangle& tri, int fraction, 
         run(core::setup_triangle<rule, int128>(tri.a, tri.b, tri.c, fraction));
 }
 
-// Calls visit(x, y, z, fragment shader's output) for every fragment of one primitive in the tile. All of it is inlined
-// by force: the fragment's fields that a shader does not read are then seen to be unused, and cost nothing.
+// Calls visit(x, y, z, fragment shader's output) for every fragment of one primitive in the tile. Everything is forced
+// inline, so fields of the fragment that the shader does not read cost nothing.
 template <coverage Rule, class Scene, class Visit>
 VOXELPIPE_INLINE void shade_in_tile(const Scene& s, std::uint32_t id, const core::voxel_box& tile, Visit&& visit) {
     const gathered_triangle tri(s, id);
     const auto& d = s.draws[tri.where.draw];
     if constexpr (core::is_constant<typename Scene::fragment_shader>) {
-        const auto out = d.fragment_shader(tri); // which reads nothing of what it is given
+        const auto out = d.fragment_shader(tri); // a constant shader ignores its argument
         cover_in_tile<Rule>(
             tri, s.snap.fraction, tile,
             [&](int row, std::uint32_t bits) VOXELPIPE_INLINE_LAMBDA {
