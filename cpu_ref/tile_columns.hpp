@@ -231,10 +231,10 @@ VOXELPIPE_INLINE void for_each_slab_row(const snapped_position& a, const snapped
     const voxel_box part = intersect(bounding_box, clip);
     if (part.empty()) return;
     const std::int64_t op = bounding_box.lo[p] << fraction, oq = bounding_box.lo[q] << fraction;
-    const auto place = [&](const snapped_position& v) {
+    const auto to_local = [&](const snapped_position& v) {
         return triple<Int>{{(axis == 0 ? v.y : v.x) - op, (axis == 2 ? v.y : v.z) - oq, 0}};
     };
-    const triple<Int> vertices[3] = {place(a), place(b), place(c)};
+    const triple<Int> vertices[3] = {to_local(a), to_local(b), to_local(c)};
     const Int area = (vertices[1][0] - vertices[0][0]) * (vertices[2][1] - vertices[0][1]) -
                      (vertices[1][1] - vertices[0][1]) * (vertices[2][0] - vertices[0][0]);
     half_plane<Int> lines[3];

@@ -49,8 +49,8 @@ VOXELPIPE_HD void evaluate(const float_input& in, float_output& out) {
     out.lerp = ex::lerp(a, b, in.c);
     out.saturated = ex::fma_saturated(a, b, in.c);
     out.inverse = ex::near_inverse(a);
-    out.least = ex::least(a, b);
-    out.greatest = ex::greatest(a, b);
+    out.least = ex::min(a, b);
+    out.greatest = ex::max(a, b);
     out.absolute = ex::absolute(a);
     out.as_double = ex::to_double(a);
 }

@@ -68,15 +68,15 @@ struct counted {
         auto d_narrow = on_device(gpu, std::vector<std::uint32_t>(room, 42));
         auto d_wide = on_device(gpu, std::vector<std::uint64_t>(room, 42));
         auto d_first = on_device(gpu, std::vector<std::uint64_t>(room + 1, 42));
-        device::list_places places, none;
-        places.voxels = is_wide ? d_wide.data() : nullptr;
-        places.narrow_voxels = d_narrow.data();
-        places.offsets = d_first.data();
-        places.room = room;
-        places.primitives = d_to.data();
-        const auto asked = on_device(gpu, std::vector{is_wide ? places : none});
-        device::order_by_counting({nullptr, m.pairs.values[1], m.pairs.keys[0], asked.data(), is_wide ? none : places,
-                                   m.order.tiles, m.order.lists.with(d_state.data())},
+        device::csr_pointers pointers, none;
+        pointers.voxels = is_wide ? d_wide.data() : nullptr;
+        pointers.narrow_voxels = d_narrow.data();
+        pointers.offsets = d_first.data();
+        pointers.voxel_capacity = room;
+        pointers.primitives = d_to.data();
+        const auto outputs = on_device(gpu, std::vector{is_wide ? pointers : none});
+        device::order_by_counting({nullptr, m.pairs.values[1], m.pairs.keys[0], outputs.data(),
+                                   is_wide ? none : pointers, m.order.tiles, m.order.lists.with(d_state.data())},
                                   {m.pairs.keys[0], m.pairs.values[0]}, m.counting, num_primitives, d_state.data(),
                                   {0, 0, capacity, 0, longest}, gpu.stream, nullptr);
         primitives = d_to.to_host(gpu);

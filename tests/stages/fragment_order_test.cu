@@ -45,14 +45,14 @@ struct ordered {
         auto d_narrow = on_device(gpu, std::vector<std::uint32_t>(room, 42));
         auto d_wide = on_device(gpu, std::vector<std::uint64_t>(room, 42));
         auto d_first = on_device(gpu, std::vector<std::uint64_t>(room + 1, 42));
-        device::list_places places, none;
-        places.voxels = is_wide ? d_wide.data() : nullptr;
-        places.narrow_voxels = d_narrow.data();
-        places.offsets = d_first.data();
-        places.room = room;
-        places.primitives = d_to.data();
-        const auto asked = on_device(gpu, std::vector{is_wide ? places : none});
-        device::order_fragments({d_keys.data(), d_from.data(), d_keys.data(), asked.data(), is_wide ? none : places,
+        device::csr_pointers pointers, none;
+        pointers.voxels = is_wide ? d_wide.data() : nullptr;
+        pointers.narrow_voxels = d_narrow.data();
+        pointers.offsets = d_first.data();
+        pointers.voxel_capacity = room;
+        pointers.primitives = d_to.data();
+        const auto outputs = on_device(gpu, std::vector{is_wide ? pointers : none});
+        device::order_fragments({d_keys.data(), d_from.data(), d_keys.data(), outputs.data(), is_wide ? none : pointers,
                                  order.tiles, order.lists.with(d_state.data())},
                                 num_primitives, d_state.data(), {0, 0, capacity, 0}, gpu.stream);
         primitives = d_to.to_host(gpu);

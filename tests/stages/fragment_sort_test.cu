@@ -86,7 +86,7 @@ TEST(FragmentSort, IsStableForEveryNumberOfBits) {
         const device::digit_plan plan(bits);
         EXPECT_GE(plan.passes * plan.bits, bits);
         EXPECT_LE(plan.passes, device::max_digit_passes);
-        EXPECT_LE(plan.bits, device::most_digit_bits);
+        EXPECT_LE(plan.bits, device::max_digit_bits);
         std::mt19937 random(static_cast<unsigned>(bits) + 1);
         expect_sorted(20000, bits, [&](auto) { return below(static_cast<std::uint32_t>(random()), bits); });
     }

@@ -174,11 +174,11 @@ struct brick_thin {
             first[k] = static_cast<std::int32_t>(low[k]);
             last[k] = static_cast<std::int32_t>(high[k]);
         }
-        const auto place = [&](const snapped_position& v) {
+        const auto to_local = [&](const snapped_position& v) {
             return to_uvw<std::int64_t>(axes.dominant, v.x - (box.lo[0] << fraction), v.y - (box.lo[1] << fraction),
                                         v.z - (box.lo[2] << fraction));
         };
-        const triple<std::int64_t> p[3] = {place(a), place(b), place(c)};
+        const triple<std::int64_t> p[3] = {to_local(a), to_local(b), to_local(c)};
         std::int64_t n[3];
         for (int k = 0; k < 3; ++k) {
             const int i = k == 2 ? 0 : k + 1, j = k == 0 ? 2 : k - 1;
@@ -262,8 +262,8 @@ struct brick_row {
         // About where the next depth begins, in floats.
         const float edge = exact::sub(static_cast<float>(of_column + (by_u > 0.0f ? 1 : 0)), first),
                     at = exact::mul(edge, exact::near_inverse(by_u));
-        auto end = static_cast<int>(
-            exact::greatest(exact::least(at, static_cast<float>(last - 1)), static_cast<float>(column)));
+        auto end =
+            static_cast<int>(exact::max(exact::min(at, static_cast<float>(last - 1)), static_cast<float>(column)));
         while (end > column && depth(t, end) != of_column) --end;
         while (depth(t, end + 1) == of_column) ++end;
         return end;

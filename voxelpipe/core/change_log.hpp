@@ -44,8 +44,8 @@ private:
 // The words of a log: for each target its clear value, if known, then one bit for each chunk that may have been drawn
 // into since. A target that is known holds its clear value in all chunks without a bit. All zeros: nothing is known.
 struct change_log {
-    static constexpr std::size_t max_targets = 8, most_bytes = 32; // most_bytes: of a value
-    static constexpr std::size_t known_words = 1 + most_bytes / sizeof(std::uint32_t);
+    static constexpr std::size_t max_targets = 8, max_bytes = 32; // max_bytes: of a value
+    static constexpr std::size_t known_words = 1 + max_bytes / sizeof(std::uint32_t);
     static constexpr std::size_t header_words = max_targets * known_words;
 
     // A target's clear value: 1 and the bytes of the value; zeros if unknown.
@@ -55,7 +55,7 @@ struct change_log {
         known() = default;
         template <class T>
         explicit known(const T& value) {
-            static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= most_bytes);
+            static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= max_bytes);
             words[0] = 1;
             const auto* const bytes = reinterpret_cast<const unsigned char*>(&value);
             std::copy(bytes, bytes + sizeof(T), reinterpret_cast<unsigned char*>(words + 1));

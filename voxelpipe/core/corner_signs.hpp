@@ -82,7 +82,7 @@ struct corner_edges {
         normal = exact::add(exact::add(at_corner[0], at_corner[1]), at_corner[2]);
         turned = sign_word(normal);
     }
-    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float least() const {
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float smallest() const {
         return min_magnitude(min_magnitude(at_corner[0], at_corner[1]), min_magnitude(at_corner[2], normal));
     }
     // Bytes of ones, one per edge: outside(): the corner lies outside the edge; lower_a(): the cell behind it is the
@@ -139,7 +139,7 @@ inline constexpr std::uint32_t lower_x = 0x55555555u, lower_y = 0x33333333u, low
     const auto rule_out = [&](const corner_edges& e, int a, int b, std::uint32_t lower_of_a, std::uint32_t lower_of_b)
                               VOXELPIPE_INLINE_LAMBDA {
                                   const bool wanted = (last[a] & last[b]) != 0;
-                                  sure = sure && (!wanted || e.least() > limit);
+                                  sure = sure && (!wanted || e.smallest() > limit);
                                   out |= wanted ? behind_centre(e, lower_of_a, lower_of_b) : 0;
                               };
     rule_out(xy, 0, 1, lower_x, lower_y);
@@ -182,7 +182,7 @@ inline constexpr std::uint32_t lower_x = 0x55555555u, lower_y = 0x33333333u, low
                                      : in_zx ? lower_x
                                              : lower_y;
     return {cube_of(last) & ~fold_bytes(behind_centre(e, lower_of_a, lower_of_b)),
-            e.least() > power_of_two(2 * fraction - 19)};
+            e.smallest() > power_of_two(2 * fraction - 19)};
 }
 
 // ---- boxes of 3 x 3 x 3 ---------------------------------------------------------------------------------------------
@@ -199,7 +199,7 @@ struct ruled_out {
 template <bool Swapped>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t behind_four(const corner_edges& e, float one, float& least) {
     float next_a[3], next_b[3], next_both[3];
-    least = e.least();
+    least = e.smallest();
     for (int v = 0; v < 3; ++v) {
         next_a[v] = exact::fma(-one, e.along_b[v], e.at_corner[v]);
         next_b[v] = exact::fma(one, e.along_a[v], e.at_corner[v]);

@@ -199,14 +199,14 @@ namespace exact {
     return static_cast<float>(std::floor(static_cast<double>(a) * b + c));
 #endif
 }
-[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float least(float a, float b) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float min(float a, float b) {
 #if defined(__CUDA_ARCH__)
     return fminf(a, b);
 #else
     return b < a ? b : a;
 #endif
 }
-[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float greatest(float a, float b) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float max(float a, float b) {
 #if defined(__CUDA_ARCH__)
     return fmaxf(a, b);
 #else

@@ -62,7 +62,7 @@ struct slim_rows {
     std::uint32_t first = 0, next = 0;
     const auto rule_out = [&](const corner_edges& e, bool wanted, std::uint32_t lower_of_first,
                               std::uint32_t lower_of_second) VOXELPIPE_INLINE_LAMBDA {
-        least = min_magnitude(least, wanted ? e.least() : 2 * limit);
+        least = min_magnitude(least, wanted ? e.smallest() : 2 * limit);
         first |= behind_centre(e, lower_of_first, lower_of_second) & (wanted ? ~0u : 0u);
     };
     // Edge values at the next corner are those at the first plus `step` times `along`.

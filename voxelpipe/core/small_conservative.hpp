@@ -44,9 +44,8 @@ struct near_plane {
         const float in = exact::mul(half, 1.0f - 0x1p-14f), out = exact::mul(half, 1.0f + 0x1p-14f);
         const float enters = exact::fma_saturated(-exact::add(half, row), inverse, 0.25f),
                     leaves = exact::fma_saturated(exact::sub(half, row), inverse, 0.25f); // (x + 16) / 64
-        const float k = exact::least(exact::greatest(exact::fma_up(enters, 64.0f, -16.0f), from), exact::add(to, 1.0f)),
-                    l = exact::greatest(exact::least(exact::fma_down(leaves, 64.0f, -16.0f), to),
-                                        exact::sub(from, 1.0f));
+        const float k = exact::min(exact::max(exact::fma_up(enters, 64.0f, -16.0f), from), exact::add(to, 1.0f)),
+                    l = exact::max(exact::min(exact::fma_down(leaves, 64.0f, -16.0f), to), exact::sub(from, 1.0f));
         const float at_k = exact::fma(n[0], k, row), at_l = exact::fma(n[0], l, row);
         const bool begins = (k == from) | (exact::sub(at_k, n[0]) < -out),
                    ends = (l == to) | (exact::add(at_l, n[0]) > out);

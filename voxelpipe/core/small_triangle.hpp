@@ -19,13 +19,13 @@ namespace voxelpipe::core {
 // most the projected box), n . p 3e + 1.6 and doubled for thin 3e + 2.6 bits, edge coefficients e bits, their constants
 // after the division by 2^F, and every value within the box and one voxel beyond it, 2e + 3 - F bits.
 inline constexpr int small_edge_bits = 20;
-inline constexpr int small_most_voxels = 32; // a row is one word
+inline constexpr int small_max_voxels = 32; // a row is one word
 
 // The most voxels along a side of a small triangle's bounding box.
 [[nodiscard]] VOXELPIPE_HD constexpr int small_voxels(int fraction) {
     if (2 * small_edge_bits + 3 - fraction > 31) return 0;
     const int n = 1 << (fraction < small_edge_bits ? small_edge_bits - fraction : 0);
-    return n < small_most_voxels ? n : small_most_voxels;
+    return n < small_max_voxels ? n : small_max_voxels;
 }
 static_assert(3 * small_edge_bits + 3 <= 63, "the plane of a small triangle would overflow 64 bits");
 static_assert(small_voxels(16) == 16 && small_voxels(14) == 32 && small_voxels(12) == 32 && small_voxels(11) == 0);

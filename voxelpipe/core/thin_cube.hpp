@@ -75,11 +75,11 @@ struct thin_cube {
         return exact::fma(along[a], across[b], -exact::mul(along[b], across[a]));
     };
     const float nx = normal(1, 2), ny = normal(2, 0), nz = normal(0, 1);
-    const bool is_x = exact::absolute(nx) > exact::greatest(exact::absolute(ny), exact::absolute(nz));
+    const bool is_x = exact::absolute(nx) > exact::max(exact::absolute(ny), exact::absolute(nz));
     const bool is_y = !is_x && exact::absolute(ny) > exact::absolute(nz), is_z = !is_x && !is_y;
     const float nu = is_x ? ny : nx, nv = is_z ? ny : nz, nw = is_x ? nx : is_y ? ny : nz;
     const float limit = power_of_two(2 * fraction - 18); // 16 E
-    sure = exact::sub(exact::absolute(nw), exact::greatest(exact::absolute(nu), exact::absolute(nv))) > limit;
+    sure = exact::sub(exact::absolute(nw), exact::max(exact::absolute(nu), exact::absolute(nv))) > limit;
 
     const int last_u = is_x ? last[1] : last[0], last_v = is_z ? last[1] : last[2];
     float u[3], w[3];
@@ -89,7 +89,7 @@ struct thin_cube {
     }
     const corner_edges e(u, w);
     const bool has_corner = (last_u & last_v) != 0;
-    sure = sure && (!has_corner || e.least() > limit);
+    sure = sure && (!has_corner || e.smallest() > limit);
     const std::uint32_t out = fold_bytes(behind_centre(e, lower_x, lower_y));
     const std::uint32_t columns = quad_of(last_u, last_v) & ~(has_corner ? out : 0);
 
@@ -110,7 +110,7 @@ struct thin_cube {
         const std::int32_t depth = exact::integer_below(at[i], over);
         depths |= (static_cast<std::uint32_t>(depth) & 3u) << 2 * i;
         const float off = exact::absolute(exact::sub(over, 0.5f));
-        furthest = exact::greatest(furthest, (columns >> i & 1u) != 0 ? off : 0.0f);
+        furthest = exact::max(furthest, (columns >> i & 1u) != 0 ? off : 0.0f);
     }
     sure = sure && exact::fma(limit, exact::absolute(inverse), exact::add(furthest, 0x1p-17f)) < 0.5f;
     return {is_x ? 0 : is_y ? 1 : 2, columns, depths ^ 0xaau}; // from below the centre to below the box: 2

@@ -69,14 +69,14 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
         arena start = memory;
         auto* const state = start.take<pipeline_state>(1); // first in the call's memory
         zero_memory(state, start.used() - memory.used(), stream);
-        output_pointers asked;
-        asked.value.voxels = voxels;
-        asked.value.offsets = offsets;
-        asked.value.room = room;
-        asked.value.primitives = primitives;
-        asked.value.payloads = payloads;
-        const auto sorted = call.template launch<Rule, Key>(memory, stream, asked);
-        const bool are_done = sorted.are_placed && std::is_void_v<Payload>; // only the lengths are missing
+        output_pointers outputs;
+        outputs.value.voxels = voxels;
+        outputs.value.offsets = offsets;
+        outputs.value.voxel_capacity = room;
+        outputs.value.primitives = primitives;
+        outputs.value.payloads = payloads;
+        const auto sorted = call.template launch<Rule, Key>(memory, stream, outputs);
+        const bool are_done = sorted.are_at_output && std::is_void_v<Payload>; // only the lengths are missing
         launch_behind(publish_lists_kernel<Key, payload_storage<Payload>>, are_done ? 1 : fill_device(room),
                       threads_per_block, stream, stage::abuffer_emit, sorted, state, call.limits, counts, voxels,
                       offsets, primitives, payloads);

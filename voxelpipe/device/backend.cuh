@@ -81,7 +81,7 @@ public:
         buffer<std::uint32_t> max(*this, std::size_t{1});
         device::with_runtime_errors([&] {
             device::check(cudaMemsetAsync(max.data(), 0, sizeof(std::uint32_t), stream));
-            device::find_most_index(triangles, max.data(), stream);
+            device::find_max_index(triangles, max.data(), stream);
         });
         return max.to_host(*this)[0];
     }

@@ -27,7 +27,7 @@ struct pipeline_state {
     unsigned long long longest_run; // of those, the longest run of one voxel that is too long for a block
     struct {
         unsigned long long split, lengths[4];
-        unsigned long long set_up; // split triangles whose setup is kept (split_setup)
+        unsigned long long setups_ready; // split triangles whose setup is kept (split_setup)
         [[nodiscard]] VOXELPIPE_HD bool are_none() const {
             return (split | lengths[0] | lengths[1] | lengths[2] | lengths[3]) == 0;
         }

@@ -73,15 +73,16 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
         (void)memory.take<pipeline_state>(1);
         with_lists<Key>([&]<class Lists>() { Lists(*this, memory); });
     }
-    // Launches the stages up to the sorted lists, which may already be at the output pointers `asked` (are_placed):
-    // these have room for limits.fragments primitives. The state comes first in the memory and must be zero on entry.
+    // Launches the stages up to the sorted lists, which may already be at the output pointers `outputs`
+    // (are_at_output): these have room for limits.fragments primitives. The state comes first in the memory and must be
+    // zero on entry.
     template <coverage Rule, class Key>
     [[nodiscard]] fragment_lists<Key, Payload> launch(arena& memory, cudaStream_t stream,
-                                                      const output_pointers& asked = {}) const {
+                                                      const output_pointers& outputs = {}) const {
         pipeline_state* const state = memory.take<pipeline_state>(1);
         fragment_lists<Key, Payload> sorted{};
         with_lists<Key>(
-            [&]<class Lists>() { sorted = Lists(*this, memory).template launch<Rule>(state, stream, asked); });
+            [&]<class Lists>() { sorted = Lists(*this, memory).template launch<Rule>(state, stream, outputs); });
         return sorted;
     }
 
@@ -106,11 +107,11 @@ private:
               buffers(memory, c.draws), share(memory, c.num_primitives, c.limits.fragment_records) {}
         template <coverage Rule>
         [[nodiscard]] fragment_lists<Key, Payload> launch(pipeline_state* state, cudaStream_t stream,
-                                                          const output_pointers& asked) const {
+                                                          const output_pointers& outputs) const {
             const scene_type s = buffers.shade(call.draws, call.g, stream);
             end_stage(call.clock, &stage_times::vertex_shade);
             return build_lists<Rule, first_value>(s, lists, share.with(state), state, call.limits, true, stream,
-                                                  call.clock, asked);
+                                                  call.clock, outputs);
         }
     };
 
@@ -132,7 +133,7 @@ private:
               order(order_memory::take(memory, c.limits.fragments)) {}
         template <coverage Rule>
         [[nodiscard]] fragment_lists<std::uint32_t, Payload> launch(pipeline_state* state, cudaStream_t stream,
-                                                                    const output_pointers& asked) const {
+                                                                    const output_pointers& outputs) const {
             const draw_type& d = call.draws[0];
             const core::snap_transform snap = core::make_snap_transform(call.g);
             const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
@@ -140,7 +141,7 @@ private:
                 const raster_input<std::remove_cvref_t<decltype(source)>> in{source, call.num_primitives, snap.fraction,
                                                                              call.g.extent};
                 list_raster<Rule>(in, num_vertices, 0, deferred.with(state), lists.keys[0], lists.values[0],
-                                  prepare_lists(lists, asked, order.tiles, call.limits), state, call.limits, stream);
+                                  prepare_lists(lists, outputs, order.tiles, call.limits), state, call.limits, stream);
             };
             if constexpr (shades_in_raster) {
                 raster(shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, 0});
@@ -151,7 +152,7 @@ private:
             }
             end_stage(call.clock, &stage_times::fine_raster);
             fragment_lists<std::uint32_t, Payload> sorted = sort_unordered(
-                lists, order, asked, call.num_primitives, nullptr, state, call.limits, stream, call.clock);
+                lists, order, outputs, call.num_primitives, nullptr, state, call.limits, stream, call.clock);
             if constexpr (!std::is_same_v<Payload, no_payload>)
                 sorted.payload = voxelpipe::get<0>(d.fragment_shader.values);
             return sorted;
@@ -177,17 +178,17 @@ private:
               payloads(memory.take<Payload>(has_payload ? c.limits.fragments : 0)) {}
         template <coverage Rule>
         [[nodiscard]] fragment_lists<std::uint32_t, Payload> launch(pipeline_state* state, cudaStream_t stream,
-                                                                    const output_pointers& asked) {
+                                                                    const output_pointers& outputs) {
             const capacities& limits = call.limits;
             const scene_type s = buffers.shade(call.draws, call.g, stream);
             end_stage(call.clock, &stage_times::vertex_shade);
             const raster_input<stored_source> in{{s.geo.one}, call.num_primitives, s.geo.snap.fraction, call.g.extent};
             list_raster<Rule>(in, s.geo.one.num_vertices, 0, deferred.with(state), lists.keys[0], lists.values[0],
-                              prepare_lists(lists, asked, order.tiles, limits), state, limits, stream);
+                              prepare_lists(lists, outputs, order.tiles, limits), state, limits, stream);
             if (call.filters) filter_lists(s, lists, state, limits, stream);
             end_stage(call.clock, &stage_times::fine_raster);
             fragment_lists<std::uint32_t, Payload> sorted =
-                sort_unordered(lists, order, asked, call.num_primitives, spare, state, limits, stream, call.clock);
+                sort_unordered(lists, order, outputs, call.num_primitives, spare, state, limits, stream, call.clock);
             if (!call.filters || has_payload) {
                 launch_behind(shade_lists_kernel<first_value, scene_type, Payload>, fill_device(limits.fragments),
                               threads_per_block, stream, stage::abuffer_emit, s, sorted, payloads, state, limits);

@@ -62,7 +62,9 @@ public:
         return make_bytes(block_.data(), readback_.page());
     }
     // Tells the device where the lists of the next call are to go.
-    [[nodiscard]] output_pointers ask(const list_places& places) const { return readback_.ask(places); }
+    [[nodiscard]] output_pointers set_outputs(const csr_pointers& pointers) const {
+        return readback_.set_outputs(pointers);
+    }
 
     // Puts launch_all(stream), which works in the workspace, on the stream, waits, and returns the call's state. With
     // `bytes` the launches become a graph once equal bytes have come often enough. The first `zeroed_bytes` of the

@@ -29,11 +29,11 @@ struct list_arrays {
           offsets(from, num_voxels == 0 ? 0 : num_voxels + 1, stage::abuffer_emit),
           primitives(from, num_fragments, stage::abuffer_emit),
           payloads(from, has_payload ? num_fragments : 0, stage::abuffer_emit) {}
-    [[nodiscard]] list_places places(std::uint64_t room) {
-        list_places p;
+    [[nodiscard]] csr_pointers pointers(std::uint64_t voxel_capacity) {
+        csr_pointers p;
         p.voxels = voxels.data();
         p.offsets = offsets.data();
-        p.room = room;
+        p.voxel_capacity = voxel_capacity;
         p.primitives = primitives.data();
         p.payloads = payloads.data();
         return p;
@@ -100,11 +100,11 @@ private:
                 bytes = workspace_.bytes_for_graph(call_.clock, [&](const void* workspace, const void* page) {
                     return call_.template bytes<Rule, Key>(workspace, page);
                 });
-            const output_pointers asked = workspace_.ask(arrays.places(voxel_room));
+            const output_pointers outputs = workspace_.set_outputs(arrays.pointers(voxel_room));
             state_ = workspace_.run(call_.clock, bytes, sizeof(pipeline_state), from_.stream, [&](cudaStream_t on) {
                 arena carved(memory);
-                const auto sorted = call_.template launch<Rule, Key>(carved, on, asked);
-                place_lists(sorted, static_cast<const pipeline_state*>(memory), call_.limits, on, call_.clock);
+                const auto sorted = call_.template launch<Rule, Key>(carved, on, outputs);
+                store_lists(sorted, static_cast<const pipeline_state*>(memory), call_.limits, on, call_.clock);
             });
         });
         if (has_failed(state_, call_.limits)) return;

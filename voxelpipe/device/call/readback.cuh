@@ -61,10 +61,10 @@ public:
         if (page_ != nullptr) page_->state = {};
     }
     // Sets the output pointers; call before the launches.
-    [[nodiscard]] output_pointers ask(const list_places& places) const {
-        if (on_device_ == nullptr) return {places, nullptr};
-        std::memcpy(&page_->places, &places, sizeof(places));
-        return {places, &on_device_->places};
+    [[nodiscard]] output_pointers set_outputs(const csr_pointers& pointers) const {
+        if (on_device_ == nullptr) return {pointers, nullptr};
+        std::memcpy(&page_->pointers, &pointers, sizeof(pointers));
+        return {pointers, &on_device_->pointers};
     }
     // The last work that a call puts on its stream. With a page, it zeros the state.
     void send(pipeline_state* state, cudaStream_t stream) const {
@@ -98,7 +98,7 @@ private:
     using sent = sent_state<pipeline_state>;
     struct contents {
         sent state;
-        list_places places;
+        csr_pointers pointers;
     };
     static_assert(sizeof(contents) <= static_cast<std::size_t>(page_bytes));
 
@@ -122,7 +122,7 @@ private:
             void* on_device = nullptr;
             if (cudaHostGetDevicePointer(&on_device, page_, 0) == cudaSuccess) {
                 on_device_ = static_cast<contents*>(on_device);
-                // The program may ask for threads that sleep or yield instead of spinning.
+                // The program may set_outputs for threads that sleep or yield instead of spinning.
                 unsigned flags = 0;
                 may_spin_ = cudaGetDeviceFlags(&flags) == cudaSuccess &&
                             (flags & (cudaDeviceScheduleYield | cudaDeviceScheduleBlockingSync)) == 0;

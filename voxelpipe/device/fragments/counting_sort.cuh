@@ -19,7 +19,7 @@ struct counted_pairs {
     std::uint32_t *voxels, *primitives;
 };
 
-// Writes listed fragments in order to b.places(), and lists the voxels. b.from: scratch for the primitives. Does not
+// Writes listed fragments in order to b.pointers(), and lists the voxels. b.from: scratch for the primitives. Does not
 // end the last stage.
 VOXELPIPE_DECLARES_KERNELS void order_by_counting(order_buffers b, const counted_pairs& pairs, const counting_memory& m,
                                                   std::uint64_t num_primitives, pipeline_state* state,

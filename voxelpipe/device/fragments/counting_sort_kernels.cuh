@@ -138,10 +138,10 @@ __global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __
         const unsigned long long of_tiles = tile_sums::before(m.tiles, tile, all);
         if (lane == 0) before_tile = of_tiles;
         if (lane == 0 && tile == gridDim.x - 1) {
-            const list_places to = b.places();
+            const csr_pointers to = b.pointers();
             const std::uint64_t num = (of_tiles + all) >> shift;
             state->list_voxels = num;
-            if (num <= to.room) to.offsets[num] = n;
+            if (num <= to.voxel_capacity) to.offsets[num] = n;
             atomicOr(&m.starts[n / 32], 1u << n % 32);
         }
     }
@@ -149,46 +149,44 @@ __global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __
         next_long[lane] = num_long[lane] == 0 ? 0 : atomicAdd(&b.lists.counts[lane], num_long[lane]);
     __syncthreads();
     const unsigned long long earlier = before_tile + of_warps[warp];
-    const list_places to = b.places();
+    const csr_pointers to = b.pointers();
 #pragma unroll
     for (unsigned r = 0; r < rounds; ++r) {
         const std::uint32_t c[4] = {four[r].x, four[r].y, four[r].z, four[r].w};
         if ((c[0] | c[1] | c[2] | c[3]) == 0) continue;
         const unsigned long long at = earlier + before[r];
-        auto place = static_cast<std::uint32_t>(at & tile_sums::low);
+        auto offset = static_cast<std::uint32_t>(at & tile_sums::low);
         std::uint64_t number = at >> shift;
-        std::uint32_t places[4];
+        std::uint32_t offsets_of_four[4];
 #pragma unroll
         for (unsigned k = 0; k < 4; ++k) {
-            places[k] = place;
+            offsets_of_four[k] = offset;
             if (c[k] == 0) continue;
             if (const int list = order_lists::list_of(c[k]); list >= 0)
-                b.lists.add(atomicAdd(&next_long[list], 1u), place, c[k]);
+                b.lists.add(atomicAdd(&next_long[list], 1u), offset, c[k]);
             else if (c[k] > max_of_block)
-                b.lists.push(place, c[k]);
+                b.lists.push(offset, c[k]);
             const std::uint32_t voxel = 4 * (first_four + 32 * r) + k;
-            if (number < to.room) {
+            if (number < to.voxel_capacity) {
                 if (to.voxels != nullptr)
                     to.voxels[number] = voxel;
                 else
                     to.narrow_voxels[number] = voxel;
-                to.offsets[number] = place;
+                to.offsets[number] = offset;
             }
             ++number;
-            atomicOr(&m.starts[place / 32], 1u << place % 32);
-            place += c[k];
+            atomicOr(&m.starts[offset / 32], 1u << offset % 32);
+            offset += c[k];
         }
-        mine[32 * r] = {places[0], places[1], places[2], places[3]};
+        mine[32 * r] = {offsets_of_four[0], offsets_of_four[1], offsets_of_four[2], offsets_of_four[3]};
     }
 }
 
 // Writes each fragment's primitive to its position.
 template <class Count>
-__global__ __launch_bounds__(threads_per_block) void place_fragments_kernel(const std::uint32_t* voxels,
-                                                                            const std::uint32_t* values,
-                                                                            std::uint32_t* to,
-                                                                            const __grid_constant__ Count count,
-                                                                            const __grid_constant__ counting_memory m) {
+__global__ __launch_bounds__(threads_per_block) void scatter_fragments_kernel(
+    const std::uint32_t* voxels, const std::uint32_t* values, std::uint32_t* to, const __grid_constant__ Count count,
+    const __grid_constant__ counting_memory m) {
     constexpr unsigned items = counting_items;
     await_stream();
     const auto n = static_cast<std::uint32_t>(count.get());
@@ -227,7 +225,7 @@ VOXELPIPE_DEFINES_KERNELS void order_by_counting(order_buffers b, const counted_
                   m);
     launch_behind(list_counted_kernel<counting_memory>, static_cast<unsigned>(m.num_tiles()), counting_threads, stream,
                   where, b, m, state, of_lists);
-    launch_behind(place_fragments_kernel<sort_count>, blocks, threads_per_block, stream, where, pairs.voxels,
+    launch_behind(scatter_fragments_kernel<sort_count>, blocks, threads_per_block, stream, where, pairs.voxels,
                   pairs.primitives, b.from, count, m);
     end_stage(clock, &stage_times::tile_sort);
     order_fragments(b, num_primitives, state, limits, stream);

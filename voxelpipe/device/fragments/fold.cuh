@@ -51,10 +51,10 @@ struct target_fold {
     static constexpr bool any_order =
         traits::order_free && (core::user_blend<blend_type, value> || core::user_blend_template<blend_type, value>);
     // Values that fit the block's memory at once; 0 if a voxel is always one thread's.
-    static constexpr unsigned places = alignof(value) > 16 ? 0
-                                                           : (fold_bytes / sizeof(value) < threads_per_block
-                                                                  ? fold_bytes / sizeof(value)
-                                                                  : threads_per_block);
+    static constexpr unsigned max_staged = alignof(value) > 16 ? 0
+                                                               : (fold_bytes / sizeof(value) < threads_per_block
+                                                                      ? fold_bytes / sizeof(value)
+                                                                      : threads_per_block);
 
     const fragment_lists<Key, Values>& lists;
     const target_view<target>& view;
@@ -79,13 +79,15 @@ struct target_fold {
         auto a = traits::begin(view(f.x, f.y, f.z));
         if constexpr (any_order) {
             // Each thread folds a part; then half of the parts are folded onto the other half.
-            if (mine < places && f.first + mine < f.last) {
+            if (mine < max_staged && f.first + mine < f.last) {
                 value part = get(f.first + mine);
-                for (std::uint64_t i = f.first + mine + places; i < f.last; i += places) traits::apply(part, get(i));
+                for (std::uint64_t i = f.first + mine + max_staged; i < f.last; i += max_staged)
+                    traits::apply(part, get(i));
                 values[mine] = part;
             }
             __syncthreads();
-            for (unsigned n = f.last - f.first < places ? static_cast<unsigned>(f.last - f.first) : places; n > 1;) {
+            for (unsigned n = f.last - f.first < max_staged ? static_cast<unsigned>(f.last - f.first) : max_staged;
+                 n > 1;) {
                 const unsigned half = (n + 1) / 2;
                 if (mine + half < n) traits::apply(values[mine], values[mine + half]);
                 __syncthreads();
@@ -93,8 +95,8 @@ struct target_fold {
             }
             if (mine == 0) traits::apply(a, values[0]);
         } else {
-            for (std::uint64_t first = f.first; first < f.last; first += places) {
-                const unsigned n = f.last - first < places ? static_cast<unsigned>(f.last - first) : places;
+            for (std::uint64_t first = f.first; first < f.last; first += max_staged) {
+                const unsigned n = f.last - first < max_staged ? static_cast<unsigned>(f.last - first) : max_staged;
                 if (mine < n) values[mine] = get(first + mine);
                 __syncthreads();
                 if (mine == 0)
@@ -133,9 +135,9 @@ __global__ void fold_kernel(const __grid_constant__ fragment_lists<Key, Values> 
             using fold_type = target_fold<K, Key, Values, Framebuffer>;
             const fold_type target{lists, voxelpipe::get<K>(fb.targets)};
             if (target.view.load == load_operation::off) return;
-            const bool together = fold_type::places != 0 && (fold_type::any_order || n <= max_long_in_order);
+            const bool together = fold_type::max_staged != 0 && (fold_type::any_order || n <= max_long_in_order);
             if (valid && !(together && mine.is_long())) target.alone(mine);
-            if constexpr (fold_type::places != 0) {
+            if constexpr (fold_type::max_staged != 0) {
                 for (unsigned k = 0; together && k < n; ++k)
                     target.together(find_fragments(lists, start + long_voxels[k], *state, fb.extent), memory);
             }

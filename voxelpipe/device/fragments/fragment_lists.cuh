@@ -94,7 +94,7 @@ struct list_buffers {
     std::uint32_t* primitives;     // by offset; null without payloads
     Payload* payloads;             // by offset; null without payloads
     std::uint64_t* first_of_voxel; // fragment numbers, ascending: list_voxels of them, and room for one more
-    list_places* places;           // output pointers of the call
+    csr_pointers* pointers;        // output pointers of the call
     void* storage;
     std::size_t storage_bytes;
 };
@@ -132,9 +132,9 @@ struct fragment_lists {
     const std::uint32_t* primitives; // null: a value is a primitive
     const Payload* payloads;         // null: all are `payload`
     const std::uint64_t* first_of_voxel;
-    const list_places* places; // output pointers of the call
+    const csr_pointers* pointers; // output pointers of the call
     Payload payload;
-    bool are_placed;        // all but the payloads are at the output pointers, and only there
+    bool are_at_output;     // all but the payloads are at the output pointers, and only there
     bool payloads_in_order; // payloads are by fragment, not by offset
 
     [[nodiscard]] __device__ std::uint64_t voxel(std::uint64_t i) const {
@@ -156,7 +156,7 @@ void prepare_sort(Key* keys, std::uint32_t* values, std::uint64_t capacity, cons
 
 // The preparation that a call's lists need before they are sorted.
 template <class Key, class Payload>
-[[nodiscard]] sort_preparation prepare_lists(const list_buffers<Key, Payload>& b, const output_pointers& asked,
+[[nodiscard]] sort_preparation prepare_lists(const list_buffers<Key, Payload>& b, const output_pointers& outputs,
                                              const tile_counts& tiles, const capacities& limits) {
     sort_preparation p;
     p.is_wanted = true;
@@ -165,8 +165,8 @@ template <class Key, class Payload>
     p.counting = b.counting;
     p.capacity = limits.fragments;
     p.tiles = tiles;
-    p.asked = asked;
-    p.places = b.places;
+    p.outputs = outputs;
+    p.pointers = b.pointers;
     return p;
 }
 
@@ -196,18 +196,18 @@ template <class Key, class Payload>
 
 // Sorts listed fragments by voxel and selects the first fragment of each voxel.
 template <class Key, class Payload>
-[[nodiscard]] fragment_lists<Key, Payload> sort_lists(const list_buffers<Key, Payload>& b, const output_pointers& asked,
-                                                      pipeline_state* state, const capacities& limits,
-                                                      cudaStream_t stream, stage_clock* clock) {
+[[nodiscard]] fragment_lists<Key, Payload>
+sort_lists(const list_buffers<Key, Payload>& b, const output_pointers& outputs, pipeline_state* state,
+           const capacities& limits, cudaStream_t stream, stage_clock* clock) {
     const sorted_pairs<Key> sorted =
-        sort_by_voxel(b, prepare_lists(b, asked, {}, limits), state, limits, stream, clock);
+        sort_by_voxel(b, prepare_lists(b, outputs, {}, limits), state, limits, stream, clock);
     fragment_lists<Key, Payload> lists{};
     lists.keys = sorted.keys;
     lists.values = sorted.values;
     lists.primitives = b.primitives;
     lists.payloads = b.payloads;
     lists.first_of_voxel = b.first_of_voxel;
-    lists.places = b.places;
+    lists.pointers = b.pointers;
     select_voxels(lists.keys, b.first_of_voxel, state, limits, b.storage, b.storage_bytes, stream);
     end_stage(clock, &stage_times::abuffer_emit);
     return lists;
@@ -218,26 +218,26 @@ template <class Key, class Payload>
 // otherwise null.
 template <class Payload>
 [[nodiscard]] fragment_lists<std::uint32_t, Payload>
-sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const output_pointers& asked,
+sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory& order, const output_pointers& outputs,
                std::uint32_t num_primitives, std::uint32_t* spare, pipeline_state* state, const capacities& limits,
                cudaStream_t stream, stage_clock* clock) {
-    list_places here;
+    csr_pointers here;
     here.offsets = b.first_of_voxel;
-    here.room = limits.fragments;
+    here.voxel_capacity = limits.fragments;
     fragment_lists<std::uint32_t, Payload> lists{};
     if (b.counting.is_used()) {
         VOXELPIPE_ASSERT(spare == nullptr);
         here.narrow_voxels = b.keys[1];
         here.primitives = b.values[0]; // after they have been read
-        order_by_counting({nullptr, b.values[1], b.keys[0], b.places, here, order.tiles, order.lists.with(state)},
+        order_by_counting({nullptr, b.values[1], b.keys[0], b.pointers, here, order.tiles, order.lists.with(state)},
                           {b.keys[0], b.values[0]}, b.counting, num_primitives, state, limits, stream, clock);
     } else {
-        sort_preparation preparation = prepare_lists(b, asked, order.tiles, limits);
+        sort_preparation preparation = prepare_lists(b, outputs, order.tiles, limits);
         preparation.is_wanted = !preparation.sorts; // for the fillers
         const sorted_pairs<std::uint32_t> sorted = sort_by_voxel(b, preparation, state, limits, stream, clock);
         here.narrow_voxels = sorted.spare_keys;
         here.primitives = sorted.spare_values;
-        order_fragments({sorted.keys, sorted.values, spare != nullptr ? spare : sorted.keys, b.places, here,
+        order_fragments({sorted.keys, sorted.values, spare != nullptr ? spare : sorted.keys, b.pointers, here,
                          order.tiles, order.lists.with(state)},
                         num_primitives, state, limits, stream);
         lists.keys = sorted.keys;
@@ -246,8 +246,8 @@ sort_unordered(const list_buffers<std::uint32_t, Payload>& b, const order_memory
     lists.voxels = here.narrow_voxels;
     lists.first_of_voxel = here.offsets;
     lists.values = here.primitives; // a value is a primitive
-    lists.places = b.places;
-    lists.are_placed = asked.value.voxels != nullptr;
+    lists.pointers = b.pointers;
+    lists.are_at_output = outputs.value.voxels != nullptr;
     return lists;
 }
 
@@ -275,7 +275,7 @@ __global__ __launch_bounds__(threads_per_block, 4) void filter_lists_kernel(cons
             const std::uint64_t i = start + 32 * static_cast<unsigned>(k) + lane;
             bool keep = false;
             if (i < n) {
-                const voxel_place at = place_of(from.voxels[i], s.geo.extent);
+                const voxel_position at = position_of(from.voxels[i], s.geo.extent);
                 keep = shade_small_fragment<false>(s, from.primitives[i], at.x, at.y, at.z).keep;
                 discarded += static_cast<std::uint32_t>(!keep);
             }
@@ -326,11 +326,11 @@ __global__ __launch_bounds__(threads_per_block, 4) void shade_lists_kernel(
     await_stream();
     if (has_failed(*state, limits)) return;
     const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::max_numbered
-    const std::uint32_t* const primitives = lists.are_placed ? lists.places->primitives : lists.values;
+    const std::uint32_t* const primitives = lists.are_at_output ? lists.pointers->primitives : lists.values;
     std::uint32_t discarded = 0;
     for (std::uint64_t i = std::uint64_t{blockIdx.x} * threads_per_block + threadIdx.x; i < n;
          i += std::uint64_t{gridDim.x} * threads_per_block) {
-        const voxel_place at = place_of(lists.keys[i], s.geo.extent);
+        const voxel_position at = position_of(lists.keys[i], s.geo.extent);
         const auto out = shade_small_fragment<false>(s, primitives[i], at.x, at.y, at.z);
         discarded += static_cast<std::uint32_t>(!out.keep);
         if constexpr (!std::is_same_v<Payload, no_payload>) payloads[i] = MakePayload{}(out);
@@ -342,13 +342,13 @@ template <coverage Rule, class MakePayload, class Scene, class Key, class Payloa
 [[nodiscard]] fragment_lists<Key, Payload>
 build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const list_memory& m, pipeline_state* state,
             const capacities& limits, bool counts_triangles, cudaStream_t stream, stage_clock* clock,
-            const output_pointers& asked = {}) {
+            const output_pointers& outputs = {}) {
     const fragment_cells<Rule, Scene, Payload, MakePayload> op{
         s, b.keys[0], sizeof(Key) == sizeof(std::uint64_t), b.values[0], b.primitives, b.payloads, counts_triangles};
     share_count(s.geo, op, m.share, state, m.storage, m.storage_bytes, stage::abuffer_emit, stream);
     share_emit(s.geo, op, m.share, state, limits, stage::abuffer_emit, stream);
     end_stage(clock, &stage_times::fine_raster);
-    return sort_lists(b, asked, state, limits, stream, clock);
+    return sort_lists(b, outputs, state, limits, stream, clock);
 }
 
 // ---- into an A-buffer -----------------------------------------------------------------------------------------------
@@ -365,7 +365,7 @@ __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint6
                            std::uint32_t* primitives, Payload* payloads) {
     const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
-    if (!lists.are_placed) {
+    if (!lists.are_at_output) {
         for (std::uint64_t i = thread; i < num_voxels; i += threads) {
             voxels[i] = lists.voxel(i);
             offsets[i] = lists.first_of_voxel[i];
@@ -373,7 +373,7 @@ __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint6
         if (thread == 0 && num_voxels != 0) offsets[num_voxels] = num_fragments;
     }
     for (std::uint64_t i = thread; i < num_fragments; i += threads) {
-        if (!lists.are_placed) primitives[i] = lists.primitive(i);
+        if (!lists.are_at_output) primitives[i] = lists.primitive(i);
         if constexpr (!std::is_same_v<Payload, no_payload>) payloads[i] = lists.payload_of(i);
     }
 }
@@ -387,19 +387,19 @@ __global__ void copy_lists_kernel(fragment_lists<Key, Payload> lists, std::uint6
 
 // The same to the output pointers, with the lengths in the state, if there is room for the voxels.
 template <class Key, class Payload>
-__global__ void place_lists_kernel(const __grid_constant__ fragment_lists<Key, Payload> lists,
+__global__ void store_lists_kernel(const __grid_constant__ fragment_lists<Key, Payload> lists,
                                    const pipeline_state* state, capacities limits) {
     await_stream();
-    const list_places to = *lists.places;
-    if (has_failed(*state, limits) || state->list_voxels > to.room) return;
+    const csr_pointers to = *lists.pointers;
+    if (has_failed(*state, limits) || state->list_voxels > to.voxel_capacity) return;
     copy_lists(lists, state->list_voxels, state->list_fragments, to.voxels, to.offsets, to.primitives,
                static_cast<Payload*>(to.payloads));
 }
 template <class Key, class Payload>
-void place_lists(const fragment_lists<Key, Payload>& lists, const pipeline_state* state, const capacities& limits,
+void store_lists(const fragment_lists<Key, Payload>& lists, const pipeline_state* state, const capacities& limits,
                  cudaStream_t stream, stage_clock* clock) {
-    if (lists.are_placed && std::is_same_v<Payload, no_payload>) return;
-    launch_behind(place_lists_kernel<Key, Payload>, fill_device(limits.fragments), threads_per_block, stream,
+    if (lists.are_at_output && std::is_same_v<Payload, no_payload>) return;
+    launch_behind(store_lists_kernel<Key, Payload>, fill_device(limits.fragments), threads_per_block, stream,
                   stage::abuffer_emit, lists, state, limits);
     end_stage(clock, &stage_times::abuffer_emit);
 }
@@ -453,7 +453,7 @@ template <class Key, class Payload>
         b.payloads = memory.take<Payload>(capacity);
     }
     b.first_of_voxel = memory.take<std::uint64_t>(capacity + 1);
-    b.places = memory.take<list_places>(1);
+    b.pointers = memory.take<csr_pointers>(1);
     b.storage = memory.take<std::byte>(b.storage_bytes);
     return b;
 }

@@ -48,13 +48,15 @@ struct listing_sink : sink_base<Call> {
         if (mask == 0) return;
         write_row(atomicAdd(&m_.n, static_cast<unsigned>(__popc(mask))), voxel(x0, y, z), mask);
     }
-    template <class Place>
-    __device__ VOXELPIPE_INLINE void voxels(word bits, const Place& place_of) {
+    template <class Position>
+    __device__ VOXELPIPE_INLINE void voxels(word bits, const Position& position_of) {
         if (bits == 0) return;
         for (unsigned at = atomicAdd(&m_.n, static_cast<unsigned>(__popc(bits))); bits != 0; bits &= bits - 1)
-            write(at++, place_of(__ffs(static_cast<int>(bits)) - 1));
+            write(at++, position_of(__ffs(static_cast<int>(bits)) - 1));
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t place(int x, int y, int z) const { return voxel(x, y, z); }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t position(int x, int y, int z) const {
+        return voxel(x, y, z);
+    }
     __device__ VOXELPIPE_INLINE void emit(std::uint32_t voxel, bool wanted) {
         if (wanted) write(atomicAdd(&m_.n, 1u), voxel);
     }

@@ -104,7 +104,7 @@ __device__ VOXELPIPE_INLINE void order_run(const std::uint32_t* from, std::uint3
     __syncthreads();
 }
 
-// Sorts, one per block, voxels, and runs of longer voxels, which are sorted in place.
+// Sorts, one per block, voxels, and runs of longer voxels, which are sorted in offset.
 __device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::uint32_t* primitives,
                                                  sort_exchange& exchange) {
     constexpr int max_items = max_of_block / block_sort_threads;
@@ -126,7 +126,7 @@ template <class Buffers>
 __global__ __launch_bounds__(block_sort_threads, 4) void order_long_kernel(const __grid_constant__ Buffers b) {
     __shared__ sort_exchange exchange;
     await_stream();
-    std::uint32_t* const to = b.places().primitives;
+    std::uint32_t* const to = b.pointers().primitives;
     // If there are few blocks' worth, each list has blocks of its own.
     order_by_warps<0>(b, to, exchange, gridDim.x / 3);
     order_by_warps<1>(b, to, exchange, gridDim.x / 3 * 2);
@@ -143,10 +143,10 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
     constexpr std::uint32_t num_words = dense_part / 32;
     constexpr unsigned at_once = 4; // loads in flight
     static_assert(num_words == dense_threads);
-    __shared__ std::uint32_t words[num_words], places[num_words], all_before;
+    __shared__ std::uint32_t words[num_words], offsets[num_words], all_before;
     __shared__ typename scan::TempStorage storage;
     await_stream();
-    std::uint32_t* const primitives = b.places().primitives;
+    std::uint32_t* const primitives = b.pointers().primitives;
     const std::uint32_t parts = b.lists.dense_parts(), lane = threadIdx.x % 32,
                         n = b.lists.counts[order_lists::dense_list] * parts;
     for (std::uint32_t r = blockIdx.x; r < n; r += gridDim.x) {
@@ -168,8 +168,8 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
 #pragma unroll
             for (unsigned k = 0; k < at_once; ++k) {
                 const std::uint32_t at = 4 * (i + k * dense_threads) - begin; // modulo 2^32
-                const auto add = [&](std::uint32_t primitive, std::uint32_t place) VOXELPIPE_INLINE_LAMBDA {
-                    if (place >= length) return;
+                const auto add = [&](std::uint32_t primitive, std::uint32_t offset) VOXELPIPE_INLINE_LAMBDA {
+                    if (offset >= length) return;
                     const std::uint32_t bit = primitive - first; // modulo 2^32
                     before += primitive < first ? 1 : 0;
                     if (bit < dense_part) atomicOr(&words[bit / 32], 1u << bit % 32);
@@ -184,9 +184,9 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
         before = __reduce_add_sync(0xffffffffu, before);
         if (lane == 0 && before != 0) atomicAdd(&all_before, before);
         __syncthreads();
-        std::uint32_t place = static_cast<std::uint32_t>(__popc(words[threadIdx.x]));
-        scan(storage).ExclusiveSum(place, place);
-        places[threadIdx.x] = place;
+        std::uint32_t offset = static_cast<std::uint32_t>(__popc(words[threadIdx.x]));
+        scan(storage).ExclusiveSum(offset, offset);
+        offsets[threadIdx.x] = offset;
         __syncthreads();
         // One word per warp, so that neighbouring lanes write neighbouring elements.
         std::uint32_t* const to = primitives + run.begin + all_before;
@@ -195,7 +195,7 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
         for (std::uint32_t w = warp_in_block(); w < num_words; w += dense_threads / 32) {
             const std::uint32_t word = words[w];
             if ((word >> lane & 1u) != 0)
-                to[places[w] + static_cast<std::uint32_t>(__popc(word & below))] = first + 32 * w + lane;
+                to[offsets[w] + static_cast<std::uint32_t>(__popc(word & below))] = first + 32 * w + lane;
         }
         __syncthreads();
     }
@@ -243,7 +243,7 @@ __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::
         const std::uint32_t primitive = numbers[at];
         const std::uint32_t least = __shfl_sync(0xffffffffu, primitive, 0),
                             most = __shfl_sync(0xffffffffu, primitive, 31);
-        std::uint64_t place = voxel.begin + group + (at - own);
+        std::uint64_t offset = voxel.begin + group + (at - own);
         for (std::uint64_t start = group; start < end; start += 32 * length) {
             const std::uint64_t mine = start + lane * length;
             std::uint32_t low = 0, high = 0; // how many of the run's numbers are below `least`, and below `most`
@@ -255,10 +255,10 @@ __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::
             for (unsigned k = 0; k < 32 && start + k * length < end; ++k) {
                 const std::uint32_t first = __shfl_sync(0xffffffffu, low, k);
                 const std::uint32_t between = __shfl_sync(0xffffffffu, high, k) - first;
-                place += first + count_less(numbers + start + k * length + first, between, primitive);
+                offset += first + count_less(numbers + start + k * length + first, between, primitive);
             }
         }
-        if (i < entry.run.length) (voxel.length <= group_length ? b.places().primitives : to)[place] = primitive;
+        if (i < entry.run.length) (voxel.length <= group_length ? b.pointers().primitives : to)[offset] = primitive;
     }
 }
 

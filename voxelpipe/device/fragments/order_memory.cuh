@@ -108,13 +108,13 @@ struct order_lists {
 };
 
 // Output arrays of lists: the voxels, ascending, in either of two types; the offset of each voxel's first fragment, and
-// one more element with the number of fragments; the primitives by voxel; payloads. Voxels beyond `room` are counted,
-// not written.
-struct list_places {
+// one more element with the number of fragments; the primitives by voxel; payloads. Voxels beyond `voxel_capacity` are
+// counted, not written.
+struct csr_pointers {
     std::uint64_t* voxels = nullptr; // or
     std::uint32_t* narrow_voxels = nullptr;
     std::uint64_t* offsets = nullptr;
-    std::uint64_t room = 0;
+    std::uint64_t voxel_capacity = 0;
     std::uint32_t* primitives = nullptr;
     void* payloads = nullptr;
 };
@@ -122,8 +122,8 @@ struct list_places {
 // Output pointers of a call; null if the lists stay in the call's memory. With a page, which the device can read, the
 // pointers are read from it when the call runs, so that a call kept as a graph finds new arrays.
 struct output_pointers {
-    list_places value;
-    const list_places* page = nullptr;
+    csr_pointers value;
+    const csr_pointers* page = nullptr;
 };
 
 // Number of voxels that begin in each tile of windows, published for later tiles: one word each, zero before.
@@ -182,14 +182,14 @@ struct sort_preparation {
     bool sorts = false;         // sort_fragments will run, unless
     counting_memory counting{}; // this is in use: then the counting sort
     sort_memory sort{};
-    std::uint64_t capacity = 0;    // fragments
-    tile_counts tiles{};           // may be empty
-    list_places* places = nullptr; // may be null
-    output_pointers asked;
+    std::uint64_t capacity = 0;       // fragments
+    tile_counts tiles{};              // may be empty
+    csr_pointers* pointers = nullptr; // may be null
+    output_pointers outputs;
 
     // All threads of a launch call it.
     __device__ VOXELPIPE_INLINE void run(std::uint64_t thread, std::uint64_t threads) const {
-        if (places != nullptr && thread == 0) *places = asked.page != nullptr ? *asked.page : asked.value;
+        if (pointers != nullptr && thread == 0) *pointers = outputs.page != nullptr ? *outputs.page : outputs.value;
         if (tiles.words != nullptr)
             for (std::uint64_t i = thread; i < tile_counts::num(capacity); i += threads) tiles.words[i] = 0;
         if (counting.is_used())
@@ -214,21 +214,21 @@ struct order_memory {
 
 // Arrays of the fragment order. keys: the voxels of the fragments, ascending; null if a counting sort has listed the
 // voxels, which then made `starts`. from: their primitives, in any order within a voxel; overwritten. spare: room for
-// as many; may alias keys. The lists go to the pointers *asked, which lie in device memory, or to `here` if these are
+// as many; may alias keys. The lists go to the pointers *outputs, which lie in device memory, or to `here` if these are
 // null.
 struct order_buffers {
     const std::uint32_t* keys;
     std::uint32_t* from;
     std::uint32_t* spare;
-    const list_places* asked;
-    list_places here;
+    const csr_pointers* outputs;
+    csr_pointers here;
     tile_counts tiles;
     order_lists lists;
     int primitive_bits = 32; // of the largest primitive
     const std::uint32_t* starts = nullptr;
 
-    [[nodiscard]] __device__ VOXELPIPE_INLINE const list_places& places() const {
-        return asked->voxels != nullptr ? *asked : here;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE const csr_pointers& pointers() const {
+        return outputs->voxels != nullptr ? *outputs : here;
     }
 };
 

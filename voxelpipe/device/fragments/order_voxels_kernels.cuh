@@ -86,7 +86,7 @@ template <int Items>
 // The voxels of a window of 32 * Items elements, counted from its first; a lane has Items neighbours.
 template <int Items>
 struct window_voxels {
-    static constexpr std::uint32_t places = 32 * Items;
+    static constexpr std::uint32_t num_elements = 32 * Items;
     unsigned starts;    // bit k: the lane's element k begins another voxel than the element before, or lies beyond the
                         // fragments
     unsigned begins;    // the same for voxels that begin within window_length and before n
@@ -138,9 +138,9 @@ struct window_voxels {
 // Writes the window's primitives [begin, end), whole voxels, in order. A fragment is sorted by its voxel's rank within
 // the window, then by its primitive, of primitive_bits bits.
 template <class Word, int Items>
-__device__ VOXELPIPE_INLINE void order_places(const std::uint32_t (&primitive)[Items], std::uint32_t* to,
-                                              const window_voxels<Items>& window, std::uint32_t begin,
-                                              std::uint32_t end, int primitive_bits) {
+__device__ VOXELPIPE_INLINE void order_elements(const std::uint32_t (&primitive)[Items], std::uint32_t* to,
+                                                const window_voxels<Items>& window, std::uint32_t begin,
+                                                std::uint32_t end, int primitive_bits) {
     constexpr std::uint32_t few = Items <= 8 ? 6 * Items : 0; // for longer runs the general network is cheaper
     const std::uint32_t first = threadIdx.x % 32 * Items;
     Word w[Items], rank = static_cast<Word>(window.rank) - 1;
@@ -151,7 +151,7 @@ __device__ VOXELPIPE_INLINE void order_places(const std::uint32_t (&primitive)[I
         w[k] = first + k < end ? but_before : ~Word{0};
     }
     // A voxel that ends with the window has no start behind it.
-    const std::uint32_t longest = few != 0 && end < window.places ? window.longest() : few + 1;
+    const std::uint32_t longest = few != 0 && end < window.num_elements ? window.longest() : few + 1;
     if (longest <= few)
         sort_runs_of_warp(w, longest);
     else
@@ -189,7 +189,8 @@ struct order_of_window {
     static constexpr int items = 8, wide_items = 16;
     using voxels_type = window_voxels<items>;
     using wide_type = window_voxels<wide_items>;
-    static_assert(voxels_type::places >= window_length && wide_type::places >= window_length - 1 + max_of_window);
+    static_assert(voxels_type::num_elements >= window_length &&
+                  wide_type::num_elements >= window_length - 1 + max_of_window);
 
     const order_buffers& b;
     std::uint32_t begin, n, before; // n counts from the window's first, as all indices do; the voxel before it
@@ -222,7 +223,7 @@ struct order_of_window {
         const std::uint32_t skipped = voxels_type::first_of(voxels.begins);
         const unsigned behind = voxels.starts & ~voxels.begins;
         std::uint32_t whole = count;
-        std::uint32_t end = voxels_type::places;
+        std::uint32_t end = voxels_type::num_elements;
         if (__any_sync(0xffffffffu, behind != 0))
             end = voxels_type::first_of(behind);
         else
@@ -233,12 +234,12 @@ struct order_of_window {
             return;
         }
         const auto order = [&]<class Word>(int primitive_bits) VOXELPIPE_INLINE_LAMBDA {
-            if (end <= voxels_type::places) {
-                order_places<Word>(primitive, to, voxels, skipped, end, primitive_bits);
+            if (end <= voxels_type::num_elements) {
+                order_elements<Word>(primitive, to, voxels, skipped, end, primitive_bits);
             } else {
                 std::uint32_t all[wide_items], voxels_of_all[wide_items];
                 load_neighbours(b.from + begin, threadIdx.x % 32 * wide_items, n, all);
-                order_places<Word>(all, to, wide_type(get_starts(voxels_of_all), n), skipped, end, primitive_bits);
+                order_elements<Word>(all, to, wide_type(get_starts(voxels_of_all), n), skipped, end, primitive_bits);
             }
         };
         if constexpr (Narrow)
@@ -303,7 +304,7 @@ __global__ __launch_bounds__(32 * order_warps,
     if (has_failed(*state, limits)) return;
     const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::max_numbered
     const std::uint32_t warp = warp_in_block(), lane = threadIdx.x % 32;
-    const list_places to = b.places();
+    const csr_pointers to = b.pointers();
     const std::uint32_t tile = blockIdx.x; // see count_before
     const std::uint64_t first = std::uint64_t{tile} * tile_counts::length, begin = first + warp * window_length;
     if (first >= n) return;
@@ -325,13 +326,13 @@ __global__ __launch_bounds__(32 * order_warps,
             before = sum;
             if (first + tile_counts::length >= n) { // the last tile
                 state->list_voxels = sum + all;
-                if (sum + all <= to.room) to.offsets[sum + all] = n;
+                if (sum + all <= to.voxel_capacity) to.offsets[sum + all] = n;
             }
         }
     }
     __syncthreads();
     std::uint64_t at = before + earlier + lane;
-    for (std::uint32_t r = lane; r < window.count && at < to.room; r += 32, at += 32) {
+    for (std::uint32_t r = lane; r < window.count && at < to.voxel_capacity; r += 32, at += 32) {
         if (to.voxels != nullptr)
             to.voxels[at] = windows[warp].voxels[r];
         else
@@ -351,7 +352,7 @@ __global__ __launch_bounds__(32 * order_warps,
     const std::uint64_t begin = (std::uint64_t{blockIdx.x} * order_warps + warp_in_block()) * window_length;
     if (begin >= n) return;
     const order_of_window<true> window(b, static_cast<std::uint32_t>(begin), n);
-    window.template order<Narrow>(b.places().primitives);
+    window.template order<Narrow>(b.pointers().primitives);
 }
 
 // ---- host -----------------------------------------------------------------------------------------------------------

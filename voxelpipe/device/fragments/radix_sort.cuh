@@ -27,7 +27,7 @@ inline constexpr int few_sort_items = 8; // if the device runs all tiles at once
     return items == few_sort_items ? 3 : 2;
 }
 inline constexpr int digit_count_threads = 1024;
-inline constexpr int most_digit_bits = 10;
+inline constexpr int max_digit_bits = 10;
 inline constexpr int max_digit_passes = 4;
 inline constexpr std::uint64_t max_sorted = std::uint64_t{1} << 30; // pairs: two bits of a tile's words are flags
 
@@ -36,7 +36,7 @@ struct digit_plan {
     int passes, bits; // bits of a digit
 
     VOXELPIPE_HD constexpr explicit digit_plan(int key_bits)
-        : passes(key_bits == 0 ? 1 : (key_bits + most_digit_bits - 1) / most_digit_bits),
+        : passes(key_bits == 0 ? 1 : (key_bits + max_digit_bits - 1) / max_digit_bits),
           bits(key_bits == 0 ? 1 : (key_bits + passes - 1) / passes) {}
     [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t num_digits() const { return 1u << bits; }
 };
@@ -96,7 +96,7 @@ struct sort_memory {
     static constexpr std::uint32_t own = 1u << 30, all = 2u << 30, value = own - 1;
     struct totals {
         std::uint32_t digits[max_digit_passes]
-                            [1 << most_digit_bits]; // counts; then the offset of each digit's first pair
+                            [1 << max_digit_bits]; // counts; then the offset of each digit's first pair
         std::uint32_t blocks_done;
         std::uint32_t num; // pairs
     };

@@ -33,8 +33,8 @@ __global__ __launch_bounds__(digit_count_threads) void count_digits_kernel(const
                                                                            const __grid_constant__ sort_memory m) {
     using scan = cub::BlockScan<std::uint32_t, digit_count_threads>;
     constexpr int at_once = 4; // loads in flight
-    static_assert(digit_count_threads >= 1 << most_digit_bits);
-    __shared__ std::uint32_t digits[max_digit_passes][1 << most_digit_bits];
+    static_assert(digit_count_threads >= 1 << max_digit_bits);
+    __shared__ std::uint32_t digits[max_digit_passes][1 << max_digit_bits];
     __shared__ typename scan::TempStorage storage;
     __shared__ bool is_last;
     const std::uint32_t num_digits = m.plan.num_digits();
@@ -163,7 +163,7 @@ __global__ __launch_bounds__(sort_threads,
     extern __shared__ __align__(16) unsigned char dynamic_memory[];
     auto& shared = *reinterpret_cast<tile_memory*>(dynamic_memory);
     // Of each digit: offset within the tile, later what turns it into the global offset.
-    __shared__ std::uint32_t places[DigitsEach * sort_threads];
+    __shared__ std::uint32_t offsets[DigitsEach * sort_threads];
     __shared__ typename scan::TempStorage storage;
     const digit_of digit(m.plan, pass);
     const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32, num_digits = m.plan.num_digits();
@@ -177,7 +177,7 @@ __global__ __launch_bounds__(sort_threads,
     const std::uint32_t length = n - begin < most ? n - begin : most;
     // A lane has every 32nd pair of its warp's. Elements beyond the last count as pairs with the last digit.
     const std::uint32_t first = warp * 32 * items + lane;
-    std::uint32_t key[items], value[items], place[items / 2]; // two offsets in each
+    std::uint32_t key[items], value[items], slot[items / 2]; // two offsets in each
     from.ask_once([&]<class Joined>(Joined) VOXELPIPE_INLINE_LAMBDA {
 #pragma unroll
         for (std::uint32_t i = 0; i < items; ++i) {
@@ -197,7 +197,7 @@ __global__ __launch_bounds__(sort_threads,
         __syncwarp();
         if (before == 0) of_digit = static_cast<std::uint16_t>(own + static_cast<std::uint32_t>(__popc(same)));
         __syncwarp();
-        place[i / 2] = i % 2 == 0 ? own : place[i / 2] | own << 16;
+        slot[i / 2] = i % 2 == 0 ? own : slot[i / 2] | own << 16;
     }
     // Makes the compiler recompute the counts' addresses below: held until then, they would not fit the registers.
 #pragma unroll
@@ -209,7 +209,7 @@ __global__ __launch_bounds__(sort_threads,
     const std::uint32_t apart = num_digits / DigitsEach;
     const std::uint64_t my_word = std::uint64_t{tile} * apart + threadIdx.x;
     word* const mine = reinterpret_cast<word*>(m.words[pass % 2]) + my_word;
-    std::uint32_t total[DigitsEach], place_here[DigitsEach];
+    std::uint32_t total[DigitsEach], tile_offset[DigitsEach];
     counts sum{};
 #pragma unroll(8)
     for (unsigned w = 0; w < warps; ++w) {
@@ -226,20 +226,20 @@ __global__ __launch_bounds__(sort_threads,
                                  ::cuda::memory_order_relaxed);
         if (pass + 1 < m.plan.passes) reinterpret_cast<word*>(m.words[1 - pass % 2])[my_word] = 0;
     }
-    scan(storage).ExclusiveSum(total, place_here);
+    scan(storage).ExclusiveSum(total, tile_offset);
 #pragma unroll
-    for (std::uint32_t k = 0; k < DigitsEach; ++k) places[first_digit + k] = place_here[k];
+    for (std::uint32_t k = 0; k < DigitsEach; ++k) offsets[first_digit + k] = tile_offset[k];
     __syncthreads();
 #pragma unroll
     for (std::uint32_t i = 0; i < items; i += 2) {
         const std::uint32_t d = digit(key[i]), other = digit(key[i + 1]);
-        place[i / 2] += places[d] + shared.counts[warp][d] + ((places[other] + shared.counts[warp][other]) << 16);
+        slot[i / 2] += offsets[d] + shared.counts[warp][d] + ((offsets[other] + shared.counts[warp][other]) << 16);
     }
     __syncthreads(); // the counts have been read
 #pragma unroll
     for (std::uint32_t i = 0; i < items; i += 2) {
-        shared.pairs[place[i / 2] & 0xffffu] = {key[i], value[i]};
-        shared.pairs[place[i / 2] >> 16] = {key[i + 1], value[i + 1]};
+        shared.pairs[slot[i / 2] & 0xffffu] = {key[i], value[i]};
+        shared.pairs[slot[i / 2] >> 16] = {key[i + 1], value[i + 1]};
     }
     if (has_digits) {
         word before = 0;
@@ -249,8 +249,8 @@ __global__ __launch_bounds__(sort_threads,
         }
 #pragma unroll
         for (int k = 0; k < DigitsEach; ++k)
-            places[first_digit + k] =
-                m.all_tiles->digits[pass][first_digit + k] + group::get(before, k) - place_here[k]; // modulo 2^32
+            offsets[first_digit + k] =
+                m.all_tiles->digits[pass][first_digit + k] + group::get(before, k) - tile_offset[k]; // modulo 2^32
     }
     __syncthreads();
     to.ask_once([&]<class Joined>(Joined) VOXELPIPE_INLINE_LAMBDA {
@@ -259,7 +259,7 @@ __global__ __launch_bounds__(sort_threads,
             const std::uint32_t at = threadIdx.x + sort_threads * i;
             if (at >= length) break;
             const uint2 pair = shared.pairs[at];
-            to.template store<Joined::value>(places[digit(pair.x)] + at, pair);
+            to.template store<Joined::value>(offsets[digit(pair.x)] + at, pair);
         }
     });
 }
@@ -288,7 +288,7 @@ VOXELPIPE_DEFINES_KERNELS [[nodiscard]] int sort_fragments(const sort_pairs& pai
     for (int p = 0; p < m.plan.passes && tiles != 0; ++p) {
         const pair_array from = p == 0 ? pairs.apart(0) : pairs.joined(p % 2);
         const pair_array to = p + 1 == m.plan.passes ? pairs.apart(1 - p % 2) : pairs.joined(1 - p % 2);
-        if (m.plan.bits == most_digit_bits)
+        if (m.plan.bits == max_digit_bits)
             few ? launch_sort_pass<2, few_sort_items>(from, to, tiles, m, p, where, stream)
                 : launch_sort_pass<2, sort_items>(from, to, tiles, m, p, where, stream);
         else

@@ -87,7 +87,7 @@ struct voxel_cells<framebuffer_view<Targets...>> {
     // Stores the cells to the voxel's targets.
     template <class Scene>
     __device__ VOXELPIPE_INLINE void store(const Scene& s, const framebuffer_view<Targets...>& fb,
-                                           const voxel_place& at) const {
+                                           const voxel_position& at) const {
         core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() VOXELPIPE_INLINE_LAMBDA {
             const auto& view = voxelpipe::get<K>(fb.targets);
             const auto& cell = voxelpipe::get<K>(of);
@@ -220,7 +220,7 @@ __global__ __launch_bounds__(threads_per_block, 4) void resolve_runs_kernel(
             const unsigned starts = __ballot_sync(whole_warp, valid && voxel != previous);
             const unsigned upto = starts & ((2u << lane) - 1);
             some_cells<cells> mine{};
-            const voxel_place at = place_of(voxel, fb.extent);
+            const voxel_position at = position_of(voxel, fb.extent);
             if (valid) {
                 const auto out = shade_small_fragment<false>(s, primitive, at.x, at.y, at.z);
                 mine.any = static_cast<word>(out.keep);
@@ -310,7 +310,7 @@ __global__ __launch_bounds__(threads_per_block) void resolve_ends_kernel(
         }
         if (mine.any != 0) {
             const std::uint32_t voxel = f.voxels[(run + 1) * resolve_run - 1];
-            mine.cells.store(s, fb, place_of(voxel, fb.extent));
+            mine.cells.store(s, fb, position_of(voxel, fb.extent));
             ++touched;
         }
         __syncwarp();

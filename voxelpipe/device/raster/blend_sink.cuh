@@ -67,21 +67,21 @@ struct blending_sink : sink_base<Call> {
         each_target([&]<std::size_t K>(const auto& t, immediate_mode mode)
                         VOXELPIPE_INLINE_LAMBDA { mine.touched += blend_row(t, x0, y, z, own, value_of<K>(), mode); });
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE auto place(int x, int y, int z) const {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE auto position(int x, int y, int z) const {
         if constexpr (Call::output::only_sets)
-            return place_of_word(voxelpipe::get<0>(this->call.out.fb.targets), glm::ivec3(x, y, z));
+            return word_position_of(voxelpipe::get<0>(this->call.out.fb.targets), glm::ivec3(x, y, z));
         else
             return glm::ivec3(x, y, z);
     }
     __device__ VOXELPIPE_INLINE void emit(const glm::ivec3& at, bool wanted) {
         if (wanted) row(at.x, at.y, at.z, 1u);
     }
-    __device__ VOXELPIPE_INLINE void emit(const word_place& at, bool wanted) {
+    __device__ VOXELPIPE_INLINE void emit(const word_position& at, bool wanted) {
         if (!wanted) return;
         ++mine.fragments;
         reduce_or(voxelpipe::get<0>(this->call.out.fb.targets).elements + at.number(), at.bit());
     }
-    __device__ VOXELPIPE_INLINE void emit_line(word_place first, const word_place& step, unsigned count) {
+    __device__ VOXELPIPE_INLINE void emit_line(word_position first, const word_position& step, unsigned count) {
         mine.fragments += count;
         // Loaded once: the compiler reloads after each reduction whatever is not in a register.
         word* const words = voxelpipe::get<0>(this->call.out.fb.targets).elements;
@@ -116,12 +116,12 @@ struct blending_sink : sink_base<Call> {
                 mine.touched += blend_shared(t, x, y, z, value, mode);
         });
     }
-    // The voxels place_of(i) for the bits i of a mask of four.
-    template <class Place>
-    __device__ VOXELPIPE_INLINE void voxels(word bits, const Place& place_of) {
+    // The voxels position_of(i) for the bits i of a mask of four.
+    template <class Position>
+    __device__ VOXELPIPE_INLINE void voxels(word bits, const Position& position_of) {
         mine.fragments += static_cast<unsigned>(__popc(bits));
         each_target([&]<std::size_t K>(const auto& t, immediate_mode mode) VOXELPIPE_INLINE_LAMBDA {
-            mine.touched += blend_voxels(t, bits, place_of, value_of<K>(), mode);
+            mine.touched += blend_voxels(t, bits, position_of, value_of<K>(), mode);
         });
     }
     // Moves counts from one sink of a thread to another.

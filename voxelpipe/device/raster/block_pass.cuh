@@ -17,13 +17,13 @@ inline constexpr int block_min_blocks = 5; // per multiprocessor: bounds the reg
 
 // Triangles by their vertices, each in a column of words.
 struct triangle_queue {
-    std::int32_t q[9][queue_places];
+    std::int32_t q[9][queue_slots];
 };
 
 // Shared memory of one warp.
 struct warp_queues {
-    triangle_queue tiny_queue, small_queue;  // boxes for raster_tiny; other small ones
-    std::uint32_t large_queue[queue_places]; // numbers of triangles, which are loaded again
+    triangle_queue tiny_queue, small_queue; // boxes for raster_tiny; other small ones
+    std::uint32_t large_queue[queue_slots]; // numbers of triangles, which are loaded again
 };
 
 // The work of one warp, from the mesh to a sink. Every warp has its own queues, so no thread waits for another warp.
@@ -42,7 +42,7 @@ struct block_warp {
     std::uint32_t* oversized; // the block's oversized triangles
     unsigned& num_oversized;
     int lane = static_cast<int>(threadIdx.x) % 32;
-    int num_tinies = 0, num_smalls = 0, num_larges = 0;
+    int num_tiny = 0, num_small = 0, num_large = 0;
 
     __device__ VOXELPIPE_INLINE static void push(triangle_queue& queue, int at, const int32_triangle& r) {
         for (int k = 0; k < 9; ++k) queue.q[k][at] = r.q[k / 3][k % 3];
@@ -64,7 +64,7 @@ struct block_warp {
         r = corners.take(call.in);
         if (has_next) corners.fetch(call.in.source, next);
         if (valid) {
-            most = r.most();
+            most = r.longest_side();
             is_oversized = !r.is_near || most > max_group_side(call.in.fraction);
             inside = r.inside(call.in.extent);
             if (!is_oversized && inside < 0 && r.template is_outside<Call::rule>(call.in.extent))
@@ -86,19 +86,19 @@ struct block_warp {
         }
         waits = waits && !is_done;
         if (__any_sync(0xffffffffu, waits || is_oversized)) {
-            const int kind = waits ? size_class_of<Call::rule>(r, most) : -1;
-            const int tiny_at = take_place(kind == size_class::tiny, num_tinies);
-            if (kind == size_class::tiny) push(queues.tiny_queue, tiny_at, r);
-            const int small_at = take_place(kind == size_class::thread, num_smalls);
-            if (kind == size_class::thread) push(queues.small_queue, small_at, r);
+            const int size = waits ? size_class_of<Call::rule>(r, most) : -1;
+            const int tiny_at = take_slot(size == size_class::tiny, num_tiny);
+            if (size == size_class::tiny) push(queues.tiny_queue, tiny_at, r);
+            const int small_at = take_slot(size == size_class::thread, num_small);
+            if (size == size_class::thread) push(queues.small_queue, small_at, r);
             // If each block has at most one round of the mesh, some multiprocessors may have no block: these triangles
             // go to the whole device.
             const bool is_spread =
-                kind == size_class::thread_heavy && call.in.num_triangles <= gridDim.x * raster_threads;
-            const bool is_large = kind == size_class::thread_heavy && !is_spread;
-            const int large_at = take_place(is_large, num_larges);
+                size == size_class::thread_heavy && call.in.num_triangles <= gridDim.x * raster_threads;
+            const bool is_large = size == size_class::thread_heavy && !is_spread;
+            const int large_at = take_slot(is_large, num_large);
             if (is_large) queues.large_queue[large_at] = i;
-            call.lists.push(size_class::warp_group, is_spread || kind == size_class::warp_group, i);
+            call.lists.push(size_class::warp_group, is_spread || size == size_class::warp_group, i);
             if (is_oversized)
                 oversized[atomicAdd(&num_oversized, 1u)] = i; // a function call here would spill the caller's registers
         }
@@ -123,13 +123,13 @@ struct block_warp {
         for (std::uint32_t first = begin;;) {
             int w = own, at = 0;
             bool is_tiny = false, is_large = false;
-            if (num_tinies >= 32) {
-                at = (num_tinies -= 32) + lane;
+            if (num_tiny >= 32) {
+                at = (num_tiny -= 32) + lane;
                 is_tiny = true;
-            } else if (num_smalls >= 32) {
-                at = (num_smalls -= 32) + lane;
-            } else if (num_larges >= 32) {
-                at = (num_larges -= 32) + lane;
+            } else if (num_small >= 32) {
+                at = (num_small -= 32) + lane;
+            } else if (num_large >= 32) {
+                at = (num_large -= 32) + lane;
                 is_large = true;
             } else if (first < num_triangles) {
                 // While a batch is drawn, the corners of the next one are being fetched, and the indices of the one
@@ -142,9 +142,9 @@ struct block_warp {
             } else {
                 if (ended == 0) {
                     if (lane == 0) {
-                        left[0][own] = num_tinies;
-                        left[1][own] = num_smalls;
-                        left[2][own] = num_larges;
+                        left[0][own] = num_tiny;
+                        left[1][own] = num_small;
+                        left[2][own] = num_large;
                     }
                     __syncthreads();
                 }

@@ -41,23 +41,23 @@ __device__ __noinline__ void keep_setups(const Call& call, unsigned warp, unsign
 }
 
 // A warp's position in the deferred pass.
-struct warp_place {
+struct warp_position {
     unsigned warp, warps; // of the whole launch
     unsigned lane;
 };
 
 // Draws the triangles of one list from number `first` on, by group_lanes lanes each.
 template <class Call, class Sink>
-__device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std::uint32_t first,
-                                                 const warp_place& place, const lane_rows& kept, Sink& sink) {
+__device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int size, std::uint32_t first,
+                                                 const warp_position& position, const lane_rows& kept, Sink& sink) {
     constexpr unsigned at_once = 32 / group_lanes;
-    const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[kind]));
+    const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[size]));
     const unsigned chunks = (length - first + at_once - 1) / at_once;
-    for (unsigned chunk = place.warp; chunk < chunks; chunk += place.warps) {
-        const std::uint32_t i = first + chunk * at_once + place.lane / group_lanes;
+    for (unsigned chunk = position.warp; chunk < chunks; chunk += position.warps) {
+        const std::uint32_t i = first + chunk * at_once + position.lane / group_lanes;
         const bool wanted = i < length;
         __syncwarp();
-        raster_by_group<Call::rule>(call.in, wanted, wanted ? call.lists.at(kind, i) : 0, kept, sink);
+        raster_by_group<Call::rule>(call.in, wanted, wanted ? call.lists.at(size, i) : 0, kept, sink);
         __syncwarp();
     }
 }
@@ -67,24 +67,25 @@ __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int kind, std
 // lists advance together, part by part (list_walk): they are nearly in the order of the mesh, so voxels are in the
 // cache while triangles of all classes touch them.
 template <class Call, class Rows, class Sink>
-__device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_place& place, const lane_rows& kept,
+__device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_position& position, const lane_rows& kept,
                                               Rows& rows, Sink& sink) {
-    constexpr int kinds = size_class::warp_group; // those before warp_group
-    std::uint32_t chunks[kinds];
-    for (int k = 0; k < kinds; ++k) {
+    constexpr int num_classes = size_class::warp_group; // those before warp_group
+    std::uint32_t chunks[num_classes];
+    for (int k = 0; k < num_classes; ++k) {
         const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[k]));
-        const bool few = k != size_class::tiny && length / 64 * group_lanes < place.warps;
+        const bool few = k != size_class::tiny && length / 64 * group_lanes < position.warps;
         chunks[k] = few ? 0 : length / 32;
-        const unsigned from_last = place.warps - 1 - place.warp; // warps at the end have fewer whole chunks
-        raster_by_lanes(call, k, chunks[k] * 32, {few ? place.warp : from_last, place.warps, place.lane}, kept, sink);
+        const unsigned from_last = position.warps - 1 - position.warp; // warps at the end have fewer whole chunks
+        raster_by_lanes(call, k, chunks[k] * 32, {few ? position.warp : from_last, position.warps, position.lane}, kept,
+                        sink);
     }
     // While a chunk is drawn, the vertex numbers of the next one and the triangle numbers of the one after that are
     // being loaded.
-    using walk_type = core::list_walk<kinds>;
+    using walk_type = core::list_walk<num_classes>;
     using chunk = typename walk_type::chunk;
-    walk_type walk(chunks, place.warp, place.warps);
+    walk_type walk(chunks, position.warp, position.warps);
     const auto number = [&](const chunk& c) VOXELPIPE_INLINE_LAMBDA {
-        return c.list < 0 ? 0 : call.lists.at(c.list, 32 * c.number + place.lane);
+        return c.list < 0 ? 0 : call.lists.at(c.list, 32 * c.number + position.lane);
     };
     const auto vertices = [&](const chunk& c, std::uint32_t triangle) VOXELPIPE_INLINE_LAMBDA {
         return c.list < 0 ? glm::uvec3(0) : call.in.source.triangle(triangle);
@@ -149,36 +150,36 @@ __global__ __launch_bounds__(raster_threads,
     __syncthreads();
     const unsigned in_block = warp_in_block();
     const lane_rows kept(memory_of_warps[in_block].rows);
-    const warp_place place{blockIdx.x * raster_warps + in_block, gridDim.x * raster_warps, threadIdx.x % 32};
+    const warp_position position{blockIdx.x * raster_warps + in_block, gridDim.x * raster_warps, threadIdx.x % 32};
     typename sink_type::memory& memory = memories[in_block];
-    const bool has_records = uniform(*call.lists.next) != 0;
+    const bool has_items = uniform(*call.lists.next) != 0;
     // Work items of few split triangles go to different multiprocessors.
-    const unsigned warp_of_records = thin ? place.warp : in_block * gridDim.x + blockIdx.x;
-    const auto draw_records = [&]() VOXELPIPE_INLINE_LAMBDA {
-        return raster_all_work_items(call, dropped, memory_of_warps[in_block].bricks, memory, warp_of_records,
-                                     place.warps);
+    const unsigned warp_of_items = thin ? position.warp : in_block * gridDim.x + blockIdx.x;
+    const auto draw_items = [&]() VOXELPIPE_INLINE_LAMBDA {
+        return raster_all_work_items(call, dropped, memory_of_warps[in_block].bricks, memory, warp_of_items,
+                                     position.warps);
     };
     // Thin work items come last: their setups are ready when all else is drawn. Conservative ones take longest, so they
     // come first, while other warps draw the rest.
-    typename sink_type::totals of_records{};
-    if (has_records) {
-        keep_setups(call, warp_of_records, place.warps);
-        if constexpr (!thin) of_records = draw_records();
+    typename sink_type::totals of_items{};
+    if (has_items) {
+        keep_setups(call, warp_of_items, position.warps);
+        if constexpr (!thin) of_items = draw_items();
     }
     sink_type sink(call, dropped, memory);
-    sink.take_over(of_records);
-    raster_by_lanes(call, size_class::warp_group, 0, place, kept, sink);
+    sink.take_over(of_items);
+    raster_by_lanes(call, size_class::warp_group, 0, position, kept, sink);
     if constexpr (combines_words<Call>) {
         combining_sink<Call> rows(sink, words[in_block]);
-        raster_lists(call, place, kept, rows, sink);
+        raster_lists(call, position, kept, rows, sink);
         sink.take_over(rows.end());
     } else {
-        raster_lists(call, place, kept, sink, sink);
+        raster_lists(call, position, kept, sink, sink);
     }
     if constexpr (thin) {
-        if (has_records) {
+        if (has_items) {
             (void)sink.end(); // flushes; the memory becomes another sink's
-            sink.take_over(draw_records());
+            sink.take_over(draw_items());
         }
     }
     sink.finish(state);

@@ -67,7 +67,7 @@ struct deferred_triangles {
     // ready.
     static constexpr std::size_t max_setups = 1u << 14, setup_bytes = 384;
     std::byte* setups;
-    unsigned long long* set_up;
+    unsigned long long* setups_ready;
     std::uint32_t num_setups;
 
     // Oversized triangles that a block of the first pass leaves until its end, in a part of the array for each block.
@@ -95,31 +95,31 @@ struct deferred_triangles {
         deferred_triangles l = *this;
         l.lengths = state->deferred.lengths;
         l.next = &state->deferred.split;
-        l.set_up = &state->deferred.set_up;
+        l.setups_ready = &state->deferred.setups_ready;
         return l;
     }
     [[nodiscard]] static constexpr bool holds(std::uint64_t triangles, std::uint64_t work_items_each) {
         return triangles < (std::uint64_t{1} << (64 - work_item_bits)) &&
                triangles * work_items_each < (std::uint64_t{1} << work_item_bits);
     }
-    __device__ std::uint32_t& at(int kind, unsigned long long i) const {
-        std::uint32_t* const array = arrays[kind / 2];
-        return kind % 2 == 0 ? array[i] : array[capacity - 1 - i];
+    __device__ std::uint32_t& at(int size, unsigned long long i) const {
+        std::uint32_t* const array = arrays[size / 2];
+        return size % 2 == 0 ? array[i] : array[capacity - 1 - i];
     }
     // Appends a triangle of each lane that wants it to a list. All lanes call it.
-    __device__ VOXELPIPE_INLINE void push(int kind, bool wanted, std::uint32_t triangle) const {
+    __device__ VOXELPIPE_INLINE void push(int size, bool wanted, std::uint32_t triangle) const {
         const unsigned who = __ballot_sync(0xffffffffu, wanted);
         if (who == 0) return;
         const unsigned lane = threadIdx.x % 32;
         unsigned long long first = 0;
-        if (lane == 0) first = atomicAdd(&lengths[kind], static_cast<unsigned long long>(__popc(who)));
+        if (lane == 0) first = atomicAdd(&lengths[size], static_cast<unsigned long long>(__popc(who)));
         first = __shfl_sync(0xffffffffu, first, 0);
-        if (wanted) at(kind, first + static_cast<unsigned>(__popc(who & ((1u << lane) - 1)))) = triangle;
+        if (wanted) at(size, first + static_cast<unsigned>(__popc(who & ((1u << lane) - 1)))) = triangle;
     }
     // Appends a split triangle of each lane that has work items. All lanes call it.
-    __device__ void push_split(std::uint32_t triangle, unsigned long long records) const {
+    __device__ void push_split(std::uint32_t triangle, unsigned long long items) const {
         const unsigned lane = threadIdx.x % 32;
-        const unsigned long long mine = (records != 0 ? 1ull << work_item_bits : 0) + records;
+        const unsigned long long mine = (items != 0 ? 1ull << work_item_bits : 0) + items;
         unsigned long long sum = mine;
         for (unsigned d = 1; d < 32; d *= 2) {
             const unsigned long long other = __shfl_up_sync(0xffffffffu, sum, d);
@@ -127,23 +127,23 @@ struct deferred_triangles {
         }
         unsigned long long first = 0;
         if (lane == 31 && sum != 0) first = atomicAdd(next, sum);
-        const unsigned long long place = __shfl_sync(0xffffffffu, first, 31) + sum - mine;
-        if (records == 0) return;
-        const unsigned long long number = place >> work_item_bits;
+        const unsigned long long packed = __shfl_sync(0xffffffffu, first, 31) + sum - mine;
+        if (items == 0) return;
+        const unsigned long long number = packed >> work_item_bits;
         split[number] = triangle;
-        first_work_items[number] = place & ((1ull << work_item_bits) - 1);
+        first_work_items[number] = packed & ((1ull << work_item_bits) - 1);
     }
 };
 
-inline constexpr int queue_places = 64; // up to 31 wait when a warp adds up to 32
+inline constexpr int queue_slots = 64; // up to 31 wait when a warp adds up to 32
 
 // Returns the slot of a lane that wants one, behind the `count` that wait, and adds the new ones to count. All lanes
 // call it.
-__device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
+__device__ VOXELPIPE_INLINE int take_slot(bool wanted, int& count) {
     const unsigned who = __ballot_sync(0xffffffffu, wanted);
-    const int place = count + __popc(who & ((1u << threadIdx.x % 32) - 1));
+    const int slot = count + __popc(who & ((1u << threadIdx.x % 32) - 1));
     count += __popc(who);
-    return place;
+    return slot;
 }
 
 // A warp's triangles that wait for their lists, by warp_triangles; the counts are registers with the same value in all
@@ -151,8 +151,8 @@ __device__ VOXELPIPE_INLINE int take_place(bool wanted, int& count) {
 // whatever else lies there: with one per 32 triangles, first passes took some 20 % more or less, depending on where
 // state and target lay.
 struct class_queues {
-    static constexpr int places = 128, at_once = places - 32;
-    std::uint16_t triangles[size_class::count][places];
+    static constexpr int slots = 128, at_once = slots - 32;
+    std::uint16_t triangles[size_class::count][slots];
 };
 
 struct class_writer {
@@ -161,12 +161,12 @@ struct class_writer {
     int waiting[size_class::count] = {};
 
     // Queues the triangle of every lane whose size class is not negative. All lanes call it.
-    __device__ VOXELPIPE_INLINE void push(int kind, std::uint32_t code) {
-        const unsigned kinds = __reduce_or_sync(0xffffffffu, kind < 0 ? 0 : 1u << kind); // mostly one or two
+    __device__ VOXELPIPE_INLINE void push(int size, std::uint32_t code) {
+        const unsigned classes = __reduce_or_sync(0xffffffffu, size < 0 ? 0 : 1u << size); // mostly one or two
         for (int k = 0; k < size_class::count; ++k) {
-            if ((kinds >> k & 1u) == 0) continue;
-            const int place = take_place(kind == k, waiting[k]);
-            if (kind == k) queues.triangles[k][place] = static_cast<std::uint16_t>(code);
+            if ((classes >> k & 1u) == 0) continue;
+            const int slot = take_slot(size == k, waiting[k]);
+            if (size == k) queues.triangles[k][slot] = static_cast<std::uint16_t>(code);
             if (waiting[k] < class_queues::at_once) continue;
             __syncwarp();
             waiting[k] -= class_queues::at_once;
@@ -177,9 +177,9 @@ struct class_writer {
     // Stores how much waits in the warp's queues to shared memory, for the whole block, which must synchronise next.
     // All threads call it.
     template <int Warps>
-    __device__ VOXELPIPE_INLINE void note(unsigned (&places)[size_class::count][Warps]) const {
+    __device__ VOXELPIPE_INLINE void note(unsigned (&slots)[size_class::count][Warps]) const {
         if (threadIdx.x % 32 == 0)
-            for (int k = 0; k < size_class::count; ++k) places[k][threadIdx.x / 32] = static_cast<unsigned>(waiting[k]);
+            for (int k = 0; k < size_class::count; ++k) slots[k][threadIdx.x / 32] = static_cast<unsigned>(waiting[k]);
     }
     // How many triangles wait in the block, or at least `many` if some of them are large. Synchronises the block.
     static constexpr int many = 32;
@@ -192,35 +192,35 @@ struct class_writer {
     // Appends the queued triangles to the lists. The block reserves room for all of its warps at once. All threads call
     // it.
     template <int Warps>
-    __device__ VOXELPIPE_INLINE void finish(unsigned (&places)[size_class::count][Warps]) {
+    __device__ VOXELPIPE_INLINE void finish(unsigned (&slots)[size_class::count][Warps]) {
         const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32;
         for (int k = static_cast<int>(warp); k < size_class::count; k += Warps) {
             unsigned n = 0, before = 0;
             for (unsigned w = 0; w < Warps; ++w) {
-                before += w < lane ? places[k][w] : 0;
-                n += places[k][w];
+                before += w < lane ? slots[k][w] : 0;
+                n += slots[k][w];
             }
             if (n == 0) continue;
             __syncwarp();
             const auto first = static_cast<unsigned>(take(k, n)); // fewer than 2^32 exist
-            if (lane < Warps) places[k][lane] = first + before;
+            if (lane < Warps) slots[k][lane] = first + before;
         }
         __syncthreads();
         for (int k = 0; k < size_class::count; ++k)
-            if (waiting[k] != 0) write(k, places[k][warp], 0, waiting[k]);
+            if (waiting[k] != 0) write(k, slots[k][warp], 0, waiting[k]);
     }
 
 private:
     // Stores n queued triangles of a class, from `at` on, to slots `first` and on of its list.
-    __device__ VOXELPIPE_INLINE void write(int kind, unsigned long long first, int at, int n) const {
+    __device__ VOXELPIPE_INLINE void write(int size, unsigned long long first, int at, int n) const {
 #pragma unroll 1
         for (int i = static_cast<int>(threadIdx.x) % 32; i < n; i += 32)
-            lists.at(kind, first + static_cast<unsigned>(i)) = warp_triangles::of(queues.triangles[kind][at + i]);
+            lists.at(size, first + static_cast<unsigned>(i)) = warp_triangles::of(queues.triangles[size][at + i]);
     }
     // Reserves room for n triangles.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long take(int kind, unsigned n) const {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long take(int size, unsigned n) const {
         unsigned long long first = 0;
-        if (threadIdx.x % 32 == 0) first = atomicAdd(&lists.lengths[kind], static_cast<unsigned long long>(n));
+        if (threadIdx.x % 32 == 0) first = atomicAdd(&lists.lengths[size], static_cast<unsigned long long>(n));
         return __shfl_sync(0xffffffffu, first, 0);
     }
 };

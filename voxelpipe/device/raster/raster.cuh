@@ -26,11 +26,11 @@ inline constexpr int first_min_blocks = Call::rule == coverage::thin || Call::si
 // Thin triangles of up to 2 x 2 x 2 voxels that are redone in integers: those that floats cannot decide, and those of
 // warps with few. Each takes a column of words.
 struct cube_queue {
-    std::int32_t q[9][queue_places];
-    std::uint32_t triangle[queue_places]; // by warp_triangles
+    std::int32_t q[9][queue_slots];
+    std::uint32_t triangle[queue_slots]; // by warp_triangles
 };
 struct no_queue {};
-// For thin coverage: the cubes, and when none waits, the rows for draw_left.
+// For thin coverage: the cubes, and when none waits, the rows for draw_remaining.
 union cubes_or_rows {
     cube_queue cubes;
     kept_rows rows;
@@ -48,7 +48,7 @@ inline constexpr int oversized_side = 64; // stands for triangles to split: larg
 // Shared memory of one warp of the first pass.
 template <class Call>
 struct first_memory {
-    class_queues kinds;
+    class_queues queues;
     std::conditional_t<Call::rule == coverage::thin, cubes_or_rows, no_queue> thin;
     typename Call::sink::memory sink;
 };
@@ -90,7 +90,7 @@ struct first_warp {
         int32_triangle r;
         if (valid) {
             r = near();
-            side = r.most();
+            side = r.longest_side();
             inside = r.inside(call.in.extent);
             if (!r.is_near || side > max_group_side(call.in.fraction)) {
                 side = oversized_side;
@@ -120,7 +120,7 @@ struct first_warp {
             core::thin_cube cube{};
             if (at_once && is_cube) cube = core::thin_cube_by_signs(r.q, r.lo, r.last, call.in.fraction, sure);
             if (__any_sync(0xffffffffu, is_cube && !sure)) {
-                const int at = take_place(is_cube && !sure, num_cubes);
+                const int at = take_slot(is_cube && !sure, num_cubes);
                 if (is_cube && !sure) {
                     for (int k = 0; k < 9; ++k) memory.thin.cubes.q[k][at] = r.q[k / 3][k % 3];
                     memory.thin.cubes.triangle[at] = code;
@@ -243,29 +243,29 @@ struct first_warp {
 // each.
 template <class Call>
 __device__ __noinline__ typename Call::sink::totals
-draw_left(const Call& call, unsigned* dropped, first_memory<Call> (&memories)[raster_warps],
-          const unsigned (&waiting)[size_class::count][raster_warps], unsigned n) {
+draw_remaining(const Call& call, unsigned* dropped, first_memory<Call> (&memories)[raster_warps],
+               const unsigned (&waiting)[size_class::count][raster_warps], unsigned n) {
     first_memory<Call>& memory = memories[warp_in_block()];
     typename Call::sink sink(call, dropped, memory.sink);
     unsigned at = threadIdx.x % 32;
     const bool wanted = at < n;
-    int kind = 0;
+    int size = 0;
     std::uint32_t triangle = 0;
     int32_triangle r{};
     if (wanted) {
         unsigned warp = 0;
-        while (at >= waiting[kind][warp]) {
-            at -= waiting[kind][warp];
+        while (at >= waiting[size][warp]) {
+            at -= waiting[size][warp];
             warp = (warp + 1) % raster_warps;
-            kind += warp == 0 ? 1 : 0;
+            size += warp == 0 ? 1 : 0;
         }
-        triangle = warp_triangles::of(memories[warp].kinds.triangles[kind][at], warp);
+        triangle = warp_triangles::of(memories[warp].queues.triangles[size][at], warp);
         r = load_int32(call.in, call.in.source.triangle(triangle));
     }
     emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
         if (!wanted) return;
         sink.begin(triangle);
-        if (kind == size_class::tiny)
+        if (size == size_class::tiny)
             raster_tiny<Call::rule>(call.in, r, sink);
         else if constexpr (Call::rule == coverage::thin)
             raster_small<Call::rule, true>(call.in, r, lane_rows(memory.thin.rows), sink);
@@ -283,7 +283,7 @@ template <class Call, bool Alone, bool Close>
 __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& again, pipeline_state* state) {
     using sink_type = typename Call::sink;
     __shared__ first_memory<Call> memories[raster_warps];
-    __shared__ unsigned places[size_class::count][raster_warps];
+    __shared__ unsigned slots[size_class::count][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_oversized;
     const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
     await_stream();
@@ -296,7 +296,7 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
     __syncthreads();
     first_memory<Call>& memory = memories[warp_in_block()];
     sink_type sink(call, dropped, memory.sink);
-    class_writer writer{call.lists, memory.kinds};
+    class_writer writer{call.lists, memory.queues};
     const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
     first_warp<Call, Alone, Close> warp{
         call,         memory, sink, writer, call.lists.oversized + std::size_t{blockIdx.x} * batches * raster_threads,
@@ -304,17 +304,17 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
     const unsigned looked_at = warp.run(index);
     __syncthreads();
     split_oversized(call, sink, warp.oversized, num_oversized);
-    writer.note(places);
+    writer.note(slots);
     int left = class_writer::many;
     if constexpr (Alone)
         left = writer.count();
     else
         __syncthreads();
     if (left >= class_writer::many) {
-        writer.finish(places);
+        writer.finish(slots);
     } else if (left != 0 && threadIdx.x < 32) {
         (void)sink.end(); // flushes; the memory becomes another sink's
-        sink.take_over(draw_left(again, dropped, memories, places, static_cast<unsigned>(left)));
+        sink.take_over(draw_remaining(again, dropped, memories, slots, static_cast<unsigned>(left)));
     }
     sink.finish(state);
     count_looked_at(looked_at, dropped, state);

@@ -18,8 +18,8 @@ namespace voxelpipe::device {
 // Each thread has a sink of its own. Voxels are (x, y, z) of the grid; `mask` has a bit for each voxel of a row along
 // x, lowest first. Some sinks have more members: commit() if fragments are staged; one(x, y, z), mark_boxes and
 // mark_brick if equal voxels are merged; row_by_all(lanes, x, y, z, mask) if long rows are split; rounds, share and
-// row_rounds if rounds are taken; emit_line(place, step, count), fragments one step apart, if they are staged or only
-// bits are set.
+// row_rounds if rounds are taken; emit_line(position, step, count), fragments one step apart, if they are staged or
+// only bits are set.
 template <class Sink>
 concept fragment_sink = requires(Sink sink, const glm::uvec3& indices, std::uint32_t triangle, int x, int y, int z,
                                  word mask, pipeline_state* state) {
@@ -39,9 +39,9 @@ concept fragment_sink = requires(Sink sink, const glm::uvec3& indices, std::uint
     sink.drop(core::triangle_class{});             // counts a triangle that is not drawn
 
     // ---- fragments ----
-    // Position of a voxel, linear in x, y and z: ivec3, or a number modulo 2^32. emit(place, wanted) takes one
+    // Position of a voxel, linear in x, y and z: ivec3, or a number modulo 2^32. emit(position, wanted) takes one
     // fragment.
-    sink.place(x, y, z);
+    sink.position(x, y, z);
     sink.row(x, y, z, mask);               // a row from (x, y, z) on
     sink.cube(x, y, z, mask);              // 2 x 2 x 2 voxels from (x, y, z) on, x first: 8 bits
     sink.slim(x, y, z, core::slim_rows{}); // rows of a box that is one voxel wide along two axes or three long
@@ -58,7 +58,7 @@ concept fragment_sink = requires(Sink sink, const glm::uvec3& indices, std::uint
 // compile-time members:
 //   defers                  the first pass leaves larger triangles to the deferred pass; otherwise block_pass.cuh
 //   can_skip_deferred_pass  the deferred pass may be left out: a call that misses triangles writes no target
-//   only_sets, only_blends  all targets are in use, and all values are true, or all targets are blended in place
+//   only_sets, only_blends  all targets are in use, and all values are true, or all targets are blended in position
 template <coverage Rule, class Source, class Output>
 struct raster_call {
     static constexpr coverage rule = Rule;

@@ -13,7 +13,7 @@ inline constexpr int raster_warps = raster_threads / 32;
 // Longest side of a bounding box that is drawn without a loop (raster_tiny).
 template <coverage Rule>
 inline constexpr int max_tiny_side = Rule == coverage::thin ? 2 : 3;
-inline constexpr int most_side = 8;      // longest side of a box whose rows fit a byte
+inline constexpr int max_short_side = 8; // longest side of a box whose rows fit a byte
 inline constexpr int max_long_side = 16; // longest side of a box whose rows fit 16 bits
 inline constexpr int max_cells = 1024;   // most voxels of a box that one thread draws
 inline constexpr int small_cells = 27;   // most voxels of size_class::thread
@@ -40,7 +40,7 @@ template <coverage Rule>
     if (most <= max_tiny_side<Rule>) return size_class::tiny;
     const int x = r.last[0] + 1, y = r.last[1] + 1, z = r.last[2] + 1;
     const int cost = thin ? core::max3(x * y, y * z, z * x) : x * y * z;
-    if (cost <= (thin ? small_columns : small_cells) && (thin || most <= most_side)) return size_class::thread;
+    if (cost <= (thin ? small_columns : small_cells) && (thin || most <= max_short_side)) return size_class::thread;
     return cost <= (thin ? max_columns : max_cells) && (thin || most <= max_long_side) ? size_class::thread_heavy
                                                                                        : size_class::warp_group;
 }

@@ -54,12 +54,12 @@ static_assert(max_columns < max_long_side * max_long_side && 32 / group_lanes <=
 
 // The columns of a small triangle for thin coverage: rows along the longer side of the box, and the position of their
 // voxels, which is linear in u, v and w.
-template <class Place>
+template <class Position>
 struct thin_columns {
     core::small_thin s;
     core::triple<std::int32_t> begin, end; // along u, v, w
     int lowest, depth;                     // along w: voxels of the grid before the box; voxels of the grid
-    Place origin, by_u, by_v, by_w;
+    Position origin, by_u, by_v, by_w;
 
     // Returns false if the triangle has no area.
     template <class Source, class Sink>
@@ -80,9 +80,9 @@ struct thin_columns {
         }
         depth = axis == 0 ? call.extent.x : axis == 1 ? call.extent.y : call.extent.z;
         lowest = axis == 0 ? lo[0] : axis == 1 ? lo[1] : lo[2];
-        const auto step_along = [&](int k) VOXELPIPE_INLINE_LAMBDA { return sink.place(k == 0, k == 1, k == 2); };
+        const auto step_along = [&](int k) VOXELPIPE_INLINE_LAMBDA { return sink.position(k == 0, k == 1, k == 2); };
         const int next = axis == 2 ? 0 : axis + 1, last = axis == 0 ? 2 : axis - 1; // axes of u and v
-        origin = sink.place(lo[0], lo[1], lo[2]);
+        origin = sink.position(lo[0], lo[1], lo[2]);
         by_u = step_along(swapped ? last : next);
         by_v = step_along(swapped ? next : last);
         by_w = step_along(axis);
@@ -95,14 +95,14 @@ struct thin_columns {
 };
 
 template <class Sink>
-using place_of_sink = decltype(std::declval<const Sink&>().place(0, 0, 0));
+using position_of_sink = decltype(std::declval<const Sink&>().position(0, 0, 0));
 
 // Emits the thin fragments of the columns in rows first, first + step, ...; returns false if the triangle has no area.
 template <class Source, class Kept, class Sink>
 __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, const core::small_triangle& t,
                                              const std::int32_t (&lo)[3], const core::small_box& box, int first,
                                              int step, Kept&& kept, Sink& sink) {
-    thin_columns<place_of_sink<Sink>> c;
+    thin_columns<position_of_sink<Sink>> c;
     if (!c.find(call, t, lo, box, sink)) return false;
     auto row = c.origin;
     c.s.columns(
@@ -120,7 +120,7 @@ __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, c
 template <class Source, class Kept, class Sink>
 [[nodiscard]] __device__ VOXELPIPE_INLINE bool raster_thin_by_rounds(const raster_input<Source>& call,
                                                                      const int32_triangle& r, Kept&& kept, Sink& sink) {
-    thin_columns<place_of_sink<Sink>> c;
+    thin_columns<position_of_sink<Sink>> c;
     const bool has_area = c.find(call, r.relative(call.fraction), r.lo, r.part(call.extent), sink);
     if (!__all_sync(0xffffffffu, !has_area || c.is_inside())) return false;
     core::small_thin::walk walk{};
@@ -133,11 +133,11 @@ template <class Source, class Kept, class Sink>
     sink.rounds(
         count, [&]() VOXELPIPE_INLINE_LAMBDA { return walk.is_done(); },
         [&]() VOXELPIPE_INLINE_LAMBDA {
-            auto place = row;
+            auto position = row;
             c.s.next_column(
                 walk, kept, [&](int v) VOXELPIPE_INLINE_LAMBDA { row = c.origin + c.by_v * v; },
-                [&](int u, int w) VOXELPIPE_INLINE_LAMBDA { place = row + c.by_u * u + c.by_w * w; });
-            return place;
+                [&](int u, int w) VOXELPIPE_INLINE_LAMBDA { position = row + c.by_u * u + c.by_w * w; });
+            return position;
         });
     return true;
 }
@@ -163,8 +163,8 @@ __device__ VOXELPIPE_INLINE void emit_thin_cube(const raster_input<Source>& call
             if (p.x < 0 || p.y < 0 || p.z < 0 || p.x >= call.extent.x || p.y >= call.extent.y || p.z >= call.extent.z)
                 columns &= ~(1u << i);
         }
-    const auto by_u = sink.place(axis != 0, axis == 0, 0), by_v = sink.place(0, axis == 2, axis != 2),
-               by_w = sink.place(axis == 0, axis == 1, axis == 2), below = sink.place(r.lo[0], r.lo[1], r.lo[2]);
+    const auto by_u = sink.position(axis != 0, axis == 0, 0), by_v = sink.position(0, axis == 2, axis != 2),
+               by_w = sink.position(axis == 0, axis == 1, axis == 2), below = sink.position(r.lo[0], r.lo[1], r.lo[2]);
     sink.voxels(columns, [&](int column) VOXELPIPE_INLINE_LAMBDA {
         return below + by_u * (column & 1) + by_v * (column >> 1) + by_w * cube.depth(column);
     });
@@ -320,7 +320,7 @@ __device__ VOXELPIPE_INLINE void raster_rows_by_rounds(const raster_input<Source
         if (out.sure) box = {{1, 1, 1}, {0, 0, 0}};
     }
     const core::small_conservative s(r.relative(call.fraction), call.fraction);
-    const bool is_long = r.most() > most_side;
+    const bool is_long = r.longest_side() > max_short_side;
     {
         const core::small_box part = is_long ? core::small_box{{1, 1, 1}, {0, 0, 0}} : box;
         auto rows = core::small_conservative::row_walk_8::of(s, part, true);
@@ -335,7 +335,7 @@ __device__ VOXELPIPE_INLINE void raster_rows_by_rounds(const raster_input<Source
 }
 
 // Draws any small triangle, by one thread. Apart: the kernel holds nothing else in registers meanwhile. kept:
-// lane_rows, or no_rows for conservative boxes of at most most_side voxels a side.
+// lane_rows, or no_rows for conservative boxes of at most max_short_side voxels a side.
 template <coverage Rule, bool Apart, class Source, class Kept, class Sink>
 __device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, const int32_triangle& r,
                                               const Kept& kept, Sink& sink) {
@@ -349,7 +349,7 @@ __device__ VOXELPIPE_INLINE void raster_small(const raster_input<Source>& call, 
             sink.row(r.lo[0] + box.lo[0], r.lo[1] + y, r.lo[2] + z, bits);
         };
         const int most = core::max3(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]) + 1;
-        if (std::is_same_v<Kept, no_rows> || most <= most_side)
+        if (std::is_same_v<Kept, no_rows> || most <= max_short_side)
             s.template rows<Apart>(box, emit);
         else if constexpr (!std::is_same_v<Kept, no_rows>)
             s.template rows_of_16<Apart>(box, kept, emit);

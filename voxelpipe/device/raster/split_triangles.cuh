@@ -28,7 +28,7 @@ static_assert((std::int64_t{max_immediate_extent} / core::brick_size + 1) * (max
 template <coverage Rule>
 struct split_pieces {
     static constexpr int across = Rule == coverage::thin ? 1 : core::brick_size; // voxels along v
-    static constexpr int per_record = Rule == coverage::thin ? 32 : 8;
+    static constexpr int per_work_item = Rule == coverage::thin ? 32 : 8;
     core::row_axes axes;
     core::triple<std::int64_t> lo, hi;            // the box, as uvw of these axes
     std::int64_t first_u, first_v, per_row, rows; // 32 bits can number the pieces (max_immediate_extent)
@@ -45,7 +45,7 @@ struct split_pieces {
         }
     }
     [[nodiscard]] VOXELPIPE_HD std::int64_t count() const { return per_row * rows; }
-    [[nodiscard]] VOXELPIPE_HD std::int64_t records() const { return (count() + per_record - 1) / per_record; }
+    [[nodiscard]] VOXELPIPE_HD std::int64_t work_items() const { return (count() + per_work_item - 1) / per_work_item; }
     // The lowest voxel of piece i along u and v, possibly outside the box.
     [[nodiscard]] VOXELPIPE_HD std::int64_t u(std::int64_t i) const {
         return (first_u + static_cast<std::uint32_t>(i) % static_cast<std::uint32_t>(per_row)) << core::log2_brick;
@@ -55,7 +55,7 @@ struct split_pieces {
     }
     // Piece i divided among lanes_each lanes: has_rows is true if part `part` has rows within the box, piece returns
     // them as a box of voxels.
-    static constexpr int lanes_each = 32 / per_record;
+    static constexpr int lanes_each = 32 / per_work_item;
     [[nodiscard]] VOXELPIPE_HD bool has_rows(std::int64_t i, unsigned part) const {
         return first_row(i, part) <= hi[1] && first_row(i, part + 1) > lo[1];
     }
@@ -67,10 +67,10 @@ struct split_pieces {
                 axes.from_rows(inside(u1, 0), inside(v1, 1), hi[2])};
     }
     // The most work items that a triangle can have in a grid of this extent.
-    [[nodiscard]] static std::uint64_t max_records(glm::ivec3 extent) {
+    [[nodiscard]] static std::uint64_t max_work_items(glm::ivec3 extent) {
         const auto of = [](std::int64_t along, std::int64_t rest) {
             const std::int64_t pieces = (along / core::brick_size + 1) * (rest / across + 1);
-            return static_cast<std::uint64_t>((pieces + per_record - 1) / per_record);
+            return static_cast<std::uint64_t>((pieces + per_work_item - 1) / per_work_item);
         };
         return std::max(core::max3(of(extent.y, extent.z), of(extent.z, extent.x), of(extent.x, extent.y)),
                         core::max3(of(extent.z, extent.y), of(extent.x, extent.z), of(extent.y, extent.x)));
@@ -88,8 +88,8 @@ private:
 };
 // For either rule.
 [[nodiscard]] inline std::uint64_t max_work_items(glm::ivec3 extent) {
-    return std::max(split_pieces<coverage::thin>::max_records(extent),
-                    split_pieces<coverage::conservative>::max_records(extent));
+    return std::max(split_pieces<coverage::thin>::max_work_items(extent),
+                    split_pieces<coverage::conservative>::max_work_items(extent));
 }
 
 // A triangle in full width, and the voxels that it may touch.
@@ -113,14 +113,14 @@ struct located_triangle {
     }
 };
 
-// Classifies a triangle; if it is drawn, `records` becomes its number of work items.
+// Classifies a triangle; if it is drawn, `items` becomes its number of work items.
 template <class Call>
-__device__ inline core::triangle_class find_records(const Call& call, std::uint32_t triangle,
-                                                    unsigned long long& records) {
+__device__ inline core::triangle_class count_work_items(const Call& call, std::uint32_t triangle,
+                                                        unsigned long long& items) {
     const located_triangle<Call> t(call, triangle);
     if (t.kind != core::triangle_class::drawn) return t.kind;
     if (Call::rule == coverage::thin && core::has_zero_area(t.a, t.b, t.c)) return core::triangle_class::zero_area;
-    records = static_cast<unsigned long long>(t.pieces(call.in.fraction).records());
+    items = static_cast<unsigned long long>(t.pieces(call.in.fraction).work_items());
     return t.kind;
 }
 
@@ -130,14 +130,14 @@ __device__ VOXELPIPE_INLINE void split_oversized(const Call& call, Sink& sink, c
                                                  unsigned num_oversized) {
     for (unsigned first = 0; first < num_oversized; first += blockDim.x) {
         const unsigned at = first + threadIdx.x;
-        unsigned long long records = 0;
+        unsigned long long items = 0;
         const std::uint32_t triangle = at < num_oversized ? oversized[at] : 0;
         if (at < num_oversized) {
-            const core::triangle_class kind = find_records(call, triangle, records);
+            const core::triangle_class kind = count_work_items(call, triangle, items);
             if (kind != core::triangle_class::drawn) sink.drop(kind);
         }
         __syncwarp();
-        call.lists.push_split(triangle, records);
+        call.lists.push_split(triangle, items);
     }
 }
 
@@ -147,7 +147,7 @@ struct alignas(16) split_setup {
     std::conditional_t<Rule == coverage::thin, core::brick_thin, core::brick_triangle> bricks; // set if is_narrow
     core::voxel_box box, reach; // of the triangle; its part within the grid
     split_pieces<Rule> pieces;
-    unsigned long long first_record; // number of the triangle's first work item
+    unsigned long long first_work_item; // number of the triangle's first work item
     std::uint32_t triangle;
     std::uint32_t is_narrow; // 0 if the 64-bit path cannot hold it
 
@@ -155,7 +155,7 @@ struct alignas(16) split_setup {
     template <class Call>
     __device__ VOXELPIPE_INLINE void find(const Call& call, std::uint32_t number) {
         const int fraction = call.in.fraction;
-        first_record = call.lists.first_work_items[number];
+        first_work_item = call.lists.first_work_items[number];
         triangle = call.lists.split[number];
         const located_triangle<Call> t(call, triangle);
         const core::voxel_box whole = core::bounds(t.a, t.b, t.c, fraction);
@@ -179,31 +179,30 @@ struct alignas(16) split_setup {
         unsigned kept = 0;
         for (std::uint32_t first = warp; first < num; first += 32 * warps) {
             const std::uint32_t mine = first + lane * warps;
-            unsigned record = 0, records = 0;
+            unsigned item = 0, items = 0;
             if (mine < num) {
                 split_setup& setup = kept_of(call.lists)[mine];
                 setup.find(call, mine);
-                record = static_cast<unsigned>(setup.first_record);
-                records = static_cast<unsigned>(setup.pieces.records());
+                item = static_cast<unsigned>(setup.first_work_item);
+                items = static_cast<unsigned>(setup.pieces.work_items());
             }
             const unsigned lanes = __ballot_sync(0xffffffffu, mine < num);
             kept += static_cast<unsigned>(__popc(lanes));
             for (unsigned left = lanes; left != 0; left &= left - 1) {
                 const int of = __ffs(static_cast<int>(left)) - 1;
-                const unsigned begin = __shfl_sync(0xffffffffu, record, of),
-                               count = __shfl_sync(0xffffffffu, records, of);
+                const unsigned begin = __shfl_sync(0xffffffffu, item, of), count = __shfl_sync(0xffffffffu, items, of);
                 for (unsigned i = lane; i < count; i += 32)
                     call.lists.oversized[begin + i] = first + static_cast<unsigned>(of) * warps;
             }
         }
         __threadfence();
         __syncwarp();
-        if (lane == 0 && kept != 0) atomicAdd(call.lists.set_up, static_cast<unsigned long long>(kept));
+        if (lane == 0 && kept != 0) atomicAdd(call.lists.setups_ready, static_cast<unsigned long long>(kept));
     }
     // True if all `num` setups are ready. Polls for a short time only: there may be blocks that have not begun. All
     // lanes call it.
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool are_kept(const deferred_triangles& lists, std::uint32_t num) {
-        ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device> kept(*lists.set_up);
+        ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device> kept(*lists.setups_ready);
         bool all = false;
         for (int look = 0; look < 256 && !all; ++look) {
             if (threadIdx.x % 32 == 0) all = kept.load(::cuda::memory_order_relaxed) == num;
@@ -275,8 +274,8 @@ struct span_writer {
     const unsigned lane = threadIdx.x % 32;
     unsigned first = 0;
     while (n > 1) {
-        const unsigned step = (n + 31) / 32, place = step * lane;
-        const bool below = place < n && numbers[first + place] <= number;
+        const unsigned step = (n + 31) / 32, probe = step * lane;
+        const bool below = probe < n && numbers[first + probe] <= number;
         const unsigned skipped = (static_cast<unsigned>(__popc(__ballot_sync(0xffffffffu, below))) - 1) * step;
         first += skipped;
         n = n - skipped < step ? n - skipped : step;
@@ -299,22 +298,22 @@ struct brick_memory {
 // at a time: if there are few work items, more warps with less work finish sooner. A thin piece is one lane's, so it is
 // not divided.
 template <coverage Rule>
-[[nodiscard]] VOXELPIPE_HD inline unsigned parts_of_record(unsigned long long records, unsigned warps) {
+[[nodiscard]] VOXELPIPE_HD inline unsigned parts_of_work_item(unsigned long long items, unsigned warps) {
     unsigned parts = 1;
     if (Rule == coverage::conservative)
-        while (parts < split_pieces<Rule>::per_record && records * parts * 2 <= warps) parts *= 2;
+        while (parts < split_pieces<Rule>::per_work_item && items * parts * 2 <= warps) parts *= 2;
     return parts;
 }
 
 // A lane's piece of a split thin triangle: a row of columns, and the position of its voxels (see thin_columns).
-template <class Place>
+template <class Position>
 struct thin_piece {
     core::brick_row row;
     core::row_axes axes;
     int u, v;            // of the row's first column
     std::int32_t w;      // depths count from here
     std::int32_t lo, hi; // depths of the grid that the triangle can have
-    Place origin, by_u, by_w;
+    Position origin, by_u, by_w;
 
     // Has no columns if not `wanted`.
     template <class Sink>
@@ -333,13 +332,13 @@ struct thin_piece {
         w = first[2] + row.base;
         lo = low(2) - w;
         hi = high(2) - w;
-        const auto place = [&](int along_u, int along_v, int along_w) {
+        const auto position = [&](int along_u, int along_v, int along_w) {
             const auto p = axes.from_rows(along_u, along_v, along_w);
-            return sink.place(p[0], p[1], p[2]);
+            return sink.position(p[0], p[1], p[2]);
         };
-        origin = place(u, v, w);
-        by_u = place(1, 0, 0);
-        by_w = place(0, 0, 1);
+        origin = position(u, v, w);
+        by_u = position(1, 0, 0);
+        by_w = position(0, 0, 1);
     }
 
     // Passes the fragments to a sink that distributes them over all lanes, 32 columns at a time from any lanes' rows.
@@ -362,9 +361,9 @@ struct thin_piece {
         });
         return true;
     }
-    // Emits runs of columns with equal depth. ByPlace: runs that do not lie along x are emitted by position; otherwise
-    // all are rows, which are marked too.
-    template <bool ByPlace, class Sink>
+    // Emits runs of columns with equal depth. ByPosition: runs that do not lie along x are emitted by position;
+    // otherwise all are rows, which are marked too.
+    template <bool ByPosition, class Sink>
     __device__ VOXELPIPE_INLINE void emit(const split_setup<coverage::thin>& t, Sink& sink) const {
         if (row.columns == 0) return;
         const int last = row.last_column();
@@ -378,7 +377,7 @@ struct thin_piece {
                 sink.row(p[0], p[1], p[2], (2u << to) - (1u << from));
                 continue;
             }
-            if constexpr (ByPlace) {
+            if constexpr (ByPosition) {
                 sink.emit_line(origin + by_u * from + by_w * depth, by_u, static_cast<unsigned>(to - from + 1));
             } else {
                 for (int column = from; column <= to; ++column) {
@@ -393,16 +392,16 @@ struct thin_piece {
 
 // The numbers of work items and of split triangles.
 struct split_work_items {
-    unsigned long long records, triangles;
+    unsigned long long work_items, triangles;
 
     __device__ VOXELPIPE_INLINE explicit split_work_items(const deferred_triangles& lists) {
         const unsigned long long packed = uniform(*lists.next);
-        records = packed & ((1ull << deferred_triangles::work_item_bits) - 1);
+        work_items = packed & ((1ull << deferred_triangles::work_item_bits) - 1);
         triangles = packed >> deferred_triangles::work_item_bits;
     }
     // True if all triangles are set up before their work items are drawn: if each warp has several.
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool want_setups(const deferred_triangles& lists, unsigned warps) const {
-        return triangles <= lists.num_setups && records >= 3 * warps && records <= lists.oversized_capacity;
+        return triangles <= lists.num_setups && work_items >= 3 * warps && work_items <= lists.oversized_capacity;
     }
 };
 
@@ -414,28 +413,27 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
                                                    unsigned warp, unsigned warps) {
     constexpr bool thin = Call::rule == coverage::thin;
     constexpr auto rule = core::to_rule(Call::rule);
-    constexpr int per_record = split_pieces<Call::rule>::per_record;
+    constexpr int per_work_item = split_pieces<Call::rule>::per_work_item;
     using sink_type = Sink;
     const unsigned lane = threadIdx.x % 32;
     const split_work_items all(call.lists);
-    const unsigned long long records = all.records;
-    const unsigned parts = parts_of_record<Call::rule>(records, warps);
+    const unsigned long long items = all.work_items;
+    const unsigned parts = parts_of_work_item<Call::rule>(items, warps);
     using setup_type = split_setup<Call::rule>;
     // A kept setup is fetched while the previous work item is drawn, and its number while the one before that is; into
     // registers, they would have to be waited for.
     const bool are_kept = all.want_setups(call.lists, warps) &&
                           setup_type::are_kept(call.lists, static_cast<std::uint32_t>(all.triangles));
-    const auto fetch_number = [&](unsigned long long record) VOXELPIPE_INLINE_LAMBDA {
-        if (lane == 0 && record < records)
-            copy_word(static_cast<std::uint32_t>(__cvta_generic_to_shared(&memory.next)),
-                      call.lists.oversized + record);
+    const auto fetch_number = [&](unsigned long long item) VOXELPIPE_INLINE_LAMBDA {
+        if (lane == 0 && item < items)
+            copy_word(static_cast<std::uint32_t>(__cvta_generic_to_shared(&memory.next)), call.lists.oversized + item);
     };
     if (are_kept) {
         memory.setups[0].fetch(call.lists, call.lists.oversized[warp]);
         fetch_number(std::uint64_t{warp} + warps);
     }
     unsigned which = 0;
-    for (unsigned long long i = uniform(warp); i < records * parts; i += warps, which ^= are_kept ? 1u : 0u) {
+    for (unsigned long long i = uniform(warp); i < items * parts; i += warps, which ^= are_kept ? 1u : 0u) {
         const unsigned long long r = i / parts;
         __syncwarp(); // lanes that diverged in the last pieces meet; nobody reads the last setup any longer
         // Work items with kept setups have one part.
@@ -444,7 +442,7 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
             __syncwarp();
             const std::uint32_t next = memory.next;
             __syncwarp();
-            if (r + warps < records) memory.setups[which ^ 1].fetch(call.lists, next);
+            if (r + warps < items) memory.setups[which ^ 1].fetch(call.lists, next);
             fetch_number(r + 2ull * warps);
         } else {
             const unsigned number = find_last(call.lists.first_work_items, static_cast<unsigned>(all.triangles), r);
@@ -453,10 +451,11 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
         }
         const setup_type& setup = memory.setups[which];
         const split_pieces<Call::rule>& pieces = setup.pieces;
-        const unsigned of_record = lane % per_record, of_piece = lane / per_record;
-        const auto piece = static_cast<std::int64_t>((r - setup.first_record) * per_record + of_record);
+        const unsigned of_item = lane % per_work_item, of_piece = lane / per_work_item;
+        const auto piece = static_cast<std::int64_t>((r - setup.first_work_item) * per_work_item + of_item);
         sink.begin(setup.triangle);
-        const bool valid = piece < pieces.count() && of_record * parts / per_record == static_cast<unsigned>(i % parts);
+        const bool valid =
+            piece < pieces.count() && of_item * parts / per_work_item == static_cast<unsigned>(i % parts);
         if (setup.is_narrow == 0) {
             const glm::uvec3 index = call.in.source.triangle(setup.triangle);
             const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
@@ -473,7 +472,7 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
             continue;
         }
         if constexpr (thin) {
-            const thin_piece<place_of_sink<Sink>> found(setup, piece, valid, sink);
+            const thin_piece<position_of_sink<Sink>> found(setup, piece, valid, sink);
             if constexpr (Sink::takes_warp_rounds)
                 if (found.emit_by_group(setup, sink)) continue;
             emit_with_retry(
@@ -531,9 +530,9 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
                                   brick[2] * core::brick_size - static_cast<int>(box.lo[2]));
                 }
                 w += pieces.lanes_each;
-                const int place = take_place(hit, waiting);
+                const int slot = take_slot(hit, waiting);
                 if (hit)
-                    for (int k = 0; k < 3; ++k) memory.bricks[k][place] = static_cast<std::int16_t>(brick[k]);
+                    for (int k = 0; k < 3; ++k) memory.bricks[k][slot] = static_cast<std::int16_t>(brick[k]);
                 if (waiting > max_bricks - 32) {
                     raster_bricks(waiting);
                     waiting = 0;

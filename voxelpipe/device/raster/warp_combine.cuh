@@ -18,20 +18,20 @@ namespace voxelpipe::device {
 
 // Shared memory of one warp: slots by a hash of the word's number. A word whose slot is taken by another goes to memory
 // at once.
-struct word_places {
+struct word_slots {
     static constexpr int log2_count = 8, count = 1 << log2_count;
     static constexpr std::uint32_t none = ~0u; // no target that is blended by 32-bit numbers has that word
-    uint2 places[count];                       // number of a word, its bits
+    uint2 slots[count];                        // number of a word, its bits
 
     // All lanes call it.
     __device__ VOXELPIPE_INLINE void start() {
-        for (int i = static_cast<int>(threadIdx.x) % 32; i < count; i += 32) places[i] = uint2{none, 0};
+        for (int i = static_cast<int>(threadIdx.x) % 32; i < count; i += 32) slots[i] = uint2{none, 0};
         __syncwarp();
     }
     // Any lanes call it. In assembly, so that the compiler does not provide for addresses outside shared memory.
     __device__ VOXELPIPE_INLINE void set(word* words, std::uint32_t number, word bits) {
-        const std::uint32_t place = number * 0x9e3779b1u >> (32 - log2_count);
-        const auto at = static_cast<std::uint32_t>(__cvta_generic_to_shared(places + place));
+        const std::uint32_t slot = number * 0x9e3779b1u >> (32 - log2_count);
+        const auto at = static_cast<std::uint32_t>(__cvta_generic_to_shared(slots + slot));
         std::uint32_t seen = 0;
         asm volatile("atom.relaxed.cta.shared.cas.b32 %0, [%1], %2, %3;"
                      : "=r"(seen)
@@ -45,10 +45,10 @@ struct word_places {
     __device__ VOXELPIPE_INLINE void flush(word* words) {
         __syncwarp();
         for (int i = static_cast<int>(threadIdx.x) % 32; i < count; i += 32) {
-            const uint2 place = places[i];
-            if (place.x == none) continue;
-            reduce_or(words + place.x, place.y);
-            places[i] = uint2{none, 0};
+            const uint2 slot = slots[i];
+            if (slot.x == none) continue;
+            reduce_or(words + slot.x, slot.y);
+            slots[i] = uint2{none, 0};
         }
         __syncwarp();
     }
@@ -60,19 +60,19 @@ struct no_words {};
 template <class Call>
 inline constexpr bool combines_words = Call::output::only_sets && (Call::rule == coverage::thin);
 template <class Call>
-using warp_words = std::conditional_t<combines_words<Call>, word_places, no_words>;
+using warp_words = std::conditional_t<combines_words<Call>, word_slots, no_words>;
 
 // Replaces the sink that it is made from, for single fragments.
 template <class Call>
 struct combining_sink : Call::sink {
-    word_places& words;
+    word_slots& words;
 
-    __device__ VOXELPIPE_INLINE combining_sink(const typename Call::sink& sink, word_places& words_)
+    __device__ VOXELPIPE_INLINE combining_sink(const typename Call::sink& sink, word_slots& words_)
         : Call::sink(sink), words(words_) {
         this->mine = {};
         words.start();
     }
-    __device__ VOXELPIPE_INLINE void emit(const word_place& at, bool wanted) {
+    __device__ VOXELPIPE_INLINE void emit(const word_position& at, bool wanted) {
         if (!wanted) return;
         ++this->mine.fragments;
         words.set(voxelpipe::get<0>(this->call.out.fb.targets).elements, at.number(), at.bit());

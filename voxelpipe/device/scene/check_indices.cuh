@@ -16,7 +16,7 @@ VOXELPIPE_DECLARES_KERNELS void check_indices(const glm::uvec3* triangles, std::
                                               std::uint64_t num_vertices, pipeline_state* state, cudaStream_t stream);
 
 // The largest index of some triangles, possibly none. *max must be 0 before.
-VOXELPIPE_DECLARES_KERNELS void find_most_index(const array_view<const glm::uvec3>& triangles, std::uint32_t* most,
-                                                cudaStream_t stream);
+VOXELPIPE_DECLARES_KERNELS void find_max_index(const array_view<const glm::uvec3>& triangles, std::uint32_t* max_index,
+                                               cudaStream_t stream);
 
 } // namespace voxelpipe::device

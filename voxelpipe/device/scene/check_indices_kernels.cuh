@@ -31,14 +31,14 @@ __global__ void check_indices_kernel(const Index* indices, std::uint64_t count, 
 
 // *max must be 0 before.
 template <class Index>
-__global__ void max_index_kernel(const Index* indices, std::uint64_t count, Index* most) {
+__global__ void max_index_kernel(const Index* indices, std::uint64_t count, Index* max_index) {
     await_stream();
     const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
     Index mine = 0;
     for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < count; i += threads)
         mine = indices[i] > mine ? indices[i] : mine;
     mine = __reduce_max_sync(0xffffffffu, mine);
-    if (threadIdx.x % 32 == 0) atomicMax(most, mine);
+    if (threadIdx.x % 32 == 0) atomicMax(max_index, mine);
 }
 
 VOXELPIPE_DEFINES_KERNELS void check_indices(const glm::uvec3* triangles, std::uint64_t num_triangles,
@@ -48,12 +48,12 @@ VOXELPIPE_DEFINES_KERNELS void check_indices(const glm::uvec3* triangles, std::u
                   static_cast<std::uint32_t>(num_vertices), state);
 }
 
-VOXELPIPE_DEFINES_KERNELS void find_most_index(const array_view<const glm::uvec3>& triangles, std::uint32_t* most,
-                                               cudaStream_t stream) {
+VOXELPIPE_DEFINES_KERNELS void find_max_index(const array_view<const glm::uvec3>& triangles, std::uint32_t* max_index,
+                                              cudaStream_t stream) {
     if (triangles.size() == 0) return;
     launch_behind(max_index_kernel<std::uint32_t>, fill_device(triangles.size()), threads_per_block, stream,
                   stage::validate, reinterpret_cast<const std::uint32_t*>(triangles.data()),
-                  std::uint64_t{3} * triangles.size(), most);
+                  std::uint64_t{3} * triangles.size(), max_index);
 }
 
 } // namespace voxelpipe::device

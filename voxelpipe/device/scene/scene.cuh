@@ -125,10 +125,10 @@ struct scene {
 };
 
 // A voxel of the computed part, from its linear number: x fastest, then y, then z.
-struct voxel_place {
+struct voxel_position {
     int x, y, z;
 };
-[[nodiscard]] VOXELPIPE_HD inline voxel_place place_of(std::uint32_t voxel, const glm::ivec3& extent) {
+[[nodiscard]] VOXELPIPE_HD inline voxel_position position_of(std::uint32_t voxel, const glm::ivec3& extent) {
     const auto nx = static_cast<std::uint32_t>(extent.x), ny = static_cast<std::uint32_t>(extent.y);
     const std::uint32_t row = voxel / nx, z = row / ny;
     return {static_cast<int>(voxel - row * nx), static_cast<int>(row - z * ny), static_cast<int>(z)};

@@ -110,7 +110,9 @@ struct int32_triangle {
             last[k] = hi[k] - lo[k];
         }
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE int most() const { return core::max3(last[0], last[1], last[2]) + 1; }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE int longest_side() const {
+        return core::max3(last[0], last[1], last[2]) + 1;
+    }
     // Negative if some of the box lies outside the grid. An int instead of a bool, which would take two more
     // instructions at each use.
     [[nodiscard]] __device__ VOXELPIPE_INLINE int inside(const glm::ivec3& extent) const {

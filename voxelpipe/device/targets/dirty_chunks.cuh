@@ -59,18 +59,18 @@ struct chunk_marks {
 // -------------------------------------------------------------------------------------------
 
 // Up to chunk_yz elements in consecutive rows along y.
-template <class Place>
-struct column_of_places {
-    Place* first;
+template <class Unit>
+struct unit_column {
+    Unit* first;
     std::size_t step; // distance from one row to the next, in elements
     int rows;
 };
 
 // Calls f for the marked chunks of a target in rows along x. Each lane gets columns of 16 bytes or of one element, next
 // to those of its neighbours.
-template <class Place, class Element, class F>
+template <class Unit, class Element, class F>
 __device__ VOXELPIPE_INLINE void for_each_marked(Element* elements, const chunk_marks& marks, F&& f) {
-    constexpr int per_place = static_cast<int>(sizeof(Place) / sizeof(Element));
+    constexpr int per_unit = static_cast<int>(sizeof(Unit) / sizeof(Element));
     const int lane = static_cast<int>(threadIdx.x) % 32;
     const unsigned warps = gridDim.x * (blockDim.x / 32);
     const std::size_t slices = static_cast<std::size_t>(marks.rows.y) * static_cast<unsigned>(marks.extent.z);
@@ -82,15 +82,15 @@ __device__ VOXELPIPE_INLINE void for_each_marked(Element* elements, const chunk_
         for (int w = 0; w < marks.rows.words; ++w) {
             const word marked = row[w];
             if (marked == 0) continue;
-            for (int x0 = 0; x0 < 32 * chunk_x; x0 += 32 * per_place) {
-                const int inside = x0 + lane * per_place, x = w * 32 * chunk_x + inside;
+            for (int x0 = 0; x0 < 32 * chunk_x; x0 += 32 * per_unit) {
+                const int inside = x0 + lane * per_unit, x = w * 32 * chunk_x + inside;
                 if ((marked >> (inside >> log2_chunk_x) & 1u) == 0 || x >= marks.extent.x) continue;
                 const std::size_t first =
                     (static_cast<std::size_t>(z) * static_cast<unsigned>(marks.extent.y) + static_cast<unsigned>(y)) *
                         static_cast<unsigned>(marks.extent.x) +
                     static_cast<unsigned>(x);
-                f(column_of_places<Place>{reinterpret_cast<Place*>(elements + first),
-                                          static_cast<std::size_t>(marks.extent.x / per_place), rows});
+                f(unit_column<Unit>{reinterpret_cast<Unit*>(elements + first),
+                                    static_cast<std::size_t>(marks.extent.x / per_unit), rows});
             }
         }
     }

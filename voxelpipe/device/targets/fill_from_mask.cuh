@@ -201,17 +201,17 @@ __global__ __launch_bounds__(threads_per_block) void fill_chunks_kernel(
         if (keeps_marks && threadIdx.x == 0) marks.words[i] = fresh;
         if (z < nz)
             with_chunk_filler(
-                to, marks, [&]<class Place>(const chunk_filler<Element, Place>& filler) VOXELPIPE_INLINE_LAMBDA {
+                to, marks, [&]<class Unit>(const chunk_filler<Element, Unit>& filler) VOXELPIPE_INLINE_LAMBDA {
                     filler.fill(w * 32 * chunk_x, y0, z, marked, [&](int x, int row) VOXELPIPE_INLINE_LAMBDA {
-                        constexpr int count = sizeof(Place) / sizeof(Element);
-                        const word of_place = bits[warp][row][x / 32 % 32] >> x % 32;
+                        constexpr int count = sizeof(Unit) / sizeof(Element);
+                        const word of_unit = bits[warp][row][x / 32 % 32] >> x % 32;
                         number lanes[count * numbers];
                         for (int k = 0; k < count * numbers; ++k)
                             lanes[k] = static_cast<number>(
-                                cleared[k % numbers] ^ (changed[k % numbers] & (0u - (of_place >> k / numbers & 1u))));
-                        Place place;
-                        memcpy(&place, lanes, sizeof(place));
-                        return place;
+                                cleared[k % numbers] ^ (changed[k % numbers] & (0u - (of_unit >> k / numbers & 1u))));
+                        Unit unit;
+                        memcpy(&unit, lanes, sizeof(unit));
+                        return unit;
                     });
                 });
         __syncthreads(); // before shared memory is written again

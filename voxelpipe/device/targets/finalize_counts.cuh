@@ -107,13 +107,14 @@ __global__ __launch_bounds__(threads_per_block) void finalize_counts_kernel(
     known[threadIdx.x] = core::bit_cast<number>(fold(threadIdx.x));
     __syncthreads();
     count_values<Fold, T> values{fold, known};
-    // Ends place(i) for i in [0, count).
-    const auto end_all = [&](std::uint64_t count, const auto& place) {
+    // Ends address(i) for i in [0, count).
+    const auto end_all = [&](std::uint64_t count, const auto& address) {
         for (std::uint64_t first = 0; first < count; first += batch) {
             uint4 loaded[batch];
-            for (unsigned b = 0; b < batch; ++b) loaded[b] = first + b < count ? *place(first + b) : uint4{0, 0, 0, 0};
             for (unsigned b = 0; b < batch; ++b)
-                if (first + b < count) values.end(place(first + b), loaded[b]);
+                loaded[b] = first + b < count ? *address(first + b) : uint4{0, 0, 0, 0};
+            for (unsigned b = 0; b < batch; ++b)
+                if (first + b < count) values.end(address(first + b), loaded[b]);
         }
     };
     if (marks.words == nullptr) {
@@ -130,11 +131,11 @@ __global__ __launch_bounds__(threads_per_block) void finalize_counts_kernel(
         }
         for (std::uint64_t i = done + thread; i < num_elements; i += threads) at[i] = values.of(at[i]);
     } else if (has_wide_rows(at, marks)) {
-        for_each_marked<uint4>(at, marks, [&](const column_of_places<uint4>& c) {
+        for_each_marked<uint4>(at, marks, [&](const unit_column<uint4>& c) {
             end_all(static_cast<unsigned>(c.rows), [&](std::uint64_t i) { return c.first + c.step * i; });
         });
     } else {
-        for_each_marked<number>(at, marks, [&](const column_of_places<number>& c) {
+        for_each_marked<number>(at, marks, [&](const unit_column<number>& c) {
             for (int i = 0; i < c.rows; ++i) {
                 number& n = c.first[c.step * static_cast<unsigned>(i)];
                 if (n != 0) n = values.of(n);

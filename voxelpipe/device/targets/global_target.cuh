@@ -139,23 +139,25 @@ template <class Target>
     return reinterpret_cast<word*>(reinterpret_cast<char*>(t.elements) + 4u * number);
 }
 // Position of a voxel in such rows, as a linear quantity: the number of its row's first word, and x; both modulo 2^32.
-struct word_place {
+struct word_position {
     std::uint32_t row, x;
-    [[nodiscard]] __device__ VOXELPIPE_INLINE word_place operator+(const word_place& other) const {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE word_position operator+(const word_position& other) const {
         return {row + other.row, x + other.x};
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE word_place operator*(int n) const {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE word_position operator*(int n) const {
         return {row * static_cast<std::uint32_t>(n), x * static_cast<std::uint32_t>(n)};
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t number() const { return row + (x >> 5); }
     [[nodiscard]] __device__ VOXELPIPE_INLINE word bit() const { return 1u << (x & 31); }
 };
 template <class Target>
-[[nodiscard]] __device__ VOXELPIPE_INLINE word_place place_of_word(const target_view<Target>& t, const glm::ivec3& p) {
+[[nodiscard]] __device__ VOXELPIPE_INLINE word_position word_position_of(const target_view<Target>& t,
+                                                                         const glm::ivec3& p) {
     return {word_of(t, 0, p.y, p.z), static_cast<std::uint32_t>(p.x)};
 }
 template <class Target>
-[[nodiscard]] __device__ VOXELPIPE_INLINE word_place place_of_word(const target_view<Target>&, const word_place& p) {
+[[nodiscard]] __device__ VOXELPIPE_INLINE word_position word_position_of(const target_view<Target>&,
+                                                                         const word_position& p) {
     return p;
 }
 
@@ -373,7 +375,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_shared(const target_view<Target>& t, 
 }
 
 // Blends up to four voxels, position(i) for the bits i of `wanted`; their loads are in flight together. If the mode is
-// to blend rows of bits, positions may be word_places.
+// to blend rows of bits, positions may be word_positions.
 template <class Target, class Value, class Position>
 __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, word wanted, const Position& position,
                                                   const Value& value, immediate_mode mode) {
@@ -384,7 +386,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, 
             word* at[4];
             word missing[4];
             for (int k = 0; k < 4; ++k) {
-                const word_place p = place_of_word(t, position(k));
+                const word_position p = word_position_of(t, position(k));
                 at[k] = t.elements + p.number();
                 missing[k] = (wanted >> k & 1u) != 0 ? p.bit() : 0;
             }
@@ -398,7 +400,7 @@ __device__ VOXELPIPE_INLINE unsigned blend_voxels(const target_view<Target>& t, 
         }
     }
     unsigned touched = 0;
-    if constexpr (!std::is_same_v<decltype(position(0)), word_place>) {
+    if constexpr (!std::is_same_v<decltype(position(0)), word_position>) {
 #pragma unroll 1
         for (; wanted != 0; wanted &= wanted - 1) {
             const glm::ivec3 p = position(__ffs(static_cast<int>(wanted)) - 1);

@@ -138,7 +138,7 @@ __device__ void store_bit(const target_view<Target>& t, int x, int y, int z, boo
 
 // Stores a touched voxel of an atomic target.
 template <class Target, class Cell>
-__device__ void store_cell(const target_view<Target>& view, const voxel_place& at, const Cell& cell) {
+__device__ void store_cell(const target_view<Target>& view, const voxel_position& at, const Cell& cell) {
     if (view.load == load_operation::off) return;
     const auto stored = view.load == load_operation::clear ? view.clear_value : view(at.x, at.y, at.z);
     view.store(at.x, at.y, at.z,
@@ -147,7 +147,7 @@ __device__ void store_cell(const target_view<Target>& view, const voxel_place& a
 
 // Stores a touched voxel of a target whose last fragment wins: that fragment's value.
 template <class Target, class Value>
-__device__ void store_winner(const target_view<Target>& view, const voxel_place& at, const Value& value) {
+__device__ void store_winner(const target_view<Target>& view, const voxel_position& at, const Value& value) {
     if (view.load == load_operation::off) return;
     if constexpr (Target::map::is_bit)
         store_bit(view, at.x, at.y, at.z, value);

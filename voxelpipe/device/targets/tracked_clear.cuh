@@ -19,7 +19,7 @@ namespace voxelpipe::device {
 template <class Target>
 [[nodiscard]] bool can_be_known(const target_view<Target>& t) {
     using map = typename Target::map;
-    if constexpr (map::is_bit || map::bricks || sizeof(typename Target::value_type) > core::change_log::most_bytes)
+    if constexpr (map::is_bit || map::bricks || sizeof(typename Target::value_type) > core::change_log::max_bytes)
         return false;
     else
         return map::elements(t.extent) * sizeof(typename Target::element_type) >= marked_bytes;
@@ -61,7 +61,7 @@ struct change_tracking<framebuffer_view<Targets...>> {
             if (t.load != load_operation::clear || !can_be_known(t)) return;
             changes_known = true;
             if (!may_end(t, K)) return;
-            if constexpr (sizeof(t.clear_value) <= core::change_log::most_bytes) {
+            if constexpr (sizeof(t.clear_value) <= core::change_log::max_bytes) {
                 by_chunks[K] = true;
                 last_by_chunks = static_cast<int>(K);
                 after[K] = known(t.clear_value);
@@ -84,36 +84,36 @@ struct change_tracking<framebuffer_view<Targets...>> {
                       lane >= known_words || known[lane % known_words] == wanted.words[lane % known_words]);
 }
 
-// Writes chunks of a target in rows along x. `Place`: one element, or as many as fill 16 bytes.
-template <class Element, class Place>
+// Writes chunks of a target in rows along x. `Unit`: one element, or as many as fill 16 bytes.
+template <class Element, class Unit>
 struct chunk_filler {
-    static constexpr int per_place = static_cast<int>(sizeof(Place) / sizeof(Element));
-    static constexpr int lanes_of_row = chunk_x / per_place, rows_at_once = 32 / lanes_of_row; // of a chunk
-    static_assert(per_place <= chunk_x && 32 % lanes_of_row == 0);
+    static constexpr int per_unit = static_cast<int>(sizeof(Unit) / sizeof(Element));
+    static constexpr int lanes_of_row = chunk_x / per_unit, rows_at_once = 32 / lanes_of_row; // of a chunk
+    static_assert(per_unit <= chunk_x && 32 % lanes_of_row == 0);
 
-    Place* to;
+    Unit* to;
     glm::ivec3 extent;
 
     // Writes the part at this z of the chunks that are marked in one word; a warp calls it, and each lane writes one
-    // Place at a time. (x0, y0): the lowest voxel of the word's first chunk. place_at(x, row): the elements from x on
+    // Unit at a time. (x0, y0): the lowest voxel of the word's first chunk. unit_at(x, row): the elements from x on
     // in row y0 + row.
-    template <class PlaceAt>
-    __device__ VOXELPIPE_INLINE void fill(int x0, int y0, int z, word marked, PlaceAt&& place_at) const {
+    template <class UnitAt>
+    __device__ VOXELPIPE_INLINE void fill(int x0, int y0, int z, word marked, UnitAt&& unit_at) const {
         const int lane = static_cast<int>(threadIdx.x) % 32, rows = min(chunk_yz, extent.y - y0);
         const std::size_t first_row =
             static_cast<std::size_t>(z) * static_cast<unsigned>(extent.y) + static_cast<unsigned>(y0);
         const auto store = [&](int x, int row) VOXELPIPE_INLINE_LAMBDA {
             to[((first_row + static_cast<unsigned>(row)) * static_cast<unsigned>(extent.x) + static_cast<unsigned>(x)) /
-               per_place] = place_at(x, row);
+               per_unit] = unit_at(x, row);
         };
         if (marked == ~0u) { // in the order of memory
             const int end = min(x0 + 32 * chunk_x, extent.x);
             for (int row = 0; row < rows; ++row)
-                for (int x = x0 + lane * per_place; x < end; x += 32 * per_place) store(x, row);
+                for (int x = x0 + lane * per_unit; x < end; x += 32 * per_unit) store(x, row);
             return;
         }
         for (; marked != 0; marked &= marked - 1) {
-            const int x = x0 + (__ffs(static_cast<int>(marked)) - 1) * chunk_x + lane % lanes_of_row * per_place;
+            const int x = x0 + (__ffs(static_cast<int>(marked)) - 1) * chunk_x + lane % lanes_of_row * per_unit;
             if (x >= extent.x) continue;
             for (int row = lane / lanes_of_row; row < rows; row += rows_at_once) store(x, row);
         }
@@ -141,11 +141,11 @@ __global__ __launch_bounds__(threads_per_block) void clear_chunks_kernel(
     if (has_failed(*state, limits)) return;
     const bool is_known = is_known_as(known, wanted);
     with_chunk_filler(
-        elements, marks, [&]<class Place>(const chunk_filler<Element, Place>& filler) VOXELPIPE_INLINE_LAMBDA {
-            Element lanes[sizeof(Place) / sizeof(Element)];
+        elements, marks, [&]<class Unit>(const chunk_filler<Element, Unit>& filler) VOXELPIPE_INLINE_LAMBDA {
+            Element lanes[sizeof(Unit) / sizeof(Element)];
             for (Element& e : lanes) e = pattern.value;
-            Place place;
-            memcpy(&place, lanes, sizeof(place));
+            Unit unit;
+            memcpy(&unit, lanes, sizeof(unit));
             // A warp takes one z of a row of chunks.
             const unsigned warps = gridDim.x * (blockDim.x / 32);
             const auto rows_y = static_cast<unsigned>(marks.rows.y);
@@ -155,7 +155,7 @@ __global__ __launch_bounds__(threads_per_block) void clear_chunks_kernel(
                 const word* const row = marks.row(y, z >> log2_chunk_yz);
                 for (int w = 0; w < marks.rows.words; ++w)
                     filler.fill(w * 32 * chunk_x, y * chunk_yz, z, is_known ? row[w] : ~0u,
-                                [&](int, int) VOXELPIPE_INLINE_LAMBDA { return place; });
+                                [&](int, int) VOXELPIPE_INLINE_LAMBDA { return unit; });
             }
         });
 }
@@ -247,7 +247,7 @@ __launch_bounds__(threads_per_block) void mark_voxels_kernel(const Voxel* voxels
     for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < n; i += threads) {
         const Voxel voxel = voxels[i];
         if (i != 0 && voxels[i - 1] == voxel) continue;
-        const voxel_place at = place_of(voxel, marks.extent);
+        const voxel_position at = position_of(voxel, marks.extent);
         marks.mark_row(at.x, at.x, at.y, at.z);
     }
 }

@@ -81,7 +81,7 @@ __device__ void block_prefix(int value, int* sums) {
 
 // ---- small triangles ------------------------------------------------------------------------------------------------
 
-inline constexpr int fragment_places = 4096; // capacity of the queue
+inline constexpr int queue_capacity = 4096;  // capacity of the queue
 inline constexpr int max_queue_cells = 1024; // most voxels of a bounding box within the tile whose fragments are queued
 
 // A triangle's bounding box, and its part within a tile.
@@ -96,7 +96,7 @@ struct small_part {
         : in{{geo.draw(geo.find_draw(id))}, 0, geo.snap.fraction, geo.extent} {
         const draw_geometry& d = in.source.geometry;
         t = load_int32(in, d.triangles[id - d.first_primitive]);
-        is_small = t.is_near && t.most() <= core::small_voxels(in.fraction);
+        is_small = t.is_near && t.longest_side() <= core::small_voxels(in.fraction);
         box = t.part(geo.extent);
         int cells = 1;
         for (int k = 0; k < 3; ++k) {
@@ -121,7 +121,7 @@ struct small_part {
                         z <= tile.hi[2])
                         to(x, y, z, bits);
                 }
-                [[nodiscard]] __device__ VOXELPIPE_INLINE static glm::ivec3 place(int x, int y, int z) {
+                [[nodiscard]] __device__ VOXELPIPE_INLINE static glm::ivec3 position(int x, int y, int z) {
                     return {x, y, z};
                 }
                 __device__ VOXELPIPE_INLINE void emit(const glm::ivec3& at, bool wanted) {
@@ -129,7 +129,7 @@ struct small_part {
                 }
             } within{tile, row};
             struct kept_in_thread {
-                word words[core::small_most_voxels];
+                word words[core::small_max_voxels];
                 __device__ VOXELPIPE_INLINE void set(int i, word w) { words[i] = w; }
                 [[nodiscard]] __device__ VOXELPIPE_INLINE word get(int i) const { return words[i]; }
             } kept;
@@ -157,8 +157,8 @@ struct batch_memory {
     int sums[Threads];
     std::uint32_t ids[Threads];
     unit_list lists[Threads];
-    std::uint32_t fragments[fragment_places]; // voxel of the tile, 15 bits, and the triangle's index in the batch
-    std::uint8_t in_units[Threads];           // 1: the triangle's fragments come from its units
+    std::uint32_t fragments[queue_capacity]; // voxel of the tile, 15 bits, and the triangle's index in the batch
+    std::uint8_t in_units[Threads];          // 1: the triangle's fragments come from its units
     int num_fragments;
 };
 static_assert(sizeof(batch_memory<256>) + 1024 <= tuning::batch_bytes);
@@ -172,7 +172,7 @@ __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, c
     constexpr int size = 1 << Log2Size;
     const int fraction = s.geo.snap.fraction;
     const int x0 = static_cast<int>(tile.lo[0]), y0 = static_cast<int>(tile.lo[1]), z0 = static_cast<int>(tile.lo[2]);
-    const auto place = [&](int x, int y, int z) { return ((z - z0) * size + (y - y0)) * size + (x - x0); };
+    const auto voxel_of = [&](int x, int y, int z) { return ((z - z0) * size + (y - y0)) * size + (x - x0); };
     for (std::uint32_t first = 0; first < count; first += Threads) {
         const std::uint32_t mine = first + threadIdx.x;
         if (threadIdx.x == 0) m.num_fragments = 0;
@@ -184,9 +184,9 @@ __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, c
             bool whole = part.is_small; // all of its fragments are in the queue
             if (whole)
                 part.rows(tile, [&](int x, int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
-                    const auto from = static_cast<std::uint32_t>(place(x, y, z)) | threadIdx.x << 15;
+                    const auto from = static_cast<std::uint32_t>(voxel_of(x, y, z)) | threadIdx.x << 15;
                     int at = atomicAdd(&m.num_fragments, __popc(bits));
-                    for (; bits != 0 && at < fragment_places; bits &= bits - 1)
+                    for (; bits != 0 && at < queue_capacity; bits &= bits - 1)
                         m.fragments[at++] = from + static_cast<std::uint32_t>(__ffs(static_cast<int>(bits)) - 1);
                     whole = whole && bits == 0;
                 });
@@ -200,7 +200,7 @@ __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, c
             }
         }
         block_prefix<Threads>(units, m.sums); // also makes all queued fragments visible
-        const int waiting = m.num_fragments < fragment_places ? m.num_fragments : fragment_places;
+        const int waiting = m.num_fragments < queue_capacity ? m.num_fragments : queue_capacity;
         for (int f = static_cast<int>(threadIdx.x); f < waiting; f += Threads) {
             const std::uint32_t packed = m.fragments[f];
             if (m.in_units[packed >> 15] != 0) continue;
@@ -222,8 +222,9 @@ __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, c
             const int unit = u - (lo == 0 ? 0 : m.sums[lo - 1]);
             const std::uint32_t triangle = m.ids[lo];
             const loaded_triangle t = s.geo.load(triangle);
-            shade_fragments<Rule>(s, t, triangle, m.lists[lo].unit(tile, unit),
-                                  [&](int x, int y, int z, const auto& out) { visit(place(x, y, z), triangle, out); });
+            shade_fragments<Rule>(
+                s, t, triangle, m.lists[lo].unit(tile, unit),
+                [&](int x, int y, int z, const auto& out) { visit(voxel_of(x, y, z), triangle, out); });
         }
         __syncthreads();
     }

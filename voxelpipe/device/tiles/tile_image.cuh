@@ -95,7 +95,7 @@ using bit_row =
     std::conditional_t<Size == 32, std::uint32_t, std::conditional_t<Size == 16, std::uint16_t, std::uint8_t>>;
 
 template <class Image>
-[[nodiscard]] __device__ VOXELPIPE_INLINE voxel_place place_in_tile(const core::voxel_box& box, int i) {
+[[nodiscard]] __device__ VOXELPIPE_INLINE voxel_position voxel_in_tile(const core::voxel_box& box, int i) {
     constexpr int size = Image::size;
     return {static_cast<int>(box.lo[0]) + i % size, static_cast<int>(box.lo[1]) + i / size % size,
             static_cast<int>(box.lo[2]) + i / (size * size)};
@@ -126,7 +126,7 @@ __device__ void store_bit_row(const Framebuffer& fb, const core::voxel_box& box,
 
 // Stores a touched voxel of all targets whose last fragment wins: shades that fragment. winner: its primitive + 1.
 template <class Image, class Scene, class Framebuffer>
-__device__ void store_winners(const Scene& s, const Framebuffer& fb, const voxel_place& at, word winner) {
+__device__ void store_winners(const Scene& s, const Framebuffer& fb, const voxel_position& at, word winner) {
     const auto out = shade_fragment(s, winner - 1, at.x, at.y, at.z);
     Image::for_each_target([&]<std::size_t K>() {
         if constexpr (method_of<typename Image::template target<K>>() == blend_method::winner)
@@ -155,7 +155,7 @@ __device__ std::uint32_t store_tile(const Scene& s, const Framebuffer& fb, const
     if constexpr (Image::has_atomic || Image::has_winner) {
         for (int i = first; i < Image::voxels; i += step) {
             if (((tile[Image::touched_at + (i >> 5)] >> (i & 31)) & 1u) == 0) continue;
-            const voxel_place at = place_in_tile<Image>(box, i);
+            const voxel_position at = voxel_in_tile<Image>(box, i);
             Image::for_each_target([&]<std::size_t K>() {
                 using t = typename Image::template target<K>;
                 if constexpr (method_of<t>() == blend_method::atomic) {

@@ -137,7 +137,7 @@ __global__ __launch_bounds__(threads_per_block) void tile_resolve_kernel(const _
             });
         }
         const int i = 32 * group + static_cast<int>(lane);
-        const voxel_place at = place_in_tile<Image>(box, i);
+        const voxel_position at = voxel_in_tile<Image>(box, i);
         if constexpr (Image::has_atomic) {
             Image::for_each_target([&]<std::size_t K>() {
                 using t = typename Image::template target<K>;
