@@ -14,6 +14,7 @@
 #include <voxelpipe/device/call/list_arrays.cuh>
 #include <voxelpipe/device/kernels.cuh>
 #include <voxelpipe/device/scene/check_indices.cuh>
+#include <voxelpipe/solid.hpp>
 
 #include <algorithm>
 #include <cstddef>
@@ -117,6 +118,16 @@ public:
                              abuffer<cuda_backend, Payload>& lists, const voxelize_options& options,
                              std::uint64_t triangles_in, Coverage = {});
 
+    // Implements voxelize_solid. Arguments are validated. Defined in device/solid.cuh.
+    template <class Mesh, class VertexShader, class SolidShader, class... Targets>
+    [[nodiscard]] status run_solid(std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
+                                   const framebuffer_view<Targets...>& fb, const solid_options& options,
+                                   std::uint64_t triangles_in);
+    template <class Mesh, class VertexShader, class SolidShader, class Payload>
+    [[nodiscard]] status run_solid(std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
+                                   abuffer<cuda_backend, Payload>& lists, const solid_options& options,
+                                   std::uint64_t triangles_in);
+
     // Frees the memory that is kept between calls.
     void release() { workspace_.release(); }
 
@@ -168,7 +179,8 @@ private:
         });
     }
 
-    device::call_history framebuffer_history_{{true, false, true}}, list_history_{{true, false, true}};
+    device::call_history framebuffer_history_{{true, false, true}}, list_history_{{true, false, true}},
+        solid_history_{{true, false, true}};
     device::call_workspace workspace_;
     strategy_choice choice_;
     std::vector<const void*> discarding_; // types of A-buffer calls that were shaded late and discarded fragments

@@ -38,6 +38,11 @@ struct pipeline_state {
             return rule == coverage::thin ? lengths[1] : lengths[0] + lengths[1];
         }
     } deferred; // one draw's triangles that the first pass leaves (deferred_triangles)
+    struct {
+        unsigned long long crossings;  // that are not among list_fragments
+        unsigned long long cover_ends; // listed: where runs of covered voxels begin and end
+        unsigned long long open_rows, max_winding;
+    } solid; // solid/
 
     // For capacities::longest_ordered: 0 if the windows order all voxels, 1 if a block can take the longest that they
     // leave.

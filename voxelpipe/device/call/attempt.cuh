@@ -32,6 +32,9 @@ namespace voxelpipe::device {
     s.counts.fragments = state.fragments;
     s.counts.fragments_discarded = state.discarded;
     s.counts.voxels = state.voxels;
+    s.solid.open_rows = state.solid.open_rows;
+    s.solid.crossings = state.solid.crossings;
+    s.solid.max_winding = state.solid.max_winding;
     return s;
 }
 

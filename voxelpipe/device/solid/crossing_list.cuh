@@ -1,0 +1,162 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The list that a solid is made from: where triangles cross rows along x, and, for extents that ask for it, where runs
+// of covered voxels begin and end. An entry is a key, the row and the body, and a value, the voxel and the kind. The
+// entries of a row fix its voxels in whatever order they are listed, so they are appended by atomics and sorted by key
+// alone.
+
+#include <voxelpipe/device/fragments/fragment_lists.cuh>
+#include <voxelpipe/device/fragments/radix_sort.cuh>
+#include <voxelpipe/device/scene/cub_sort.cuh>
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+// What changes at the voxel of an entry and holds from there on.
+enum class entry_kind : std::uint32_t { leave, enter, cover_begin, cover_end };
+
+// Position and kind in one word: a position is 0 .. extent, at most 2^20.
+struct entry_value {
+    std::uint32_t bits;
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static entry_value of(std::uint32_t position, entry_kind kind) {
+        return {position << 2 | static_cast<std::uint32_t>(kind)};
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE int position() const { return static_cast<int>(bits >> 2); }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_crossing() const { return (bits & 2u) == 0; }
+    // 1 where a body or a run begins, -1 where it ends.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE int step() const {
+        return is_crossing() ? ((bits & 1u) != 0 ? 1 : -1) : ((bits & 1u) != 0 ? -1 : 1);
+    }
+};
+
+// Entries are numbered with 32 bits. Keys have 32 bits where rows times bodies fit, otherwise 64; one kernel serves
+// both.
+struct crossing_list {
+    void* keys;
+    std::uint32_t* values;
+    std::uint64_t capacity;
+    std::uint32_t num_bodies; // the draws, or 1 if all are one body
+    bool are_wide;            // the keys
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint64_t key(std::uint64_t i) const {
+        return are_wide ? static_cast<const std::uint64_t*>(keys)[i] : static_cast<const std::uint32_t*>(keys)[i];
+    }
+    // Nothing beyond the capacity.
+    __device__ VOXELPIPE_INLINE void store(std::uint64_t i, std::uint64_t row, std::uint32_t body,
+                                           const entry_value& value) const {
+        if (i >= capacity) return;
+        const std::uint64_t key = row * num_bodies + body;
+        if (are_wide)
+            static_cast<std::uint64_t*>(keys)[i] = key;
+        else
+            static_cast<std::uint32_t*>(keys)[i] = static_cast<std::uint32_t>(key);
+        values[i] = value.bits;
+    }
+};
+
+// On the host, of a call that has run: crossings that were listed are counted as the others are.
+inline void count_listed_crossings(pipeline_state& state) {
+    state.solid.crossings += state.list_fragments - state.solid.cover_ends;
+}
+
+// Room for n items of each thread behind what *total counts: the number of the thread's first one. One atomic a block,
+// because atomics on one address wait for one another. All threads of the block take part.
+__device__ inline unsigned long long reserve_for_block(unsigned long long n, unsigned long long* total) {
+    __shared__ unsigned long long first_of_warp[threads_per_block / 32];
+    const unsigned lane = threadIdx.x % 32, warp = warp_in_block();
+    unsigned long long before = n; // with its own
+    for (unsigned step = 1; step < 32; step *= 2) {
+        const unsigned long long other = __shfl_up_sync(0xffffffffu, before, step);
+        if (lane >= step) before += other;
+    }
+    __syncthreads(); // the last use of first_of_warp is over
+    if (lane == 31) first_of_warp[warp] = before;
+    __syncthreads();
+    if (threadIdx.x == 0) {
+        unsigned long long sum = 0;
+        for (auto& w : first_of_warp) {
+            const unsigned long long of_warp = w;
+            w = sum;
+            sum += of_warp;
+        }
+        const unsigned long long first = sum != 0 ? atomicAdd(total, sum) : 0;
+        for (auto& w : first_of_warp) w += first;
+    }
+    __syncthreads();
+    return first_of_warp[warp] + before - n;
+}
+
+// ---- the sort -------------------------------------------------------------------------------------------------------
+
+// Memory of the list and of its sort.
+struct crossing_memory {
+    std::uint64_t capacity = 0;
+    std::uint32_t num_bodies = 1;
+    bool are_wide = false;
+    int bits = 0; // of a key
+    sort_pairs pairs;
+    sort_memory sort;
+    std::uint64_t* wide_keys[2]{};
+    std::uint32_t* wide_values[2]{};
+    void* storage = nullptr;
+    std::size_t storage_bytes = 0;
+
+    // Keys below num_keys, of which there may be 2^64.
+    [[nodiscard]] static crossing_memory take(arena& memory, std::uint64_t capacity, uint128 num_keys,
+                                              std::uint32_t num_bodies) {
+        crossing_memory m;
+        m.capacity = capacity;
+        m.num_bodies = num_bodies;
+        m.are_wide = num_keys > (uint128{1} << 32) || !are_sorted_here<std::uint32_t>(capacity);
+        if (!m.are_wide) {
+            m.bits = exact::bit_width(static_cast<std::uint64_t>(num_keys - 1));
+            m.pairs = sort_pairs::take(memory, capacity);
+            m.sort = sort_memory::take(memory, capacity, m.bits);
+            return m;
+        }
+        m.bits = std::min(exact::bit_width(num_keys), 64); // with the filler
+        for (int i = 0; i < 2; ++i) {
+            m.wide_keys[i] = memory.take<std::uint64_t>(capacity);
+            m.wide_values[i] = memory.take<std::uint32_t>(capacity);
+        }
+        m.storage_bytes = sort_bytes<std::uint64_t>(capacity, m.bits);
+        m.storage = memory.take<std::byte>(m.storage_bytes);
+        return m;
+    }
+    [[nodiscard]] crossing_list list(int at = 0) const {
+        return {are_wide ? static_cast<void*>(wide_keys[at]) : pairs.keys[at],
+                are_wide ? wide_values[at] : pairs.values[at], capacity, num_bodies, are_wide};
+    }
+};
+
+// Makes what the sort of 32-bit keys starts from: zeros for the entries that there are.
+template <class State>
+__global__ __launch_bounds__(threads_per_block) void prepare_crossings_kernel(const __grid_constant__ sort_memory sort,
+                                                                              const State* state, capacities limits) {
+    await_stream();
+    sort.zero(has_failed(*state, limits) ? 0 : state->list_fragments,
+              std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x, std::uint64_t{gridDim.x} * blockDim.x);
+}
+
+// Sorts the entries by key; where they are then. state->list_fragments says how many there are.
+template <int = 0>
+[[nodiscard]] crossing_list sort_crossings(const crossing_memory& m, pipeline_state* state, const capacities& limits,
+                                           cudaStream_t stream) {
+    if (m.are_wide) {
+        fill_end(m.wide_keys[0], m.wide_values[0], &state->list_fragments, m.capacity, state, limits, stream);
+        return m.list(sort_by_cell(m.wide_keys, m.wide_values, m.capacity, m.bits, m.storage, m.storage_bytes,
+                                   stage::tile_sort, stream));
+    }
+    launch_behind(prepare_crossings_kernel<pipeline_state>, fill_device(m.capacity / 8 + 1), threads_per_block, stream,
+                  stage::tile_sort, m.sort, static_cast<const pipeline_state*>(state), limits);
+    return m.list(sort_fragments(m.pairs, sort_count{state, limits}, m.capacity, m.sort, stream));
+}
+
+} // namespace voxelpipe::device

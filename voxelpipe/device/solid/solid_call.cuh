@@ -1,0 +1,275 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Host side of a solid's call: what memory it takes (plan_memory) and its launches on one stream without a wait
+// (launch), up to the sorted entries for any output, or through the targets of a framebuffer.
+
+#include <voxelpipe/device/base/stage_clock.cuh>
+#include <voxelpipe/device/call/graph_cache.cuh>
+#include <voxelpipe/device/scene/check_indices.cuh>
+#include <voxelpipe/device/scene/vertex_shade.cuh>
+#include <voxelpipe/device/solid/emit_crossings.cuh>
+#include <voxelpipe/device/solid/fill_rows.cuh>
+#include <voxelpipe/device/solid/parity_rows.cuh>
+#include <voxelpipe/device/solid/solid_cover.cuh>
+#include <voxelpipe/device/targets/clear_target.cuh>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <new>
+#include <span>
+#include <vector>
+
+namespace voxelpipe::device {
+
+// All but the draws and the output that the launches of a call depend on.
+struct solid_plan {
+    grid g;
+    solid_options options;
+    std::uint32_t num_primitives;
+    capacities limits;
+};
+
+// The draws of a call, and their entries.
+template <class Draw>
+struct solid_entries;
+template <class Mesh, class VertexShader, class SolidShader>
+struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
+    using draw_type = draw<Mesh, VertexShader, SolidShader>;
+    using solid_shader = SolidShader;
+
+    std::span<const draw_type> draws;
+    solid_plan plan;
+    stage_clock* clock = nullptr;
+
+    solid_entries(std::span<const draw_type> draws_, const grid& g, const solid_options& options,
+                  std::uint32_t num_primitives, const capacities& limits)
+        : draws(draws_) {
+        std::memset(static_cast<void*>(&plan), 0, sizeof(plan)); // padding is part of a graph's key
+        plan.g = g;
+        plan.options = options;
+        plan.num_primitives = num_primitives;
+        plan.limits = limits;
+    }
+
+    // Throws std::bad_alloc if the call has more entries, keys or work items than can be numbered.
+    void require_fit() const {
+        if (plan.limits.fragments > max_listed_entries || num_keys() > (uint128{1} << 64) ||
+            !row_triangles::holds(plan.num_primitives, plan.g.extent))
+            throw std::bad_alloc();
+    }
+    [[nodiscard]] bool has_cover() const { return plan.options.extent != solid_extent::centre; }
+    // A body a draw, of several.
+    [[nodiscard]] bool is_split() const { return plan.options.bodies == bodies::draw && draws.size() > 1; }
+    [[nodiscard]] row_grid rows() const { return {plan.g.extent, core::make_snap_transform(plan.g).fraction}; }
+    [[nodiscard]] sweep_rules rules() const {
+        return {rows(), plan.g.offset, plan.options.rule, plan.options.extent, plan.options.count_voxels};
+    }
+    // The mesh is read, shaded and snapped by the kernel that makes the crossings: once a corner, not once a vertex.
+    [[nodiscard]] bool shades_on_the_spot() const {
+        return is_cheap<VertexShader> && draws.size() == 1 && !has_cover();
+    }
+
+    struct memory {
+        vertex_positions positions{};
+        draw_geometry* geometries = nullptr;
+        SolidShader* shaders = nullptr; // by draw, where they differ
+        row_triangles kept{};
+        crossing_memory list;
+        cover_memory cover;
+    };
+    // is_listing: otherwise the crossings go elsewhere.
+    [[nodiscard]] memory take(arena& a, bool is_listing = true) const {
+        memory m;
+        std::size_t vertices = 0, most = 0;
+        for (const draw_type& d : draws) {
+            vertices += d.mesh.positions.size();
+            most = std::max(most, d.mesh.triangles.size());
+        }
+        if (!shades_on_the_spot()) m.positions = vertex_positions::take(a, vertices);
+        m.geometries = a.take<draw_geometry>(draws.size() > 1 ? draws.size() : 0);
+        if (is_split()) m.shaders = a.take<SolidShader>(draws.size());
+        m.kept = row_triangles::take(a, plan.num_primitives);
+        if (is_listing) m.list = crossing_memory::take(a, plan.limits.fragments, num_keys(), num_bodies());
+        if (has_cover()) m.cover = cover_memory::take(a, most, plan.g, plan.limits);
+        return m;
+    }
+    [[nodiscard]] body_shaders<SolidShader> shaders(const memory& m, cudaStream_t stream) const {
+        if (!is_split()) return {draws[0].fragment_shader, nullptr};
+        upload(
+            m.shaders, draws.size(), [&](std::size_t d) { return draws[d].fragment_shader; }, stream);
+        return {draws[0].fragment_shader, m.shaders};
+    }
+
+    // Lists all entries and sorts them; state->list_fragments says how many there are.
+    [[nodiscard]] crossing_list launch(const memory& m, pipeline_state* state, cudaStream_t stream) const {
+        const crossing_appender sink{m.list.list(), is_split()};
+        emit(m, sink, {}, state, stream);
+        const crossing_list sorted = sort_crossings(m.list, state, plan.limits, stream);
+        end_stage(clock, &stage_times::tile_sort);
+        return sorted;
+    }
+    // Gives all crossings to a sink, and the list the cover where that is wanted. zeros: memory that is to be zero
+    // before.
+    template <class Sink>
+    void emit(const memory& m, const Sink& sink, const zeroed_memory& zeros, pipeline_state* state,
+              cudaStream_t stream) const {
+        const row_triangles kept = m.kept.with(state);
+        if constexpr (is_cheap<VertexShader>) {
+            if (shades_on_the_spot()) {
+                const draw_type& d = draws[0];
+                emit_crossings(
+                    shaded_triangles<Mesh, VertexShader>{
+                        {d.mesh, d.vertex_shader, core::make_snap_transform(plan.g), 0},
+                        plan.num_primitives,
+                        static_cast<std::uint32_t>(d.mesh.positions.size())},
+                    rows(), sink, kept, zeros, state, stream);
+                end_stage(clock, &stage_times::coarse_raster);
+                return;
+            }
+        }
+        std::vector<draw_geometry> geometry_of;
+        const geometry geo = shade(m, geometry_of, stream);
+        emit_crossings(stored_triangles{geo, plan.num_primitives}, rows(), sink, kept, zeros, state, stream);
+        end_stage(clock, &stage_times::coarse_raster);
+        if constexpr (Sink::is_listing)
+            if (has_cover()) emit_cover(m, geo, geometry_of, sink.list, state, stream);
+    }
+
+private:
+    [[nodiscard]] std::uint32_t num_bodies() const { return is_split() ? static_cast<std::uint32_t>(draws.size()) : 1; }
+    [[nodiscard]] uint128 num_keys() const { return static_cast<uint128>(rows().num_rows()) * num_bodies(); }
+
+    [[nodiscard]] geometry shade(const memory& m, std::vector<draw_geometry>& geometry_of, cudaStream_t stream) const {
+        geometry geo{};
+        geo.num_draws = static_cast<std::uint32_t>(draws.size());
+        geo.num_primitives = plan.num_primitives;
+        geo.snap = core::make_snap_transform(plan.g);
+        geo.extent = plan.g.extent;
+        std::size_t vertex = 0;
+        std::uint32_t primitive = 0;
+        for (std::size_t d = 0; d < draws.size(); ++d) {
+            const Mesh& mesh = draws[d].mesh;
+            const vertex_positions positions = m.positions.from(vertex);
+            geometry_of.push_back(
+                {mesh.triangles.data(), positions, primitive, static_cast<std::uint32_t>(mesh.positions.size())});
+            vertex_shade(mesh, draws[d].vertex_shader, geo.snap, static_cast<std::uint32_t>(d), positions,
+                         static_cast<no_varyings*>(nullptr), stream); // a solid has none
+            vertex += mesh.positions.size();
+            primitive += static_cast<std::uint32_t>(mesh.triangles.size());
+        }
+        geo.one = geometry_of[0];
+        if (draws.size() > 1) {
+            upload(
+                m.geometries, draws.size(), [&](std::size_t d) { return geometry_of[d]; }, stream);
+            geo.many = m.geometries;
+        }
+        end_stage(clock, &stage_times::vertex_shade);
+        return geo;
+    }
+    void emit_cover(const memory& m, const geometry& geo, const std::vector<draw_geometry>& geometry_of,
+                    const crossing_list& list, pipeline_state* state, cudaStream_t stream) const {
+        for (std::size_t d = 0; d < draws.size(); ++d) {
+            if (d == 0 || is_split()) m.cover.clear(plan.g, stream);
+            m.cover.raster(geometry_of[d], static_cast<std::uint32_t>(draws[d].mesh.triangles.size()), geo, plan.g,
+                           state, plan.limits, stream);
+            if (d + 1 == draws.size() || is_split())
+                m.cover.list(rows(), list, is_split() ? static_cast<std::uint32_t>(d) : 0, state, stream);
+        }
+        end_stage(clock, &stage_times::fine_raster);
+    }
+};
+
+template <class Draw, class Framebuffer>
+struct solid_call;
+template <class Mesh, class VertexShader, class SolidShader, class... Targets>
+struct solid_call<draw<Mesh, VertexShader, SolidShader>, framebuffer_view<Targets...>> {
+    using draw_type = draw<Mesh, VertexShader, SolidShader>;
+    using framebuffer_type = framebuffer_view<Targets...>;
+
+    solid_entries<draw_type> entries;
+    framebuffer_type fb;
+
+    static constexpr bool has_bytes =
+        std::is_trivially_copyable_v<draw_type> && std::is_trivially_copyable_v<framebuffer_type>;
+    [[nodiscard]] call_bytes bytes(const void* workspace, const void* page) const {
+        call_bytes b = bytes_of_call<solid_call>(workspace, page);
+        b.add(entries.plan);
+        b.add(fb);
+        for (const draw_type& d : entries.draws) b.add(d);
+        return b;
+    }
+
+    using parity = parity_target<SolidShader, framebuffer_type>;
+    // Whether crossings change bits of the target where they lie. Then no capacity can be too small, and nothing fails
+    // once indices are known to be right.
+    [[nodiscard]] bool is_parity() const {
+        if constexpr (parity::is_possible)
+            return entries.plan.options.rule == fill_rule::even_odd && !entries.is_split() && !entries.has_cover() &&
+                   parity::suits(entries.draws[0].fragment_shader, fb);
+        return false;
+    }
+
+    [[nodiscard]] std::size_t plan_memory() const {
+        arena memory;
+        (void)memory.take<pipeline_state>(1);
+        if (is_parity()) (void)row_marks::take(memory, entries.rows());
+        (void)entries.take(memory, !is_parity());
+        return memory.used();
+    }
+    // Bytes at the start of the workspace that must be zero on entry. A finished call leaves them zero, but for the
+    // state.
+    [[nodiscard]] std::size_t zeroed_bytes() const {
+        arena memory;
+        (void)memory.take<pipeline_state>(1);
+        if (is_parity()) (void)row_marks::take(memory, entries.rows());
+        return memory.used();
+    }
+    void launch(arena& memory, cudaStream_t stream) const {
+        auto* const state = memory.take<pipeline_state>(1);
+        if (fb.changes != nullptr) // what the log says of the targets will not hold
+            check(cudaMemsetAsync(fb.changes, 0, core::change_log::header_words * sizeof(word), stream));
+        if constexpr (parity::is_possible) {
+            if (is_parity()) {
+                launch_parity(memory, state, stream);
+                return;
+            }
+        }
+        const auto m = entries.take(memory);
+        const auto& limits = entries.plan.limits;
+        const auto shaders = entries.shaders(m, stream);
+        const crossing_list sorted = entries.launch(m, state, stream);
+        core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
+            const auto& t = voxelpipe::get<K>(fb.targets);
+            if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
+        });
+        end_stage(entries.clock, &stage_times::clear);
+        fill_rows(sorted, entries.rules(), shaders, fb, state, limits, stream);
+        end_stage(entries.clock, &stage_times::tile_resolve);
+    }
+
+private:
+    void launch_parity(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+        const row_grid rows = entries.rows();
+        const row_marks marks = row_marks::take(memory, rows);
+        const auto m = entries.take(memory, false);
+        for (const draw_type& d : entries.draws)
+            if (!d.mesh.has_checked_indices() && d.mesh.triangles.size() != 0)
+                check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);
+        word* const bits = parity::bits(fb);
+        const auto words_x = static_cast<std::uint32_t>((rows.extent.x + 31) / 32);
+        const std::uint64_t words = rows.num_rows() * words_x;
+        zeroed_memory zeros;
+        if (words % 4 == 0 && reinterpret_cast<std::uintptr_t>(bits) % 16 == 0)
+            zeros = {reinterpret_cast<uint4*>(bits), words / 4};
+        else
+            clear_target(voxelpipe::get<0>(fb.targets), state, entries.plan.limits, stream);
+        entries.emit(m, crossing_toggler{bits, marks.marked, marks.odd_behind, words_x}, zeros, state, stream);
+        end_parities(bits, marks, rows, entries.plan.options.count_voxels, state, stream);
+        end_stage(entries.clock, &stage_times::tile_resolve);
+    }
+};
+
+} // namespace voxelpipe::device

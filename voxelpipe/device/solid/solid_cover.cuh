@@ -1,0 +1,156 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The conservative cover of a solid's body, as entries of its rows: one where a run of covered voxels begins and one
+// behind its end. The raster of the occupancy mask sets a bit for each covered voxel, and a pass over the bits lists
+// the runs, body by body in one mask. So a row with cover and no crossing is swept as any other, and the memory does
+// not grow with the number of draws.
+
+#include <voxelpipe/device/fragments/list_sink.cuh>
+#include <voxelpipe/device/raster/mask_sink.cuh>
+#include <voxelpipe/device/raster/raster.cuh>
+#include <voxelpipe/device/scene/count_and_emit.cuh>
+#include <voxelpipe/device/scene/int128_coverage.cuh>
+#include <voxelpipe/device/solid/crossing_list.cuh>
+#include <voxelpipe/device/solid/solid_source.cuh>
+
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+// Appends where runs of bits begin and end in rows, but for ends behind a row. A thread a word.
+template <class State>
+__global__ __launch_bounds__(threads_per_block) void list_cover_kernel(const word* mask,
+                                                                       const __grid_constant__ row_grid grid,
+                                                                       const __grid_constant__ crossing_list list,
+                                                                       std::uint32_t body, State* state) {
+    await_stream();
+    const auto words_x = static_cast<std::uint32_t>((grid.extent.x + 31) / 32);
+    const std::uint64_t num = grid.num_rows() * words_x, step = std::uint64_t{gridDim.x} * blockDim.x;
+    for (std::uint64_t start = std::uint64_t{blockIdx.x} * blockDim.x; start < num; start += step) {
+        const std::uint64_t i = start + threadIdx.x;
+        word begins = 0, ends = 0;
+        std::uint32_t x0 = 0;
+        if (i < num) {
+            x0 = static_cast<std::uint32_t>(i % words_x) * 32;
+            const word bits = mask[i], before = bits << 1 | (x0 != 0 ? mask[i - 1] >> 31 : 0u);
+            const auto left = static_cast<std::uint32_t>(grid.extent.x) - x0;
+            begins = bits & ~before;
+            ends = ~bits & before & (left >= 32 ? ~0u : (1u << left) - 1);
+        }
+        const auto n = static_cast<unsigned>(__popc(begins) + __popc(ends));
+        if (__syncthreads_or(static_cast<int>(n != 0)) == 0) continue;
+        unsigned long long at = reserve_for_block(n, &state->list_fragments);
+        const unsigned long long all = block_sum(n);
+        if (threadIdx.x == 0) atomicAdd(&state->solid.cover_ends, all);
+        const std::uint64_t row = i / words_x;
+        for (; begins != 0; begins &= begins - 1)
+            list.store(at++, row, body,
+                       entry_value::of(x0 + static_cast<unsigned>(__ffs(static_cast<int>(begins))) - 1,
+                                       entry_kind::cover_begin));
+        for (; ends != 0; ends &= ends - 1)
+            list.store(
+                at++, row, body,
+                entry_value::of(x0 + static_cast<unsigned>(__ffs(static_cast<int>(ends))) - 1, entry_kind::cover_end));
+    }
+}
+
+// Grids and meshes that the 32-bit raster does not serve: sets the bits of voxels, as cells of count_and_emit.
+struct cover_cells {
+    static constexpr coverage rule = coverage::conservative;
+    static constexpr std::int64_t small_columns = 256;
+    static constexpr bool counts_triangles = false;
+    word* mask;
+    glm::ivec3 extent;
+
+    [[nodiscard]] __device__ static core::voxel_box cells(const core::voxel_box& reach) { return reach; }
+    [[nodiscard]] __device__ cell_counts count(const geometry& geo, const loaded_triangle& t, std::uint32_t,
+                                               const core::voxel_box& box, bool) const {
+        const int fraction = geo.snap.fraction;
+        const auto set = [&](int axis, int u, int v, int w0, int w1) {
+            for (int w = w0; w <= w1; ++w) {
+                const auto p = core::to_xyz(axis, u, v, w);
+                atomicOr(mask + mask_target::map::cell(extent, p[0], p[1], p[2]), 1u << (p[0] & 31));
+            }
+        };
+        if (core::fits_narrow(t.a, t.b, t.c, fraction)) {
+            const auto s = core::setup_triangle<core::span_rule::conservative, std::int64_t>(t.a, t.b, t.c, fraction);
+            core::for_each_span<core::span_rule::conservative>(
+                s, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
+                    set(s.axis, static_cast<int>(u), static_cast<int>(v), static_cast<int>(w0), static_cast<int>(w1));
+                });
+        } else {
+            const int axis = core::dominant_axis(t.a, t.b, t.c, fraction);
+            for_each_wide_span<core::span_rule::conservative>(
+                t.a, t.b, t.c, fraction, box, [&](const wide_span& s) { set(axis, s.u, s.v, s.w_first, s.w_last); });
+        }
+        return {};
+    }
+};
+
+// Memory for the cover of one body after the other.
+struct cover_memory {
+    word* mask = nullptr;            // null: no cover is wanted
+    pipeline_state* state = nullptr; // of the raster, which counts triangles in its own way
+    deferred_triangles deferred{};
+    share_buffers share{}; // where the 32-bit raster does not serve
+
+    [[nodiscard]] static bool is_listed(std::uint64_t num_triangles, const grid& g) {
+        return is_listable(num_triangles, core::make_snap_transform(g).fraction, g.extent);
+    }
+    [[nodiscard]] static cover_memory take(arena& memory, std::size_t max_triangles, const grid& g,
+                                           const capacities& limits) {
+        cover_memory m;
+        m.mask = memory.take<word>(mask_target::map::elements(g.extent));
+        m.state = memory.take<pipeline_state>(1);
+        if (is_listed(max_triangles, g))
+            m.deferred = deferred_triangles::take(memory, max_triangles);
+        else
+            m.share = take_share(memory, static_cast<std::uint32_t>(max_triangles), limits.fragment_records);
+        return m;
+    }
+    void clear(const grid& g, cudaStream_t stream) const {
+        check(cudaMemsetAsync(mask, 0, mask_target::map::elements(g.extent) * sizeof(word), stream),
+              stage::fine_raster);
+    }
+    // Sets the bits of a draw's cover. of_draw: its geometry by itself. call_state: the call's, for the records that
+    // are wanted.
+    void raster(const draw_geometry& of_draw, std::uint32_t num_triangles, const geometry& all, const grid& g,
+                pipeline_state* call_state, const capacities& limits, cudaStream_t stream) const {
+        if (num_triangles == 0) return;
+        check(cudaMemsetAsync(state, 0, sizeof(*state), stream), stage::fine_raster);
+        if (is_listed(deferred.capacity, g)) {
+            const raster_call<coverage::conservative, stored_source, mask_output> call{
+                {{of_draw}, num_triangles, all.snap.fraction, g.extent},
+                {mask, g.extent, of_draw.num_vertices, state, false},
+                deferred.with(state)};
+            launch_raster(call, state, stage::fine_raster, stream);
+            return;
+        }
+        geometry one = all;
+        one.one = of_draw;
+        one.one.first_primitive = 0;
+        one.many = nullptr;
+        one.num_draws = 1;
+        one.num_primitives = num_triangles;
+        share_buffers b = share;
+        b.num_records = &call_state->fragment_records;
+        b.num_cells = &state->list_fragments;
+        check(cudaMemsetAsync(b.num_records, 0, sizeof(*b.num_records), stream), stage::fine_raster);
+        const cover_cells op{mask, g.extent};
+        share_count_small<<<num_blocks(num_triangles), threads_per_block, 0, stream>>>(one, op, b, state);
+        check(cudaGetLastError(), stage::fine_raster);
+        share_count_large<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(one, op, b, state);
+        check(cudaGetLastError(), stage::fine_raster);
+    }
+    // Appends what is set, as the cover of a body.
+    void list(const row_grid& grid, const crossing_list& to, std::uint32_t body, pipeline_state* call_state,
+              cudaStream_t stream) const {
+        const std::uint64_t words = mask_target::map::elements(grid.extent);
+        launch_behind(list_cover_kernel<pipeline_state>, fill_device(words), threads_per_block, stream,
+                      stage::fine_raster, static_cast<const word*>(mask), grid, to, body, call_state);
+    }
+};
+
+} // namespace voxelpipe::device
