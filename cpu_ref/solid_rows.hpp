@@ -161,7 +161,8 @@ private:
         }
         if (k0 != k1 && options_.extent == solid_extent::outer) range.include(k0->word, (k1 - 1)->word);
         if (range.first > range.last) return;
-        sink.add({y, z, draw, mask, range.first, range.last, scratch.spans.data()});
+        const row_of_body row{y, z, draw, mask, range.first, range.last, scratch.spans.data()}; // named for nvcc
+        sink.add(row);
         std::fill(mask + range.first, mask + range.last + 1, 0u);
     }
 

@@ -21,5 +21,6 @@
 #if defined(__CUDACC__)
 #include <voxelpipe/device/abuffer_async.cuh>
 #include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/device/solid.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>
 #endif

@@ -14,6 +14,13 @@
 #include <string>
 #include <vector>
 
+// Tells the order of fragments.
+struct solids_in_order {
+    static constexpr bool order_free = false;
+    VOXELPIPE_HD std::uint32_t identity() const { return 7; }
+    VOXELPIPE_HD std::uint32_t combine(std::uint32_t a, std::uint32_t b) const { return a * 31u + b; }
+};
+
 namespace {
 
 using namespace device_test;
@@ -86,13 +93,6 @@ mesh_data ball(glm::vec3 centre, float radius, int rings) {
 
 // ---- what is drawn --------------------------------------------------------------------------------------------------
 
-// Blends that tell the order of fragments.
-struct in_order {
-    static constexpr bool order_free = false;
-    VOXELPIPE_HD std::uint32_t identity() const { return 7; }
-    VOXELPIPE_HD std::uint32_t combine(std::uint32_t a, std::uint32_t b) const { return a * 31u + b; }
-};
-
 // All that a solid's fragment has, and a discard.
 struct everything {
     std::uint32_t id;
@@ -112,8 +112,9 @@ using everything_targets =
     vp::framebuffer<Backend, vp::target<float, vp::blend::add>, vp::target<std::int64_t, vp::blend::replace>,
                     vp::target<std::uint32_t, vp::blend::min, vp::layout::tiled>,
                     vp::target<vp::bit, vp::blend::bit_xor, vp::layout::tiled>,
-                    vp::target<glm::vec3, vp::blend::add, vp::layout::planar>, vp::target<std::uint32_t, in_order>,
-                    vp::target<std::uint16_t, vp::blend::count>, vp::target<std::int32_t, vp::blend::max>>;
+                    vp::target<glm::vec3, vp::blend::add, vp::layout::planar>,
+                    vp::target<std::uint32_t, solids_in_order>, vp::target<std::uint16_t, vp::blend::count>,
+                    vp::target<std::int32_t, vp::blend::max>>;
 template <class Backend>
 using bit_target = vp::framebuffer<Backend, vp::target<vp::bit, vp::blend::bit_or>>;
 
