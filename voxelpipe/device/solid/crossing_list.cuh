@@ -108,7 +108,8 @@ struct crossing_memory {
     void* storage = nullptr;
     std::size_t storage_bytes = 0;
 
-    // Keys below num_keys, of which there may be 2^64.
+    // Keys below num_keys, of which there may be 2^64. A template, so that programs without solids compile no sort.
+    template <int = 0>
     [[nodiscard]] static crossing_memory take(arena& memory, std::uint64_t capacity, uint128 num_keys,
                                               std::uint32_t num_bodies) {
         crossing_memory m;

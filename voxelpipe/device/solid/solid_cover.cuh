@@ -89,7 +89,8 @@ struct cover_cells {
     }
 };
 
-// Memory for the cover of one body after the other.
+// Memory for the cover of one body after the other. Members that launch are templates, so that programs without solids
+// compile none of their kernels.
 struct cover_memory {
     word* mask = nullptr;            // null: no cover is wanted
     pipeline_state* state = nullptr; // of the raster, which counts triangles in its own way
@@ -116,6 +117,7 @@ struct cover_memory {
     }
     // Sets the bits of a draw's cover. of_draw: its geometry by itself. call_state: the call's, for the records that
     // are wanted.
+    template <int = 0>
     void raster(const draw_geometry& of_draw, std::uint32_t num_triangles, const geometry& all, const grid& g,
                 pipeline_state* call_state, const capacities& limits, cudaStream_t stream) const {
         if (num_triangles == 0) return;
@@ -145,6 +147,7 @@ struct cover_memory {
         check(cudaGetLastError(), stage::fine_raster);
     }
     // Appends what is set, as the cover of a body.
+    template <int = 0>
     void list(const row_grid& grid, const crossing_list& to, std::uint32_t body, pipeline_state* call_state,
               cudaStream_t stream) const {
         const std::uint64_t words = mask_target::map::elements(grid.extent);
