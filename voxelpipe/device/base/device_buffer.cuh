@@ -6,6 +6,7 @@
 
 #include <voxelpipe/core/layout.hpp>
 #include <voxelpipe/device/base/memory.cuh>
+#include <voxelpipe/host_target.hpp>
 #include <voxelpipe/mesh.hpp>
 
 #include <cuda_runtime.h>

@@ -8,7 +8,7 @@
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/call/graph_cache.cuh>
 #include <voxelpipe/device/scene/check_indices.cuh>
-#include <voxelpipe/device/scene/vertex_shade.cuh>
+#include <voxelpipe/device/scene/scene_memory.cuh>
 #include <voxelpipe/device/solid/emit_crossings.cuh>
 #include <voxelpipe/device/solid/fill_rows.cuh>
 #include <voxelpipe/device/solid/parity_rows.cuh>
