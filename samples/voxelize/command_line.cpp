@@ -360,9 +360,9 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
     app.add_flag("--no-edges", raw.no_edges, "No lines between voxels")->group("Picture (.png)");
     app.add_flag("--no-ground", raw.no_ground, "No shadow on the ground")->group("Picture (.png)");
 
-    add_choice(
-        app, "--up", options.write.up, {{"y", up_axis::y}, {"z", up_axis::z}},
-        "Axis of the model that stands upright in .png and .vox: y or z. Default: y, as in glTF; many .stl have z")
+    add_choice(app, "--up", options.write.up, {{"y", up_axis::y}, {"z", up_axis::z}},
+               "Axis of the model that stands upright in .png, .vox and .schem: y or z. Default: y, as in glTF; many "
+               ".stl have z")
         ->option_text("AXIS")
         ->group("Files");
     app.add_flag("--merge", options.write.merge_faces,
@@ -370,7 +370,8 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->group("Files");
     app.add_flag("--points", options.write.points, "Write the centres of the voxels into .ply, not their outer sides")
         ->group("Files");
-    app.add_option("--compression", options.write.compression, "Level of .npz, .vti and .nrrd, 0 to 9. Default: 1")
+    app.add_option("--compression", options.write.compression,
+                   "Level of .npz, .vti, .nrrd and .schem, 0 to 9. Default: 1")
         ->check(CLI::Range(0, 9).description(""))
         ->option_text("N")
         ->group("Files");

@@ -134,7 +134,7 @@ TEST_F(Mesh, ObjAndXyzHoldExactCoordinates) {
 TEST_F(Mesh, FormatsWithOneVoxelSizeRefuseSeveral) {
     volume v = make_occupancy({4, 4, 4});
     v.voxel_size = {1, 1, 2};
-    for (const std::string extension : {".vox", ".binvox"}) {
+    for (const std::string extension : {".vox", ".schem", ".binvox"}) {
         try {
             write(v, folder_ / ("a" + extension));
             ADD_FAILURE() << extension << " was written";

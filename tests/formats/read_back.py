@@ -13,7 +13,7 @@ import json
 import pathlib
 import sys
 
-MODULES = ["numpy", "vtkmodules", "nrrd", "trimesh", "PIL", "pyvox", "midvoxio", "pygltflib"]
+MODULES = ["numpy", "vtkmodules", "nrrd", "trimesh", "PIL", "pyvox", "midvoxio", "pygltflib", "mcschematic"]
 
 
 def have_modules():
@@ -209,6 +209,38 @@ def check_vox(case, files):
     few = len(np.unique(want, axis=0)) <= 255
     assert distance.max() <= (0 if few else 100), f"a colour is off by {distance.max()}"
     assert distance.mean() <= 25, f"colours are off by {distance.mean()}"
+
+
+def check_schem(case, files):
+    import json
+    import nbtlib
+    import numpy as np
+    from mcschematic import MCSchematic
+
+    nx, ny, nz = case["extent"]
+    tree = nbtlib.load(str(files[0]), gzipped=True)
+    tree = tree["Schematic"] if "Schematic" in tree else tree
+    assert tree["Version"] == 2
+    size = [int(tree[name]) for name in ("Width", "Height", "Length")]
+    assert size == ([nx, ny, nz] if case["up"] == "y" else [nx, nz, ny]), size
+    assert len(tree["BlockData"]) == nx * ny * nz
+
+    structure = MCSchematic(str(files[0])).getStructure()
+    names = structure.getBlockPalette()
+    name_of = {int(number): name for name, number in names.items() if isinstance(name, str)}
+    blocks = structure.getBlockStates()
+    k, j, i = np.nonzero(expected(case, 0))
+    # Minecraft is y up: where z is up in the volume, (i, j, k) stands at (i, k, ny-1-j).
+    places = np.stack([i, j, k] if case["up"] == "y" else [i, k, ny - 1 - j], axis=1)
+    assert set(blocks) == set(map(tuple, places.tolist())), "blocks stand elsewhere"
+    table = json.loads((files[0].parent / "blocks.json").read_text())
+    colors = np.array([color for _, color in table], dtype=int)
+    clay = np.array(case["clay"])
+    want = expected(case, 1)[k, j, i, :3].astype(int) if len(case["channels"]) > 1 else np.broadcast_to(clay, places.shape)
+    nearest = ((want[:, None, :] - colors[None, :, :]) ** 2).sum(axis=2).argmin(axis=1)
+    for place, n in zip(places.tolist(), nearest):
+        got = name_of[blocks[tuple(place)]]
+        assert got == "minecraft:" + table[n][0], f"{place}: {got}, expected {table[n][0]}"
 
 
 def expected_sides(case):

@@ -4,6 +4,7 @@
 // Writes the files that read_back.py reads, and manifest.json, which says what they hold: write_samples FOLDER.
 
 #include "formats/formats.hpp"
+#include "formats/schem.hpp"
 #include "test_volumes.hpp"
 
 #include <cstdio>
@@ -38,8 +39,8 @@ volume with_channels(std::array<std::int64_t, 3> extent, std::uint32_t density, 
 
 std::vector<sample_case> make_cases() {
     const std::vector<std::string> any{".npy", ".npz", ".vti", ".nrrd"};
-    const std::vector<std::string> solid{".npy", ".npz", ".vti", ".nrrd", ".vox", ".binvox",
-                                         ".glb", ".obj", ".ply", ".xyz",  ".png"};
+    const std::vector<std::string> solid{".npy",    ".npz", ".vti", ".nrrd", ".vox", ".schem",
+                                         ".binvox", ".glb", ".obj", ".ply",  ".xyz", ".png"};
     const std::vector<std::string> meshes{".glb", ".obj", ".ply"};
     std::vector<sample_case> cases;
     const auto add = [&](const char* name, std::array<std::int64_t, 3> extent, std::uint32_t density, bool color,
@@ -55,10 +56,10 @@ std::vector<sample_case> make_cases() {
     add("words", {65, 64, 63}, 3, true, false, solid);
     add("thin", {3, 1, 200}, 2, true, false, solid);
     add("long", {300, 17, 40}, 23, true, false, solid);
-    add("split", {260, 40, 513}, 997, true, false, {".vox", ".binvox"}).options.up = up_axis::z;
+    add("split", {260, 40, 513}, 997, true, false, {".vox", ".schem", ".binvox"}).options.up = up_axis::z;
     add("split_y", {270, 513, 33}, 997, true, false, {".vox"});
     add("empty", {9, 8, 7}, 0, false, false,
-        {".npy", ".npz", ".vti", ".nrrd", ".binvox", ".glb", ".obj", ".ply", ".xyz", ".png"});
+        {".npy", ".npz", ".vti", ".nrrd", ".schem", ".binvox", ".glb", ".obj", ".ply", ".xyz", ".png"});
     add("merged", {40, 33, 21}, 2, false, false, meshes).options.merge_faces = true;
     add("merged_colors", {40, 33, 21}, 1, true, false, meshes).options.merge_faces = true;
     add("pieces", {37, 23, 11}, 5, true, false, meshes).options.faces_per_file = 1000;
@@ -85,7 +86,7 @@ std::string list_of(const auto& values) {
 
 std::string describe(const sample_case& c, const std::map<std::string, std::vector<std::string>>& files) {
     std::string out = "  {\"name\": \"" + c.name + "\", \"density\": " + std::to_string(c.density);
-    out += ", \"up\": \"";
+    out += ", \"clay\": [" + list_of(clay) + "], \"up\": \"";
     out += c.options.up == up_axis::y ? "y" : "z";
     out += std::string("\", \"merge\": ") + (c.options.merge_faces ? "true" : "false") +
            ", \"points\": " + (c.options.points ? "true" : "false");
@@ -134,7 +135,14 @@ int main(int argc, char** argv) {
         }
         std::ofstream out(folder / "manifest.json");
         out << "[\n" << manifest << "\n]\n";
-        return out ? 0 : 1;
+        std::string blocks;
+        for (const block_color& b : schem_blocks()) {
+            if (!blocks.empty()) blocks += ",\n";
+            blocks += "[\"" + std::string(b.name) + "\", [" + list_of(b.color) + "]]";
+        }
+        std::ofstream table(folder / "blocks.json");
+        table << "[\n" << blocks << "\n]\n";
+        return out && table ? 0 : 1;
     } catch (const std::exception& e) {
         std::cerr << "write_samples: " << e.what() << "\n";
         return 1;

@@ -9,6 +9,7 @@
 #include "npz.hpp"
 #include "nrrd.hpp"
 #include "png.hpp"
+#include "schem.hpp"
 #include "text.hpp"
 #include "vox.hpp"
 #include "vti.hpp"
@@ -23,10 +24,11 @@ namespace {
 using writer = std::vector<std::filesystem::path> (*)(const volume&, const std::filesystem::path&,
                                                       const write_options&);
 
-constexpr std::array<format, 11> all_formats{{
+constexpr std::array<format, 12> all_formats{{
     {".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", false, true, false, false},
     {".npz", "NumPy archive with one array for each channel", false, true, false, false},
     {".vox", "MagicaVoxel model, split above 256 voxels, 255 colours", true, false, true, true},
+    {".schem", "Minecraft schematic (Sponge 2, WorldEdit) of concrete, wool, terracotta", true, false, true, true},
     {".binvox", "binvox occupancy, padded to a cube", true, false, false, true},
     {".vti", "VTK image data for ParaView, all channels as cell data", false, true, false, false},
     {".nrrd", "NRRD for 3D Slicer and teem; OUT.CHANNEL.nrrd for several", false, true, false, false},
@@ -36,8 +38,8 @@ constexpr std::array<format, 11> all_formats{{
     {".xyz", "centres of the voxels as text: x y z and red green blue, 0 to 255", true, false, true, false},
     {".png", "shaded picture of the voxels", true, false, true, false},
 }};
-constexpr std::array<writer, 11> all_writers{write_npy, write_npz, write_vox, write_binvox, write_vti, write_nrrd,
-                                             write_glb, write_obj, write_ply, write_xyz,    write_png};
+constexpr std::array<writer, 12> all_writers{write_npy,  write_npz, write_vox, write_schem, write_binvox, write_vti,
+                                             write_nrrd, write_glb, write_obj, write_ply,   write_xyz,    write_png};
 
 std::string extension_of(const std::filesystem::path& path) {
     std::string extension = path.extension().string();
