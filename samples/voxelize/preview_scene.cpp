@@ -35,37 +35,79 @@ preview_scene::preview_scene(const volume& v, int threads) {
     std::mutex merging;
     parallel_for(static_cast<std::size_t>(fine_size_[2]), threads, [&](std::size_t layer) {
         int3 low = extent_, high{};
-        fill_layer(v, bits, static_cast<std::int32_t>(layer), low, high);
+        look_at_layer(v, bits, static_cast<std::int32_t>(layer), low, high);
         const std::lock_guard lock(merging);
         for (std::size_t a = 0; a < 3; ++a) {
             low_[a] = std::min(low_[a], low[a]);
             high_[a] = std::max(high_[a], high[a]);
         }
     });
+    std::uint32_t num_bricks = full_brick + 1;
     for (std::int32_t k = 0; k < fine_size_[2]; ++k)
         for (std::int32_t j = 0; j < fine_size_[1]; ++j)
-            for (std::int32_t i = 0; i < fine_size_[0]; ++i)
-                if (fine_[flag_index(fine_size_, i, j, k)] != 0)
-                    coarse_[flag_index(coarse_size_, i / 8, j / 8, k / 8)] = 1;
+            for (std::int32_t i = 0; i < fine_size_[0]; ++i) {
+                std::uint32_t& number = fine_[flag_index(fine_size_, i, j, k)];
+                if (number == empty_brick) continue;
+                if (number != full_brick) number = num_bricks++;
+                coarse_[flag_index(coarse_size_, i / 8, j / 8, k / 8)] = 1;
+            }
+    bricks_.resize(num_bricks);
+    bricks_[full_brick].fill(~std::uint64_t{0});
+    parallel_for(static_cast<std::size_t>(fine_size_[2]), threads,
+                 [&](std::size_t layer) { fill_layer(static_cast<std::int32_t>(layer)); });
 }
 
-// Flags of one layer of bricks, and the bounds of its voxels.
-void preview_scene::fill_layer(const volume& v, const channel& bits, std::int32_t layer, int3& low, int3& high) {
+// Which bricks of a layer are empty, full or neither (any other number), and the bounds of its voxels.
+void preview_scene::look_at_layer(const volume& v, const channel& bits, std::int32_t layer, int3& low, int3& high) {
+    const auto words = static_cast<std::size_t>(v.words_per_row());
     const std::int32_t k_end = std::min(layer * 8 + 8, extent_[2]);
-    for (std::int32_t k = layer * 8; k < k_end; ++k)
-        for (std::int32_t j = 0; j < extent_[1]; ++j)
-            for (std::int32_t w = 0; 32 * w < extent_[0]; ++w) {
-                const std::uint32_t word = v.word(bits, w, j, k);
-                if (word == 0) continue;
-                for (std::int32_t b = 0; b < 4; ++b)
-                    if ((word >> (8 * b) & 0xffu) != 0) fine_[flag_index(fine_size_, 4 * w + b, j / 8, layer)] = 1;
-                const int3 first{32 * w + std::countr_zero(word), j, k};
-                const int3 last{32 * w + 31 - std::countl_zero(word), j, k};
-                for (std::size_t a = 0; a < 3; ++a) {
-                    low[a] = std::min(low[a], first[a]);
-                    high[a] = std::max(high[a], last[a] + 1);
+    std::vector<std::uint32_t> any(words), all(words); // of the rows that go through the same bricks
+    for (std::int32_t j0 = 0; j0 < extent_[1]; j0 += 8) {
+        const std::int32_t j_end = std::min(j0 + 8, extent_[1]);
+        const bool whole = k_end - layer * 8 == 8 && j_end - j0 == 8;
+        std::fill(any.begin(), any.end(), 0u);
+        std::fill(all.begin(), all.end(), whole ? ~0u : 0u);
+        for (std::int32_t k = layer * 8; k < k_end; ++k)
+            for (std::int32_t j = j0; j < j_end; ++j) {
+                std::uint32_t row = 0;
+                for (std::size_t w = 0; w < words; ++w) {
+                    const std::uint32_t word = v.word(bits, static_cast<std::int64_t>(w), j, k);
+                    row |= word;
+                    any[w] |= word;
+                    all[w] &= word;
                 }
+                if (row == 0) continue;
+                low[1] = std::min(low[1], j);
+                low[2] = std::min(low[2], k);
+                high[1] = std::max(high[1], j + 1);
+                high[2] = std::max(high[2], k + 1);
             }
+        for (std::int32_t i = 0; i < fine_size_[0]; ++i) {
+            const auto w = static_cast<std::size_t>(i / 4);
+            const unsigned some = any[w] >> (8 * (i % 4)) & 0xffu, each = all[w] >> (8 * (i % 4)) & 0xffu;
+            if (some == 0) continue;
+            fine_[flag_index(fine_size_, i, j0 / 8, layer)] = each == 0xffu ? full_brick : full_brick + 1;
+            low[0] = std::min(low[0], 8 * i + std::countr_zero(some));
+            high[0] = std::max(high[0], 8 * i + static_cast<std::int32_t>(std::bit_width(some)));
+        }
+    }
+}
+
+// The bricks of a layer that have a number of their own.
+void preview_scene::fill_layer(std::int32_t layer) {
+    const std::int32_t k_end = std::min(layer * 8 + 8, extent_[2]);
+    for (std::int32_t j0 = 0; j0 < extent_[1]; j0 += 8)
+        for (std::int32_t i = 0; i < fine_size_[0]; ++i) {
+            const std::uint32_t number = fine_[flag_index(fine_size_, i, j0 / 8, layer)];
+            if (number <= full_brick) continue;
+            for (std::int32_t k = layer * 8; k < k_end; ++k) {
+                std::uint64_t word = 0;
+                for (std::int32_t j = j0; j < std::min(j0 + 8, extent_[1]); ++j)
+                    word |= std::to_integer<std::uint64_t>(bits_[k * slice_bytes_ + j * row_bytes_ + i])
+                            << (8 * (j - j0));
+                bricks_[number][static_cast<std::size_t>(k - layer * 8)] = word;
+            }
+        }
 }
 
 ray_hit preview_scene::first_hit(const vec3& origin, const vec3& direction, double limit) const {
@@ -120,7 +162,9 @@ ray_hit preview_scene::first_hit(const vec3& origin, const vec3& direction, doub
     };
     while (true) {
         const bool far_off = coarse_[flag_index(coarse_size_, cell[0] >> 6, cell[1] >> 6, cell[2] >> 6)] == 0;
-        if (far_off || fine_[flag_index(fine_size_, cell[0] >> 3, cell[1] >> 3, cell[2] >> 3)] == 0) {
+        const std::uint32_t number =
+            far_off ? empty_brick : fine_[flag_index(fine_size_, cell[0] >> 3, cell[1] >> 3, cell[2] >> 3)];
+        if (number == empty_brick) {
             const int level = far_off ? 6 : 3;
             for (std::size_t a = 0; a < 3; ++a) aim(a, level);
             if (!advance()) return {};
@@ -130,11 +174,12 @@ ray_hit preview_scene::first_hit(const vec3& origin, const vec3& direction, doub
             }
             cell[axis] = side[axis] + ahead[axis] - 1;
         } else { // voxel by voxel to the end of the brick; only the axis that was crossed changes
+            const brick& voxels = bricks_[number];
             for (std::size_t a = 0; a < 3; ++a) aim(a, 0);
             std::int32_t crossed;
             do {
-                const std::byte* row = bits_ + cell[2] * slice_bytes_ + cell[1] * row_bytes_;
-                if ((std::to_integer<unsigned>(row[cell[0] >> 3]) >> (cell[0] & 7) & 1u) != 0)
+                const std::uint64_t layer = voxels[static_cast<std::size_t>(cell[2] & 7)];
+                if ((layer >> (8 * (cell[1] & 7) + (cell[0] & 7)) & 1u) != 0)
                     return {t, cell, static_cast<int>(axis), direction[axis] < 0};
                 if (!advance()) return {};
                 crossed = cell[axis];

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The occupied voxels as something that rays can hit: the packed bits, and above them one flag for each 8^3 and each
-// 64^3 voxels, so that empty space is crossed in large steps. Internal to the preview.
+// The occupied voxels as something that rays can hit: bricks of 8^3 voxels, 64 bytes each and only where there are any,
+// found through a table, and above it a flag for each 64^3 voxels, so that empty space is crossed in large steps and a
+// ray reads little memory. Internal to the preview.
 
 #include "volume.hpp"
 
@@ -73,7 +74,8 @@ private:
     // First and last occupied voxel of a row; first > last when there is none.
     [[nodiscard]] std::array<std::int32_t, 2> row_ends(std::int32_t j, std::int32_t k) const;
     [[nodiscard]] std::uint32_t window(std::int32_t i, std::int32_t j, std::int32_t k) const;
-    void fill_layer(const volume& v, const channel& bits, std::int32_t layer, int3& low, int3& high);
+    void look_at_layer(const volume& v, const channel& bits, std::int32_t layer, int3& low, int3& high);
+    void fill_layer(std::int32_t layer);
 
     const std::byte* bits_ = nullptr;
     std::int64_t row_bytes_ = 0;
@@ -81,8 +83,12 @@ private:
     int3 extent_{};
     int3 fine_size_{};
     int3 coarse_size_{};
-    std::vector<std::uint8_t> fine_;   // 1 for each 8^3 with an occupied voxel
-    std::vector<std::uint8_t> coarse_; // the same for 64^3
+    // Bit i of byte j of word k is voxel (i, j, k) of the brick.
+    using brick = std::array<std::uint64_t, 8>;
+    static constexpr std::uint32_t empty_brick = 0, full_brick = 1;
+    std::vector<std::uint32_t> fine_;  // for each 8^3 voxels the number of its brick
+    std::vector<brick> bricks_;        // all empty ones are one, all full ones too
+    std::vector<std::uint8_t> coarse_; // 1 for each 64^3 with an occupied voxel
     int3 low_{};
     int3 high_{};
 };

@@ -20,11 +20,12 @@ constexpr double sun_azimuth = -52; // degrees from the camera, so that the two 
 constexpr double sun_elevation = 48;
 constexpr double sun_softness = 0.045;   // radius of the sun's disc at distance 1
 constexpr double occlusion_share = 0.22; // reach of ambient occlusion, in diagonals of the model
-constexpr int smoothing = 4;             // samples to either side; with the pattern of 8 x 8 below all of it is seen
+constexpr int occlusion_rays = 2;
+constexpr int smoothing = 4; // pixels to either side; with the pattern of 8 x 8 below all of it is seen
 
 constexpr double ray_lift = 1e-3; // voxels above the face where a secondary ray starts
 
-// Rank of a sample in a pattern of 8 x 8, such that neighbours lie far apart: the bits of x^y and y, interleaved.
+// Rank of a pixel in a pattern of 8 x 8, such that neighbours lie far apart: the bits of x^y and y, interleaved.
 unsigned pattern_rank(int x, int y) {
     const unsigned a = static_cast<unsigned>(x ^ y), b = static_cast<unsigned>(y);
     unsigned rank = 0;
@@ -90,7 +91,6 @@ preview_shader::preview_shader(const volume& v, const preview_scene& scene, cons
     sun_ = direction_of(axes_, options.azimuth + sun_azimuth, sun_elevation);
     sun_side_[0] = direction_of(axes_, options.azimuth + sun_azimuth + 90, 0);
     sun_side_[1] = direction_of(axes_, options.azimuth + sun_azimuth, sun_elevation + 90);
-    occlusion_rays_ = std::max(2, 12 / (options.samples * options.samples));
 }
 
 camera::ray preview_shader::ray_of(int x, int y) const {
@@ -173,6 +173,28 @@ preview_shader::sample preview_shader::find(const camera::ray& ray, normal_cache
     return s;
 }
 
+bool preview_shader::on_one_surface(const sample& a, const sample& b) {
+    if (a.what != b.what) return false;
+    float alike = 0, off = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+        alike += b.normal[i] * a.normal[i];
+        off += (b.position[i] - a.position[i]) * a.normal[i];
+    }
+    return alike >= 0.85f && std::abs(off) <= a.slack; // nearly the same normal, close to the tangent plane
+}
+
+void preview_shader::find_pixel(sample* samples, int x, int y, normal_cache& cache) const {
+    const int s = options_.samples;
+    for (int n = 0; n < s * s; ++n) {
+        samples[n] = find(ray_of(x * s + n % s, y * s + n / s), cache);
+        samples[n].light = 0;
+        while (samples[n].light < n && (samples[samples[n].light].light != samples[n].light ||
+                                        !on_one_surface(samples[samples[n].light], samples[n])))
+            ++samples[n].light;
+        if (samples[n].light == n) gather_light(samples[n], x, y);
+    }
+}
+
 void preview_shader::gather_light(sample& s, int x, int y) const {
     if (s.what == seen::nothing) return;
     const vec3 normal{s.normal[0], s.normal[1], s.normal[2]};
@@ -190,11 +212,11 @@ void preview_shader::gather_light(sample& s, int x, int y) const {
 
     const std::uint32_t rank = pattern_rank(x, y);
     // Directions about the normal, more of them where they count more (cosine), from a point set that is even over each
-    // 8 x 8 samples and rays together.
+    // 8 x 8 pixels and rays together.
     double hidden = 0;
-    for (int n = 0; n < occlusion_rays_; ++n) {
+    for (int n = 0; n < occlusion_rays; ++n) {
         const std::uint32_t index = static_cast<std::uint32_t>(n) * 64 + rank;
-        const double u = (index + 0.5) / (64.0 * occlusion_rays_);
+        const double u = (index + 0.5) / (64.0 * occlusion_rays);
         const double phi = 2 * std::numbers::pi * radical_inverse(index);
         const double across = std::sqrt(u);
         const vec3 direction =
@@ -205,7 +227,7 @@ void preview_shader::gather_light(sample& s, int x, int y) const {
             hidden += near * (1.5 - 0.5 * near); // fades to nothing at the reach
         }
     }
-    s.open = static_cast<float>(1 - hidden / occlusion_rays_);
+    s.open = static_cast<float>(1 - hidden / occlusion_rays);
 
     s.sunlit = 0;
     if (dot(sun_, normal) <= 0) return;
@@ -216,25 +238,20 @@ void preview_shader::gather_light(sample& s, int x, int y) const {
     s.sunlit = hit.axis < 0 ? 1.0f : 0.0f;
 }
 
-// Mean of the light over the neighbours on the same surface: with nearly the same normal, close to the tangent plane.
-void preview_shader::smooth(const sample_rows& rows, int x, int row, float& open, float& sunlit) const {
-    const sample& middle = rows.at(x, row);
+// Mean of the light over this sample and the pixels around it whose first sample lies on the same surface.
+void preview_shader::smooth(const pixel_rows& rows, int x, int row, const sample& middle, float& open,
+                            float& sunlit) const {
     float weight = 0, open_sum = 0, sun_sum = 0;
+    const auto add = [&](const sample& other) {
+        weight += 1;
+        open_sum += other.open;
+        sun_sum += other.sunlit;
+    };
     for (int y = std::max(0, row - smoothing); y < std::min(rows.rows, row + smoothing); ++y)
-        for (int i = std::max(0, x - smoothing); i < std::min(rows.width, x + smoothing); ++i) {
-            const sample& other = rows.at(i, y);
-            if (other.what != middle.what) continue;
-            float alike = 0, off = 0;
-            for (std::size_t a = 0; a < 3; ++a) {
-                alike += other.normal[a] * middle.normal[a];
-                off += (other.position[a] - middle.position[a]) * middle.normal[a];
-            }
-            if (alike < 0.85f || std::abs(off) > middle.slack) continue;
-            weight += 1;
-            open_sum += other.open;
-            sun_sum += other.sunlit;
-        }
-    open = open_sum / weight; // the sample itself counts, so the weight is at least 1
+        for (int i = std::max(0, x - smoothing); i < std::min(rows.width, x + smoothing); ++i)
+            if (const sample& other = *rows.at(i, y); on_one_surface(middle, other)) add(other);
+    if (middle.light != 0) add(middle); // not among the first ones
+    open = open_sum / weight;
     sunlit = sun_sum / weight;
 }
 
@@ -267,46 +284,46 @@ rgb_linear preview_shader::backdrop_at(double x, double y) const {
 }
 
 void preview_shader::render_rows(int from, int to, int components, std::uint8_t* pixels) const {
-    const int s = options_.samples;
-    sample_rows rows;
-    rows.first = std::max(0, from * s - smoothing);
-    rows.rows = std::min(options_.height * s, to * s + smoothing) - rows.first;
-    rows.width = options_.width * s;
-    rows.samples.resize(static_cast<std::size_t>(rows.rows) * static_cast<std::size_t>(rows.width));
+    const int per_pixel = options_.samples * options_.samples;
+    pixel_rows rows;
+    rows.first = std::max(0, from - smoothing);
+    rows.rows = std::min(options_.height, to + smoothing) - rows.first;
+    rows.width = options_.width;
+    rows.per_pixel = per_pixel;
+    rows.samples.resize(static_cast<std::size_t>(rows.rows) * static_cast<std::size_t>(rows.width) *
+                        static_cast<std::size_t>(per_pixel));
     if (!scene_.empty())
         for (int row = 0; row < rows.rows; ++row) {
             normal_cache cache;
-            for (int x = 0; x < rows.width; ++x) {
-                sample& here = rows.samples[static_cast<std::size_t>(row) * static_cast<std::size_t>(rows.width) +
-                                            static_cast<std::size_t>(x)];
-                here = find(ray_of(x, rows.first + row), cache);
-                gather_light(here, x, rows.first + row);
-            }
+            for (int x = 0; x < rows.width; ++x) find_pixel(rows.at(x, row), x, rows.first + row, cache);
         }
 
-    const float share = 1.0f / static_cast<float>(s * s);
+    const float share = 1.0f / static_cast<float>(per_pixel);
+    std::vector<std::array<float, 2>> light(static_cast<std::size_t>(per_pixel)); // open and sunlit, smoothed
     for (int y = from; y < to; ++y)
         for (int x = 0; x < options_.width; ++x) {
             const rgb_linear behind = backdrop_at((x + 0.5) / options_.width, (y + 0.5) / options_.height);
             rgb_linear sum{};
             float alpha = 0;
-            for (int n = 0; n < s * s; ++n) {
-                const int sx = x * s + n % s;
-                const int row = y * s + n / s - rows.first;
-                const sample& hit = rows.at(sx, row);
-                float open = 1, sunlit = 1;
-                if (hit.what != seen::nothing) smooth(rows, sx, row, open, sunlit);
+            const sample* const samples = rows.at(x, y - rows.first);
+            for (int n = 0; n < per_pixel; ++n) {
+                const sample& hit = samples[n];
+                auto& [open, sunlit] = light[static_cast<std::size_t>(n)];
+                if (hit.light != n)
+                    light[static_cast<std::size_t>(n)] = light[static_cast<std::size_t>(hit.light)];
+                else if (hit.what != seen::nothing)
+                    smooth(rows, x, y - rows.first, hit, open, sunlit);
                 if (hit.what == seen::voxel) {
                     const rgb_linear lit = shade(hit, open, sunlit);
                     for (std::size_t a = 0; a < 3; ++a) sum[a] += lit[a] * share;
                     alpha += share;
                     continue;
                 }
-                const float light = hit.what == seen::ground ? ground_shade(open, sunlit) : 1.0f;
+                const float shown = hit.what == seen::ground ? ground_shade(open, sunlit) : 1.0f;
                 if (components == 4)
-                    alpha += (1 - light) * share; // black over whatever lies behind
+                    alpha += (1 - shown) * share; // black over whatever lies behind
                 else
-                    for (std::size_t a = 0; a < 3; ++a) sum[a] += behind[a] * light * share;
+                    for (std::size_t a = 0; a < 3; ++a) sum[a] += behind[a] * shown * share;
             }
             std::uint8_t* out = pixels + (static_cast<std::ptrdiff_t>(y - from) * options_.width + x) * components;
             const float scale = components == 4 && alpha > 0 ? 1 / alpha : 1.0f;

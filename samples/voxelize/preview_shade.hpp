@@ -3,9 +3,9 @@
 #pragma once
 
 // Light and colour of the preview. Rows of the picture are rendered one band at a time: find what each sample sees,
-// gather ambient occlusion and sunlight with few rays each, smooth these over neighbouring samples of the same face,
-// shade, and average. Which rays a sample casts depends on its place alone, so the picture is the same on any number of
-// threads. Internal to the preview.
+// gather ambient occlusion and sunlight with few rays, once for the samples of a pixel that lie on one surface, smooth
+// these over neighbouring pixels of the same surface, shade, and average. Which rays a sample casts depends on its
+// place alone, so the picture is the same on any number of threads. Internal to the preview.
 
 #include "preview.hpp"
 #include "preview_camera.hpp"
@@ -38,16 +38,20 @@ private:
         rgb_linear albedo{};
         float open = 1;   // share of the sky that is not hidden by voxels nearby
         float sunlit = 1; // share of the sun that is seen
+        int light = 0;    // which sample of the pixel gathered the two; the others have none
     };
-    // A rectangle of samples, a few rows larger than the band on either side for the smoothing.
-    struct sample_rows {
-        int first = 0; // sample row of the picture that row 0 is
+    // Rows of pixels, a few more than the band on either side for the smoothing.
+    struct pixel_rows {
+        int first = 0; // row of the picture that row 0 is
         int rows = 0;
         int width = 0;
-        std::vector<sample> samples;
-        [[nodiscard]] const sample& at(int x, int row) const {
-            return samples[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
-                           static_cast<std::size_t>(x)];
+        int per_pixel = 1;           // samples
+        std::vector<sample> samples; // of each pixel, row by row
+        [[nodiscard]] sample* at(int x, int row) {
+            return samples.data() + (std::ptrdiff_t{row} * width + x) * per_pixel;
+        }
+        [[nodiscard]] const sample* at(int x, int row) const {
+            return samples.data() + (std::ptrdiff_t{row} * width + x) * per_pixel;
         }
     };
 
@@ -59,8 +63,12 @@ private:
     };
     [[nodiscard]] sample find(const camera::ray& ray, normal_cache& cache) const;
     [[nodiscard]] rgb_linear albedo_of(const ray_hit& hit, const vec3& at, double pixels_per_voxel) const;
+    // Whether light that falls on one sample falls on the other.
+    [[nodiscard]] static bool on_one_surface(const sample& a, const sample& b);
+    // The samples of pixel (x, y).
+    void find_pixel(sample* samples, int x, int y, normal_cache& cache) const;
     void gather_light(sample& s, int x, int y) const;
-    void smooth(const sample_rows& rows, int x, int row, float& open, float& sunlit) const;
+    void smooth(const pixel_rows& rows, int x, int row, const sample& middle, float& open, float& sunlit) const;
     [[nodiscard]] rgb_linear shade(const sample& s, float open, float sunlit) const;
     [[nodiscard]] float ground_shade(float open, float sunlit) const;
     [[nodiscard]] rgb_linear backdrop_at(double x, double y) const;
@@ -78,7 +86,6 @@ private:
     double radius_ = 0;  // half diagonal of the occupied voxels, world units
     double occlusion_reach_ = 0;
     double ground_height_ = 0;
-    int occlusion_rays_ = 4;
     std::array<float, 256> to_linear_{};
     std::array<rgb_linear, 2> backdrop_{}; // top, bottom
 };
