@@ -103,18 +103,18 @@ TEST(Strategy, LimitsOfAMask) {
     EXPECT_EQ(chosen(f), strategy::immediate); // nothing needs a last pass
     f.clears_values = true;
     EXPECT_EQ(chosen(f), strategy::occupancy_mask);
-    f.mask_bytes = voxelpipe::device::max_mask_bytes_in_place;
+    f.mask_bytes = voxelpipe::tuning::max_mask_bytes_in_place;
     EXPECT_EQ(chosen(f), strategy::occupancy_mask);
     ++f.mask_bytes;
     EXPECT_EQ(chosen(f), strategy::immediate);
     f.blends_in_place = false;
     EXPECT_EQ(chosen(f), strategy::occupancy_mask);
-    f.mask_bytes = voxelpipe::device::max_mask_bytes + 1;
+    f.mask_bytes = voxelpipe::tuning::max_mask_bytes + 1;
     EXPECT_EQ(chosen(f), strategy::sorted_reduce);
     f = constant_bit();
     f.all_draws_equal = false;
     EXPECT_EQ(chosen(f), strategy::immediate);
-    f.num_draws = voxelpipe::device::max_raster_draws + 1;
+    f.num_draws = voxelpipe::tuning::max_raster_draws + 1;
     EXPECT_EQ(chosen(f), strategy::tiled);
 }
 

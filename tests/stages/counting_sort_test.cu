@@ -149,8 +149,8 @@ TEST(CountingSort, SortsInGridsOfEverySize) {
 
 TEST(CountingSort, OrdersVoxelsOfEveryLength) {
     std::vector<std::uint32_t> lengths;
-    for (const std::uint32_t limit : {device::window_length, device::max_of_window, 512u, device::max_of_warp,
-                                      device::max_of_block, 2 * device::max_of_block})
+    for (const std::uint32_t limit : {vp::tuning::window_length, vp::tuning::max_of_window, 512u, device::max_of_warp,
+                                      vp::tuning::max_of_block, 2 * vp::tuning::max_of_block})
         for (const std::uint32_t length : {limit - 1, limit, limit + 1}) lengths.insert(lengths.end(), 3, length);
     for (std::uint32_t length = 1; length < 300; ++length) lengths.push_back(length);
     for (const bool shuffled : {false, true}) {
@@ -158,11 +158,11 @@ TEST(CountingSort, OrdersVoxelsOfEveryLength) {
         // Primitives far apart, so that no voxel is dense.
         expect_counted(of_lengths(lengths, 5000, shuffled), 1u << 21, 3 + shuffled, 20000);
     }
-    expect_counted(of_lengths(std::vector<std::uint32_t>(40, device::window_length), 1, true), 40, 5);
+    expect_counted(of_lengths(std::vector<std::uint32_t>(40, vp::tuning::window_length), 1, true), 40, 5);
     // All voxels of a tile are long, and all long voxels are in one tile.
     expect_counted(of_lengths(std::vector<std::uint32_t>(3000, 258), 1, true), 1u << 17, 6);
     for (std::uint32_t rest = 1; rest < 40; ++rest)
-        expect_counted(of_lengths({1, device::window_length - 2, rest}, 3, false), 9, 7 + rest);
+        expect_counted(of_lengths({1, vp::tuning::window_length - 2, rest}, 3, false), 9, 7 + rest);
 }
 
 TEST(CountingSort, SortsMillionsOfFragments) {

@@ -117,30 +117,30 @@ TEST(FragmentOrder, OrdersEveryLengthOfAWindowAndAWarp) {
 TEST(FragmentOrder, OrdersVoxelsAtTheLimitsOfEveryClass) {
     std::vector<std::uint64_t> lengths;
     for (const std::uint32_t limit :
-         {device::window_length, device::max_of_window, 512u, device::max_of_warp, device::max_of_block,
-          device::tile_counts::length, 2 * device::max_of_block, 32 * 32 * 32u})
+         {vp::tuning::window_length, vp::tuning::max_of_window, 512u, device::max_of_warp, vp::tuning::max_of_block,
+          device::tile_counts::length, 2 * vp::tuning::max_of_block, 32 * 32 * 32u})
         for (const std::uint32_t length : {limit - 1, limit, limit + 1}) lengths.insert(lengths.end(), 3, length);
     expect_ordered(lengths, 3);
     expect_ordered(lengths, 4, few_primitives - 1);
     // Voxels that begin and end at borders of windows and tiles, and last voxels of every length.
-    expect_ordered(std::vector<std::uint64_t>(20, device::window_length), 15);
+    expect_ordered(std::vector<std::uint64_t>(20, vp::tuning::window_length), 15);
     expect_ordered(std::vector<std::uint64_t>(3, device::tile_counts::length), 16);
     for (std::uint32_t rest = 1; rest < 40; ++rest) {
-        expect_ordered({1, device::window_length - 2, rest}, 17 + rest, few_primitives - 1);
+        expect_ordered({1, vp::tuning::window_length - 2, rest}, 17 + rest, few_primitives - 1);
         expect_ordered({rest}, 18 + rest);
     }
 }
 
 TEST(FragmentOrder, OrdersDenseVoxels) {
-    const std::uint32_t part = device::dense_part, most = part * device::max_dense_parts;
-    const std::uint64_t block = device::max_of_block;
+    const std::uint32_t part = vp::tuning::dense_part, most = part * vp::tuning::max_dense_parts;
+    const std::uint64_t block = vp::tuning::max_of_block;
     // Nearly all primitives, one more than a block handles, and lengths around a part's border.
     for (const std::uint32_t num : {std::uint32_t{block} + 1, part - 1, part, part + 1, 3 * part + 17})
         for (const std::uint32_t seed : {1u, 2u})
             expect_ordered({7, num, block + 1, 300, num - 1, 2, num}, seed, num - 1);
     // The smallest dense voxel, and one fragment less, which is cut into runs.
     for (const std::uint32_t num : {most, most - 1, most + 1}) {
-        const std::uint64_t least = num / device::min_dense;
+        const std::uint64_t least = num / vp::tuning::min_dense;
         expect_ordered({least - 1, least, 1, least + 1, 3 * least}, num, num - 1);
     }
     expect_ordered(std::vector<std::uint64_t>(70, 5000), 5, 100000); // more parts than blocks
@@ -148,8 +148,8 @@ TEST(FragmentOrder, OrdersDenseVoxels) {
 
 // One voxel of primitives far apart that fills the capacity exactly.
 TEST(FragmentOrder, NeedsNoMoreCapacityThanFragments) {
-    for (const std::uint32_t n : {device::max_of_window + 1, device::max_of_block, device::max_of_block + 1,
-                                  device::max_of_block + 2, 2 * device::max_of_block + 1}) {
+    for (const std::uint32_t n : {vp::tuning::max_of_window + 1, vp::tuning::max_of_block, vp::tuning::max_of_block + 1,
+                                  vp::tuning::max_of_block + 2, 2 * vp::tuning::max_of_block + 1}) {
         std::vector<std::uint32_t> primitives(n);
         for (std::uint32_t i = 0; i < n; ++i) primitives[i] = 1000 * (n - i);
         const ordered result(std::vector<std::uint32_t>(n, 3), primitives, n, 1000 * std::uint64_t{n} + 1, false, 1);
@@ -165,7 +165,7 @@ TEST(FragmentOrder, OrdersFewAndManyFragments) {
     for (std::uint64_t& length : lengths) length = 1 + random() % (random() % 50 == 0 ? 3000 : 10);
     expect_ordered(lengths, 5);
     // Windows that are exactly filled by the voxels that begin in them.
-    for (std::uint64_t& length : lengths) length = 1 + random() % (random() % 8 == 0 ? device::max_of_window : 60);
+    for (std::uint64_t& length : lengths) length = 1 + random() % (random() % 8 == 0 ? vp::tuning::max_of_window : 60);
     expect_ordered(lengths, 6);
     expect_ordered(lengths, 7, few_primitives - 1);
     // Many tiles.

@@ -70,7 +70,7 @@ void expect_sorted(std::uint64_t num, int bits, const Key& key) {
     std::vector<std::uint32_t> order(num);
     std::iota(order.begin(), order.end(), 0u);
     std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return keys[a] < keys[b]; });
-    for (const int items : {device::few_sort_items, device::sort_items}) {
+    for (const int items : {vp::tuning::few_sort_items, vp::tuning::sort_items}) {
         const sorted s = sort_on_device(keys, num, bits, items);
         for (std::uint64_t i = 0; i < num; ++i) {
             ASSERT_EQ(s.values[i], order[i]) << i << " of " << num << ", " << bits << " bits, " << items;
@@ -86,7 +86,7 @@ TEST(FragmentSort, IsStableForEveryNumberOfBits) {
         const device::digit_plan plan(bits);
         EXPECT_GE(plan.passes * plan.bits, bits);
         EXPECT_LE(plan.passes, device::max_digit_passes);
-        EXPECT_LE(plan.bits, device::max_digit_bits);
+        EXPECT_LE(plan.bits, vp::tuning::max_digit_bits);
         std::mt19937 random(static_cast<unsigned>(bits) + 1);
         expect_sorted(20000, bits, [&](auto) { return below(static_cast<std::uint32_t>(random()), bits); });
     }
@@ -95,7 +95,8 @@ TEST(FragmentSort, IsStableForEveryNumberOfBits) {
 TEST(FragmentSort, HandlesLengthsAroundTileBorders) {
     for (const std::uint64_t tiles : {0, 1, 2, 7})
         for (const std::int64_t more : {-33, -1, 0, 1, 2, 31, 511}) {
-            const std::int64_t num = static_cast<std::int64_t>(tiles * device::sort_tile(device::sort_items)) + more;
+            const std::int64_t num =
+                static_cast<std::int64_t>(tiles * device::sort_tile(vp::tuning::sort_items)) + more;
             if (num < 0) continue;
             std::mt19937 random(static_cast<unsigned>(num));
             for (const int bits : {5, 21, 27, 30})
@@ -106,7 +107,7 @@ TEST(FragmentSort, HandlesLengthsAroundTileBorders) {
 
 // All equal, two alternating, the largest key, runs, descending.
 TEST(FragmentSort, IsStableForEqualAndAlternatingKeys) {
-    constexpr std::uint64_t num = 5 * device::sort_tile(device::sort_items) + 1000;
+    constexpr std::uint64_t num = 5 * device::sort_tile(vp::tuning::sort_items) + 1000;
     for (const int bits : {9, 21, 27, 30, 32}) {
         const std::uint32_t largest = below(~0u, bits);
         expect_sorted(num, bits, [&](auto) { return largest; });
@@ -130,7 +131,7 @@ TEST(FragmentSort, LooksBackOverManyTiles) {
 TEST(FragmentSort, WritesNothingIfTheCallHasFailed) {
     std::vector<std::uint32_t> keys(20000);
     for (std::uint32_t i = 0; i < keys.size(); ++i) keys[i] = 20000 - i;
-    const sorted s = sort_on_device(keys, keys.size() + 1, 18, device::sort_items); // two passes
+    const sorted s = sort_on_device(keys, keys.size() + 1, 18, vp::tuning::sort_items); // two passes
     EXPECT_TRUE(s.keys == keys);
 }
 

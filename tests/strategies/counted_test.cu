@@ -153,7 +153,7 @@ TEST(Counted, EveryLayoutAndExtentHoldsTheCpusBytes) {
 TEST(Counted, LargeGridsWithMarksHoldTheCpusBytes) {
     for (const glm::ivec3 extent : {glm::ivec3(320, 200, 140), glm::ivec3(333, 191, 141), glm::ivec3(1100, 92, 91)}) {
         ASSERT_GE(static_cast<std::size_t>(extent.x) * static_cast<std::size_t>(extent.y * extent.z) * sizeof(float),
-                  vp::device::marked_bytes);
+                  vp::tuning::marked_bytes);
         const glm::vec3 size(extent);
         mesh_data m = mixed_triangles(1500, size.x, 210); // many outside the grid, and some across its faces
         append(m, crowded(36.0f, 211));

@@ -157,7 +157,7 @@ TEST(Direct, LargeTrianglesWithManyWorkItemsGiveTheCpusBytes) {
 // As many as there are kept set-ups, some of which are not split, and more: then no set-up is kept, and each work item
 // repeats it.
 TEST(Direct, MoreLargeTrianglesThanKeptSetUpsGiveTheCpusBytes) {
-    constexpr auto most = static_cast<int>(vp::device::deferred_triangles::max_setups);
+    constexpr auto most = static_cast<int>(vp::tuning::max_setups);
     const glm::ivec3 extent(150, 160, 140);
     for (const int count : {most, most + most / 4}) {
         const mesh_data m = long_triangles(extent, count, 88);

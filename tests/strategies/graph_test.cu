@@ -292,11 +292,11 @@ TEST(Graph, ListsLaunchWhatTheyNeed) {
             .num_nodes();
     };
     const vp::grid g = box_grid({10, 10, 10});
-    const std::uint64_t counted = 2 * m.triangles.size(), block = vp::device::max_of_block;
+    const std::uint64_t counted = 2 * m.triangles.size(), block = vp::tuning::max_of_block;
     EXPECT_EQ(num_nodes(g, counted, false), num_nodes(g, counted + 1, false) + 1);
     EXPECT_EQ(num_nodes(g, block, true), num_nodes(g, block, false) + 1);
     EXPECT_EQ(num_nodes(g, block + 1, true), num_nodes(g, block + 1, false) + 3);
-    EXPECT_EQ(num_nodes(g, vp::device::max_of_window, true), num_nodes(g, vp::device::max_of_window, false));
+    EXPECT_EQ(num_nodes(g, vp::tuning::max_of_window, true), num_nodes(g, vp::tuning::max_of_window, false));
 }
 
 // Without the kernel for larger triangles: the same voxels by a launch less where there are few of these; otherwise,

@@ -511,11 +511,11 @@ TEST(Pipeline, LaunchesFillTheDevice) {
     for (std::uint64_t bit = 0; bit <= 32; ++bit) {
         const auto items = static_cast<std::uint32_t>((std::uint64_t{1} << bit) - (bit == 32 ? 1 : 0));
         const std::uint64_t blocks = vp::device::raster_blocks(items, 8);
-        const std::uint64_t in_round = blocks * vp::device::raster_threads;
+        const std::uint64_t in_round = blocks * vp::tuning::raster_threads;
         const std::uint64_t rounds = (items + in_round - 1) / in_round;
         EXPECT_LE(rounds, vp::device::warp_triangles::max_rounds) << bit;
         EXPECT_GE(blocks, std::min<std::uint64_t>(multiprocessors, (items + 127) / 128)) << bit;
-        EXPECT_LT((blocks - 1) * vp::device::raster_threads, items) << bit; // no block without a triangle
+        EXPECT_LT((blocks - 1) * vp::tuning::raster_threads, items) << bit; // no block without a triangle
         EXPECT_LE(blocks, static_cast<unsigned>(properties.maxGridSize[0])) << bit;
     }
 }
@@ -532,7 +532,7 @@ TEST(Pipeline, TheFirstKernelIsAloneForFineMeshesOnly) {
         EXPECT_EQ((deferred{0, {5, 3, 1, 0}, 0}.num_deferred(rule)), much);
         EXPECT_EQ((deferred{0, {0, 0, 0, 1}, 0}.num_deferred(rule)), much);
     }
-    const std::uint64_t each = vp::device::max_left_of_block;
+    const std::uint64_t each = vp::tuning::max_left_of_block;
     for (const std::size_t triangles : {1u, 128u, 129u, 1u << 30}) {
         SCOPED_TRACE(triangles);
         EXPECT_TRUE(vp::device::leaves_few(triangles, 0));
@@ -541,7 +541,7 @@ TEST(Pipeline, TheFirstKernelIsAloneForFineMeshesOnly) {
     }
     EXPECT_FALSE(vp::device::leaves_few(128, each + 1)); // a block's
     EXPECT_TRUE(vp::device::leaves_few(129, each + 1));
-    const auto at_once = static_cast<std::uint64_t>(vp::device::num_multiprocessors()) * vp::device::max_left_blocks;
+    const auto at_once = static_cast<std::uint64_t>(vp::device::num_multiprocessors()) * vp::tuning::max_left_blocks;
     EXPECT_TRUE(vp::device::leaves_few(1u << 30, each * at_once));
     EXPECT_FALSE(vp::device::leaves_few(1u << 30, each * at_once + 1));
 }

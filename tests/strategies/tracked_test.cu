@@ -185,7 +185,7 @@ template <class Kind>
 void expect_same_sequences(const glm::ivec3& extent) {
     ASSERT_GE(sizeof(typename Kind::first::value_type) * static_cast<std::size_t>(extent.x) *
                   static_cast<std::size_t>(extent.y) * static_cast<std::size_t>(extent.z),
-              vp::device::marked_bytes);
+              vp::tuning::marked_bytes);
     sequence<vp::cpu_backend, Kind> expected(extent);
     sequence<vp::cuda_backend, Kind> tracked(extent);
     tracked.framebuffer().track_changes(tracked.backend());

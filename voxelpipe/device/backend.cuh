@@ -15,6 +15,7 @@
 #include <voxelpipe/device/kernels.cuh>
 #include <voxelpipe/device/scene/check_indices.cuh>
 #include <voxelpipe/solid.hpp>
+#include <voxelpipe/tuning/tuning_strategy.hpp>
 
 #include <algorithm>
 #include <cstddef>
@@ -222,7 +223,7 @@ status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader
             call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
             limits.skips_deferred_pass = call.limits.skips_deferred_pass =
                 call.can_skip_deferred_pass(guess.num_deferred) ? 1 : 0;
-            call.has_few_a_voxel = limits.fragments < device::min_counted * guess.voxel_room;
+            call.has_few_a_voxel = limits.fragments < tuning::min_counted * guess.voxel_room;
             device::list_filler filler(call, *this, workspace_, use_pinned_memory, use_graphs, made, state);
             if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
                 filler.template fill<Coverage, std::uint64_t>(options.rule, guess.voxel_room);

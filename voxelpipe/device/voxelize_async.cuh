@@ -7,6 +7,7 @@
 // leaves every target as it was, and read_status reports what was needed.
 
 #include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/tuning/tuning_strategy.hpp>
 
 namespace voxelpipe {
 
@@ -34,7 +35,8 @@ struct workspace_limits {
 
     // A start for a mesh whose triangles are mostly smaller than a tile.
     [[nodiscard]] static workspace_limits for_triangles(std::uint64_t triangles) {
-        return {triangles + triangles / 4 + 16384, triangles / 16 + 4096, 4 * triangles + 65536, triangles / 16 + 4096};
+        const auto first = tuning::first_capacities(triangles);
+        return {first[0], first[1], first[2], first[3]};
     }
 };
 

@@ -5,6 +5,7 @@
 // Operations of whole warps and blocks.
 
 #include <voxelpipe/config.hpp>
+#include <voxelpipe/tuning/tuning_raster.hpp>
 
 #include <cstdint>
 
@@ -12,11 +13,10 @@ namespace voxelpipe::device {
 
 using word = std::uint32_t;
 
-inline constexpr int group_lanes = 8; // lanes that share one larger triangle
 // The bits of a row that belong to this lane if group_lanes lanes share it: every group_lanes-th bit, so that
 // neighbouring lanes have neighbouring voxels.
 [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t bits_of_lane() {
-    return ~0u / ((1u << group_lanes) - 1) << threadIdx.x % group_lanes;
+    return ~0u / ((1u << tuning::group_lanes) - 1) << threadIdx.x % tuning::group_lanes;
 }
 
 // Returns a value that is equal in all lanes, in a form that tells the compiler so. A value loaded from memory or

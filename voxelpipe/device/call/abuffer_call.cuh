@@ -17,10 +17,6 @@
 
 namespace voxelpipe::device {
 
-// Fragments per voxel, on average, from which on they are sorted by counting. With 16 and 21, as on hairball, that took
-// 1 to 3 % longer than the radix sort; with 35 and more, 9 to 19 % less (whole calls at 128^3 on an H200).
-inline constexpr std::uint64_t min_counted = 24;
-
 template <class Draw, class Payload>
 struct abuffer_call;
 template <class Mesh, class VertexShader, class FragmentShader, class Payload>
@@ -90,7 +86,7 @@ private:
     // True if fragments may be sorted by counting: voxels are not known to have so many fragments that atomics wait for
     // each other, nor so few that counting gains nothing.
     [[nodiscard]] bool may_count() const {
-        return !has_few_a_voxel && (limits.longest_ordered <= max_of_block || limits.longest_ordered == ~0ull);
+        return !has_few_a_voxel && (limits.longest_ordered <= tuning::max_of_block || limits.longest_ordered == ~0ull);
     }
 
     // Fragments are counted, get offsets from a scan, and are written by ascending primitive. Serves any number of

@@ -9,6 +9,7 @@
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/call/capacity_history.hpp>
 #include <voxelpipe/device/fragments/order_voxels.cuh>
+#include <voxelpipe/tuning/tuning_strategy.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <glm/vec3.hpp>
@@ -81,10 +82,9 @@ template <class Launch>
     try {
         std::optional<stage_clock> clock;
         if (times != nullptr) clock.emplace(stream);
-        const std::uint64_t n = key.triangles;
+        const auto first = tuning::first_capacities(key.triangles);
         call_history::lengths room =
-            history.guess(key, {n + n / 4 + 16384, n / 16 + 4096, std::min(4 * n + 65536, max_first_fragments),
-                                n / 16 + 4096, 0, 0, 0});
+            history.guess(key, {first[0], first[1], std::min(first[2], max_first_fragments), first[3], 0, 0, 0});
         const auto longest = history.max_needed(key, need::longest_ordered);
         const auto num_deferred = history.max_needed(key, need::deferred);
         bool missed_deferred = false; // in any try

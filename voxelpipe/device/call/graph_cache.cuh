@@ -7,6 +7,7 @@
 // pointers among these: their contents may change from call to call.
 
 #include <voxelpipe/device/base/memory.cuh>
+#include <voxelpipe/tuning/tuning_strategy.hpp>
 
 #include <cstddef>
 #include <cstring>
@@ -70,7 +71,7 @@ public:
     template <class F>
     void launch(const call_bytes& arguments, cudaStream_t stream, const F& launch_all) {
         if (arguments == arguments_) {
-            if (times_ < worth_a_graph && ++times_ == worth_a_graph) graph_ = record(launch_all);
+            if (times_ < tuning::worth_a_graph && ++times_ == tuning::worth_a_graph) graph_ = record(launch_all);
         } else {
             *this = {};
             arguments_ = arguments;
@@ -83,8 +84,6 @@ public:
     }
 
 private:
-    static constexpr int worth_a_graph = 3; // calls: a graph costs as much as ten calls save
-
     // Captures on a separate stream: the caller's may not allow capture. Returns null if there is no graph.
     template <class F>
     [[nodiscard]] static cudaGraphExec_t record(const F& launch_all) {

@@ -5,21 +5,13 @@
 // Decides, for calls of constant shaders, which targets are blended in place and which count their fragments.
 
 #include <voxelpipe/device/targets/finalize_counts.cuh>
+#include <voxelpipe/tuning/tuning_strategy.hpp>
 
 #include <bit>
 #include <cstring>
 #include <span>
 
 namespace voxelpipe::device {
-
-// Tiles take over if the counted targets without marks have more bytes than counted_bytes plus this per triangle: their
-// last pass reads the whole grid, but tiles only what is touched. At 4 TB/s these bytes take 4 ns, as much as a few
-// fragments cost in tiles.
-inline constexpr std::uint64_t counted_bytes_per_triangle = 16384, counted_bytes = marked_bytes;
-
-// Bits up to this size are counted after drawing, which takes as long as the clear. Atomics that report first touches
-// would make every warp wait; beyond this size they take less time than counting.
-inline constexpr std::uint64_t max_counted_bits = std::uint64_t{256} << 20;
 
 template <std::size_t K, class Target, class Draw>
 [[nodiscard]] bool may_be_counted(std::span<const Draw> draws, const target_view<Target>& t) {
@@ -65,7 +57,8 @@ void plan_immediate(std::span<const Draw> draws, const framebuffer_view<Targets.
         const bool may_count = may_be_counted<K>(draws, t);
         if (tells && telling < 0) telling = static_cast<int>(K);
         using map = typename core::pack_element<K, Targets...>::type::map;
-        if (tells && telling_bits < 0 && map::is_bit && map::elements(fb.extent) * sizeof(word) <= max_counted_bits)
+        if (tells && telling_bits < 0 && map::is_bit &&
+            map::elements(fb.extent) * sizeof(word) <= tuning::max_counted_bits)
             telling_bits = static_cast<int>(K);
         if (may_count && countable < 0) countable = static_cast<int>(K);
         if (map::is_bit && map::elements(fb.extent) >> 30 != 0) plan.modes.of[K] = immediate_mode::blend_far;
@@ -94,7 +87,7 @@ void plan_immediate(std::span<const Draw> draws, const framebuffer_view<Targets.
         if (plan.counts(K) && !ends_by_marks(voxelpipe::get<K>(fb.targets)))
             bytes += target::map::elements(fb.extent) * sizeof(typename target::element_type);
     });
-    plan.is_cheap = bytes <= counted_bytes + num_primitives * counted_bytes_per_triangle;
+    plan.is_cheap = bytes <= tuning::counted_bytes + num_primitives * tuning::counted_bytes_per_triangle;
 }
 
 } // namespace voxelpipe::device

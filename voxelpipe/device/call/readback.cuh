@@ -9,6 +9,7 @@
 #include <voxelpipe/device/base/warp.cuh>
 #include <voxelpipe/device/fragments/fragment_lists.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
+#include <voxelpipe/tuning/tuning_strategy.hpp>
 
 #include <atomic>
 #include <cstddef>
@@ -82,9 +83,9 @@ public:
         // A failed call never arrives, so the stream is queried now and then; first at once, because some drivers hold
         // launches back until queried. Calls of milliseconds block.
         if (may_spin_)
-            for (unsigned i = 0; i < max_looks; ++i) {
+            for (unsigned i = 0; i < tuning::max_looks; ++i) {
                 if (arrives(copy)) return copy;
-                if (i % looks_between == 0)
+                if (i % tuning::looks_between == 0)
                     if (const cudaError_t error = cudaStreamQuery(stream); error != cudaErrorNotReady) break;
             }
         check(cudaStreamSynchronize(stream));
@@ -94,7 +95,6 @@ public:
 
 private:
     static constexpr std::align_val_t page_bytes{4096};
-    static constexpr unsigned max_looks = 1u << 20, looks_between = 1u << 14; // a look takes one or two nanoseconds
     using sent = sent_state<pipeline_state>;
     struct contents {
         sent state;

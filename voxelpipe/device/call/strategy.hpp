@@ -8,6 +8,8 @@
 //
 // An A-buffer call has no strategy: its fragments are listed and sorted (call/abuffer_call.cuh).
 
+#include <voxelpipe/tuning/tuning_strategy.hpp>
+
 #include <cstddef>
 #include <cstdint>
 
@@ -82,15 +84,6 @@ struct call_facts {
     bool may_list = true;                // there is memory for lists of fragments
 };
 
-// Raster launches a draw: calls of more draws go through tiles, whose launches take them all.
-inline constexpr std::size_t max_raster_draws = 16;
-// The last pass of a mask reads it from end to end.
-inline constexpr std::uint64_t max_mask_bytes = std::uint64_t{512} << 20;
-// If targets can be drawn into in place, a mask pays as long as it stays in L2, and if voxels are counted, values are
-// cleared or indices need a look anyway. Otherwise it pays up to a size by the triangles: 16 MB and the 871,000
-// triangles of the dragon 0.0976 instead of 0.0935 ms, 2.9 million the same, 7.2 million 0.173 instead of 0.193 ms.
-inline constexpr std::uint64_t max_mask_bytes_in_place = std::uint64_t{32} << 20;
-inline constexpr std::uint64_t min_mask_bytes = std::uint64_t{1} << 20, mask_bytes_per_triangle = 6;
 // Fragments whose runs the passes over sorted lists number.
 inline constexpr std::uint64_t max_sorted_fragments = std::uint64_t{1} << 28;
 // Voxel ids of lists have 32 bits.
@@ -99,14 +92,14 @@ inline constexpr std::uint64_t max_listed_voxels = 0xffffffffu;
 // ---- can it? --------------------------------------------------------------------------------------------------------
 
 [[nodiscard]] constexpr bool can_use_mask(const call_facts& f) {
-    return f.possible.occupancy_mask && f.all_draws_equal && f.fits_int32 && f.num_draws <= max_raster_draws &&
-           f.mask_bytes <= max_mask_bytes;
+    return f.possible.occupancy_mask && f.all_draws_equal && f.fits_int32 && f.num_draws <= tuning::max_raster_draws &&
+           f.mask_bytes <= tuning::max_mask_bytes;
 }
 [[nodiscard]] constexpr bool can_use_immediate(const call_facts& f) {
-    return f.possible.immediate && f.blends_in_place && f.fits_int32 && f.num_draws <= max_raster_draws;
+    return f.possible.immediate && f.blends_in_place && f.fits_int32 && f.num_draws <= tuning::max_raster_draws;
 }
 [[nodiscard]] constexpr bool can_list(const call_facts& f) {
-    return f.may_list && f.fits_int32 && f.num_draws <= max_raster_draws && f.num_voxels < max_listed_voxels &&
+    return f.may_list && f.fits_int32 && f.num_draws <= tuning::max_raster_draws && f.num_voxels < max_listed_voxels &&
            f.fragment_capacity <= max_sorted_fragments;
 }
 [[nodiscard]] constexpr bool can_use_reduce(const call_facts& f) { return f.possible.sorted_reduce && can_list(f); }
@@ -119,9 +112,10 @@ inline constexpr std::uint64_t max_listed_voxels = 0xffffffffu;
 [[nodiscard]] constexpr bool use_mask(const call_facts& f) {
     if (!can_use_mask(f)) return false;
     if (!use_immediate(f)) return true;
-    if (f.mask_bytes > max_mask_bytes_in_place) return false;
+    if (f.mask_bytes > tuning::max_mask_bytes_in_place) return false;
     return f.counts_voxels || f.clears_values ||
-           (!f.has_checked_indices && f.mask_bytes <= min_mask_bytes + f.num_triangles * mask_bytes_per_triangle);
+           (!f.has_checked_indices &&
+            f.mask_bytes <= tuning::min_mask_bytes + f.num_triangles * tuning::mask_bytes_per_triangle);
 }
 
 struct strategy_rule {

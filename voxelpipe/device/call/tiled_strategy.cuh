@@ -12,6 +12,7 @@
 #include <voxelpipe/device/scene/scene_memory.cuh>
 #include <voxelpipe/device/targets/tracked_clear.cuh>
 #include <voxelpipe/device/tiles/tile_passes.cuh>
+#include <voxelpipe/tuning/tuning_fragments.hpp>
 
 #include <cstdint>
 #include <optional>
@@ -37,7 +38,8 @@ struct tiled_strategy {
         const auto& limits = c.plan.limits;
         if constexpr (has_tiles)
             tiles.emplace(memory, core::tile_grid(c.plan.g.extent, log2_size), c.plan.num_primitives, limits,
-                          max_image_words<log2_size, framebuffer_type>(), default_pairs_per_item(limits.tile_pairs));
+                          max_image_words<log2_size, framebuffer_type>(),
+                          tuning::default_pairs_per_item(limits.tile_pairs));
         if constexpr (groups::has_ordered) {
             lists = take_lists<Key, values>(memory, num_voxels(c.plan.g), limits.fragments);
             share.emplace(memory, c.plan.num_primitives, limits.fragment_records);

@@ -12,14 +12,11 @@
 
 namespace voxelpipe::device {
 
-inline constexpr unsigned counting_items = 8; // independent fragments of a thread
-inline constexpr unsigned counting_threads = 1024;
-
 // Numbers each fragment within its voxel, and counts each voxel's fragments.
 template <class Count>
 __global__ __launch_bounds__(threads_per_block) void number_fragments_kernel(
     const std::uint32_t* voxels, const __grid_constant__ Count count, const __grid_constant__ counting_memory m) {
-    constexpr unsigned items = counting_items;
+    constexpr unsigned items = tuning::counting_items;
     await_stream();
     const auto n = static_cast<std::uint32_t>(count.get());
     const std::uint32_t lane = threadIdx.x % 32, below = (1u << lane) - 1;
@@ -92,10 +89,11 @@ struct tile_sums {
 
 // Turns each voxel's count into the offset of its first fragment, and lists the voxels that have any.
 template <class Memory>
-__global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __grid_constant__ order_buffers b,
-                                                                        const __grid_constant__ Memory m,
-                                                                        pipeline_state* state, capacities limits) {
-    constexpr unsigned rounds = Memory::tile / counting_threads / 4, warps = counting_threads / 32;
+__global__ __launch_bounds__(tuning::counting_threads) void list_counted_kernel(const __grid_constant__ order_buffers b,
+                                                                                const __grid_constant__ Memory m,
+                                                                                pipeline_state* state,
+                                                                                capacities limits) {
+    constexpr unsigned rounds = Memory::tile / tuning::counting_threads / 4, warps = tuning::counting_threads / 32;
     constexpr int shift = tile_sums::voxels;
     __shared__ unsigned long long of_warps[warps];
     __shared__ unsigned long long before_tile;
@@ -122,7 +120,7 @@ __global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __
         const uint4 c = four[r];
         const unsigned voxels = (c.x != 0) + (c.y != 0) + (c.z != 0) + (c.w != 0);
         const std::uint32_t fragments = c.x + c.y + c.z + c.w;
-        if (fragments > max_of_window)
+        if (fragments > tuning::max_of_window)
             for (const std::uint32_t one : {c.x, c.y, c.z, c.w})
                 if (const int list = order_lists::list_of(one); list >= 0) atomicAdd(&num_long[list], 1u);
         unsigned long long all = 0;
@@ -164,7 +162,7 @@ __global__ __launch_bounds__(counting_threads) void list_counted_kernel(const __
             if (c[k] == 0) continue;
             if (const int list = order_lists::list_of(c[k]); list >= 0)
                 b.lists.add(atomicAdd(&next_long[list], 1u), offset, c[k]);
-            else if (c[k] > max_of_block)
+            else if (c[k] > tuning::max_of_block)
                 b.lists.push(offset, c[k]);
             const std::uint32_t voxel = 4 * (first_four + 32 * r) + k;
             if (number < to.voxel_capacity) {
@@ -187,7 +185,7 @@ template <class Count>
 __global__ __launch_bounds__(threads_per_block) void scatter_fragments_kernel(
     const std::uint32_t* voxels, const std::uint32_t* values, std::uint32_t* to, const __grid_constant__ Count count,
     const __grid_constant__ counting_memory m) {
-    constexpr unsigned items = counting_items;
+    constexpr unsigned items = tuning::counting_items;
     await_stream();
     const auto n = static_cast<std::uint32_t>(count.get());
     for (std::uint64_t first = std::uint64_t{blockIdx.x} * items * threads_per_block + threadIdx.x; first < n;
@@ -214,17 +212,17 @@ VOXELPIPE_DEFINES_KERNELS void order_by_counting(order_buffers b, const counted_
                                                  std::uint64_t num_primitives, pipeline_state* state,
                                                  const capacities& limits, cudaStream_t stream, stage_clock* clock) {
     constexpr stage where = stage::abuffer_emit;
-    const unsigned blocks = fill_device(limits.fragments / counting_items + 1);
+    const unsigned blocks = fill_device(limits.fragments / tuning::counting_items + 1);
     b.starts = m.starts;
-    if (num_primitives <= std::uint64_t{dense_part} * max_dense_parts)
+    if (num_primitives <= std::uint64_t{tuning::dense_part} * tuning::max_dense_parts)
         b.lists.num_primitives = static_cast<std::uint32_t>(num_primitives);
     capacities of_lists = limits;
     of_lists.longest_ordered = ~0ull; // properties of voxels must not stop these kernels
     const sort_count count{state, of_lists};
     launch_behind(number_fragments_kernel<sort_count>, blocks, threads_per_block, stream, where, pairs.voxels, count,
                   m);
-    launch_behind(list_counted_kernel<counting_memory>, static_cast<unsigned>(m.num_tiles()), counting_threads, stream,
-                  where, b, m, state, of_lists);
+    launch_behind(list_counted_kernel<counting_memory>, static_cast<unsigned>(m.num_tiles()), tuning::counting_threads,
+                  stream, where, b, m, state, of_lists);
     launch_behind(scatter_fragments_kernel<sort_count>, blocks, threads_per_block, stream, where, pairs.voxels,
                   pairs.primitives, b.from, count, m);
     end_stage(clock, &stage_times::tile_sort);

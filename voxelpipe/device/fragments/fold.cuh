@@ -10,20 +10,16 @@
 
 #include <voxelpipe/device/fragments/fragment_lists.cuh>
 #include <voxelpipe/device/targets/target_traits.cuh>
+#include <voxelpipe/tuning/tuning_fragments.hpp>
 
 #include <utility>
 
 namespace voxelpipe::device {
 
-inline constexpr std::uint32_t max_folded_alone = 1024; // most fragments of a voxel that one thread folds
-inline constexpr unsigned max_long_in_order =
-    32; // most longer voxels of a block that are folded one by one; more are quicker side by side
-inline constexpr int fold_bytes = 8 * 1024; // of shared memory, for values of fragments
-
 struct voxel_fragments {
     std::uint64_t first = 0, last = 0;
     int x = 0, y = 0, z = 0;
-    [[nodiscard]] VOXELPIPE_HD bool is_long() const { return last - first > max_folded_alone; }
+    [[nodiscard]] VOXELPIPE_HD bool is_long() const { return last - first > tuning::max_folded_alone; }
 };
 
 // Voxel number v of the lists.
@@ -52,8 +48,8 @@ struct target_fold {
         traits::order_free && (core::user_blend<blend_type, value> || core::user_blend_template<blend_type, value>);
     // Values that fit the block's memory at once; 0 if a voxel is always one thread's.
     static constexpr unsigned max_staged = alignof(value) > 16 ? 0
-                                                               : (fold_bytes / sizeof(value) < threads_per_block
-                                                                      ? fold_bytes / sizeof(value)
+                                                               : (tuning::fold_bytes / sizeof(value) < threads_per_block
+                                                                      ? tuning::fold_bytes / sizeof(value)
                                                                       : threads_per_block);
 
     const fragment_lists<Key, Values>& lists;
@@ -113,7 +109,7 @@ template <class Key, class Values, class Framebuffer, std::size_t... I>
 __global__ void fold_kernel(const __grid_constant__ fragment_lists<Key, Values> lists,
                             const __grid_constant__ Framebuffer fb, pipeline_state* state, capacities limits,
                             bool count_voxels) {
-    __shared__ __align__(16) unsigned char memory[fold_bytes];
+    __shared__ __align__(16) unsigned char memory[tuning::fold_bytes];
     __shared__ unsigned num_long, long_voxels[threads_per_block];
     if (has_failed(*state, limits)) return;
     const std::uint64_t num_voxels = state->list_voxels;
@@ -135,7 +131,8 @@ __global__ void fold_kernel(const __grid_constant__ fragment_lists<Key, Values> 
             using fold_type = target_fold<K, Key, Values, Framebuffer>;
             const fold_type target{lists, voxelpipe::get<K>(fb.targets)};
             if (target.view.load == load_operation::off) return;
-            const bool together = fold_type::max_staged != 0 && (fold_type::any_order || n <= max_long_in_order);
+            const bool together =
+                fold_type::max_staged != 0 && (fold_type::any_order || n <= tuning::max_long_in_order);
             if (valid && !(together && mine.is_long())) target.alone(mine);
             if constexpr (fold_type::max_staged != 0) {
                 for (unsigned k = 0; together && k < n; ++k)

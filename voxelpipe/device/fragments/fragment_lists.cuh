@@ -16,6 +16,7 @@
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/scene/cub_sort.cuh>
 #include <voxelpipe/device/scene/fragment_shade.cuh>
+#include <voxelpipe/tuning/tuning_raster.hpp>
 
 #include <algorithm>
 #include <bit>
@@ -28,7 +29,7 @@ namespace voxelpipe::device {
 template <coverage Rule, class Scene, class Payload, class MakePayload>
 struct fragment_cells {
     static constexpr coverage rule = Rule;
-    static constexpr std::int64_t small_columns = 256; // a warp per triangle pays only beyond
+    static constexpr std::int64_t small_columns = tuning::small_fragment_columns;
     static constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
 
     Scene s;

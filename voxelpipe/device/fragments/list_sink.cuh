@@ -8,6 +8,7 @@
 
 #include <voxelpipe/device/fragments/order_memory.cuh>
 #include <voxelpipe/device/raster/raster.cuh>
+#include <voxelpipe/tuning/tuning_fragments.hpp>
 
 namespace voxelpipe::device {
 
@@ -260,12 +261,13 @@ private:
 };
 
 struct list_output {
-    // With the queues, less than 48 KB for a block. A box of 2 x 2 x 2 voxels has at most eight fragments, four of a
+    // A box of 2 x 2 x 2 voxels has at most eight fragments, four of a
     // thin triangle.
     template <class Call>
-    using sink = listing_sink<Call, 448, Call::rule == coverage::thin ? 448 - 32 * 4 : 448 - 32 * 8>;
+    using sink = listing_sink<Call, tuning::staged_fragments,
+                              tuning::staged_fragments - 32 * (Call::rule == coverage::thin ? 4 : 8)>;
     template <class Call>
-    using deferred_sink = listing_sink<Call, 960, 192>; // fewer blocks, and triangles of many rows
+    using deferred_sink = listing_sink<Call, tuning::deferred_staged_fragments, tuning::deferred_flush_at>;
     static constexpr bool defers = true;
     static constexpr bool can_skip_deferred_pass = true; // no target is written if triangles are missing
     static constexpr bool only_sets = false;

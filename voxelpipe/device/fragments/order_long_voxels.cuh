@@ -18,8 +18,8 @@ namespace voxelpipe::device {
 // lanes do not conflict in a bank.
 struct sort_exchange {
     static constexpr std::uint32_t of_warp = max_of_warp + max_of_warp / 32;
-    std::uint32_t numbers[block_sort_threads / 32 * of_warp];
-    static_assert(block_sort_threads / 32 * of_warp >= max_of_block);
+    std::uint32_t numbers[tuning::block_sort_threads / 32 * of_warp];
+    static_assert(tuning::block_sort_threads / 32 * of_warp >= tuning::max_of_block);
 };
 
 // Writes the first n numbers of a warp; a lane has Items consecutive ones.
@@ -43,7 +43,7 @@ template <int List>
 __device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uint32_t* to, sort_exchange& exchange,
                                                 unsigned start) {
     constexpr int items = static_cast<int>(order_lists::max_below(List + 1) / 32);
-    constexpr std::uint32_t warps = block_sort_threads / 32;
+    constexpr std::uint32_t warps = tuning::block_sort_threads / 32;
     const std::uint32_t n = uniform(b.lists.counts[List]), lane = threadIdx.x % 32;
     const std::uint32_t block = blockIdx.x >= start ? blockIdx.x - start : blockIdx.x + gridDim.x - start;
     for (std::uint32_t r = block * warps + warp_in_block(); r < n; r += gridDim.x * warps) {
@@ -63,19 +63,19 @@ __device__ VOXELPIPE_INLINE void order_by_warps(const order_buffers& b, std::uin
 // numbers through shared memory.
 template <int Items>
 __device__ VOXELPIPE_INLINE void sort_block(std::uint32_t (&w)[Items], sort_exchange& exchange) {
-    constexpr int of_warp = 32 * Items, all = block_sort_threads * Items;
+    constexpr int of_warp = 32 * Items, all = tuning::block_sort_threads * Items;
     sort_warp(w);
     // Compares this thread's numbers with those of the thread whose number differs in the bits `threads`.
     const auto compare = [&](unsigned threads, unsigned lower_bit, bool mirrored) VOXELPIPE_INLINE_LAMBDA {
         __syncthreads();
 #pragma unroll
-        for (int k = 0; k < Items; ++k) exchange.numbers[k * block_sort_threads + threadIdx.x] = w[k];
+        for (int k = 0; k < Items; ++k) exchange.numbers[k * tuning::block_sort_threads + threadIdx.x] = w[k];
         __syncthreads();
         const bool lower = (threadIdx.x & lower_bit) == 0;
 #pragma unroll
         for (int k = 0; k < Items; ++k) {
             const std::uint32_t other =
-                exchange.numbers[(mirrored ? Items - 1 - k : k) * block_sort_threads + (threadIdx.x ^ threads)];
+                exchange.numbers[(mirrored ? Items - 1 - k : k) * tuning::block_sort_threads + (threadIdx.x ^ threads)];
             w[k] = lower ? min(w[k], other) : max(w[k], other);
         }
     };
@@ -94,7 +94,7 @@ __device__ VOXELPIPE_INLINE void order_run(const std::uint32_t* from, std::uint3
     std::uint32_t w[Items];
 #pragma unroll
     for (std::uint32_t k = 0; k < Items; ++k) {
-        const std::uint32_t i = threadIdx.x + block_sort_threads * k;
+        const std::uint32_t i = threadIdx.x + tuning::block_sort_threads * k;
         w[k] = i < length ? from[i] : ~0u;
     }
     sort_block(w, exchange);
@@ -107,7 +107,7 @@ __device__ VOXELPIPE_INLINE void order_run(const std::uint32_t* from, std::uint3
 // Sorts, one per block, voxels, and runs of longer voxels, which are sorted in offset.
 __device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::uint32_t* primitives,
                                                  sort_exchange& exchange) {
-    constexpr int max_items = max_of_block / block_sort_threads;
+    constexpr int max_items = tuning::max_of_block / tuning::block_sort_threads;
     using lists = order_lists;
     const std::uint32_t whole = b.lists.counts[lists::block_list], all = whole + b.lists.counts[lists::run_list];
     for (std::uint32_t r = blockIdx.x; r < all; r += gridDim.x) {
@@ -115,7 +115,7 @@ __device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::ui
         const std::uint32_t* const from = b.from + run.begin;
         std::uint32_t* const to = (r < whole ? primitives : b.from) + run.begin;
         const auto length = static_cast<std::uint32_t>(run.length);
-        if (length <= max_of_block / 2)
+        if (length <= tuning::max_of_block / 2)
             order_run<max_items / 2>(from, to, length, exchange);
         else
             order_run<max_items>(from, to, length, exchange);
@@ -123,7 +123,7 @@ __device__ VOXELPIPE_INLINE void order_by_blocks(const order_buffers& b, std::ui
 }
 
 template <class Buffers>
-__global__ __launch_bounds__(block_sort_threads, 4) void order_long_kernel(const __grid_constant__ Buffers b) {
+__global__ __launch_bounds__(tuning::block_sort_threads, 4) void order_long_kernel(const __grid_constant__ Buffers b) {
     __shared__ sort_exchange exchange;
     await_stream();
     std::uint32_t* const to = b.pointers().primitives;
@@ -138,11 +138,11 @@ __global__ __launch_bounds__(block_sort_threads, 4) void order_long_kernel(const
 // Sorts dense voxels: a block sets a bit for each primitive of its part that occurs in a voxel, and counts the
 // primitives of earlier parts.
 template <class Buffers>
-__global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid_constant__ Buffers b) {
-    using scan = cub::BlockScan<std::uint32_t, dense_threads, cub::BLOCK_SCAN_WARP_SCANS>;
-    constexpr std::uint32_t num_words = dense_part / 32;
+__global__ __launch_bounds__(tuning::dense_threads) void order_dense_kernel(const __grid_constant__ Buffers b) {
+    using scan = cub::BlockScan<std::uint32_t, tuning::dense_threads, cub::BLOCK_SCAN_WARP_SCANS>;
+    constexpr std::uint32_t num_words = tuning::dense_part / 32;
     constexpr unsigned at_once = 4; // loads in flight
-    static_assert(num_words == dense_threads);
+    static_assert(num_words == tuning::dense_threads);
     __shared__ std::uint32_t words[num_words], offsets[num_words], all_before;
     __shared__ typename scan::TempStorage storage;
     await_stream();
@@ -151,7 +151,7 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
                         n = b.lists.counts[order_lists::dense_list] * parts;
     for (std::uint32_t r = blockIdx.x; r < n; r += gridDim.x) {
         const fragment_run run = b.lists.voxels[order_lists::dense_list][r / parts];
-        const std::uint32_t first = r % parts * dense_part;
+        const std::uint32_t first = r % parts * tuning::dense_part;
         const auto begin = static_cast<std::uint32_t>(run.begin), length = static_cast<std::uint32_t>(run.length);
         words[threadIdx.x] = 0;
         if (threadIdx.x == 0) all_before = 0;
@@ -159,22 +159,22 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
         // Aligned groups of four; some elements may lie outside the voxel.
         std::uint32_t before = 0;
         const std::uint32_t end_four = (begin + length + 3) / 4;
-        for (std::uint32_t i = begin / 4 + threadIdx.x; i < end_four; i += at_once * dense_threads) {
+        for (std::uint32_t i = begin / 4 + threadIdx.x; i < end_four; i += at_once * tuning::dense_threads) {
             uint4 fours[at_once];
 #pragma unroll
             for (unsigned k = 0; k < at_once; ++k)
-                if (i + k * dense_threads < end_four)
-                    fours[k] = reinterpret_cast<const uint4*>(b.from)[i + k * dense_threads];
+                if (i + k * tuning::dense_threads < end_four)
+                    fours[k] = reinterpret_cast<const uint4*>(b.from)[i + k * tuning::dense_threads];
 #pragma unroll
             for (unsigned k = 0; k < at_once; ++k) {
-                const std::uint32_t at = 4 * (i + k * dense_threads) - begin; // modulo 2^32
+                const std::uint32_t at = 4 * (i + k * tuning::dense_threads) - begin; // modulo 2^32
                 const auto add = [&](std::uint32_t primitive, std::uint32_t offset) VOXELPIPE_INLINE_LAMBDA {
                     if (offset >= length) return;
                     const std::uint32_t bit = primitive - first; // modulo 2^32
                     before += primitive < first ? 1 : 0;
-                    if (bit < dense_part) atomicOr(&words[bit / 32], 1u << bit % 32);
+                    if (bit < tuning::dense_part) atomicOr(&words[bit / 32], 1u << bit % 32);
                 };
-                if (i + k * dense_threads >= end_four) break;
+                if (i + k * tuning::dense_threads >= end_four) break;
                 add(fours[k].x, at);
                 add(fours[k].y, at + 1);
                 add(fours[k].z, at + 2);
@@ -192,7 +192,7 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
         std::uint32_t* const to = primitives + run.begin + all_before;
         const unsigned below = (1u << lane) - 1;
 #pragma unroll(4)
-        for (std::uint32_t w = warp_in_block(); w < num_words; w += dense_threads / 32) {
+        for (std::uint32_t w = warp_in_block(); w < num_words; w += tuning::dense_threads / 32) {
             const std::uint32_t word = words[w];
             if ((word >> lane & 1u) != 0)
                 to[offsets[w] + static_cast<std::uint32_t>(__popc(word & below))] = first + 32 * w + lane;
@@ -224,7 +224,7 @@ __global__ __launch_bounds__(dense_threads) void order_dense_kernel(const __grid
 template <class Buffers>
 __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::uint32_t* from, std::uint32_t* to,
                                   std::uint64_t length, bool last) {
-    constexpr std::uint32_t parts = max_of_block / threads_per_block;
+    constexpr std::uint32_t parts = tuning::max_of_block / threads_per_block;
     await_stream();
     const std::uint32_t lane = threadIdx.x % 32;
     const std::uint64_t n = std::uint64_t{b.lists.counts[order_lists::run_list]} * parts;
@@ -234,7 +234,7 @@ __global__ void merge_runs_kernel(const __grid_constant__ Buffers b, const std::
         if (voxel.length <= length) continue; // done by the previous merge
         const std::uint64_t i = r % parts * threads_per_block + threadIdx.x;
         if (i - lane >= entry.run.length) continue; // no lane has a fragment
-        const std::uint64_t group_length = last ? voxel.length : length * merge_ways;
+        const std::uint64_t group_length = last ? voxel.length : length * tuning::merge_ways;
         // Within the voxel. Lanes beyond the last fragment take the last.
         const std::uint64_t at = entry.run.begin - voxel.begin + (i < entry.run.length ? i : entry.run.length - 1);
         const std::uint64_t group = at / group_length * group_length, own = at / length * length;

@@ -7,28 +7,17 @@
 
 #include <voxelpipe/device/fragments/radix_sort.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
+#include <voxelpipe/tuning/tuning_fragments.hpp>
 
 #include <bit>
 #include <cstdint>
 
 namespace voxelpipe::device {
 
-inline constexpr std::uint32_t window_length = 192; // a warp takes the voxels that begin in this many fragments
-inline constexpr std::uint32_t max_of_window = 256; // most fragments of a voxel that a window orders
-inline constexpr int num_warp_sorts = 2;            // with 16 or 32 fragments a lane
+inline constexpr int num_warp_sorts = 2; // with 16 or 32 fragments a lane
 inline constexpr std::uint32_t max_of_warp = 32 * 32;
-inline constexpr std::uint32_t max_of_block = 4096;
 inline constexpr int narrow_primitive_bits = 24; // in 32 bits, beside the rank of a voxel in its window
-inline constexpr int order_warps = 4;            // of a block that takes windows
-inline constexpr int order_blocks = 8;           // per multiprocessor
-inline constexpr int block_sort_threads = 256;
-inline constexpr int dense_threads = 1024;
-inline constexpr std::uint32_t merge_ways = 64; // runs that one merge takes
-// A voxel of more than max_of_block fragments is dense if at least one in min_dense of all primitives is in it. Then a
-// bit for each primitive orders it, by blocks for dense_part bits each, all of which read the whole voxel. So all bits
-// of a call are a few words per fragment.
-inline constexpr std::uint32_t dense_part = 1u << 15, max_dense_parts = 64, min_dense = 64;
-inline constexpr std::uint64_t only_dense = max_of_block + 1; // as longest_ordered: there are dense voxels, but no runs
+inline constexpr std::uint64_t only_dense = tuning::max_of_block + 1; // longest_ordered of dense voxels without runs
 
 // A range of fragments.
 struct fragment_run {
@@ -53,7 +42,7 @@ struct order_lists {
     [[nodiscard]] static order_lists take(arena& memory, std::uint64_t capacity) {
         order_lists w{};
         for (int k = 0; k < num_lists - 1; ++k) w.voxels[k] = memory.take<fragment_run>(capacity / (max_below(k) + 1));
-        w.runs = memory.take<voxel_run>(2 * (capacity / max_of_block)); // each voxel's last run may be short
+        w.runs = memory.take<voxel_run>(2 * (capacity / tuning::max_of_block)); // each voxel's last run may be short
         return w;
     }
     // Sets the pointers to the counters.
@@ -66,17 +55,17 @@ struct order_lists {
     }
     // The most fragments of a voxel that is too small for list k.
     [[nodiscard]] VOXELPIPE_HD static constexpr std::uint32_t max_below(int k) {
-        return k == 0 ? max_of_window : k == 1 ? 32 * 16 : k == 2 ? max_of_warp : max_of_block;
+        return k == 0 ? tuning::max_of_window : k == 1 ? 32 * 16 : k == 2 ? max_of_warp : tuning::max_of_block;
     }
     [[nodiscard]] VOXELPIPE_HD std::uint32_t dense_parts() const { // per voxel
-        return (num_primitives + dense_part - 1) / dense_part;
+        return (num_primitives + tuning::dense_part - 1) / tuning::dense_part;
     }
     // The list of a voxel that is neither divided into runs nor dense, or -1.
     [[nodiscard]] VOXELPIPE_HD static constexpr int list_of(unsigned long long length) {
-        return length > max_of_block || length <= max_of_window ? -1
-               : length > max_below(2)                          ? 2
-               : length > max_below(1)                          ? 1
-                                                                : 0;
+        return length > tuning::max_of_block || length <= tuning::max_of_window ? -1
+               : length > max_below(2)                                          ? 2
+               : length > max_below(1)                                          ? 1
+                                                                                : 0;
     }
     // Stores a voxel in a slot that was reserved for it in list_of(length).
     __device__ VOXELPIPE_INLINE void add(unsigned at, unsigned long long begin, unsigned long long length) const {
@@ -86,19 +75,21 @@ struct order_lists {
     }
     // Appends a voxel that begins at `begin` to its list. One thread calls it.
     __device__ void push(unsigned long long begin, unsigned long long length) const {
-        const bool is_dense = length > max_of_block && num_primitives != 0 && length >= num_primitives / min_dense;
+        const bool is_dense =
+            length > tuning::max_of_block && num_primitives != 0 && length >= num_primitives / tuning::min_dense;
         if (is_dense) {
             atomicMax(longest_run, static_cast<unsigned long long>(only_dense));
             voxels[dense_list][atomicAdd(&counts[dense_list], 1u)] = {begin, length};
             return;
         }
-        if (length > max_of_block) {
+        if (length > tuning::max_of_block) {
             atomicMax(longest_run, length > only_dense ? length : only_dense + 1);
-            const auto entries = static_cast<unsigned>((length + max_of_block - 1) / max_of_block);
+            const auto entries = static_cast<unsigned>((length + tuning::max_of_block - 1) / tuning::max_of_block);
             const unsigned at = atomicAdd(&counts[run_list], entries);
             for (unsigned k = 0; k < entries; ++k) {
-                const unsigned long long from = std::uint64_t{k} * max_of_block, rest = length - from;
-                runs[at + k] = {{begin + from, rest < max_of_block ? rest : max_of_block}, {begin, length}};
+                const unsigned long long from = std::uint64_t{k} * tuning::max_of_block, rest = length - from;
+                runs[at + k] = {{begin + from, rest < tuning::max_of_block ? rest : tuning::max_of_block},
+                                {begin, length}};
             }
             return;
         }
@@ -128,7 +119,7 @@ struct output_pointers {
 
 // Number of voxels that begin in each tile of windows, published for later tiles: one word each, zero before.
 struct tile_counts {
-    static constexpr std::uint32_t length = order_warps * window_length; // fragments of a tile
+    static constexpr std::uint32_t length = tuning::order_warps * tuning::window_length; // fragments of a tile
     static constexpr unsigned long long own = 1ull << 62, all = 2ull << 62, value = own - 1;
     unsigned long long* words;
 
@@ -139,8 +130,7 @@ struct tile_counts {
 
 // Memory of a counting sort (fragments/counting_sort.cuh), which replaces sort_memory.
 struct counting_memory {
-    static constexpr std::uint32_t tile = 16384;                        // voxels
-    static constexpr std::uint64_t max_voxels = std::uint64_t{1} << 21; // of a grid: the counters fit the cache
+    static constexpr std::uint32_t tile = tuning::counting_tile; // voxels
 
     std::uint64_t num_voxels = 0;     // of the grid, rounded up to whole tiles; 0 if there is no counting sort
     std::uint64_t capacity = 0;       // fragments
@@ -151,7 +141,7 @@ struct counting_memory {
 
     // True if up to `capacity` fragments of a grid can be sorted by counting, with few counters per fragment.
     [[nodiscard]] static bool suits(std::uint64_t num_voxels, std::uint64_t capacity) {
-        return num_voxels <= max_voxels && num_voxels <= 8 * capacity && capacity < max_sorted;
+        return num_voxels <= tuning::max_counted_voxels && num_voxels <= 8 * capacity && capacity < max_sorted;
     }
     [[nodiscard]] static counting_memory take(arena& memory, std::uint64_t capacity, std::uint64_t num_voxels) {
         counting_memory m{};

@@ -54,7 +54,7 @@ __device__ VOXELPIPE_INLINE void publish(const tile_counts& tiles, std::uint32_t
 
 // A warp's window: the voxels that begin in it, and their offsets.
 struct order_window {
-    std::uint32_t voxels[window_length], first[window_length];
+    std::uint32_t voxels[tuning::window_length], first[tuning::window_length];
 };
 
 // Bit k of the result: element k of the lane's Items neighbours begins another voxel than the element before, or lies
@@ -94,7 +94,7 @@ struct window_voxels {
 
     __device__ VOXELPIPE_INLINE window_voxels(unsigned starts_, std::uint32_t n) : starts(starts_) {
         const std::uint32_t lane = threadIdx.x % 32, first = lane * Items;
-        constexpr std::uint32_t length = window_length;
+        constexpr std::uint32_t length = tuning::window_length;
         const std::uint32_t most = n < length ? n : length, own = first < most ? most - first : 0;
         begins = starts & (own < Items ? (1u << own) - 1 : ~0u);
         rank = static_cast<std::uint32_t>(__popc(begins));
@@ -189,8 +189,8 @@ struct order_of_window {
     static constexpr int items = 8, wide_items = 16;
     using voxels_type = window_voxels<items>;
     using wide_type = window_voxels<wide_items>;
-    static_assert(voxels_type::num_elements >= window_length &&
-                  wide_type::num_elements >= window_length - 1 + max_of_window);
+    static_assert(voxels_type::num_elements >= tuning::window_length &&
+                  wide_type::num_elements >= tuning::window_length - 1 + tuning::max_of_window);
 
     const order_buffers& b;
     std::uint32_t begin, n, before; // n counts from the window's first, as all indices do; the voxel before it
@@ -269,7 +269,7 @@ private:
                 const int nearest = __ffs(static_cast<int>(lanes)) - 1;
                 end += static_cast<std::uint32_t>(32 * nearest +
                                                   __ffs(static_cast<int>(__shfl_sync(0xffffffffu, word, nearest))) - 1);
-                if (end - last <= max_of_window) return 0;
+                if (end - last <= tuning::max_of_window) return 0;
             }
             end = last;
             return 1;
@@ -283,8 +283,8 @@ private:
                 break;
             }
             end += 32;
-        } while (end - last <= max_of_window);
-        if (end - last <= max_of_window) return 0;
+        } while (end - last <= tuning::max_of_window);
+        if (end - last <= tuning::max_of_window) return 0;
         end = find_end(keys, n, voxel, end);
         if (lane == 0) b.lists.push(begin + last, end - last);
         end = last;
@@ -294,11 +294,11 @@ private:
 
 // Narrow: primitives have at most narrow_primitive_bits bits.
 template <bool Narrow>
-__global__ __launch_bounds__(32 * order_warps,
-                             order_blocks) void order_windows_kernel(const __grid_constant__ order_buffers b,
-                                                                     pipeline_state* state, capacities limits) {
-    __shared__ order_window windows[order_warps];
-    __shared__ std::uint32_t counts[order_warps];
+__global__ __launch_bounds__(32 * tuning::order_warps,
+                             tuning::order_blocks) void order_windows_kernel(const __grid_constant__ order_buffers b,
+                                                                             pipeline_state* state, capacities limits) {
+    __shared__ order_window windows[tuning::order_warps];
+    __shared__ std::uint32_t counts[tuning::order_warps];
     __shared__ unsigned long long before;
     await_stream();
     if (has_failed(*state, limits)) return;
@@ -306,14 +306,14 @@ __global__ __launch_bounds__(32 * order_warps,
     const std::uint32_t warp = warp_in_block(), lane = threadIdx.x % 32;
     const csr_pointers to = b.pointers();
     const std::uint32_t tile = blockIdx.x; // see count_before
-    const std::uint64_t first = std::uint64_t{tile} * tile_counts::length, begin = first + warp * window_length;
+    const std::uint64_t first = std::uint64_t{tile} * tile_counts::length, begin = first + warp * tuning::window_length;
     if (first >= n) return;
     // A warp without a window takes one behind the last fragment, in which nothing begins.
     const order_of_window<false> window(b, static_cast<std::uint32_t>(begin < n ? begin : n), n);
     if (lane == 0) counts[warp] = window.count;
     __syncthreads();
     std::uint32_t earlier = 0, all = 0;
-    for (std::uint32_t w = 0; w < order_warps; ++w) {
+    for (std::uint32_t w = 0; w < tuning::order_warps; ++w) {
         earlier += w < warp ? counts[w] : 0;
         all += counts[w];
     }
@@ -343,13 +343,15 @@ __global__ __launch_bounds__(32 * order_warps,
 
 // The same if a counting sort has listed the voxels, long ones included.
 template <bool Narrow>
-__global__ __launch_bounds__(32 * order_warps,
-                             order_blocks) void order_starts_kernel(const __grid_constant__ order_buffers b,
-                                                                    const pipeline_state* state, capacities limits) {
+__global__ __launch_bounds__(32 * tuning::order_warps,
+                             tuning::order_blocks) void order_starts_kernel(const __grid_constant__ order_buffers b,
+                                                                            const pipeline_state* state,
+                                                                            capacities limits) {
     await_stream();
     if (has_failed(*state, limits)) return;
     const auto n = static_cast<std::uint32_t>(state->list_fragments);
-    const std::uint64_t begin = (std::uint64_t{blockIdx.x} * order_warps + warp_in_block()) * window_length;
+    const std::uint64_t begin =
+        (std::uint64_t{blockIdx.x} * tuning::order_warps + warp_in_block()) * tuning::window_length;
     if (begin >= n) return;
     const order_of_window<true> window(b, static_cast<std::uint32_t>(begin), n);
     window.template order<Narrow>(b.pointers().primitives);
@@ -365,7 +367,7 @@ VOXELPIPE_DEFINES_KERNELS void order_fragments(order_buffers b, std::uint64_t nu
     const bool by_starts = b.starts != nullptr;
     for (const std::uint32_t* numbers : {b.keys, static_cast<const std::uint32_t*>(b.from)})
         VOXELPIPE_ASSERT(reinterpret_cast<std::uintptr_t>(numbers) % 16 == 0); // for load_neighbours
-    if (num_primitives <= std::uint64_t{dense_part} * max_dense_parts)
+    if (num_primitives <= std::uint64_t{tuning::dense_part} * tuning::max_dense_parts)
         b.lists.num_primitives = static_cast<std::uint32_t>(num_primitives);
     b.primitive_bits = num_primitives < 2 ? 1 : static_cast<int>(std::bit_width(num_primitives - 1));
     const auto windows =
@@ -375,19 +377,19 @@ VOXELPIPE_DEFINES_KERNELS void order_fragments(order_buffers b, std::uint64_t nu
     if (by_starts)
         launch_behind(b.primitive_bits <= narrow_primitive_bits ? order_starts_kernel<true>
                                                                 : order_starts_kernel<false>,
-                      blocks, 32 * order_warps, stream, where, b, state, limits);
+                      blocks, 32 * tuning::order_warps, stream, where, b, state, limits);
     else
-        launch_behind(windows, blocks, 32 * order_warps, stream, where, b, state, limits);
-    if (capacity > max_of_window && longest != 0)
-        launch_behind(order_long_kernel<order_buffers>, fill_device(capacity / (max_of_window + 1) * 32, 4),
-                      block_sort_threads, stream, where, b);
-    if (capacity > max_of_block && longest > max_of_block && b.lists.num_primitives != 0)
-        launch_behind(order_dense_kernel<order_buffers>, static_cast<unsigned>(num_multiprocessors()), dense_threads,
-                      stream, where, b);
+        launch_behind(windows, blocks, 32 * tuning::order_warps, stream, where, b, state, limits);
+    if (capacity > tuning::max_of_window && longest != 0)
+        launch_behind(order_long_kernel<order_buffers>, fill_device(capacity / (tuning::max_of_window + 1) * 32, 4),
+                      tuning::block_sort_threads, stream, where, b);
+    if (capacity > tuning::max_of_block && longest > tuning::max_of_block && b.lists.num_primitives != 0)
+        launch_behind(order_dense_kernel<order_buffers>, static_cast<unsigned>(num_multiprocessors()),
+                      tuning::dense_threads, stream, where, b);
     // Runs of 2^12, 2^18 and 2^24 fragments; the last merge takes all that there are.
-    std::uint64_t length = max_of_block;
+    std::uint64_t length = tuning::max_of_block;
     for (int level = 0; level < 3 && capacity > length && longest > std::max(length, only_dense);
-         ++level, length *= merge_ways)
+         ++level, length *= tuning::merge_ways)
         launch_behind(merge_runs_kernel<order_buffers>, fill_device(capacity), threads_per_block, stream, where, b,
                       level % 2 == 0 ? b.from : b.spare, level % 2 == 0 ? b.spare : b.from, length, level == 2);
 }

@@ -11,23 +11,16 @@
 
 #include <voxelpipe/device/base/kernel_library.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
+#include <voxelpipe/tuning/tuning_fragments.hpp>
 
 #include <cstdint>
 #include <type_traits>
 
 namespace voxelpipe::device {
 
-inline constexpr int sort_threads = 512; // of a block, which sorts a tile
-inline constexpr int sort_items = 16;    // pairs per thread
-inline constexpr int few_sort_items = 8; // if the device runs all tiles at once, because shorter tiles finish sooner
 [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t sort_tile(int items) {
-    return static_cast<std::uint32_t>(sort_threads * items);
+    return static_cast<std::uint32_t>(tuning::sort_threads * items);
 }
-[[nodiscard]] VOXELPIPE_HD constexpr int sort_blocks(int items) { // per multiprocessor, at once
-    return items == few_sort_items ? 3 : 2;
-}
-inline constexpr int digit_count_threads = 1024;
-inline constexpr int max_digit_bits = 10;
 inline constexpr int max_digit_passes = 4;
 inline constexpr std::uint64_t max_sorted = std::uint64_t{1} << 30; // pairs: two bits of a tile's words are flags
 
@@ -36,7 +29,7 @@ struct digit_plan {
     int passes, bits; // bits of a digit
 
     VOXELPIPE_HD constexpr explicit digit_plan(int key_bits)
-        : passes(key_bits == 0 ? 1 : (key_bits + max_digit_bits - 1) / max_digit_bits),
+        : passes(key_bits == 0 ? 1 : (key_bits + tuning::max_digit_bits - 1) / tuning::max_digit_bits),
           bits(key_bits == 0 ? 1 : (key_bits + passes - 1) / passes) {}
     [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t num_digits() const { return 1u << bits; }
 };
@@ -96,20 +89,20 @@ struct sort_memory {
     static constexpr std::uint32_t own = 1u << 30, all = 2u << 30, value = own - 1;
     struct totals {
         std::uint32_t digits[max_digit_passes]
-                            [1 << max_digit_bits]; // counts; then the offset of each digit's first pair
+                            [1 << tuning::max_digit_bits]; // counts; then the offset of each digit's first pair
         std::uint32_t blocks_done;
         std::uint32_t num; // pairs
     };
     totals* all_tiles = nullptr;
     std::uint32_t* words[2]{}; // [tile][digit], used by alternate passes: each pass zeros those of the next
     digit_plan plan{1};
-    int items = sort_items; // per thread
+    int items = tuning::sort_items; // per thread
 
     // Pairs per thread for up to `capacity` pairs.
     [[nodiscard]] static int items_for(std::uint64_t capacity) {
-        const std::uint64_t at_once =
-            static_cast<std::uint64_t>(num_multiprocessors()) * static_cast<unsigned>(sort_blocks(few_sort_items));
-        return capacity <= at_once * sort_tile(few_sort_items) ? few_sort_items : sort_items;
+        const std::uint64_t at_once = static_cast<std::uint64_t>(num_multiprocessors()) *
+                                      static_cast<unsigned>(tuning::sort_blocks(tuning::few_sort_items));
+        return capacity <= at_once * sort_tile(tuning::few_sort_items) ? tuning::few_sort_items : tuning::sort_items;
     }
     [[nodiscard]] static sort_memory take(arena& memory, std::uint64_t capacity, int key_bits, int items) {
         sort_memory m{};

@@ -28,13 +28,12 @@ struct digit_of {
 
 // Counts the digits of all passes, and computes the offset of each digit's first pair.
 template <class Count>
-__global__ __launch_bounds__(digit_count_threads) void count_digits_kernel(const std::uint32_t* keys,
-                                                                           const __grid_constant__ Count count,
-                                                                           const __grid_constant__ sort_memory m) {
-    using scan = cub::BlockScan<std::uint32_t, digit_count_threads>;
+__global__ __launch_bounds__(tuning::digit_count_threads) void count_digits_kernel(
+    const std::uint32_t* keys, const __grid_constant__ Count count, const __grid_constant__ sort_memory m) {
+    using scan = cub::BlockScan<std::uint32_t, tuning::digit_count_threads>;
     constexpr int at_once = 4; // loads in flight
-    static_assert(digit_count_threads >= 1 << max_digit_bits);
-    __shared__ std::uint32_t digits[max_digit_passes][1 << max_digit_bits];
+    static_assert(tuning::digit_count_threads >= 1 << tuning::max_digit_bits);
+    __shared__ std::uint32_t digits[max_digit_passes][1 << tuning::max_digit_bits];
     __shared__ typename scan::TempStorage storage;
     __shared__ bool is_last;
     const std::uint32_t num_digits = m.plan.num_digits();
@@ -42,8 +41,8 @@ __global__ __launch_bounds__(digit_count_threads) void count_digits_kernel(const
         if (threadIdx.x < num_digits) digits[p][threadIdx.x] = 0;
     await_stream();
     __syncthreads();
-    const std::uint64_t n = count.get(), threads = std::uint64_t{gridDim.x} * digit_count_threads,
-                        thread = std::uint64_t{blockIdx.x} * digit_count_threads + threadIdx.x;
+    const std::uint64_t n = count.get(), threads = std::uint64_t{gridDim.x} * tuning::digit_count_threads,
+                        thread = std::uint64_t{blockIdx.x} * tuning::digit_count_threads + threadIdx.x;
     for (std::uint64_t i = thread; i < n / 4; i += threads * at_once) {
         uint4 fours[at_once];
 #pragma unroll
@@ -140,34 +139,35 @@ count_before(typename digit_group<DigitsEach>::word* mine, std::uint32_t tile, s
 // Shared memory of a block: first the number of each digit's pairs in its warps, then the pairs of its tile.
 template <int DigitsEach, int Items>
 union sort_tile_memory {
-    std::uint16_t counts[sort_threads / 32][DigitsEach * sort_threads];
+    std::uint16_t counts[tuning::sort_threads / 32][DigitsEach * tuning::sort_threads];
     uint2 pairs[sort_tile(Items)];
 };
 
 // Pass `pass` over the digits; each thread handles DigitsEach digits. A template, like all kernels in headers.
 template <class Memory, int DigitsEach, int Items>
-__global__ __launch_bounds__(sort_threads,
-                             sort_blocks(Items)) void sort_pass_kernel(const __grid_constant__ pair_array from,
-                                                                       const __grid_constant__ pair_array to,
-                                                                       const __grid_constant__ Memory m, int pass) {
-    using scan = cub::BlockScan<std::uint32_t, sort_threads, cub::BLOCK_SCAN_WARP_SCANS>; // needs few registers
+__global__ __launch_bounds__(tuning::sort_threads,
+                             tuning::sort_blocks(Items)) void sort_pass_kernel(const __grid_constant__ pair_array from,
+                                                                               const __grid_constant__ pair_array to,
+                                                                               const __grid_constant__ Memory m,
+                                                                               int pass) {
+    using scan = cub::BlockScan<std::uint32_t, tuning::sort_threads, cub::BLOCK_SCAN_WARP_SCANS>; // needs few registers
     using group = digit_group<DigitsEach>;
     using word = typename group::word;
     using atomic_word = ::cuda::atomic_ref<word, ::cuda::thread_scope_device>;
     using counts = typename group::counts;
     using tile_memory = sort_tile_memory<DigitsEach, Items>;
-    constexpr unsigned warps = sort_threads / 32;
+    constexpr unsigned warps = tuning::sort_threads / 32;
     constexpr unsigned items = Items;
     constexpr std::uint32_t most = sort_tile(Items);
     static_assert(items % 2 == 0 && most < 1 << 16);
     extern __shared__ __align__(16) unsigned char dynamic_memory[];
     auto& shared = *reinterpret_cast<tile_memory*>(dynamic_memory);
     // Of each digit: offset within the tile, later what turns it into the global offset.
-    __shared__ std::uint32_t offsets[DigitsEach * sort_threads];
+    __shared__ std::uint32_t offsets[DigitsEach * tuning::sort_threads];
     __shared__ typename scan::TempStorage storage;
     const digit_of digit(m.plan, pass);
     const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32, num_digits = m.plan.num_digits();
-    for (unsigned i = threadIdx.x; i < sizeof(shared.counts) / sizeof(std::uint32_t); i += sort_threads)
+    for (unsigned i = threadIdx.x; i < sizeof(shared.counts) / sizeof(std::uint32_t); i += tuning::sort_threads)
         reinterpret_cast<std::uint32_t*>(shared.counts)[i] = 0; // wider stores made the pass 7 % slower
     await_stream();
     __syncthreads();
@@ -256,7 +256,7 @@ __global__ __launch_bounds__(sort_threads,
     to.ask_once([&]<class Joined>(Joined) VOXELPIPE_INLINE_LAMBDA {
 #pragma unroll
         for (std::uint32_t i = 0; i < items; ++i) {
-            const std::uint32_t at = threadIdx.x + sort_threads * i;
+            const std::uint32_t at = threadIdx.x + tuning::sort_threads * i;
             if (at >= length) break;
             const uint2 pair = shared.pairs[at];
             to.template store<Joined::value>(offsets[digit(pair.x)] + at, pair);
@@ -271,29 +271,29 @@ void launch_sort_pass(const pair_array& from, const pair_array& to, unsigned til
     const auto kernel = sort_pass_kernel<sort_memory, DigitsEach, Items>;
     check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared_bytes)),
           where);
-    launch_behind(kernel, tiles, sort_threads, shared_bytes, stream, where, from, to, m, pass);
+    launch_behind(kernel, tiles, tuning::sort_threads, shared_bytes, stream, where, from, to, m, pass);
 }
 
 VOXELPIPE_DEFINES_KERNELS [[nodiscard]] int sort_fragments(const sort_pairs& pairs, const sort_count& count,
                                                            std::uint64_t capacity, const sort_memory& m,
                                                            cudaStream_t stream) {
     constexpr stage where = stage::abuffer_emit;
-    constexpr std::uint64_t pairs_of_block = 8 * digit_count_threads;
+    constexpr std::uint64_t pairs_of_block = 8 * tuning::digit_count_threads;
     const auto max_blocks = static_cast<std::uint64_t>(num_multiprocessors());
     launch_behind(count_digits_kernel<sort_count>,
-                  static_cast<unsigned>(std::min(capacity / pairs_of_block + 1, max_blocks)), digit_count_threads,
-                  stream, where, pairs.keys[0], count, m);
+                  static_cast<unsigned>(std::min(capacity / pairs_of_block + 1, max_blocks)),
+                  tuning::digit_count_threads, stream, where, pairs.keys[0], count, m);
     const auto tiles = static_cast<unsigned>(m.num_tiles(capacity));
-    const bool few = m.items == few_sort_items;
+    const bool few = m.items == tuning::few_sort_items;
     for (int p = 0; p < m.plan.passes && tiles != 0; ++p) {
         const pair_array from = p == 0 ? pairs.apart(0) : pairs.joined(p % 2);
         const pair_array to = p + 1 == m.plan.passes ? pairs.apart(1 - p % 2) : pairs.joined(1 - p % 2);
-        if (m.plan.bits == max_digit_bits)
-            few ? launch_sort_pass<2, few_sort_items>(from, to, tiles, m, p, where, stream)
-                : launch_sort_pass<2, sort_items>(from, to, tiles, m, p, where, stream);
+        if (m.plan.bits == tuning::max_digit_bits)
+            few ? launch_sort_pass<2, tuning::few_sort_items>(from, to, tiles, m, p, where, stream)
+                : launch_sort_pass<2, tuning::sort_items>(from, to, tiles, m, p, where, stream);
         else
-            few ? launch_sort_pass<1, few_sort_items>(from, to, tiles, m, p, where, stream)
-                : launch_sort_pass<1, sort_items>(from, to, tiles, m, p, where, stream);
+            few ? launch_sort_pass<1, tuning::few_sort_items>(from, to, tiles, m, p, where, stream)
+                : launch_sort_pass<1, tuning::sort_items>(from, to, tiles, m, p, where, stream);
     }
     return tiles == 0 ? 0 : m.plan.passes % 2;
 }

@@ -11,15 +11,13 @@
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/scene/fragment_shade.cuh>
 #include <voxelpipe/device/targets/target_traits.cuh>
+#include <voxelpipe/tuning/tuning_fragments.hpp>
 
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
 
 namespace voxelpipe::device {
-
-inline constexpr std::uint32_t resolve_run = 256; // fragments of a run
-inline constexpr std::size_t max_cell_bytes = 128;
 
 // ---- cells ----------------------------------------------------------------------------------------------------------
 
@@ -122,7 +120,7 @@ inline constexpr bool is_resolvable = false;
 template <class... Targets>
 requires((method_of<Targets>() != blend_method::ordered) &&
          ...) inline constexpr bool is_resolvable<framebuffer_view<Targets...>> =
-    sizeof(voxel_cells<framebuffer_view<Targets...>>) <= max_cell_bytes;
+    sizeof(voxel_cells<framebuffer_view<Targets...>>) <= tuning::max_cell_bytes;
 
 // Cells of a lane, or none if no fragment was kept.
 template <class Cells>
@@ -165,7 +163,7 @@ struct run_ends {
     std::uint32_t* flags; // of each run
 
     [[nodiscard]] static std::uint64_t num(std::uint64_t fragments) {
-        return (fragments + resolve_run - 1) / resolve_run;
+        return (fragments + tuning::resolve_run - 1) / tuning::resolve_run;
     }
     [[nodiscard]] static run_ends take(arena& memory, std::uint64_t capacity) {
         run_ends e{};
@@ -192,10 +190,11 @@ __global__ __launch_bounds__(threads_per_block, 4) void resolve_runs_kernel(
     if (has_failed(*state, limits)) return;
     const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::max_numbered
     const std::uint32_t lane = threadIdx.x % 32, warps = gridDim.x * (threads_per_block / 32);
-    const std::uint32_t runs = (n + resolve_run - 1) / resolve_run;
+    const std::uint32_t runs = (n + tuning::resolve_run - 1) / tuning::resolve_run;
     std::uint32_t kept = 0, discarded = 0, touched = 0;
     for (std::uint32_t run = blockIdx.x * (threads_per_block / 32) + warp_in_block(); run < runs; run += warps) {
-        const std::uint32_t begin = run * resolve_run, end = n - begin < resolve_run ? n : begin + resolve_run;
+        const std::uint32_t begin = run * tuning::resolve_run,
+                            end = n - begin < tuning::resolve_run ? n : begin + tuning::resolve_run;
         std::uint32_t before = begin == 0 ? ~0u : f.voxels[begin - 1]; // voxel of the fragment before
         const std::uint32_t behind = end < n ? f.voxels[end] : ~0u;    // voxel of the fragment behind the run
         some_cells<cells> carried{};                                   // of the last voxel, in this run
@@ -278,7 +277,7 @@ __global__ __launch_bounds__(threads_per_block) void resolve_ends_kernel(
     await_stream();
     if (has_failed(*state, limits)) return;
     const auto n = static_cast<std::uint32_t>(state->list_fragments);
-    const std::uint32_t lane = threadIdx.x % 32, runs = (n + resolve_run - 1) / resolve_run;
+    const std::uint32_t lane = threadIdx.x % 32, runs = (n + tuning::resolve_run - 1) / tuning::resolve_run;
     const std::uint32_t step = gridDim.x * threads_per_block;
     std::uint32_t touched = 0;
     for (std::uint32_t first = (blockIdx.x * (threads_per_block / 32) + warp_in_block()) * 32; first < runs;
@@ -309,7 +308,7 @@ __global__ __launch_bounds__(threads_per_block) void resolve_ends_kernel(
             if (lane == owner) mine.merge(part);
         }
         if (mine.any != 0) {
-            const std::uint32_t voxel = f.voxels[(run + 1) * resolve_run - 1];
+            const std::uint32_t voxel = f.voxels[(run + 1) * tuning::resolve_run - 1];
             mine.cells.store(s, fb, position_of(voxel, fb.extent));
             ++touched;
         }

@@ -13,17 +13,15 @@
 
 namespace voxelpipe::device {
 
-inline constexpr int block_min_blocks = 5; // per multiprocessor: bounds the registers
-
 // Triangles by their vertices, each in a column of words.
 struct triangle_queue {
-    std::int32_t q[9][queue_slots];
+    std::int32_t q[9][tuning::queue_slots];
 };
 
 // Shared memory of one warp.
 struct warp_queues {
-    triangle_queue tiny_queue, small_queue; // boxes for raster_tiny; other small ones
-    std::uint32_t large_queue[queue_slots]; // numbers of triangles, which are loaded again
+    triangle_queue tiny_queue, small_queue;         // boxes for raster_tiny; other small ones
+    std::uint32_t large_queue[tuning::queue_slots]; // numbers of triangles, which are loaded again
 };
 
 // The work of one warp, from the mesh to a sink. Every warp has its own queues, so no thread waits for another warp.
@@ -75,7 +73,7 @@ struct block_warp {
         sink.mark_boxes(waits, r);
         if constexpr (thin) {
             const bool is_cube = waits && most <= 2;
-            if (__popc(__ballot_sync(0xffffffffu, is_cube)) >= min_thin_cubes && is_cube) {
+            if (__popc(__ballot_sync(0xffffffffu, is_cube)) >= tuning::min_thin_cubes && is_cube) {
                 const core::thin_cube cube = core::thin_cube_by_signs(r.q, r.lo, r.last, call.in.fraction, is_done);
                 if (is_done) emit_thin_cube(call.in, r, cube, sink);
             }
@@ -94,7 +92,7 @@ struct block_warp {
             // If each block has at most one round of the mesh, some multiprocessors may have no block: these triangles
             // go to the whole device.
             const bool is_spread =
-                size == size_class::thread_heavy && call.in.num_triangles <= gridDim.x * raster_threads;
+                size == size_class::thread_heavy && call.in.num_triangles <= gridDim.x * tuning::raster_threads;
             const bool is_large = size == size_class::thread_heavy && !is_spread;
             const int large_at = take_slot(is_large, num_large);
             if (is_large) queues.large_queue[large_at] = i;
@@ -170,8 +168,8 @@ struct block_warp {
         // One lane each, the larger triangles would keep a few lanes busy long after all others.
         int num = 0;
         for (const int n : left[2]) num += n;
-        for (int start = 0; start < num; start += Warps * 32 / group_lanes) {
-            int at = start + static_cast<int>(threadIdx.x) / group_lanes, w = 0;
+        for (int start = 0; start < num; start += Warps * 32 / tuning::group_lanes) {
+            int at = start + static_cast<int>(threadIdx.x) / tuning::group_lanes, w = 0;
             while (w < Warps && at >= left[2][w]) at -= left[2][w++];
             raster_by_group<Call::rule>(call.in, w < Warps, w < Warps ? all[w].large_queue[at] : 0, lane_rows(kept),
                                         sink);
@@ -186,9 +184,9 @@ struct block_warp {
 };
 
 template <class Call>
-__global__ __launch_bounds__(raster_threads,
-                             block_min_blocks) void block_raster_kernel(const __grid_constant__ Call call,
-                                                                        pipeline_state* state) {
+__global__ __launch_bounds__(tuning::raster_threads,
+                             tuning::value_blocks) void block_raster_kernel(const __grid_constant__ Call call,
+                                                                            pipeline_state* state) {
     using sink_type = typename Call::sink;
     __shared__ warp_queues queues[raster_warps];
     __shared__ kept_rows rows_of_warps[raster_warps];
@@ -196,20 +194,20 @@ __global__ __launch_bounds__(raster_threads,
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ int left[3][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_oversized;
-    const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
+    const glm::uvec3 index = load_index(call.in, blockIdx.x * tuning::raster_threads + threadIdx.x);
     await_stream();
     if (state->index_error != 0) return;
     if (threadIdx.x == 0) num_oversized = 0;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();
     sink_type sink(call, dropped, memories[threadIdx.x / 32]);
-    const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
+    const std::uint32_t step = gridDim.x * tuning::raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
     block_warp<Call> warp{call,
                           queues[threadIdx.x / 32],
                           rows_of_warps[threadIdx.x / 32],
                           corners[threadIdx.x / 32],
                           sink,
-                          call.lists.oversized + std::size_t{blockIdx.x} * batches * raster_threads,
+                          call.lists.oversized + std::size_t{blockIdx.x} * batches * tuning::raster_threads,
                           num_oversized};
     const unsigned looked_at = warp.run(index, queues, left);
     sink.finish(state);

@@ -16,9 +16,7 @@ namespace voxelpipe::device {
 
 // Blocks per multiprocessor: bounds the registers.
 template <class Call>
-inline constexpr int deferred_min_blocks = Call::sink::stages_in_shared   ? 4
-                                           : Call::rule == coverage::thin ? 6
-                                                                          : 5;
+inline constexpr int deferred_min_blocks = tuning::deferred_blocks(Call::rule, Call::sink::stages_in_shared);
 
 // Draws all work items. Out of line, so that their registers are not reserved while other triangles are drawn. Does not
 // wait for other warps of the block.
@@ -50,11 +48,11 @@ struct warp_position {
 template <class Call, class Sink>
 __device__ VOXELPIPE_INLINE void raster_by_lanes(const Call& call, int size, std::uint32_t first,
                                                  const warp_position& position, const lane_rows& kept, Sink& sink) {
-    constexpr unsigned at_once = 32 / group_lanes;
+    constexpr unsigned at_once = 32 / tuning::group_lanes;
     const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[size]));
     const unsigned chunks = (length - first + at_once - 1) / at_once;
     for (unsigned chunk = position.warp; chunk < chunks; chunk += position.warps) {
-        const std::uint32_t i = first + chunk * at_once + position.lane / group_lanes;
+        const std::uint32_t i = first + chunk * at_once + position.lane / tuning::group_lanes;
         const bool wanted = i < length;
         __syncwarp();
         raster_by_group<Call::rule>(call.in, wanted, wanted ? call.lists.at(size, i) : 0, kept, sink);
@@ -73,7 +71,7 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_posit
     std::uint32_t chunks[num_classes];
     for (int k = 0; k < num_classes; ++k) {
         const std::uint32_t length = uniform(static_cast<std::uint32_t>(call.lists.lengths[k]));
-        const bool few = k != size_class::tiny && length / 64 * group_lanes < position.warps;
+        const bool few = k != size_class::tiny && length / 64 * tuning::group_lanes < position.warps;
         chunks[k] = few ? 0 : length / 32;
         const unsigned from_last = position.warps - 1 - position.warp; // warps at the end have fewer whole chunks
         raster_by_lanes(call, k, chunks[k] * 32, {few ? position.warp : from_last, position.warps, position.lane}, kept,
@@ -129,7 +127,7 @@ __device__ VOXELPIPE_INLINE void raster_lists(const Call& call, const warp_posit
 }
 
 template <class Call>
-__global__ __launch_bounds__(raster_threads,
+__global__ __launch_bounds__(tuning::raster_threads,
                              deferred_min_blocks<Call>) void deferred_pass_kernel(const __grid_constant__ Call call,
                                                                                   pipeline_state* state) {
     using sink_type = typename Call::deferred_sink;
@@ -143,8 +141,8 @@ __global__ __launch_bounds__(raster_threads,
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ unsigned dropped[num_triangle_classes];
     await_stream();
-    call.out.prepare(std::uint64_t{blockIdx.x} * raster_threads + threadIdx.x,
-                     std::uint64_t{gridDim.x} * raster_threads);
+    call.out.prepare(std::uint64_t{blockIdx.x} * tuning::raster_threads + threadIdx.x,
+                     std::uint64_t{gridDim.x} * tuning::raster_threads);
     if (state->index_error != 0) return;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();

@@ -46,7 +46,7 @@ struct warp_triangles {
     }
     // A triangle of another warp of the block.
     [[nodiscard]] __device__ VOXELPIPE_INLINE static std::uint32_t of(std::uint32_t code, unsigned warp) {
-        return (code / 32 * gridDim.x + blockIdx.x) * raster_threads + warp * 32 + code % 32;
+        return (code / 32 * gridDim.x + blockIdx.x) * tuning::raster_threads + warp * 32 + code % 32;
     }
 };
 
@@ -65,7 +65,7 @@ struct deferred_triangles {
 
     // Setups of split triangles (raster/split_triangles.cuh), if they are kept: room for num_setups, and how many are
     // ready.
-    static constexpr std::size_t max_setups = 1u << 14, setup_bytes = 384;
+    static constexpr std::size_t setup_bytes = 384;
     std::byte* setups;
     unsigned long long* setups_ready;
     std::uint32_t num_setups;
@@ -79,14 +79,14 @@ struct deferred_triangles {
         deferred_triangles l{};
         // A block's part holds whole batches of all threads of a persistent kernel.
         const std::size_t threads = std::max(static_cast<std::size_t>(num_multiprocessors()) * 2048,
-                                             num_triangles / warp_triangles::max_rounds + raster_threads);
+                                             num_triangles / warp_triangles::max_rounds + tuning::raster_threads);
         l.oversized_capacity = num_triangles + std::min(threads, num_triangles + 2048);
         l.oversized = memory.take<std::uint32_t>(l.oversized_capacity);
         for (auto& array : l.arrays) array = memory.take<std::uint32_t>(num_triangles);
         l.capacity = static_cast<std::uint32_t>(num_triangles);
         l.split = memory.take<std::uint32_t>(num_triangles);
         l.first_work_items = memory.take<unsigned long long>(num_triangles);
-        l.num_setups = static_cast<std::uint32_t>(std::min(num_triangles, max_setups));
+        l.num_setups = static_cast<std::uint32_t>(std::min(num_triangles, tuning::max_setups));
         l.setups = memory.take<std::byte>(l.num_setups * setup_bytes);
         return l;
     }
@@ -135,8 +135,6 @@ struct deferred_triangles {
     }
 };
 
-inline constexpr int queue_slots = 64; // up to 31 wait when a warp adds up to 32
-
 // Returns the slot of a lane that wants one, behind the `count` that wait, and adds the new ones to count. All lanes
 // call it.
 __device__ VOXELPIPE_INLINE int take_slot(bool wanted, int& count) {
@@ -151,7 +149,7 @@ __device__ VOXELPIPE_INLINE int take_slot(bool wanted, int& count) {
 // whatever else lies there: with one per 32 triangles, first passes took some 20 % more or less, depending on where
 // state and target lay.
 struct class_queues {
-    static constexpr int slots = 128, at_once = slots - 32;
+    static constexpr int slots = tuning::class_slots, at_once = slots - 32;
     std::uint16_t triangles[size_class::count][slots];
 };
 

@@ -6,6 +6,7 @@
 // last list first in each part; a worker takes every num_workers-th chunk.
 
 #include <voxelpipe/config.hpp>
+#include <voxelpipe/tuning/tuning_raster.hpp>
 
 #include <cstdint>
 
@@ -28,7 +29,7 @@ public:
             chunks_[k] = chunks[k];
             all += chunks[k];
         }
-        while (part_bits_ < max_part_bits && all >> part_bits_ >= 8 * num_workers) ++part_bits_;
+        while (part_bits_ < tuning::max_part_bits && all >> part_bits_ >= 8 * num_workers) ++part_bits_;
     }
     // This worker's next chunk. After the last, always none.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE chunk next() {
@@ -51,8 +52,6 @@ public:
     }
 
 private:
-    static constexpr int max_part_bits = 6; // log2 of the number of parts; a worker has at least four chunks of each
-
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t begin_of(std::uint32_t part, std::uint32_t chunks) const {
         return static_cast<std::uint32_t>(static_cast<std::uint64_t>(chunks) * part >> part_bits_);
     }

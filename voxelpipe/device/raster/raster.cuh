@@ -14,6 +14,7 @@
 #include <voxelpipe/device/raster/small_triangles.cuh>
 #include <voxelpipe/device/raster/split_triangles.cuh>
 #include <voxelpipe/device/raster/warp_combine.cuh>
+#include <voxelpipe/tuning/tuning_strategy.hpp>
 
 namespace voxelpipe::device {
 
@@ -21,13 +22,13 @@ namespace voxelpipe::device {
 
 // Blocks per multiprocessor: bounds the registers.
 template <class Call>
-inline constexpr int first_min_blocks = Call::rule == coverage::thin || Call::sink::stages_in_shared ? 6 : 8;
+inline constexpr int first_min_blocks = tuning::first_blocks(Call::rule, Call::sink::stages_in_shared);
 
 // Thin triangles of up to 2 x 2 x 2 voxels that are redone in integers: those that floats cannot decide, and those of
 // warps with few. Each takes a column of words.
 struct cube_queue {
-    std::int32_t q[9][queue_slots];
-    std::uint32_t triangle[queue_slots]; // by warp_triangles
+    std::int32_t q[9][tuning::queue_slots];
+    std::uint32_t triangle[tuning::queue_slots]; // by warp_triangles
 };
 struct no_queue {};
 // For thin coverage: the cubes, and when none waits, the rows for draw_remaining.
@@ -36,13 +37,6 @@ union cubes_or_rows {
     kept_rows rows;
 };
 
-// Use the slim-box code if at least this many of the warp's triangles have a box three voxels long; it draws the
-// smaller ones too, with 1.5 x the instructions of the cube code. Fewer are deferred.
-inline constexpr int min_slim = 3;
-// Deferred triangles per block, on average, up to which a call is launched without a deferred pass: each block draws
-// its own at its end. A mesh finer than the grid defers few, and drawing them takes no longer than a second kernel
-// takes to start.
-inline constexpr std::uint64_t max_left_of_block = 14, max_left_blocks = 6; // blocks a multiprocessor
 inline constexpr int oversized_side = 64; // stands for triangles to split: larger than max_group_side
 
 // Shared memory of one warp of the first pass.
@@ -115,7 +109,7 @@ struct first_warp {
             }
         } else {
             const bool is_cube = side != 0 && side <= 2;
-            const bool at_once = __popc(__ballot_sync(0xffffffffu, is_cube)) >= min_thin_cubes;
+            const bool at_once = __popc(__ballot_sync(0xffffffffu, is_cube)) >= tuning::min_thin_cubes;
             bool sure = false;
             core::thin_cube cube{};
             if (at_once && is_cube) cube = core::thin_cube_by_signs(r.q, r.lo, r.last, call.in.fraction, sure);
@@ -148,7 +142,7 @@ struct first_warp {
     // Tries to set what find_cube found, for the whole warp; returns true if it did. After a batch that is not close,
     // 15 are not tried.
     __device__ VOXELPIPE_INLINE bool sets_close_cubes(std::uint32_t& code, const int32_triangle& r, word bits) {
-        const bool looks = (code & not_close) == 0 || code / 32 % 16 == 0;
+        const bool looks = (code & not_close) == 0 || code / 32 % tuning::batches_not_close == 0;
         if (looks && set_close_cubes(voxelpipe::get<0>(call.out.fb.targets), r.lo, bits)) {
             code &= ~not_close;
             sink.count(bits);
@@ -163,7 +157,7 @@ struct first_warp {
     template <class LoadNext>
     __device__ VOXELPIPE_INLINE bool draws_slim(std::uint32_t i, const int32_triangle& r, int inside, int& side,
                                                 const LoadNext& load_next) {
-        if (__popc(__ballot_sync(0xffffffffu, side == 3)) < min_slim) return false;
+        if (__popc(__ballot_sync(0xffffffffu, side == 3)) < tuning::min_slim) return false;
         core::slim_rows rows{};
         if (side != 0 && side <= 3 && inside >= 0 && core::is_slim(r.last))
             rows = core::slim_rows_by_signs(r.q, r.lo, r.last, call.in.fraction);
@@ -200,8 +194,8 @@ struct first_warp {
     // read.
     __device__ VOXELPIPE_INLINE unsigned run(glm::uvec3 index) {
         const unsigned lane = threadIdx.x % 32;
-        const std::uint32_t step = gridDim.x * raster_threads, num = call.in.num_triangles;
-        const std::uint32_t begin = blockIdx.x * raster_threads + warp_in_block() * 32;
+        const std::uint32_t step = gridDim.x * tuning::raster_threads, num = call.in.num_triangles;
+        const std::uint32_t begin = blockIdx.x * tuning::raster_threads + warp_in_block() * 32;
         // Indices are loaded one batch ahead, or two if vertices are loaded ahead too.
         if constexpr (loads_ahead) {
             bool valid = begin + lane < num && sink.check(index);
@@ -285,11 +279,11 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
     __shared__ first_memory<Call> memories[raster_warps];
     __shared__ unsigned slots[size_class::count][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_oversized;
-    const glm::uvec3 index = load_index(call.in, blockIdx.x * raster_threads + threadIdx.x);
+    const glm::uvec3 index = load_index(call.in, blockIdx.x * tuning::raster_threads + threadIdx.x);
     await_stream();
     if constexpr (Alone)
-        call.out.prepare(std::uint64_t{blockIdx.x} * raster_threads + threadIdx.x,
-                         std::uint64_t{gridDim.x} * raster_threads);
+        call.out.prepare(std::uint64_t{blockIdx.x} * tuning::raster_threads + threadIdx.x,
+                         std::uint64_t{gridDim.x} * tuning::raster_threads);
     if (call.out.is_checked() && state->index_error != 0) return;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     if (threadIdx.x == 0) num_oversized = 0;
@@ -297,9 +291,13 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
     first_memory<Call>& memory = memories[warp_in_block()];
     sink_type sink(call, dropped, memory.sink);
     class_writer writer{call.lists, memory.queues};
-    const std::uint32_t step = gridDim.x * raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
+    const std::uint32_t step = gridDim.x * tuning::raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
     first_warp<Call, Alone, Close> warp{
-        call,         memory, sink, writer, call.lists.oversized + std::size_t{blockIdx.x} * batches * raster_threads,
+        call,
+        memory,
+        sink,
+        writer,
+        call.lists.oversized + std::size_t{blockIdx.x} * batches * tuning::raster_threads,
         num_oversized};
     const unsigned looked_at = warp.run(index);
     __syncthreads();
@@ -321,13 +319,13 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
 }
 
 template <class Call, bool Close>
-__global__ __launch_bounds__(raster_threads,
+__global__ __launch_bounds__(tuning::raster_threads,
                              first_min_blocks<Call>) void first_pass_kernel(const __grid_constant__ Call call,
                                                                             pipeline_state* state) {
     raster_first<Call, false, Close>(call, call, state);
 }
 template <class Call, bool Close>
-__global__ __launch_bounds__(raster_threads,
+__global__ __launch_bounds__(tuning::raster_threads,
                              first_min_blocks<Call>) void only_pass_kernel(const __grid_constant__ Call call,
                                                                            const __grid_constant__ Call again,
                                                                            pipeline_state* state) {
@@ -339,16 +337,16 @@ __global__ __launch_bounds__(raster_threads,
 // Blocks of the first pass: as many as fit the device at once, but no fewer than warp_triangles needs to number their
 // rounds.
 [[nodiscard]] inline unsigned raster_blocks(std::uint32_t num_triangles, int per_multiprocessor) {
-    const std::uint32_t batches = core::blocks_for_each(num_triangles, raster_threads);
+    const std::uint32_t batches = core::blocks_for_each(num_triangles, tuning::raster_threads);
     const auto at_once = static_cast<std::uint32_t>(num_multiprocessors() * per_multiprocessor);
     return std::min(batches, std::max(at_once, core::blocks_for_each(batches, warp_triangles::max_rounds)));
 }
 
 // True if a call of one draw may be launched without a deferred pass, if calls like it deferred `left` triangles.
 [[nodiscard]] inline bool leaves_few(std::size_t num_triangles, std::uint64_t left) {
-    const std::uint64_t batches = core::blocks_for_each(num_triangles, raster_threads);
-    const auto at_once = static_cast<std::uint64_t>(num_multiprocessors()) * max_left_blocks;
-    return left <= std::min(batches, at_once) * max_left_of_block;
+    const std::uint64_t batches = core::blocks_for_each(num_triangles, tuning::raster_threads);
+    const auto at_once = static_cast<std::uint64_t>(num_multiprocessors()) * tuning::max_left_blocks;
+    return left <= std::min(batches, at_once) * tuning::max_left_of_block;
 }
 
 // is_first: these are a call's first kernels. They read indices before they wait for the stream, so they must not start
@@ -366,26 +364,26 @@ void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStr
         const auto launch = [&]<bool Close>() {
             if constexpr (Call::output::can_skip_deferred_pass) {
                 if (skips_deferred_pass) {
-                    launch_kernel(!is_first, only_pass_kernel<Call, Close>, blocks, raster_threads, 0, stream, where,
-                                  call, call, state);
+                    launch_kernel(!is_first, only_pass_kernel<Call, Close>, blocks, tuning::raster_threads, 0, stream,
+                                  where, call, call, state);
                     return;
                 }
             }
-            launch_kernel(!is_first, first_pass_kernel<Call, Close>, blocks, raster_threads, 0, stream, where, call,
-                          state);
+            launch_kernel(!is_first, first_pass_kernel<Call, Close>, blocks, tuning::raster_threads, 0, stream, where,
+                          call, state);
         };
         if (are_close)
             launch.template operator()<has_close_cubes<Call>>();
         else
             launch.template operator()<false>();
     } else {
-        launch_kernel(!is_first, block_raster_kernel<Call>, raster_blocks(triangles, block_min_blocks), raster_threads,
-                      0, stream, where, call, state);
+        launch_kernel(!is_first, block_raster_kernel<Call>, raster_blocks(triangles, tuning::value_blocks),
+                      tuning::raster_threads, 0, stream, where, call, state);
     }
     if (skips_deferred_pass) return;
     const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
-    launch_behind(deferred_pass_kernel<Call>, multiprocessors * deferred_min_blocks<Call>, raster_threads, stream,
-                  where, call, state);
+    launch_behind(deferred_pass_kernel<Call>, multiprocessors * deferred_min_blocks<Call>, tuning::raster_threads,
+                  stream, where, call, state);
 }
 
 } // namespace voxelpipe::device

@@ -50,7 +50,7 @@ static_assert(sizeof(kept_rows::words[0]) == 128);
 struct no_rows {};
 // A part of at most 32 x 32 columns by group_lanes lanes, or of max_columns by one, has at most max_long_side rows
 // along its shorter side.
-static_assert(max_columns < max_long_side * max_long_side && 32 / group_lanes <= max_long_side);
+static_assert(tuning::max_columns < max_long_side * max_long_side && 32 / tuning::group_lanes <= max_long_side);
 
 // The columns of a small triangle for thin coverage: rows along the longer side of the box, and the position of their
 // voxels, which is linear in u, v and w.
@@ -142,10 +142,6 @@ template <class Source, class Kept, class Sink>
     return true;
 }
 
-// Draw thin boxes of at most two voxels a side as soon as they are read, if a warp's 32 triangles have at least this
-// many; fewer are queued until all lanes have one.
-inline constexpr int min_thin_cubes = 16;
-
 // Emits the thin fragments of a bounding box of at most two voxels a side, all columns at once: the common case of a
 // fine mesh.
 template <class Source, class Sink>
@@ -185,31 +181,32 @@ __device__ VOXELPIPE_INLINE bool raster_thin_cube(const raster_input<Source>& ca
 template <class Sink>
 __device__ VOXELPIPE_INLINE void raster_lanes(const core::small_conservative& s, const std::int32_t (&lo)[3],
                                               const core::small_box& box, Sink& sink) {
-    const int lane = static_cast<int>(threadIdx.x) % group_lanes;
-    const unsigned first_of_group = threadIdx.x % 32 / group_lanes * group_lanes;
-    const unsigned group = ((1u << group_lanes) - 1) << first_of_group;
+    const int lane = static_cast<int>(threadIdx.x) % tuning::group_lanes;
+    const unsigned first_of_group = threadIdx.x % 32 / tuning::group_lanes * tuning::group_lanes;
+    const unsigned group = ((1u << tuning::group_lanes) - 1) << first_of_group;
     const int x0 = box.lo[0], x1 = box.hi[0];
-    for (int first_y = box.lo[1]; first_y <= box.hi[1]; first_y += group_lanes) {
+    for (int first_y = box.lo[1]; first_y <= box.hi[1]; first_y += tuning::group_lanes) {
         const word at_y = first_y + lane <= box.hi[1] ? s.limit_at_y(x0, x1, first_y + lane) : 0;
         const unsigned ys = __ballot_sync(group, at_y != 0) >> first_of_group;
         if (ys == 0) continue;
-        for (int first_z = box.lo[2]; first_z <= box.hi[2]; first_z += group_lanes) {
+        for (int first_z = box.lo[2]; first_z <= box.hi[2]; first_z += tuning::group_lanes) {
             const word at_z = first_z + lane <= box.hi[2] ? s.limit_at_z(x0, x1, first_z + lane) : 0;
             const unsigned zs = __ballot_sync(group, at_z != 0) >> first_of_group;
             const bool by_y = __popc(ys) <= __popc(zs);
             for (unsigned left = by_y ? ys : zs; left != 0; left &= left - 1) {
                 const int one = __ffs(static_cast<int>(left)) - 1;
-                const word limit = __shfl_sync(group, by_y ? at_y : at_z, one, group_lanes) & (by_y ? at_z : at_y);
+                const word limit =
+                    __shfl_sync(group, by_y ? at_y : at_z, one, tuning::group_lanes) & (by_y ? at_z : at_y);
                 const int y = first_y + (by_y ? one : lane), z = first_z + (by_y ? lane : one);
                 const word bits = limit == 0 || !s.meets_row(y, z) ? 0 : s.plane_bits(x0, y, z, limit);
                 if constexpr (Sink::splits_long_rows) {
-                    if (by_y && __popc(ys) <= group_lanes / 4) { // few long rows: all lanes draw each
+                    if (by_y && __popc(ys) <= tuning::group_lanes / 4) { // few long rows: all lanes draw each
                         word rows = __ballot_sync(group, bits != 0) >> first_of_group;
                         const unsigned longest = __reduce_max_sync(group, static_cast<unsigned>(__popc(bits)));
                         if (static_cast<unsigned>(__popc(rows)) * 5 <= longest * 3) {
                             for (; rows != 0; rows &= rows - 1) {
                                 const int of = __ffs(static_cast<int>(rows)) - 1;
-                                const word mask = __shfl_sync(group, bits, of, group_lanes);
+                                const word mask = __shfl_sync(group, bits, of, tuning::group_lanes);
                                 sink.row_by_all(group, lo[0] + x0, lo[1] + y, lo[2] + first_z + of, mask);
                             }
                             continue;
@@ -270,9 +267,9 @@ __device__ VOXELPIPE_INLINE void raster_by_group(const raster_input<Source>& cal
         if (!wanted) return;
         sink.begin(triangle);
         if constexpr (Rule == coverage::thin) {
-            const int lane = static_cast<int>(threadIdx.x) % group_lanes;
-            const bool has_area =
-                raster_thin(call, r.relative(call.fraction), r.lo, r.part(call.extent), lane, group_lanes, kept, sink);
+            const int lane = static_cast<int>(threadIdx.x) % tuning::group_lanes;
+            const bool has_area = raster_thin(call, r.relative(call.fraction), r.lo, r.part(call.extent), lane,
+                                              tuning::group_lanes, kept, sink);
             if (!has_area && lane == 0) sink.drop(core::triangle_class::zero_area);
         } else {
             raster_lanes(core::small_conservative(r.relative(call.fraction), call.fraction), r.lo, r.part(call.extent),

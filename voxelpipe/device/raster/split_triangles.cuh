@@ -28,7 +28,7 @@ static_assert((std::int64_t{max_immediate_extent} / core::brick_size + 1) * (max
 template <coverage Rule>
 struct split_pieces {
     static constexpr int across = Rule == coverage::thin ? 1 : core::brick_size; // voxels along v
-    static constexpr int per_work_item = Rule == coverage::thin ? 32 : 8;
+    static constexpr int per_work_item = tuning::pieces_per_work_item<Rule>;
     core::row_axes axes;
     core::triple<std::int64_t> lo, hi;            // the box, as uvw of these axes
     std::int64_t first_u, first_v, per_row, rows; // 32 bits can number the pieces (max_immediate_extent)
@@ -204,7 +204,7 @@ struct alignas(16) split_setup {
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool are_kept(const deferred_triangles& lists, std::uint32_t num) {
         ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device> kept(*lists.setups_ready);
         bool all = false;
-        for (int look = 0; look < 256 && !all; ++look) {
+        for (int look = 0; look < tuning::setup_polls && !all; ++look) {
             if (threadIdx.x % 32 == 0) all = kept.load(::cuda::memory_order_relaxed) == num;
             all = __shfl_sync(0xffffffffu, static_cast<int>(all), 0) != 0;
         }
@@ -283,15 +283,13 @@ struct span_writer {
     return uniform(first);
 }
 
-inline constexpr int max_bricks = 64;
-
 // Shared memory of one warp for split triangles.
 template <coverage Rule>
 struct brick_memory {
     split_setup<Rule> setups[2]; // of a work item and of the next one
     std::uint32_t next;          // the setup's number of the next work item, or of the one after that
     // Bricks that wait, by their position in the grid.
-    std::int16_t bricks[Rule == coverage::thin ? 1 : 3][max_bricks];
+    std::int16_t bricks[Rule == coverage::thin ? 1 : 3][tuning::max_bricks];
 };
 
 // Number of parts, a power of two, that a work item is divided into. A warp goes through the bricks of its columns four
@@ -401,7 +399,8 @@ struct split_work_items {
     }
     // True if all triangles are set up before their work items are drawn: if each warp has several.
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool want_setups(const deferred_triangles& lists, unsigned warps) const {
-        return triangles <= lists.num_setups && work_items >= 3 * warps && work_items <= lists.oversized_capacity;
+        return triangles <= lists.num_setups && work_items >= tuning::min_items_for_setups * warps &&
+               work_items <= lists.oversized_capacity;
     }
 };
 
@@ -483,8 +482,8 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
             const int axis = pieces.axes.dominant;
             const auto raster_bricks = [&](int n) {
                 __syncwarp();
-                for (int first = 0; first < n; first += 32 / group_lanes) {
-                    const int at = first + static_cast<int>(lane) / group_lanes;
+                for (int first = 0; first < n; first += 32 / tuning::group_lanes) {
+                    const int at = first + static_cast<int>(lane) / tuning::group_lanes;
                     emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
                         if (at >= n) return;
                         std::int32_t corner[3]; // in the grid
@@ -498,7 +497,7 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
                                              ? static_cast<int>(reach.hi[k]) - corner[k]
                                              : core::brick_size - 1;
                         }
-                        sink.mark_brick(corner, lane % group_lanes);
+                        sink.mark_brick(corner, lane % tuning::group_lanes);
                         raster_lanes(t.at(from[0], from[1], from[2]), corner, part, sink);
                     });
                 }
@@ -533,7 +532,7 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
                 const int slot = take_slot(hit, waiting);
                 if (hit)
                     for (int k = 0; k < 3; ++k) memory.bricks[k][slot] = static_cast<std::int16_t>(brick[k]);
-                if (waiting > max_bricks - 32) {
+                if (waiting > tuning::max_bricks - 32) {
                     raster_bricks(waiting);
                     waiting = 0;
                 }

@@ -19,7 +19,7 @@ namespace voxelpipe::device {
 // Shared memory of one warp: slots by a hash of the word's number. A word whose slot is taken by another goes to memory
 // at once.
 struct word_slots {
-    static constexpr int log2_count = 8, count = 1 << log2_count;
+    static constexpr int log2_count = tuning::log2_word_slots, count = 1 << log2_count;
     static constexpr std::uint32_t none = ~0u; // no target that is blended by 32-bit numbers has that word
     uint2 slots[count];                        // number of a word, its bits
 
@@ -89,10 +89,9 @@ struct combining_sink : Call::sink {
 // costs more than it gains. On a surface as large as three faces of the grid, 32 triangles then cover at most five
 // voxels.
 [[nodiscard]] inline bool may_be_close(std::uint32_t num_triangles, const glm::ivec3& extent) {
-    constexpr std::uint64_t least = 6; // triangles per voxel of those faces
     const std::uint64_t x = static_cast<std::uint32_t>(extent.x), y = static_cast<std::uint32_t>(extent.y),
                         z = static_cast<std::uint32_t>(extent.z);
-    return num_triangles >= least * (x * y + y * z + z * x);
+    return num_triangles >= tuning::min_close_triangles * (x * y + y * z + z * x);
 }
 
 // Sets the 2 x 2 x 2 cubes of a warp's lanes if all lie within 4 x 4 x 4 voxels, so that two words hold them. Each lane

@@ -10,11 +10,11 @@
 
 #include <voxelpipe/device/scene/cub_sort.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
+#include <voxelpipe/tuning/tuning_raster.hpp>
 
 namespace voxelpipe::device {
 
 inline constexpr int chunk_columns = 16;     // a chunk of a large triangle is a row of this many columns
-inline constexpr int share_min_blocks = 3;   // per multiprocessor: bounds the registers
 inline constexpr int chunks_per_record = 32; // one per lane
 
 // 32 consecutive chunks of a large triangle.
@@ -94,9 +94,9 @@ struct cell_counts {
 //   emit(geometry, triangle, primitive, box, whole, offset)   stores the cells that count() counts, from offset on
 template <class Op>
 __global__ __launch_bounds__(threads_per_block,
-                             share_min_blocks) void share_count_small(const __grid_constant__ geometry geo,
-                                                                      const __grid_constant__ Op op, share_buffers b,
-                                                                      pipeline_state* state) {
+                             tuning::share_min_blocks) void share_count_small(const __grid_constant__ geometry geo,
+                                                                              const __grid_constant__ Op op,
+                                                                              share_buffers b, pipeline_state* state) {
     using core::triangle_class;
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     const bool valid = i < geo.num_primitives;
@@ -170,9 +170,9 @@ __device__ void for_each_record(const geometry& geo, const Op& op, const share_b
 
 template <class Op>
 __global__ __launch_bounds__(threads_per_block,
-                             share_min_blocks) void share_count_large(const __grid_constant__ geometry geo,
-                                                                      const __grid_constant__ Op op, share_buffers b,
-                                                                      pipeline_state* state) {
+                             tuning::share_min_blocks) void share_count_large(const __grid_constant__ geometry geo,
+                                                                              const __grid_constant__ Op op,
+                                                                              share_buffers b, pipeline_state* state) {
     unsigned long long all = 0, discarded = 0;
     if (state->index_error == 0) {
         for_each_record(geo, op, b,
@@ -194,10 +194,9 @@ __global__ __launch_bounds__(threads_per_block,
 }
 
 template <class Op>
-__global__ __launch_bounds__(threads_per_block,
-                             share_min_blocks) void share_emit_small(const __grid_constant__ geometry geo,
-                                                                     const __grid_constant__ Op op, share_buffers b,
-                                                                     const pipeline_state* state, capacities limits) {
+__global__ __launch_bounds__(threads_per_block, tuning::share_min_blocks) void share_emit_small(
+    const __grid_constant__ geometry geo, const __grid_constant__ Op op, share_buffers b, const pipeline_state* state,
+    capacities limits) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i >= geo.num_primitives || has_failed(*state, limits) || b.counts[i] == 0) return;
     const auto id = static_cast<std::uint32_t>(i);
@@ -212,10 +211,9 @@ __global__ __launch_bounds__(threads_per_block,
 // counts[i] is decremented to what remains of primitive i. A primitive's records take their offsets in any order: the
 // later stable sort by cell hides it, because a primitive meets a cell once.
 template <class Op>
-__global__ __launch_bounds__(threads_per_block,
-                             share_min_blocks) void share_emit_large(const __grid_constant__ geometry geo,
-                                                                     const __grid_constant__ Op op, share_buffers b,
-                                                                     const pipeline_state* state, capacities limits) {
+__global__ __launch_bounds__(threads_per_block, tuning::share_min_blocks) void share_emit_large(
+    const __grid_constant__ geometry geo, const __grid_constant__ Op op, share_buffers b, const pipeline_state* state,
+    capacities limits) {
     if (has_failed(*state, limits)) return;
     for_each_record(geo, op, b,
                     [&](std::uint32_t id, const loaded_triangle& t, bool valid, const core::voxel_box& box) {

@@ -7,6 +7,7 @@
 
 #include <voxelpipe/core/interpolate.hpp>
 #include <voxelpipe/core/primitive.hpp>
+#include <voxelpipe/tuning/tuning_raster.hpp>
 
 namespace voxelpipe::device {
 
@@ -21,17 +22,15 @@ struct wide_triangle {
     glm::vec3 normal;
 };
 
-inline constexpr int wide_batch = 8;
-
 // Writes the spans within `box` from number `skip` on. Returns how many; fewer than wide_batch at the end.
 template <core::span_rule Rule>
 __device__ __noinline__ int wide_spans(core::snapped_position a, core::snapped_position b, core::snapped_position c,
                                        int fraction, const core::voxel_box& box, int skip,
-                                       wide_span (&out)[wide_batch]) {
+                                       wide_span (&out)[tuning::wide_batch]) {
     const auto t = core::setup_triangle<Rule, int128>(a, b, c, fraction);
     int i = 0, n = 0;
     core::for_each_span<Rule>(t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
-        if (i++ < skip || n == wide_batch) return;
+        if (i++ < skip || n == tuning::wide_batch) return;
         out[n++] = {static_cast<int>(u), static_cast<int>(v), static_cast<int>(w0), static_cast<int>(w1),
                     core::barycentric(t, u, v)};
     });
@@ -55,11 +54,11 @@ __device__ __noinline__ glm::vec3 wide_barycentric(Position a, Position b, Posit
 template <core::span_rule Rule, class Visit>
 __device__ void for_each_wide_span(core::snapped_position a, core::snapped_position b, core::snapped_position c,
                                    int fraction, const core::voxel_box& box, Visit&& visit) {
-    wide_span spans[wide_batch];
-    for (int skip = 0;; skip += wide_batch) {
+    wide_span spans[tuning::wide_batch];
+    for (int skip = 0;; skip += tuning::wide_batch) {
         const int n = wide_spans<Rule>(a, b, c, fraction, box, skip, spans);
         for (int i = 0; i < n; ++i) visit(spans[i]);
-        if (n < wide_batch) break;
+        if (n < tuning::wide_batch) break;
     }
 }
 

@@ -5,6 +5,7 @@
 // Clears render targets, including padding (padding bits become 0). Writes nothing if the call has failed.
 
 #include <voxelpipe/device/scene/scene.cuh>
+#include <voxelpipe/tuning/tuning_raster.hpp>
 
 #include <algorithm>
 #include <cstdint>
@@ -16,14 +17,6 @@ template <class Element>
 struct fill_pattern {
     Element value;
 };
-
-// A block fills 16 KB and ends: 4 GiB take 0.92 ms, against 1.0 ms with persistent blocks.
-inline constexpr unsigned fill_stores = 4; // 16-byte stores of a thread, a block's width apart
-
-// Bit targets within these sizes, which exceed the cache, are written past it (Streams), so that it keeps what it has
-// of the mesh: calls at 1024^3 took 0.3 to 2 % less on average. Values are written through the cache: streaming made no
-// difference at 512 MB and cost 1 % at 4 GiB.
-inline constexpr std::uint64_t min_streamed = std::uint64_t{64} << 20, max_streamed = std::uint64_t{256} << 20;
 
 // Elements of 1, 2, 4, 8 or 16 bytes are stored 16 bytes at a time.
 template <bool Streams, class Element>
@@ -38,9 +31,9 @@ __global__ void fill_kernel(Element* to, std::uint64_t count, const __grid_const
             for (unsigned i = 0; i < per_store; ++i) lanes[i] = pattern.value;
             uint4 wide;
             memcpy(&wide, lanes, 16);
-            const std::uint64_t stores = count / per_store, per_block = std::uint64_t{fill_stores} * blockDim.x;
+            const std::uint64_t stores = count / per_store, per_block = std::uint64_t{tuning::fill_stores} * blockDim.x;
             for (std::uint64_t first = blockIdx.x * per_block; first < stores; first += gridDim.x * per_block)
-                for (unsigned k = 0; k < fill_stores; ++k) {
+                for (unsigned k = 0; k < tuning::fill_stores; ++k) {
                     const std::uint64_t i = first + k * blockDim.x + threadIdx.x;
                     if (i >= stores) continue;
                     if constexpr (Streams)
@@ -81,7 +74,7 @@ __global__ void fill_bits_kernel(const __grid_constant__ target_view<Target> t, 
 template <bool Streams, class Element>
 void fill_elements(Element* to, std::uint64_t count, const fill_pattern<Element>& pattern, const pipeline_state* state,
                    const capacities& limits, cudaStream_t stream) {
-    constexpr std::uint64_t bytes_per_block = std::uint64_t{16} * fill_stores * threads_per_block;
+    constexpr std::uint64_t bytes_per_block = std::uint64_t{16} * tuning::fill_stores * threads_per_block;
     const std::uint64_t blocks = count * sizeof(Element) / bytes_per_block + 1;
     launch_behind(fill_kernel<Streams, Element>, static_cast<unsigned>(std::min(blocks, core::max_blocks)),
                   threads_per_block, stream, stage::fine_raster, to, count, pattern, state, limits);
@@ -94,7 +87,8 @@ void clear_target(const target_view<Target>& t, const pipeline_state* state, con
     using element = typename Target::element_type;
     const auto fill = [&](element* to, std::uint64_t count, const element& value) {
         if constexpr (map::is_bit)
-            if (const std::uint64_t bytes = count * sizeof(element); bytes >= min_streamed && bytes <= max_streamed) {
+            if (const std::uint64_t bytes = count * sizeof(element);
+                bytes >= tuning::min_streamed && bytes <= tuning::max_streamed) {
                 fill_elements<true>(to, count, fill_pattern<element>{value}, state, limits, stream);
                 return;
             }

@@ -40,7 +40,7 @@ struct chunk_marks {
     __device__ VOXELPIPE_INLINE void mark_brick(const std::int32_t (&corner)[3], unsigned lane) const {
         constexpr unsigned across = core::brick_size / chunk_yz;
         static_assert(core::brick_size % chunk_yz == 0 && chunk_x % core::brick_size == 0 &&
-                      across * across <= static_cast<unsigned>(group_lanes));
+                      across * across <= static_cast<unsigned>(tuning::group_lanes));
         const int y = corner[1] + static_cast<int>(lane % across) * chunk_yz,
                   z = corner[2] + static_cast<int>(lane / across) * chunk_yz;
         if (lane < across * across && y < extent.y && z < extent.z) mark_row(corner[0], corner[0], y, z);

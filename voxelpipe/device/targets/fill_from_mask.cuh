@@ -12,6 +12,7 @@
 #include <voxelpipe/device/targets/clear_target.cuh>
 #include <voxelpipe/device/targets/target_traits.cuh>
 #include <voxelpipe/device/targets/tracked_clear.cuh>
+#include <voxelpipe/tuning/tuning_raster.hpp>
 
 #include <algorithm>
 #include <cstddef>
@@ -38,7 +39,7 @@ struct value_writer {
     using value_type = typename Target::value_type;
     static constexpr bool goes_wide =
         !map::bricks && !map::planes && sizeof(value_type) <= 16 && 16 % sizeof(value_type) == 0;
-    static constexpr unsigned batch = 4; // loads in flight
+    static constexpr unsigned batch = tuning::last_pass_loads;
 
     const word* touched;
     const target_view<Target>& t;
@@ -132,7 +133,7 @@ void fill_values(const word* touched, const target_view<Target>& t, const typena
                  const Tracking& tracking, const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
     // Blocks write a fixed part and end, as in clear_target.
     const std::uint64_t bytes = Target::map::elements(t.extent) * sizeof(typename Target::element_type),
-                        blocks = std::min(bytes / (16 * fill_stores * threads_per_block) + 1, core::max_blocks);
+                        blocks = std::min(bytes / (16 * tuning::fill_stores * threads_per_block) + 1, core::max_blocks);
     // If other targets are cleared by chunks, the log will not know this one.
     const bool fills = t.load == load_operation::clear && !Target::map::bricks,
                marks = !fills && !tracking.changes_known;
@@ -315,7 +316,7 @@ __global__ __launch_bounds__(threads_per_block) void fill_bits_kernel(uint4* tou
                                                                       const __grid_constant__ Values values,
                                                                       bool count_voxels, pipeline_state* state,
                                                                       capacities limits) {
-    constexpr unsigned batch = 4; // loads in flight
+    constexpr unsigned batch = tuning::last_pass_loads;
     await_stream();
     const bool failed = state->index_error != 0 || misses_deferred(*state, limits);
     const std::uint64_t num = (num_words + 3) / 4, threads = std::uint64_t{gridDim.x} * blockDim.x;

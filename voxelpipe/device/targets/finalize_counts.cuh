@@ -10,6 +10,8 @@
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/targets/dirty_chunks.cuh>
 #include <voxelpipe/device/targets/global_target.cuh>
+#include <voxelpipe/tuning/tuning_raster.hpp>
+#include <voxelpipe/tuning/tuning_strategy.hpp>
 
 #include <bit>
 #include <cstring>
@@ -42,9 +44,6 @@ struct immediate_plan {
     }
 };
 
-// A target of this many bytes is worth marks: reading it takes longer than marking.
-inline constexpr std::uint64_t marked_bytes = std::uint64_t{32} << 20;
-
 // True if the last pass of a target uses marks: the target is large, and voxels without fragments already have their
 // final bits, zero.
 template <class Target>
@@ -52,7 +51,7 @@ template <class Target>
     using map = typename Target::map;
     if constexpr (is_countable<Target> && !map::bricks) {
         constexpr typename Target::value_type none{};
-        return map::elements(t.extent) * sizeof(none) >= marked_bytes &&
+        return map::elements(t.extent) * sizeof(none) >= tuning::marked_bytes &&
                std::memcmp(&t.clear_value, &none, sizeof(none)) == 0;
     } else {
         return false;
@@ -100,7 +99,7 @@ __global__ __launch_bounds__(threads_per_block) void finalize_counts_kernel(
     unsigned_word<T>* at, std::uint64_t num_elements, const __grid_constant__ chunk_marks marks,
     const __grid_constant__ Fold fold, bool count_voxels, pipeline_state* state, capacities limits) {
     using number = unsigned_word<T>;
-    constexpr int per_load = 16 / sizeof(T), batch = 4; // loads in flight
+    constexpr int per_load = 16 / sizeof(T), batch = tuning::last_pass_loads;
     __shared__ number known[threads_per_block];
     await_stream();
     if (has_failed(*state, limits)) return;

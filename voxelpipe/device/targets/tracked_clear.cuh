@@ -8,6 +8,7 @@
 
 #include <voxelpipe/device/targets/clear_target.cuh>
 #include <voxelpipe/device/targets/finalize_counts.cuh>
+#include <voxelpipe/tuning/tuning_strategy.hpp>
 
 #include <algorithm>
 #include <cstddef>
@@ -22,7 +23,7 @@ template <class Target>
     if constexpr (map::is_bit || map::bricks || sizeof(typename Target::value_type) > core::change_log::max_bytes)
         return false;
     else
-        return map::elements(t.extent) * sizeof(typename Target::element_type) >= marked_bytes;
+        return map::elements(t.extent) * sizeof(typename Target::element_type) >= tuning::marked_bytes;
 }
 
 // True if a log can know some target of the framebuffer.

@@ -8,13 +8,14 @@
 
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/scene/int128_coverage.cuh>
+#include <voxelpipe/tuning/tuning_raster.hpp>
 
 namespace voxelpipe::device {
 
 template <coverage Rule>
 struct tile_cells {
     static constexpr coverage rule = Rule;
-    static constexpr std::int64_t small_columns = 16;
+    static constexpr std::int64_t small_columns = tuning::small_tile_columns;
     core::tile_grid tiles;
     std::uint32_t* keys;       // tile numbers
     std::uint32_t* primitives; // as long as keys

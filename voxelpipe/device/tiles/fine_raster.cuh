@@ -13,10 +13,9 @@
 #include <voxelpipe/device/tiles/tile_image.cuh>
 #include <voxelpipe/device/tiles/tile_split.cuh>
 #include <voxelpipe/tuning/tuning_fine_raster.hpp>
+#include <voxelpipe/tuning/tuning_fragments.hpp>
 
 namespace voxelpipe::device {
-
-inline constexpr int unit_columns = 32; // approximate columns of a unit
 
 // The part of a triangle within a tile, divided into units: rows of columns in the plane of u and v. A small part is
 // one unit, the whole tile box.
@@ -33,12 +32,12 @@ struct unit_list {
                                                      int& num_units) {
         const std::int64_t x = box.hi[0] - box.lo[0] + 1, y = box.hi[1] - box.lo[1] + 1, z = box.hi[2] - box.lo[2] + 1;
         num_units = 1;
-        if (core::max3(x * y, y * z, z * x) <= unit_columns) return {static_cast<std::uint32_t>(whole)};
+        if (core::max3(x * y, y * z, z * x) <= tuning::unit_columns) return {static_cast<std::uint32_t>(whole)};
         const int w = core::dominant_axis(t.a, t.b, t.c, fraction);
         const auto first = core::to_uvw(w, box.lo[0] - tile.lo[0], box.lo[1] - tile.lo[1], box.lo[2] - tile.lo[2]);
         const auto size = core::to_uvw(w, x, y, z);
         const auto columns = static_cast<std::uint32_t>(size[0]), rows = static_cast<std::uint32_t>(size[1]);
-        const std::uint32_t rows_a_unit = unit_columns / columns < 1 ? 1 : unit_columns / columns;
+        const std::uint32_t rows_a_unit = tuning::unit_columns / columns < 1 ? 1 : tuning::unit_columns / columns;
         num_units = static_cast<int>((rows + rows_a_unit - 1) / rows_a_unit);
         return {static_cast<std::uint32_t>(w) | static_cast<std::uint32_t>(first[0]) << 2 |
                 static_cast<std::uint32_t>(first[1]) << 7 | (columns - 1) << 12 | (rows - 1) << 17 |
@@ -81,9 +80,6 @@ __device__ void block_prefix(int value, int* sums) {
 
 // ---- small triangles ------------------------------------------------------------------------------------------------
 
-inline constexpr int queue_capacity = 4096;  // capacity of the queue
-inline constexpr int max_queue_cells = 1024; // most voxels of a bounding box within the tile whose fragments are queued
-
 // A triangle's bounding box, and its part within a tile.
 template <coverage Rule>
 struct small_part {
@@ -105,7 +101,7 @@ struct small_part {
             if (hi < box.hi[k]) box.hi[k] = hi;
             cells *= box.hi[k] - box.lo[k] + 1;
         }
-        is_small = is_small && cells <= max_queue_cells;
+        is_small = is_small && cells <= tuning::max_queue_cells;
     }
 
     // Calls row(x, y, z, bits) for the rows of fragments in the tile.
@@ -157,8 +153,9 @@ struct batch_memory {
     int sums[Threads];
     std::uint32_t ids[Threads];
     unit_list lists[Threads];
-    std::uint32_t fragments[queue_capacity]; // voxel of the tile, 15 bits, and the triangle's index in the batch
-    std::uint8_t in_units[Threads];          // 1: the triangle's fragments come from its units
+    std::uint32_t
+        fragments[tuning::queue_capacity]; // voxel of the tile, 15 bits, and the triangle's index in the batch
+    std::uint8_t in_units[Threads];        // 1: the triangle's fragments come from its units
     int num_fragments;
 };
 static_assert(sizeof(batch_memory<256>) + 1024 <= tuning::batch_bytes);
@@ -186,7 +183,7 @@ __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, c
                 part.rows(tile, [&](int x, int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
                     const auto from = static_cast<std::uint32_t>(voxel_of(x, y, z)) | threadIdx.x << 15;
                     int at = atomicAdd(&m.num_fragments, __popc(bits));
-                    for (; bits != 0 && at < queue_capacity; bits &= bits - 1)
+                    for (; bits != 0 && at < tuning::queue_capacity; bits &= bits - 1)
                         m.fragments[at++] = from + static_cast<std::uint32_t>(__ffs(static_cast<int>(bits)) - 1);
                     whole = whole && bits == 0;
                 });
@@ -200,7 +197,7 @@ __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, c
             }
         }
         block_prefix<Threads>(units, m.sums); // also makes all queued fragments visible
-        const int waiting = m.num_fragments < queue_capacity ? m.num_fragments : queue_capacity;
+        const int waiting = m.num_fragments < tuning::queue_capacity ? m.num_fragments : tuning::queue_capacity;
         for (int f = static_cast<int>(threadIdx.x); f < waiting; f += Threads) {
             const std::uint32_t packed = m.fragments[f];
             if (m.in_units[packed >> 15] != 0) continue;

@@ -45,11 +45,6 @@ template <int Log2Size, class Framebuffer>
 
 // ---- the coarse pass ------------------------------------------------------------------------------------------------
 
-// Most pairs of a work item: makes enough items for the device, and few images of split tiles.
-[[nodiscard]] inline std::uint32_t default_pairs_per_item(std::uint64_t pair_capacity) {
-    return static_cast<std::uint32_t>(std::max<std::uint64_t>(512, pair_capacity / 1024));
-}
-
 // Arrays of a coarse pass, and memory for the images of split tiles, which the fine passes use one after the other.
 // Uses limits.tile_pairs and limits.tile_records.
 struct tile_memory {

@@ -8,6 +8,7 @@
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/tiles/fine_raster.cuh>
 #include <voxelpipe/device/tiles/tile_split.cuh>
+#include <voxelpipe/tuning/tuning_fragments.hpp>
 
 namespace voxelpipe::device {
 
@@ -40,7 +41,6 @@ struct image_column {
 };
 
 inline constexpr int resolve_warps = threads_per_block / 32;
-inline constexpr int resolve_bytes = 16 * 1024; // shared memory for partial cells, one target after the other
 
 // Combines one word of every thread of the block; all threads get the result.
 template <class Combine>
@@ -60,7 +60,7 @@ __device__ word combine_block(word v, const Combine& combine) {
 template <class Blend, class Image, class Store>
 __device__ void merge_cells(const image_column<Image>& column, int offset, unsigned char* memory, Store&& store) {
     using cell = typename Blend::cell;
-    constexpr int fit = resolve_bytes / static_cast<int>(32 * sizeof(cell));
+    constexpr int fit = tuning::resolve_bytes / static_cast<int>(32 * sizeof(cell));
     static_assert(fit >= 1);
     constexpr unsigned ways = fit < resolve_warps ? fit : resolve_warps; // warps that read
     __shared__ unsigned founds[resolve_warps];
@@ -103,7 +103,7 @@ __global__ __launch_bounds__(threads_per_block) void tile_resolve_kernel(const _
                                                                          pipeline_state* state, capacities limits) {
     if (has_failed(*state, limits)) return;
     constexpr unsigned groups = Image::voxels / 32;
-    __shared__ __align__(16) unsigned char memory[resolve_bytes];
+    __shared__ __align__(16) unsigned char memory[tuning::resolve_bytes];
     const unsigned lane = threadIdx.x % 32;
     const std::uint64_t work = std::uint64_t{state->num_splits} * groups;
     std::uint64_t touched = 0; // in thread 0
