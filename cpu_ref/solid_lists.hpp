@@ -48,28 +48,28 @@ public:
         if (several_) // the bodies came one after another, each by ascending x
             std::stable_sort(fragments_.begin(), fragments_.end(),
                              [](const emitted& a, const emitted& b) { return a.x < b.x; });
-        auto& store = this->store;
+        auto& lists = this->store;
         const std::uint64_t row =
             static_cast<std::uint64_t>(z) * static_cast<std::uint64_t>(grid_.extent.y) + static_cast<std::uint64_t>(y);
         for (std::size_t i = 0; i < fragments_.size();) {
             row_segment segment{};
             segment.key = row * tiles_x_ + fragments_[i].x / tile_size;
             segment.worker = worker_;
-            segment.voxel = store.counts.size();
-            segment.fragment = store.primitives.size();
+            segment.voxel = lists.counts.size();
+            segment.fragment = lists.primitives.size();
             for (std::size_t j = i;
                  j < fragments_.size() && fragments_[j].x / tile_size == fragments_[i].x / tile_size;) {
                 std::uint32_t n = 0;
                 const std::uint32_t x = fragments_[j].x;
                 for (; j < fragments_.size() && fragments_[j].x == x; ++j, ++n) {
-                    store.primitives.push_back(fragments_[j].draw);
-                    if constexpr (has_payload) store.payloads.push_back(fragments_[j].payload);
+                    lists.primitives.push_back(fragments_[j].draw);
+                    if constexpr (has_payload) lists.payloads.push_back(fragments_[j].payload);
                 }
-                store.counts.push_back(n);
-                store.columns.push_back(static_cast<std::uint8_t>(x % tile_size));
+                lists.counts.push_back(n);
+                lists.columns.push_back(static_cast<std::uint8_t>(x % tile_size));
                 ++segment.num_voxels;
             }
-            segment.num_fragments = store.primitives.size() - segment.fragment;
+            segment.num_fragments = lists.primitives.size() - segment.fragment;
             i += segment.num_fragments;
             this->segments.push_back(segment);
         }

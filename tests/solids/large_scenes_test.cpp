@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "scenes.hpp"
+
+namespace solids {
+namespace {
+
+TEST(SolidScenes, DragonIsClosedAndTheSameUnderEveryRule) {
+    std::string why;
+    const auto dragon = load_scene("dragon", why);
+    if (!dragon) GTEST_SKIP() << why;
+    EXPECT_EQ(scene_status(*dragon, 512, {}).counts.voxels, 7458944u);
+    const vp::status nonzero = scene_status(*dragon, 1024, {});
+    EXPECT_EQ(nonzero.counts.voxels, scene_status(*dragon, 1024, {.rule = vp::fill_rule::even_odd}).counts.voxels);
+    EXPECT_EQ(nonzero.solid.open_rows, 0u);
+}
+
+TEST(SolidScenes, BladeAndAsianDragonAreClosed) {
+    for (const char* name : {"blade", "asiandragon"}) {
+        std::string why;
+        const auto m = load_scene(name, why);
+        if (!m) GTEST_SKIP() << why;
+        for (const int n : {128, 1024}) EXPECT_EQ(scene_status(*m, n, {}).solid.open_rows, 0u) << name << ' ' << n;
+    }
+}
+
+TEST(SolidScenes, ConferenceIsOpen) {
+    std::string why;
+    const auto conference = load_scene("conference", why);
+    if (!conference) GTEST_SKIP() << why;
+    EXPECT_EQ(scene_status(*conference, 1024, {.rule = vp::fill_rule::even_odd}).solid.open_rows, 73303u);
+    EXPECT_EQ(scene_status(*conference, 1024, {}).solid.open_rows, 74566u);
+}
+
+} // namespace
+} // namespace solids
