@@ -7,6 +7,7 @@
 // threads and any order of the triangles.
 
 #include <cpu_ref/solid_lists.hpp>
+#include <cpu_ref/solid_repair.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -37,24 +38,58 @@ template <class Mesh, class VertexShader, class SolidShader>
     return s;
 }
 
-// The crossings and the cover of the geometry, then `finish(sweep, status so far)`.
+[[nodiscard]] inline status solid_failure(status_code code, const solid_geometry& s) {
+    status failed = core::failure(code, stage::coarse_raster);
+    failed.counts.triangles_in = s.triangles_in;
+    return failed;
+}
+
+[[nodiscard]] inline cover_list find_cover(const execution& how, const solid_geometry& s) {
+    const bool small_keys = core::tile_grid(s.where.extent, log2_tile_size).count() <= std::uint64_t{1} << 32;
+    return small_keys ? find_cover<std::uint32_t>(how, s) : find_cover<std::uint64_t>(how, s);
+}
+
+// The crossings along x, and how many rows they leave open, for calls that need no more of them.
+template <class Crossing>
+void count_crossings(const raw_array<Crossing>& sorted, solid_counters& counts) {
+    counts.crossings = sorted.size();
+    for (std::size_t i = 0; i < sorted.size();) {
+        const std::size_t first = i;
+        while (i < sorted.size() && sorted[i].key == sorted[first].key && sorted[i].draw == sorted[first].draw) ++i;
+        counts.open_rows += (i - first) % 2;
+    }
+}
+
+// The crossings and the cover of the geometry, or what a repair makes of them, then finish(sweep, status so far).
 template <class Crossing, class Finish>
-[[nodiscard]] status run_sweep(const execution& how, const solid_geometry& s, const solid_options& options,
-                               bool needs_winding, status result, const Finish& finish) {
-    auto found = find_crossings<Crossing>(how, s);
-    if (found.code != status_code::ok) {
-        status failed = core::failure(found.code, stage::coarse_raster);
-        failed.counts.triangles_in = s.triangles_in;
-        return failed;
+[[nodiscard]] status run_sweep(const execution& how, const solid_geometry& s, solid_options options, bool needs_winding,
+                               status result, const Finish& finish) {
+    raw_array<Crossing> crossings;
+    std::vector<beam_words> words;
+    if (options.repair != repair::exterior) {
+        auto found = find_crossings<Crossing>(how, s, options.repair == repair::vote);
+        if (found.code != status_code::ok) return solid_failure(found.code, s);
+        result.counts = found.counts;
+        crossings = std::move(found.crossings);
     }
-    result.counts = found.counts;
-    std::vector<beam_words> cover;
-    if (options.extent != solid_extent::centre) {
-        const bool small_keys = core::tile_grid(s.where.extent, log2_tile_size).count() <= std::uint64_t{1} << 32;
-        cover = small_keys ? find_cover<std::uint32_t>(how, s) : find_cover<std::uint64_t>(how, s);
+    const bool is_set = options.repair == repair::exterior || options.repair == repair::vote;
+    if (is_set || options.extent != solid_extent::centre) {
+        cover_list cover = find_cover(how, s);
+        if (cover.code != status_code::ok) return solid_failure(cover.code, s);
+        if (options.repair == repair::exterior) result.counts = cover.counts;
+        words = std::move(cover.beams);
     }
-    const solid_sweep<Crossing> sweep(s.where.extent, options, needs_winding, std::move(found.crossings),
-                                      std::move(cover));
+    if (is_set) { // the sweep has nothing to do but hand the words on
+        options.extent = solid_extent::outer;
+        if (options.repair == repair::vote) {
+            count_crossings(crossings, result.solid);
+            crossings = {};
+            words = find_majority(how, s, std::move(words));
+        } else {
+            words = find_interior(how, s, options.closing, std::move(words));
+        }
+    }
+    const solid_sweep<Crossing> sweep(s.where.extent, options, needs_winding, std::move(crossings), std::move(words));
     return finish(sweep, result);
 }
 
@@ -62,12 +97,15 @@ template <class Crossing, class Finish>
 template <class Mesh, class VertexShader, class SolidShader, class Finish>
 [[nodiscard]] status run_solid(const execution& how, std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
                                const grid& g, const solid_options& options, const Finish& finish) {
-    const solid_geometry s = make_solid_geometry(how, draws, g, options);
+    solid_geometry s = make_solid_geometry(how, draws, g, options);
+    status result;
+    if (options.repair == repair::close_holes && !add_cones(s, options.max_hole_edges, result.solid))
+        return solid_failure(status_code::too_many_triangles, s);
     constexpr bool needs_winding = shader_reads_winding<draw<Mesh, VertexShader, SolidShader>>;
     const bool small_keys = row_numbers(g.extent).num_beams() * tile_rows <= std::uint64_t{1} << 32;
     if (options.bodies == bodies::call && small_keys)
-        return run_sweep<call_crossing>(how, s, options, needs_winding, status{}, finish);
-    return run_sweep<draw_crossing>(how, s, options, needs_winding, status{}, finish);
+        return run_sweep<call_crossing>(how, s, options, needs_winding, result, finish);
+    return run_sweep<draw_crossing>(how, s, options, needs_winding, result, finish);
 }
 
 } // namespace voxelpipe::cpu

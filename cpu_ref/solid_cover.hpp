@@ -46,11 +46,19 @@ inline void take_words(constant_scratch& scratch, std::uint32_t draw, std::uint3
     }
 }
 
-// The cover of every body: each beam that has any, ascending.
+// The cover of every body.
+struct cover_list {
+    status_code code = status_code::ok;
+    counters counts{};             // as conservative coverage has them
+    std::vector<beam_words> beams; // each that has any, ascending
+};
+
 template <class Key>
-[[nodiscard]] std::vector<beam_words> find_cover(const execution& how, const solid_geometry& s) {
+[[nodiscard]] cover_list find_cover(const execution& how, const solid_geometry& s) {
     const core::tile_grid tiles(s.where.extent, log2_tile_size);
     auto coarse = coarse_raster<coverage::conservative, Key>(how, s, tiles);
+    cover_list cover{coarse.code, coarse.counts, {}};
+    if (coarse.code != status_code::ok) return cover;
     const std::vector<tile_range> ranges = tile_sort(how, coarse.pairs, tiles.count());
     const auto beam_of = [&](const tile_range& r) { return r.tile / static_cast<std::uint64_t>(tiles.tiles.x); };
 
@@ -61,11 +69,11 @@ template <class Key>
         if (i == 0 || beam_of(ranges[i]) != beam_of(ranges[i - 1])) first.push_back(i);
     first.push_back(ranges.size());
     const std::size_t num_beams = first.size() - 1;
-    std::vector<beam_words> beams(num_beams);
+    cover.beams.resize(num_beams);
     std::vector<std::unique_ptr<constant_scratch>> scratch;
     for (unsigned w = 0; w < std::max(1u, how.threads); ++w) scratch.push_back(std::make_unique<constant_scratch>());
     parallel_for(how.threads, num_beams, [&](unsigned worker, std::size_t b) {
-        beam_words& out = beams[b];
+        beam_words& out = cover.beams[b];
         out.beam = beam_of(ranges[first[b]]);
         for (std::size_t r = first[b]; r < first[b + 1]; ++r) {
             const tile_range& range = ranges[r];
@@ -89,7 +97,7 @@ template <class Key>
         }
         sort_words(out.words);
     });
-    return beams;
+    return cover;
 }
 
 } // namespace voxelpipe::cpu

@@ -7,6 +7,7 @@
 
 #include <cpu_ref/pipeline.hpp>
 #include <voxelpipe/core/crossing.hpp>
+#include <voxelpipe/core/holes.hpp>
 #include <voxelpipe/solid.hpp>
 
 #include <cstddef>
@@ -21,8 +22,7 @@ struct solid_geometry : geometry {
     std::vector<std::uint32_t> body; // per part: the draw that it belongs to; 0 where all are one body
     std::vector<bool> is_repair;     // per part: cones, which are not counted
     std::vector<shaded_vertices<no_varyings>> vertices; // owns the positions of the draws
-    std::vector<std::vector<core::snapped_position>> repair_positions;
-    std::vector<std::vector<glm::uvec3>> repair_triangles;
+    std::vector<core::hole_cones> cones;                // owns the others
     std::uint64_t triangles_in = 0;
 };
 
@@ -78,9 +78,10 @@ struct crossing_list {
     raw_array<Crossing> crossings; // by row, and in a row by primitive, hence by body
 };
 
-// Reads every triangle once: counts it, and finds its crossings with the rows of the grid.
+// Reads every triangle once: counts it, and finds its crossings with the rows of the grid. `votes`: rows along y and z
+// will be asked too, so that more triangles take part.
 template <class Crossing>
-[[nodiscard]] crossing_list<Crossing> find_crossings(const execution& how, const solid_geometry& s) {
+[[nodiscard]] crossing_list<Crossing> find_crossings(const execution& how, const solid_geometry& s, bool votes) {
     how.enter(stage::coarse_raster);
     crossing_list<Crossing> all;
     const row_numbers rows(s.where.extent);
@@ -118,7 +119,7 @@ template <class Crossing>
                     ++(nonfinite ? counts.triangles_nonfinite : counts.triangles_too_far);
                     continue;
                 }
-                if (!core::meets_rows(a, b_, c, s.snap.fraction, whole)) {
+                if (!core::meets_rows(a, b_, c, s.snap.fraction, whole, votes)) {
                     counts.triangles_outside += counted ? 1 : 0;
                     continue;
                 }

@@ -199,7 +199,7 @@ void sweep_all(const execution& how, const solid_sweep<Crossing>& sweep,
         result.solid.open_rows += s->counts.open_rows;
         result.solid.max_winding = std::max(result.solid.max_winding, s->counts.max_winding);
     }
-    result.solid.crossings = sweep.num_crossings();
+    result.solid.crossings += sweep.num_crossings();
 }
 
 // Whether all draws that give fragments give the same values.

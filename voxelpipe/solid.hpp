@@ -34,8 +34,9 @@ enum class solid_extent : std::uint8_t {
 enum class repair : std::uint8_t {
     none,        // a hole casts its shadow along +x; solid_counters::open_rows tells
     close_holes, // a cone is put over each hole's boundary, before anything else
-    exterior,    // inside is what a flood from outside the grid does not reach, without fill rule and extent
-    vote,        // inside is what most of the rows along x, y and z say, without fill rule and extent
+    // Fill rule and extent do not apply to the other two; what a triangle touches is inside.
+    exterior, // what a flood from outside the grid does not reach through untouched voxels: fills cavities; no crops
+    vote,     // what most of the closed rows along x, y and z call inside by even_odd; a tie is outside
 };
 
 // Written {.rule = fill_rule::even_odd, .extent = solid_extent::outer}.
@@ -61,7 +62,7 @@ inline constexpr solid_options each_draw{.rule = fill_rule::even_odd, .bodies = 
 struct solid_fragment {
     glm::ivec3 voxel;     // index in the whole grid
     std::uint32_t draw;   // which draw of the call; 0 with bodies::call
-    std::int64_t winding; // winding number of the voxel's centre; 0 is possible with outer, exterior and vote
+    std::int64_t winding; // winding number of the voxel's centre; 0 is possible with outer; 0 with exterior, vote
 };
 
 namespace core {

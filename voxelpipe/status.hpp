@@ -69,7 +69,7 @@ struct counters {
 struct solid_counters {
     // Rows whose crossings, in, before and behind the grid, are odd in number (fill_rule::even_odd) or do not sum to 0
     // (other rules); with bodies::draw each draw counts for itself. More than 0 proves that the mesh is not closed; 0
-    // proves only that these rows balance.
+    // proves only that these rows balance. repair::vote counts as even_odd does; repair::exterior looks at no rows.
     std::uint64_t open_rows = 0;
     std::uint64_t crossings = 0;   // of triangles with rows, in, before and behind the grid
     std::uint64_t max_winding = 0; // greatest |winding number| of a voxel's centre; 0 for fill_rule::even_odd

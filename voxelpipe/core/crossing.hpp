@@ -216,11 +216,15 @@ VOXELPIPE_HD constexpr void for_each_crossing(const snapped_position& a, const s
 }
 
 // Whether a drawable triangle takes part in a solid of the grid, of which `whole` is the computed part: its closed box
-// meets the part's y and z intervals. Where it lies along x does not matter, for it flips what is behind it.
+// meets the part's y and z intervals. Where it lies along x does not matter, for it flips what is behind it. With votes
+// (repair::vote) rows along y and z count as well: it meets two of the three intervals.
 [[nodiscard]] VOXELPIPE_HD constexpr bool meets_rows(const snapped_position& a, const snapped_position& b,
-                                                     const snapped_position& c, int fraction, const voxel_box& whole) {
+                                                     const snapped_position& c, int fraction, const voxel_box& whole,
+                                                     bool votes = false) {
     const voxel_box box = bounds(a, b, c, fraction);
-    return box.lo[1] <= whole.hi[1] && box.hi[1] >= whole.lo[1] && box.lo[2] <= whole.hi[2] && box.hi[2] >= whole.lo[2];
+    const auto meets = [&](int axis) { return box.lo[axis] <= whole.hi[axis] && box.hi[axis] >= whole.lo[axis]; };
+    const bool y = meets(1), z = meets(2);
+    return (y && z) || (votes && (y || z) && meets(0));
 }
 
 } // namespace core

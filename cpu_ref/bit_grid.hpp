@@ -1,0 +1,130 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A dense grid of bits in rows along x, for the repairs of solids: dilation by a box and a flood of rows.
+
+#include <cpu_ref/parallel.hpp>
+
+#include <glm/vec3.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace voxelpipe::cpu {
+
+class bit_grid {
+public:
+    explicit bit_grid(glm::ivec3 extent)
+        : extent_(extent), words_((static_cast<std::size_t>(extent.x) + 63) / 64),
+          bits_(words_ * static_cast<std::size_t>(extent.y) * static_cast<std::size_t>(extent.z)) {}
+
+    [[nodiscard]] glm::ivec3 extent() const { return extent_; }
+    [[nodiscard]] std::size_t words() const { return words_; } // of 64 bits, in a row
+    [[nodiscard]] std::uint64_t* row(int y, int z) { return bits_.data() + first(y, z); }
+    [[nodiscard]] const std::uint64_t* row(int y, int z) const { return bits_.data() + first(y, z); }
+    void set(int x, int y, int z) { row(y, z)[x / 64] |= std::uint64_t{1} << (x % 64); }
+    void flip(int x, int y, int z) { row(y, z)[x / 64] ^= std::uint64_t{1} << (x % 64); }
+
+    // Sets the 32 bits from x on, a multiple of 32 plus `shift`; those beyond the extent must be 0.
+    void set_bits(int x, int y, int z, std::uint32_t bits) {
+        std::uint64_t* const r = row(y, z);
+        const int at = x % 64;
+        r[x / 64] |= std::uint64_t{bits} << at;
+        if (at > 32 && bits >> (64 - at) != 0) r[x / 64 + 1] |= std::uint64_t{bits} >> (64 - at);
+    }
+    // The 32 bits from x on; 0 beyond the row.
+    [[nodiscard]] std::uint32_t get_bits(int x, int y, int z) const {
+        const std::uint64_t* const r = row(y, z);
+        const auto i = static_cast<std::size_t>(x) / 64;
+        const int at = x % 64;
+        std::uint64_t w = r[i] >> at;
+        if (at > 32 && i + 1 < words_) w |= r[i + 1] << (64 - at);
+        return static_cast<std::uint32_t>(w);
+    }
+    // Bits of the last word that belong to the row.
+    [[nodiscard]] std::uint64_t last_word() const {
+        return extent_.x % 64 == 0 ? ~std::uint64_t{0} : (std::uint64_t{1} << (extent_.x % 64)) - 1;
+    }
+
+private:
+    [[nodiscard]] std::size_t first(int y, int z) const {
+        return (static_cast<std::size_t>(z) * static_cast<std::size_t>(extent_.y) + static_cast<std::size_t>(y)) *
+               words_;
+    }
+    glm::ivec3 extent_;
+    std::size_t words_;
+    std::vector<std::uint64_t> bits_;
+};
+
+namespace detail {
+
+// a |= a moved down by `by` bits (towards lower x).
+inline void or_shifted_down(std::uint64_t* a, std::size_t n, int by) {
+    const auto words = static_cast<std::size_t>(by) / 64;
+    const int bits = by % 64;
+    for (std::size_t i = 0; i + words < n; ++i) {
+        std::uint64_t w = a[i + words] >> bits;
+        if (bits != 0 && i + words + 1 < n) w |= a[i + words + 1] << (64 - bits);
+        a[i] |= w;
+    }
+}
+inline void or_shifted_up(std::uint64_t* a, std::size_t n, int by) {
+    const auto words = static_cast<std::size_t>(by) / 64;
+    const int bits = by % 64;
+    for (std::size_t i = n; i-- > words;) {
+        std::uint64_t w = a[i - words] << bits;
+        if (bits != 0 && i > words) w |= a[i - words - 1] >> (64 - bits);
+        a[i] |= w;
+    }
+}
+
+// Calls step(k) so that steps of a |= a moved by k reach all distances up to r.
+template <class Step>
+void by_doubling(int r, const Step& step) {
+    int reached = 0;
+    while (reached < r) {
+        const int k = std::min(reached + 1, r - reached);
+        step(k);
+        reached += k;
+    }
+}
+
+} // namespace detail
+
+// Sets every bit within r of a bit that is set, in the max norm. What lies beyond the grid is not set.
+inline void dilate(bit_grid& g, int r, unsigned threads) {
+    if (r == 0) return;
+    const glm::ivec3 e = g.extent();
+    const std::size_t n = g.words();
+    const auto or_row = [&](std::uint64_t* to, const std::uint64_t* from) {
+        for (std::size_t i = 0; i < n; ++i) to[i] |= from[i];
+    };
+    parallel_for(threads, static_cast<std::size_t>(e.z), [&](unsigned, std::size_t slice) {
+        const auto z = static_cast<int>(slice);
+        for (int y = 0; y < e.y; ++y) {
+            std::uint64_t* const row = g.row(y, z);
+            // Up and down one after the other cover all distances from -r to r.
+            detail::by_doubling(r, [&](int k) { detail::or_shifted_up(row, n, k); });
+            row[n - 1] &= g.last_word();
+            detail::by_doubling(r, [&](int k) { detail::or_shifted_down(row, n, k); });
+        }
+    });
+    // Ascending, row i takes row i + k before that is changed; descending, row i takes row i - k.
+    const auto along = [&](int count, const auto& row_at) {
+        detail::by_doubling(r, [&](int k) {
+            for (int i = 0; i + k < count; ++i) or_row(row_at(i), row_at(i + k));
+        });
+        detail::by_doubling(r, [&](int k) {
+            for (int i = count - 1; i >= k; --i) or_row(row_at(i), row_at(i - k));
+        });
+    };
+    parallel_for(threads, static_cast<std::size_t>(e.z),
+                 [&](unsigned, std::size_t z) { along(e.y, [&](int i) { return g.row(i, static_cast<int>(z)); }); });
+    parallel_for(threads, static_cast<std::size_t>(e.y),
+                 [&](unsigned, std::size_t y) { along(e.z, [&](int i) { return g.row(static_cast<int>(y), i); }); });
+}
+
+} // namespace voxelpipe::cpu
