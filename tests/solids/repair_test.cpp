@@ -298,11 +298,8 @@ TEST(Exterior, FindsItsWayThroughACorridorOfManyTurns) {
 
 TEST(Exterior, ClosingSealsGapsAndAMeshThatLeavesTheGridIsFloodedThere) {
     const vp::grid g = unit_grid({20, 20, 20});
-    mesh m = without_triangles(box({4, 4, 4}, {16, 16, 16}), {2, 3});
-    m.add(box({4, 4, 4}, {16, 8.6f, 4}));
-    m.add(box({4, 11.4f, 4}, {16, 16, 4})); // the lid below has a slit of some two voxels
     const std::size_t middle = index(g.extent, 10, 10, 10);
-    EXPECT_EQ(library_solid(m, g, exterior(0)).voxels[middle], 1) << "the wrong face was opened";
+    // The lid below has a slit of some two voxels.
     mesh slit = without_triangles(box({4, 4, 4}, {16, 16, 16}), {0, 1});
     slit.add(box({4, 4, 4}, {16, 8.6f, 4}));
     slit.add(box({4, 11.4f, 4}, {16, 16, 4}));
