@@ -8,6 +8,7 @@
 #include <cpu_ref/abuffer_pass.hpp>
 #include <cpu_ref/framebuffer_pass.hpp>
 #include <cpu_ref/solid.hpp>
+#include <cpu_ref/sparse_pass.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <cstddef>
@@ -99,6 +100,25 @@ public:
             return cpu::run_solid(how, draws, g, options, [&](const auto& sweep, const status& result) {
                 return solid_pass(how, sweep, draws, g, options, out, result);
             });
+        });
+    }
+
+    // The same for sparse framebuffers.
+    template <class Draws, class Coverage = core::known_coverage<>, class... Targets>
+    [[nodiscard]] status run_sparse(const Draws& draws, const grid& g, sparse_framebuffer<cpu_backend, Targets...>& out,
+                                    const voxelize_options& options, std::uint64_t triangles_in, Coverage = {}) {
+        return guarded(triangles_in, [&](const cpu::execution& how) {
+            auto s = cpu::make_scene(how, draws, cpu::tile_aligned(g));
+            s.drawn = cpu::part_of_aligned(g);
+            return Coverage::dispatch(options.rule, [&]<coverage Rule>() {
+                return cpu::draw_sparse_surface<Rule>(how, *this, g, s, options.count_voxels, out);
+            });
+        });
+    }
+    template <class... Targets>
+    [[nodiscard]] status clear_sparse(const grid& g, sparse_framebuffer<cpu_backend, Targets...>& out) {
+        return guarded(0, [&](const cpu::execution& how) {
+            return cpu::draw_sparse(how, *this, g, cpu::empty_source{}, false, counters{}, out);
         });
     }
 

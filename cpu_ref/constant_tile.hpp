@@ -42,6 +42,17 @@ inline constexpr bool folds_once = std::is_same_v<Blend, blend::replace> || std:
 template <class Target>
 inline constexpr bool target_folds_once = folds_once<typename Target::blend_type, typename Target::value_type>;
 
+// Whether a target that takes part has to know how many fragments a voxel has.
+template <class... Targets>
+[[nodiscard]] bool needs_repeats(const framebuffer_view<Targets...>& fb) {
+    bool repeats = false;
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        using target_type = typename core::pack_element<I, Targets...>::type;
+        if (!target_folds_once<target_type> && get<I>(fb.targets).load != load_operation::off) repeats = true;
+    });
+    return repeats;
+}
+
 // What one thread keeps for the tile that it is at.
 struct constant_scratch {
     std::array<std::uint32_t, tile_rows> touched{};
@@ -136,10 +147,11 @@ private:
     std::uint32_t known_end_ = 0;
 };
 
+// `at` is the place in the target of the tile's lowest voxel; its x is a multiple of 32.
 template <class Target>
-void resolve_constant_target(const core::voxel_box& tile, const target_view<Target>& t,
+void resolve_constant_target(const glm::ivec3& at, const target_view<Target>& t,
                              const typename Target::value_type& value, const constant_scratch& scratch) {
-    const auto x0 = static_cast<int>(tile.lo[0]), y0 = static_cast<int>(tile.lo[1]), z0 = static_cast<int>(tile.lo[2]);
+    const int x0 = at.x, y0 = at.y, z0 = at.z;
     constant_folder<Target> folder(t, value);
     for (std::size_t row = 0; row < tile_rows; ++row) {
         const std::uint32_t word = scratch.touched[row];
@@ -151,7 +163,7 @@ void resolve_constant_target(const core::voxel_box& tile, const target_view<Targ
 
 // Ends the tile: the targets get their values, voxels are counted, the marks are wiped.
 template <class Values, class... Targets>
-void resolve_constant_tile(const core::voxel_box& tile, const framebuffer_view<Targets...>& fb, const Values& values,
+void resolve_constant_tile(const glm::ivec3& at, const framebuffer_view<Targets...>& fb, const Values& values,
                            constant_scratch& scratch) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
         const auto& t = get<I>(fb.targets);
@@ -159,7 +171,7 @@ void resolve_constant_tile(const core::voxel_box& tile, const framebuffer_view<T
         // A count target ignores the value, whatever its type.
         typename target_type::value_type value{};
         if constexpr (!std::is_same_v<typename target_type::blend_type, blend::count>) value = get<I>(values);
-        if (t.load != load_operation::off) resolve_constant_target<target_type>(tile, t, value, scratch);
+        if (t.load != load_operation::off) resolve_constant_target<target_type>(at, t, value, scratch);
     });
     for (std::size_t row = 0; row < tile_rows; ++row) {
         std::uint32_t word = scratch.touched[row];

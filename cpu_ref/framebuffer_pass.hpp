@@ -79,6 +79,18 @@ struct tile_scratch {
     counters counts{};
 };
 
+// Room for the sums of a tile in the targets that take part.
+template <class... Targets>
+void reserve_sums(const framebuffer_view<Targets...>& fb, tile_scratch<Targets...>& scratch) {
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        using target_type = typename core::pack_element<I, Targets...>::type;
+        if constexpr (!works_in_place<target_type>)
+            if (get<I>(fb.targets).load != load_operation::off)
+                get<I>(scratch.sums) =
+                    std::make_unique_for_overwrite<typename target_type::traits::accumulator[]>(tile_voxels);
+    });
+}
+
 template <class... Targets>
 inline constexpr bool all_in_place = (works_in_place<Targets> && ...);
 
@@ -95,10 +107,12 @@ VOXELPIPE_INLINE void blend_in_place(const target_view<Target>& t, int x, int y,
     }
 }
 
+// `at` is the place in the targets of the tile's lowest voxel.
 template <coverage Rule, bool Track, class Scene, class... Targets>
-void raster_tile(const Scene& s, const core::voxel_box& box, const std::uint32_t* primitives, std::size_t stride,
-                 std::size_t count, const framebuffer_view<Targets...>& fb, tile_scratch<Targets...>& scratch) {
-    const auto x0 = static_cast<int>(box.lo[0]), y0 = static_cast<int>(box.lo[1]), z0 = static_cast<int>(box.lo[2]);
+void raster_tile(const Scene& s, const core::voxel_box& box, const glm::ivec3& at, const std::uint32_t* primitives,
+                 std::size_t stride, std::size_t count, const framebuffer_view<Targets...>& fb,
+                 tile_scratch<Targets...>& scratch) {
+    const int x0 = at.x, y0 = at.y, z0 = at.z;
     std::uint64_t fragments = 0, discarded = 0;
     for (std::size_t i = 0; i < count; ++i) {
         const std::uint32_t id =
@@ -137,9 +151,8 @@ void raster_tile(const Scene& s, const core::voxel_box& box, const std::uint32_t
 
 // Ends the tile: sums become stored values, voxels are counted, the marks are wiped.
 template <class... Targets>
-void resolve_tile(const core::voxel_box& box, const framebuffer_view<Targets...>& fb,
-                  tile_scratch<Targets...>& scratch) {
-    const auto x0 = static_cast<int>(box.lo[0]), y0 = static_cast<int>(box.lo[1]), z0 = static_cast<int>(box.lo[2]);
+void resolve_tile(const glm::ivec3& at, const framebuffer_view<Targets...>& fb, tile_scratch<Targets...>& scratch) {
+    [[maybe_unused]] const int x0 = at.x, y0 = at.y, z0 = at.z;
     for (std::size_t row = 0; row < tile_rows; ++row) {
         std::uint32_t word = scratch.touched[row];
         if (word == 0) continue;
@@ -180,13 +193,7 @@ void raster_tiles(const execution& how, const Scene& s, const core::tile_grid& t
     std::vector<std::unique_ptr<tile_scratch<Targets...>>> scratch;
     for (unsigned w = 0; w < workers; ++w) {
         scratch.push_back(std::make_unique<tile_scratch<Targets...>>());
-        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-            using target_type = typename core::pack_element<I, Targets...>::type;
-            if constexpr (!works_in_place<target_type>)
-                if (get<I>(fb.targets).load != load_operation::off)
-                    get<I>(scratch.back()->sums) =
-                        std::make_unique_for_overwrite<typename target_type::traits::accumulator[]>(tile_voxels);
-        });
+        reserve_sums(fb, *scratch.back());
     }
     clear_targets(how, fb);
     const stopwatch watch(how.times, &stage_times::fine_raster);
@@ -199,10 +206,10 @@ void raster_tiles(const execution& how, const Scene& s, const core::tile_grid& t
         constexpr std::size_t stride = sizeof(tile_pair<Key>);
         auto& mine = *scratch[worker];
         if (count_voxels || !all_in_place<Targets...>) {
-            raster_tile<Rule, true>(s, box, primitives, stride, count, fb, mine);
-            resolve_tile(box, fb, mine);
+            raster_tile<Rule, true>(s, box, lowest(box), primitives, stride, count, fb, mine);
+            resolve_tile(lowest(box), fb, mine);
         } else if constexpr (all_in_place<Targets...>) {
-            raster_tile<Rule, false>(s, box, primitives, stride, count, fb, mine);
+            raster_tile<Rule, false>(s, box, lowest(box), primitives, stride, count, fb, mine);
         }
         meter.advance();
     });
@@ -217,11 +224,7 @@ template <coverage Rule, class Key, class Scene, class... Targets>
 void raster_constant_tiles(const execution& how, const Scene& s, const core::tile_grid& tiles,
                            const std::vector<tile_range>& ranges, const raw_array<tile_pair<Key>>& pairs,
                            unsigned workers, const framebuffer_view<Targets...>& fb, counters& counts) {
-    bool repeats = false;
-    core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-        using target_type = typename core::pack_element<I, Targets...>::type;
-        if (!target_folds_once<target_type> && get<I>(fb.targets).load != load_operation::off) repeats = true;
-    });
+    const bool repeats = needs_repeats(fb);
     std::vector<std::unique_ptr<constant_scratch>> scratch;
     for (unsigned w = 0; w < workers; ++w) {
         scratch.push_back(std::make_unique<constant_scratch>());
@@ -241,7 +244,7 @@ void raster_constant_tiles(const execution& how, const Scene& s, const core::til
             cover_tile<Rule, true>(s, box, primitives, stride, count, mine);
         else
             cover_tile<Rule, false>(s, box, primitives, stride, count, mine);
-        resolve_constant_tile(box, fb, s.draws[0].fragment_shader.values, mine);
+        resolve_constant_tile(lowest(box), fb, s.draws[0].fragment_shader.values, mine);
         meter.advance();
     });
     for (const auto& w : scratch) {

@@ -64,6 +64,11 @@ inline constexpr int tile_size = 1 << log2_tile_size;
 inline constexpr std::size_t tile_rows = std::size_t{tile_size} * tile_size;
 inline constexpr std::size_t tile_voxels = tile_rows * tile_size;
 
+// A box's lowest voxel.
+[[nodiscard]] inline glm::ivec3 lowest(const core::voxel_box& box) {
+    return {static_cast<int>(box.lo[0]), static_cast<int>(box.lo[1]), static_cast<int>(box.lo[2])};
+}
+
 // The number of a voxel within its tile; a row is y + tile_size * z.
 [[nodiscard]] constexpr std::size_t tile_voxel(int row, int x) {
     return static_cast<std::size_t>(row) * tile_size + static_cast<std::size_t>(x);
@@ -130,6 +135,7 @@ struct geometry {
     std::vector<std::uint32_t> first_primitive; // per draw, and one more: the total
     core::snap_transform snap{};
     grid where{};
+    core::voxel_box drawn{}; // the voxels to draw: all of `where`, unless that begins ahead of them
 
     struct primitive {
         std::uint32_t draw, triangle;
@@ -143,9 +149,6 @@ struct geometry {
                 1;
         const std::uint32_t t = id - first_primitive[d];
         return {d, t, parts[d].triangles[t]};
-    }
-    [[nodiscard]] core::voxel_box whole_box() const {
-        return {{{0, 0, 0}}, {{where.extent.x - 1, where.extent.y - 1, where.extent.z - 1}}};
     }
 };
 
@@ -165,6 +168,7 @@ make_scene(const execution& how, std::span<const draw<Mesh, VertexShader, Fragme
     scene<Mesh, VertexShader, FragmentShader> s;
     s.draws = draws;
     s.where = g;
+    s.drawn = {{{0, 0, 0}}, {{g.extent.x - 1, g.extent.y - 1, g.extent.z - 1}}};
     s.snap = core::make_snap_transform(g);
     s.normal_factors = core::normal_factors(g);
     s.vertices = vertex_shade(how, draws, s.snap);
@@ -229,7 +233,7 @@ template <coverage Rule, class Key>
     constexpr std::size_t block = 8192;
     const std::size_t n = s.first_primitive.back();
     const std::size_t blocks = (n + block - 1) / block;
-    const core::voxel_box whole = s.whole_box();
+    const core::voxel_box whole = s.drawn;
     struct block_result {
         status_code code = status_code::ok;
         counters counts{};

@@ -87,6 +87,12 @@ public:
     [[nodiscard]] glm::ivec3 first() const { return first_; }
     [[nodiscard]] glm::ivec3 last() const { return last_; }
 
+    // (x, y, z) is in the box.
+    void store(int x, int y, int z, const value_type& v) {
+        VOXELPIPE_EXPECTS(x >= first_.x && y >= first_.y && z >= first_.z && x < last_.x && y < last_.y && z < last_.z);
+        map::store(elements_.data(), copied_extent_, x - copied_first_.x, y - copied_first_.y, z - copied_first_.z, v);
+    }
+
     // Calls copy(box, to) for each box of a target's elements, which belongs at `to`.
     template <class Copy>
     void fill(glm::ivec3 extent, Copy&& copy) {

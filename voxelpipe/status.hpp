@@ -81,11 +81,12 @@ struct solid_counters {
     friend bool operator==(const solid_counters&, const solid_counters&) = default;
 };
 
-// Sizes that a caller's workspace must have; set if `code` is capacity_exceeded.
+// Sizes that a caller's workspace or limits must have; set if `code` is capacity_exceeded.
 struct required_sizes {
     std::uint64_t tile_pairs = 0;
     std::uint64_t fragments = 0;
     std::uint64_t bytes = 0;
+    std::uint64_t bricks = 0, voxels = 0; // of a sparse framebuffer with limits
 };
 
 [[nodiscard]] inline const char* to_string(status_code code) {

@@ -14,6 +14,7 @@
 #include <voxelpipe/mesh.hpp>
 #include <voxelpipe/shader.hpp>
 #include <voxelpipe/solid.hpp>
+#include <voxelpipe/sparse.hpp>
 #include <voxelpipe/stage_times.hpp>
 #include <voxelpipe/status.hpp>
 #include <voxelpipe/voxelize.hpp>

@@ -1,0 +1,285 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A sparse framebuffer's contents in host memory: found by voxel, walked brick by brick or voxel by voxel, made dense
+// as a whole or in part, and merged with those of other parts of the same grid.
+
+#include <voxelpipe/core/brick_table.hpp>
+#include <voxelpipe/core/index_iterator.hpp>
+#include <voxelpipe/framebuffer.hpp>
+#include <voxelpipe/grid.hpp>
+#include <voxelpipe/host_target.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe {
+
+namespace core {
+
+// Whether a target's blend sums in a wider format than it stores.
+template <class Target>
+inline constexpr bool has_wide_sums =
+    !std::is_same_v<typename Target::traits::accumulator, typename Target::value_type>;
+
+struct no_sum {};
+template <class Target>
+using kept_sum = std::conditional_t<has_wide_sums<Target>, typename Target::traits::accumulator, no_sum>;
+
+// The elements of a target whose every voxel is `value`; padding is as a dense call clears it.
+template <class Target>
+[[nodiscard]] std::vector<typename Target::element_type> filled_elements(const glm::ivec3& extent,
+                                                                         const typename Target::value_type& value) {
+    using map = typename Target::map;
+    using element = typename Target::element_type;
+    if (!fits_memory<Target>(extent))
+        throw std::length_error("voxelpipe: a dense target of this extent has more bytes than can be addressed");
+    std::vector<element> elements;
+    if constexpr (map::is_bit) {
+        elements.resize(map::elements(extent));
+        if (value)
+            for (int z = 0; z < extent.z; ++z)
+                for (int y = 0; y < extent.y; ++y)
+                    for (int x = 0; x < extent.x; ++x) map::store(elements.data(), extent, x, y, z, true);
+    } else if constexpr (map::planes) {
+        for (int c = 0; c < map::components; ++c) elements.insert(elements.end(), map::cells(extent), value[c]);
+    } else {
+        elements.assign(map::elements(extent), value);
+    }
+    return elements;
+}
+
+} // namespace core
+
+// Calls f(glm::ivec3 voxel, std::uint64_t rank) for each voxel that exists in a brick of a host table, in Morton order.
+// Voxels are numbered from the corner of the part.
+template <class F>
+void for_each_voxel_in(const brick_table& table, std::uint64_t brick, F&& f) {
+    const glm::ivec3 origin = table.brick_origin(brick);
+    std::uint64_t rank = table.offsets[brick];
+    for (unsigned w = 0; w < 8; ++w)
+        for (std::uint64_t word = table.masks[brick].words[w]; word != 0; word &= word - 1)
+            f(origin + core::morton_position(64 * w + static_cast<unsigned>(std::countr_zero(word))), rank++);
+}
+
+// A copy of a sparse framebuffer in host memory; to be had from sparse_framebuffer::to_host.
+template <class... Targets>
+class host_sparse {
+public:
+    static constexpr std::size_t num_targets = sizeof...(Targets);
+    template <std::size_t I>
+    using target_type = typename core::pack_element<I, Targets...>::type;
+
+    std::vector<std::uint64_t> keys; // the arrays of brick_table
+    std::vector<brick_mask> masks;
+    std::vector<std::uint64_t> offsets;
+    core::pack<std::vector<typename core::rank_map<Targets>::element>...> values; // by rank; none of a disabled target
+    core::pack<std::vector<core::kept_sum<Targets>>...> sums;                     // by rank, where they were kept
+    core::pack<typename Targets::value_type...> clear_values;                     // what absent voxels read as
+    grid where;                                                                   // of the last call
+
+    // Refers to the arrays.
+    [[nodiscard]] brick_table table() const {
+        return {keys.data(), masks.data(), offsets.data(), keys.size(), where.extent, where.offset};
+    }
+    [[nodiscard]] std::uint64_t num_bricks() const { return keys.size(); }
+    [[nodiscard]] std::uint64_t num_voxels() const { return table().num_voxels(); }
+    // Whether a voxel exists, numbered from the corner of the part; false outside.
+    [[nodiscard]] bool contains(const glm::ivec3& voxel) const { return table().find(voxel) != brick_table::none; }
+
+    struct brick_entry {
+        glm::ivec3 origin;      // its first voxel, from the corner of the part; negative where a crop cuts the brick
+        const brick_mask& mask; // which of its 512 voxels exist
+        std::uint64_t first;    // rank of the first of them
+    };
+    [[nodiscard]] brick_entry brick(std::uint64_t i) const {
+        VOXELPIPE_EXPECTS(i < num_bricks());
+        return {table().brick_origin(i), masks[i], offsets[i]};
+    }
+    // A random-access range of brick_entry, in Morton order. Refers to the arrays.
+    class brick_range {
+    public:
+        explicit brick_range(const host_sparse& owner) : owner_(&owner) {}
+        [[nodiscard]] auto begin() const { return core::index_iterator(brick_at{owner_}, 0); }
+        [[nodiscard]] auto end() const { return core::index_iterator(brick_at{owner_}, owner_->keys.size()); }
+        [[nodiscard]] std::size_t size() const { return owner_->keys.size(); }
+        [[nodiscard]] brick_entry operator[](std::size_t i) const { return owner_->brick(i); }
+
+    private:
+        struct brick_at {
+            const host_sparse* owner = nullptr;
+            brick_entry operator()(std::size_t i) const { return owner->brick(i); }
+        };
+        const host_sparse* owner_;
+    };
+    [[nodiscard]] brick_range bricks() const { return brick_range(*this); }
+
+    // Calls f(glm::ivec3 voxel, std::uint64_t rank) for every voxel that exists, in Morton order.
+    template <class F>
+    void for_each_voxel(F&& f) const {
+        const brick_table t = table();
+        for (std::uint64_t b = 0; b < t.count; ++b) for_each_voxel_in(t, b, f);
+    }
+
+    // One target: vp::get<I>(host). Refers to the host_sparse.
+    template <std::size_t I>
+    class target_reference {
+    public:
+        using target = typename core::pack_element<I, Targets...>::type;
+        using value_type = typename target::value_type;
+        explicit target_reference(const host_sparse& owner) : owner_(owner) {}
+
+        // The value of a voxel that exists. The target is not disabled.
+        [[nodiscard]] value_type operator[](std::uint64_t rank) const {
+            VOXELPIPE_EXPECTS(rank < owner_.num_voxels());
+            return core::rank_map<target>::load(get<I>(owner_.values).data(), rank);
+        }
+        // The value of any voxel of the part: the clear value, where it does not exist.
+        [[nodiscard]] value_type operator()(int x, int y, int z) const {
+            const std::uint64_t rank = owner_.table().find({x, y, z});
+            return rank == brick_table::none ? get<I>(owner_.clear_values) : (*this)[rank];
+        }
+        [[nodiscard]] bool enabled() const { return owner_.num_voxels() == 0 || !get<I>(owner_.values).empty(); }
+
+        // The dense target: the same elements as a dense framebuffer's. Throws std::length_error where it cannot be
+        // addressed.
+        [[nodiscard]] host_target<target> to_dense() const {
+            const glm::ivec3 extent = owner_.where.extent;
+            host_target<target> dense{core::filled_elements<target>(extent, get<I>(owner_.clear_values)), extent};
+            if (!enabled()) return {{}, extent};
+            owner_.for_each_voxel([&](const glm::ivec3& v, std::uint64_t rank) {
+                target::map::store(dense.elements.data(), extent, v.x, v.y, v.z, (*this)[rank]);
+            });
+            return dense;
+        }
+        // The part [begin, begin + size), addressed by the voxels of the whole. Throws std::out_of_range if it is not
+        // within the extent.
+        [[nodiscard]] host_region<target> to_dense_region(glm::ivec3 begin, glm::ivec3 size) const {
+            const glm::ivec3 extent = owner_.where.extent;
+            for (int a = 0; a < 3; ++a)
+                if (begin[a] < 0 || size[a] < 0 || size[a] > extent[a] - begin[a])
+                    throw std::out_of_range("voxelpipe: a region to read that is not within the framebuffer");
+            if (!enabled() || size.x == 0 || size.y == 0 || size.z == 0) return {};
+            host_region<target> region(extent, begin, size);
+            const glm::ivec3 end = begin + size;
+            for (int z = begin.z; z < end.z; ++z)
+                for (int y = begin.y; y < end.y; ++y)
+                    for (int x = begin.x; x < end.x; ++x) region.store(x, y, z, get<I>(owner_.clear_values));
+            const brick_table t = owner_.table();
+            const auto visit = [&](std::uint64_t b) {
+                for_each_voxel_in(t, b, [&](const glm::ivec3& v, std::uint64_t rank) {
+                    if (v.x >= begin.x && v.y >= begin.y && v.z >= begin.z && v.x < end.x && v.y < end.y && v.z < end.z)
+                        region.store(v.x, v.y, v.z, (*this)[rank]);
+                });
+            };
+            // Bricks are looked up where the box has fewer than the table.
+            const glm::ivec3 first = (begin + t.offset) >> core::log2_brick_size,
+                             last = (end - 1 + t.offset) >> core::log2_brick_size, n = last - first + 1;
+            if (static_cast<double>(n.x) * n.y * n.z > static_cast<double>(t.count)) {
+                for (std::uint64_t b = 0; b < t.count; ++b) visit(b);
+                return region;
+            }
+            for (int z = first.z; z <= last.z; ++z)
+                for (int y = first.y; y <= last.y; ++y)
+                    for (int x = first.x; x <= last.x; ++x)
+                        if (const std::uint64_t b = t.find_brick(core::morton_key(x, y, z)); b != brick_table::none)
+                            visit(b);
+            return region;
+        }
+
+    private:
+        const host_sparse& owner_;
+    };
+};
+
+template <std::size_t I, class... Targets>
+[[nodiscard]] auto get(const host_sparse<Targets...>& h) {
+    return typename host_sparse<Targets...>::template target_reference<I>(h);
+}
+
+// Whether two hold the same bits: bricks, voxels and the values of all targets. Where they lie in space and what absent
+// voxels read as is not compared. Values that are structs need an operator==.
+template <class... Targets>
+[[nodiscard]] bool same_contents(const host_sparse<Targets...>& a, const host_sparse<Targets...>& b) {
+    bool same = a.keys == b.keys && a.masks == b.masks && a.offsets == b.offsets;
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        const auto &x = get<I>(a.values), &y = get<I>(b.values);
+        same = same && x.size() == y.size();
+        for (std::size_t i = 0; same && i < x.size(); ++i) same = core::is_same_value(x[i], y[i]);
+    });
+    return same;
+}
+
+// Joins the results of two parts of one grid: crops, whose borders may run through bricks. Both have the same targets
+// enabled and no voxel in common; throws std::invalid_argument otherwise. The result's part is the box around both.
+template <class... Targets>
+[[nodiscard]] host_sparse<Targets...> merge(const host_sparse<Targets...>& a, const host_sparse<Targets...>& b) {
+    if (a.where.uncropped() != b.where.uncropped())
+        throw std::invalid_argument("voxelpipe::merge: the parts are not of one grid");
+    host_sparse<Targets...> out;
+    out.clear_values = a.clear_values;
+    const glm::ivec3 low = glm::min(a.where.offset, b.where.offset),
+                     high = glm::max(a.where.offset + a.where.extent, b.where.offset + b.where.extent);
+    out.where = a.where.uncropped().crop(low, high - low);
+    const std::uint64_t voxels = a.num_voxels() + b.num_voxels();
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        using target = typename core::pack_element<I, Targets...>::type;
+        if (a.num_voxels() != 0 && b.num_voxels() != 0 &&
+            (get<I>(a.values).empty() != get<I>(b.values).empty() || get<I>(a.sums).empty() != get<I>(b.sums).empty()))
+            throw std::invalid_argument("voxelpipe::merge: the parts have different targets");
+        if (!get<I>(a.values).empty() || !get<I>(b.values).empty())
+            get<I>(out.values).resize(core::rank_map<target>::elements(voxels));
+        if (!get<I>(a.sums).empty() || !get<I>(b.sums).empty()) get<I>(out.sums).resize(voxels);
+    });
+    std::uint64_t rank = 0;
+    const auto copy = [&](const host_sparse<Targets...>& from, std::uint64_t first, std::uint64_t to) {
+        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            using map = core::rank_map<typename core::pack_element<I, Targets...>::type>;
+            if (!get<I>(out.values).empty())
+                map::store(get<I>(out.values).data(), to, map::load(get<I>(from.values).data(), first));
+            if (!get<I>(out.sums).empty()) get<I>(out.sums)[to] = get<I>(from.sums)[first];
+        });
+    };
+    for (std::size_t i = 0, j = 0; i < a.keys.size() || j < b.keys.size();) {
+        const bool from_a = j == b.keys.size() || (i < a.keys.size() && a.keys[i] <= b.keys[j]);
+        const bool from_b = i == a.keys.size() || (j < b.keys.size() && b.keys[j] <= a.keys[i]);
+        brick_mask mask;
+        out.keys.push_back(from_a ? a.keys[i] : b.keys[j]);
+        out.offsets.push_back(rank);
+        std::uint64_t next_a = from_a ? a.offsets[i] : 0, next_b = from_b ? b.offsets[j] : 0;
+        for (int w = 0; w < 8; ++w) {
+            const std::uint64_t in_a = from_a ? a.masks[i].words[w] : 0, in_b = from_b ? b.masks[j].words[w] : 0;
+            if ((in_a & in_b) != 0) throw std::invalid_argument("voxelpipe::merge: a voxel is in both parts");
+            mask.words[w] = in_a | in_b;
+            for (std::uint64_t word = mask.words[w]; word != 0; word &= word - 1) {
+                if ((in_a & word & (0 - word)) != 0)
+                    copy(a, next_a++, rank++);
+                else
+                    copy(b, next_b++, rank++);
+            }
+        }
+        out.masks.push_back(mask);
+        i += from_a ? 1 : 0;
+        j += from_b ? 1 : 0;
+    }
+    if (!out.keys.empty()) out.offsets.push_back(rank);
+    return out;
+}
+
+// The same for any number of parts, at least one; each voxel is copied about log2(parts) times.
+template <class... Targets>
+[[nodiscard]] host_sparse<Targets...> merge(std::span<const host_sparse<Targets...>> parts) {
+    if (parts.empty()) throw std::invalid_argument("voxelpipe::merge: no parts");
+    if (parts.size() == 1) return parts[0];
+    return merge(merge(parts.first(parts.size() / 2)), merge(parts.subspan(parts.size() / 2)));
+}
+
+} // namespace voxelpipe
