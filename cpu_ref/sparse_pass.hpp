@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Into a sparse framebuffer: vertex shade -> coarse raster -> tile sort in Morton order -> tile by tile: fine raster into
-// a thread's dense tile, then its bricks. Nothing is dense but one tile a thread, so memory is in proportion to the
-// result. Tiles lie on the lattice of the whole grid, also where a part of it is drawn.
+// Into a sparse framebuffer: vertex shade -> coarse raster -> tile sort in Morton order -> tile by tile: fine raster
+// into a thread's dense tile, then its bricks. Nothing is dense but one tile a thread, so memory is in proportion to
+// the result. Tiles lie on the lattice of the whole grid, also where a part of it is drawn.
 //
 // What is drawn comes from a source of fragments:
 //   num_tiles(), key(i)   the tiles that it may draw in: Morton keys in the whole grid, ascending

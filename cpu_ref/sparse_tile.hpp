@@ -34,8 +34,7 @@ inline void set_row(tile_mask& mask, std::uint32_t row, int y, int z) {
     const auto within = static_cast<unsigned>(core::morton_key(0, y & 3, z & 3));
     const auto first = static_cast<std::size_t>(core::morton_key(0, y >> 2, z >> 2));
     for (int x = 0; row != 0; ++x, row >>= 4)
-        if ((row & 15u) != 0)
-            mask[first + core::morton_key(x, 0, 0)] |= std::uint64_t{spread[row & 15u]} << within;
+        if ((row & 15u) != 0) mask[first + core::morton_key(x, 0, 0)] |= std::uint64_t{spread[row & 15u]} << within;
 }
 
 // Bricks with their values as they are found, by one thread; or a finished stretch of them.
@@ -183,8 +182,7 @@ private:
     template <std::size_t I>
     [[nodiscard]] typename target<I>::value_type load(std::size_t cell) const {
         return target<I>::map::load(get<I>(memory_).get(), glm::ivec3(tile_size), static_cast<int>(cell % tile_size),
-                                    static_cast<int>(cell / tile_size % tile_size),
-                                    static_cast<int>(cell / tile_rows));
+                                    static_cast<int>(cell / tile_size % tile_size), static_cast<int>(cell / tile_rows));
     }
     // The place in the scratch, (z * 32 + y) * 32 + x, of a bit of a word of a tile_mask.
     [[nodiscard]] std::size_t cell_of(unsigned word, unsigned bit) const {

@@ -4,8 +4,8 @@
 
 // sparse_framebuffer takes the place of a framebuffer: made dense, it equals that bit for bit, but its memory is in
 // proportion to the voxels that are drawn. Bricks of 8^3 voxels (core/brick_table.hpp), aligned with the whole grid,
-// hold a mask of the voxels that exist; their values lie in the Morton order of the voxels, one array a target. The same
-// input gives the same bytes.
+// hold a mask of the voxels that exist; their values lie in the Morton order of the voxels, one array a target. The
+// same input gives the same bytes.
 
 #include <voxelpipe/host_sparse.hpp>
 #include <voxelpipe/voxelize.hpp>
@@ -72,8 +72,8 @@ struct sparse_view {
 
 // Owns its bricks and values on `Backend`; each call makes them as many as they must be. Empty before the first call;
 // after one that failed it is as it was. New arrays are made before the old ones go.
-// A call that clears all targets leaves the voxels that keep a fragment. Where a target loads, or is off, the voxels that
-// exist stay, and new ones start from the clear value.
+// A call that clears all targets leaves the voxels that keep a fragment. Where a target loads, or is off, the voxels
+// that exist stay, and new ones start from the clear value.
 template <class Backend, class... Targets>
 class sparse_framebuffer {
     static_assert(sizeof...(Targets) >= 1, "voxelpipe: a framebuffer needs at least one render target");
@@ -268,7 +268,8 @@ template <class Backend, class... Targets>
 
 } // namespace core
 
-// As for a framebuffer: the targets that are to be cleared hold their clear values. Where none is kept, no voxel is left.
+// As for a framebuffer: the targets that are to be cleared hold their clear values. Where none is kept, no voxel is
+// left.
 template <class Backend, class... Targets>
 [[nodiscard]] status clear(Backend& backend, sparse_framebuffer<Backend, Targets...>& fb) {
     if (const status s = validate(fb.where()); !s.ok()) return s;
@@ -276,8 +277,8 @@ template <class Backend, class... Targets>
     return backend.clear_sparse(fb.where(), fb);
 }
 
-// Draws meshes into a sparse framebuffer: as into a framebuffer, with the same counts. A target that loads needs the grid
-// of the call before (extent_mismatch otherwise): parts drawn apart are joined by merge().
+// Draws meshes into a sparse framebuffer: as into a framebuffer, with the same counts. A target that loads needs the
+// grid of the call before (extent_mismatch otherwise): parts drawn apart are joined by merge().
 template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, sparse_framebuffer<Backend, Targets...>& fb,
