@@ -51,6 +51,8 @@ present() {
         libdraco-dev) has_header draco/compression/decode.h ;;
         libmeshoptimizer-dev) has_header meshoptimizer.h ;;
         libgtest-dev) has_header gtest/gtest.h ;;
+        libnanovdb-dev) has_header nanovdb/NanoVDB.h ;;
+        libnanovdb-tools) command -v nanovdb_validate >/dev/null ;;
         libbenchmark-dev) has_header benchmark/benchmark.h ;;
         python3-venv) python3 -c 'import ensurepip, venv' 2>/dev/null ;;
         *) [[ $(dpkg-query -W -f='${Status}' "$1" 2>/dev/null) == "install ok installed" ]] ;;
@@ -91,6 +93,9 @@ Install them and run the same command again; on Debian or Ubuntu:
 # What the library, the tool and the samples are built with.
 build_packages=(g++ cmake ninja-build libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev zlib1g-dev
     libminizip-dev libdeflate-dev libwebp-dev libassimp-dev libdraco-dev libmeshoptimizer-dev)
+
+# What the tests need beside them: readers of NanoVDB files that are not ours.
+test_packages=(libgtest-dev libnanovdb-dev libnanovdb-tools)
 
 # configure PRESET [cmake option...]: quiet unless it fails. Uses ccache where there is one, and the staged prefix.
 configure() {

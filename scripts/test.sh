@@ -20,7 +20,7 @@ else
     say "make test: about $minutes minutes with $jobs jobs to build everything and run all tests"
 fi
 
-need_packages "${build_packages[@]}" libgtest-dev
+need_packages "${build_packages[@]}" "${test_packages[@]}"
 scripts/python_env.sh || printf 'note: without these Python modules the tests formats.read_back.* do not run\n'
 
 say "configuring and building the library's tests, the tool and the samples (build/$preset)"

@@ -83,7 +83,7 @@ public:
     std::vector<std::uint64_t> offsets;
     core::pack<std::vector<typename core::rank_map<Targets>::element>...> values; // by rank; none of a disabled target
     core::pack<std::vector<core::kept_sum<Targets>>...> sums;                     // by rank, where they were kept
-    core::pack<typename Targets::value_type...> clear_values;                     // what absent voxels read as
+    core::pack<typename Targets::value_type...> clear_values{};                   // what absent voxels read as
     grid where;                                                                   // of the last call
 
     // Refers to the arrays.
