@@ -109,7 +109,7 @@ public:
                                     const voxelize_options& options, std::uint64_t triangles_in, Coverage = {}) {
         return guarded(triangles_in, [&](const cpu::execution& how) {
             auto s = cpu::make_scene(how, draws, cpu::tile_aligned(g));
-            s.drawn = cpu::part_of_aligned(g);
+            s.lead = g.offset - s.where.offset;
             return Coverage::dispatch(options.rule, [&]<coverage Rule>() {
                 return cpu::draw_sparse_surface<Rule>(how, *this, g, s, options.count_voxels, out);
             });

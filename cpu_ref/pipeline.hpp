@@ -135,7 +135,7 @@ struct geometry {
     std::vector<std::uint32_t> first_primitive; // per draw, and one more: the total
     core::snap_transform snap{};
     grid where{};
-    core::voxel_box drawn{}; // the voxels to draw: all of `where`, unless that begins ahead of them
+    glm::ivec3 lead{0}; // voxels of `where` ahead of those to draw, which reach to its end
 
     struct primitive {
         std::uint32_t draw, triangle;
@@ -149,6 +149,9 @@ struct geometry {
                 1;
         const std::uint32_t t = id - first_primitive[d];
         return {d, t, parts[d].triangles[t]};
+    }
+    [[nodiscard]] core::voxel_box whole_box() const {
+        return {{{lead.x, lead.y, lead.z}}, {{where.extent.x - 1, where.extent.y - 1, where.extent.z - 1}}};
     }
 };
 
@@ -168,7 +171,6 @@ make_scene(const execution& how, std::span<const draw<Mesh, VertexShader, Fragme
     scene<Mesh, VertexShader, FragmentShader> s;
     s.draws = draws;
     s.where = g;
-    s.drawn = {{{0, 0, 0}}, {{g.extent.x - 1, g.extent.y - 1, g.extent.z - 1}}};
     s.snap = core::make_snap_transform(g);
     s.normal_factors = core::normal_factors(g);
     s.vertices = vertex_shade(how, draws, s.snap);
@@ -233,7 +235,7 @@ template <coverage Rule, class Key>
     constexpr std::size_t block = 8192;
     const std::size_t n = s.first_primitive.back();
     const std::size_t blocks = (n + block - 1) / block;
-    const core::voxel_box whole = s.drawn;
+    const core::voxel_box whole = s.whole_box();
     struct block_result {
         status_code code = status_code::ok;
         counters counts{};

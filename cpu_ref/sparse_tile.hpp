@@ -84,15 +84,14 @@ public:
     explicit sparse_scratch(const sparse_plan<Targets...>& plan) : plan_(plan) {
         view.extent = glm::ivec3(tile_size);
         core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-            using target = typename core::pack_element<I, Targets...>::type;
             const auto& t = get<I>(plan_.targets);
             auto& v = get<I>(view.targets);
             v.extent = view.extent;
             v.load = t.load;
             v.clear_value = start<I>();
             if (!t.enabled) return;
-            const std::size_t n = target::map::elements(view.extent);
-            get<I>(memory_) = std::make_unique<typename target::element_type[]>(n);
+            const std::size_t n = target<I>::map::elements(view.extent);
+            get<I>(memory_) = std::make_unique<typename target<I>::element_type[]>(n);
             v.elements = get<I>(memory_).get();
             for (std::size_t i = 0; i < tile_voxels; ++i) store<I>(i, start<I>());
         });

@@ -11,6 +11,8 @@
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/host_target.hpp>
 
+#include <glm/common.hpp>
+
 #include <algorithm>
 #include <bit>
 #include <cstddef>
