@@ -88,8 +88,8 @@ bool make_small(const snapped_position (&v)[3], int fraction, const voxel_box& b
 voxel_box coarsen_box(const voxel_box& box) {
     voxel_box r{};
     for (int k = 0; k < 3; ++k) {
-        r.lo[k] = box.lo[k] >> log2_brick;
-        r.hi[k] = box.hi[k] >> log2_brick;
+        r.lo[k] = box.lo[k] >> log2_raster_brick;
+        r.hi[k] = box.hi[k] >> log2_raster_brick;
     }
     return r;
 }
@@ -361,9 +361,9 @@ TEST(BrickTriangle, BricksMakeTheGeneralSet) {
                 for (std::int64_t by = bricks.lo[1]; by <= bricks.hi[1]; ++by)
                     for (std::int64_t bx = bricks.lo[0]; bx <= bricks.hi[0]; ++bx) {
                         ++tested;
-                        const int at[3] = {static_cast<int>(bx * brick_size - box.lo[0]),
-                                           static_cast<int>(by * brick_size - box.lo[1]),
-                                           static_cast<int>(bz * brick_size - box.lo[2])};
+                        const int at[3] = {static_cast<int>(bx * raster_brick_size - box.lo[0]),
+                                           static_cast<int>(by * raster_brick_size - box.lo[1]),
+                                           static_cast<int>(bz * raster_brick_size - box.lo[2])};
                         if (!t.meets(at[0], at[1], at[2])) continue;
                         ++met;
                         const small_conservative s = t.at(at[0], at[1], at[2]);
@@ -371,7 +371,7 @@ TEST(BrickTriangle, BricksMakeTheGeneralSet) {
                         for (int k = 0; k < 3; ++k) {
                             lo[k] = at[k] < 0 ? -at[k] : 0;
                             const int end = static_cast<int>(box.hi[k] - box.lo[k]) - at[k];
-                            hi[k] = end < brick_size ? end : brick_size - 1;
+                            hi[k] = end < raster_brick_size ? end : raster_brick_size - 1;
                         }
                         const auto turned = to_uvw(setup.axis, at[0], at[1], at[2]);
                         double first = 0, last = 0;
@@ -382,7 +382,7 @@ TEST(BrickTriangle, BricksMakeTheGeneralSet) {
                                     s.limit_at_y(lo[0], hi[0], y) & s.limit_at_z(lo[0], hi[0], z);
                                 const std::uint32_t bits = s.meets_row(y, z) ? s.plane_bits(lo[0], y, z, limit) : 0;
                                 ASSERT_EQ(bits, s.row(lo[0], hi[0], y, z));
-                                for (int x = 0; x < brick_size; ++x) {
+                                for (int x = 0; x < raster_brick_size; ++x) {
                                     if (((bits >> x) & 1u) == 0) continue;
                                     const int p[3] = {at[0] + lo[0] + x, at[1] + y, at[2] + z};
                                     ASSERT_GE(p[setup.axis], first);
@@ -411,11 +411,12 @@ TEST(BrickTriangle, BricksMakeTheGeneralSet) {
                 const auto origin = axes.to_rows(box.lo[0], box.lo[1], box.lo[2]);
                 voxels columns;
                 const auto before =
-                    static_cast<int>(g.number(0, brick_size - 1)); // distance of the box from the brick's begin
+                    static_cast<int>(g.number(0, raster_brick_size - 1)); // distance of the box from the brick's begin
                 for (int at_v = 0; at_v <= last[1]; ++at_v)
-                    for (int at_u = -before; at_u <= last[0]; at_u += brick_size) {
+                    for (int at_u = -before; at_u <= last[0]; at_u += raster_brick_size) {
                         const int end = static_cast<int>(last[0]) - at_u;
-                        brick_row row(thin, at_u, at_v, at_u < 0 ? before : 0, end < brick_size ? end : brick_size - 1);
+                        brick_row row(thin, at_u, at_v, at_u < 0 ? before : 0,
+                                      end < raster_brick_size ? end : raster_brick_size - 1);
                         if (row.columns == 0) continue;
                         ASSERT_TRUE(thin.meets_row(at_u, at_v));
                         const int lowest = row.first_column(), highest = row.last_column();
@@ -472,7 +473,7 @@ TEST(BrickTriangle, RowsOfTheLargestTrianglesAreTheGeneralSet) {
                     const auto at_u = static_cast<int>(g.number(0, end[0] - origin[0])),
                                at_v = static_cast<int>(g.number(0, end[1] - origin[1]));
                     const std::int64_t left = end[0] - origin[0] - at_u;
-                    const int last = left < brick_size ? static_cast<int>(left) : brick_size - 1;
+                    const int last = left < raster_brick_size ? static_cast<int>(left) : raster_brick_size - 1;
                     const brick_row row(thin, at_u, at_v, 0, last);
                     voxels columns;
                     for (std::uint32_t rest = row.columns; rest != 0; rest &= rest - 1) {

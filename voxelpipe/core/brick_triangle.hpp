@@ -11,8 +11,8 @@
 
 namespace voxelpipe::core {
 
-inline constexpr int log2_brick = 4;
-inline constexpr int brick_size = 1 << log2_brick;
+inline constexpr int log2_raster_brick = 4;
+inline constexpr int raster_brick_size = 1 << log2_raster_brick;
 
 struct brick_half_plane {
     std::int32_t a, b; // edges of the 64-bit path: below 2^24, with a bit to spare
@@ -23,7 +23,7 @@ struct brick_half_plane {
     }
     // True if any voxel of the brick's square, lowest at (x, y), is inside.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr bool meets(int x, int y) const {
-        return at(x, y) + std::int64_t{brick_size - 1} * ((a > 0 ? a : 0) + (b > 0 ? b : 0)) >= 0;
+        return at(x, y) + std::int64_t{raster_brick_size - 1} * ((a > 0 ? a : 0) + (b > 0 ? b : 0)) >= 0;
     }
     // The same half-plane with (x, y) as the origin; its signs are exact for voxels -1 to 16.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr small_half_plane from(int x, int y) const {
@@ -73,8 +73,8 @@ struct brick_triangle {
         if (!all) return false;
         std::int64_t low = n[0] * x + n[1] * y + n[2] * z, high = low;
         for (int i = 0; i < 3; ++i) {
-            low += (brick_size - 1) * negative_part(n[i]);
-            high += (brick_size - 1) * positive_part(n[i]);
+            low += (raster_brick_size - 1) * negative_part(n[i]);
+            high += (raster_brick_size - 1) * positive_part(n[i]);
         }
         return high + below >= 0 && above - low >= 0;
     }
@@ -97,8 +97,8 @@ struct brick_triangle {
             return;
         }
         const std::int64_t sum = nu * u + nv * v;
-        const std::int64_t low = sum + (brick_size - 1) * (negative_part(nu) + negative_part(nv));
-        const std::int64_t high = sum + (brick_size - 1) * (positive_part(nu) + positive_part(nv));
+        const std::int64_t low = sum + (raster_brick_size - 1) * (negative_part(nu) + negative_part(nv));
+        const std::int64_t high = sum + (raster_brick_size - 1) * (positive_part(nu) + positive_part(nv));
         const double from = static_cast<double>(-below - high) / static_cast<double>(nw);
         const double to = static_cast<double>(above - low) / static_cast<double>(nw);
         first = (from < to ? from : to) - 1.0;
@@ -216,13 +216,13 @@ struct brick_thin {
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets_row(int u, int v) const {
         bool all = true;
         for (int i = 0; i < 3; ++i)
-            all = all && uv[i].at(u, v) + std::int64_t{brick_size - 1} * (uv[i].a > 0 ? uv[i].a : 0) >= 0;
+            all = all && uv[i].at(u, v) + std::int64_t{raster_brick_size - 1} * (uv[i].a > 0 ? uv[i].a : 0) >= 0;
         return all;
     }
 };
 
-// The covered columns of a row of at most brick_size, which are consecutive, and their depths, which ascend or descend.
-// Values that are equal for all rows of the triangle are passed to its functions.
+// The covered columns of a row of at most raster_brick_size, which are consecutive, and their depths, which ascend or
+// descend. Values that are equal for all rows of the triangle are passed to its functions.
 struct brick_row {
     std::int64_t plane = 0;    // small_thin::depth; columns and depths are relative to the row's position
     float by_u = 0, first = 0; // depths in floats: slope per column; depth of column 0
@@ -230,7 +230,7 @@ struct brick_row {
     std::int32_t base = 0;     // the row's position: a depth near its first column's, from the bounding box
 
     brick_row() = default; // no columns
-    // Columns from .. to, at most brick_size of them, from (u, v) on.
+    // Columns from .. to, at most raster_brick_size of them, from (u, v) on.
     VOXELPIPE_HD VOXELPIPE_INLINE brick_row(const brick_thin& t, int u, int v, int from, int to) {
         small_thin s = t.from(u, v);
         // Floats resolve depths of up to some twenty voxels. Any base within a voxel or two will do, and this one is: a

@@ -19,7 +19,8 @@
 namespace voxelpipe::device {
 
 inline constexpr int max_immediate_extent = 1 << 16; // bricks are numbered with 16 bits, voxels with 32
-static_assert((std::int64_t{max_immediate_extent} / core::brick_size + 1) * (max_immediate_extent + 1) < 1u << 31);
+static_assert((std::int64_t{max_immediate_extent} / core::raster_brick_size + 1) * (max_immediate_extent + 1) <
+              1u << 31);
 
 // Splits a large triangle's box of voxels into pieces, one per lane, and groups these into work items, one per warp.
 // Conservative: columns of bricks along the dominant axis, few per work item, because the bricks of a column keep eight
@@ -27,7 +28,7 @@ static_assert((std::int64_t{max_immediate_extent} / core::brick_size + 1) * (max
 // along the one of the other two axes that makes fewer of them.
 template <coverage Rule>
 struct split_pieces {
-    static constexpr int across = Rule == coverage::thin ? 1 : core::brick_size; // voxels along v
+    static constexpr int across = Rule == coverage::thin ? 1 : core::raster_brick_size; // voxels along v
     static constexpr int per_work_item = tuning::pieces_per_work_item<Rule>;
     core::row_axes axes;
     core::triple<std::int64_t> lo, hi;            // the box, as uvw of these axes
@@ -48,7 +49,8 @@ struct split_pieces {
     [[nodiscard]] VOXELPIPE_HD std::int64_t work_items() const { return (count() + per_work_item - 1) / per_work_item; }
     // The lowest voxel of piece i along u and v, possibly outside the box.
     [[nodiscard]] VOXELPIPE_HD std::int64_t u(std::int64_t i) const {
-        return (first_u + static_cast<std::uint32_t>(i) % static_cast<std::uint32_t>(per_row)) << core::log2_brick;
+        return (first_u + static_cast<std::uint32_t>(i) % static_cast<std::uint32_t>(per_row))
+               << core::log2_raster_brick;
     }
     [[nodiscard]] VOXELPIPE_HD std::int64_t v(std::int64_t i) const {
         return (first_v + static_cast<std::uint32_t>(i) / static_cast<std::uint32_t>(per_row)) * across;
@@ -60,7 +62,7 @@ struct split_pieces {
         return first_row(i, part) <= hi[1] && first_row(i, part + 1) > lo[1];
     }
     [[nodiscard]] VOXELPIPE_HD core::voxel_box piece(std::int64_t i, unsigned part) const {
-        const std::int64_t u0 = u(i), u1 = u0 + core::brick_size - 1;
+        const std::int64_t u0 = u(i), u1 = u0 + core::raster_brick_size - 1;
         const std::int64_t v0 = first_row(i, part), v1 = first_row(i, part + 1) - 1;
         const auto inside = [&](std::int64_t at, int k) { return at < lo[k] ? lo[k] : at > hi[k] ? hi[k] : at; };
         return {axes.from_rows(inside(u0, 0), inside(v0, 1), lo[2]),
@@ -69,7 +71,7 @@ struct split_pieces {
     // The most work items that a triangle can have in a grid of this extent.
     [[nodiscard]] static std::uint64_t max_work_items(glm::ivec3 extent) {
         const auto of = [](std::int64_t along, std::int64_t rest) {
-            const std::int64_t pieces = (along / core::brick_size + 1) * (rest / across + 1);
+            const std::int64_t pieces = (along / core::raster_brick_size + 1) * (rest / across + 1);
             return static_cast<std::uint64_t>((pieces + per_work_item - 1) / per_work_item);
         };
         return std::max(core::max3(of(extent.y, extent.z), of(extent.z, extent.x), of(extent.x, extent.y)),
@@ -79,8 +81,8 @@ struct split_pieces {
 private:
     VOXELPIPE_HD split_pieces(const core::voxel_box& box, const core::row_axes& axes_)
         : axes(axes_), lo(axes_.to_rows(box.lo[0], box.lo[1], box.lo[2])),
-          hi(axes_.to_rows(box.hi[0], box.hi[1], box.hi[2])), first_u(lo[0] >> core::log2_brick),
-          first_v(lo[1] / across), per_row((hi[0] >> core::log2_brick) - first_u + 1),
+          hi(axes_.to_rows(box.hi[0], box.hi[1], box.hi[2])), first_u(lo[0] >> core::log2_raster_brick),
+          first_v(lo[1] / across), per_row((hi[0] >> core::log2_raster_brick) - first_u + 1),
           rows(hi[1] / across - first_v + 1) {}
     [[nodiscard]] VOXELPIPE_HD std::int64_t first_row(std::int64_t i, unsigned part) const {
         return v(i) + part * (across / lanes_each);
@@ -326,7 +328,7 @@ struct thin_piece {
         if (wanted && t.bricks.meets_row(u - first[0], v - first[1]))
             row = core::brick_row(t.bricks, u - first[0], v - first[1],
                                   core::max3(u, first[0], low(0)) - u, // columns of the bounding box, within the grid
-                                  core::min3(u + core::brick_size - 1, last[0], high(0)) - u);
+                                  core::min3(u + core::raster_brick_size - 1, last[0], high(0)) - u);
         w = first[2] + row.base;
         lo = low(2) - w;
         hi = high(2) - w;
@@ -344,7 +346,7 @@ struct thin_piece {
     template <class Sink>
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool emit_by_group(const split_setup<coverage::thin>& t,
                                                                  Sink& sink) const {
-        constexpr int most = core::brick_size + 1; // slopes are at most one
+        constexpr int most = core::raster_brick_size + 1; // slopes are at most one
         if (!__all_sync(0xffffffffu, row.columns == 0 || (lo <= -most && hi >= most))) return false;
         const int first = row.columns != 0 ? row.first_column() : 0; // lanes without columns are not asked
         sink.share(__popc(row.columns), [&](unsigned lane, unsigned i) VOXELPIPE_INLINE_LAMBDA {
@@ -490,12 +492,12 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
                         int from[3];            // the same, from the bounding box
                         core::small_box part;
                         for (int k = 0; k < 3; ++k) {
-                            corner[k] = memory.bricks[k][at] * core::brick_size;
+                            corner[k] = memory.bricks[k][at] * core::raster_brick_size;
                             from[k] = corner[k] - static_cast<int>(box.lo[k]);
                             part.lo[k] = reach.lo[k] > corner[k] ? static_cast<int>(reach.lo[k]) - corner[k] : 0;
-                            part.hi[k] = reach.hi[k] - corner[k] < core::brick_size - 1
+                            part.hi[k] = reach.hi[k] - corner[k] < core::raster_brick_size - 1
                                              ? static_cast<int>(reach.hi[k]) - corner[k]
-                                             : core::brick_size - 1;
+                                             : core::raster_brick_size - 1;
                         }
                         sink.mark_brick(corner, lane % tuning::group_lanes);
                         raster_lanes(t.at(from[0], from[1], from[2]), corner, part, sink);
@@ -513,8 +515,9 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
                 first += static_cast<double>(origin[2]);
                 last += static_cast<double>(origin[2]);
                 if (first <= high && last >= low) {
-                    w = (static_cast<int>(first > low ? first : low) >> core::log2_brick) + static_cast<int>(of_piece);
-                    w_end = static_cast<int>(last < high ? last : high) >> core::log2_brick;
+                    w = (static_cast<int>(first > low ? first : low) >> core::log2_raster_brick) +
+                        static_cast<int>(of_piece);
+                    w_end = static_cast<int>(last < high ? last : high) >> core::log2_raster_brick;
                 }
             }
             int waiting = 0;
@@ -522,11 +525,11 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
                 bool hit = false;
                 core::triple<int> brick{};
                 if (w <= w_end) {
-                    brick = core::to_xyz(axis, static_cast<int>(u0 >> core::log2_brick),
-                                         static_cast<int>(v0 >> core::log2_brick), w);
-                    hit = t.meets(brick[0] * core::brick_size - static_cast<int>(box.lo[0]),
-                                  brick[1] * core::brick_size - static_cast<int>(box.lo[1]),
-                                  brick[2] * core::brick_size - static_cast<int>(box.lo[2]));
+                    brick = core::to_xyz(axis, static_cast<int>(u0 >> core::log2_raster_brick),
+                                         static_cast<int>(v0 >> core::log2_raster_brick), w);
+                    hit = t.meets(brick[0] * core::raster_brick_size - static_cast<int>(box.lo[0]),
+                                  brick[1] * core::raster_brick_size - static_cast<int>(box.lo[1]),
+                                  brick[2] * core::raster_brick_size - static_cast<int>(box.lo[2]));
                 }
                 w += pieces.lanes_each;
                 const int slot = take_slot(hit, waiting);

@@ -38,8 +38,8 @@ struct chunk_marks {
     }
     // Marks the brick (core/brick_triangle.hpp) with this lowest voxel; group_lanes lanes call it.
     __device__ VOXELPIPE_INLINE void mark_brick(const std::int32_t (&corner)[3], unsigned lane) const {
-        constexpr unsigned across = core::brick_size / chunk_yz;
-        static_assert(core::brick_size % chunk_yz == 0 && chunk_x % core::brick_size == 0 &&
+        constexpr unsigned across = core::raster_brick_size / chunk_yz;
+        static_assert(core::raster_brick_size % chunk_yz == 0 && chunk_x % core::raster_brick_size == 0 &&
                       across * across <= static_cast<unsigned>(tuning::group_lanes));
         const int y = corner[1] + static_cast<int>(lane % across) * chunk_yz,
                   z = corner[2] + static_cast<int>(lane / across) * chunk_yz;
