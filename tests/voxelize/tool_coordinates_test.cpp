@@ -86,8 +86,8 @@ TEST(Coordinates, ATranslationOfMillionsKeepsEveryVoxel) {
             EXPECT_GE(2U, differing(expected, found)) << away.x << ' ' << coverage;
             EXPECT_EQ("[]", found.warnings);
             for (int axis = 0; axis < 3; ++axis)
-                EXPECT_NEAR(expected.stats["grid"]["origin"][axis].get<double>() + away[axis],
-                            found.stats["grid"]["origin"][axis], 1e-8);
+                EXPECT_NEAR(expected.stats["grid"]["origin"][static_cast<std::size_t>(axis)].get<double>() + away[axis],
+                            found.stats["grid"]["origin"][static_cast<std::size_t>(axis)], 1e-8);
         }
     }
 }
