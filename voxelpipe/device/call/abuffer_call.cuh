@@ -9,6 +9,7 @@
 #include <voxelpipe/device/fragments/fragment_lists.cuh>
 #include <voxelpipe/device/fragments/list_sink.cuh>
 #include <voxelpipe/device/fragments/segmented_reduce.cuh>
+#include <voxelpipe/device/fragments/shade_lists.cuh>
 #include <voxelpipe/device/scene/scene_memory.cuh>
 
 #include <cstdint>

@@ -9,6 +9,7 @@
 #include <voxelpipe/device/base/device_buffer.cuh>
 #include <voxelpipe/device/call/abuffer_call.cuh>
 #include <voxelpipe/device/call/call_workspace.cuh>
+#include <voxelpipe/device/fragments/store_lists.cuh>
 
 #include <cstdint>
 #include <optional>

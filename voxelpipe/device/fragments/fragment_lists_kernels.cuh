@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Kernels and launches of fragments/fragment_lists.cuh that depend on no shader.
+// Kernels and launches of fragments/fragment_lists.cuh and shade_lists.cuh that depend on no shader.
 
 #include <voxelpipe/device/fragments/fragment_lists.cuh>
+#include <voxelpipe/device/fragments/shade_lists.cuh>
 
 #include <cstdint>
 

@@ -30,7 +30,7 @@ raster_all_work_items(const Call& call, unsigned* dropped, brick_memory<Call::ru
     return sink.end();
 }
 
-// Sets up the warp's share of the split triangles (raster/split_triangles.cuh).
+// Sets up the warp's share of the split triangles (raster/split_setup.cuh).
 template <class Call>
 __device__ __noinline__ void keep_setups(const Call& call, unsigned warp, unsigned warps) {
     const split_work_items all(call.lists);

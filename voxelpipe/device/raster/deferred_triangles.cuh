@@ -63,7 +63,7 @@ struct deferred_triangles {
     unsigned long long* first_work_items;
     unsigned long long* next;
 
-    // Setups of split triangles (raster/split_triangles.cuh), if they are kept: room for num_setups, and how many are
+    // Setups of split triangles (raster/split_setup.cuh), if they are kept: room for num_setups, and how many are
     // ready.
     static constexpr std::size_t setup_bytes = 384;
     std::byte* setups;

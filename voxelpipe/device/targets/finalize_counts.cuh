@@ -9,7 +9,7 @@
 
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/targets/dirty_chunks.cuh>
-#include <voxelpipe/device/targets/global_target.cuh>
+#include <voxelpipe/device/targets/immediate_mode.cuh>
 #include <voxelpipe/tuning/tuning_raster.hpp>
 #include <voxelpipe/tuning/tuning_strategy.hpp>
 

@@ -4,8 +4,8 @@
 
 // Blends that one atomic on global memory performs: those of integers, and sums whose every partial sum is exact.
 
+#include <voxelpipe/device/targets/blend_method.cuh>
 #include <voxelpipe/device/targets/repeated_fold.hpp>
-#include <voxelpipe/device/targets/shared_blend.cuh>
 #include <voxelpipe/framebuffer.hpp>
 
 #include <bit>

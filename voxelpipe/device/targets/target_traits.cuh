@@ -6,7 +6,7 @@
 // that the tile passes draw together; and how one finished voxel is stored.
 
 #include <voxelpipe/device/scene/scene.cuh>
-#include <voxelpipe/device/targets/shared_blend.cuh>
+#include <voxelpipe/device/targets/blend_method.cuh>
 #include <voxelpipe/framebuffer.hpp>
 #include <voxelpipe/tuning/tuning_fine_raster.hpp>
 

@@ -7,7 +7,7 @@
 // and global memory (images of split tiles).
 
 #include <voxelpipe/device/scene/fragment_shade.cuh>
-#include <voxelpipe/device/targets/shared_blend.cuh>
+#include <voxelpipe/device/targets/blend_method.cuh>
 #include <voxelpipe/device/targets/target_traits.cuh>
 #include <voxelpipe/framebuffer.hpp>
 

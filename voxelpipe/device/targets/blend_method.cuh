@@ -1,0 +1,124 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// How a target's fragments are combined on the device, and the words of whole values and of bits, for vectors component
+// by component (targets/shared_blend.cuh has those of scalars).
+
+#include <voxelpipe/device/targets/shared_blend.cuh>
+
+#include <cstdint>
+#include <type_traits>
+
+namespace voxelpipe::device {
+
+// How a target's fragments are combined on the device.
+enum class blend_method : std::uint8_t {
+    atomic,  // value_blend's words
+    bits,    // one bit a voxel
+    winner,  // replace: the highest primitive wins a word; its fragment is shaded again at the end
+    ordered, // everything else: folded in primitive order through lists of fragments
+};
+
+// value_blend<Blend, T>: scalar_blend, component by component for vectors.
+template <class Blend, class T>
+struct value_blend : scalar_blend<Blend, T> {};
+template <class Blend, class T>
+requires swaps<Blend, T>
+struct value_blend<Blend, T> : swap_blend<Blend, T> {
+};
+template <class Blend, glm::length_t N, class S, glm::qualifier Q>
+requires(!core::user_blend<Blend, glm::vec<N, S, Q>> && !core::user_blend_template<Blend, glm::vec<N, S, Q>> &&
+         (scalar_blend<Blend, S>::available || swaps<Blend, S>)) struct value_blend<Blend, glm::vec<N, S, Q>> {
+    using part = value_blend<Blend, S>;
+    using vector = glm::vec<N, S, Q>;
+    static constexpr bool available = true;
+    static constexpr int words = part::words * N;
+    struct cell {
+        typename part::cell c[N];
+    };
+    __device__ static void clear(word* plane, int i, int n) {
+        for (int c = 0; c < N; ++c) part::clear(plane + c * part::words * n, i, n);
+    }
+    template <class Value>
+    __device__ static void accumulate(word* plane, int i, int n, const Value& v) {
+        for (int c = 0; c < N; ++c) {
+            if constexpr (std::is_same_v<Blend, blend::count>)
+                part::accumulate(plane + c * part::words * n, i, n, v);
+            else
+                part::accumulate(plane + c * part::words * n, i, n, v[c]);
+        }
+    }
+    __device__ static cell load(const word* plane, int i, int n) {
+        cell r;
+        for (int c = 0; c < N; ++c) r.c[c] = part::load(plane + c * part::words * n, i, n);
+        return r;
+    }
+    template <class Value>
+    __device__ static cell cell_of(const Value& v) {
+        cell r;
+        for (int c = 0; c < N; ++c) {
+            if constexpr (std::is_same_v<Blend, blend::count>)
+                r.c[c] = part::cell_of(v);
+            else
+                r.c[c] = part::cell_of(v[c]);
+        }
+        return r;
+    }
+    __device__ static void merge(cell& a, const cell& b) {
+        for (int c = 0; c < N; ++c) part::merge(a.c[c], b.c[c]);
+    }
+    __device__ static vector finish(const cell& r, vector stored) {
+        for (int c = 0; c < N; ++c) stored[c] = part::finish(r.c[c], stored[c]);
+        return stored;
+    }
+};
+
+// Bits: what a fragment of value v does to the voxel's bit, as an or, and, or xor of a word.
+template <class Blend>
+struct bit_blend {
+    static constexpr bool is_and = std::is_same_v<Blend, blend::bit_and>;
+    static constexpr bool is_or = std::is_same_v<Blend, blend::bit_or> || std::is_same_v<Blend, blend::add_saturate>;
+    static constexpr bool is_xor = std::is_same_v<Blend, blend::bit_xor> || std::is_same_v<Blend, blend::add> ||
+                                   std::is_same_v<Blend, blend::count>;
+    // min and max of bool are and and or.
+    static constexpr bool clears = is_and || std::is_same_v<Blend, blend::min>;
+    static constexpr bool sets = is_or || std::is_same_v<Blend, blend::max>;
+    static constexpr bool available = clears || sets || is_xor;
+    static constexpr word neutral = clears ? ~word{0} : 0;
+
+    template <class Value>
+    __device__ static void accumulate(word* w, word mask, const Value& v) {
+        bool value = true;
+        if constexpr (!std::is_same_v<Blend, blend::count>) value = v;
+        if constexpr (clears) {
+            if (!value && (*w & mask) != 0) atomicAnd(w, ~mask);
+        } else if constexpr (sets) {
+            if (value && (*w & mask) == 0) atomicOr(w, mask); // most fragments find their bit set
+        } else {
+            if (value) atomicXor(w, mask);
+        }
+    }
+    __device__ static void merge(word& a, word b) {
+        if constexpr (clears)
+            a &= b;
+        else if constexpr (sets)
+            a |= b;
+        else
+            a ^= b;
+    }
+};
+
+template <class Target>
+[[nodiscard]] VOXELPIPE_HD constexpr blend_method method_of() {
+    using blend_type = typename Target::blend_type;
+    if constexpr (std::is_same_v<blend_type, blend::replace>)
+        return blend_method::winner;
+    else if constexpr (Target::map::is_bit)
+        return bit_blend<blend_type>::available ? blend_method::bits : blend_method::ordered;
+    else
+        return value_blend<blend_type, typename Target::value_type>::available ? blend_method::atomic
+                                                                               : blend_method::ordered;
+}
+
+} // namespace voxelpipe::device
