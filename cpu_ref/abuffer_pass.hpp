@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Fine raster into an A-buffer: each tile's fragments are bucketed by voxel on the spot (they come in primitive order,
-// so a stable bucketing leaves each voxel's list sorted), and rows of voxels are then put in the order of the whole
-// grid. Memory is in proportion to the fragments: nothing is dense but one tile's counters per thread.
+// Fine raster into an A-buffer. A tile's fragments come in primitive order, so a stable bucketing by voxel sorts each
+// voxel's list. Rows of voxels are then put into the grid's order. Memory is proportional to the fragments; only one
+// tile's counters per thread are dense.
 
 #include <cpu_ref/tile_fragments.hpp>
 
@@ -12,25 +12,25 @@
 
 namespace voxelpipe::cpu {
 
-// One thread's finished fragments, in the order of its tiles, and within a tile by voxel.
+// The finished fragments of one thread: by tile, and within a tile by voxel.
 template <class Payload>
 struct bucket_store {
     std::vector<std::uint32_t> counts; // fragments of each occupied voxel
-    std::vector<std::uint8_t> columns; // its x within the tile
+    std::vector<std::uint8_t> columns; // x of each occupied voxel within its tile
     std::vector<std::uint32_t> primitives;
-    std::vector<Payload> payloads; // stays empty where there is none
+    std::vector<Payload> payloads; // empty if the A-buffer has none
 };
 
-// Up to 32 voxels of one tile that lie in one row: what is moved as a piece.
+// The occupied voxels of one row of a tile, at most 32. They are copied together.
 struct row_segment {
-    std::uint64_t key; // its place in the grid: (z * ny + y) * tiles along x + tile x
+    std::uint64_t key; // position in the grid: (z * ny + y) * tiles along x + tile x
     std::uint32_t worker;
     std::uint32_t num_voxels;
-    std::uint64_t voxel, fragment; // first of each in the worker's store
+    std::uint64_t voxel, fragment; // first of each in the thread's store
     std::uint64_t num_fragments;
 };
 
-// What one thread has made of the lists.
+// One thread's part of the lists.
 template <class Payload>
 struct list_part {
     bucket_store<Payload> store;
@@ -45,12 +45,12 @@ struct abuffer_scratch : list_part<Payload> {
         std::uint16_t voxel; // within the tile
         [[no_unique_address]] Payload payload;
     };
-    std::vector<emitted> fragments; // of one tile, as they come
+    std::vector<emitted> fragments; // of one tile, as emitted
     std::array<std::uint32_t, tile_voxels> count{};
     std::array<std::uint32_t, tile_rows> touched{};
 };
 
-// `primitives` are `stride` bytes apart: those of sorted pairs, whatever their key's type.
+// `primitives` are `stride` bytes apart, because they are members of sorted pairs with keys of either type.
 template <coverage Rule, class Payload, class Scene>
 void bucket_tile(const Scene& s, const core::tile_grid& tiles, std::uint64_t tile, const std::uint32_t* primitives,
                  std::size_t stride, std::size_t count, std::uint32_t worker, abuffer_scratch<Payload>& scratch) {
@@ -79,7 +79,7 @@ void bucket_tile(const Scene& s, const core::tile_grid& tiles, std::uint64_t til
     }
     scratch.counts.fragments += scratch.fragments.size();
 
-    // Counts become places in the store; the fragments go there in order.
+    // Turns counts into offsets in the store and moves the fragments there, in order.
     bucket_store<Payload>& store = scratch.store;
     const std::size_t base = store.primitives.size();
     std::size_t next = base;
@@ -122,8 +122,8 @@ void bucket_tile(const Scene& s, const core::tile_grid& tiles, std::uint64_t til
     }
 }
 
-// Puts the threads' parts together: rows of voxels in the order of the whole grid. `parts` are pointers to what derives
-// from list_part; they lose their segments. `result` gets the counts of fragments and voxels.
+// Merges the threads' parts: rows of voxels in the order of the whole grid. `parts` are pointers to objects derived
+// from list_part; emit_lists takes their segments. Adds the counts of fragments and voxels to `result`.
 template <class Parts, class Backend, class Payload>
 [[nodiscard]] status emit_lists(const execution& how, Backend& backend, glm::ivec3 extent, const Parts& parts,
                                 status result, abuffer<Backend, Payload>& lists) {
@@ -144,7 +144,7 @@ template <class Parts, class Backend, class Payload>
     const std::uint64_t keys = static_cast<std::uint64_t>(extent.z) * static_cast<std::uint64_t>(extent.y) *
                                static_cast<std::uint64_t>(tiles.tiles.x);
     radix_sort(how.threads, segments, static_cast<int>(std::bit_width(keys - 1)));
-    // Each segment's place in the result; the counts of the whole follow.
+    // The first voxel and fragment of each segment in the result, and finally the totals.
     struct place {
         std::uint64_t voxel, fragment;
     };

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// cpu_backend: the pipeline on CPU threads, in plain C++20. It gives the bits that every other backend has to give, for
-// any number of threads, and is quick enough to be used in earnest.
+// cpu_backend: the pipeline on CPU threads, in plain C++20. Its results define those of every other backend, bit by
+// bit, and do not depend on the number of threads.
 
 #include <cpu_ref/abuffer_pass.hpp>
 #include <cpu_ref/framebuffer_pass.hpp>
@@ -23,11 +23,11 @@
 
 namespace voxelpipe {
 
-// Threads may call through one backend at the same time, each with a framebuffer or A-buffer of its own, if `times` is
-// null; `progress` then hears of all calls.
+// Threads may use one backend at the same time, each with its own framebuffer or A-buffer, if `times` is null.
+// `progress` then gets reports of all calls.
 class cpu_backend {
 public:
-    // Host memory by operator new, uninitialised, 64-byte aligned. Throws std::bad_alloc.
+    // Host memory, uninitialised, aligned to 64 bytes. The constructor throws std::bad_alloc.
     template <class T>
     class buffer {
     public:
@@ -41,7 +41,7 @@ public:
         [[nodiscard]] std::size_t size() const { return count_; }
         [[nodiscard]] backend_view<const T> view() const { return {data_.get(), count_}; }
         [[nodiscard]] std::vector<T> to_host(cpu_backend&) const { return {data_.get(), data_.get() + count_}; }
-        // Copies a box of the elements; `to` has room for box.count() of them.
+        // Copies a box of elements. `to` has room for box.count() of them.
         void read_box(cpu_backend&, const core::element_box& box, T* to) const {
             for (std::size_t z = 0; z < box.slices; ++z)
                 for (std::size_t y = 0; y < box.rows; ++y, to += box.row)
@@ -67,22 +67,22 @@ public:
     cpu_backend() = default;
     explicit cpu_backend(unsigned num_threads) : threads(num_threads) {}
 
-    unsigned threads = 0;         // 0: as many as the machine runs at once
-    stage_times* times = nullptr; // where to add up the time of each stage, if anywhere
+    unsigned threads = 0;         // 0: as many as the machine has
+    stage_times* times = nullptr; // if not null, the time of each stage is added here
     std::function<void(std::uint64_t done, std::uint64_t total)> progress; // called from any thread, one call at a time
 
-    // Copies an array of this backend's memory; what bounds() calls.
+    // Copies an array of this backend's memory. Used by bounds().
     template <class T>
     [[nodiscard]] std::vector<std::remove_const_t<T>> read(backend_view<T> from) const {
         return {from.begin(), from.end()};
     }
 
-    // What check_indices calls.
+    // Used by check_indices.
     [[nodiscard]] std::uint32_t max_index(array_view<const glm::uvec3> triangles) const {
         return core::max_index(triangles);
     }
 
-    // What voxelize calls; arguments are validated. Exceptions of a user's shader or progress function pass through.
+    // Used by voxelize, with validated arguments. Exceptions of a user's shader or progress function pass through.
     template <class Draws, class Output, class Coverage = core::known_coverage<>>
     [[nodiscard]] status run(const Draws& draws, const grid& g, Output& out, const voxelize_options& options,
                              std::uint64_t triangles_in, Coverage = {}) {
@@ -92,7 +92,7 @@ public:
         });
     }
 
-    // What voxelize_solid calls, likewise.
+    // Used by voxelize_solid, in the same way.
     template <class Draw, class Output>
     [[nodiscard]] status run_solid(std::span<const Draw> draws, const grid& g, Output& out,
                                    const solid_options& options, std::uint64_t triangles_in) {
@@ -103,7 +103,7 @@ public:
         });
     }
 
-    // The same for sparse framebuffers.
+    // Used by voxelize with a sparse framebuffer, in the same way.
     template <class Draws, class Coverage = core::known_coverage<>, class... Targets>
     [[nodiscard]] status run_sparse(const Draws& draws, const grid& g, sparse_framebuffer<cpu_backend, Targets...>& out,
                                     const voxelize_options& options, std::uint64_t triangles_in, Coverage = {}) {
@@ -122,7 +122,7 @@ public:
         });
     }
 
-    // What vp::clear calls, and voxelize without triangles; arguments are validated.
+    // Used by vp::clear, and by voxelize without triangles, with validated arguments.
     template <class... Targets>
     [[nodiscard]] status clear(const framebuffer_view<Targets...>& fb) {
         const cpu::execution how = execution(nullptr);
@@ -138,7 +138,7 @@ private:
     [[nodiscard]] cpu::execution execution(stage* at) const {
         return {threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency()), times, &progress, at};
     }
-    // Runs work(execution); memory that is not there becomes a status.
+    // Runs work(execution). Turns failed allocations into a status.
     template <class Work>
     status guarded(std::uint64_t triangles_in, const Work& work) {
         stage at = stage::validate;
@@ -151,12 +151,12 @@ private:
             return work(execution(&at));
         } catch (const std::bad_alloc&) {
             return out_of_memory();
-        } catch (const std::length_error&) { // a vector longer than can be: the same thing
+        } catch (const std::length_error&) { // a vector longer than max_size()
             return out_of_memory();
         }
     }
-    // Tile numbers of 32 bits keep the tile pairs small. A grid with more tiles than that has 2^47 voxels, more than
-    // any framebuffer holds, though not more than an A-buffer may span.
+    // True if tile numbers fit 32 bits, which keeps the tile pairs small. A grid with more tiles has 2^47 voxels: more
+    // than any framebuffer holds, but an A-buffer may span them.
     static bool has_small_keys(const grid& g) {
         return core::tile_grid(g.extent, cpu::log2_tile_size).count() <= std::uint64_t{1} << 32;
     }

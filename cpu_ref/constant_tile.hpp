@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Tiles of a scene whose shader gives every fragment the same values: only which voxels are covered matters, and for
-// blends where a repetition counts, how often. A tile's coverage is gathered in one bit (and one number) a voxel, and
-// the targets are touched once a voxel at its end, with as many folds as there were fragments.
+// Tiles of a scene whose shader gives every fragment the same values. Then only coverage matters and, for blends in
+// which a repetition counts, the number of fragments of each voxel. A tile gathers one bit, and if needed one number,
+// per voxel; at its end each target is updated once per covered voxel.
 
 #include <cpu_ref/tile_fragments.hpp>
 
@@ -12,19 +12,19 @@
 
 namespace voxelpipe::cpu {
 
-// The same bytes; padding within a value, if it has any, may then say no.
+// True if the values have equal bytes. Padding within a value may differ, which makes it false.
 template <class... Ts>
 [[nodiscard]] bool same_values(const constant_output<Ts...>& a, const constant_output<Ts...>& b) {
     bool same = true;
     core::for_each_index<sizeof...(Ts)>([&]<std::size_t I>() {
         const auto &x = get<I>(a.values), &y = get<I>(b.values);
-        // Equal bytes are equal values; where equal values differ in bytes, the draws are shaded one by one.
+        // Equal bytes mean equal values. Draws with equal values in different bytes are shaded fragment by fragment.
         same = same && std::memcmp(&x, &y, sizeof(x)) == 0; // NOLINT(bugprone-suspicious-memory-comparison)
     });
     return same;
 }
 
-// Whether all draws give the same values; those that differ are shaded fragment by fragment.
+// True if all draws give the same values.
 template <class Scene>
 [[nodiscard]] bool same_values(const Scene& s) {
     for (const auto& d : s.draws)
@@ -32,7 +32,7 @@ template <class Scene>
     return true;
 }
 
-// Blends for which folding the same value a second time changes nothing.
+// True if folding the same value a second time changes nothing.
 template <class Blend, class T>
 inline constexpr bool folds_once = std::is_same_v<Blend, blend::replace> || std::is_same_v<Blend, blend::min> ||
                                    std::is_same_v<Blend, blend::max> || std::is_same_v<Blend, blend::bit_and> ||
@@ -42,7 +42,7 @@ inline constexpr bool folds_once = std::is_same_v<Blend, blend::replace> || std:
 template <class Target>
 inline constexpr bool target_folds_once = folds_once<typename Target::blend_type, typename Target::value_type>;
 
-// Whether a target that takes part has to know how many fragments a voxel has.
+// True if an active target needs the number of fragments of each voxel.
 template <class... Targets>
 [[nodiscard]] bool needs_repeats(const framebuffer_view<Targets...>& fb) {
     bool repeats = false;
@@ -53,10 +53,10 @@ template <class... Targets>
     return repeats;
 }
 
-// What one thread keeps for the tile that it is at.
+// One thread's data of its current tile.
 struct constant_scratch {
     std::array<std::uint32_t, tile_rows> touched{};
-    std::unique_ptr<std::uint32_t[]> repeats; // fragments of each voxel; where a target needs them
+    std::unique_ptr<std::uint32_t[]> repeats; // fragments of each voxel; null if no target needs them
     counters counts{};
 };
 
@@ -92,7 +92,7 @@ void cover_tile(const geometry& s, const core::voxel_box& tile, const std::uint3
     scratch.counts.fragments += fragments;
 }
 
-// One target and the value that every fragment has: folds it into words of 32 voxels along x.
+// Folds a constant value into one target, 32 voxels along x at a time.
 template <class Target>
 class constant_folder {
 public:
@@ -105,8 +105,8 @@ public:
         }
     }
 
-    // Voxels x + i for the ones i of `word`; x is a multiple of 32. Voxel x + i has repeats[i] fragments; one, where
-    // `repeats` is null or a repetition changes nothing.
+    // Updates voxels x + i for the bits i of `word`; x is a multiple of 32. Voxel x + i has repeats[i] fragments, or
+    // one if `repeats` is null or a repetition changes nothing.
     void apply(int x, int y, int z, std::uint32_t word, const std::uint32_t* repeats) {
         if constexpr (by_words) {
             std::uint32_t& stored = t_.elements[map::cell(t_.extent, x, y, z)];
@@ -124,9 +124,9 @@ public:
 private:
     using map = typename Target::map;
     using traits = typename Target::traits;
-    // What becomes of a 0 and of a 1 goes for all voxels of a word at once.
+    // If a result depends only on the stored bit, a word is updated at once.
     static constexpr bool by_words = map::is_bit && target_folds_once<Target>;
-    // A target that was cleared needs not be read, and has few different results.
+    // A cleared target need not be read. It has few different results, of which this many are kept.
     static constexpr std::uint32_t num_known = target_folds_once<Target> ? 2 : 16;
 
     [[nodiscard]] value_type fold(const value_type& stored, std::uint32_t n) const {
@@ -147,7 +147,7 @@ private:
     std::uint32_t known_end_ = 0;
 };
 
-// `at` is the place in the target of the tile's lowest voxel; its x is a multiple of 32.
+// `at`: position in the target of the tile's lowest voxel; x is a multiple of 32.
 template <class Target>
 void resolve_constant_target(const glm::ivec3& at, const target_view<Target>& t,
                              const typename Target::value_type& value, const constant_scratch& scratch) {
@@ -161,14 +161,14 @@ void resolve_constant_target(const glm::ivec3& at, const target_view<Target>& t,
     }
 }
 
-// Ends the tile: the targets get their values, voxels are counted, the marks are wiped.
+// Ends the tile: updates the targets, counts voxels, and resets the scratch.
 template <class Values, class... Targets>
 void resolve_constant_tile(const glm::ivec3& at, const framebuffer_view<Targets...>& fb, const Values& values,
                            constant_scratch& scratch) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
         const auto& t = get<I>(fb.targets);
         using target_type = typename core::pack_element<I, Targets...>::type;
-        // A count target ignores the value, whatever its type.
+        // Targets of blend::count ignore the value, whatever its type.
         typename target_type::value_type value{};
         if constexpr (!std::is_same_v<typename target_type::blend_type, blend::count>) value = get<I>(values);
         if (t.load != load_operation::off) resolve_constant_target<target_type>(at, t, value, scratch);

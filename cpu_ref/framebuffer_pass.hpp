@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Fine raster into render targets: every tile's triangles in order, each fragment shaded and folded into its targets.
-// Blends that accumulate in their own format (reproducible sums) keep a tile of accumulators; all others work in place.
-// A shader that gives every fragment the same values takes the way of constant_tile.hpp.
+// Fine raster into render targets. The triangles of a tile are drawn in order; each fragment is shaded and folded into
+// its targets. Blends with an accumulator format of their own (reproducible sums) use a tile of accumulators; all
+// others work in place. A shader whose values are constant is handled by constant_tile.hpp.
 
 #include <cpu_ref/constant_tile.hpp>
 
@@ -14,7 +14,7 @@
 
 namespace voxelpipe::cpu {
 
-// Sets every voxel of the targets that clear. Padding (of bit rows and bricks) is cleared too; padding bits become 0.
+// Clears a target, including its padding. Padding bits become 0.
 template <class Target>
 void clear_target(const execution& how, const target_view<Target>& t) {
     using map = typename Target::map;
@@ -24,7 +24,7 @@ void clear_target(const execution& how, const target_view<Target>& t) {
     const std::size_t blocks = (n + block - 1) / block;
     if constexpr (map::is_bit) {
         if (t.clear_value) {
-            // Rows end within a word: set bits up to the extent only.
+            // Rows end within a word: sets bits only up to the extent.
             const std::uint32_t tail = t.extent.x % 32 == 0 ? ~0u : (1u << (t.extent.x % 32)) - 1;
             const auto y_end = t.extent.y, z_end = t.extent.z;
             parallel_for(how.threads, blocks, [&](unsigned, std::size_t b) {
@@ -68,18 +68,18 @@ template <class Target>
 inline constexpr bool works_in_place =
     std::is_same_v<typename Target::traits::accumulator, typename Target::value_type>;
 
-// What one thread keeps for the tile that it is at.
+// One thread's data of its current tile.
 template <class... Targets>
 struct tile_scratch {
     template <class Target>
     using accumulators = std::unique_ptr<typename Target::traits::accumulator[]>;
 
-    std::array<std::uint32_t, tile_rows> touched{}; // a bit a voxel: has got a fragment
+    std::array<std::uint32_t, tile_rows> touched{}; // one bit per voxel: it has a fragment
     core::pack<accumulators<Targets>...> sums;      // tile_voxels each, for targets that do not work in place
     counters counts{};
 };
 
-// Room for the sums of a tile in the targets that take part.
+// Allocates the sums of a tile for active targets.
 template <class... Targets>
 void reserve_sums(const framebuffer_view<Targets...>& fb, tile_scratch<Targets...>& scratch) {
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
@@ -107,7 +107,7 @@ VOXELPIPE_INLINE void blend_in_place(const target_view<Target>& t, int x, int y,
     }
 }
 
-// `at` is the place in the targets of the tile's lowest voxel.
+// `at`: position in the targets of the tile's lowest voxel.
 template <coverage Rule, bool Track, class Scene, class... Targets>
 void raster_tile(const Scene& s, const core::voxel_box& box, const glm::ivec3& at, const std::uint32_t* primitives,
                  std::size_t stride, std::size_t count, const framebuffer_view<Targets...>& fb,
@@ -149,7 +149,7 @@ void raster_tile(const Scene& s, const core::voxel_box& box, const glm::ivec3& a
     scratch.counts.fragments_discarded += discarded;
 }
 
-// Ends the tile: sums become stored values, voxels are counted, the marks are wiped.
+// Ends the tile: stores sums, counts voxels, and resets the marks.
 template <class... Targets>
 void resolve_tile(const glm::ivec3& at, const framebuffer_view<Targets...>& fb, tile_scratch<Targets...>& scratch) {
     [[maybe_unused]] const int x0 = at.x, y0 = at.y, z0 = at.z;
@@ -189,7 +189,7 @@ template <coverage Rule, class Key, class Scene, class... Targets>
 void raster_tiles(const execution& how, const Scene& s, const core::tile_grid& tiles,
                   const std::vector<tile_range>& ranges, const raw_array<tile_pair<Key>>& pairs, unsigned workers,
                   const framebuffer_view<Targets...>& fb, bool count_voxels, counters& counts) {
-    // All memory is there before the first voxel is written.
+    // Allocates everything before the first voxel is written.
     std::vector<std::unique_ptr<tile_scratch<Targets...>>> scratch;
     for (unsigned w = 0; w < workers; ++w) {
         scratch.push_back(std::make_unique<tile_scratch<Targets...>>());
@@ -268,7 +268,8 @@ template <coverage Rule, class Key, class Scene, class... Targets>
     const std::vector<tile_range> ranges = tile_sort(how, coarse.pairs, tiles.count());
 
     how.enter(stage::fine_raster);
-    if (fb.changes != nullptr) core::change_log::forget(fb.changes); // all is cleared, and nothing is marked
+    if (fb.changes != nullptr)
+        core::change_log::forget(fb.changes); // the targets are cleared whole, and no changes are logged
     const unsigned workers =
         static_cast<unsigned>(std::max<std::size_t>(1, std::min<std::size_t>(how.threads, ranges.size())));
     bool constant_output = false;

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The CPU pipeline: vertex shade -> coarse raster (triangle, tile) pairs -> tile sort -> fine raster, tile by tile,
-// each tile's triangles in order. No atomics and no races: a tile belongs to one thread, so every blend, order-free or
-// not, is a plain fold, and the result is the same for any number of threads. Needs neither nvcc nor a CUDA header.
+// The CPU pipeline: vertex shade, coarse raster into (triangle, tile) pairs, tile sort, and fine raster tile by tile,
+// with each tile's triangles in order. A tile belongs to one thread, so there are neither atomics nor races: every
+// blend is a plain fold, and the result is the same for any number of threads. Needs neither nvcc nor a CUDA header.
 
 #include <cpu_ref/parallel.hpp>
 #include <voxelpipe/core/coverage.hpp>
@@ -27,19 +27,19 @@
 
 namespace voxelpipe::cpu {
 
-// What the stages need to know of how they run.
+// How the stages of a call run.
 struct execution {
     unsigned threads = 1;
     stage_times* times = nullptr;
     const std::function<void(std::uint64_t done, std::uint64_t total)>* progress = nullptr;
-    stage* at = nullptr; // where to note the stage that runs, for the status of a call that fails
+    stage* at = nullptr; // if not null, notes the current stage for the status of a failed call
 
     void enter(stage s) const {
         if (at != nullptr) *at = s;
     }
 };
 
-// Adds the time until its end to one of the stage times.
+// Adds the lifetime of this object to one of the stage times.
 class stopwatch {
 public:
     stopwatch(stage_times* times, double stage_times::*field) : times_(times), field_(field) {
@@ -64,19 +64,19 @@ inline constexpr int tile_size = 1 << log2_tile_size;
 inline constexpr std::size_t tile_rows = std::size_t{tile_size} * tile_size;
 inline constexpr std::size_t tile_voxels = tile_rows * tile_size;
 
-// A box's lowest voxel.
+// The lowest voxel of a box.
 [[nodiscard]] inline glm::ivec3 lowest(const core::voxel_box& box) {
     return {static_cast<int>(box.lo[0]), static_cast<int>(box.lo[1]), static_cast<int>(box.lo[2])};
 }
 
-// The number of a voxel within its tile; a row is y + tile_size * z.
+// Index of a voxel within its tile; a row is y + tile_size * z.
 [[nodiscard]] constexpr std::size_t tile_voxel(int row, int x) {
     return static_cast<std::size_t>(row) * tile_size + static_cast<std::size_t>(x);
 }
 
 // ---- vertex shade ---------------------------------------------------------------------------------------------------
 
-// The vertices of one draw after the vertex shader, snapped; varyings stay empty where there are none.
+// The vertices of one draw after the vertex shader, snapped. varyings is null if there are none.
 template <class Varyings>
 struct shaded_vertices {
     std::unique_ptr<core::snapped_position[]> positions;
@@ -86,7 +86,7 @@ struct shaded_vertices {
 template <class Mesh, class VertexShader, class FragmentShader>
 using draw_varyings = typename core::shaded<Mesh, VertexShader>::varyings;
 
-// Varyings: what the vertex shader makes, or no_varyings, which leaves its varyings out.
+// Varyings: the vertex shader's varyings, or no_varyings to omit them.
 template <class Varyings, class Mesh, class VertexShader, class FragmentShader>
 [[nodiscard]] auto shade_vertices(const execution& how, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                   const core::snap_transform& snap) {
@@ -122,20 +122,20 @@ template <class Mesh, class VertexShader, class FragmentShader>
     return shade_vertices<draw_varyings<Mesh, VertexShader, FragmentShader>>(how, draws, snap);
 }
 
-// ---- the scene as the raster stages see it --------------------------------------------------------------------------
+// ---- scene ----------------------------------------------------------------------------------------------------------
 
-// What is covered, whatever the shaders: what needs no more than this is compiled once, not once a shader.
+// The geometry, without shaders. Code that needs only this is compiled once instead of once per shader.
 struct geometry {
-    struct part { // a draw
+    struct part { // one draw
         array_view<const glm::uvec3> triangles;
         const core::snapped_position* positions = nullptr; // owned by the scene
         std::size_t num_vertices = 0;
     };
     std::vector<part> parts;
-    std::vector<std::uint32_t> first_primitive; // per draw, and one more: the total
+    std::vector<std::uint32_t> first_primitive; // by draw, then the total
     core::snap_transform snap{};
     grid where{};
-    glm::ivec3 lead{0}; // voxels of `where` ahead of those to draw, which reach to its end
+    glm::ivec3 lead{0}; // lowest voxel of `where` that is drawn
 
     struct primitive {
         std::uint32_t draw, triangle;
@@ -161,7 +161,7 @@ struct scene : geometry {
     using fragment_shader = FragmentShader;
 
     std::span<const draw<Mesh, VertexShader, FragmentShader>> draws;
-    std::vector<shaded_vertices<varyings>> vertices; // per draw
+    std::vector<shaded_vertices<varyings>> vertices; // by draw
     core::triple<double> normal_factors{};
 };
 
@@ -195,7 +195,7 @@ struct tile_pair {
     std::uint32_t primitive;
 };
 
-// The pairs of one block of triangles, as they come.
+// The pairs of one block of triangles, in primitive order.
 template <class Key>
 class pair_list {
 public:
@@ -336,9 +336,8 @@ template <class Key>
 
 // ---- fragments ------------------------------------------------------------------------------------------------------
 
-// Calls visit(x, y, z, fragment shader's output) for every fragment of one primitive within `box` (voxels of the
-// computed part of the grid). All of it is inlined by force: the fragment's fields that a shader does not read are then
-// seen to be unused, and cost nothing.
+// Calls visit(x, y, z, fragment shader's output) for every fragment of one primitive within `box`, a box of voxels of
+// the grid. Everything is force-inlined, so that fragment fields that a shader does not read cost nothing.
 template <coverage Rule, class Scene, class Visit>
 VOXELPIPE_INLINE void shade_fragments(const Scene& s, std::uint32_t id, const core::voxel_box& box, Visit&& visit) {
     using varyings = typename Scene::varyings;
@@ -382,7 +381,7 @@ VOXELPIPE_INLINE void shade_fragments(const Scene& s, std::uint32_t id, const co
         run(core::setup_triangle<rule, int128>(a, b, c, s.snap.fraction));
 }
 
-// Reports tiles done, a hundred times at most, one call at a time.
+// Reports the number of finished tiles, at most a hundred times, one call at a time.
 class progress_meter {
 public:
     progress_meter(const execution& how, std::uint64_t total) : how_(how), total_(total) {}
