@@ -145,13 +145,13 @@ template <class Parts, class Backend, class Payload>
                                static_cast<std::uint64_t>(tiles.tiles.x);
     radix_sort(how.threads, segments, static_cast<int>(std::bit_width(keys - 1)));
     // The first voxel and fragment of each segment in the result, and finally the totals.
-    struct place {
+    struct segment_start {
         std::uint64_t voxel, fragment;
     };
-    std::vector<place> places(segments.size());
-    place total{0, 0};
+    std::vector<segment_start> starts(segments.size());
+    segment_start total{0, 0};
     for (std::size_t i = 0; i < segments.size(); ++i) {
-        places[i] = total;
+        starts[i] = total;
         total.voxel += segments[i].num_voxels;
         total.fragment += segments[i].num_fragments;
     }
@@ -169,17 +169,17 @@ template <class Parts, class Backend, class Payload>
             const row_segment& g = segments[i];
             const bucket_store<payload>& from = parts[g.worker]->store;
             const std::uint64_t row_start = g.key / tiles_x * nx + g.key % tiles_x * tile_size;
-            std::uint64_t at = places[i].fragment;
+            std::uint64_t at = starts[i].fragment;
             for (std::uint32_t v = 0; v < g.num_voxels; ++v) {
-                voxels.data()[places[i].voxel + v] = row_start + from.columns[g.voxel + v];
-                offsets.data()[places[i].voxel + v] = at;
+                voxels.data()[starts[i].voxel + v] = row_start + from.columns[g.voxel + v];
+                offsets.data()[starts[i].voxel + v] = at;
                 at += from.counts[g.voxel + v];
             }
             const auto first = static_cast<std::ptrdiff_t>(g.fragment),
                        n = static_cast<std::ptrdiff_t>(g.num_fragments);
-            std::copy_n(from.primitives.begin() + first, n, primitives.data() + places[i].fragment);
+            std::copy_n(from.primitives.begin() + first, n, primitives.data() + starts[i].fragment);
             if constexpr (lists_type::has_payload)
-                std::copy_n(from.payloads.begin() + first, n, payloads.data() + places[i].fragment);
+                std::copy_n(from.payloads.begin() + first, n, payloads.data() + starts[i].fragment);
         }
     });
     if (total.voxel != 0) offsets.data()[total.voxel] = total.fragment;
