@@ -23,5 +23,6 @@
 #include <voxelpipe/device/abuffer_async.cuh>
 #include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/device/solid.cuh>
+#include <voxelpipe/device/solid_async.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>
 #endif

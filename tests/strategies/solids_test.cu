@@ -5,7 +5,7 @@
 // and load, crops, A-buffers, ties, large triangles, many draws, and calls that run again or fail.
 #include "device_test.hpp"
 
-#include <voxelpipe/device/solid.cuh>
+#include <voxelpipe/device/solid_async.cuh>
 
 #include <algorithm>
 #include <bit>
@@ -258,6 +258,227 @@ TEST(Solids, EveryRuleBodyAndExtentIntoLists) {
     for_all_options([&](const vp::solid_options& options) {
         expect_same_lists<std::uint32_t>(three_meshes(), id_of_fragment{5}, box_grid({37, 21, 23}), options);
     });
+}
+
+// Rows of more entries than a warp sorts, and shorter ones beside them.
+TEST(Solids, RowsOfManyCrossings) {
+    mesh_data m;
+    for (int i = 0; i < 90; ++i)
+        add_box(m, {12.5f * static_cast<float>(i), 0.5f, 0.25f * static_cast<float>(i % 7)},
+                {12.5f * static_cast<float>(i) + 14.0f, 2.5f, 3.0f}, i % 5 == 4);
+    const drawing_of_bits one{{m}, {{}}, {{true}}}, two{{m, tied_bodies(9.0f, 4, 2)}, {{}}, {{true}}};
+    for (const auto rule : all_rules) {
+        one.expect_same(box_grid({1130, 4, 5}), {.rule = rule}, loading::load);
+        two.expect_same(box_grid({1130, 4, 5}), {.rule = rule, .bodies = vp::bodies::draw});
+        expect_same_lists<std::uint32_t>({m}, id_of_fragment{2}, box_grid({1130, 4, 5}), {.rule = rule});
+    }
+}
+
+// ---- grids ----------------------------------------------------------------------------------------------------------
+
+// Parts of a grid, and voxels that are no cubes.
+TEST(Solids, Crops) {
+    vp::grid g = box_grid({40, 30, 28});
+    g.voxel_size = {0.5, 1.0, 0.75};
+    const drawing_of_everything everything_drawn{three_meshes(), {{0.0f}}, {{1, 0.5f}}};
+    const drawing_of_bits bits{three_meshes(), {{}}, {{true}}};
+    for (const auto& [begin, size] :
+         {std::pair{glm::ivec3(0, 0, 0), glm::ivec3(9, 30, 28)}, std::pair{glm::ivec3(9, 4, 7), glm::ivec3(31, 17, 13)},
+          std::pair{glm::ivec3(5, 11, 12), glm::ivec3(1, 1, 1)}}) {
+        SCOPED_TRACE(begin.x);
+        for (const auto extent : all_extents)
+            for (const auto rule : all_rules) {
+                everything_drawn.expect_same(g.crop(begin, size), {.rule = rule, .extent = extent});
+                bits.expect_same(g.crop(begin, size), {.rule = rule, .extent = extent});
+            }
+    }
+}
+
+// Extents that the 32-bit raster of the cover does not serve.
+TEST(Solids, LongGrids) {
+    mesh_data m = tied_bodies(12.0f, 9, 3);
+    for (glm::vec3& p : m.positions) p.x *= 700.0f;
+    add_box(m, {-2e6f, 1.5f, 2.5f}, {4000.5f, 5.5f, 7.5f}); // in 128 bits
+    const drawing_of_bits drawing{{m, tied_bodies(9.0f, 3, 8)}, {{}}, {{true}}};
+    for (const auto extent : all_extents)
+        for (const auto of : all_bodies) drawing.expect_same(box_grid({9000, 9, 11}), {.bodies = of, .extent = extent});
+}
+
+// More rows than 32 bits number, in lists.
+TEST(Solids, MoreRowsThan32BitsNumber) {
+    mesh_data m = tied_bodies(5.0f, 5, 3);
+    append(m, translated(tied_bodies(5.0f, 5, 4), {0.0f, 65990.0f, 65990.0f}));
+    expect_same_lists<std::uint32_t>({m, m}, id_of_fragment{1}, box_grid({6, 66000, 66000}),
+                                     {.rule = vp::fill_rule::even_odd, .bodies = vp::bodies::draw});
+}
+
+// ---- triangles ------------------------------------------------------------------------------------------------------
+
+// Triangles that are cut into work items, along both axes; some in 128 bits, and so many crossings that the call runs
+// again.
+TEST(Solids, LargeTriangles) {
+    mesh_data m;
+    add_octahedron(m, {150.0f, 170.5f, 20.0f}, 130.0f);
+    add_octahedron(m, {-9000.0f, 20.0f, 10.0f}, 9500.0f, true);
+    add_box(m, {10.5f, 3.0f, -1e6f}, {60.0f, 290.5f, 35.5f});
+    append(m, long_triangles({90, 300, 70}, 40, 3));
+    const drawing_of_bits drawing{{m}, {{}}, {{true}}};
+    const vp::grid g = box_grid({90, 300, 70});
+    drawing.expect_same(g, {.rule = vp::fill_rule::even_odd});
+    drawing.expect_same(g, {.rule = vp::fill_rule::nonzero, .extent = vp::solid_extent::outer});
+    const drawing_of_bits two{{m, tied_bodies(90.0f, 3, 3)}, {{}}, {{true}}};
+    two.expect_same(g, {.rule = vp::fill_rule::positive, .bodies = vp::bodies::draw});
+    two.expect_same(g, {.rule = vp::fill_rule::even_odd});
+}
+
+TEST(Solids, ManyDraws) {
+    std::vector<mesh_data> meshes;
+    for (std::uint32_t i = 0; i < 45; ++i)
+        meshes.push_back(i == 7 ? mesh_data{} : tied_bodies(20.0f, 1 + static_cast<int>(i % 2), i));
+    const drawing_of_everything drawing{meshes, {{0.0f}, {0.5f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}, {4, 1e6f}}};
+    for (const auto of : all_bodies)
+        for (const auto extent : all_extents)
+            drawing.expect_same(box_grid({33, 18, 19}),
+                                {.rule = vp::fill_rule::even_odd, .bodies = of, .extent = extent});
+    expect_same_lists<std::uint32_t>(meshes, id_of_fragment{9}, box_grid({33, 18, 19}), vp::each_draw);
+}
+
+// ---- calls ----------------------------------------------------------------------------------------------------------
+
+// The third call like those before it is a graph; vertices may change meanwhile, and other calls come in between.
+TEST(Solids, RepeatedCalls) {
+    const vp::grid g = box_grid({40, 24, 22});
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    bit_target<vp::cpu_backend> a{cpu, g.extent};
+    bit_target<vp::cuda_backend> b{gpu, g.extent};
+    mesh_data m = tied_bodies(22.0f, 6, 2);
+    vp::mesh<vp::cuda_backend> on_device(gpu, m.positions, m.triangles);
+    for (int i = 0; i < 12; ++i) {
+        SCOPED_TRACE(i);
+        const vp::solid_options options{.rule = i / 6 == 0 ? vp::fill_rule::even_odd : vp::fill_rule::nonzero};
+        if (i % 6 == 3) {
+            for (glm::vec3& p : m.positions) p += glm::vec3(0.5f, 1.0f, 0.25f);
+            ASSERT_EQ(cudaMemcpy(const_cast<glm::vec3*>(on_device.view().positions.data()), m.positions.data(),
+                                 m.positions.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
+                      cudaSuccess);
+        }
+        const vp::mesh<vp::cpu_backend> on_host(cpu, m.positions, m.triangles);
+        const auto shader = vp::constant(true);
+        const vp::status sa = vp::voxelize_solid(cpu, on_host, g, vp::passthrough{}, shader, a, options);
+        const vp::status sb = vp::voxelize_solid(gpu, on_device, g, vp::passthrough{}, shader, b, options);
+        ASSERT_TRUE(sa.ok() && sb.ok());
+        expect_same_counts(sa.counts, sb.counts);
+        EXPECT_EQ(sa.solid, sb.solid);
+        expect_same_bytes(vp::get<0>(a).to_host(cpu), vp::get<0>(b).to_host(gpu), "bits");
+    }
+}
+
+// A bad index: the same status on both backends, and targets keep what they held.
+TEST(Solids, ABadIndexWritesNothing) {
+    const vp::grid g = box_grid({40, 24, 22});
+    vp::cuda_backend gpu;
+    bit_target<vp::cuda_backend> fb{gpu, g.extent};
+    mesh_data m = tied_bodies(22.0f, 6, 2);
+    {
+        const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
+        ASSERT_TRUE(vp::voxelize_solid(gpu, mesh, g, vp::passthrough{}, vp::constant(true), fb).ok());
+    }
+    const std::vector<std::uint32_t> before = vp::get<0>(fb).to_host(gpu);
+    m.triangles[17].y = static_cast<std::uint32_t>(m.positions.size());
+    const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
+    for (const auto rule : all_rules) {
+        const vp::status s = vp::voxelize_solid(gpu, view_of(mesh, indices::unknown), g, vp::passthrough{},
+                                                vp::constant(true), fb, {.rule = rule});
+        EXPECT_EQ(s.code, vp::status_code::index_out_of_range) << s.message();
+        EXPECT_EQ(s.triangle, 17u);
+        EXPECT_EQ(before, vp::get<0>(fb).to_host(gpu));
+    }
+}
+
+// Without memory the call says so, and targets keep what they held.
+TEST(Solids, NoMemoryWritesNothing) {
+    const vp::grid g = box_grid({40, 24, 22});
+    counting_resource memory;
+    vp::cuda_backend gpu(nullptr, memory);
+    bit_target<vp::cuda_backend> fb{gpu, g.extent};
+    const mesh_data m = tied_bodies(22.0f, 6, 2);
+    const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
+    ASSERT_TRUE(vp::voxelize_solid(gpu, mesh, g, vp::passthrough{}, vp::constant(true), fb).ok());
+    const std::vector<std::uint32_t> before = vp::get<0>(fb).to_host(gpu);
+    gpu.release();
+    memory.limit = memory.live + 1000;
+    const vp::status s =
+        vp::voxelize_solid(gpu, mesh, g, vp::passthrough{}, vp::constant(true), fb, {.rule = vp::fill_rule::positive});
+    EXPECT_EQ(s.code, vp::status_code::out_of_memory) << s.message();
+    EXPECT_EQ(before, vp::get<0>(fb).to_host(gpu));
+}
+
+// In the caller's memory: capacities that are too small are told and nothing is written; a captured call is replayed
+// with other vertices.
+TEST(Solids, Async) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<bool>>;
+    const vp::grid g = box_grid({40, 24, 22});
+    const stream_owner stream;
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu(stream.stream);
+    mesh_data m = tied_bodies(22.0f, 6, 2);
+    const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
+    const draw_type draw{mesh.view(), {}, {true}};
+    const std::span<const draw_type> draws(&draw, 1);
+    bit_target<vp::cpu_backend> a{cpu, g.extent};
+    bit_target<vp::cuda_backend> b{gpu, g.extent};
+    const auto expect_same = [&](const vp::solid_options& options, const vp::status& sb) {
+        const vp::mesh<vp::cpu_backend> on_host(cpu, m.positions, m.triangles);
+        const vp::status sa = vp::voxelize_solid(cpu, on_host, g, vp::passthrough{}, vp::constant(true), a, options);
+        ASSERT_TRUE(sb.ok()) << sb.message();
+        expect_same_counts(sa.counts, sb.counts);
+        EXPECT_EQ(sa.solid, sb.solid);
+        expect_same_bytes(vp::get<0>(a).to_host(cpu), vp::get<0>(b).to_host(gpu), "bits");
+    };
+    for (const auto rule : {vp::fill_rule::even_odd, vp::fill_rule::nonzero}) {
+        SCOPED_TRACE(static_cast<int>(rule));
+        const bool needs_room = rule == vp::fill_rule::nonzero;
+        const vp::solid_options options{.rule = rule};
+        vp::workspace_limits limits;
+        limits.fragments = needs_room ? 10 : 0;
+        std::size_t bytes = vp::solid_workspace_bytes(draws, g, b.view(), options, limits);
+        ASSERT_NE(bytes, 0u);
+        vp::cuda_backend::buffer<std::byte> memory(gpu, std::size_t{1} << 22);
+        const vp::status small =
+            vp::voxelize_solid_async(gpu, draws, g, b.view(), options, {memory.data(), bytes - 1, limits});
+        EXPECT_EQ(small.code, vp::status_code::capacity_exceeded);
+        EXPECT_EQ(small.required.bytes, bytes);
+        if (needs_room) {
+            const auto before = vp::get<0>(b).to_host(gpu);
+            const vp::workspace_view workspace{memory.data(), memory.size(), limits};
+            ASSERT_TRUE(vp::voxelize_solid_async(gpu, draws, g, b.view(), options, workspace).ok());
+            EXPECT_EQ(vp::read_status(gpu, workspace, &limits).code, vp::status_code::capacity_exceeded);
+            EXPECT_EQ(before, vp::get<0>(b).to_host(gpu));
+            EXPECT_GT(limits.fragments, 10u);
+            limits.fragments += limits.fragments / 2; // the vertices will move
+        }
+        bytes = vp::solid_workspace_bytes(draws, g, b.view(), options, limits);
+        ASSERT_LE(bytes, memory.size());
+        const vp::workspace_view workspace{memory.data(), bytes, limits};
+        cudaGraph_t graph = nullptr;
+        cudaGraphExec_t replay = nullptr;
+        ASSERT_EQ(cudaStreamBeginCapture(stream.stream, cudaStreamCaptureModeRelaxed), cudaSuccess);
+        ASSERT_TRUE(vp::voxelize_solid_async(gpu, draws, g, b.view(), options, workspace).ok());
+        ASSERT_EQ(cudaStreamEndCapture(stream.stream, &graph), cudaSuccess);
+        ASSERT_EQ(cudaGraphInstantiate(&replay, graph, 0), cudaSuccess);
+        for (int i = 0; i < 3; ++i) {
+            ASSERT_EQ(cudaGraphLaunch(replay, stream.stream), cudaSuccess);
+            expect_same(options, vp::read_status(gpu, workspace));
+            for (glm::vec3& p : m.positions) p += glm::vec3(-0.5f, 0.0f, 0.25f);
+            ASSERT_EQ(cudaMemcpyAsync(const_cast<glm::vec3*>(mesh.view().positions.data()), m.positions.data(),
+                                      m.positions.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice, stream.stream),
+                      cudaSuccess);
+            ASSERT_EQ(cudaStreamSynchronize(stream.stream), cudaSuccess);
+        }
+        cudaGraphExecDestroy(replay);
+        cudaGraphDestroy(graph);
+    }
 }
 
 } // namespace

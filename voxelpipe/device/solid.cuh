@@ -15,12 +15,13 @@ status cuda_backend::run_solid(std::span<const draw<Mesh, VertexShader, SolidSha
                                const framebuffer_view<Targets...>& fb, const solid_options& options,
                                std::uint64_t triangles_in) {
     using call_type = device::solid_call<draw<Mesh, VertexShader, SolidShader>, framebuffer_view<Targets...>>;
+    if (options.repair != repair::none) return core::failure(status_code::strategy_unavailable);
     return device::attempt(
         solid_history_, {triangles_in, g.extent, g.offset, coverage::conservative}, device::max_listed_entries, times,
         stream, [&](device::attempt_guess& guess, device::pipeline_state& state, device::stage_clock* clock) {
             call_type call{{draws, g, options, static_cast<std::uint32_t>(triangles_in), guess.limits}, fb};
             call.entries.clock = clock;
-            call.entries.require_fit();
+            if (!call.entries.fits()) throw std::bad_alloc();
             void* const memory = workspace_.prepare(call.plan_memory(), *this, use_pinned_memory, use_graphs);
             device::launch_until(stage::tile_resolve, [&] {
                 std::optional<device::call_bytes> bytes;
@@ -32,7 +33,6 @@ status cuda_backend::run_solid(std::span<const draw<Mesh, VertexShader, SolidSha
                     call.launch(carved, on);
                 });
             });
-            device::count_listed_crossings(state);
             return false;
         });
 }
@@ -42,13 +42,14 @@ status cuda_backend::run_solid(std::span<const draw<Mesh, VertexShader, SolidSha
                                abuffer<cuda_backend, Payload>& lists, const solid_options& options,
                                std::uint64_t triangles_in) {
     using call_type = device::solid_lists<draw<Mesh, VertexShader, SolidShader>, payload_storage<Payload>>;
+    if (options.repair != repair::none) return core::failure(status_code::strategy_unavailable);
     abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
     const status s = device::attempt(
         solid_history_, {triangles_in, g.extent, g.offset, coverage::conservative}, device::max_listed_entries, times,
         stream, [&](device::attempt_guess& guess, device::pipeline_state& state, device::stage_clock* clock) {
             call_type call{{draws, g, options, static_cast<std::uint32_t>(triangles_in), guess.limits}};
             call.entries.clock = clock;
-            call.entries.require_fit();
+            if (!call.entries.fits()) throw std::bad_alloc();
             device::arena carved(workspace_.prepare(call.plan_memory(), *this, use_pinned_memory, use_graphs));
             const auto memory = call.take(carved);
             device::crossing_list sorted{};
@@ -56,7 +57,6 @@ status cuda_backend::run_solid(std::span<const draw<Mesh, VertexShader, SolidSha
                 state = workspace_.run(clock, std::nullopt, sizeof(device::pipeline_state), stream,
                                        [&](cudaStream_t on) { sorted = call.launch(memory, on); });
             });
-            device::count_listed_crossings(state);
             if (device::has_failed(state, guess.limits)) return false;
             if (call.has_overlong_row(state)) throw std::bad_alloc();
             device::list_arrays<Payload> arrays(*this, state.voxels, state.fragments);

@@ -39,7 +39,7 @@ struct pipeline_state {
         }
     } deferred; // one draw's triangles that the first pass leaves (deferred_triangles)
     struct {
-        unsigned long long crossings;  // that are not among list_fragments
+        unsigned long long crossings;
         unsigned long long cover_ends; // listed: where runs of covered voxels begin and end
         unsigned long long open_rows, max_winding;
     } solid; // solid/

@@ -48,6 +48,10 @@ struct crossing_list {
     [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint64_t key(std::uint64_t i) const {
         return are_wide ? static_cast<const std::uint64_t*>(keys)[i] : static_cast<const std::uint32_t*>(keys)[i];
     }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint64_t row(std::uint64_t i) const {
+        const std::uint64_t k = key(i);
+        return num_bodies == 1 ? k : k / num_bodies; // 64-bit divisions take long
+    }
     // Nothing beyond the capacity.
     __device__ VOXELPIPE_INLINE void store(std::uint64_t i, std::uint64_t row, std::uint32_t body,
                                            const entry_value& value) const {
@@ -60,11 +64,6 @@ struct crossing_list {
         values[i] = value.bits;
     }
 };
-
-// On the host, of a call that has run: crossings that were listed are counted as the others are.
-inline void count_listed_crossings(pipeline_state& state) {
-    state.solid.crossings += state.list_fragments - state.solid.cover_ends;
-}
 
 // Room for n items of each thread behind what *total counts: the number of the thread's first one. One atomic a block,
 // because atomics on one address wait for one another. All threads of the block take part.

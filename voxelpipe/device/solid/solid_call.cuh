@@ -10,6 +10,7 @@
 #include <voxelpipe/device/scene/check_indices.cuh>
 #include <voxelpipe/device/scene/scene_memory.cuh>
 #include <voxelpipe/device/solid/emit_crossings.cuh>
+#include <voxelpipe/device/solid/fill_bit_rows.cuh>
 #include <voxelpipe/device/solid/fill_rows.cuh>
 #include <voxelpipe/device/solid/parity_rows.cuh>
 #include <voxelpipe/device/solid/solid_cover.cuh>
@@ -18,7 +19,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <new>
 #include <span>
 #include <vector>
 
@@ -54,11 +54,10 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         plan.limits = limits;
     }
 
-    // Throws std::bad_alloc if the call has more entries, keys or work items than can be numbered.
-    void require_fit() const {
-        if (plan.limits.fragments > max_listed_entries || num_keys() > (uint128{1} << 64) ||
-            !row_triangles::holds(plan.num_primitives, plan.g.extent))
-            throw std::bad_alloc();
+    // Whether entries, keys and work items of the call can be numbered.
+    [[nodiscard]] bool fits() const {
+        return plan.limits.fragments <= max_listed_entries && num_keys() <= (uint128{1} << 64) &&
+               row_triangles::holds(plan.num_primitives, plan.g.extent);
     }
     [[nodiscard]] bool has_cover() const { return plan.options.extent != solid_extent::centre; }
     // A body a draw, of several.
@@ -246,11 +245,21 @@ struct solid_call<draw<Mesh, VertexShader, SolidShader>, framebuffer_view<Target
             if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
         });
         end_stage(entries.clock, &stage_times::clear);
-        fill_rows(sorted, entries.rules(), shaders, fb, state, limits, stream);
+        fill(sorted, shaders, state, stream);
         end_stage(entries.clock, &stage_times::tile_resolve);
     }
 
 private:
+    void fill(const crossing_list& sorted, const body_shaders<SolidShader>& shaders, pipeline_state* state,
+              cudaStream_t stream) const {
+        if constexpr (fills_bit_rows<SolidShader, framebuffer_type>) {
+            if (!entries.is_split() && !entries.has_cover()) {
+                fill_bit_rows(sorted, entries.rules(), shaders.one, fb, state, entries.plan.limits, stream);
+                return;
+            }
+        }
+        fill_rows(sorted, entries.rules(), shaders, fb, state, entries.plan.limits, stream);
+    }
     void launch_parity(arena& memory, pipeline_state* state, cudaStream_t stream) const {
         const row_grid rows = entries.rows();
         const row_marks marks = row_marks::take(memory, rows);

@@ -41,14 +41,16 @@ struct sweep_memory {
     std::int32_t winding[32], cover[32];
 };
 
-// The end of the entries from `begin` on that have this key / divisor. All lanes take part.
+// The end of the entries from `begin` on that have the same key or, if that is wanted, the same row. All lanes take
+// part.
+template <bool SameRow>
 [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint64_t find_end(const crossing_list& list, std::uint64_t begin,
-                                                                 std::uint64_t end, std::uint64_t divisor,
-                                                                 std::uint64_t wanted) {
+                                                                 std::uint64_t end, std::uint64_t wanted) {
     const unsigned lane = threadIdx.x % 32;
     for (std::uint64_t first = begin;; first += 32) {
-        const bool is_other = first + lane >= end || list.key(first + lane) / divisor != wanted;
-        const unsigned others = __ballot_sync(0xffffffffu, is_other);
+        const std::uint64_t i = first + lane;
+        const bool is_other = i >= end || (SameRow ? list.row(i) : list.key(i)) != wanted;
+        const unsigned others = __ballot_sync(0xffffffffu, static_cast<int>(is_other));
         if (others != 0) return first + static_cast<unsigned>(__ffs(static_cast<int>(others))) - 1;
     }
 }
@@ -82,7 +84,7 @@ struct row_sweep {
             return;
         }
         for (std::uint64_t begin = entries.begin; begin < entries.end;) {
-            const std::uint64_t key = list.key(begin), end = find_end(list, begin, entries.end, 1, key);
+            const std::uint64_t key = list.key(begin), end = find_end<false>(list, begin, entries.end, key);
             f(static_cast<std::uint32_t>(key - row * list.num_bodies), entry_span{begin, end});
             begin = end;
         }
@@ -159,6 +161,8 @@ struct sweep_totals {
     }
     // All threads of the block take part.
     __device__ void add_up(const sweep_rules& rules, pipeline_state* state) const {
+        if (blockIdx.x == 0 && threadIdx.x == 0)
+            state->solid.crossings = state->list_fragments - state->solid.cover_ends;
         const auto add = [](unsigned long long one, unsigned long long* total) {
             const unsigned long long sum = block_sum(one);
             if (threadIdx.x == 0 && sum != 0) atomicAdd(total, sum);
@@ -183,14 +187,14 @@ __device__ VOXELPIPE_INLINE void for_each_row(const crossing_list& list, const s
     for (std::uint64_t first = (std::uint64_t{blockIdx.x} * (threads_per_block / 32) + warp_in_block()) * 32;
          first < num; first += warps * 32) {
         const std::uint64_t i = first + lane;
-        const std::uint64_t row = i < num ? list.key(i) / list.num_bodies : ~std::uint64_t{0};
+        const std::uint64_t row = i < num ? list.row(i) : ~std::uint64_t{0};
         std::uint64_t previous = __shfl_up_sync(0xffffffffu, row, 1);
-        if (lane == 0) previous = first == 0 ? ~std::uint64_t{0} : list.key(first - 1) / list.num_bodies;
+        if (lane == 0) previous = first == 0 ? ~std::uint64_t{0} : list.row(first - 1);
         for (unsigned starts = __ballot_sync(0xffffffffu, i < num && row != previous); starts != 0;
              starts &= starts - 1) {
             const int at = __ffs(static_cast<int>(starts)) - 1;
             const std::uint64_t mine = __shfl_sync(0xffffffffu, row, at), begin = first + static_cast<unsigned>(at);
-            const std::uint64_t end = find_end(list, begin, num, list.num_bodies, mine);
+            const std::uint64_t end = find_end<true>(list, begin, num, mine);
             f(row_sweep{list, rules, memory, mine, {begin, end}});
         }
     }
