@@ -1,0 +1,250 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Solids into bits on a GPU, by scene, grid and fill rule: the whole call, the same captured as a graph, a plain
+// baseline of ours (one thread a triangle, each voxel behind a crossing flipped by an atomic), whose bits must be the
+// same, the floor measured in the same run, and the fastest published figure. Prints a table of medians; --out writes
+// it as CSV too.
+
+#include "device_record.hpp"
+#include "floors.hpp"
+#include "output.hpp"
+#include "scene_choice.hpp"
+#include "session.hpp"
+#include "table.hpp"
+
+#include <voxelpipe/device/solid_async.cuh>
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <iostream>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace vp = voxelpipe;
+using namespace bench;
+
+// ---- the baseline ---------------------------------------------------------------------------------------------------
+
+constexpr unsigned block_size = 256;
+
+__global__ void flip_behind_triangles(const vp::mesh_view<> mesh, const vp::core::snap_transform snap,
+                                      const glm::ivec3 extent, std::uint32_t* words) {
+    const std::size_t i = std::size_t{blockIdx.x} * block_size + threadIdx.x;
+    if (i >= mesh.triangles.size()) return;
+    const glm::uvec3 index = mesh.triangles[i];
+    vp::core::snapped_position p[3];
+    for (int k = 0; k < 3; ++k) {
+        const glm::vec3 v = mesh.positions[index[k]];
+        p[k] = vp::core::snap(snap, v.x, v.y, v.z);
+        if (!vp::core::is_drawable(p[k])) return;
+    }
+    const vp::core::voxel_box whole{{{0, 0, 0}}, {{extent.x - 1, extent.y - 1, extent.z - 1}}};
+    const auto rows = vp::core::rows_within<0>(p[0], p[1], p[2], snap.fraction, whole);
+    vp::core::for_each_crossing<0, vp::core::centre_offset<>>(
+        p[0], p[1], p[2], snap.fraction, rows, [&](std::int64_t y, std::int64_t z, std::int64_t first, int) {
+            const std::int64_t words_x = (extent.x + 31) / 32;
+            std::uint32_t* const row = words + (z * extent.y + y) * words_x;
+            for (std::int64_t x = first < 0 ? 0 : first; x < extent.x; x = (x / 32 + 1) * 32) {
+                const std::int64_t left = extent.x - x / 32 * 32;
+                atomicXor(row + x / 32, (left < 32 ? (1u << left) - 1 : ~0u) & (~0u << (x & 31)));
+            }
+        });
+}
+
+__global__ void count_different(const std::uint32_t* a, const std::uint32_t* b, std::size_t count,
+                                unsigned long long* different) {
+    unsigned long long mine = 0;
+    for (std::size_t i = std::size_t{blockIdx.x} * block_size + threadIdx.x; i < count; i += gridDim.x * block_size)
+        mine += static_cast<unsigned>(__popc(a[i] ^ b[i]));
+    if (mine != 0) atomicAdd(different, mine);
+}
+
+std::uint64_t differences(const gpu::session& s, const std::uint32_t* a, const std::uint32_t* b, std::size_t count) {
+    const gpu::device_array<unsigned long long> on_device(1);
+    gpu::check(cudaMemsetAsync(on_device.data(), 0, on_device.bytes(), s.stream()), "comparison");
+    count_different<<<1024, block_size, 0, s.stream()>>>(a, b, count, on_device.data());
+    gpu::check(cudaGetLastError(), "comparison");
+    unsigned long long different = 0;
+    gpu::check(cudaMemcpyAsync(&different, on_device.data(), sizeof(different), cudaMemcpyDeviceToHost, s.stream()),
+               "comparison");
+    s.wait();
+    return different;
+}
+
+// ---- the table ------------------------------------------------------------------------------------------------------
+
+struct options {
+    std::string scenes = VOXELPIPE_SCENES_DIR, out;
+    std::vector<std::string> names;
+    std::vector<int> resolutions{128, 256, 512, 1024};
+    gpu::repetition repeat;
+    bool baseline = true;
+};
+
+struct published_solid {
+    std::string_view scene;
+    int resolution;
+    double peer; // ms
+};
+// The fastest of three kernels of two public voxelizers, clear included, on an H200; their sets are not exact.
+constexpr published_solid published_solids[] = {
+    {"conference", 128, 2.62},   {"conference", 512, 12.6},   {"conference", 1024, 15.2},   {"dragon", 128, 0.0245},
+    {"dragon", 512, 0.262},      {"dragon", 1024, 1.67},      {"blade", 128, 0.0308},       {"blade", 512, 0.139},
+    {"blade", 1024, 0.633},      {"hairball", 128, 0.0825},   {"hairball", 512, 1.30},      {"hairball", 1024, 6.80},
+    {"asiandragon", 128, 0.089}, {"asiandragon", 512, 0.215}, {"asiandragon", 1024, 0.675},
+};
+double published_peer(std::string_view scene, int n) {
+    for (const auto& p : published_solids)
+        if (p.scene == scene && p.resolution == n) return p.peer;
+    return 0;
+}
+
+// One scene in one grid.
+class solid_cell {
+    using target = vp::target<vp::bit, vp::blend::bit_or>;
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<bool>>;
+
+public:
+    solid_cell(gpu::session& s, const gpu::resident_mesh& mesh, const vp::grid& g)
+        : session_(s), backend_(s.stream()), grid_(g), framebuffer_(backend_, g.extent) {
+        vp::mesh_view<> view{{mesh.positions.data(), mesh.positions.size()},
+                             {mesh.triangles.data(), mesh.triangles.size()}};
+        view.checked = vp::check_indices(backend_, view.triangles);
+        draw_ = {view, {}, {true}};
+    }
+
+    vp::status call(vp::fill_rule rule) {
+        const vp::status s = vp::voxelize_solid(backend_, draws(), grid_, framebuffer_, {.rule = rule});
+        if (s.code == vp::status_code::out_of_memory) throw gpu::out_of_device_memory(s.message());
+        s.or_throw();
+        return s;
+    }
+    // Of the call as a graph; nothing where no limits suffice.
+    sample time_async(vp::fill_rule rule, const gpu::repetition& how, std::uint64_t crossings) {
+        const vp::solid_options options{.rule = rule};
+        vp::workspace_limits limits;
+        limits.fragments = rule == vp::fill_rule::even_odd ? 0 : crossings + 1024;
+        const std::size_t bytes = vp::solid_workspace_bytes(draws(), grid_, framebuffer_.view(), options, limits);
+        const gpu::device_array<std::byte> memory(bytes);
+        const vp::workspace_view workspace{memory.data(), bytes, limits};
+        const auto launch = [&] {
+            vp::voxelize_solid_async(backend_, draws(), grid_, framebuffer_.view(), options, workspace).or_throw();
+        };
+        launch();
+        vp::read_status(backend_, workspace).or_throw();
+        const gpu::captured_call graph(session_, launch);
+        const sample t = gpu::time_calls(session_, how, [&] { graph.launch(); });
+        vp::read_status(backend_, workspace).or_throw();
+        return t;
+    }
+    // Of the baseline; throws where its bits are not those of the last call.
+    sample time_baseline(const gpu::repetition& how) {
+        const std::size_t count = target::map::elements(grid_.extent);
+        const gpu::device_array<std::uint32_t> words(count);
+        const auto blocks = static_cast<unsigned>((draw_.mesh.triangles.size() + block_size - 1) / block_size);
+        const sample t = gpu::time_calls(session_, how, [&] {
+            gpu::check(cudaMemsetAsync(words.data(), 0, words.bytes(), session_.stream()), "baseline");
+            flip_behind_triangles<<<blocks, block_size, 0, session_.stream()>>>(
+                draw_.mesh, vp::core::make_snap_transform(grid_), grid_.extent, words.data());
+            gpu::check(cudaGetLastError(), "baseline");
+        });
+        const std::uint64_t n = differences(session_, vp::get<0>(framebuffer_).view().elements, words.data(), count);
+        if (n != 0) throw std::runtime_error(std::to_string(n) + " voxels are not those of the baseline");
+        return t;
+    }
+    [[nodiscard]] std::uint64_t bytes() const { return target::map::elements(grid_.extent) * sizeof(std::uint32_t); }
+
+private:
+    [[nodiscard]] std::span<const draw_type> draws() const { return {&draw_, 1}; }
+    gpu::session& session_;
+    vp::cuda_backend backend_;
+    draw_type draw_;
+    vp::grid grid_;
+    vp::framebuffer<vp::cuda_backend, target> framebuffer_;
+};
+
+int run(const options& how, const std::string& command) {
+    gpu::session session;
+    gpu::clock_watch watch;
+    table rows({"scene", "resolution", "rule", "triangles", "crossings", "voxels", "open_rows", "ms", "async_ms",
+                "baseline_ms", "floor_ms", "peer_ms", "peer/ours", "peer/async", "baseline/ours"});
+    std::vector<std::string> notes;
+    const std::vector<std::string> names = how.names.empty() ? available_scenes(how.scenes, notes) : how.names;
+    const auto ms = [](double value) { return value > 0 ? significant(value, 4) : std::string{}; };
+    const auto ratio = [](double a, double b) { return a > 0 && b > 0 ? significant(a / b) : std::string{}; };
+    std::vector<double> ahead[2]; // of the peer, by rule
+    bool failed = false;
+    for (const std::string& name : names) {
+        const mesh_data data = find_mesh(how.scenes, name);
+        const gpu::resident_mesh mesh = gpu::upload(data);
+        const double gather = gpu::gather_ms(session, mesh);
+        for (const int n : how.resolutions) try {
+                solid_cell cell(session, mesh, vp::fit(data.positions, glm::ivec3(n)));
+                const double floor = gather + gpu::memset_ms(session, cell.bytes());
+                for (const auto rule : {vp::fill_rule::even_odd, vp::fill_rule::nonzero}) {
+                    const bool is_parity = rule == vp::fill_rule::even_odd;
+                    const vp::status s = cell.call(rule);
+                    const sample whole = gpu::time_calls(session, how.repeat, [&] { (void)cell.call(rule); });
+                    sample baseline;
+                    if (how.baseline && is_parity) baseline = cell.time_baseline({1, 5, 2, 1});
+                    const sample async = cell.time_async(rule, how.repeat, s.solid.crossings);
+                    watch.read();
+                    const double peer = published_peer(data.name, n);
+                    if (peer > 0) ahead[is_parity ? 0 : 1].push_back(peer / whole.median);
+                    rows.add_row({data.name, std::to_string(n), is_parity ? "even_odd" : "nonzero",
+                                  std::to_string(data.triangles.size()), std::to_string(s.solid.crossings),
+                                  std::to_string(s.counts.voxels), std::to_string(s.solid.open_rows), ms(whole.median),
+                                  ms(async.median), ms(baseline.median), ms(floor), ms(peer), ratio(peer, whole.median),
+                                  ratio(peer, async.median), ratio(baseline.median, whole.median)});
+                    say(data.name + " " + std::to_string(n) + (is_parity ? " even_odd " : " nonzero ") +
+                        significant(whole.median) + " ms");
+                }
+                session.trim();
+            } catch (const std::exception& e) {
+                failed = true;
+                notes.push_back("failed: " + name + " " + std::to_string(n) + ": " + e.what());
+                say(notes.back());
+            }
+    }
+    std::string text = "# Solids into bits on a GPU\n\n" + gpu::describe_device(watch) +
+                       "- clocks over the run: " + watch.range() + "\n- command: `" + command +
+                       "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
+                       " calls, CUDA events around the whole call, clear included, mesh on the device\n"
+                       "- peer: quoted, the fastest of three kernels of two public voxelizers on an NVIDIA H200; their "
+                       "sets are not exact\n";
+    for (const std::string& note : notes) text += "- " + note + "\n";
+    text += "- ahead of the peer, geometric means: even_odd " + significant(geometric_mean(ahead[0])) + ", nonzero " +
+            significant(geometric_mean(ahead[1])) + "\n\n" + rows.markdown();
+    std::cout << text;
+    if (!how.out.empty()) {
+        write_file(std::filesystem::path(how.out) / "gpu_solids.md", text);
+        write_file(std::filesystem::path(how.out) / "gpu_solids.csv", rows.csv());
+    }
+    return failed ? 1 : 0;
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+    options how;
+    CLI::App app{"cuda_backend's times of solids next to a plain baseline, the floor and published figures"};
+    app.add_option("--scenes", how.scenes, "Folder of the benchmark scenes (.vpm or .vpz)")->capture_default_str();
+    app.add_option("--mesh", how.names, "A scene, a generated mesh or a file; may be repeated. Default: five scenes");
+    app.add_option("--resolution", how.resolutions, "Voxels a side; may be repeated")->capture_default_str();
+    app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
+    app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
+    app.add_flag("!--no-baseline", how.baseline, "Leave out the baseline");
+    app.add_option("--out", how.out, "Folder for gpu_solids.md and gpu_solids.csv");
+    CLI11_PARSE(app, argc, argv);
+    try {
+        return run(how, bench::command_line(argc, argv));
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "bench_gpu_solids: %s\n", e.what());
+        return 1;
+    }
+}
