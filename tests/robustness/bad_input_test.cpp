@@ -532,6 +532,67 @@ TEST(OutOfMemory, DuringAnAbufferCallLeavesEarlierListsUnchanged) {
         }
 }
 
+// Every option that takes memory of its own.
+constexpr vp::solid_options solid_calls[]{
+    {.rule = vp::fill_rule::even_odd},   {.bodies = vp::bodies::draw, .extent = vp::solid_extent::outer},
+    {.repair = vp::repair::close_holes}, {.repair = vp::repair::exterior, .closing = 1},
+    {.repair = vp::repair::vote},
+};
+
+TEST(OutOfMemory, DuringASolidCallLeavesTheTargetsUnchanged) {
+    for (const vp::solid_options& options : solid_calls)
+        for (const unsigned threads : {1u, 3u}) {
+            large_call c;
+            vp::cpu_backend be(threads);
+            draw draws[] = {{c.mesh, {}, shader}, {c.mesh, {}, shader}};
+            draws[0].mesh.triangles = {c.triangles.data(), 8500};
+            draws[1].mesh.triangles = {c.triangles.data() + 8500, 8500};
+            draws[1].fragment_shader = vp::constant(2.0f, false, glm::dvec4(2.0));
+            const auto attempt = [&] {
+                return vp::voxelize_solid(be, std::span<const draw>(draws), c.grid, c.view, options);
+            };
+            ASSERT_TRUE(attempt().ok());
+            const std::vector<float> depths = c.depths;
+            const std::vector<std::uint32_t> words = c.words;
+            ASSERT_FALSE(c.untouched());
+            c.wipe();
+            refuse_each_allocation(attempt, [&](const vp::status& s) {
+                EXPECT_TRUE(s.ok() ? c.depths == depths && c.words == words : c.untouched()) << s.message();
+                c.wipe();
+            });
+        }
+}
+
+TEST(OutOfMemory, DuringASolidCallLeavesEarlierListsUnchanged) {
+    for (const vp::solid_options& options : solid_calls) {
+        const call earlier;
+        const large_call c;
+        vp::cpu_backend be(2);
+        vp::abuffer<vp::cpu_backend, int> lists{be};
+        const auto draw_earlier = [&] {
+            vp::voxelize(be, earlier.mesh, earlier.grid, by_weight{}, payload, lists).or_throw();
+        };
+        const auto attempt = [&] {
+            return vp::voxelize_solid(be, c.mesh, c.grid, by_weight{}, payload, lists, options);
+        };
+        ASSERT_TRUE(attempt().ok());
+        const auto expected = lists.to_host(be);
+        draw_earlier();
+        const auto before = lists.to_host(be);
+        ASSERT_NE(expected.extent, before.extent);
+        refuse_each_allocation(attempt, [&](const vp::status& s) {
+            const auto& same = s.ok() ? expected : before;
+            const auto got = lists.to_host(be);
+            EXPECT_EQ(got.voxels, same.voxels) << s.message();
+            EXPECT_EQ(got.offsets, same.offsets);
+            EXPECT_EQ(got.primitives, same.primitives);
+            EXPECT_EQ(got.payloads, same.payloads);
+            EXPECT_EQ(got.extent, same.extent);
+            if (s.ok()) draw_earlier();
+        });
+    }
+}
+
 TEST(OutOfMemory, InAConstructorIsAnException) {
     call c;
     vp::cpu_backend be(1);
