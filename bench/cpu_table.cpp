@@ -8,6 +8,7 @@
 #include "generated_meshes.hpp"
 #include "machine.hpp"
 #include "mesh_file.hpp"
+#include "plain_solid.hpp"
 #include "plain_voxelizer.hpp"
 #include "published_figures.hpp"
 #include "table.hpp"
@@ -20,6 +21,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <limits>
 #include <thread>
 
 namespace {
@@ -43,12 +45,13 @@ struct options {
 
 // ---- one cell -------------------------------------------------------------------------------------------------------
 
-enum class output_kind { bits, sums, lists };
+enum class output_kind { bits, sums, lists, solid };
 
 struct cell_kind {
     const char* name;
     output_kind output;
     vp::coverage rule;
+    vp::fill_rule fill = vp::fill_rule::nonzero; // solid only
 };
 constexpr cell_kind cell_kinds[]{
     {"bit conservative", output_kind::bits, vp::coverage::conservative},
@@ -56,6 +59,8 @@ constexpr cell_kind cell_kinds[]{
     {"float add conservative", output_kind::sums, vp::coverage::conservative},
     {"A-buffer thin", output_kind::lists, vp::coverage::thin},
     {"A-buffer conservative", output_kind::lists, vp::coverage::conservative},
+    {"bit solid even_odd", output_kind::solid, {}, vp::fill_rule::even_odd},
+    {"bit solid nonzero", output_kind::solid, {}, vp::fill_rule::nonzero},
 };
 
 struct our_run {
@@ -115,7 +120,11 @@ cell_result run_cell(const bench::mesh_data& mesh, const vp::grid& grid, const c
                      const std::vector<unsigned>& threads, const options& how) {
     cell_result result;
     const vp::mesh_view<> view{mesh.positions, mesh.triangles};
-    result.baseline_tests = bench::baseline::tests_needed(mesh, grid, kind.rule);
+    // The baseline of solids has one rule, and a voxel costs it less than a test.
+    if (kind.output == output_kind::solid)
+        result.baseline_tests = kind.fill == vp::fill_rule::even_odd ? 0 : std::numeric_limits<double>::infinity();
+    else
+        result.baseline_tests = bench::baseline::tests_needed(mesh, grid, kind.rule);
     // A test takes some 3 ns; more where triangles are tiny, but then there are few tests.
     const bool baseline = !how.no_baseline && result.baseline_tests * 3e-9 < how.baseline_limit;
     const bench::repetition plain_runs{0, 1, 5, how.seconds};
@@ -133,6 +142,23 @@ cell_result run_cell(const bench::mesh_data& mesh, const vp::grid& grid, const c
         if (baseline) {
             std::vector<std::uint32_t> plain(words.size());
             result.baseline = bench::measure(plain_runs, [&] { bench::baseline::bits(mesh, grid, kind.rule, plain); });
+            if (plain != words) differ(mesh, kind);
+        }
+        break;
+    }
+    case output_kind::solid: {
+        using target = vp::target<vp::bit, blend::bit_or>;
+        std::vector<std::uint32_t> words(target::map::elements(grid.extent));
+        vp::framebuffer_view<target> fb{grid.extent, {}};
+        vp::get<0>(fb.targets) = {words.data(), grid.extent, vp::load_operation::clear, false};
+        for (const unsigned n : threads)
+            result.ours.push_back(time_ours(n, how, [&](vp::cpu_backend& b) {
+                return vp::voxelize_solid(b, view, grid, vp::passthrough{}, vp::constant(true), fb,
+                                          {.rule = kind.fill});
+            }));
+        if (baseline) {
+            std::vector<std::uint32_t> plain(words.size());
+            result.baseline = bench::measure(plain_runs, [&] { bench::baseline::solid_bits(mesh, grid, plain); });
             if (plain != words) differ(mesh, kind);
         }
         break;
@@ -319,11 +345,12 @@ int run(const options& how) {
     threads.push_back(most);
 
     const bench::machine_record record = bench::describe_machine();
-    std::string text =
-        "# CPU table\n\n" + record.markdown() +
-        "- times: milliseconds of whole calls, medians, clear included, mesh and framebuffer in memory\n"
-        "- baseline: one thread, every voxel of each triangle's bounding box tested exactly; the same voxels\n"
-        "\n";
+    std::string text = "# CPU table\n\n" + record.markdown() +
+                       "- times: milliseconds of whole calls, medians, clear included, mesh and framebuffer in memory\n"
+                       "- baseline: one thread, every voxel of each triangle's bounding box tested exactly; solids, "
+                       "even_odd: every voxel "
+                       "behind a crossing flipped; the same voxels\n"
+                       "\n";
     std::filesystem::create_directories(how.out);
     const std::filesystem::path folder = how.out;
     if (!how.scenes_only) {

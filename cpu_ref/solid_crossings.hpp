@@ -78,6 +78,51 @@ struct crossing_list {
     raw_array<Crossing> crossings; // by row, and in a row by primitive, hence by body
 };
 
+// Counts primitives from `begin` to `end`, and appends their crossings.
+template <class Crossing>
+[[nodiscard]] status_code read_triangles(const solid_geometry& s, const row_numbers& rows, std::size_t begin,
+                                         std::size_t end, bool votes, counters& counts, std::vector<Crossing>& found) {
+    const core::voxel_box whole = s.whole_box();
+    const int fraction = s.snap.fraction;
+    for (std::size_t i = begin; i < end;) {
+        const std::uint32_t number = s.find(static_cast<std::uint32_t>(i)).draw;
+        const geometry::part& part = s.parts[number];
+        const std::size_t last = std::min<std::size_t>(end, s.first_primitive[number + 1]);
+        const glm::uvec3* triangle = part.triangles.data() + (i - s.first_primitive[number]);
+        const core::snapped_position* const positions = part.positions;
+        const std::uint32_t body = s.body[number];
+        std::uint64_t drawn = 0, outside = 0;
+        for (; i < last; ++i, ++triangle) {
+            const glm::uvec3 t = *triangle;
+            if (t.x >= part.num_vertices || t.y >= part.num_vertices || t.z >= part.num_vertices)
+                return status_code::index_out_of_range;
+            const core::snapped_position &a = positions[t.x], &b = positions[t.y], &c = positions[t.z];
+            if (!core::is_drawable(a) || !core::is_drawable(b) || !core::is_drawable(c)) {
+                const bool nonfinite =
+                    a.x == core::nonfinite_mark || b.x == core::nonfinite_mark || c.x == core::nonfinite_mark;
+                ++(nonfinite ? counts.triangles_nonfinite : counts.triangles_too_far);
+                continue;
+            }
+            if (!core::meets_rows(a, b, c, fraction, whole, votes)) {
+                ++outside;
+                continue;
+            }
+            ++drawn;
+            const core::row_box box = core::rows_within<0>(a, b, c, fraction, whole);
+            if (box.empty()) continue;
+            core::for_each_crossing<0, core::centre_offset<>>(
+                a, b, c, fraction, box, [&](std::int64_t y, std::int64_t z, std::int64_t first, int winding) {
+                    const auto x = static_cast<std::uint32_t>(std::clamp<std::int64_t>(first, 0, s.where.extent.x));
+                    found.emplace_back(rows.number(y, z), 2 * x + (winding > 0 ? 0 : 1), body);
+                });
+        }
+        if (s.is_repair[number]) continue;
+        counts.triangles_drawn += drawn;
+        counts.triangles_outside += outside;
+    }
+    return status_code::ok;
+}
+
 // Reads every triangle once: counts it, and finds its crossings with the rows of the grid. `votes`: rows along y and z
 // will be asked too, so that more triangles take part.
 template <class Crossing>
@@ -90,7 +135,6 @@ template <class Crossing>
         constexpr std::size_t block = 8192;
         const std::size_t n = s.first_primitive.back();
         const std::size_t blocks = (n + block - 1) / block;
-        const core::voxel_box whole = s.whole_box();
         struct block_result {
             status_code code = status_code::ok;
             counters counts{};
@@ -101,37 +145,7 @@ template <class Crossing>
             block_result& part = parts[b];
             std::vector<Crossing> found;
             counters counts{};
-            const std::size_t last = std::min(n, (b + 1) * block);
-            for (std::size_t i = b * block; i < last; ++i) {
-                const auto tri = s.find(static_cast<std::uint32_t>(i));
-                const geometry::part& in = s.parts[tri.draw];
-                if (tri.index.x >= in.num_vertices || tri.index.y >= in.num_vertices ||
-                    tri.index.z >= in.num_vertices) {
-                    part.code = status_code::index_out_of_range;
-                    return;
-                }
-                const core::snapped_position &a = in.positions[tri.index.x], &b_ = in.positions[tri.index.y],
-                                             &c = in.positions[tri.index.z];
-                const bool counted = !s.is_repair[tri.draw];
-                if (!core::is_drawable(a) || !core::is_drawable(b_) || !core::is_drawable(c)) {
-                    const bool nonfinite =
-                        a.x == core::nonfinite_mark || b_.x == core::nonfinite_mark || c.x == core::nonfinite_mark;
-                    ++(nonfinite ? counts.triangles_nonfinite : counts.triangles_too_far);
-                    continue;
-                }
-                if (!core::meets_rows(a, b_, c, s.snap.fraction, whole, votes)) {
-                    counts.triangles_outside += counted ? 1 : 0;
-                    continue;
-                }
-                counts.triangles_drawn += counted ? 1 : 0;
-                const core::row_box box = core::rows_within<0>(a, b_, c, s.snap.fraction, whole);
-                core::for_each_crossing<0, core::centre_offset<>>(
-                    a, b_, c, s.snap.fraction, box,
-                    [&](std::int64_t y, std::int64_t z, std::int64_t first, int winding) {
-                        const auto x = static_cast<std::uint32_t>(std::clamp<std::int64_t>(first, 0, s.where.extent.x));
-                        found.emplace_back(rows.number(y, z), 2 * x + (winding > 0 ? 0 : 1), s.body[tri.draw]);
-                    });
-            }
+            part.code = read_triangles(s, rows, b * block, std::min(n, (b + 1) * block), votes, counts, found);
             part.crossings = std::move(found);
             part.counts = counts;
         });

@@ -539,34 +539,42 @@ constexpr vp::solid_options solid_calls[]{
     {.repair = vp::repair::vote},
 };
 
+// The triangles outside cancel: they are no hole that would need thousands of cones.
+struct solid_call : large_call {
+    solid_call() {
+        for (std::size_t i = 2; i + 1 < triangles.size(); i += 2) std::swap(triangles[i].y, triangles[i].z);
+    }
+};
+
 TEST(OutOfMemory, DuringASolidCallLeavesTheTargetsUnchanged) {
-    for (const vp::solid_options& options : solid_calls)
-        for (const unsigned threads : {1u, 3u}) {
-            large_call c;
-            vp::cpu_backend be(threads);
-            draw draws[] = {{c.mesh, {}, shader}, {c.mesh, {}, shader}};
-            draws[0].mesh.triangles = {c.triangles.data(), 8500};
-            draws[1].mesh.triangles = {c.triangles.data() + 8500, 8500};
-            draws[1].fragment_shader = vp::constant(2.0f, false, glm::dvec4(2.0));
-            const auto attempt = [&] {
-                return vp::voxelize_solid(be, std::span<const draw>(draws), c.grid, c.view, options);
-            };
-            ASSERT_TRUE(attempt().ok());
-            const std::vector<float> depths = c.depths;
-            const std::vector<std::uint32_t> words = c.words;
-            ASSERT_FALSE(c.untouched());
+    unsigned threads = 1; // in turn 1 and 2
+    for (const vp::solid_options& options : solid_calls) {
+        solid_call c;
+        vp::cpu_backend be(threads);
+        threads = 3 - threads;
+        draw draws[] = {{c.mesh, {}, shader}, {c.mesh, {}, shader}};
+        draws[0].mesh.triangles = {c.triangles.data(), 8500};
+        draws[1].mesh.triangles = {c.triangles.data() + 8500, 8500};
+        draws[1].fragment_shader = vp::constant(2.0f, false, glm::dvec4(2.0));
+        const auto attempt = [&] {
+            return vp::voxelize_solid(be, std::span<const draw>(draws), c.grid, c.view, options);
+        };
+        ASSERT_TRUE(attempt().ok());
+        const std::vector<float> depths = c.depths;
+        const std::vector<std::uint32_t> words = c.words;
+        ASSERT_FALSE(c.untouched());
+        c.wipe();
+        refuse_each_allocation(attempt, [&](const vp::status& s) {
+            EXPECT_TRUE(s.ok() ? c.depths == depths && c.words == words : c.untouched()) << s.message();
             c.wipe();
-            refuse_each_allocation(attempt, [&](const vp::status& s) {
-                EXPECT_TRUE(s.ok() ? c.depths == depths && c.words == words : c.untouched()) << s.message();
-                c.wipe();
-            });
-        }
+        });
+    }
 }
 
 TEST(OutOfMemory, DuringASolidCallLeavesEarlierListsUnchanged) {
-    for (const vp::solid_options& options : solid_calls) {
+    for (const vp::solid_options& options : {solid_calls[0], solid_calls[1]}) {
         const call earlier;
-        const large_call c;
+        const solid_call c;
         vp::cpu_backend be(2);
         vp::abuffer<vp::cpu_backend, int> lists{be};
         const auto draw_earlier = [&] {

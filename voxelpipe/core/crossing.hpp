@@ -218,13 +218,16 @@ VOXELPIPE_HD constexpr void for_each_crossing(const snapped_position& a, const s
 // Whether a drawable triangle takes part in a solid of the grid, of which `whole` is the computed part: its closed box
 // meets the part's y and z intervals. Where it lies along x does not matter, for it flips what is behind it. With votes
 // (repair::vote) rows along y and z count as well: it meets two of the three intervals.
-[[nodiscard]] VOXELPIPE_HD constexpr bool meets_rows(const snapped_position& a, const snapped_position& b,
-                                                     const snapped_position& c, int fraction, const voxel_box& whole,
-                                                     bool votes = false) {
-    const voxel_box box = bounds(a, b, c, fraction);
-    const auto meets = [&](int axis) { return box.lo[axis] <= whole.hi[axis] && box.hi[axis] >= whole.lo[axis]; };
-    const bool y = meets(1), z = meets(2);
-    return (y && z) || (votes && (y || z) && meets(0));
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr bool meets_rows(const snapped_position& a,
+                                                                      const snapped_position& b,
+                                                                      const snapped_position& c, int fraction,
+                                                                      const voxel_box& whole, bool votes = false) {
+    const auto meets = [&](std::int64_t low, std::int64_t high, int axis) {
+        return high >= whole.lo[axis] << fraction && low <= (whole.hi[axis] + 1) << fraction;
+    };
+    const bool y = meets(min3(a.y, b.y, c.y), max3(a.y, b.y, c.y), 1),
+               z = meets(min3(a.z, b.z, c.z), max3(a.z, b.z, c.z), 2);
+    return (y && z) || (votes && (y || z) && meets(min3(a.x, b.x, c.x), max3(a.x, b.x, c.x), 0));
 }
 
 } // namespace core
