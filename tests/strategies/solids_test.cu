@@ -154,7 +154,7 @@ struct drawing {
         const vp::status sa = draw(cpu, a, g, options, how), sb = draw(gpu, b, g, options, how);
         ASSERT_TRUE(sa.ok()) << sa.message();
         ASSERT_TRUE(sb.ok()) << sb.message();
-        EXPECT_NE(sa.solid.crossings, 0u);
+        EXPECT_NE(sa.solid.crossings + sa.counts.fragments, 0u); // not of nothing
         expect_same_counts(sa.counts, sb.counts);
         EXPECT_EQ(sa.solid, sb.solid) << "open rows " << sa.solid.open_rows << " " << sb.solid.open_rows
                                       << ", crossings " << sa.solid.crossings << " " << sb.solid.crossings
@@ -479,6 +479,89 @@ TEST(Solids, Async) {
         cudaGraphExecDestroy(replay);
         cudaGraphDestroy(graph);
     }
+}
+
+// ---- repairs --------------------------------------------------------------------------------------------------------
+
+// Without every n-th triangle.
+mesh_data with_holes(mesh_data m, std::size_t n) {
+    std::vector<glm::uvec3> kept;
+    for (std::size_t i = 0; i < m.triangles.size(); ++i)
+        if (i % n != n - 1) kept.push_back(m.triangles[i]);
+    m.triangles = kept;
+    return m;
+}
+// The same with vertices that neighbours share.
+mesh_data welded(const mesh_data& m) {
+    mesh_data w;
+    for (const glm::uvec3& t : m.triangles) {
+        glm::uvec3 to;
+        for (int k = 0; k < 3; ++k) {
+            const auto at = std::find(w.positions.begin(), w.positions.end(), m.positions[t[k]]);
+            to[k] = static_cast<std::uint32_t>(at - w.positions.begin());
+            if (at == w.positions.end()) w.positions.push_back(m.positions[t[k]]);
+        }
+        w.triangles.push_back(to);
+    }
+    return w;
+}
+// Two broken balls and broken boxes; the first one's vertices are shared.
+std::vector<mesh_data> broken_meshes() {
+    return {welded(with_holes(ball({14.3f, 11.2f, 12.7f}, 9.4f, 7), 9)),
+            with_holes(ball({20.0f, 13.5f, 10.0f}, 6.1f, 5), 11), with_holes(tied_bodies(24.0f, 7, 5), 13)};
+}
+
+TEST(Solids, ClosedHoles) {
+    const drawing_of_everything all{broken_meshes(), {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};
+    const drawing_of_bits bits{broken_meshes(), {{}}, {{true}}}, one{{broken_meshes()[0]}, {{}}, {{true}}};
+    const vp::grid g = box_grid({37, 26, 25});
+    for (const std::uint64_t max_edges : {std::uint64_t{3}, ~std::uint64_t{0}})
+        for (const auto of : all_bodies) {
+            vp::solid_options options{.rule = vp::fill_rule::even_odd,
+                                      .bodies = of,
+                                      .repair = vp::repair::close_holes,
+                                      .max_hole_edges = max_edges};
+            bits.expect_same(g, options);
+            one.expect_same(g.crop({5, 6, 7}, {20, 9, 11}), options);
+            options.rule = vp::fill_rule::nonzero;
+            options.extent = vp::solid_extent::outer;
+            all.expect_same(g, options);
+            expect_same_lists<std::uint32_t>(broken_meshes(), id_of_fragment{5}, g, options);
+        }
+}
+
+TEST(Solids, ExteriorAndVote) {
+    const drawing_of_everything all{broken_meshes(), {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};
+    const drawing_of_bits bits{broken_meshes(), {{}}, {{true}}};
+    for (const auto of : all_bodies) {
+        for (const int closing : {0, 1, 3}) {
+            SCOPED_TRACE(closing);
+            const vp::solid_options options{.bodies = of, .repair = vp::repair::exterior, .closing = closing};
+            bits.expect_same(box_grid({37, 26, 25}), options);
+            all.expect_same(box_grid({37, 26, 25}), options, loading::load);
+        }
+        const vp::solid_options options{.bodies = of, .repair = vp::repair::vote};
+        bits.expect_same(box_grid({37, 26, 25}), options);
+        all.expect_same(box_grid({64, 26, 25}).crop({3, 5, 2}, {40, 17, 20}), options);
+        expect_same_lists<std::uint32_t>(broken_meshes(), id_of_fragment{5}, box_grid({37, 26, 25}), options);
+    }
+    const drawing_of_bits one{{broken_meshes()[1]}, {{}}, {{true}}};
+    one.expect_same(box_grid({130, 41, 43}), {.repair = vp::repair::exterior, .closing = 35});
+}
+
+// The whole of a maze is reached, whatever the number of turns.
+TEST(Solids, ExteriorOfAMaze) {
+    mesh_data m;
+    for (int i = 0; i < 6; ++i) { // walls one after the other, each with a gap at another end
+        const float x = 4.5f + 5.0f * static_cast<float>(i), low = i % 2 == 0 ? 0.0f : 3.0f, high = low + 20.5f;
+        add_quad(m, {x, low, 0.0f}, {x, high, 0.0f}, {x, high, 24.0f}, {x, low, 24.0f}, false);
+    }
+    for (const float y : {0.0f, 24.0f})
+        add_quad(m, {4.5f, y, 0.0f}, {29.5f, y, 0.0f}, {29.5f, y, 24.0f}, {4.5f, y, 24.0f}, false);
+    for (const float z : {0.5f, 23.5f})
+        add_quad(m, {4.5f, 0.0f, z}, {29.5f, 0.0f, z}, {29.5f, 24.0f, z}, {4.5f, 24.0f, z}, false);
+    const drawing_of_bits maze{{m}, {{}}, {{true}}};
+    maze.expect_same(box_grid({34, 24, 24}), {.repair = vp::repair::exterior});
 }
 
 } // namespace

@@ -25,11 +25,15 @@ inline constexpr int rows_per_line = 256; // of an item
 struct crossing_appender {
     static constexpr bool is_listing = true;
     crossing_list list;
-    bool is_split; // a body a draw
+    bool is_split;           // a body a draw
+    std::uint32_t num_draws; // the cones of body k are draw num_draws + k
 
     __device__ VOXELPIPE_INLINE void emit(const row_grid& grid, unsigned long long at, std::uint32_t draw,
                                           std::int64_t y, std::int64_t z, std::int64_t first, int winding) const {
-        list.store(at, grid.row(y, z), is_split ? draw : 0,
+        list.store(at, grid.row(y, z),
+                   !is_split          ? 0
+                   : draw < num_draws ? draw
+                                      : draw - num_draws,
                    entry_value::of(grid.position(first), winding > 0 ? entry_kind::enter : entry_kind::leave));
     }
 };
@@ -229,7 +233,7 @@ __global__ __launch_bounds__(threads_per_block) void find_rows_kernel(const __gr
     const bool is_large =
         has_rows && (t.rows.v.hi - t.rows.v.lo >= small_lines || t.rows.u.hi - t.rows.u.lo >= small_line ||
                      !core::fits_narrow(t.p[0], t.p[1], t.p[2], grid.fraction));
-    count_classes(valid, t.index_ok, t.kind, state);
+    count_classes(valid && source.is_counted(i), t.index_ok, t.kind, state);
     if (__syncthreads_or(static_cast<int>(has_rows)) == 0) return;
     const unsigned long long at = reserve_for_block(has_rows && !is_large ? 1 : 0, kept.num_small);
     if (has_rows && !is_large) kept.triangles[at] = static_cast<std::uint32_t>(i);

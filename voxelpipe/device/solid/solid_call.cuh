@@ -10,10 +10,13 @@
 #include <voxelpipe/device/scene/check_indices.cuh>
 #include <voxelpipe/device/scene/scene_memory.cuh>
 #include <voxelpipe/device/solid/emit_crossings.cuh>
+#include <voxelpipe/device/solid/exterior.cuh>
 #include <voxelpipe/device/solid/fill_bit_rows.cuh>
 #include <voxelpipe/device/solid/fill_rows.cuh>
 #include <voxelpipe/device/solid/parity_rows.cuh>
+#include <voxelpipe/device/solid/solid_cones.cuh>
 #include <voxelpipe/device/solid/solid_cover.cuh>
+#include <voxelpipe/device/solid/vote.cuh>
 #include <voxelpipe/device/targets/clear_target.cuh>
 
 #include <algorithm>
@@ -41,12 +44,14 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
     using solid_shader = SolidShader;
 
     std::span<const draw_type> draws;
+    std::span<const cone_part> cones; // of each body, or none
     solid_plan plan;
     stage_clock* clock = nullptr;
 
+    // num_primitives: with the triangles of the cones.
     solid_entries(std::span<const draw_type> draws_, const grid& g, const solid_options& options,
-                  std::uint32_t num_primitives, const capacities& limits)
-        : draws(draws_) {
+                  std::uint32_t num_primitives, const capacities& limits, std::span<const cone_part> cones_ = {})
+        : draws(draws_), cones(cones_) {
         std::memset(static_cast<void*>(&plan), 0, sizeof(plan)); // padding is part of a graph's key
         plan.g = g;
         plan.options = options;
@@ -59,16 +64,21 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         return plan.limits.fragments <= max_listed_entries && num_keys() <= (uint128{1} << 64) &&
                row_triangles::holds(plan.num_primitives, plan.g.extent);
     }
-    [[nodiscard]] bool has_cover() const { return plan.options.extent != solid_extent::centre; }
+    [[nodiscard]] bool has_cover() const { return makes_sets() || plan.options.extent != solid_extent::centre; }
+    // Bodies are sets of voxels that no crossings are swept for.
+    [[nodiscard]] bool makes_sets() const {
+        return plan.options.repair == repair::exterior || plan.options.repair == repair::vote;
+    }
     // A body a draw, of several.
     [[nodiscard]] bool is_split() const { return plan.options.bodies == bodies::draw && draws.size() > 1; }
     [[nodiscard]] row_grid rows() const { return {plan.g.extent, core::make_snap_transform(plan.g).fraction}; }
     [[nodiscard]] sweep_rules rules() const {
-        return {rows(), plan.g.offset, plan.options.rule, plan.options.extent, plan.options.count_voxels};
+        const solid_extent extent = makes_sets() ? solid_extent::outer : plan.options.extent;
+        return {rows(), plan.g.offset, plan.options.rule, extent, plan.options.count_voxels, !makes_sets()};
     }
     // The mesh is read, shaded and snapped by the kernel that makes the crossings: once a corner, not once a vertex.
     [[nodiscard]] bool shades_on_the_spot() const {
-        return is_cheap<VertexShader> && draws.size() == 1 && !has_cover();
+        return is_cheap<VertexShader> && draws.size() == 1 && cones.empty() && !has_cover();
     }
 
     struct memory {
@@ -78,6 +88,8 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         row_triangles kept{};
         crossing_memory list;
         cover_memory cover;
+        exterior_memory exterior;
+        vote_memory vote;
     };
     // is_listing: otherwise the crossings go elsewhere.
     [[nodiscard]] memory take(arena& a, bool is_listing = true) const {
@@ -87,12 +99,16 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
             vertices += d.mesh.positions.size();
             most = std::max(most, d.mesh.triangles.size());
         }
+        for (const cone_part& c : cones) most = std::max(most, std::size_t{c.num_triangles});
         if (!shades_on_the_spot()) m.positions = vertex_positions::take(a, vertices);
-        m.geometries = a.take<draw_geometry>(draws.size() > 1 ? draws.size() : 0);
+        m.geometries = a.take<draw_geometry>(num_parts() > 1 ? num_parts() : 0);
         if (is_split()) m.shaders = a.take<SolidShader>(draws.size());
         m.kept = row_triangles::take(a, plan.num_primitives);
         if (is_listing) m.list = crossing_memory::take(a, plan.limits.fragments, num_keys(), num_bodies());
         if (has_cover()) m.cover = cover_memory::take(a, most, plan.g, plan.limits);
+        if (plan.options.repair == repair::exterior)
+            m.exterior = exterior_memory::take(a, plan.g.extent, plan.options.closing);
+        if (plan.options.repair == repair::vote) m.vote = vote_memory::take(a, plan.g.extent);
         return m;
     }
     [[nodiscard]] body_shaders<SolidShader> shaders(const memory& m, cudaStream_t stream) const {
@@ -104,8 +120,11 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
 
     // Lists all entries and sorts them; state->list_fragments says how many there are.
     [[nodiscard]] crossing_list launch(const memory& m, pipeline_state* state, cudaStream_t stream) const {
-        const crossing_appender sink{m.list.list(), is_split()};
-        emit(m, sink, {}, state, stream);
+        const crossing_appender sink{m.list.list(), is_split(), static_cast<std::uint32_t>(draws.size())};
+        if (makes_sets())
+            emit_sets(m, sink.list, state, stream);
+        else
+            emit(m, sink, {}, state, stream);
         const crossing_list sorted = sort_crossings(m.list, state, plan.limits, stream);
         end_stage(clock, &stage_times::tile_sort);
         return sorted;
@@ -131,19 +150,25 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         }
         std::vector<draw_geometry> geometry_of;
         const geometry geo = shade(m, geometry_of, stream);
-        emit_crossings(stored_triangles{geo, plan.num_primitives}, rows(), sink, kept, zeros, state, stream);
+        emit_crossings(stored_triangles{geo, plan.num_primitives, num_drawn(geometry_of)}, rows(), sink, kept, zeros,
+                       state, stream);
         end_stage(clock, &stage_times::coarse_raster);
         if constexpr (Sink::is_listing)
             if (has_cover()) emit_cover(m, geo, geometry_of, sink.list, state, stream);
     }
 
 private:
+    [[nodiscard]] std::size_t num_parts() const { return draws.size() + cones.size(); }
+    // Triangles of the draws, which are counted.
+    [[nodiscard]] std::uint32_t num_drawn(const std::vector<draw_geometry>& geometry_of) const {
+        return cones.empty() ? plan.num_primitives : geometry_of[draws.size()].first_primitive;
+    }
     [[nodiscard]] std::uint32_t num_bodies() const { return is_split() ? static_cast<std::uint32_t>(draws.size()) : 1; }
     [[nodiscard]] uint128 num_keys() const { return static_cast<uint128>(rows().num_rows()) * num_bodies(); }
 
     [[nodiscard]] geometry shade(const memory& m, std::vector<draw_geometry>& geometry_of, cudaStream_t stream) const {
         geometry geo{};
-        geo.num_draws = static_cast<std::uint32_t>(draws.size());
+        geo.num_draws = static_cast<std::uint32_t>(num_parts());
         geo.num_primitives = plan.num_primitives;
         geo.snap = core::make_snap_transform(plan.g);
         geo.extent = plan.g.extent;
@@ -159,24 +184,68 @@ private:
             vertex += mesh.positions.size();
             primitive += static_cast<std::uint32_t>(mesh.triangles.size());
         }
+        for (const cone_part& c : cones) {
+            geometry_of.push_back(c.geometry);
+            geometry_of.back().first_primitive = primitive;
+            primitive += c.num_triangles;
+        }
         geo.one = geometry_of[0];
-        if (draws.size() > 1) {
+        if (num_parts() > 1) {
             upload(
-                m.geometries, draws.size(), [&](std::size_t d) { return geometry_of[d]; }, stream);
+                m.geometries, num_parts(), [&](std::size_t d) { return geometry_of[d]; }, stream);
             geo.many = m.geometries;
         }
         end_stage(clock, &stage_times::vertex_shade);
         return geo;
     }
-    void emit_cover(const memory& m, const geometry& geo, const std::vector<draw_geometry>& geometry_of,
-                    const crossing_list& list, pipeline_state* state, cudaStream_t stream) const {
-        for (std::size_t d = 0; d < draws.size(); ++d) {
-            if (d == 0 || is_split()) m.cover.clear(plan.g, stream);
+    // Calls f(body, first draw, behind its last draw).
+    template <class F>
+    void for_each_body(F&& f) const {
+        for (std::size_t d = 0; d < draws.size(); d = is_split() ? d + 1 : draws.size())
+            f(is_split() ? static_cast<std::uint32_t>(d) : 0u, d, is_split() ? d + 1 : draws.size());
+    }
+    // The mask of a body's cover, with its cones.
+    void cover_body(const memory& m, const geometry& geo, const std::vector<draw_geometry>& geometry_of,
+                    std::uint32_t body, std::size_t first, std::size_t last, pipeline_state* state,
+                    cudaStream_t stream) const {
+        m.cover.clear(plan.g, stream);
+        for (std::size_t d = first; d < last; ++d)
             m.cover.raster(geometry_of[d], static_cast<std::uint32_t>(draws[d].mesh.triangles.size()), geo, plan.g,
                            state, plan.limits, stream);
-            if (d + 1 == draws.size() || is_split())
-                m.cover.list(rows(), list, is_split() ? static_cast<std::uint32_t>(d) : 0, state, stream);
+        if (!cones.empty())
+            m.cover.raster(geometry_of[draws.size() + body], cones[body].num_triangles, geo, plan.g, state, plan.limits,
+                           stream);
+    }
+    // Bodies that repair::exterior or repair::vote decides, as runs of cover. Waits.
+    void emit_sets(const memory& m, const crossing_list& list, pipeline_state* state, cudaStream_t stream) const {
+        std::vector<draw_geometry> geometry_of;
+        const geometry geo = shade(m, geometry_of, stream);
+        m.cover.start(stream);
+        for_each_body([&](std::uint32_t body, std::size_t first, std::size_t last) {
+            cover_body(m, geo, geometry_of, body, first, last, state, stream);
+            if (plan.options.repair == repair::exterior) {
+                m.exterior.close(m.cover.mask, stream);
+            } else {
+                const std::uint32_t begin = geometry_of[first].first_primitive,
+                                    end = last < draws.size() ? geometry_of[last].first_primitive : plan.num_primitives;
+                m.vote.vote(stored_triangles{geo, plan.num_primitives, plan.num_primitives}, begin, end - begin, rows(),
+                            m.cover.mask, state, stream);
+            }
+            m.cover.list(rows(), list, body, state, stream);
+        });
+        if (plan.options.repair == repair::exterior) {
+            take_counts_kernel<pipeline_state><<<1, 1, 0, stream>>>(m.cover.state, state);
+            check(cudaGetLastError(), stage::fine_raster);
         }
+        end_stage(clock, &stage_times::fine_raster);
+    }
+    void emit_cover(const memory& m, const geometry& geo, const std::vector<draw_geometry>& geometry_of,
+                    const crossing_list& list, pipeline_state* state, cudaStream_t stream) const {
+        m.cover.start(stream);
+        for_each_body([&](std::uint32_t body, std::size_t first, std::size_t last) {
+            cover_body(m, geo, geometry_of, body, first, last, state, stream);
+            m.cover.list(rows(), list, body, state, stream);
+        });
         end_stage(clock, &stage_times::fine_raster);
     }
 };

@@ -60,7 +60,7 @@ __global__ __launch_bounds__(threads_per_block) void list_cover_kernel(const wor
 struct cover_cells {
     static constexpr coverage rule = coverage::conservative;
     static constexpr std::int64_t small_columns = 256;
-    static constexpr bool counts_triangles = false;
+    static constexpr bool counts_triangles = true;
     word* mask;
     glm::ivec3 extent;
 
@@ -89,6 +89,16 @@ struct cover_cells {
     }
 };
 
+// Of a call that has no crossings: its triangles are counted as conservative coverage counts them. One thread.
+template <class State>
+__global__ void take_counts_kernel(const State* from, State* to) {
+    to->nonfinite = from->nonfinite;
+    to->too_far = from->too_far;
+    to->outside = from->outside;
+    to->drawn = from->drawn;
+    to->index_error |= from->index_error;
+}
+
 // Memory for the cover of one body after the other. Members that launch are templates, so that programs without solids
 // compile none of their kernels.
 struct cover_memory {
@@ -111,6 +121,10 @@ struct cover_memory {
             m.share = take_share(memory, static_cast<std::uint32_t>(max_triangles), limits.fragment_records);
         return m;
     }
+    // Once a call.
+    void start(cudaStream_t stream) const {
+        check(cudaMemsetAsync(state, 0, sizeof(*state), stream), stage::fine_raster);
+    }
     void clear(const grid& g, cudaStream_t stream) const {
         check(cudaMemsetAsync(mask, 0, mask_target::map::elements(g.extent) * sizeof(word), stream),
               stage::fine_raster);
@@ -121,7 +135,7 @@ struct cover_memory {
     void raster(const draw_geometry& of_draw, std::uint32_t num_triangles, const geometry& all, const grid& g,
                 pipeline_state* call_state, const capacities& limits, cudaStream_t stream) const {
         if (num_triangles == 0) return;
-        check(cudaMemsetAsync(state, 0, sizeof(*state), stream), stage::fine_raster);
+        check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream), stage::fine_raster);
         if (is_listed(deferred.capacity, g)) {
             const raster_call<coverage::conservative, stored_source, mask_output> call{
                 {{of_draw}, num_triangles, all.snap.fraction, g.extent},

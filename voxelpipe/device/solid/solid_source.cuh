@@ -18,6 +18,8 @@ struct shaded_triangles {
     shading_source<Mesh, VertexShader> source;
     std::uint32_t num_triangles, num_vertices;
 
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_counted(std::uint64_t) { return true; }
+
     struct located {
         glm::uvec3 index;
         bool index_ok;
@@ -40,6 +42,9 @@ struct shaded_triangles {
 struct stored_triangles {
     geometry geo;
     std::uint32_t num_triangles;
+    std::uint32_t num_counted; // the draws' triangles; those behind them close holes
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool is_counted(std::uint64_t i) const { return i < num_counted; }
 
     struct located {
         glm::uvec3 index;

@@ -21,6 +21,7 @@ struct sweep_rules {
     fill_rule rule;
     solid_extent extent;
     bool count_voxels;
+    bool counts_crossings; // the entries; otherwise they have been counted
 };
 
 // Entries of a row, or of one body in it.
@@ -161,7 +162,7 @@ struct sweep_totals {
     }
     // All threads of the block take part.
     __device__ void add_up(const sweep_rules& rules, pipeline_state* state) const {
-        if (blockIdx.x == 0 && threadIdx.x == 0)
+        if (rules.counts_crossings && blockIdx.x == 0 && threadIdx.x == 0)
             state->solid.crossings = state->list_fragments - state->solid.cover_ends;
         const auto add = [](unsigned long long one, unsigned long long* total) {
             const unsigned long long sum = block_sum(one);

@@ -59,6 +59,10 @@ template <class T>
     const std::uint64_t both = std::uint64_t{high} << 32 | low;
     return static_cast<unsigned>(both << (shift & 31u) >> 32);
 }
+// The lower word of (high, low) >> shift % 32.
+[[nodiscard]] inline unsigned __funnelshift_r(unsigned low, unsigned high, unsigned shift) {
+    return static_cast<unsigned>((std::uint64_t{high} << 32 | low) >> (shift & 31u));
+}
 template <class T>
 [[nodiscard]] T __ldg(const T* p) {
     return *p;
