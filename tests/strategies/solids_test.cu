@@ -441,6 +441,7 @@ TEST(Solids, Async) {
         const bool needs_room = rule == vp::fill_rule::nonzero;
         const vp::solid_options options{.rule = rule};
         vp::workspace_limits limits;
+        limits.expects_deferred = needs_room; // is not asked
         limits.fragments = needs_room ? 10 : 0;
         std::size_t bytes = vp::solid_workspace_bytes(draws, g, b.view(), options, limits);
         ASSERT_NE(bytes, 0u);

@@ -71,6 +71,10 @@ template <class Mesh, class VertexShader, class SolidShader, class... Targets>
                 device::arena memory(workspace.memory);
                 device::zero_memory(workspace.memory, call.zeroed_bytes(), backend.stream);
                 call.launch(memory, backend.stream);
+                if (!workspace.limits.expects_deferred) { // which read_status would take for triangles that are missing
+                    auto* const state = static_cast<device::pipeline_state*>(workspace.memory);
+                    device::check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), backend.stream));
+                }
             });
         } catch (const device::cuda_failure& e) {
             return device::to_status(e);

@@ -270,6 +270,7 @@ struct solid_call<draw<Mesh, VertexShader, SolidShader>, framebuffer_view<Target
         return b;
     }
 
+    static constexpr std::uint64_t max_words_zeroed_by_block = 1u << 15;
     using parity = parity_target<SolidShader, framebuffer_type>;
     // Whether crossings change bits of the target where they lie. Then no capacity can be too small, and nothing fails
     // once indices are known to be right.
@@ -340,7 +341,9 @@ private:
         const auto words_x = static_cast<std::uint32_t>((rows.extent.x + 31) / 32);
         const std::uint64_t words = rows.num_rows() * words_x;
         zeroed_memory zeros;
-        if (words % 4 == 0 && reinterpret_cast<std::uintptr_t>(bits) % 16 == 0)
+        // By the blocks of the first kernel, where there are enough of them.
+        if (words % 4 == 0 && reinterpret_cast<std::uintptr_t>(bits) % 16 == 0 &&
+            words <= max_words_zeroed_by_block * num_blocks(entries.plan.num_primitives))
             zeros = {reinterpret_cast<uint4*>(bits), words / 4};
         else
             clear_target(voxelpipe::get<0>(fb.targets), state, entries.plan.limits, stream);

@@ -16,7 +16,7 @@ struct parity_masks {
     word* inside[3];
     word* open[3]; // along x a bit for each row, by number; along y and z rows of words as those of the voxels
 
-    [[nodiscard]] static std::uint64_t num_open_words(const bit_box& box, int axis) {
+    [[nodiscard]] VOXELPIPE_HD static std::uint64_t num_open_words(const bit_box& box, int axis) {
         const auto ny = static_cast<std::uint64_t>(box.extent.y), nz = static_cast<std::uint64_t>(box.extent.z);
         return axis == 0 ? (ny * nz + 31) / 32 : box.words_x() * (axis == 1 ? nz : ny);
     }
