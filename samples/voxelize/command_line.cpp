@@ -75,8 +75,17 @@ std::string in_words(const std::vector<std::pair<const char*, T>>& choices) {
 
 // An option that takes one of a few words.
 template <class T>
+struct choice_of {
+    using type = T;
+};
+template <class T>
+struct choice_of<std::optional<T>> {
+    using type = T;
+};
+template <class T>
 CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
-                        std::vector<std::pair<const char*, T>> choices, const std::string& description) {
+                        std::vector<std::pair<const char*, typename choice_of<T>::type>> choices,
+                        const std::string& description) {
     const auto take = [&value, name, choices = std::move(choices)](const std::string& text) {
         for (const auto& [word, meaning] : choices) {
             if (lower(text) != word) continue;
@@ -121,21 +130,33 @@ std::string footer() {
     }
     text += "\nOUTPUTS (by extension; .npy has the shape (nz, ny, nx) or (nz, ny, nx, components))\n";
     for (const format& entry : formats()) line(entry.extension, entry.description);
-    text += "\nGRID\n"
-            "  -r N            N voxels along the longest side of the model, as few as hold it along the others: 2 x 1 "
-            "x 1\n"
-            "                  gets 128 x 64 x 64. With --padding P, N - 2 P of them.\n"
-            "  -s S            Voxel (i, j, k) spans i S to (i + 1) S, and so on. The grid is the voxels that the "
-            "model's box\n"
-            "                  spans: 6 of 0.1 for 0.6. A layer that the box only touches is left out, unless "
-            "--coverage thin\n"
-            "                  needs it: a face in the plane between two voxels lies in the upper one.\n"
-            "  --padding P     Nothing is drawn in the P outermost layers.\n"
-            "\nEXIT CODES\n"
-            "  0 done   1 wrong command line   2 the model cannot be used   3 not enough memory\n"
-            "  4 an output cannot be written   5 --backend cuda cannot be used   70 a bug of this program\n"
-            "  5 is: built without CUDA, no driver, a driver too old, no GPU, or one that there is no code for; too\n"
-            "  little memory on the GPU is 3, as on the machine. With --backend auto the CPU does the work instead.\n";
+    text +=
+        "\nGRID\n"
+        "  -r N            N voxels along the longest side of the model, as few as hold it along the others: 2 x 1 "
+        "x 1\n"
+        "                  gets 128 x 64 x 64. With --padding P, N - 2 P of them.\n"
+        "  -s S            Voxel (i, j, k) spans i S to (i + 1) S, and so on. The grid is the voxels that the "
+        "model's box\n"
+        "                  spans: 6 of 0.1 for 0.6. A layer that the box only touches is left out, unless "
+        "--coverage thin\n"
+        "                  needs it: a face in the plane between two voxels lies in the upper one.\n"
+        "  --padding P     Nothing is drawn in the P outermost layers.\n"
+        "\nSOLIDS\n"
+        "  A voxel is inside by the winding number of its centre: how often the surface goes round it. That is exact, "
+        "and needs\n"
+        "  a closed model: a warning says which share of the rows of voxels shows holes.\n"
+        "  nonzero         where it is not 0: parts may overlap, a shell in a shell that faces inward is a cavity\n"
+        "  even_odd        where it is odd: overlaps are holes, every shell in a shell is a cavity\n"
+        "  positive        where it is more than 0: parts that are inside out are nothing\n"
+        "  each_draw       even_odd for every mesh primitive of every node by itself, united\n"
+        "  Inside, normal is 0, material and triangle are -1, depth is NaN, count is the number of bodies: 1, with "
+        "each_draw\n"
+        "  more where they overlap. Alpha masks cut no holes into a solid.\n"
+        "\nEXIT CODES\n"
+        "  0 done   1 wrong command line   2 the model cannot be used   3 not enough memory\n"
+        "  4 an output cannot be written   5 --backend cuda cannot be used   70 a bug of this program\n"
+        "  5 is: built without CUDA, no driver, a driver too old, no GPU, or one that there is no code for; too\n"
+        "  little memory on the GPU is 3, as on the machine. With --backend auto the CPU does the work instead.\n";
     return text;
 }
 
@@ -199,7 +220,10 @@ std::vector<std::string> arguments(int argc, const char* const* argv) {
 
 // What the options fill before it is understood.
 struct raw_options {
-    std::string resolution, origin, voxel_size, extent, image_size, background;
+    std::string resolution, origin, voxel_size, extent, image_size, background, fill_color;
+    std::optional<solid_rule> solid;
+    std::optional<solid_extent> extent_of_solid;
+    std::optional<voxelpipe::coverage> coverage;
     std::vector<std::string> targets;
     bool no_edges = false;
     bool no_ground = false;
@@ -218,7 +242,7 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->group("Output");
     app.add_option("-t,--target", raw.targets,
                    "What to compute for each voxel, see TARGETS; may be repeated. Default: occupancy, with color where "
-                   "an output shows colours (.vox, .glb, .obj, .ply, .xyz, .png)")
+                   "an output shows colours (.vox, .schem, .glb, .obj, .ply, .xyz, .png)")
         ->allow_extra_args(false)
         ->delimiter(',')
         ->option_text("NAME")
@@ -271,12 +295,29 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
         ->group("Model");
 
     using voxelpipe::coverage;
-    add_choice(app, "--coverage", options.voxelize.coverage,
-               {{"conservative", coverage::conservative}, {"thin", coverage::thin}},
+    add_choice(app, "--coverage", raw.coverage, {{"conservative", coverage::conservative}, {"thin", coverage::thin}},
                "conservative: every voxel that a triangle touches. thin: the fewest without a hole (6-separating). "
                "Default: conservative")
         ->option_text("RULE")
         ->group("Coverage and values");
+    add_choice(app, "--solid", raw.solid,
+               {{"nonzero", solid_rule::nonzero},
+                {"even_odd", solid_rule::even_odd},
+                {"positive", solid_rule::positive},
+                {"each_draw", solid_rule::each_draw}},
+               "Fill the model instead: nonzero, even_odd, positive or each_draw, see SOLIDS. Not with --coverage")
+        ->option_text("RULE")
+        ->group("Solids");
+    add_choice(app, "--solid-extent", raw.extent_of_solid,
+               {{"centre", solid_extent::centre}, {"outer", solid_extent::outer}, {"inner", solid_extent::inner}},
+               "centre: voxels whose centre is inside. outer: these and those that the surface touches. inner: these "
+               "without those. Default: outer")
+        ->option_text("WHICH")
+        ->group("Solids");
+    app.add_option("--fill-color", raw.fill_color,
+                   "Colour of the voxels inside: #rrggbb, or mean, that of the surface's voxels. Default: mean")
+        ->option_text("COLOUR")
+        ->group("Solids");
     add_choice(app, "--depth-axis", options.voxelize.depth_axis, {{"x", 0}, {"y", 1}, {"z", 2}},
                "Axis of --target depth: x, y or z. Default: z")
         ->option_text("AXIS")
@@ -387,6 +428,24 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
                              std::to_string(VOXELPIPE_VERSION_MINOR) + '.' + std::to_string(VOXELPIPE_VERSION_PATCH),
                          "Print the version")
         ->group("Messages");
+}
+
+void understand_solid(command_line& options, const raw_options& raw) {
+    if (raw.coverage) options.voxelize.coverage = *raw.coverage;
+    if (!raw.solid) {
+        if (raw.extent_of_solid) throw usage_error("--solid-extent goes with --solid");
+        if (!raw.fill_color.empty()) throw usage_error("--fill-color goes with --solid");
+        return;
+    }
+    if (raw.coverage)
+        throw usage_error("--solid and --coverage do not go together: a solid's surface is conservative, see "
+                          "--solid-extent");
+    solid_request& solid = options.voxelize.solid.emplace();
+    solid.rule = *raw.solid;
+    solid.extent = raw.extent_of_solid.value_or(solid_extent::outer);
+    if (raw.fill_color.empty() || lower(raw.fill_color) == "mean") return;
+    solid.fill_color = parse_color(raw.fill_color);
+    if (!solid.fill_color) throw usage_error("--fill-color takes mean or #rrggbb, not \"" + raw.fill_color + '"');
 }
 
 void understand_grid(command_line& options, const raw_options& raw) {
@@ -513,6 +572,7 @@ command_line parse_command_line(int argc, const char* const* argv) {
     // Ranges let NaN through.
     if (!std::isfinite(options.load.scale)) throw usage_error("--scale is a number");
     if (!std::isfinite(options.load.gltf.seconds)) throw usage_error("--time is a number of seconds");
+    understand_solid(options, raw);
     understand_grid(options, raw);
     understand_outputs(options, raw);
     understand_picture(options, raw);

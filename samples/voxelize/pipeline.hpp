@@ -3,7 +3,7 @@
 #pragma once
 // The tool's pipeline, a template over the backend: instantiated for cpu_backend in voxelizer.cpp and for cuda_backend
 // in cuda_device.cu. Takes a scene, uploads it, draws every slab of the grid into a framebuffer of all wanted targets
-// and resolves it into the volume.
+// and resolves it into the volume. A solid is drawn after its surface, and the voxels inside are filled on the host.
 
 #include "mip_levels.hpp"
 #include "outside.hpp"
@@ -71,9 +71,12 @@ public:
     pipeline(Backend& backend, scene& model, const voxelize_request& request, voxelize_stats& stats)
         : backend_{backend}, request_{request}, stats_{stats} {
         for (const target wanted : request.targets) wanted_[static_cast<std::size_t>(wanted)] = true;
-        // What the sides of the grid see is known once all voxels are.
-        hides_occupancy_ = wants(target::color_outer) && !wants(target::occupancy);
-        if (hides_occupancy_) wanted_[static_cast<std::size_t>(target::occupancy)] = true;
+        for (const target wanted : request.targets)
+            draws_surface_ =
+                draws_surface_ || !request.solid || (wanted != target::occupancy && wanted != target::count);
+        // What the sides of the grid see, and what lies inside, is known once all voxels are.
+        keeps_bits_ = request.solid ? draws_surface_ : wants(target::occupancy) || wants(target::color_outer);
+        if (request.solid) bits_name_ = "surface";
         const stage_timer timer{*this, "upload"};
         tables_.push_back({backend_, one(make_color_tables())});
         upload_pictures(model);
@@ -103,22 +106,25 @@ public:
         }
         for (const target wanted : request_.targets)
             result.add_unset(std::string(info_of(wanted).name), info_of(wanted).type, info_of(wanted).components);
-        if (hides_occupancy_) result.add_unset("occupancy", scalar::bit);
+        // Channels that nobody asked for come last.
+        const std::size_t num_wanted = result.channels.size();
+        if (keeps_bits_ && result.find(bits_name_) == nullptr) result.add_unset(bits_name_, scalar::bit);
 
-        const int depth = slab_depth(surface_voxel_bytes());
-        const int passes = wants(target::color_outer) ? 2 : 1;
+        const int passes = (draws_surface_ ? 1 : 0) + (wants(target::color_outer) ? 1 : 0) + (request_.solid ? 1 : 0);
         const auto report_from = [this, passes](int pass, int slab, int slabs) {
             report_ = [this, passes, pass, slab, slabs](double done) {
                 if (request_.progress) request_.progress((pass + (slab + done) / slabs) / passes);
             };
         };
-        stats_.slabs = for_each_slab(depth, [&](const voxelpipe::grid& part, int begin, int slab, int slabs) {
-            report_from(0, slab, slabs);
-            if (only_bits_)
-                draw_bits(result, part, begin);
-            else
-                draw_surface(result, part, begin);
-        });
+        if (draws_surface_)
+            stats_.slabs = for_each_slab(slab_depth(surface_voxel_bytes()),
+                                         [&](const voxelpipe::grid& part, int begin, int slab, int slabs) {
+                                             report_from(0, slab, slabs);
+                                             if (only_bits_)
+                                                 draw_bits(result, part, begin);
+                                             else
+                                                 draw_surface(result, part, begin);
+                                         });
         if (wants(target::normal)) count_cancelled_normals(result);
         if (wants(target::color_outer)) {
             const voxelize_stats counted = stats_; // the same fragments again
@@ -132,7 +138,18 @@ public:
             stats_ = counted;
             stats_.milliseconds = std::move(times);
         }
-        if (hides_occupancy_) result.channels.pop_back();
+        if (request_.solid) {
+            if (!wants(target::occupancy)) result.add_unset(inside_name_, scalar::bit);
+            const double voxel_bytes = 0.125 + (counts_bodies() ? sizeof(std::uint32_t) : 0);
+            const int slabs =
+                for_each_slab(slab_depth(voxel_bytes), [&](const voxelpipe::grid& part, int begin, int slab, int all) {
+                    report_from(passes - 1, slab, all);
+                    draw_solid(result, part, begin);
+                });
+            if (!draws_surface_) stats_.slabs = slabs;
+            finish_solid(result);
+        }
+        result.channels.erase(result.channels.begin() + static_cast<std::ptrdiff_t>(num_wanted), result.channels.end());
         return result;
     }
 
@@ -331,8 +348,8 @@ private:
 
     [[nodiscard]] std::bitset<num_targets> enabled_targets() const {
         std::bitset<num_targets> enabled;
-        enabled[occupancy] = wants(target::occupancy);
-        enabled[count] = wants(target::count) || wants(target::color);
+        enabled[occupancy] = keeps_bits_;
+        enabled[count] = counts_fragments() || wants(target::color);
         enabled[color_sum] = wants(target::color);
         enabled[color_max] = wants(target::color_max);
         enabled[color_last] = wants(target::color_replace);
@@ -375,15 +392,26 @@ private:
         return slabs;
     }
 
+    // As numbers of triangles; of solids it is the number of bodies.
+    [[nodiscard]] bool counts_fragments() const { return wants(target::count) && !request_.solid; }
+
+    static void check(const vp::status& status, const voxelize_request& request) {
+        if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
+        if (status.code == vp::status_code::strategy_unavailable)
+            throw backend_error(std::string("--strategy ") + to_string(request.strategy) +
+                                " cannot draw these targets; automatic and tiled can");
+        status.or_throw();
+    }
+
     template <class Draw, class Framebuffer>
     void draw(const std::vector<Draw>& draws, const voxelpipe::grid& part, Framebuffer& framebuffer) {
         const vp::status status = vp::voxelize(backend_, std::span<const Draw>(draws), part, framebuffer,
                                                vp::voxelize_options{request_.coverage});
-        if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
-        if (status.code == vp::status_code::strategy_unavailable)
-            throw backend_error(std::string("--strategy ") + to_string(request_.strategy) +
-                                " cannot draw these targets; automatic and tiled can");
-        status.or_throw();
+        check(status, request_);
+        add_counts(status);
+    }
+
+    void add_counts(const vp::status& status) {
         stats_.triangles_dropped = status.counts.triangles_dropped();
         stats_.triangles_drawn += status.counts.triangles_drawn;
         stats_.triangles_flat += status.counts.triangles_zero_area;
@@ -404,13 +432,13 @@ private:
 
     void draw_bits(volume& result, const voxelpipe::grid& part, int begin) {
         std::bitset<2> enabled;
-        enabled[0] = wants(target::occupancy) || !wants(target::count);
-        enabled[1] = wants(target::count);
+        enabled[0] = keeps_bits_ || !counts_fragments();
+        enabled[1] = counts_fragments();
         bits_framebuffer& framebuffer = framebuffer_for(bits_framebuffer_, part.extent, enabled);
         draw_reporting(bits_draws_, part, framebuffer);
         const stage_timer timer{*this, "resolve"};
-        if (wants(target::occupancy)) copy<0>(result, target::occupancy, framebuffer, begin);
-        if (wants(target::count)) copy<1>(result, target::count, framebuffer, begin);
+        if (keeps_bits_) copy<0>(result, bits_name_, framebuffer, begin);
+        if (counts_fragments()) copy<1>(result, target::count, framebuffer, begin);
     }
 
     void draw_surface(volume& result, const voxelpipe::grid& part, int begin) {
@@ -418,8 +446,8 @@ private:
         if (enabled_targets()[triangle]) vp::get<triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
         draw_reporting(draws_, part, framebuffer);
         const stage_timer timer{*this, "resolve"};
-        if (wants(target::occupancy)) copy<occupancy>(result, target::occupancy, framebuffer, begin);
-        if (wants(target::count)) copy<count>(result, target::count, framebuffer, begin);
+        if (keeps_bits_) copy<occupancy>(result, bits_name_, framebuffer, begin);
+        if (counts_fragments()) copy<count>(result, target::count, framebuffer, begin);
         if (wants(target::color))
             resolve<glm::u8vec4>(result, target::color, part.extent, begin,
                                  mean_color{elements_of<color_sum>(framebuffer), elements_of<count>(framebuffer),
@@ -445,7 +473,7 @@ private:
         for (std::size_t i = 0; i < draws_.size(); ++i)
             outer_draws_.push_back(
                 {draws_[i].mesh, draws_[i].vertex_shader, {draws_[i].fragment_shader, draw_is_double_sided_[i] != 0}});
-        return sides_that_see(result, *result.find("occupancy"), request_.threads);
+        return sides_that_see(result, *result.find(bits_name_), request_.threads);
     }
 
     void draw_outer(volume& result, const voxelpipe::grid& part, int begin, const std::vector<std::uint8_t>& sides) {
@@ -464,6 +492,80 @@ private:
         draw_reporting(outer_draws_, part, framebuffer);
         const stage_timer timer{*this, "resolve"};
         resolve<glm::u8vec4>(result, target::color_outer, part.extent, begin, outer_color{elements_of<0>(framebuffer)});
+    }
+
+    // ---- solids ----------------------------------------------------------------------------------------------------
+
+    // Otherwise the count is 1 inside.
+    [[nodiscard]] bool counts_bodies() const {
+        return wants(target::count) && request_.solid->rule == solid_rule::each_draw;
+    }
+
+    [[nodiscard]] vp::solid_options solid_options() const {
+        vp::solid_options options;
+        switch (request_.solid->rule) {
+        case solid_rule::nonzero:
+            options.rule = vp::fill_rule::nonzero;
+            break;
+        case solid_rule::even_odd:
+            options.rule = vp::fill_rule::even_odd;
+            break;
+        case solid_rule::positive:
+            options.rule = vp::fill_rule::positive;
+            break;
+        case solid_rule::each_draw:
+            options = vp::each_draw;
+            break;
+        }
+        switch (request_.solid->extent) {
+        case solid_extent::centre:
+            options.extent = vp::solid_extent::centre;
+            break;
+        case solid_extent::outer:
+            options.extent = vp::solid_extent::outer;
+            break;
+        case solid_extent::inner:
+            options.extent = vp::solid_extent::inner;
+            break;
+        }
+        return options;
+    }
+
+    // Into the occupancy, or the channel that stands for it, and the count.
+    void draw_solid(volume& result, const voxelpipe::grid& part, int begin) {
+        std::bitset<2> enabled;
+        enabled[0] = true;
+        enabled[1] = counts_bodies();
+        bits_framebuffer& framebuffer = framebuffer_for(solid_framebuffer_, part.extent, enabled);
+        vp::status status;
+        {
+            const stage_timer timer{*this, "voxelize"};
+            status = vp::voxelize_solid(backend_, bits_draws_, part, framebuffer, solid_options());
+        }
+        check(status, request_);
+        if (!draws_surface_) add_counts(status);
+        solid_counts& counts = stats_.solid ? *stats_.solid : stats_.solid.emplace();
+        counts.rows += static_cast<std::uint64_t>(part.extent.y) * static_cast<std::uint64_t>(part.extent.z);
+        counts.open_rows += status.solid.open_rows;
+        counts.crossings += status.solid.crossings;
+        counts.max_winding = std::max(counts.max_winding, status.solid.max_winding);
+        report_(1.0);
+        const stage_timer timer{*this, "resolve"};
+        copy<0>(result, wants(target::occupancy) ? std::string(info_of(target::occupancy).name) : inside_name_,
+                framebuffer, begin);
+        if (counts_bodies()) copy<1>(result, target::count, framebuffer, begin);
+    }
+
+    // The volume's other values, once all bits are there.
+    void finish_solid(volume& result) {
+        const stage_timer timer{*this, "fill"};
+        const channel& solid =
+            *result.find(wants(target::occupancy) ? std::string(info_of(target::occupancy).name) : inside_name_);
+        stats_.voxels = static_cast<std::uint64_t>(result.popcount(solid));
+        if (wants(target::count) && !counts_bodies()) count_bits(result, solid, request_.threads);
+        if (draws_surface_) fill_inside(result, solid, *result.find(bits_name_), *request_.solid, request_.threads);
+        if (std::string warning = open_warning(*request_.solid, *stats_.solid); !warning.empty())
+            stats_.warnings.push_back(std::move(warning));
     }
 
     // Counts the covered voxels whose resolved normal is 0.
@@ -510,8 +612,8 @@ private:
 
     // Where voxel (0, 0, begin) of a channel lies.
     template <class T>
-    [[nodiscard]] static T* channel_at(volume& result, target id, int begin) {
-        channel* c = result.find(info_of(id).name);
+    [[nodiscard]] static T* channel_at(volume& result, std::string_view name, int begin) {
+        channel* c = result.find(name);
         const std::size_t layer = result.num_bytes(c->type, c->components) / static_cast<std::size_t>(result.extent[2]);
         return reinterpret_cast<T*>(c->data.data() + layer * static_cast<std::size_t>(begin));
     }
@@ -519,10 +621,14 @@ private:
     // A target as it is.
     template <std::size_t I, class Framebuffer>
     void copy(volume& result, target id, Framebuffer& framebuffer, int begin) {
+        copy<I>(result, info_of(id).name, framebuffer, begin);
+    }
+    template <std::size_t I, class Framebuffer>
+    void copy(volume& result, std::string_view name, Framebuffer& framebuffer, int begin) {
         const auto* const elements = elements_of<I>(framebuffer);
         using element = std::remove_cvref_t<decltype(*elements)>;
         using map = typename std::remove_cvref_t<decltype(vp::get<I>(framebuffer))>::target_type::map;
-        memory_access<Backend>::read(backend_, channel_at<element>(result, id, begin),
+        memory_access<Backend>::read(backend_, channel_at<element>(result, name, begin),
                                      map::elements(framebuffer.extent()), as_it_is<element>{elements},
                                      thread_count(request_.threads));
     }
@@ -532,7 +638,7 @@ private:
     void resolve(volume& result, target id, glm::ivec3 extent, int begin, const Value& value) {
         const std::size_t voxels = static_cast<std::size_t>(extent.x) * static_cast<std::size_t>(extent.y) *
                                    static_cast<std::size_t>(extent.z);
-        memory_access<Backend>::read(backend_, channel_at<T>(result, id, begin), voxels, value,
+        memory_access<Backend>::read(backend_, channel_at<T>(result, info_of(id).name, begin), voxels, value,
                                      thread_count(request_.threads));
     }
 
@@ -542,7 +648,10 @@ private:
     std::bitset<target_table.size()> wanted_;
     bool any_mask_ = false;
     bool only_bits_ = false;
-    bool hides_occupancy_ = false; // computed, but not asked for: the volume's last channel until the end
+    bool draws_surface_ = false; // else a solid's bits are all there is
+    bool keeps_bits_ = false;    // of the surface, in the channel bits_name_
+    std::string bits_name_ = "occupancy";
+    const std::string inside_name_ = "inside"; // the channel of a solid's bits where no occupancy is asked for
     std::function<void(double)> report_;
     glm::dvec3 reference_{0.0};     // what positions are relative to; see reference_point
     voxelpipe::grid relative_grid_; // the grid, its origin taken from there
@@ -569,6 +678,7 @@ private:
     std::vector<bits_draw> bits_draws_;
     std::unique_ptr<surface_framebuffer> surface_framebuffer_;
     std::unique_ptr<bits_framebuffer> bits_framebuffer_;
+    std::unique_ptr<bits_framebuffer> solid_framebuffer_;
     std::vector<char> draw_is_double_sided_;
     std::vector<outer_draw> outer_draws_;
     std::unique_ptr<outer_framebuffer> outer_framebuffer_;

@@ -32,7 +32,9 @@ void check(const volume& v, const preview_options& o) {
     require(o.field_of_view >= 0 && o.field_of_view <= 150, "the field of view must be 0 to 150 degrees");
 }
 
-std::optional<rgb8> parse_hex(std::string_view text) {
+} // namespace
+
+std::optional<rgb8> parse_color(std::string_view text) {
     if (text.size() != 7 || text[0] != '#') return std::nullopt;
     std::uint32_t value = 0;
     const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), value, 16);
@@ -41,16 +43,14 @@ std::optional<rgb8> parse_hex(std::string_view text) {
                 static_cast<std::uint8_t>(value)};
 }
 
-} // namespace
-
 std::optional<background> parse_background(std::string_view text) {
     if (text == "sky") return background{};
     if (text == "white") return background{{255, 255, 255}, {255, 255, 255}, false};
     if (text == "dark") return background{{24, 27, 33}, {52, 57, 66}, false};
     if (text == "transparent") return background{{255, 255, 255}, {255, 255, 255}, true};
     const std::size_t comma = text.find(',');
-    const auto top = parse_hex(text.substr(0, comma));
-    const auto bottom = comma == std::string_view::npos ? top : parse_hex(text.substr(comma + 1));
+    const auto top = parse_color(text.substr(0, comma));
+    const auto bottom = comma == std::string_view::npos ? top : parse_color(text.substr(comma + 1));
     if (!top || !bottom) return std::nullopt;
     return background{*top, *bottom, false};
 }

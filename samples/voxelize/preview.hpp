@@ -31,6 +31,9 @@ struct background {
     bool transparent = false; // RGBA picture; the shadow on the ground stays, as black with alpha
 };
 
+// "#rrggbb"; nothing for anything else.
+[[nodiscard]] std::optional<rgb8> parse_color(std::string_view text);
+
 // "sky", "white", "dark", "transparent", "#rrggbb" or "#rrggbb,#rrggbb" (top, bottom); nothing for anything else.
 [[nodiscard]] std::optional<background> parse_background(std::string_view text);
 

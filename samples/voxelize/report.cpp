@@ -86,6 +86,11 @@ void print_text(std::ostream& stream, const run_report& report) {
     if (report.stats.fragments_discarded != 0) stream << " (" << report.stats.fragments_discarded << " more discarded)";
     stream << '\n';
     line("voxels") << report.stats.voxels << '\n';
+    if (report.stats.solid && report.request.solid)
+        line("solid") << to_string(report.request.solid->rule) << ", " << to_string(report.request.solid->extent)
+                      << ", " << report.stats.solid->crossings << " crossings, " << report.stats.solid->open_rows
+                      << " of " << report.stats.solid->rows << " rows open, greatest winding "
+                      << report.stats.solid->max_winding << '\n';
     if (report.stats.normals_cancelled != 0) line("normals cancelled") << report.stats.normals_cancelled << '\n';
     stream << std::fixed << std::setprecision(1);
     for (const auto& [stage, time] : report.stats.milliseconds)
@@ -105,6 +110,15 @@ void print_json(std::ostream& stream, const run_report& report) {
                     {"origin", {grid.origin.x, grid.origin.y, grid.origin.z}},
                     {"voxel_size", {grid.voxel_size.x, grid.voxel_size.y, grid.voxel_size.z}}};
     root["coverage"] = report.request.coverage == voxelpipe::coverage::thin ? "thin" : "conservative";
+    if (report.stats.solid && report.request.solid) {
+        root.erase("coverage");
+        root["solid"] = {{"rule", to_string(report.request.solid->rule)},
+                         {"extent", to_string(report.request.solid->extent)},
+                         {"rows", report.stats.solid->rows},
+                         {"open_rows", report.stats.solid->open_rows},
+                         {"crossings", report.stats.solid->crossings},
+                         {"max_winding", report.stats.solid->max_winding}};
+    }
     root["targets"] = json::array();
     for (const target id : report.request.targets) root["targets"].push_back(info_of(id).name);
     root["backend"] = report.stats.backend;

@@ -43,6 +43,7 @@ void require_volume(const voxelize_request& request) {
         bytes += largest;
     }
     const glm::ivec3 extent = request.grid.extent;
+    if (request.solid) bytes += 0.25 * extent.x * extent.y * extent.z; // the bits of the surface and of the inside
     memory::require(bytes,
                     "a result of " + std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
                         std::to_string(extent.z) + " voxels",
@@ -152,6 +153,9 @@ std::string why_empty(const voxelize_stats& stats) {
     const std::string text = "no voxel is covered: ";
     if (stats.fragments_discarded != 0)
         return text + "alpha discards all " + std::to_string(stats.fragments_discarded) + " fragments";
+    if (stats.solid && stats.solid->crossings != 0)
+        return text + "no centre of a voxel is inside the model (--solid-extent outer also takes the voxels that its "
+                      "surface touches, --solid nonzero also what is wound inside out)";
     if (stats.triangles_drawn != 0) return text + "what the triangles cover lies outside the grid";
     if (stats.triangles_flat != 0)
         return text +

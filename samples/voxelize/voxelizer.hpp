@@ -6,6 +6,7 @@
 
 #include "memory.hpp"
 #include "scene.hpp"
+#include "solid.hpp"
 #include "targets.hpp"
 #include "volume.hpp"
 
@@ -17,6 +18,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -35,6 +37,7 @@ struct voxelize_request {
     voxelpipe::grid grid;
     int padding = 0; // voxels of it on every side in which nothing is drawn
     voxelpipe::coverage coverage = voxelpipe::coverage::conservative;
+    std::optional<solid_request> solid;             // instead of the surface, whose coverage is conservative then
     std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
     blend_alpha alpha = blend_alpha::weight;
@@ -62,9 +65,10 @@ struct voxelize_stats {
     std::uint64_t triangles_dropped = 0;   // a position that is not finite, or too far from the grid to be snapped
     std::uint64_t triangles_drawn = 0;     // that reach into the grid, summed over slabs
     std::uint64_t triangles_flat = 0;      // left out by thin coverage: they have no area; summed over slabs
-    std::uint64_t fragments = 0;           // kept, over all voxels
+    std::uint64_t fragments = 0;           // kept, over all voxels; of a solid's surface where that is drawn
     std::uint64_t fragments_discarded = 0; // by an alpha mask
-    std::uint64_t voxels = 0;              // with at least one fragment
+    std::uint64_t voxels = 0;              // with at least one fragment; of a solid where that is asked for
+    std::optional<solid_counts> solid;     // where that is asked for
     std::uint64_t normals_cancelled = 0;   // voxels whose normals cancel out, or that have none; with --target normal
     std::vector<std::pair<std::string, double>> milliseconds; // stage -> time, in pipeline order
     std::vector<std::string> warnings;                        // one line each

@@ -97,6 +97,12 @@ TEST(GpuFiles, OfAModelWithEverythingInIt) {
         expect_same_files(folder, model, {"-r", "120", "--coverage", coverage, "--work-memory", "1", "-t", all_targets},
                           {"a.npz"});
     }
+    for (const char* rule : {"nonzero", "even_odd", "positive", "each_draw"})
+        for (const char* extent : {"outer", "inner"})
+            expect_same_files(
+                folder, model,
+                {"-r", "90", "--solid", rule, "--solid-extent", extent, "--work-memory", "1", "-t", all_targets},
+                {"a.npz"});
     expect_same_files(folder, model, {"-r", "64", "--image-size", "160x120"}, {"a.vox", "a.png"});
     expect_same_files(folder, model, {"-r", "33", "--depth-axis", "x", "-t", "depth,normal"}, {"a.npz"});
 }

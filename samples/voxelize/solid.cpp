@@ -1,0 +1,127 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "solid.hpp"
+
+#include "parallel.hpp"
+#include "preview.hpp"
+#include "srgb.hpp"
+#include "targets.hpp"
+
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <string>
+
+namespace voxelize {
+
+namespace {
+
+using rgba8 = std::array<std::uint8_t, 4>;
+
+// VISIT(number of a voxel) for every bit of WORD(w, j, k) of a layer.
+template <class Word, class Visit>
+void for_each_bit(const volume& v, std::int64_t k, const Word& word, const Visit& visit) {
+    for (std::int64_t j = 0; j < v.extent[1]; ++j)
+        for (std::int64_t w = 0; w < v.words_per_row(); ++w)
+            for (std::uint32_t bits = word(w, j, k); bits != 0; bits &= bits - 1)
+                visit(static_cast<std::size_t>(v.index(32 * w + std::countr_zero(bits), j, k)));
+}
+
+// In linear light, weighted by alpha. Sums of integers, so that the order of the layers does not show.
+rgba8 mean_of(const volume& v, const channel& surface, const channel& colors, int threads) {
+    const color_tables tables = make_color_tables();
+    constexpr double scale = 65535;
+    std::array<std::uint64_t, 256> linear{};
+    for (std::size_t byte = 0; byte < linear.size(); ++byte)
+        linear[byte] = static_cast<std::uint64_t>(std::lround(scale * static_cast<double>(tables.linear[byte])));
+    std::array<std::atomic<std::uint64_t>, 4> sums{};
+    parallel_for(static_cast<std::size_t>(v.extent[2]), threads, [&](std::size_t layer) {
+        std::array<std::uint64_t, 4> own{};
+        for_each_bit(
+            v, static_cast<std::int64_t>(layer),
+            [&](std::int64_t w, std::int64_t j, std::int64_t k) { return v.word(surface, w, j, k); },
+            [&](std::size_t i) {
+                rgba8 color;
+                std::memcpy(color.data(), colors.data.data() + 4 * i, 4);
+                for (std::size_t a = 0; a < 3; ++a) own[a] += linear[color[a]] * color[3];
+                own[3] += color[3];
+            });
+        for (std::size_t a = 0; a < 4; ++a) sums[a] += own[a];
+    });
+    if (sums[3] == 0) return {clay[0], clay[1], clay[2], 255};
+    rgba8 mean{0, 0, 0, 255};
+    for (std::size_t a = 0; a < 3; ++a)
+        mean[a] = encode_srgb(
+            tables, static_cast<float>(static_cast<double>(sums[a]) / (scale * static_cast<double>(sums[3]))));
+    return mean;
+}
+
+} // namespace
+
+const char* to_string(solid_rule rule) {
+    constexpr const char* names[] = {"nonzero", "even_odd", "positive", "each_draw"};
+    return names[static_cast<std::size_t>(rule)];
+}
+
+const char* to_string(solid_extent extent) {
+    constexpr const char* names[] = {"centre", "outer", "inner"};
+    return names[static_cast<std::size_t>(extent)];
+}
+
+std::string open_warning(const solid_request& request, const solid_counts& counts) {
+    if (counts.open_rows == 0) return {};
+    std::array<char, 32> share{};
+    std::snprintf(share.data(), share.size(), "%.3g",
+                  100 * static_cast<double>(counts.open_rows) / static_cast<double>(counts.rows));
+    const bool each = request.rule == solid_rule::each_draw;
+    return "the model is not closed: " + std::to_string(counts.open_rows) + " of the " + std::to_string(counts.rows) +
+           " rows of voxels along x (" + share.data() + " %" + (each ? ", counted for each draw" : "") +
+           ") do not leave it as often as they enter it, so voxels behind a hole may be wrong. Close the mesh, or take "
+           "the surface alone (without --solid)";
+}
+
+void fill_inside(volume& v, const channel& solid, const channel& surface, const solid_request& request, int threads) {
+    threads = thread_count(threads);
+    for (channel& c : v.channels) {
+        const std::optional<target> id = target_named(c.name);
+        if (!id || c.type == scalar::bit || *id == target::count) continue;
+        const std::size_t bytes = size_of(c.type) * static_cast<std::size_t>(c.components);
+        std::array<std::byte, 16> empty{}, inside{};
+        for (std::size_t at = 0; at + 4 <= bytes; at += 4) std::memcpy(empty.data() + at, &info_of(*id).empty, 4);
+        inside = empty;
+        if (c.name.starts_with("color")) {
+            const rgba8 color = request.fill_color ? rgba8{(*request.fill_color)[0], (*request.fill_color)[1],
+                                                           (*request.fill_color)[2], 255}
+                                                   : mean_of(v, surface, c, threads);
+            std::memcpy(inside.data(), color.data(), 4);
+        }
+        parallel_for(static_cast<std::size_t>(v.extent[2]), threads, [&](std::size_t layer) {
+            const auto set = [&](const channel& those, const channel& without, const std::array<std::byte, 16>& value) {
+                for_each_bit(
+                    v, static_cast<std::int64_t>(layer),
+                    [&](std::int64_t w, std::int64_t j, std::int64_t k) {
+                        return v.word(those, w, j, k) & ~v.word(without, w, j, k);
+                    },
+                    [&](std::size_t i) { std::memcpy(c.data.data() + bytes * i, value.data(), bytes); });
+            };
+            if (inside != empty) set(solid, surface, inside);
+            set(surface, solid, empty);
+        });
+    }
+}
+
+void count_bits(volume& v, const channel& solid, int threads) {
+    channel& counts = *v.find(info_of(target::count).name);
+    parallel_for(static_cast<std::size_t>(v.extent[2]), thread_count(threads), [&](std::size_t layer) {
+        const auto k = static_cast<std::int64_t>(layer);
+        for (std::int64_t j = 0; j < v.extent[1]; ++j)
+            for (std::int64_t i = 0; i < v.extent[0]; ++i) {
+                const std::uint32_t count = v.bit(solid, i, j, k) ? 1 : 0;
+                std::memcpy(counts.data.data() + 4 * static_cast<std::size_t>(v.index(i, j, k)), &count, 4);
+            }
+    });
+}
+
+} // namespace voxelize

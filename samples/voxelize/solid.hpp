@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Solids: what --solid asks for, what it counts, and the values of the voxels inside, which no triangle touches.
+
+#include "volume.hpp"
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace voxelize {
+
+// What is inside; the first three are the library's fill rules for the model as one body.
+enum class solid_rule : std::uint8_t {
+    nonzero,
+    even_odd,
+    positive,
+    each_draw, // even_odd of every draw by itself
+};
+
+// Which voxels are part of the solid.
+enum class solid_extent : std::uint8_t {
+    centre, // those whose centre is inside
+    outer,  // these and those that a triangle touches
+    inner,  // those whose centre is inside and that no triangle touches
+};
+
+// As the command line spells them.
+[[nodiscard]] const char* to_string(solid_rule rule);
+[[nodiscard]] const char* to_string(solid_extent extent);
+
+struct solid_request {
+    solid_rule rule = solid_rule::nonzero;
+    solid_extent extent = solid_extent::outer;
+    // sRGB of the voxels inside; none: the mean of the model's covered voxels, in linear light, by alpha.
+    std::optional<std::array<std::uint8_t, 3>> fill_color;
+};
+
+// As vp::solid_counters has them, of all slabs.
+struct solid_counts {
+    std::uint64_t rows = 0; // of voxels along x
+    std::uint64_t open_rows = 0;
+    std::uint64_t crossings = 0;
+    std::uint64_t max_winding = 0;
+};
+
+// One line where open rows prove that the model is not closed: how many, and what to do; empty where there are none.
+[[nodiscard]] std::string open_warning(const solid_request& request, const solid_counts& counts);
+
+// Gives every channel but those of bits and the count its values where the solid and the surface differ. Voxels of
+// SOLID without a bit in SURFACE get the colour of the fill, opaque, or the target's empty value. Voxels with a bit in
+// SURFACE alone are emptied. Both are bit channels of V.
+void fill_inside(volume& v, const channel& solid, const channel& surface, const solid_request& request, int threads);
+
+// The channel "count" from the bits of one body: 1 inside.
+void count_bits(volume& v, const channel& solid, int threads);
+
+} // namespace voxelize
