@@ -20,8 +20,8 @@
 
 namespace voxelpipe {
 
-// What is known about the indices of some triangles, so that calls need not read them again. Valid as long as nobody
-// writes to them.
+// Facts about the indices of some triangles, so that calls need not read them again. Valid as long as nobody writes to
+// them.
 struct checked_indices {
     const glm::uvec3* triangles = nullptr; // start of the `count` checked triangles; null: nothing is known
     std::size_t count = 0;

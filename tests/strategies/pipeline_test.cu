@@ -535,15 +535,15 @@ TEST(Pipeline, TheFirstKernelIsAloneForFineMeshesOnly) {
     const std::uint64_t each = vp::tuning::max_left_of_block;
     for (const std::size_t triangles : {1u, 128u, 129u, 1u << 30}) {
         SCOPED_TRACE(triangles);
-        EXPECT_TRUE(vp::device::leaves_few(triangles, 0));
-        EXPECT_TRUE(vp::device::leaves_few(triangles, each));
-        EXPECT_FALSE(vp::device::leaves_few(triangles, much));
+        EXPECT_TRUE(vp::device::defers_few(triangles, 0));
+        EXPECT_TRUE(vp::device::defers_few(triangles, each));
+        EXPECT_FALSE(vp::device::defers_few(triangles, much));
     }
-    EXPECT_FALSE(vp::device::leaves_few(128, each + 1)); // a block's
-    EXPECT_TRUE(vp::device::leaves_few(129, each + 1));
+    EXPECT_FALSE(vp::device::defers_few(128, each + 1)); // a block's
+    EXPECT_TRUE(vp::device::defers_few(129, each + 1));
     const auto at_once = static_cast<std::uint64_t>(vp::device::num_multiprocessors()) * vp::tuning::max_left_blocks;
-    EXPECT_TRUE(vp::device::leaves_few(1u << 30, each * at_once));
-    EXPECT_FALSE(vp::device::leaves_few(1u << 30, each * at_once + 1));
+    EXPECT_TRUE(vp::device::defers_few(1u << 30, each * at_once));
+    EXPECT_FALSE(vp::device::defers_few(1u << 30, each * at_once + 1));
 }
 
 // add_unordered may differ in bits, but stays within the rounding errors of its additions.

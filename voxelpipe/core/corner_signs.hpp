@@ -187,8 +187,8 @@ inline constexpr std::uint32_t lower_x = 0x55555555u, lower_y = 0x33333333u, low
 
 // ---- boxes of 3 x 3 x 3 ---------------------------------------------------------------------------------------------
 
-// What is ruled out in a box of 3 x 3 x 3: cells of two axes, numbered with factors 1 and 3 (in the order of their
-// names: the first axis has factor 1, but z of zx has 3), and voxels x + 3 y + 9 z.
+// Parts of a box of 3 x 3 x 3 that are ruled out: cells of two axes, numbered with factors 1 and 3 (in the order of
+// their names: the first axis has factor 1, but z of zx has 3), and voxels x + 3 y + 9 z.
 struct ruled_out {
     std::uint32_t xy, yz, zx, plane;
     bool sure; // otherwise the others are meaningless

@@ -60,12 +60,12 @@ template <coverage Rule, bool Run, class Key, class Payload, class Call>
 void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
     arena behind = memory; // behind the memory of the stages
     call.template plan_memory<Key>(behind);
-    const std::size_t room = call.limits.fragments;
+    const std::size_t capacity = call.limits.fragments;
     auto* const counts = behind.take<list_counts>(1);
-    auto* const voxels = behind.take<std::uint64_t>(room);
-    auto* const offsets = behind.take<std::uint64_t>(room + 1);
-    auto* const primitives = behind.take<std::uint32_t>(room);
-    auto* const payloads = std::is_void_v<Payload> ? nullptr : behind.take<payload_storage<Payload>>(room);
+    auto* const voxels = behind.take<std::uint64_t>(capacity);
+    auto* const offsets = behind.take<std::uint64_t>(capacity + 1);
+    auto* const primitives = behind.take<std::uint32_t>(capacity);
+    auto* const payloads = std::is_void_v<Payload> ? nullptr : behind.take<payload_storage<Payload>>(capacity);
     if constexpr (Run) {
         arena start = memory;
         auto* const state = start.take<pipeline_state>(1); // first in the call's memory
@@ -73,12 +73,12 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
         output_pointers outputs;
         outputs.value.voxels = voxels;
         outputs.value.offsets = offsets;
-        outputs.value.voxel_capacity = room;
+        outputs.value.voxel_capacity = capacity;
         outputs.value.primitives = primitives;
         outputs.value.payloads = payloads;
         const auto sorted = call.template launch<Rule, Key>(memory, stream, outputs);
         const bool are_done = sorted.are_at_output && std::is_void_v<Payload>; // only the lengths are missing
-        launch_behind(publish_lists_kernel<Key, payload_storage<Payload>>, are_done ? 1 : fill_device(room),
+        launch_behind(publish_lists_kernel<Key, payload_storage<Payload>>, are_done ? 1 : fill_device(capacity),
                       threads_per_block, stream, stage::abuffer_emit, sorted, state, call.limits, counts, voxels,
                       offsets, primitives, payloads);
         lists = {counts, voxels, offsets, primitives, payloads, call.g.extent};

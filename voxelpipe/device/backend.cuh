@@ -223,20 +223,20 @@ status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader
             call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
             limits.skips_deferred_pass = call.limits.skips_deferred_pass =
                 call.can_skip_deferred_pass(guess.num_deferred) ? 1 : 0;
-            call.has_few_a_voxel = limits.fragments < tuning::min_counted * guess.voxel_room;
+            call.has_few_a_voxel = limits.fragments < tuning::min_counted * guess.expected_voxels;
             device::list_filler filler(call, *this, workspace_, use_pinned_memory, use_graphs, made, state);
             if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {
-                filler.template fill<Coverage, std::uint64_t>(options.rule, guess.voxel_room);
+                filler.template fill<Coverage, std::uint64_t>(options.rule, guess.expected_voxels);
                 return false;
             }
             call.may_shade_late = true;
             const void* const type = device::tag_of_call<call_type>();
             call.filters = std::find(discarding_.begin(), discarding_.end(), type) != discarding_.end();
-            filler.template fill<Coverage, std::uint32_t>(options.rule, guess.voxel_room);
+            filler.template fill<Coverage, std::uint32_t>(options.rule, guess.expected_voxels);
             if (state.discarded != 0 && call.template shades_late<std::uint32_t>() && !call.filters) {
                 discarding_.push_back(type);
                 call.filters = true;
-                filler.template fill<Coverage, std::uint32_t>(options.rule, guess.voxel_room);
+                filler.template fill<Coverage, std::uint32_t>(options.rule, guess.expected_voxels);
             }
             return false;
         });

@@ -54,8 +54,8 @@ struct pipeline_state {
 // Lengths of a call's arrays. Elements that do not fit are counted but not written.
 struct capacities {
     unsigned long long tile_pairs, tile_records, fragments, fragment_records;
-    // What calls like this one hardly needed before, and so is not launched: kernels for voxels of more fragments than
-    // longest_ordered, and the deferred pass.
+    // Kernels that earlier calls like this one hardly needed, and that are not launched: those for voxels of more
+    // fragments than longest_ordered, and the deferred pass.
     unsigned long long longest_ordered = ~0ull;
     unsigned long long skips_deferred_pass = 0; // or 1. As wide as the rest, so that there is no padding (call_bytes)
 };

@@ -27,8 +27,9 @@ __device__ VOXELPIPE_INLINE void await_stream() {
 #endif
 }
 
-// The architectures that a translation unit is compiled for. A template parameter of whatever launches kernels, because
-// units of one program, the library's among them (base/kernel_library.cuh), may be compiled for different ones.
+// The architectures that a translation unit is compiled for. Functions that launch kernels have it as a template
+// parameter, because units of one program, including the library's (base/kernel_library.cuh), may be compiled for
+// different ones.
 template <int...>
 struct architectures {};
 #if defined(__CUDA_ARCH_LIST__) && CUDART_VERSION >= 12030 // graphs capture early launches from 12.3 on

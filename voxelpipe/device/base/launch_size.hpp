@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Block counts of kernel launches, in 64-bit arithmetic: at least 1, because 0 is an error, and at most the limit of a
-// grid's x axis.
+// Block counts of kernel launches, in 64-bit arithmetic: at least 1, because 0 is an error, and at most the limit
+// of a grid's x axis.
 
 #include <cstdint>
 
@@ -25,10 +25,10 @@ inline constexpr std::uint64_t max_numbered = 0xfffffff0u;
 [[nodiscard]] constexpr unsigned blocks_to_fill(std::uint64_t items, std::uint32_t per_block,
                                                 std::uint32_t multiprocessors,
                                                 std::uint32_t blocks_per_multiprocessor) {
-    const std::uint64_t room = std::uint64_t{multiprocessors} * blocks_per_multiprocessor;
-    const std::uint64_t most = room == 0 ? 1 : room < max_blocks ? room : max_blocks;
+    const std::uint64_t resident = std::uint64_t{multiprocessors} * blocks_per_multiprocessor;
+    const std::uint64_t max_useful = resident == 0 ? 1 : resident < max_blocks ? resident : max_blocks;
     const std::uint64_t wanted = items / per_block + static_cast<std::uint64_t>(items % per_block != 0);
-    return static_cast<unsigned>(wanted == 0 ? 1 : wanted < most ? wanted : most);
+    return static_cast<unsigned>(wanted == 0 ? 1 : wanted < max_useful ? wanted : max_useful);
 }
 
 } // namespace voxelpipe::core

@@ -54,8 +54,8 @@ inline void check(cudaError_t error, stage where = stage::validate) {
 
 } // namespace device
 
-// Where a cuda_backend takes its memory from, in stream order. The default is the current device's cudaMallocAsync
-// pool. Refers to a resource, which must outlive it. A resource is any object with
+// The source of a cuda_backend's memory, in stream order. The default is the current device's cudaMallocAsync pool.
+// Refers to a resource, which must outlive it. A resource is any object with
 //   void* allocate_async(bytes, alignment, stream)      and deallocate_async(pointer, bytes, alignment, stream), or
 //   void* allocate(stream, bytes, alignment)            and deallocate(stream, pointer, bytes, alignment),
 // whose stream can be made from a cudaStream_t: cuda::mr resources of CCCL 2 and 3, and wrappers of other allocators.

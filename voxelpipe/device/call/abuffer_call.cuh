@@ -58,7 +58,7 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
                draws.size() == 1 && is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
     }
     // See framebuffer_call.
-    [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t left) const { return leaves_few(num_primitives, left); }
+    [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t left) const { return defers_few(num_primitives, left); }
     template <class Key>
     [[nodiscard]] bool shades_late() const {
         return !core::is_constant<FragmentShader> && is_listed_call<Key>();

@@ -46,7 +46,7 @@ namespace voxelpipe::device {
                                                                           : stage::abuffer_emit;
 }
 
-// What the host knows of a call that bears on its capacities.
+// Properties of a call that determine its capacities.
 struct call_key {
     std::uint64_t triangles;
     glm::ivec3 extent, offset;
@@ -54,17 +54,17 @@ struct call_key {
     friend bool operator==(const call_key&, const call_key&) = default;
 };
 
-// What earlier calls needed: the four capacities, the number of voxels in their lists, longest_ordered() and
+// Needs of earlier calls: the four capacities, the number of voxels in their lists, longest_ordered() and
 // num_deferred() of their state.
 struct call_needs {
     enum index { tile_pairs, tile_records, fragments, fragment_records, list_voxels, longest_ordered, deferred, count };
 };
 using call_history = core::capacity_history<call_key, call_needs::count>;
 
-// What one try of a call is launched with.
+// Capacities and guesses that one try of a call is launched with.
 struct attempt_guess {
     capacities limits;
-    std::uint64_t voxel_room;   // voxels that the lists are likely to have; 0 if unknown
+    std::uint64_t expected_voxels; // voxels that the lists are likely to have; 0 if unknown
     std::uint64_t num_deferred; // triangles that calls like this one deferred; ~0 if unknown, or if that guess failed
 };
 
@@ -83,18 +83,18 @@ template <class Launch>
         std::optional<stage_clock> clock;
         if (times != nullptr) clock.emplace(stream);
         const auto first = tuning::first_capacities(key.triangles);
-        call_history::lengths room =
+        call_history::lengths capacity =
             history.guess(key, {first[0], first[1], std::min(first[2], max_first_fragments), first[3], 0, 0, 0});
         const auto longest = history.max_needed(key, need::longest_ordered);
         const auto num_deferred = history.max_needed(key, need::deferred);
         bool missed_deferred = false; // in any try
         for (int tries = 0;; ++tries) {
-            attempt_guess guess{
-                {room[need::tile_pairs], room[need::tile_records], room[need::fragments], room[need::fragment_records]},
-                room[need::list_voxels],
-                tries == 0 && num_deferred ? *num_deferred : ~std::uint64_t{0}};
+            attempt_guess guess{{capacity[need::tile_pairs], capacity[need::tile_records], capacity[need::fragments],
+                                 capacity[need::fragment_records]},
+                                capacity[need::list_voxels],
+                                tries == 0 && num_deferred ? *num_deferred : ~std::uint64_t{0}};
             capacities& limits = guess.limits;
-            if (tries == 0 && longest) limits.longest_ordered = longest_like(*longest);
+            if (tries == 0 && longest) limits.longest_ordered = expected_longest(*longest);
             pipeline_state state{};
             const bool need_not_list = launch(guess, state, clock ? &*clock : nullptr);
             missed_deferred = missed_deferred || misses_deferred(state, limits);
@@ -122,7 +122,7 @@ template <class Launch>
                 s.required = {state.tile_pairs, state.list_fragments, 0};
                 break;
             }
-            history.raise(room, needed);
+            history.raise(capacity, needed);
         }
         if (clock) clock->read(*times);
     } catch (const cuda_failure& e) {

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a cuda_backend keeps between calls to run the next one quickly: device memory, a page of host memory for the
-// counters, and the CUDA graph of the last call.
+// Memory that a cuda_backend keeps between calls to run the next one quickly: device memory, a page of host memory for
+// the counters, and the CUDA graph of the last call.
 
 #include <voxelpipe/device/base/memory.cuh>
 #include <voxelpipe/device/base/stage_clock.cuh>

@@ -28,17 +28,17 @@ public:
     // gets `first`, or more if an earlier call did not fit.
     [[nodiscard]] lengths guess(const Key& key, const lengths& first) const {
         const bool known = last_ == key;
-        lengths room{};
+        lengths capacities{};
         for (std::size_t k = 0; k < N; ++k)
-            room[k] = limited(k, known && needed_[k] != 0 ? needed_[k] + needed_[k] / 16 + 1024
-                                                          : std::max(most_[k], first[k]));
-        return room;
+            capacities[k] = limited(k, known && needed_[k] != 0 ? needed_[k] + needed_[k] / 16 + 1024
+                                                                : std::max(max_capacities_[k], first[k]));
+        return capacities;
     }
     // Raises the capacities for the next try of a call that did not fit.
-    void raise(lengths& room, const lengths& needed) {
+    void raise(lengths& capacities, const lengths& needed) {
         for (std::size_t k = 0; k < N; ++k) {
-            if (needed[k] > room[k]) room[k] = limited(k, needed[k] + needed[k] / 16);
-            most_[k] = std::max(most_[k], room[k]);
+            if (needed[k] > capacities[k]) capacities[k] = limited(k, needed[k] + needed[k] / 16);
+            max_capacities_[k] = std::max(max_capacities_[k], capacities[k]);
         }
     }
     // Records a call that fitted. The key does not distinguish all calls: equal keys share the largest need.
@@ -57,7 +57,7 @@ private:
         return is_numbered_[k] ? std::min(length, max_numbered) : length;
     }
     std::array<bool, N> is_numbered_;
-    lengths most_{}, needed_{};
+    lengths max_capacities_{}, needed_{};
     std::optional<Key> last_;
 };
 

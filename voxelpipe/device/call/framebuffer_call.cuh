@@ -92,7 +92,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     // True if the deferred pass may be skipped, given that calls like this one deferred num_deferred triangles. Safe:
     // these strategies write no target before all triangles are drawn, so a wrong guess only costs time.
     [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t num_deferred) const {
-        if (draws.size() != 1 || !leaves_few(max_triangles(), num_deferred)) return false;
+        if (draws.size() != 1 || !defers_few(max_triangles(), num_deferred)) return false;
         return chosen() == strategy::occupancy_mask || lists_fragments();
     }
 
@@ -154,7 +154,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     [[nodiscard]] bool has_checked_indices() const {
         return std::all_of(draws.begin(), draws.end(), [](const draw_type& d) { return d.mesh.has_checked_indices(); });
     }
-    // Of the largest draw.
+    // The size of the largest draw.
     [[nodiscard]] std::size_t max_triangles() const {
         std::size_t most = 0;
         for (const draw_type& d : draws) most = std::max(most, d.mesh.triangles.size());

@@ -75,23 +75,23 @@ public:
         : call_(call), from_(from), workspace_(workspace), may_lock_(may_lock), may_graph_(may_graph), lists_(lists),
           state_(state) {}
 
-    // Key: of a voxel. voxel_room: how many voxels the lists are likely to have; 0 if nothing is known.
+    // Key: of a voxel. expected_voxels: how many voxels the lists are likely to have; 0 if nothing is known.
     template <class Coverage, class Key>
-    void fill(coverage rule, std::uint64_t voxel_room) {
-        Coverage::dispatch(rule, [&]<coverage Rule>() { fill<Rule, Key>(voxel_room); });
+    void fill(coverage rule, std::uint64_t expected_voxels) {
+        Coverage::dispatch(rule, [&]<coverage Rule>() { fill<Rule, Key>(expected_voxels); });
     }
 
 private:
     using arrays_type = list_arrays<Payload>;
 
-    // Without a wait before the lists are written, if voxel_room is not 0.
+    // Without a wait before the lists are written, if expected_voxels is not 0.
     template <coverage Rule, class Key>
-    void fill(std::uint64_t voxel_room) {
+    void fill(std::uint64_t expected_voxels) {
         arena plan;
         call_.template plan_memory<Key>(plan);
         void* const memory = workspace_.prepare(plan.used(), from_, may_lock_, may_graph_);
-        arrays_type arrays = make_beforehand(voxel_room);
-        if (voxel_room == 0) {
+        arrays_type arrays = make_beforehand(expected_voxels);
+        if (expected_voxels == 0) {
             fill_exactly<Rule, Key>(memory);
             return;
         }
@@ -101,7 +101,7 @@ private:
                 bytes = workspace_.bytes_for_graph(call_.clock, [&](const void* workspace, const void* page) {
                     return call_.template bytes<Rule, Key>(workspace, page);
                 });
-            const output_pointers outputs = workspace_.set_outputs(arrays.pointers(voxel_room));
+            const output_pointers outputs = workspace_.set_outputs(arrays.pointers(expected_voxels));
             state_ = workspace_.run(call_.clock, bytes, sizeof(pipeline_state), from_.stream, [&](cudaStream_t on) {
                 arena carved(memory);
                 const auto sorted = call_.template launch<Rule, Key>(carved, on, outputs);
@@ -110,7 +110,7 @@ private:
         });
         if (has_failed(state_, call_.limits)) return;
         const std::uint64_t num_voxels = state_.list_voxels, num_fragments = state_.list_fragments;
-        if (num_voxels > voxel_room) { // more than guessed
+        if (num_voxels > expected_voxels) { // more than guessed
             fill<Rule, Key>(0);
         } else if (num_fragments >= call_.limits.fragments / 4 * 3 || num_fragments == 0) {
             arrays.move_into(lists_, num_voxels, num_fragments);
@@ -121,14 +121,14 @@ private:
         }
     }
 
-    // Arrays with a little more room than the lists are likely to need. If memory is short, empty ones, and voxel_room
-    // becomes 0: lists of the exact length may still fit.
-    [[nodiscard]] arrays_type make_beforehand(std::uint64_t& voxel_room) const {
+    // Arrays with a little more room than the lists are likely to need. If memory is short, empty ones, and
+    // expected_voxels becomes 0: lists of the exact length may still fit.
+    [[nodiscard]] arrays_type make_beforehand(std::uint64_t& expected_voxels) const {
         try {
-            return {from_, voxel_room, voxel_room == 0 ? 0 : call_.limits.fragments};
+            return {from_, expected_voxels, expected_voxels == 0 ? 0 : call_.limits.fragments};
         } catch (const cuda_failure& e) {
             if (e.error != cudaErrorMemoryAllocation) throw;
-            voxel_room = 0;
+            expected_voxels = 0;
             return {from_, 0, 0};
         }
     }

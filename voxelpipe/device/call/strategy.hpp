@@ -50,7 +50,7 @@ enum class strategy : std::uint32_t {
     return "unknown";
 }
 
-// What was chosen, and why: the rule in words.
+// The chosen strategy, and the rule that chose it in words.
 struct strategy_choice {
     strategy value = strategy::automatic;
     const char* why = "no call yet";
@@ -66,7 +66,7 @@ struct possible_strategies {
     bool sorted_fold = false;    // some blend depends on it
 };
 
-// What the host knows of a call before it is launched.
+// Properties of a call that are known before its launch.
 struct call_facts {
     possible_strategies possible;
     std::size_t num_draws = 1;

@@ -15,16 +15,16 @@ namespace voxelpipe::device {
 // Room: fragments that fit a warp's shared memory. FlushAt: number from which on they are written to the list. That
 // takes an atomic on a word shared by all warps of the device (see class_queues), so batches should be large; but the
 // fragments of 32 triangles should fit in the rest, or they must be emitted twice.
-template <class Call, unsigned Room, unsigned FlushAt>
+template <class Call, unsigned Capacity, unsigned FlushAt>
 struct listing_sink : sink_base<Call> {
     static constexpr bool stages_in_shared = true;
     static constexpr bool merges_equal_voxels = false;
     static constexpr bool splits_long_rows = false; // a lane's row is written by itself, whatever its length
     static constexpr bool takes_warp_rounds = true;
-    static constexpr unsigned room = Room;
+    static constexpr unsigned staging_capacity = Capacity;
     static constexpr unsigned flush_at = FlushAt;
     struct memory {
-        std::uint32_t voxels[room], primitives[room];
+        std::uint32_t voxels[staging_capacity], primitives[staging_capacity];
         unsigned n;
     };
 
@@ -69,7 +69,7 @@ struct listing_sink : sink_base<Call> {
     __device__ VOXELPIPE_INLINE void rounds(std::uint32_t count, IsDone&& is_done, Next&& next) {
         const unsigned all = __reduce_add_sync(0xffffffffu, count), before = (1u << threadIdx.x % 32) - 1;
         if (all == 0) return;
-        const unsigned long long first = take(all), rest = room_from(first);
+        const unsigned long long first = take(all), rest = remaining_from(first);
         std::uint32_t *const voxels = this->call.out.voxels + first, *const primitives =
                                                                          this->call.out.primitives + first;
         unsigned given = 0;
@@ -89,10 +89,10 @@ struct listing_sink : sink_base<Call> {
     // The same for up to 31 fragments per lane, distributed over all lanes: of(lane, i) is the voxel of a lane's
     // fragment i. All lanes call it.
     template <class Of>
-    __device__ VOXELPIPE_INLINE void share(std::uint32_t count, Of&& of) {
+    __device__ VOXELPIPE_INLINE void distribute(std::uint32_t count, Of&& of) {
         const unsigned begin = sum_before<0, 5>(count), all = __shfl_sync(0xffffffffu, begin + count, 31);
         if (all == 0) return;
-        const unsigned long long first = take(all), rest = room_from(first);
+        const unsigned long long first = take(all), rest = remaining_from(first);
         std::uint32_t *const voxels = this->call.out.voxels + first, *const primitives =
                                                                          this->call.out.primitives + first;
         for (unsigned given = 0; given < all; given += 32) {
@@ -111,7 +111,7 @@ struct listing_sink : sink_base<Call> {
     // Stages the rows of a round. If there is no room for it, what is staged is written to the list first.
     template <class IsDone, class Next>
     __device__ VOXELPIPE_INLINE void row_rounds(IsDone&& is_done, Next&& next) {
-        static_assert(room >= 32 * max_long_side);
+        static_assert(staging_capacity >= 32 * max_long_side);
         for (bool more = !is_done(); __any_sync(0xffffffffu, more); more = !is_done()) {
             word mask = 0;
             std::uint32_t first = 0;
@@ -124,7 +124,7 @@ struct listing_sink : sink_base<Call> {
             unsigned at = sum_before<0, 3>(length);
             if (__any_sync(0xffffffffu, length > 7)) at += sum_before<3, 5>(length);
             const unsigned all = __shfl_sync(0xffffffffu, at + length, 31);
-            if (kept_ + all > room) {
+            if (kept_ + all > staging_capacity) {
                 __syncwarp();
                 flush(kept_);
                 kept_ = 0;
@@ -169,7 +169,7 @@ struct listing_sink : sink_base<Call> {
             restart();
             return false;
         }
-        if (n > room) {
+        if (n > staging_capacity) {
             flush(kept_);
             base_ = take(n - kept_);
             kept_ = 0;
@@ -209,7 +209,7 @@ private:
     }
     __device__ VOXELPIPE_INLINE void write(unsigned at, std::uint32_t voxel) {
         if (!bypasses_staging_) {
-            if (at >= room) return;
+            if (at >= staging_capacity) return;
             m_.voxels[at] = voxel;
             m_.primitives[at] = primitive_;
         } else if (base_ + at < this->call.out.capacity) {
@@ -225,7 +225,7 @@ private:
         return __shfl_sync(0xffffffffu, first, 0);
     }
     // Elements that the list has from number `first` on.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long room_from(unsigned long long first) const {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long remaining_from(unsigned long long first) const {
         const unsigned long long capacity = this->call.out.capacity;
         return first < capacity ? capacity - first : 0;
     }

@@ -17,7 +17,7 @@ namespace voxelpipe::device {
 
 // The capacities::longest_ordered for calls like one that had this pipeline_state::longest_ordered(): the largest for
 // which the same kernels are launched.
-[[nodiscard]] inline std::uint64_t longest_like(std::uint64_t longest) {
+[[nodiscard]] inline std::uint64_t expected_longest(std::uint64_t longest) {
     constexpr std::uint64_t block = tuning::max_of_block, ways = tuning::merge_ways;
     for (const std::uint64_t most : {std::uint64_t{0}, block, only_dense, block * ways, block * ways * ways})
         if (longest <= most) return most;

@@ -40,7 +40,7 @@ struct pair_array {
 
     // Calls use(std::bool_constant<interleaved>). Tested once and not for each pair, so that loads are not delayed.
     template <class Use>
-    __device__ VOXELPIPE_INLINE void ask_once(Use&& use) const {
+    __device__ VOXELPIPE_INLINE void with_layout(Use&& use) const {
         if (values == nullptr)
             use(std::true_type{});
         else
@@ -64,21 +64,23 @@ struct pair_array {
     }
 };
 
-// The two buffers between which a sort moves its pairs. Values begin where the room for keys ends.
+// The two buffers between which a sort moves its pairs. Values begin where the padded keys end.
 struct sort_pairs {
     std::uint32_t *keys[2]{}, *values[2]{};
 
     [[nodiscard]] static sort_pairs take(arena& memory, std::uint64_t capacity) {
-        const std::uint64_t room = room_for(capacity);
+        const std::uint64_t padded = padded_to_256_bytes(capacity);
         sort_pairs p;
         for (int i = 0; i < 2; ++i) {
-            p.keys[i] = memory.take<std::uint32_t>(2 * room);
-            p.values[i] = p.keys[i] == nullptr ? nullptr : p.keys[i] + room;
+            p.keys[i] = memory.take<std::uint32_t>(2 * padded);
+            p.values[i] = p.keys[i] == nullptr ? nullptr : p.keys[i] + padded;
         }
         return p;
     }
-    // Room for keys, such that values begin at a multiple of 256 bytes too.
-    [[nodiscard]] static constexpr std::uint64_t room_for(std::uint64_t capacity) { return (capacity + 63) / 64 * 64; }
+    // Number of keys after which values begin at a multiple of 256 bytes too.
+    [[nodiscard]] static constexpr std::uint64_t padded_to_256_bytes(std::uint64_t capacity) {
+        return (capacity + 63) / 64 * 64;
+    }
     [[nodiscard]] pair_array joined(int i) const { return {keys[i], nullptr}; }
     [[nodiscard]] pair_array apart(int i) const { return {keys[i], values[i]}; }
 };

@@ -162,7 +162,7 @@ __global__ __launch_bounds__(tuning::sort_threads,
     static_assert(items % 2 == 0 && most < 1 << 16);
     extern __shared__ __align__(16) unsigned char dynamic_memory[];
     auto& shared = *reinterpret_cast<tile_memory*>(dynamic_memory);
-    // Of each digit: offset within the tile, later what turns it into the global offset.
+    // By digit: the offset within the tile, later the difference from it to the global offset.
     __shared__ std::uint32_t offsets[DigitsEach * tuning::sort_threads];
     __shared__ typename scan::TempStorage storage;
     const digit_of digit(m.plan, pass);
@@ -178,7 +178,7 @@ __global__ __launch_bounds__(tuning::sort_threads,
     // A lane has every 32nd pair of its warp's. Elements beyond the last count as pairs with the last digit.
     const std::uint32_t first = warp * 32 * items + lane;
     std::uint32_t key[items], value[items], slot[items / 2]; // two offsets in each
-    from.ask_once([&]<class Joined>(Joined) VOXELPIPE_INLINE_LAMBDA {
+    from.with_layout([&]<class Joined>(Joined) VOXELPIPE_INLINE_LAMBDA {
 #pragma unroll
         for (std::uint32_t i = 0; i < items; ++i) {
             const bool is_one = first + 32 * i < length;
@@ -253,7 +253,7 @@ __global__ __launch_bounds__(tuning::sort_threads,
                 m.all_tiles->digits[pass][first_digit + k] + group::get(before, k) - tile_offset[k]; // modulo 2^32
     }
     __syncthreads();
-    to.ask_once([&]<class Joined>(Joined) VOXELPIPE_INLINE_LAMBDA {
+    to.with_layout([&]<class Joined>(Joined) VOXELPIPE_INLINE_LAMBDA {
 #pragma unroll
         for (std::uint32_t i = 0; i < items; ++i) {
             const std::uint32_t at = threadIdx.x + tuning::sort_threads * i;

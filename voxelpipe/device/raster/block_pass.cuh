@@ -35,7 +35,7 @@ struct block_warp {
     const Call& call;
     warp_queues& queues;
     kept_rows& kept; // of the warp
-    coming_corners<typename Call::source_type>& corners;
+    next_corners<typename Call::source_type>& corners;
     sink_type& sink;
     std::uint32_t* oversized; // the block's oversized triangles
     unsigned& num_oversized;
@@ -190,7 +190,7 @@ __global__ __launch_bounds__(tuning::raster_threads,
     using sink_type = typename Call::sink;
     __shared__ warp_queues queues[raster_warps];
     __shared__ kept_rows rows_of_warps[raster_warps];
-    __shared__ coming_corners<typename Call::source_type> corners[raster_warps];
+    __shared__ next_corners<typename Call::source_type> corners[raster_warps];
     __shared__ typename sink_type::memory memories[raster_warps];
     __shared__ int left[3][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_oversized;

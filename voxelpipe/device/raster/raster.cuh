@@ -343,7 +343,7 @@ __global__ __launch_bounds__(tuning::raster_threads,
 }
 
 // True if a call of one draw may be launched without a deferred pass, if calls like it deferred `left` triangles.
-[[nodiscard]] inline bool leaves_few(std::size_t num_triangles, std::uint64_t left) {
+[[nodiscard]] inline bool defers_few(std::size_t num_triangles, std::uint64_t left) {
     const std::uint64_t batches = core::blocks_for_each(num_triangles, tuning::raster_threads);
     const auto at_once = static_cast<std::uint64_t>(num_multiprocessors()) * tuning::max_left_blocks;
     return left <= std::min(batches, at_once) * tuning::max_left_of_block;

@@ -133,7 +133,7 @@ struct thin_piece {
         constexpr int most = core::raster_brick_size + 1; // slopes are at most one
         if (!__all_sync(0xffffffffu, row.columns == 0 || (lo <= -most && hi >= most))) return false;
         const int first = row.columns != 0 ? row.first_column() : 0; // lanes without columns are not asked
-        sink.share(__popc(row.columns), [&](unsigned lane, unsigned i) VOXELPIPE_INLINE_LAMBDA {
+        sink.distribute(__popc(row.columns), [&](unsigned lane, unsigned i) VOXELPIPE_INLINE_LAMBDA {
             constexpr unsigned all = 0xffffffffu;
             core::brick_row of_lane;
             of_lane.plane = __shfl_sync(all, row.plane, lane);

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What kernels know of a call: geometry (triangles and snapped positions: all that the coarse stages read) and scene
-// (geometry with the draws' shaders and varyings).
+// The scene as kernels see it. geometry: triangles and snapped positions, which is all that the coarse stages read.
+// scene: geometry with the draws' shaders and varyings.
 
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/device/base/call_state.cuh>

@@ -184,7 +184,7 @@ __device__ VOXELPIPE_INLINE void await_copies() { asm volatile("cp.async.wait_al
 // Prefetches the corners of a warp's next triangles into shared memory, while the previous ones are drawn: there are
 // too few registers to hold them so long. Each lane has its own column of words, so no lane waits for another.
 template <class Source>
-struct coming_corners {
+struct next_corners {
     using stored = typename Source::stored;
     static constexpr std::uint32_t words_each = sizeof(stored) / sizeof(std::uint32_t);
     static_assert(sizeof(stored) % sizeof(std::uint32_t) == 0);

@@ -35,7 +35,7 @@ template <class... Targets>
     return fb.changes != nullptr && any;
 }
 
-// What a call does with the log of its framebuffer.
+// How a call uses the log of its framebuffer.
 template <class Framebuffer>
 struct change_tracking;
 template <class... Targets>
@@ -172,7 +172,7 @@ void clear_chunks(Element* to, const chunk_marks& marks, const word* known, cons
                   stage::fine_raster, to, marks, known, wanted, pattern, state, limits);
 }
 
-// What is known from now on. `wipes`: no chunk stays marked.
+// Records the targets' state after the call. `wipes`: no chunk stays marked.
 template <std::size_t N>
 struct known_targets {
     core::change_log::known of[N];
@@ -253,16 +253,16 @@ __launch_bounds__(threads_per_block) void mark_voxels_kernel(const Voxel* voxels
     }
 }
 template <class Voxel>
-void mark_listed(const Voxel* voxels, const unsigned long long* num, std::uint64_t room, const chunk_marks& marks,
+void mark_listed(const Voxel* voxels, const unsigned long long* num, std::uint64_t capacity, const chunk_marks& marks,
                  const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
-    launch_behind(mark_voxels_kernel<Voxel>, fill_device(room), threads_per_block, stream, stage::tile_resolve, voxels,
-                  num, marks, state, limits);
+    launch_behind(mark_voxels_kernel<Voxel>, fill_device(capacity), threads_per_block, stream, stage::tile_resolve,
+                  voxels, num, marks, state, limits);
 }
-// Marks listed voxels if the call must. *num: how many there are, at most `room`.
+// Marks listed voxels if the call must. *num: how many there are, at most `capacity`.
 template <class Tracking, class Voxel>
-void mark_voxels(const Tracking& tracking, const Voxel* voxels, const unsigned long long* num, std::uint64_t room,
+void mark_voxels(const Tracking& tracking, const Voxel* voxels, const unsigned long long* num, std::uint64_t capacity,
                  const pipeline_state* state, const capacities& limits, cudaStream_t stream) {
-    if (tracking.log != nullptr) mark_listed(voxels, num, room, tracking.marks(), state, limits, stream);
+    if (tracking.log != nullptr) mark_listed(voxels, num, capacity, tracking.marks(), state, limits, stream);
 }
 
 } // namespace voxelpipe::device
