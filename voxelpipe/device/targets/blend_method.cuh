@@ -2,12 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// How a target's fragments are combined on the device, and the words of whole values and of bits, for vectors component
-// by component (targets/shared_blend.cuh has those of scalars).
+// How a target's fragments are combined on the device: the words of values, including user-defined blends and,
+// component by component, vectors (targets/shared_blend.cuh has scalars); and those of bits.
 
 #include <voxelpipe/device/targets/shared_blend.cuh>
 
 #include <cstdint>
+#include <cstring>
 #include <type_traits>
 
 namespace voxelpipe::device {
@@ -18,6 +19,55 @@ enum class blend_method : std::uint8_t {
     bits,    // one bit a voxel
     winner,  // replace: the highest primitive wins a word; its fragment is shaded again at the end
     ordered, // everything else: folded in primitive order through lists of fragments
+};
+
+// True for user-defined blends that are order-free, of at most 8 bytes: combined by compare-and-swap.
+// combine(identity(), v) must be v.
+template <class Blend, class T>
+inline constexpr bool swaps = (core::user_blend<Blend, T> ||
+                               core::user_blend_template<Blend, T>)&&core::blend_traits<Blend, T>::order_free
+                              && sizeof(T) <= 8;
+
+template <class Blend, class T>
+struct swap_blend {
+    static constexpr bool available = true;
+    static constexpr int words = sizeof(T) <= 4 ? 1 : 2;
+    using traits = core::blend_traits<Blend, T>;
+    using raw = std::conditional_t<words == 1, unsigned int, unsigned long long>;
+    using cell = T;
+    __device__ static raw to_raw(const T& v) {
+        raw r = 0;
+        memcpy(&r, &v, sizeof(T));
+        return r;
+    }
+    __device__ static T from_raw(raw r) {
+        T v;
+        memcpy(&v, &r, sizeof(T));
+        return v;
+    }
+    __device__ static raw* at(word* plane, int i) { return reinterpret_cast<raw*>(plane) + i; }
+    __device__ static void clear(word* plane, int i, int) { *at(plane, i) = to_raw(traits::identity()); }
+    __device__ static void accumulate(word* plane, int i, int, const T& v) {
+        raw* const c = at(plane, i);
+        raw old = *c, seen;
+        do {
+            seen = old;
+            T value = from_raw(seen);
+            traits::apply(value, v);
+            old = atomicCAS(c, seen, to_raw(value));
+        } while (old != seen);
+    }
+    __device__ static cell load(const word* plane, int i, int) { return from_raw(*at(const_cast<word*>(plane), i)); }
+    __device__ static cell cell_of(const T& v) {
+        T c = traits::identity();
+        traits::apply(c, v);
+        return c;
+    }
+    __device__ static void merge(cell& a, const cell& b) { traits::apply(a, b); }
+    __device__ static T finish(const cell& c, T stored) {
+        traits::apply(stored, c);
+        return stored;
+    }
 };
 
 // value_blend<Blend, T>: scalar_blend, component by component for vectors.

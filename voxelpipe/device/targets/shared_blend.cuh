@@ -15,7 +15,6 @@
 #include <voxelpipe/device/base/warp.cuh>
 
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <type_traits>
 
@@ -350,56 +349,6 @@ struct scalar_blend<blend::add_unordered, S> {
     __device__ static void merge(cell& a, cell b) { a += b; }
     __device__ static S finish(cell c, S stored) {
         return core::canonical(static_cast<S>(static_cast<cell>(stored) + c));
-    }
-};
-
-// ---- user-defined blends --------------------------------------------------------------------------------------------
-
-// Order-free and at most 8 bytes: compare-and-swap. combine(identity(), v) must be v.
-template <class Blend, class T>
-inline constexpr bool swaps = (core::user_blend<Blend, T> ||
-                               core::user_blend_template<Blend, T>)&&core::blend_traits<Blend, T>::order_free
-                              && sizeof(T) <= 8;
-
-template <class Blend, class T>
-struct swap_blend {
-    static constexpr bool available = true;
-    static constexpr int words = sizeof(T) <= 4 ? 1 : 2;
-    using traits = core::blend_traits<Blend, T>;
-    using raw = std::conditional_t<words == 1, unsigned int, unsigned long long>;
-    using cell = T;
-    __device__ static raw to_raw(const T& v) {
-        raw r = 0;
-        memcpy(&r, &v, sizeof(T));
-        return r;
-    }
-    __device__ static T from_raw(raw r) {
-        T v;
-        memcpy(&v, &r, sizeof(T));
-        return v;
-    }
-    __device__ static raw* at(word* plane, int i) { return reinterpret_cast<raw*>(plane) + i; }
-    __device__ static void clear(word* plane, int i, int) { *at(plane, i) = to_raw(traits::identity()); }
-    __device__ static void accumulate(word* plane, int i, int, const T& v) {
-        raw* const c = at(plane, i);
-        raw old = *c, seen;
-        do {
-            seen = old;
-            T value = from_raw(seen);
-            traits::apply(value, v);
-            old = atomicCAS(c, seen, to_raw(value));
-        } while (old != seen);
-    }
-    __device__ static cell load(const word* plane, int i, int) { return from_raw(*at(const_cast<word*>(plane), i)); }
-    __device__ static cell cell_of(const T& v) {
-        T c = traits::identity();
-        traits::apply(c, v);
-        return c;
-    }
-    __device__ static void merge(cell& a, const cell& b) { traits::apply(a, b); }
-    __device__ static T finish(const cell& c, T stored) {
-        traits::apply(stored, c);
-        return stored;
     }
 };
 
