@@ -30,7 +30,7 @@ concept fragment_sink = requires(Sink sink, const glm::uvec3& indices, std::uint
     { Sink::merges_equal_voxels } -> std::convertible_to<bool>;
     // A row costs by its voxels, so group_lanes lanes share a long one: row_by_all.
     { Sink::splits_long_rows } -> std::convertible_to<bool>;
-    // Lanes pass their fragments in rounds, one each: rounds, share and row_rounds.
+    // Lanes pass their fragments in rounds, one each: rounds, distribute and row_rounds.
     { Sink::takes_warp_rounds } -> std::convertible_to<bool>;
 
     // ---- triangles ----
