@@ -504,17 +504,17 @@ TEST(SmallTriangle, NearPositionsSnapAsAllDo) {
     for (int i = 0; i < unit::cases(100000); ++i) {
         const float x = place(g.random), y = place(g.random), z = place(g.random) * 20;
         std::int32_t q[3];
-        ASSERT_TRUE(snap_near(t, x, y, z, q));
+        ASSERT_TRUE(snap_int32(t, x, y, z, q));
         const snapped_position p = snap(t, x, y, z);
         ASSERT_EQ(q[0], p.x);
         ASSERT_EQ(q[1], p.y);
         ASSERT_EQ(q[2], p.z);
     }
     std::int32_t q[3];
-    EXPECT_FALSE(snap_near(t, std::numeric_limits<float>::quiet_NaN(), 0, 0, q));
-    EXPECT_FALSE(snap_near(t, 0, std::numeric_limits<float>::infinity(), 0, q));
-    EXPECT_FALSE(snap_near(t, 0, 0, -1e30f, q));
-    EXPECT_FALSE(snap_near(t, 1000.0f, 0, 0, q)); // 1.26e9 units
+    EXPECT_FALSE(snap_int32(t, std::numeric_limits<float>::quiet_NaN(), 0, 0, q));
+    EXPECT_FALSE(snap_int32(t, 0, std::numeric_limits<float>::infinity(), 0, q));
+    EXPECT_FALSE(snap_int32(t, 0, 0, -1e30f, q));
+    EXPECT_FALSE(snap_int32(t, 1000.0f, 0, 0, q)); // 1.26e9 units
 }
 
 } // namespace

@@ -27,7 +27,7 @@ void compare_tiles(stages<vp::constant_output<bool>>& s, int log2_size) {
     stage_memory m(s.gpu, {});
     const stages<vp::constant_output<bool>>::scene_memory buffers(m.memory, s.on_device());
     const auto scene = buffers.shade(s.on_device(), s.g, s.gpu.stream);
-    device::share_buffers share = device::take_share(m.memory, n, limits.tile_records);
+    device::cell_buffers share = device::take_cell_buffers(m.memory, n, limits.tile_records);
     share.num_records = &m.state->tile_records;
     share.num_cells = &m.state->tile_pairs;
     const int bits = device::key_bits(tiles.count());
@@ -37,7 +37,7 @@ void compare_tiles(stages<vp::constant_output<bool>>& s, int log2_size) {
         primitives[i] = m.memory.take<std::uint32_t>(limits.tile_pairs);
     }
     const std::size_t bytes =
-        std::max(device::sort_bytes<std::uint32_t>(limits.tile_pairs, bits), device::share_scan_bytes(n));
+        std::max(device::sort_bytes<std::uint32_t>(limits.tile_pairs, bits), device::cell_scan_bytes(n));
     void* const storage = m.memory.take<std::byte>(bytes);
     device::split_buffers split{};
     split.pairs_per_item = per_item;
@@ -46,8 +46,8 @@ void compare_tiles(stages<vp::constant_output<bool>>& s, int log2_size) {
     ASSERT_LT(m.memory.used(), m.block.size());
 
     const device::tile_cells<Rule> op{tiles, keys[0], primitives[0]};
-    device::share_count(scene.geo, op, share, m.state, storage, bytes, vp::stage::coarse_raster, s.gpu.stream);
-    device::share_emit(scene.geo, op, share, m.state, limits, vp::stage::coarse_raster, s.gpu.stream);
+    device::count_cells(scene.geo, op, share, m.state, storage, bytes, vp::stage::coarse_raster, s.gpu.stream);
+    device::emit_cells(scene.geo, op, share, m.state, limits, vp::stage::coarse_raster, s.gpu.stream);
     device::fill_end(keys[0], primitives[0], share.num_cells, limits.tile_pairs, m.state, limits, s.gpu.stream);
     const int sorted = device::sort_by_cell(keys, primitives, limits.tile_pairs, bits, storage, bytes,
                                             vp::stage::tile_sort, s.gpu.stream);

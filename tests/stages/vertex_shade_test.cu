@@ -28,7 +28,7 @@ TEST(VertexShade, SnapsAsTheCpuDoes) {
         bool is_near = true;
         constexpr std::int64_t limit = std::int64_t{1} << 30;
         for (const std::int64_t q : {p.x, p.y, p.z}) is_near = is_near && q >= -limit && q <= limit; // and not a mark
-        ASSERT_EQ(in_32_bits[i].is_near != 0, is_near) << i;
+        ASSERT_EQ(in_32_bits[i].fits_int32 != 0, is_near) << i;
         num_far += !is_near;
         if (!is_near) continue;
         EXPECT_EQ(in_32_bits[i].q[0], p.x);

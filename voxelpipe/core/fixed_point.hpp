@@ -101,8 +101,8 @@ struct snap_transform {
 // snap() in 32 bits, relative to the part's first voxel. Returns false if a coordinate of the whole grid reaches 2^30
 // units or is NaN; snap() then distinguishes these. An offset lies in the grid, so it is below 2^25, because F + L <=
 // 24; it is even, because F > 0.
-[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool snap_near(const snap_transform& t, float x, float y, float z,
-                                                           std::int32_t (&q)[3]) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool snap_int32(const snap_transform& t, float x, float y, float z,
+                                                            std::int32_t (&q)[3]) {
     const double a = exact::mul(exact::to_double(x) - t.origin[0], t.scale[0]);
     const double b = exact::mul(exact::to_double(y) - t.origin[1], t.scale[1]);
     const double c = exact::mul(exact::to_double(z) - t.origin[2], t.scale[2]);

@@ -97,17 +97,17 @@ private:
         const abuffer_call& call;
         list_buffers<Key, Payload> lists;
         scene_buffers buffers;
-        list_memory share;
+        list_memory list_scratch;
 
         counted_lists(const abuffer_call& c, arena& memory)
             : call(c), lists(take_lists<Key, Payload>(memory, num_voxels(c.g), c.limits.fragments)),
-              buffers(memory, c.draws), share(memory, c.num_primitives, c.limits.fragment_records) {}
+              buffers(memory, c.draws), list_scratch(memory, c.num_primitives, c.limits.fragment_records) {}
         template <coverage Rule>
         [[nodiscard]] fragment_lists<Key, Payload> launch(pipeline_state* state, cudaStream_t stream,
                                                           const output_pointers& outputs) const {
             const scene_type s = buffers.shade(call.draws, call.g, stream);
             end_stage(call.clock, &stage_times::vertex_shade);
-            return build_lists<Rule, first_value>(s, lists, share.with(state), state, call.limits, true, stream,
+            return build_lists<Rule, first_value>(s, lists, list_scratch.with(state), state, call.limits, true, stream,
                                                   call.clock, outputs);
         }
     };

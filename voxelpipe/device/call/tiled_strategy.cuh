@@ -31,7 +31,7 @@ struct tiled_strategy {
     typename Call::scene_buffers buffers;
     std::optional<tile_memory> tiles;
     list_buffers<Key, values> lists{};
-    std::optional<list_memory> share;
+    std::optional<list_memory> list_scratch;
 
     tiled_strategy(const Call& c, arena& memory) : call(c), buffers(memory, c.draws) {
         constexpr int log2_size = Call::policy.log2_tile_size;
@@ -42,7 +42,7 @@ struct tiled_strategy {
                           tuning::default_pairs_per_item(limits.tile_pairs));
         if constexpr (groups::has_ordered) {
             lists = take_lists<Key, values>(memory, num_voxels(c.plan.g), limits.fragments);
-            share.emplace(memory, c.plan.num_primitives, limits.fragment_records);
+            list_scratch.emplace(memory, c.plan.num_primitives, limits.fragment_records);
         }
     }
 
@@ -56,8 +56,8 @@ struct tiled_strategy {
         if constexpr (has_tiles) work = coarse_pass<Rule>(s.geo, *tiles, state, limits, stream, call.clock);
         fragment_lists<Key, values> ordered{};
         if constexpr (groups::has_ordered)
-            ordered = build_lists<Rule, all_values>(s, lists, share->with(state), state, limits, !has_tiles, stream,
-                                                    call.clock);
+            ordered = build_lists<Rule, all_values>(s, lists, list_scratch->with(state), state, limits, !has_tiles,
+                                                    stream, call.clock);
         call.clear_targets({}, state, stream);
         // Fragments and voxels are counted once: by the lists, if there are any.
         if constexpr (has_tiles)

@@ -108,18 +108,19 @@ template <class Key>
 
 // Arrays for counting and writing fragments.
 struct list_memory {
-    share_buffers share;
+    cell_buffers cells;
     void* storage; // of the scan
     std::size_t storage_bytes;
 
     list_memory(arena& memory, std::uint32_t num_primitives, unsigned long long record_capacity)
-        : share(take_share(memory, num_primitives, record_capacity)), storage_bytes(share_scan_bytes(num_primitives)) {
+        : cells(take_cell_buffers(memory, num_primitives, record_capacity)),
+          storage_bytes(cell_scan_bytes(num_primitives)) {
         storage = memory.take<std::byte>(storage_bytes);
     }
     [[nodiscard]] list_memory with(pipeline_state* state) const {
         list_memory m = *this;
-        m.share.num_records = &state->fragment_records;
-        m.share.num_cells = &state->list_fragments;
+        m.cells.num_records = &state->fragment_records;
+        m.cells.num_cells = &state->list_fragments;
         return m;
     }
 };
@@ -259,8 +260,8 @@ build_lists(const Scene& s, const list_buffers<Key, Payload>& b, const list_memo
             const output_pointers& outputs = {}) {
     const fragment_cells<Rule, Scene, Payload, MakePayload> op{
         s, b.keys[0], sizeof(Key) == sizeof(std::uint64_t), b.values[0], b.primitives, b.payloads, counts_triangles};
-    share_count(s.geo, op, m.share, state, m.storage, m.storage_bytes, stage::abuffer_emit, stream);
-    share_emit(s.geo, op, m.share, state, limits, stage::abuffer_emit, stream);
+    count_cells(s.geo, op, m.cells, state, m.storage, m.storage_bytes, stage::abuffer_emit, stream);
+    emit_cells(s.geo, op, m.cells, state, limits, stage::abuffer_emit, stream);
     end_stage(clock, &stage_times::fine_raster);
     return sort_lists(b, outputs, state, limits, stream, clock);
 }

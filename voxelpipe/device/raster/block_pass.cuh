@@ -48,7 +48,7 @@ struct block_warp {
     [[nodiscard]] __device__ VOXELPIPE_INLINE int32_triangle take(const triangle_queue& queue, int at) const {
         int32_triangle r;
         for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = queue.q[k][at];
-        r.is_near = true;
+        r.fits_int32 = true;
         r.find_box(call.in.fraction);
         return r;
     }
@@ -63,7 +63,7 @@ struct block_warp {
         if (has_next) corners.fetch(call.in.source, next);
         if (valid) {
             most = r.longest_side();
-            is_oversized = !r.is_near || most > max_group_side(call.in.fraction);
+            is_oversized = !r.fits_int32 || most > max_group_side(call.in.fraction);
             inside = r.inside(call.in.extent);
             if (!is_oversized && inside < 0 && r.template is_outside<Call::rule>(call.in.extent))
                 sink.drop(triangle_class::outside);

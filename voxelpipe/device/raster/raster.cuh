@@ -73,20 +73,20 @@ struct first_warp {
     static constexpr std::uint32_t not_close =
         1u << 31; // flag of a code, which has 16 bits: the previous batch was not close
 
-    // Draws, queues or defers the lane's triangle i, if valid; near() loads it. code: by warp_triangles, possibly with
-    // not_close. load_next() is called between coverage and blending, while few registers are in use.
-    template <class Near, class LoadNext>
-    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, std::uint32_t& code, bool valid, const Near& near,
+    // Draws, queues or defers the lane's triangle i, if valid; load() returns it. code: by warp_triangles, possibly
+    // with not_close. load_next() is called between coverage and blending, while few registers are in use.
+    template <class Load, class LoadNext>
+    __device__ VOXELPIPE_INLINE void batch(std::uint32_t i, std::uint32_t& code, bool valid, const Load& load,
                                            const LoadNext& load_next) {
         // Longest side of the bounding box of a triangle still to draw, oversized_side, or 0. An int instead of several
         // bools (see inside()).
         int side = 0, inside = 0;
         int32_triangle r;
         if (valid) {
-            r = near();
+            r = load();
             side = r.longest_side();
             inside = r.inside(call.in.extent);
-            if (!r.is_near || side > max_group_side(call.in.fraction)) {
+            if (!r.fits_int32 || side > max_group_side(call.in.fraction)) {
                 side = oversized_side;
             } else if (inside < 0 && r.template is_outside<Call::rule>(call.in.extent)) {
                 sink.drop(triangle_class::outside);
@@ -180,7 +180,7 @@ struct first_warp {
         const int at = wanted ? num_cubes + lane : 0;
         int32_triangle r;
         for (int k = 0; k < 9; ++k) r.q[k / 3][k % 3] = memory.thin.cubes.q[k][at];
-        r.is_near = true;
+        r.fits_int32 = true;
         r.find_box(call.in.fraction);
         emit_with_retry(sink, [&]() VOXELPIPE_INLINE_LAMBDA {
             if (!wanted) return;
@@ -205,8 +205,8 @@ struct first_warp {
             for (std::uint32_t first = begin, code = lane; first < num; first += step, code += 32) {
                 const std::uint32_t next = first + step + lane;
                 const glm::uvec3 index_of_second = load_index(call.in, next + step);
-                const auto near = [&]() VOXELPIPE_INLINE_LAMBDA { return make_near(call.in, corners); };
-                batch(first + lane, code, valid, near, [&]() VOXELPIPE_INLINE_LAMBDA {
+                const auto load = [&]() VOXELPIPE_INLINE_LAMBDA { return make_int32_triangle(call.in, corners); };
+                batch(first + lane, code, valid, load, [&]() VOXELPIPE_INLINE_LAMBDA {
                     valid = next < num && sink.check(index);
                     if (valid) corners = load_corners(call.in, index);
                 });
@@ -215,8 +215,8 @@ struct first_warp {
         } else {
             for (std::uint32_t first = begin, code = lane; first < num; first += step, code += 32) {
                 const glm::uvec3 next = load_index(call.in, first + step + lane);
-                const auto near = [&]() VOXELPIPE_INLINE_LAMBDA { return load_int32(call.in, index); };
-                batch(first + lane, code, first + lane < num && sink.check(index), near,
+                const auto load = [&]() VOXELPIPE_INLINE_LAMBDA { return load_int32(call.in, index); };
+                batch(first + lane, code, first + lane < num && sink.check(index), load,
                       []() VOXELPIPE_INLINE_LAMBDA {});
                 index = next;
             }

@@ -52,7 +52,7 @@ struct chunk_grid {
 };
 
 // Arrays of the two passes. counts and offsets have an element per primitive.
-struct share_buffers {
+struct cell_buffers {
     std::uint32_t* counts;
     unsigned long long* offsets;
     chunk_record* records;
@@ -62,9 +62,9 @@ struct share_buffers {
 };
 
 // The counters num_records and num_cells are left null.
-[[nodiscard]] inline share_buffers take_share(arena& memory, std::uint32_t num_primitives,
-                                              unsigned long long record_capacity) {
-    share_buffers b{};
+[[nodiscard]] inline cell_buffers take_cell_buffers(arena& memory, std::uint32_t num_primitives,
+                                                    unsigned long long record_capacity) {
+    cell_buffers b{};
     b.counts = memory.take<std::uint32_t>(num_primitives);
     b.offsets = memory.take<unsigned long long>(num_primitives);
     b.records = memory.take<chunk_record>(record_capacity);
@@ -93,10 +93,8 @@ struct cell_counts {
 //                                                             is the triangle's own
 //   emit(geometry, triangle, primitive, box, whole, offset)   stores the cells that count() counts, from offset on
 template <class Op>
-__global__ __launch_bounds__(threads_per_block,
-                             tuning::share_min_blocks) void share_count_small(const __grid_constant__ geometry geo,
-                                                                              const __grid_constant__ Op op,
-                                                                              share_buffers b, pipeline_state* state) {
+__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void count_small_kernel(
+    const __grid_constant__ geometry geo, const __grid_constant__ Op op, cell_buffers b, pipeline_state* state) {
     using core::triangle_class;
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     const bool valid = i < geo.num_primitives;
@@ -153,7 +151,7 @@ __global__ __launch_bounds__(threads_per_block,
 
 // Calls visit for each record, in a warp; each lane has one of its chunks.
 template <class Op, class Visit>
-__device__ void for_each_record(const geometry& geo, const Op& op, const share_buffers& b, Visit&& visit) {
+__device__ void for_each_record(const geometry& geo, const Op& op, const cell_buffers& b, Visit&& visit) {
     const unsigned long long num = *b.num_records < b.record_capacity ? *b.num_records : b.record_capacity;
     const unsigned long long warps = std::uint64_t{gridDim.x} * blockDim.x / 32;
     const unsigned lane = threadIdx.x % 32;
@@ -169,10 +167,8 @@ __device__ void for_each_record(const geometry& geo, const Op& op, const share_b
 }
 
 template <class Op>
-__global__ __launch_bounds__(threads_per_block,
-                             tuning::share_min_blocks) void share_count_large(const __grid_constant__ geometry geo,
-                                                                              const __grid_constant__ Op op,
-                                                                              share_buffers b, pipeline_state* state) {
+__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void count_large_kernel(
+    const __grid_constant__ geometry geo, const __grid_constant__ Op op, cell_buffers b, pipeline_state* state) {
     unsigned long long all = 0, discarded = 0;
     if (state->index_error == 0) {
         for_each_record(geo, op, b,
@@ -194,8 +190,8 @@ __global__ __launch_bounds__(threads_per_block,
 }
 
 template <class Op>
-__global__ __launch_bounds__(threads_per_block, tuning::share_min_blocks) void share_emit_small(
-    const __grid_constant__ geometry geo, const __grid_constant__ Op op, share_buffers b, const pipeline_state* state,
+__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void emit_small_kernel(
+    const __grid_constant__ geometry geo, const __grid_constant__ Op op, cell_buffers b, const pipeline_state* state,
     capacities limits) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i >= geo.num_primitives || has_failed(*state, limits) || b.counts[i] == 0) return;
@@ -211,8 +207,8 @@ __global__ __launch_bounds__(threads_per_block, tuning::share_min_blocks) void s
 // counts[i] is decremented to what remains of primitive i. A primitive's records take their offsets in any order: the
 // later stable sort by cell hides it, because a primitive meets a cell once.
 template <class Op>
-__global__ __launch_bounds__(threads_per_block, tuning::share_min_blocks) void share_emit_large(
-    const __grid_constant__ geometry geo, const __grid_constant__ Op op, share_buffers b, const pipeline_state* state,
+__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void emit_large_kernel(
+    const __grid_constant__ geometry geo, const __grid_constant__ Op op, cell_buffers b, const pipeline_state* state,
     capacities limits) {
     if (has_failed(*state, limits)) return;
     for_each_record(geo, op, b,
@@ -237,35 +233,35 @@ __global__ __launch_bounds__(threads_per_block, tuning::share_min_blocks) void s
 
 // Counts the cells of the large primitives, then computes the offsets of all.
 template <class Op>
-void share_count_rest(const geometry& geo, const Op& op, const share_buffers& b, pipeline_state* state,
-                      void* scan_storage, std::size_t scan_bytes, stage where, cudaStream_t stream) {
-    share_count_large<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state);
+void count_large_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state,
+                       void* scan_storage, std::size_t scan_bytes, stage where, cudaStream_t stream) {
+    count_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state);
     check(cudaGetLastError(), where);
     sum_counts(b.counts, b.offsets, geo.num_primitives, scan_storage, scan_bytes, where, stream);
 }
 
 // Counts the cells of every primitive and computes their offsets.
 template <class Op>
-void share_count(const geometry& geo, const Op& op, const share_buffers& b, pipeline_state* state, void* scan_storage,
+void count_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state, void* scan_storage,
                  std::size_t scan_bytes, stage where, cudaStream_t stream) {
-    share_count_small<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state);
+    count_small_kernel<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state);
     check(cudaGetLastError(), where);
-    share_count_rest(geo, op, b, state, scan_storage, scan_bytes, where, stream);
+    count_large_cells(geo, op, b, state, scan_storage, scan_bytes, where, stream);
 }
 
 template <class Op>
-void share_emit_rest(const geometry& geo, const Op& op, const share_buffers& b, const pipeline_state* state,
-                     const capacities& limits, stage where, cudaStream_t stream) {
-    share_emit_large<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
+void emit_large_cells(const geometry& geo, const Op& op, const cell_buffers& b, const pipeline_state* state,
+                      const capacities& limits, stage where, cudaStream_t stream) {
+    emit_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
     check(cudaGetLastError(), where);
 }
 
 template <class Op>
-void share_emit(const geometry& geo, const Op& op, const share_buffers& b, const pipeline_state* state,
+void emit_cells(const geometry& geo, const Op& op, const cell_buffers& b, const pipeline_state* state,
                 const capacities& limits, stage where, cudaStream_t stream) {
-    share_emit_small<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
+    emit_small_kernel<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
     check(cudaGetLastError(), where);
-    share_emit_rest(geo, op, b, state, limits, where, stream);
+    emit_large_cells(geo, op, b, state, limits, where, stream);
 }
 
 } // namespace voxelpipe::device

@@ -36,7 +36,7 @@ void fill_end(Key* keys, std::uint32_t* values, const unsigned long long* num_pa
               const pipeline_state* state, const capacities& limits, cudaStream_t stream);
 
 // Bytes of storage for sum_counts.
-VOXELPIPE_DECLARES_KERNELS [[nodiscard]] std::size_t share_scan_bytes(std::uint32_t num_primitives);
+VOXELPIPE_DECLARES_KERNELS [[nodiscard]] std::size_t cell_scan_bytes(std::uint32_t num_primitives);
 
 // Sets offsets[i] to the sum of the counts before i.
 VOXELPIPE_DECLARES_KERNELS void sum_counts(const std::uint32_t* counts, unsigned long long* offsets,

@@ -52,7 +52,7 @@ void fill_end(Key* keys, std::uint32_t* values, const unsigned long long* num_pa
                   values, num_pairs, capacity, state, limits);
 }
 
-VOXELPIPE_DEFINES_KERNELS std::size_t share_scan_bytes(std::uint32_t num_primitives) {
+VOXELPIPE_DEFINES_KERNELS std::size_t cell_scan_bytes(std::uint32_t num_primitives) {
     std::size_t bytes = 0;
     check(cub::DeviceScan::ExclusiveScan(nullptr, bytes, static_cast<const std::uint32_t*>(nullptr),
                                          static_cast<unsigned long long*>(nullptr), ::cuda::std::plus<>{}, 0ull,

@@ -123,7 +123,7 @@ __device__ VOXELPIPE_INLINE auto shade_small_fragment(const Scene& s, std::uint3
     tri.index = d.triangles[tri.triangle];
     const int fraction = s.geo.snap.fraction;
     const int32_triangle r = load_int32(raster_input<stored_source>{{d}, 0, fraction, s.geo.extent}, tri.index);
-    if (!AllSmall && (!r.is_near || r.longest_side() > core::small_voxels(fraction)))
+    if (!AllSmall && (!r.fits_int32 || r.longest_side() > core::small_voxels(fraction)))
         return shade_fragment_apart(s, id, x, y, z);
     const core::small_frame frame(r.relative(fraction), fraction);
     const auto p = core::to_uvw(frame.axis, x - r.lo[0], y - r.lo[1], z - r.lo[2]);

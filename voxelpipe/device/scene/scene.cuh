@@ -21,19 +21,19 @@ namespace voxelpipe::device {
 // 16-byte load instead of three of 8.
 struct __align__(16) int32_position {
     std::int32_t q[3];
-    std::uint32_t is_near; // 0 if q is not valid
+    std::uint32_t fits_int32; // 0 if q is not valid
 
     [[nodiscard]] VOXELPIPE_HD static int32_position of(const core::snapped_position& p) {
         constexpr std::int64_t limit = std::int64_t{1} << 30;
-        const bool near =
+        const bool fits =
             p.x <= limit && p.x >= -limit && p.y <= limit && p.y >= -limit && p.z <= limit && p.z >= -limit;
-        return {{static_cast<std::int32_t>(p.x), static_cast<std::int32_t>(p.y), static_cast<std::int32_t>(p.z)}, near};
+        return {{static_cast<std::int32_t>(p.x), static_cast<std::int32_t>(p.y), static_cast<std::int32_t>(p.z)}, fits};
     }
 };
 // The output positions of vertex_shade, in both forms.
 struct vertex_positions {
     core::snapped_position* exact;
-    int32_position* near;
+    int32_position* int32;
 
     [[nodiscard]] static vertex_positions take(arena& memory, std::size_t num_vertices) {
         core::snapped_position* const exact = memory.take<core::snapped_position>(num_vertices);
@@ -41,7 +41,7 @@ struct vertex_positions {
     }
     // The positions from this vertex on. Stays null if the arena only adds up bytes.
     [[nodiscard]] vertex_positions from(std::size_t vertex) const {
-        return exact == nullptr ? *this : vertex_positions{exact + vertex, near + vertex};
+        return exact == nullptr ? *this : vertex_positions{exact + vertex, int32 + vertex};
     }
 };
 

@@ -41,7 +41,7 @@ struct shading_source {
         return core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result).position;
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool int32_position(const loaded& p, std::int32_t (&q)[3]) const {
-        return core::snap_near(snap, p.x, p.y, p.z, q);
+        return core::snap_int32(snap, p.x, p.y, p.z, q);
     }
     [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
         const glm::vec3 p = shade(vertex);
@@ -56,16 +56,16 @@ struct stored_source {
 
     using loaded = device::int32_position;
     [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(std::uint32_t vertex) const {
-        return geometry.positions.near[vertex];
+        return geometry.positions.int32[vertex];
     }
     using stored = loaded;
     [[nodiscard]] __device__ VOXELPIPE_INLINE const stored* address(std::uint32_t vertex) const {
-        return geometry.positions.near + vertex;
+        return geometry.positions.int32 + vertex;
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE static loaded load(const stored& position) { return position; }
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool int32_position(const loaded& p, std::int32_t (&q)[3]) const {
         for (int k = 0; k < 3; ++k) q[k] = p.q[k];
-        return p.is_near != 0;
+        return p.fits_int32 != 0;
     }
     [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
         return geometry.positions.exact[vertex];
@@ -98,7 +98,7 @@ struct int32_triangle {
     std::int32_t lo[3];   // lowest voxel of the bounding box
     std::int32_t hi[3];   // highest voxel
     int last[3];          // highest voxel, counted from the lowest
-    bool is_near;         // otherwise no other member is valid
+    bool fits_int32;      // otherwise no other member is valid
 
     __device__ VOXELPIPE_INLINE void find_box(int fraction) {
         for (int k = 0; k < 3; ++k) {
@@ -157,18 +157,19 @@ template <class Source>
     return {{call.source.load(index.x), call.source.load(index.y), call.source.load(index.z)}};
 }
 template <class Source>
-[[nodiscard]] __device__ VOXELPIPE_INLINE int32_triangle make_near(const raster_input<Source>& call,
-                                                                   const loaded_corners<Source>& corners) {
+[[nodiscard]] __device__ VOXELPIPE_INLINE int32_triangle make_int32_triangle(const raster_input<Source>& call,
+                                                                             const loaded_corners<Source>& corners) {
     int32_triangle r;
-    r.is_near = call.source.int32_position(corners.of[0], r.q[0]) & call.source.int32_position(corners.of[1], r.q[1]) &
-                call.source.int32_position(corners.of[2], r.q[2]);
+    r.fits_int32 = call.source.int32_position(corners.of[0], r.q[0]) &
+                   call.source.int32_position(corners.of[1], r.q[1]) &
+                   call.source.int32_position(corners.of[2], r.q[2]);
     r.find_box(call.fraction);
     return r;
 }
 template <class Source>
 [[nodiscard]] __device__ VOXELPIPE_INLINE int32_triangle load_int32(const raster_input<Source>& call,
                                                                     const glm::uvec3& index) {
-    return make_near(call, load_corners(call, index));
+    return make_int32_triangle(call, load_corners(call, index));
 }
 
 // Copy a word, or four if both addresses are multiples of 16 bytes, to an address in shared memory, asynchronously and
@@ -214,7 +215,7 @@ struct next_corners {
             memcpy(&position, mine, sizeof(position));
             corners.of[v] = call.source.load(position);
         }
-        return make_near(call, corners);
+        return make_int32_triangle(call, corners);
     }
 };
 

@@ -15,7 +15,7 @@ namespace voxelpipe::device {
 template <class Mesh, class VertexShader, class Varyings>
 __global__ void vertex_shade_kernel(const __grid_constant__ Mesh mesh, const __grid_constant__ VertexShader shader,
                                     const __grid_constant__ core::snap_transform snap, std::uint32_t draw,
-                                    core::snapped_position* positions, int32_position* near_positions,
+                                    core::snapped_position* positions, int32_position* int32_positions,
                                     Varyings* varyings) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i >= mesh.positions.size()) return;
@@ -24,7 +24,7 @@ __global__ void vertex_shade_kernel(const __grid_constant__ Mesh mesh, const __g
     const auto& o = core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result);
     const core::snapped_position p = core::snap(snap, o.position.x, o.position.y, o.position.z);
     positions[i] = p;
-    near_positions[i] = int32_position::of(p);
+    int32_positions[i] = int32_position::of(p);
     if constexpr (!std::is_empty_v<Varyings>) varyings[i] = o.varyings;
 }
 
@@ -35,7 +35,7 @@ void vertex_shade(const Mesh& mesh, const VertexShader& shader, const core::snap
     if (mesh.positions.size() == 0) return;
     vertex_shade_kernel<Mesh, VertexShader, Varyings>
         <<<num_blocks(mesh.positions.size()), threads_per_block, 0, stream>>>(mesh, shader, snap, draw, positions.exact,
-                                                                              positions.near, varyings);
+                                                                              positions.int32, varyings);
     check(cudaGetLastError(), stage::vertex_shade);
 }
 

@@ -138,7 +138,7 @@ struct solid_lists {
         m.entries = entries.take(a);
         const auto capacity = entries.plan.limits.fragments;
         m.counts = row_counts::take(a, capacity);
-        m.storage_bytes = share_scan_bytes(static_cast<std::uint32_t>(capacity));
+        m.storage_bytes = cell_scan_bytes(static_cast<std::uint32_t>(capacity));
         m.storage = a.take<std::byte>(m.storage_bytes);
         return m;
     }

@@ -105,7 +105,7 @@ struct cover_memory {
     word* mask = nullptr;            // null: no cover is wanted
     pipeline_state* state = nullptr; // of the raster, which counts triangles in its own way
     deferred_triangles deferred{};
-    share_buffers share{}; // where the 32-bit raster does not serve
+    cell_buffers cells{}; // where the 32-bit raster does not serve
 
     [[nodiscard]] static bool is_listed(std::uint64_t num_triangles, const grid& g) {
         return is_listable(num_triangles, core::make_snap_transform(g).fraction, g.extent);
@@ -118,7 +118,7 @@ struct cover_memory {
         if (is_listed(max_triangles, g))
             m.deferred = deferred_triangles::take(memory, max_triangles);
         else
-            m.share = take_share(memory, static_cast<std::uint32_t>(max_triangles), limits.fragment_records);
+            m.cells = take_cell_buffers(memory, static_cast<std::uint32_t>(max_triangles), limits.fragment_records);
         return m;
     }
     // Once a call.
@@ -150,14 +150,14 @@ struct cover_memory {
         one.many = nullptr;
         one.num_draws = 1;
         one.num_primitives = num_triangles;
-        share_buffers b = share;
+        cell_buffers b = cells;
         b.num_records = &call_state->fragment_records;
         b.num_cells = &state->list_fragments;
         check(cudaMemsetAsync(b.num_records, 0, sizeof(*b.num_records), stream), stage::fine_raster);
         const cover_cells op{mask, g.extent};
-        share_count_small<<<num_blocks(num_triangles), threads_per_block, 0, stream>>>(one, op, b, state);
+        count_small_kernel<<<num_blocks(num_triangles), threads_per_block, 0, stream>>>(one, op, b, state);
         check(cudaGetLastError(), stage::fine_raster);
-        share_count_large<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(one, op, b, state);
+        count_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(one, op, b, state);
         check(cudaGetLastError(), stage::fine_raster);
     }
     // Appends what is set, as the cover of a body.

@@ -29,8 +29,8 @@ struct shaded_triangles {
         const glm::uvec3 index = source.triangle(i);
         return {index, index.x < num_vertices && index.y < num_vertices && index.z < num_vertices};
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool near(const located&, std::uint32_t vertex,
-                                                        std::int32_t (&q)[3]) const {
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool load_int32(const located&, std::uint32_t vertex,
+                                                              std::int32_t (&q)[3]) const {
         return source.int32_position(source.load(vertex), q);
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE core::snapped_position exact(const located&, std::uint32_t vertex) const {
@@ -61,11 +61,11 @@ struct stored_triangles {
         t.positions = d.positions;
         return t;
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool near(const located& t, std::uint32_t vertex,
-                                                               std::int32_t (&q)[3]) {
-        const int32_position p = t.positions.near[vertex];
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static bool load_int32(const located& t, std::uint32_t vertex,
+                                                                     std::int32_t (&q)[3]) {
+        const int32_position p = t.positions.int32[vertex];
         for (int k = 0; k < 3; ++k) q[k] = p.q[k];
-        return p.is_near != 0;
+        return p.fits_int32 != 0;
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE static core::snapped_position exact(const located& t,
                                                                                   std::uint32_t vertex) {
@@ -104,8 +104,8 @@ struct solid_triangle {
 
 // An interval of an axis in 32 bits: whether the closed voxels from `low` to `high` meet 0 .. extent - 1, and the
 // centres between them, cut to that.
-[[nodiscard]] __device__ VOXELPIPE_INLINE bool cut_near(std::int32_t low, std::int32_t high, int fraction, int extent,
-                                                        core::index_span& centres) {
+[[nodiscard]] __device__ VOXELPIPE_INLINE bool cut_int32(std::int32_t low, std::int32_t high, int fraction, int extent,
+                                                         core::index_span& centres) {
     const std::int32_t up = (1 << fraction) - 1 - (1 << (fraction - 1)); // of a ceiling, less half a voxel
     const std::int32_t first = (low + up) >> fraction, last = ((high + up) >> fraction) - 1;
     centres = {first > 0 ? first : 0, last < extent - 1 ? last : extent - 1};
@@ -123,13 +123,13 @@ template <class Source>
     t.draw = at.draw;
     if (!t.index_ok) return t;
     std::int32_t q[3][3];
-    const bool a = source.near(at, at.index.x, q[0]), b = source.near(at, at.index.y, q[1]),
-               c = source.near(at, at.index.z, q[2]);
+    const bool a = source.load_int32(at, at.index.x, q[0]), b = source.load_int32(at, at.index.y, q[1]),
+               c = source.load_int32(at, at.index.z, q[2]);
     if (a && b && c) {
-        const bool meets_y = cut_near(core::min3(q[0][1], q[1][1], q[2][1]), core::max3(q[0][1], q[1][1], q[2][1]),
-                                      grid.fraction, grid.extent.y, t.rows.u);
-        const bool meets_z = cut_near(core::min3(q[0][2], q[1][2], q[2][2]), core::max3(q[0][2], q[1][2], q[2][2]),
-                                      grid.fraction, grid.extent.z, t.rows.v);
+        const bool meets_y = cut_int32(core::min3(q[0][1], q[1][1], q[2][1]), core::max3(q[0][1], q[1][1], q[2][1]),
+                                       grid.fraction, grid.extent.y, t.rows.u);
+        const bool meets_z = cut_int32(core::min3(q[0][2], q[1][2], q[2][2]), core::max3(q[0][2], q[1][2], q[2][2]),
+                                       grid.fraction, grid.extent.z, t.rows.v);
         if (!meets_y || !meets_z) t.kind = triangle_class::outside;
         if (!t.rows.empty())
             for (int v = 0; v < 3; ++v) t.p[v] = {q[v][0], q[v][1], q[v][2]};

@@ -49,7 +49,7 @@ template <int Log2Size, class Framebuffer>
 // Uses limits.tile_pairs and limits.tile_records.
 struct tile_memory {
     core::tile_grid tiles;
-    share_buffers share;
+    cell_buffers cells;
     std::uint32_t *keys[2], *primitives[2];
     split_buffers split{};
     word* images;
@@ -60,7 +60,7 @@ struct tile_memory {
     // image_words: max_image_words of the fine passes to come.
     tile_memory(arena& memory, const core::tile_grid& tiles_, std::uint32_t num_primitives, const capacities& limits,
                 int image_words, std::uint32_t pairs_per_item)
-        : tiles(tiles_), share(take_share(memory, num_primitives, limits.tile_records)),
+        : tiles(tiles_), cells(take_cell_buffers(memory, num_primitives, limits.tile_records)),
           bits(key_bits(tiles_.count())) {
         for (int i = 0; i < 2; ++i) {
             keys[i] = memory.take<std::uint32_t>(limits.tile_pairs);
@@ -71,7 +71,7 @@ struct tile_memory {
         split.items = memory.take<work_item>(max_items(limits.tile_pairs, tiles.count(), pairs_per_item));
         split.splits = memory.take<split_tile>(num_images);
         images = memory.take<word>(num_images * static_cast<std::uint64_t>(image_words));
-        storage_bytes = std::max(sort_bytes<std::uint32_t>(limits.tile_pairs, bits), share_scan_bytes(num_primitives));
+        storage_bytes = std::max(sort_bytes<std::uint32_t>(limits.tile_pairs, bits), cell_scan_bytes(num_primitives));
         storage = memory.take<std::byte>(storage_bytes);
     }
 };

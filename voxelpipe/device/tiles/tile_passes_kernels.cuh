@@ -70,14 +70,14 @@ VOXELPIPE_DEFINES_KERNELS void restart_items(pipeline_state* state, cudaStream_t
 template <coverage Rule>
 tile_work coarse_pass(const geometry& geo, const tile_memory& m, pipeline_state* state, const capacities& limits,
                       cudaStream_t stream, stage_clock* clock) {
-    share_buffers share = m.share;
-    share.num_records = &state->tile_records;
-    share.num_cells = &state->tile_pairs;
+    cell_buffers cells = m.cells;
+    cells.num_records = &state->tile_records;
+    cells.num_cells = &state->tile_pairs;
     const tile_cells<Rule> op{m.tiles, m.keys[0], m.primitives[0]};
-    share_count(geo, op, share, state, m.storage, m.storage_bytes, stage::coarse_raster, stream);
-    share_emit(geo, op, share, state, limits, stage::coarse_raster, stream);
+    count_cells(geo, op, cells, state, m.storage, m.storage_bytes, stage::coarse_raster, stream);
+    emit_cells(geo, op, cells, state, limits, stage::coarse_raster, stream);
     end_stage(clock, &stage_times::coarse_raster);
-    fill_end(m.keys[0], m.primitives[0], share.num_cells, limits.tile_pairs, state, limits, stream);
+    fill_end(m.keys[0], m.primitives[0], cells.num_cells, limits.tile_pairs, state, limits, stream);
     const int at = sort_by_cell(m.keys, m.primitives, limits.tile_pairs, m.bits, m.storage, m.storage_bytes,
                                 stage::tile_sort, stream);
     end_stage(clock, &stage_times::tile_sort);
