@@ -5,6 +5,7 @@
 // voxelize_solid on a GPU: cuda_backend::run_solid. Its kernels are compiled by programs that call it, and by no other.
 
 #include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/device/solid/kernel_instances.cuh>
 #include <voxelpipe/device/solid/list_rows.cuh>
 #include <voxelpipe/device/solid/solid_call.cuh>
 #include <voxelpipe/device/solid/solid_cones.cuh>

@@ -210,11 +210,11 @@ private:
                     cudaStream_t stream) const {
         m.cover.clear(plan.g, stream);
         for (std::size_t d = first; d < last; ++d)
-            m.cover.raster(geometry_of[d], static_cast<std::uint32_t>(draws[d].mesh.triangles.size()), geo, plan.g,
-                           state, plan.limits, stream);
+            raster_cover(m.cover, geometry_of[d], static_cast<std::uint32_t>(draws[d].mesh.triangles.size()), geo,
+                         plan.g, state, stream);
         if (!cones.empty())
-            m.cover.raster(geometry_of[draws.size() + body], cones[body].num_triangles, geo, plan.g, state, plan.limits,
-                           stream);
+            raster_cover(m.cover, geometry_of[draws.size() + body], cones[body].num_triangles, geo, plan.g, state,
+                         stream);
     }
     // Bodies that repair::exterior or repair::vote decides, as runs of cover. Waits.
     void emit_sets(const memory& m, const crossing_list& list, pipeline_state* state, cudaStream_t stream) const {
@@ -224,18 +224,17 @@ private:
         for_each_body([&](std::uint32_t body, std::size_t first, std::size_t last) {
             cover_body(m, geo, geometry_of, body, first, last, state, stream);
             if (plan.options.repair == repair::exterior) {
-                m.exterior.close(m.cover.mask, stream);
+                fill_to_exterior(m.exterior, m.cover.mask, stream);
             } else {
                 const std::uint32_t begin = geometry_of[first].first_primitive,
                                     end = last < draws.size() ? geometry_of[last].first_primitive : plan.num_primitives;
-                m.vote.vote(stored_triangles{geo, plan.num_primitives, plan.num_primitives}, begin, end - begin, rows(),
-                            m.cover.mask, state, stream);
+                add_votes(m.vote, stored_triangles{geo, plan.num_primitives, plan.num_primitives}, begin, end - begin,
+                          rows(), m.cover.mask, state, stream);
             }
-            m.cover.list(rows(), list, body, state, stream);
+            list_cover(m.cover, rows(), list, body, state, stream);
         });
         if (plan.options.repair == repair::exterior) {
-            take_counts_kernel<pipeline_state><<<1, 1, 0, stream>>>(m.cover.state, state);
-            check(cudaGetLastError(), stage::fine_raster);
+            take_counts(m.cover, state, stream);
         }
         end_stage(clock, &stage_times::fine_raster);
     }
@@ -244,7 +243,7 @@ private:
         m.cover.start(stream);
         for_each_body([&](std::uint32_t body, std::size_t first, std::size_t last) {
             cover_body(m, geo, geometry_of, body, first, last, state, stream);
-            m.cover.list(rows(), list, body, state, stream);
+            list_cover(m.cover, rows(), list, body, state, stream);
         });
         end_stage(clock, &stage_times::fine_raster);
     }

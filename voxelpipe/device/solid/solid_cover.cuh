@@ -99,13 +99,13 @@ __global__ void take_counts_kernel(const State* from, State* to) {
     to->index_error |= from->index_error;
 }
 
-// Memory for the cover of one body after the other. Members that launch are templates, so that programs without solids
-// compile none of their kernels.
+// Memory for the cover of one body after the other.
 struct cover_memory {
     word* mask = nullptr;            // null: no cover is wanted
     pipeline_state* state = nullptr; // of the raster, which counts triangles in its own way
     deferred_triangles deferred{};
     cell_buffers cells{}; // where the 32-bit raster does not serve
+    bool uses_raster = true;
 
     [[nodiscard]] static bool is_listed(std::uint64_t num_triangles, const grid& g) {
         return is_listable(num_triangles, core::make_snap_transform(g).fraction, g.extent);
@@ -115,7 +115,8 @@ struct cover_memory {
         cover_memory m;
         m.mask = memory.take<word>(mask_target::map::elements(g.extent));
         m.state = memory.take<pipeline_state>(1);
-        if (is_listed(max_triangles, g))
+        m.uses_raster = is_listed(max_triangles, g);
+        if (m.uses_raster)
             m.deferred = deferred_triangles::take(memory, max_triangles);
         else
             m.cells = take_cell_buffers(memory, static_cast<std::uint32_t>(max_triangles), limits.fragment_records);
@@ -129,45 +130,61 @@ struct cover_memory {
         check(cudaMemsetAsync(mask, 0, mask_target::map::elements(g.extent) * sizeof(word), stream),
               stage::fine_raster);
     }
-    // Sets the bits of a draw's cover. of_draw: its geometry by itself. call_state: the call's, for the records that
-    // are wanted.
-    template <int = 0>
-    void raster(const draw_geometry& of_draw, std::uint32_t num_triangles, const geometry& all, const grid& g,
-                pipeline_state* call_state, const capacities& limits, cudaStream_t stream) const {
-        if (num_triangles == 0) return;
-        check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream), stage::fine_raster);
-        if (is_listed(deferred.capacity, g)) {
-            const raster_call<coverage::conservative, stored_source, mask_output> call{
-                {{of_draw}, num_triangles, all.snap.fraction, g.extent},
-                {mask, g.extent, of_draw.num_vertices, state, false},
-                deferred.with(state)};
-            launch_raster(call, state, stage::fine_raster, stream);
-            return;
-        }
-        geometry one = all;
-        one.one = of_draw;
-        one.one.first_primitive = 0;
-        one.many = nullptr;
-        one.num_draws = 1;
-        one.num_primitives = num_triangles;
-        cell_buffers b = cells;
-        b.num_records = &call_state->fragment_records;
-        b.num_cells = &state->list_fragments;
-        check(cudaMemsetAsync(b.num_records, 0, sizeof(*b.num_records), stream), stage::fine_raster);
-        const cover_cells op{mask, g.extent};
-        count_small_kernel<<<num_blocks(num_triangles), threads_per_block, 0, stream>>>(one, op, b, state);
-        check(cudaGetLastError(), stage::fine_raster);
-        count_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(one, op, b, state);
-        check(cudaGetLastError(), stage::fine_raster);
-    }
-    // Appends what is set, as the cover of a body.
-    template <int = 0>
-    void list(const row_grid& grid, const crossing_list& to, std::uint32_t body, pipeline_state* call_state,
-              cudaStream_t stream) const {
-        const std::uint64_t words = mask_target::map::elements(grid.extent);
-        launch_behind(list_cover_kernel<pipeline_state>, fill_device(words), threads_per_block, stream,
-                      stage::fine_raster, static_cast<const word*>(mask), grid, to, body, call_state);
-    }
 };
+
+// Of one thread: the call runs again with room for as many records as the largest draw has wanted.
+template <class State>
+__global__ void note_records_kernel(const State* of_draw, State* of_call) {
+    if (of_draw->fragment_records > of_call->fragment_records) of_call->fragment_records = of_draw->fragment_records;
+}
+
+// Sets the bits of a draw's cover. of_draw: its geometry by itself. state: the call's.
+template <int = 0>
+void raster_cover(const cover_memory& m, const draw_geometry& of_draw, std::uint32_t num_triangles, const geometry& all,
+                  const grid& g, pipeline_state* state, cudaStream_t stream) {
+    if (num_triangles == 0) return;
+    check(cudaMemsetAsync(&m.state->deferred, 0, sizeof(m.state->deferred), stream), stage::fine_raster);
+    if (m.uses_raster) {
+        const raster_call<coverage::conservative, stored_source, mask_output> call{
+            {{of_draw}, num_triangles, all.snap.fraction, g.extent},
+            {m.mask, g.extent, of_draw.num_vertices, m.state, false},
+            m.deferred.with(m.state)};
+        launch_raster(call, m.state, stage::fine_raster, stream);
+        return;
+    }
+    geometry one = all;
+    one.one = of_draw;
+    one.one.first_primitive = 0;
+    one.many = nullptr;
+    one.num_draws = 1;
+    one.num_primitives = num_triangles;
+    cell_buffers b = m.cells;
+    b.num_records = &m.state->fragment_records;
+    b.num_cells = &m.state->list_fragments;
+    check(cudaMemsetAsync(b.num_records, 0, sizeof(*b.num_records), stream), stage::fine_raster);
+    const cover_cells op{m.mask, g.extent};
+    count_small_kernel<<<num_blocks(num_triangles), threads_per_block, 0, stream>>>(one, op, b, m.state);
+    check(cudaGetLastError(), stage::fine_raster);
+    count_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(one, op, b, m.state);
+    check(cudaGetLastError(), stage::fine_raster);
+    note_records_kernel<pipeline_state><<<1, 1, 0, stream>>>(m.state, state);
+    check(cudaGetLastError(), stage::fine_raster);
+}
+
+// Appends what is set, as the cover of a body.
+template <int = 0>
+void list_cover(const cover_memory& m, const row_grid& grid, const crossing_list& to, std::uint32_t body,
+                pipeline_state* state, cudaStream_t stream) {
+    const std::uint64_t words = mask_target::map::elements(grid.extent);
+    launch_behind(list_cover_kernel<pipeline_state>, fill_device(words), threads_per_block, stream, stage::fine_raster,
+                  static_cast<const word*>(m.mask), grid, to, body, state);
+}
+
+// Of a call without crossings.
+template <int = 0>
+void take_counts(const cover_memory& m, pipeline_state* state, cudaStream_t stream) {
+    take_counts_kernel<pipeline_state><<<1, 1, 0, stream>>>(m.state, state);
+    check(cudaGetLastError(), stage::fine_raster);
+}
 
 } // namespace voxelpipe::device

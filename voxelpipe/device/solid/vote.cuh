@@ -171,27 +171,31 @@ struct vote_memory {
         m.masks = parity_masks::take(memory, m.box);
         return m;
     }
-    // Joins what the triangles of a body vote for to the mask of its cover.
-    template <int = 0>
-    void vote(const stored_triangles& source, std::uint32_t first_triangle, std::uint32_t num_triangles,
-              const row_grid& grid, word* mask, pipeline_state* state, cudaStream_t stream) const {
-        masks.clear(box, stream);
-        const unsigned blocks = fill_device(std::uint64_t{num_triangles} * 32, 4);
-        const auto toggle = [&]<int Axis>() {
-            toggle_along_kernel<Axis, pipeline_state><<<blocks, threads_per_block, 0, stream>>>(
-                source, first_triangle, num_triangles, grid, box, masks.inside[Axis], masks.open[Axis], state);
-            check(cudaGetLastError(), stage::coarse_raster);
-        };
-        toggle.template operator()<0>();
-        toggle.template operator()<1>();
-        toggle.template operator()<2>();
-        const unsigned for_words = fill_device(box.num_words(), 16);
-        accumulate_rows_kernel<word><<<for_words, threads_per_block, 0, stream>>>(masks.inside[0], box);
-        for (const int axis : {1, 2})
-            accumulate_lines_kernel<word><<<for_words, threads_per_block, 0, stream>>>(masks.inside[axis], box, axis);
-        count_votes_kernel<pipeline_state><<<for_words, threads_per_block, 0, stream>>>(masks, box, mask, state);
-        check(cudaGetLastError(), stage::fine_raster);
-    }
 };
+
+// Joins what the triangles of a body vote for to the mask of its cover.
+template <int = 0>
+void add_votes(const vote_memory& m, const stored_triangles& source, std::uint32_t first_triangle,
+               std::uint32_t num_triangles, const row_grid& grid, word* mask, pipeline_state* state,
+               cudaStream_t stream) {
+    const bit_box& box = m.box;
+    const parity_masks& masks = m.masks;
+    masks.clear(box, stream);
+    const unsigned blocks = fill_device(std::uint64_t{num_triangles} * 32, 4);
+    const auto toggle = [&]<int Axis>() {
+        toggle_along_kernel<Axis, pipeline_state><<<blocks, threads_per_block, 0, stream>>>(
+            source, first_triangle, num_triangles, grid, box, masks.inside[Axis], masks.open[Axis], state);
+        check(cudaGetLastError(), stage::coarse_raster);
+    };
+    toggle.template operator()<0>();
+    toggle.template operator()<1>();
+    toggle.template operator()<2>();
+    const unsigned for_words = fill_device(box.num_words(), 16);
+    accumulate_rows_kernel<word><<<for_words, threads_per_block, 0, stream>>>(masks.inside[0], box);
+    for (const int axis : {1, 2})
+        accumulate_lines_kernel<word><<<for_words, threads_per_block, 0, stream>>>(masks.inside[axis], box, axis);
+    count_votes_kernel<pipeline_state><<<for_words, threads_per_block, 0, stream>>>(masks, box, mask, state);
+    check(cudaGetLastError(), stage::fine_raster);
+}
 
 } // namespace voxelpipe::device
