@@ -7,6 +7,7 @@
 #   scripts/bench.sh [OPTION...]             the CPU table
 #   scripts/bench.sh --gpu [OPTION...]       the GPU table (needs nvcc and a GPU)
 #   scripts/bench.sh --scaling [OPTION...]   the GPU's scaling curves, and plots of what is in build/bench-gpu/bench/results
+#   scripts/bench.sh --solids [OPTION...]    solids into bits on the GPU
 #   scripts/bench.sh --tune [OPTION...]      sweeps the fine raster's policies on the GPU
 #   scripts/bench.sh --plot [FILE|FOLDER]    plots of that in build/plots, e.g. of records/h200; by default those of --scaling
 #   scripts/bench.sh --nvbench [OPTION...]   the table's cells under NVBench (its options; caches are flushed between calls)
@@ -52,6 +53,10 @@ case ${1:-} in
         build_gpu bench_gpu_scaling
         "$gpu_folder/bench/gpu/bench_gpu_scaling" "${@:2}"
         plot "$results" "$results"
+        ;;
+    --solids)
+        build_gpu bench_gpu_solids
+        "$gpu_folder/bench/gpu/bench_gpu_solids" --out "$results" "${@:2}"
         ;;
     --tune)
         build_gpu bench_gpu_tune
