@@ -8,6 +8,7 @@
 // unset).
 
 #include "library.hpp"
+#include "solid_oracle.hpp"
 
 #include <glm/vec3.hpp>
 
@@ -233,10 +234,53 @@ void check(const input& in) {
     require(s.counts.fragments == fragments, "fragments");
 }
 
+// The input as a solid: some of its voxels by the oracle's rays towards the low end of their rows, and cones that leave
+// no row open.
+void check_solid(const input& in) {
+    vp::cpu_backend be(in.threads);
+    const vp::grid g = oracle::as_library(in.g, in.p);
+    const vp::mesh_view<> mesh{in.positions, in.triangles};
+    using bits = vp::target<vp::bit, vp::blend::bit_or>;
+    vp::framebuffer<vp::cpu_backend, bits> fb{be, g.extent};
+    const auto draw = [&](const vp::solid_options& options) {
+        const vp::status s = vp::voxelize_solid(be, mesh, g, vp::passthrough{}, vp::constant(true), fb, options);
+        require(may_be(s.code, in), "a solid's status that this input does not call for");
+        return s;
+    };
+    const auto rule = static_cast<vp::fill_rule>(in.triangles.size() % 3);
+    if (!draw({.repair = vp::repair::close_holes}).ok()) return;
+    require(draw({.rule = rule, .repair = vp::repair::close_holes}).solid.open_rows == 0, "an open row behind cones");
+    const vp::status s = draw({.rule = rule});
+    require(s.ok(), "the same input fails");
+
+    std::vector<oracle::snapped_triangle> snapped;
+    for (const glm::uvec3& t : in.triangles) {
+        oracle::world_triangle w{};
+        for (int v = 0; v < 3; ++v)
+            for (int axis = 0; axis < 3; ++axis) w.v[v][axis] = in.positions[t[v]][axis];
+        snapped.push_back(oracle::snap(in.g, w.v));
+    }
+    const oracle::winding_oracle oracle(oracle::fraction_bits(in.g), snapped, {-1, 0, 0});
+    const auto host = vp::get<0>(fb).to_host_target(be);
+    const int cells = g.extent.x * g.extent.y * g.extent.z, step = cells / 48 + 1;
+    for (int i = 0; i < cells; i += step) {
+        const int x = i % g.extent.x, y = i / g.extent.x % g.extent.y, z = i / g.extent.x / g.extent.y;
+        const std::int64_t winding = oracle.winding({x + in.p.begin[0], y + in.p.begin[1], z + in.p.begin[2]});
+        const bool inside = rule == vp::fill_rule::even_odd  ? winding % 2 != 0
+                            : rule == vp::fill_rule::nonzero ? winding != 0
+                                                             : winding > 0;
+        require(host(x, y, z) == inside, "a voxel of a solid");
+        if (rule != vp::fill_rule::even_odd)
+            require(static_cast<std::uint64_t>(winding < 0 ? -winding : winding) <= s.solid.max_winding, "max_winding");
+    }
+}
+
 } // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    check(parse(data, size));
+    const input in = parse(data, size);
+    check(in);
+    check_solid(in);
     return 0;
 }
 
@@ -277,6 +321,7 @@ void random_inputs(std::uint64_t count) {
         const input in = parse(bytes.data(), bytes.size());
         drawn += may_be(vp::status_code::ok, in);
         check(in);
+        check_solid(in);
     }
     std::printf("%llu random inputs, %llu of them fit to be drawn\n", static_cast<unsigned long long>(count),
                 static_cast<unsigned long long>(drawn));
