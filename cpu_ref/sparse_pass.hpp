@@ -265,7 +265,8 @@ template <class Backend, class Source, class... Targets>
         return failed;
     }
     for (const auto& w : scratch) {
-        for (const counters& c : {w->shaded.counts, w->constant.counts}) {
+        const counters both[] = {w->shaded.counts, w->constant.counts}; // named for nvcc
+        for (const counters& c : both) {
             result.counts.fragments += c.fragments;
             result.counts.fragments_discarded += c.fragments_discarded;
             result.counts.voxels += c.voxels;
