@@ -50,8 +50,8 @@ int main() {
                     static_cast<unsigned long long>(s.counts.fragments));
     // end snippet
     const auto ids = vp::get<0>(parts).to_host_target(backend);
-    good = good && s.counts.voxels == 14 * 14 * 4 + 4 * 4 * 10 && s.counts.fragments == 14 * 14 * 4 + 4 * 4 * 12 &&
-           ids(8, 8, 4) == 3 && ids(2, 2, 4) == 7;
+    good = good && s.counts.voxels == 14U * 14U * 4U + 4U * 4U * 10U &&
+           s.counts.fragments == 14U * 14U * 4U + 4U * 4U * 12U && ids(8, 8, 4) == 3 && ids(2, 2, 4) == 7;
 
     // snippet: holes
     std::vector<glm::uvec3> with_a_hole(post.triangles.begin(), post.triangles.end() - 2);
@@ -61,6 +61,6 @@ int main() {
                                                  {.repair = vp::repair::close_holes});
     // closed.solid.holes is 1, and closed.solid.open_rows is 0 behind it
     // end snippet
-    good = good && closed.counts.voxels == 4 * 4 * 12 && closed.solid.holes == 1 && closed.solid.open_rows == 0;
+    good = good && closed.counts.voxels == 4U * 4U * 12U && closed.solid.holes == 1 && closed.solid.open_rows == 0;
     return good ? 0 : 1;
 }

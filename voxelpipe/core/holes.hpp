@@ -92,8 +92,9 @@ private:
 // than 2^32 boundary vertices.
 [[nodiscard]] inline hole_cones close_holes(const std::vector<hole_part>& body, std::uint64_t max_hole_edges) {
     // Most edges cancel between the vertices as the mesh numbers them; a sum of chains may be taken in any order.
-    std::size_t num_vertices = 0;
-    for (const hole_part& p : body) num_vertices += p.num_vertices;
+    std::vector<std::uint64_t> ends; // of each part's vertices, numbered through all parts
+    std::uint64_t num_vertices = 0;
+    for (const hole_part& p : body) ends.push_back(num_vertices += p.num_vertices);
     edge_chain all(num_vertices);
     const auto for_each_edge = [&](auto&& visit) {
         std::uint64_t first = 0;
@@ -124,9 +125,8 @@ private:
         return a.x == b.x && a.y == b.y && a.z == b.z;
     };
     const auto position = [&](std::uint64_t v) {
-        std::size_t part = 0;
-        while (v >= body[part].num_vertices) v -= body[part++].num_vertices;
-        return body[part].positions[v];
+        const auto part = static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), v) - ends.begin());
+        return body[part].positions[v - (ends[part] - body[part].num_vertices)];
     };
     std::vector<std::uint64_t> used;
     for (const auto& e : unwelded) used.insert(used.end(), {e.from, e.to});
