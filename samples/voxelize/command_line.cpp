@@ -203,6 +203,8 @@ std::vector<std::string> arguments(int argc, const char* const* argv) {
             } else {
                 list.back() += "=text";
             }
+        } else if (list.back() == "--close-holes") {
+            list.back() += "=all"; // a number stands behind '='
         } else if (const auto point = points.find(list.back()); point != points.end() && !next.empty()) {
             if (i + 3 < argc && is_number(next) && is_number(argv[i + 2]) && is_number(argv[i + 3])) {
                 list.back() = point->second + '=' + next + ',' + argv[i + 2] + ',' + argv[i + 3];
@@ -224,6 +226,9 @@ struct raw_options {
     std::optional<solid_rule> solid;
     std::optional<solid_extent> extent_of_solid;
     std::optional<voxelpipe::coverage> coverage;
+    std::string close_holes; // "all", or how many edges
+    std::optional<int> closing;
+    bool vote = false;
     std::vector<std::string> targets;
     bool no_edges = false;
     bool no_ground = false;
@@ -304,8 +309,10 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
                {{"nonzero", solid_rule::nonzero},
                 {"even_odd", solid_rule::even_odd},
                 {"positive", solid_rule::positive},
-                {"each_draw", solid_rule::each_draw}},
-               "Fill the model instead: nonzero, even_odd, positive or each_draw, see SOLIDS. Not with --coverage")
+                {"each_draw", solid_rule::each_draw},
+                {"exterior", solid_rule::exterior}},
+               "Fill the model instead: nonzero, even_odd, positive, each_draw or exterior, see SOLIDS. Not with "
+               "--coverage")
         ->option_text("RULE")
         ->group("Solids");
     add_choice(app, "--solid-extent", raw.extent_of_solid,
@@ -313,6 +320,20 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
                "centre: voxels whose centre is inside. outer: these and those that the surface touches. inner: these "
                "without those. Default: outer")
         ->option_text("WHICH")
+        ->group("Solids");
+    app.add_option(
+           "--close-holes", raw.close_holes,
+           "Put a lid on every hole of the model, of at most EDGES edges where that is given, before it is filled")
+        ->option_text("[=EDGES]")
+        ->group("Solids");
+    app.add_flag("--vote", raw.vote,
+                 "Inside is what most of the rows along x, y and z say, by whether they crossed the surface an odd "
+                 "number of times; open rows abstain")
+        ->group("Solids");
+    app.add_option("--closing", raw.closing,
+                   "With --solid exterior: close gaps of about 2 R voxels for the flood. Default: 0")
+        ->check(CLI::Range(0, 64).description(""))
+        ->option_text("R")
         ->group("Solids");
     app.add_option("--fill-color", raw.fill_color,
                    "Colour of the voxels inside: #rrggbb, or mean, that of the surface's voxels. Default: mean")
@@ -433,8 +454,13 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
 void understand_solid(command_line& options, const raw_options& raw) {
     if (raw.coverage) options.voxelize.coverage = *raw.coverage;
     if (!raw.solid) {
-        if (raw.extent_of_solid) throw usage_error("--solid-extent goes with --solid");
-        if (!raw.fill_color.empty()) throw usage_error("--fill-color goes with --solid");
+        const std::pair<const char*, bool> given[]{{"--solid-extent", raw.extent_of_solid.has_value()},
+                                                   {"--close-holes", !raw.close_holes.empty()},
+                                                   {"--vote", raw.vote},
+                                                   {"--closing", raw.closing.has_value()},
+                                                   {"--fill-color", !raw.fill_color.empty()}};
+        for (const auto& [name, is_given] : given)
+            if (is_given) throw usage_error(std::string(name) + " goes with --solid");
         return;
     }
     if (raw.coverage)
@@ -443,6 +469,29 @@ void understand_solid(command_line& options, const raw_options& raw) {
     solid_request& solid = options.voxelize.solid.emplace();
     solid.rule = *raw.solid;
     solid.extent = raw.extent_of_solid.value_or(solid_extent::outer);
+    solid.vote = raw.vote;
+    solid.closing = raw.closing.value_or(0);
+    const bool is_flood = solid.rule == solid_rule::exterior;
+    if (raw.closing && !is_flood) throw usage_error("--closing goes with --solid exterior");
+    if (raw.vote && (is_flood || solid.rule == solid_rule::each_draw))
+        throw usage_error(std::string("--vote does not go with --solid ") + to_string(solid.rule));
+    if ((is_flood || raw.vote) && solid.extent != solid_extent::outer)
+        throw usage_error(std::string(is_flood ? "--solid exterior" : "--vote") + " always has --solid-extent outer");
+    if (!raw.close_holes.empty()) {
+        if (is_flood || raw.vote)
+            throw usage_error(std::string("--close-holes does not go with ") +
+                              (is_flood ? "--solid exterior" : "--vote"));
+        solid.close_holes = UINT64_MAX;
+        if (raw.close_holes != "all") {
+            const char* const end = raw.close_holes.data() + raw.close_holes.size();
+            const auto [last, error] = std::from_chars(raw.close_holes.data(), end, solid.close_holes);
+            if (error != std::errc{} || last != end || solid.close_holes == 0)
+                throw usage_error(
+                    "--close-holes takes the number of edges of the largest hole to close, 1 or more, not "
+                    "\"" +
+                    raw.close_holes + '"');
+        }
+    }
     if (raw.fill_color.empty() || lower(raw.fill_color) == "mean") return;
     solid.fill_color = parse_color(raw.fill_color);
     if (!solid.fill_color) throw usage_error("--fill-color takes mean or #rrggbb, not \"" + raw.fill_color + '"');

@@ -71,9 +71,10 @@ public:
     pipeline(Backend& backend, scene& model, const voxelize_request& request, voxelize_stats& stats)
         : backend_{backend}, request_{request}, stats_{stats} {
         for (const target wanted : request.targets) wanted_[static_cast<std::size_t>(wanted)] = true;
+        // A flood is compared with the surface, to tell whether anything is enclosed.
+        draws_surface_ = !request.solid || request.solid->rule == solid_rule::exterior;
         for (const target wanted : request.targets)
-            draws_surface_ =
-                draws_surface_ || !request.solid || (wanted != target::occupancy && wanted != target::count);
+            draws_surface_ = draws_surface_ || (wanted != target::occupancy && wanted != target::count);
         // What the sides of the grid see, and what lies inside, is known once all voxels are.
         keeps_bits_ = request.solid ? draws_surface_ : wants(target::occupancy) || wants(target::color_outer);
         if (request.solid) bits_name_ = "surface";
@@ -188,8 +189,9 @@ private:
                         vp::target<std::uint32_t, vp::blend::replace>, vp::target<float, vp::blend::min>>;
     using outer_draw = vp::draw<mesh_view, surface_vertex_shader, outer_fragment_shader>;
     using outer_framebuffer = vp::framebuffer<Backend, vp::target<std::uint64_t, vp::blend::max>>;
-    using bits_framebuffer =
-        vp::framebuffer<Backend, vp::target<vp::bit, vp::blend::bit_or>, vp::target<std::uint32_t, vp::blend::count>>;
+    using bits_target = vp::target<vp::bit, vp::blend::bit_or>;
+    using bits_map = typename bits_target::map;
+    using bits_framebuffer = vp::framebuffer<Backend, bits_target, vp::target<std::uint32_t, vp::blend::count>>;
 
     // Adds the time until its end to a stage of the statistics.
     class stage_timer {
@@ -516,6 +518,15 @@ private:
         case solid_rule::each_draw:
             options = vp::each_draw;
             break;
+        case solid_rule::exterior:
+            options.repair = vp::repair::exterior;
+            options.closing = request_.solid->closing;
+            break;
+        }
+        if (request_.solid->vote) options.repair = vp::repair::vote;
+        if (request_.solid->close_holes != 0) {
+            options.repair = vp::repair::close_holes;
+            options.max_hole_edges = request_.solid->close_holes;
         }
         switch (request_.solid->extent) {
         case solid_extent::centre:
@@ -531,8 +542,15 @@ private:
         return options;
     }
 
-    // Into the occupancy, or the channel that stands for it, and the count.
-    void draw_solid(volume& result, const voxelpipe::grid& part, int begin) {
+    // The channel of a solid's bits: the occupancy, or one that stands for it.
+    [[nodiscard]] std::string_view inside_name() const {
+        return wants(target::occupancy) ? info_of(target::occupancy).name : std::string_view(inside_name_);
+    }
+
+    // What is outside follows from the whole grid: a flood is drawn there, with the padding.
+    void draw_solid(volume& result, const voxelpipe::grid& slab, int begin) {
+        const bool is_flood = request_.solid->rule == solid_rule::exterior;
+        const voxelpipe::grid part = is_flood ? slab.uncropped() : slab;
         std::bitset<2> enabled;
         enabled[0] = true;
         enabled[1] = counts_bodies();
@@ -549,19 +567,34 @@ private:
         counts.open_rows += status.solid.open_rows;
         counts.crossings += status.solid.crossings;
         counts.max_winding = std::max(counts.max_winding, status.solid.max_winding);
+        counts.hole_edges = status.solid.hole_edges;
+        counts.holes = status.solid.holes;
+        counts.closed_holes = status.solid.cones;
         report_(1.0);
         const stage_timer timer{*this, "resolve"};
-        copy<0>(result, wants(target::occupancy) ? std::string(info_of(target::occupancy).name) : inside_name_,
-                framebuffer, begin);
+        if (part.extent == slab.extent) {
+            copy<0>(result, inside_name(), framebuffer, begin);
+        } else {
+            const auto* const words = elements_of<0>(framebuffer);
+            std::vector<std::uint32_t> bits(bits_map::elements(part.extent));
+            memory_access<Backend>::read(backend_, bits.data(), bits.size(), as_it_is<std::uint32_t>{words},
+                                         thread_count(request_.threads));
+            copy_part(result, *result.find(inside_name()), bits, {part.extent.x, part.extent.y, part.extent.z},
+                      {slab.offset.x, slab.offset.y, slab.offset.z});
+        }
         if (counts_bodies()) copy<1>(result, target::count, framebuffer, begin);
     }
 
     // The volume's other values, once all bits are there.
     void finish_solid(volume& result) {
         const stage_timer timer{*this, "fill"};
-        const channel& solid =
-            *result.find(wants(target::occupancy) ? std::string(info_of(target::occupancy).name) : inside_name_);
+        const channel& solid = *result.find(inside_name());
         stats_.voxels = static_cast<std::uint64_t>(result.popcount(solid));
+        if (request_.solid->rule == solid_rule::exterior && stats_.voxels != 0 &&
+            static_cast<std::int64_t>(stats_.voxels) == result.popcount(*result.find(bits_name_)))
+            stats_.warnings.push_back(
+                "--solid exterior finds nothing enclosed: all its voxels are the surface's. If the flood "
+                "leaked through gaps, --closing R closes those of about 2 R voxels");
         if (wants(target::count) && !counts_bodies()) count_bits(result, solid, request_.threads);
         if (draws_surface_) fill_inside(result, solid, *result.find(bits_name_), *request_.solid, request_.threads);
         if (std::string warning = open_warning(*request_.solid, *stats_.solid); !warning.empty())

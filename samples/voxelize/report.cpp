@@ -91,6 +91,9 @@ void print_text(std::ostream& stream, const run_report& report) {
                       << ", " << report.stats.solid->crossings << " crossings, " << report.stats.solid->open_rows
                       << " of " << report.stats.solid->rows << " rows open, greatest winding "
                       << report.stats.solid->max_winding << '\n';
+    if (report.stats.solid && report.stats.solid->holes != 0)
+        line("holes") << report.stats.solid->closed_holes << " of " << report.stats.solid->holes << " closed, of "
+                      << report.stats.solid->hole_edges << " edges in all\n";
     if (report.stats.normals_cancelled != 0) line("normals cancelled") << report.stats.normals_cancelled << '\n';
     stream << std::fixed << std::setprecision(1);
     for (const auto& [stage, time] : report.stats.milliseconds)
@@ -118,6 +121,12 @@ void print_json(std::ostream& stream, const run_report& report) {
                          {"open_rows", report.stats.solid->open_rows},
                          {"crossings", report.stats.solid->crossings},
                          {"max_winding", report.stats.solid->max_winding}};
+        if (report.request.solid->vote) root["solid"]["vote"] = true;
+        if (report.request.solid->close_holes != 0) {
+            root["solid"]["hole_edges"] = report.stats.solid->hole_edges;
+            root["solid"]["holes"] = report.stats.solid->holes;
+            root["solid"]["closed_holes"] = report.stats.solid->closed_holes;
+        }
     }
     root["targets"] = json::array();
     for (const target id : report.request.targets) root["targets"].push_back(info_of(id).name);

@@ -61,7 +61,7 @@ rgba8 mean_of(const volume& v, const channel& surface, const channel& colors, in
 } // namespace
 
 const char* to_string(solid_rule rule) {
-    constexpr const char* names[] = {"nonzero", "even_odd", "positive", "each_draw"};
+    constexpr const char* names[] = {"nonzero", "even_odd", "positive", "each_draw", "exterior"};
     return names[static_cast<std::size_t>(rule)];
 }
 
@@ -71,15 +71,22 @@ const char* to_string(solid_extent extent) {
 }
 
 std::string open_warning(const solid_request& request, const solid_counts& counts) {
-    if (counts.open_rows == 0) return {};
+    if (counts.open_rows == 0 || request.vote || request.rule == solid_rule::exterior) return {};
     std::array<char, 32> share{};
     std::snprintf(share.data(), share.size(), "%.3g",
                   100 * static_cast<double>(counts.open_rows) / static_cast<double>(counts.rows));
     const bool each = request.rule == solid_rule::each_draw;
-    return "the model is not closed: " + std::to_string(counts.open_rows) + " of the " + std::to_string(counts.rows) +
-           " rows of voxels along x (" + share.data() + " %" + (each ? ", counted for each draw" : "") +
-           ") do not leave it as often as they enter it, so voxels behind a hole may be wrong. Close the mesh, or take "
-           "the surface alone (without --solid)";
+    const std::string rows = std::to_string(counts.open_rows) + " of the " + std::to_string(counts.rows) +
+                             " rows of voxels along x (" + share.data() + " %" +
+                             (each ? ", counted for each draw" : "") +
+                             ") do not leave it as often as they enter it, so voxels behind a hole may be wrong. ";
+    if (request.close_holes != 0)
+        return "the model is not closed, after lids on " + std::to_string(counts.closed_holes) + " of its " +
+               std::to_string(counts.holes) + " holes: " + rows + "--close-holes without a number closes all holes";
+    return "the model is not closed: " + rows +
+           "--close-holes puts lids on holes, --vote takes what most of the rows along x, y and z say, --solid "
+           "exterior "
+           "what cannot be reached from outside";
 }
 
 void fill_inside(volume& v, const channel& solid, const channel& surface, const solid_request& request, int threads) {
@@ -110,6 +117,25 @@ void fill_inside(volume& v, const channel& solid, const channel& surface, const 
             set(surface, solid, empty);
         });
     }
+}
+
+void copy_part(volume& v, channel& to, const std::vector<std::uint32_t>& bits, const std::array<int, 3>& extent,
+               const std::array<int, 3>& offset) {
+    const auto words = static_cast<std::size_t>((extent[0] + 31) / 32);
+    for (std::int64_t k = 0; k < v.extent[2]; ++k)
+        for (std::int64_t j = 0; j < v.extent[1]; ++j) {
+            const std::uint32_t* const row =
+                bits.data() + words * static_cast<std::size_t>((k + offset[2]) * extent[1] + j + offset[1]);
+            for (std::int64_t w = 0; w < v.words_per_row(); ++w) {
+                const std::int64_t first = 32 * w + offset[0];
+                const auto at = static_cast<std::size_t>(first / 32);
+                const std::uint64_t high = at + 1 < words ? row[at + 1] : 0;
+                auto word = static_cast<std::uint32_t>((high << 32 | row[at]) >> (first % 32));
+                const std::int64_t left = v.extent[0] - 32 * w;
+                if (left < 32) word &= (std::uint32_t{1} << left) - 1;
+                std::memcpy(to.data.data() + 4 * ((k * v.extent[1] + j) * v.words_per_row() + w), &word, 4);
+            }
+        }
 }
 
 void count_bits(volume& v, const channel& solid, int threads) {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace voxelize {
 
@@ -18,6 +19,7 @@ enum class solid_rule : std::uint8_t {
     even_odd,
     positive,
     each_draw, // even_odd of every draw by itself
+    exterior,  // what a flood from outside does not reach; the extent is outer
 };
 
 // Which voxels are part of the solid.
@@ -34,6 +36,10 @@ enum class solid_extent : std::uint8_t {
 struct solid_request {
     solid_rule rule = solid_rule::nonzero;
     solid_extent extent = solid_extent::outer;
+    // Lids on holes of at most so many edges; 0: on none. Not with exterior and vote.
+    std::uint64_t close_holes = 0;
+    bool vote = false; // most of the parities along x, y and z, whatever the rule; the extent is outer
+    int closing = 0;   // exterior: gaps of about twice as many voxels are closed
     // sRGB of the voxels inside; none: the mean of the model's covered voxels, in linear light, by alpha.
     std::optional<std::array<std::uint8_t, 3>> fill_color;
 };
@@ -44,15 +50,21 @@ struct solid_counts {
     std::uint64_t open_rows = 0;
     std::uint64_t crossings = 0;
     std::uint64_t max_winding = 0;
+    std::uint64_t hole_edges = 0, holes = 0, closed_holes = 0; // of the whole model, with close_holes
 };
 
-// One line where open rows prove that the model is not closed: how many, and what to do; empty where there are none.
+// One line where open rows prove that what was filled is not closed: how many, and what to do; empty where there are
+// none, or the rule does without closed models.
 [[nodiscard]] std::string open_warning(const solid_request& request, const solid_counts& counts);
 
 // Gives every channel but those of bits and the count its values where the solid and the surface differ. Voxels of
 // SOLID without a bit in SURFACE get the colour of the fill, opaque, or the target's empty value. Voxels with a bit in
 // SURFACE alone are emptied. Both are bit channels of V.
 void fill_inside(volume& v, const channel& solid, const channel& surface, const solid_request& request, int threads);
+
+// Copies the part at OFFSET of a grid of EXTENT, rows of packed bits, to the channel.
+void copy_part(volume& v, channel& to, const std::vector<std::uint32_t>& bits, const std::array<int, 3>& extent,
+               const std::array<int, 3>& offset);
 
 // The channel "count" from the bits of one body: 1 inside.
 void count_bits(volume& v, const channel& solid, int threads);

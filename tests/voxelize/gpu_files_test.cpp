@@ -103,6 +103,13 @@ TEST(GpuFiles, OfAModelWithEverythingInIt) {
                 folder, model,
                 {"-r", "90", "--solid", rule, "--solid-extent", extent, "--work-memory", "1", "-t", all_targets},
                 {"a.npz"});
+    const std::vector<std::vector<std::string>> repairs{{"--solid", "nonzero", "--close-holes"},
+                                                        {"--solid", "even_odd", "--vote"},
+                                                        {"--solid", "exterior", "--closing", "2", "--padding", "3"}};
+    for (std::vector<std::string> repair : repairs) {
+        repair.insert(repair.end(), {"-r", "70", "-t", all_targets});
+        expect_same_files(folder, model, repair, {"a.npz"});
+    }
     expect_same_files(folder, model, {"-r", "64", "--image-size", "160x120"}, {"a.vox", "a.png"});
     expect_same_files(folder, model, {"-r", "33", "--depth-axis", "x", "-t", "depth,normal"}, {"a.npz"});
 }

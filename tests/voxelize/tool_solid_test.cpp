@@ -250,6 +250,61 @@ TEST(Solid, OpenModelsAreAWarningWithTheShare) {
     EXPECT_EQ(64, solid["crossings"]);
 }
 
+// A box without the two triangles of its side at +x: 4 edges are open, and rows along x meet the surface once.
+TEST(Solid, ModelsWithHolesAreRepaired) {
+    const scratch_folder folder;
+    builder open;
+    add_box(open, {0.25F, 0.25F, 0.25F}, {9.75F, 9.75F, 9.75F}, false, 2);
+    const std::vector<std::string> grid{"--origin", "-2,0,0", "--extent", "16,10,10"};
+    const auto solid = [&](std::vector<std::string> arguments, std::string* messages = nullptr) {
+        arguments.insert(arguments.end(), grid.begin(), grid.end());
+        return covered(folder, open, arguments, messages);
+    };
+    std::string messages;
+    // The hole's shadow: the rows in the box go on to the grid's end. The outer extent adds the sides.
+    EXPECT_LT(1000U, solid({"--solid", "nonzero"}));
+    EXPECT_EQ(1000U, solid({"--solid", "nonzero", "--close-holes"}, &messages));
+    EXPECT_EQ("", messages);
+    EXPECT_EQ(1000U, solid({"--solid", "even_odd", "--close-holes=4"}));
+    EXPECT_LT(1000U, solid({"--solid", "nonzero", "--close-holes=3"}, &messages));
+    EXPECT_NE(std::string::npos, messages.find("after lids on 0 of its 1 holes")) << messages;
+    // Along y and z the box is closed.
+    EXPECT_EQ(1000U, solid({"--solid", "even_odd", "--vote"}, &messages));
+    EXPECT_EQ("", messages);
+    EXPECT_EQ(1000U, solid({"--solid", "nonzero", "--vote", "--work-memory", "1"}));
+    // The flood comes in where the side is missing; what is left are five sides. A gap of 8 voxels needs R = 4.
+    const std::size_t sides = 1000 - 9 * 8 * 8;
+    EXPECT_EQ(sides, solid({"--solid", "exterior"}, &messages));
+    EXPECT_NE(std::string::npos, messages.find("--solid exterior finds nothing enclosed")) << messages;
+    EXPECT_EQ(sides, solid({"--solid", "exterior", "--closing", "3"}));
+    EXPECT_LT(sides + 300, solid({"--solid", "exterior", "--closing", "4"}, &messages));
+    EXPECT_EQ("", messages);
+    const json stats = json::parse(run(folder, {folder / "m.glb", "-q", "--stats", "json", "-s", "1", "--solid",
+                                                "nonzero", "--close-holes", "-o", folder / "o.npy"})
+                                       .out)["solid"];
+    EXPECT_EQ(4, stats["hole_edges"]);
+    EXPECT_EQ(1, stats["holes"]);
+    EXPECT_EQ(1, stats["closed_holes"]);
+    EXPECT_EQ(0, stats["open_rows"]);
+}
+
+// Cavities are filled, with and without a ring around the grid that takes the flood.
+TEST(Solid, ExteriorIsWhatAFloodReaches) {
+    const scratch_folder folder;
+    builder file;
+    add_box(file, {0.5F, 0.5F, 0.5F}, {39.5F, 9.5F, 9.5F});
+    add_box(file, {3.5F, 3.5F, 3.5F}, {6.5F, 6.5F, 6.5F}, true);
+    EXPECT_EQ(4000U, covered(folder, file, {"--solid", "exterior"}));
+    EXPECT_EQ(4000U, covered(folder, file, {"--solid", "exterior", "--padding", "7"}));
+    const array ringed = read_npy(folder / "o.npy");
+    ASSERT_EQ((std::vector<std::size_t>{24, 24, 54}), ringed.shape);
+    for (std::size_t i = 0; i < ringed.voxels(); ++i) {
+        const std::size_t x = i % 54, y = i / 54 % 24, z = i / (54 * 24);
+        ASSERT_EQ(x >= 7 && x < 47 && y >= 7 && y < 17 && z >= 7 && z < 17 ? 1 : 0, ringed.at<std::uint8_t>(i));
+    }
+    EXPECT_GT(4000U, covered(folder, file, {"--solid", "nonzero", "--solid-extent", "centre"}));
+}
+
 TEST(Solid, WhatDoesNotGoTogetherIsAUsageError) {
     const scratch_folder folder;
     const auto expect = [&folder](const std::vector<std::string>& arguments, const std::string& why) {
@@ -261,9 +316,22 @@ TEST(Solid, WhatDoesNotGoTogetherIsAUsageError) {
     };
     expect({"--solid", "nonzero", "--coverage", "thin"}, "--solid and --coverage do not go together");
     expect({"--solid", "nonzero", "--coverage", "conservative"}, "--solid and --coverage do not go together");
-    expect({"--solid", "full"}, "--solid takes nonzero, even_odd, positive or each_draw, not \"full\"");
+    expect({"--solid", "full"}, "--solid takes nonzero, even_odd, positive, each_draw or exterior, not \"full\"");
     expect({"--solid-extent", "outer"}, "--solid-extent goes with --solid");
     expect({"--fill-color", "mean"}, "--fill-color goes with --solid");
+    expect({"--vote"}, "--vote goes with --solid");
+    expect({"--close-holes"}, "--close-holes goes with --solid");
+    expect({"--closing", "1"}, "--closing goes with --solid");
+    expect({"--solid", "nonzero", "--closing", "1"}, "--closing goes with --solid exterior");
+    expect({"--solid", "exterior", "--closing", "65"}, "--closing");
+    expect({"--solid", "exterior", "--vote"}, "--vote does not go with --solid exterior");
+    expect({"--solid", "each_draw", "--vote"}, "--vote does not go with --solid each_draw");
+    expect({"--solid", "exterior", "--close-holes"}, "--close-holes does not go with --solid exterior");
+    expect({"--solid", "even_odd", "--vote", "--close-holes=9"}, "--close-holes does not go with --vote");
+    expect({"--solid", "nonzero", "--close-holes=0"}, "--close-holes takes the number of edges");
+    expect({"--solid", "nonzero", "--close-holes=many"}, "--close-holes takes the number of edges");
+    expect({"--solid", "exterior", "--solid-extent", "centre"}, "--solid exterior always has --solid-extent outer");
+    expect({"--solid", "even_odd", "--vote", "--solid-extent", "inner"}, "--vote always has --solid-extent outer");
     expect({"--solid", "nonzero", "--fill-color", "blue"}, "--fill-color takes mean or #rrggbb");
 }
 
