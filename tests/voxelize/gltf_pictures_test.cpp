@@ -33,7 +33,7 @@ builder with_texture(const json& texture, const json& images) {
     primitive["attributes"]["TEXCOORD_0"] = file.accessor(std::vector<float>{0, 0, 1, 0, 0, 1}, "VEC2");
     primitive["material"] = 0;
     file.root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
-    file.root["textures"] = {texture};
+    file.root["textures"] = json::array({texture}); // g++ makes an array of {texture}, clang++ does not
     file.root["images"] = images;
     return file;
 }
