@@ -36,6 +36,16 @@ public:
             std::copy(source.begin(), source.end(), data_.get());
         }
 
+        // Written out to be host functions, where nvcc compiles them: implicit ones would be both __host__ and
+        // __device__.
+        buffer(buffer&& other) noexcept : data_(std::move(other.data_)), count_(std::exchange(other.count_, 0)) {}
+        buffer& operator=(buffer&& other) noexcept {
+            data_ = std::move(other.data_);
+            count_ = std::exchange(other.count_, 0);
+            return *this;
+        }
+        ~buffer() {} // NOLINT(*-equals-default)
+
         [[nodiscard]] T* data() { return data_.get(); }
         [[nodiscard]] const T* data() const { return data_.get(); }
         [[nodiscard]] std::size_t size() const { return count_; }

@@ -144,6 +144,7 @@ struct drawing {
             else
                 vp::get<I>(fb).load();
         });
+        if (draws.size() > 1) draws.pop_back(); // other values than those that are there
         return vp::voxelize_solid(be, draws, g, fb, options);
     }
     void expect_same(const vp::grid& g, const vp::solid_options& options, loading how = loading::clear) const {
@@ -189,6 +190,68 @@ std::vector<mesh_data> three_meshes() {
     return {tied_bodies(24.0f, 12, 5), ball({14.3f, 11.2f, 12.7f}, 9.4f, 7), mixed_triangles(300, 24.0f, 3)};
 }
 
+struct id_of_fragment {
+    std::uint32_t id;
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& f) const {
+        const auto hash = static_cast<std::uint32_t>(f.voxel.x * 3 + f.voxel.y * 5 + f.voxel.z * 7 + f.winding) + id;
+        return vp::outputs(hash * 16 + f.draw).discard_if(hash % 7 == 3);
+    }
+};
+
+template <class Payload, class SolidShader>
+void expect_same_lists(const std::vector<mesh_data>& meshes, const SolidShader& shader, const vp::grid& g,
+                       const vp::solid_options& options) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    vp::abuffer<vp::cpu_backend, Payload> a{cpu};
+    vp::abuffer<vp::cuda_backend, Payload> b{gpu};
+    const auto draw = [&](auto& be, auto& lists) {
+        using backend = std::remove_cvref_t<decltype(be)>;
+        std::vector<vp::mesh<backend>> on_backend;
+        for (const mesh_data& m : meshes) on_backend.emplace_back(be, m.positions, m.triangles);
+        std::vector<vp::draw<vp::mesh_view<>, shift, SolidShader>> draws;
+        for (const auto& m : on_backend) draws.push_back({m.view(), {0.125f}, shader});
+        return vp::voxelize_solid(be, draws, g, lists, options);
+    };
+    const vp::status sa = draw(cpu, a), sb = draw(gpu, b);
+    ASSERT_TRUE(sa.ok()) << sa.message();
+    ASSERT_TRUE(sb.ok()) << sb.message();
+    expect_same_counts(sa.counts, sb.counts);
+    EXPECT_EQ(sa.solid, sb.solid);
+    expect_same_on_host(a.to_host(cpu), b.to_host(gpu));
+}
+
+// Without every n-th triangle.
+mesh_data with_holes(mesh_data m, std::size_t n) {
+    std::vector<glm::uvec3> kept;
+    for (std::size_t i = 0; i < m.triangles.size(); ++i)
+        if (i % n != n - 1) kept.push_back(m.triangles[i]);
+    m.triangles = kept;
+    return m;
+}
+// The same with vertices that neighbours share.
+mesh_data welded(const mesh_data& m) {
+    mesh_data w;
+    for (const glm::uvec3& t : m.triangles) {
+        glm::uvec3 to;
+        for (int k = 0; k < 3; ++k) {
+            const auto at = std::find(w.positions.begin(), w.positions.end(), m.positions[t[k]]);
+            to[k] = static_cast<std::uint32_t>(at - w.positions.begin());
+            if (at == w.positions.end()) w.positions.push_back(m.positions[t[k]]);
+        }
+        w.triangles.push_back(to);
+    }
+    return w;
+}
+// Two broken balls and broken boxes; the first one's vertices are shared.
+std::vector<mesh_data> broken_meshes() {
+    return {welded(with_holes(ball({14.3f, 11.2f, 12.7f}, 9.4f, 7), 9)),
+            with_holes(ball({20.0f, 13.5f, 10.0f}, 6.1f, 5), 11), with_holes(tied_bodies(24.0f, 7, 5), 13)};
+}
+
+} // namespace
+
 TEST(Solids, EveryRuleBodyAndExtentIntoEveryKindOfTarget) {
     const drawing_of_everything drawing{three_meshes(), {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};
     int i = 0;
@@ -221,38 +284,6 @@ TEST(Solids, RowsOfEveryLength) {
 }
 
 // ---- lists ----------------------------------------------------------------------------------------------------------
-
-struct id_of_fragment {
-    std::uint32_t id;
-    template <class Fragment>
-    VOXELPIPE_HD auto operator()(const Fragment& f) const {
-        const auto hash = static_cast<std::uint32_t>(f.voxel.x * 3 + f.voxel.y * 5 + f.voxel.z * 7 + f.winding) + id;
-        return vp::outputs(hash * 16 + f.draw).discard_if(hash % 7 == 3);
-    }
-};
-
-template <class Payload, class SolidShader>
-void expect_same_lists(const std::vector<mesh_data>& meshes, const SolidShader& shader, const vp::grid& g,
-                       const vp::solid_options& options) {
-    vp::cpu_backend cpu;
-    vp::cuda_backend gpu;
-    vp::abuffer<vp::cpu_backend, Payload> a{cpu};
-    vp::abuffer<vp::cuda_backend, Payload> b{gpu};
-    const auto draw = [&](auto& be, auto& lists) {
-        using backend = std::remove_cvref_t<decltype(be)>;
-        std::vector<vp::mesh<backend>> on_backend;
-        for (const mesh_data& m : meshes) on_backend.emplace_back(be, m.positions, m.triangles);
-        std::vector<vp::draw<vp::mesh_view<>, shift, SolidShader>> draws;
-        for (const auto& m : on_backend) draws.push_back({m.view(), {0.125f}, shader});
-        return vp::voxelize_solid(be, draws, g, lists, options);
-    };
-    const vp::status sa = draw(cpu, a), sb = draw(gpu, b);
-    ASSERT_TRUE(sa.ok()) << sa.message();
-    ASSERT_TRUE(sb.ok()) << sb.message();
-    expect_same_counts(sa.counts, sb.counts);
-    EXPECT_EQ(sa.solid, sb.solid);
-    expect_same_on_host(a.to_host(cpu), b.to_host(gpu));
-}
 
 TEST(Solids, EveryRuleBodyAndExtentIntoLists) {
     for_all_options([&](const vp::solid_options& options) {
@@ -387,9 +418,14 @@ TEST(Solids, ABadIndexWritesNothing) {
     const std::vector<std::uint32_t> before = vp::get<0>(fb).to_host(gpu);
     m.triangles[17].y = static_cast<std::uint32_t>(m.positions.size());
     const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
-    for (const auto rule : all_rules) {
-        const vp::status s = vp::voxelize_solid(gpu, view_of(mesh, indices::unknown), g, vp::passthrough{},
-                                                vp::constant(true), fb, {.rule = rule});
+    std::vector<vp::solid_options> options;
+    for (const auto rule : all_rules) options.push_back({.rule = rule});
+    for (const auto repair : {vp::repair::close_holes, vp::repair::exterior, vp::repair::vote})
+        options.push_back({.repair = repair});
+    for (const vp::solid_options& o : options) {
+        SCOPED_TRACE(static_cast<int>(o.rule) + 10 * static_cast<int>(o.repair));
+        const vp::status s =
+            vp::voxelize_solid(gpu, view_of(mesh, indices::unknown), g, vp::passthrough{}, vp::constant(true), fb, o);
         EXPECT_EQ(s.code, vp::status_code::index_out_of_range) << s.message();
         EXPECT_EQ(s.triangle, 17u);
         EXPECT_EQ(before, vp::get<0>(fb).to_host(gpu));
@@ -484,34 +520,6 @@ TEST(Solids, Async) {
 
 // ---- repairs --------------------------------------------------------------------------------------------------------
 
-// Without every n-th triangle.
-mesh_data with_holes(mesh_data m, std::size_t n) {
-    std::vector<glm::uvec3> kept;
-    for (std::size_t i = 0; i < m.triangles.size(); ++i)
-        if (i % n != n - 1) kept.push_back(m.triangles[i]);
-    m.triangles = kept;
-    return m;
-}
-// The same with vertices that neighbours share.
-mesh_data welded(const mesh_data& m) {
-    mesh_data w;
-    for (const glm::uvec3& t : m.triangles) {
-        glm::uvec3 to;
-        for (int k = 0; k < 3; ++k) {
-            const auto at = std::find(w.positions.begin(), w.positions.end(), m.positions[t[k]]);
-            to[k] = static_cast<std::uint32_t>(at - w.positions.begin());
-            if (at == w.positions.end()) w.positions.push_back(m.positions[t[k]]);
-        }
-        w.triangles.push_back(to);
-    }
-    return w;
-}
-// Two broken balls and broken boxes; the first one's vertices are shared.
-std::vector<mesh_data> broken_meshes() {
-    return {welded(with_holes(ball({14.3f, 11.2f, 12.7f}, 9.4f, 7), 9)),
-            with_holes(ball({20.0f, 13.5f, 10.0f}, 6.1f, 5), 11), with_holes(tied_bodies(24.0f, 7, 5), 13)};
-}
-
 TEST(Solids, ClosedHoles) {
     const drawing_of_everything all{broken_meshes(), {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};
     const drawing_of_bits bits{broken_meshes(), {{}}, {{true}}}, one{{broken_meshes()[0]}, {{}}, {{true}}};
@@ -564,5 +572,3 @@ TEST(Solids, ExteriorOfAMaze) {
     const drawing_of_bits maze{{m}, {{}}, {{true}}};
     maze.expect_same(box_grid({34, 24, 24}), {.repair = vp::repair::exterior});
 }
-
-} // namespace
