@@ -296,6 +296,18 @@ TEST(Exterior, FindsItsWayThroughACorridorOfManyTurns) {
     EXPECT_EQ(s[index(g.extent, 60, 16, 16)], 0) << "the last chamber is reached";
 }
 
+TEST(Exterior, RunsAlongATunnelOfManyWordsFromEitherEnd) {
+    const vp::grid g = unit_grid({300, 6, 6});
+    const mesh tunnel = box({1.5f, 1.5f, 1.5f}, {298.5f, 4.5f, 4.5f});
+    EXPECT_EQ(library_solid(tunnel, g, exterior(0)).voxels[index(g.extent, 150, 3, 3)], 1) << "closed at both ends";
+    for (const std::vector<std::size_t>& end : {std::vector<std::size_t>{8, 9}, {10, 11}}) {
+        const mesh open = without_triangles(tunnel, end);
+        const voxel_set s = library_solid(open, g, exterior(0)).voxels;
+        for (int x = 3; x < 297; ++x) EXPECT_EQ(s[index(g.extent, x, 3, 3)], 0) << x;
+        EXPECT_EQ(s, plain_interior(library_cover(open, g), g.extent, 0));
+    }
+}
+
 TEST(Exterior, ClosingSealsGapsAndAMeshThatLeavesTheGridIsFloodedThere) {
     const vp::grid g = unit_grid({20, 20, 20});
     const std::size_t middle = index(g.extent, 10, 10, 10);
