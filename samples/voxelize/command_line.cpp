@@ -568,6 +568,9 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     if (needs_occupancy && std::find(targets.begin(), targets.end(), target::occupancy) == targets.end())
         options.implied.push_back(target::occupancy);
     targets.insert(targets.end(), options.implied.begin(), options.implied.end());
+    options.load.gltf.colors =
+        std::any_of(targets.begin(), targets.end(), [](target id) { return info_of(id).name.starts_with("color"); });
+    options.load.gltf.blend_cuts = options.voxelize.alpha == blend_alpha::cutoff;
 }
 
 void understand_picture(command_line& options, const raw_options& raw) {

@@ -46,7 +46,7 @@ void load(scene& result, std::span<const std::byte> bytes, const gltf_file_reade
     const gltf::resources resources{document, parts.binary, parts.has_binary, read_file, memory, tolerance};
     tinygltf::Model model = parse(document);
     const gltf::accessor_reader accessors{model, document, resources, memory};
-    gltf::material_reader materials{model, accessors, resources, result};
+    gltf::material_reader materials{model, accessors, resources, options, result};
     materials.read_factors();
     if (options.animation) gltf::apply_animation(model, accessors, options.seconds, result.warnings);
     const gltf::shown_scene shown_scene = gltf::shown_meshes(model, accessors, tolerance);

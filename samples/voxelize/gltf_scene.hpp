@@ -56,6 +56,10 @@ struct gltf_options {
     std::optional<std::string> animation;
     double seconds = 0;
     int threads = 0; // that read vertices and indices; 0: one for each core. The scene does not depend on it
+    // False: pictures are read only for materials that cut fragments off by alpha, MASK and, if blend_cuts, BLEND; the
+    // others have no texture then.
+    bool colors = true;
+    bool blend_cuts = false;
 };
 
 // Gives the bytes of a file that a .gltf names. The path is relative, normalised, percent-decoded and never leaves

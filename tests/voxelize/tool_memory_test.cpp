@@ -182,6 +182,9 @@ TEST(Memory, LargePlainPicturesAllShow) {
     const outcome refused = run(folder, tight);
     EXPECT_EQ(3, refused.code) << refused.err;
     EXPECT_LT(200, need_in(refused.err)) << refused.err;
+    tight[4] = "occupancy,normal,material"; // what needs no picture reads none
+    const outcome plain = run(folder, tight);
+    EXPECT_EQ(0, plain.code) << plain.err;
 }
 
 TEST(Memory, ResultsThatDoNotFitNameTheirSize) {

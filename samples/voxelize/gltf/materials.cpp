@@ -57,6 +57,9 @@ void material_reader::read_factors() {
 std::optional<texture_coordinates> material_reader::read_texture(std::size_t material_index) {
     const tinygltf::TextureInfo& info = model_.materials[material_index].pbrMetallicRoughness.baseColorTexture;
     if (info.index < 0) return std::nullopt;
+    const alpha_mode alpha = scene_.materials[material_index].alpha;
+    const bool cuts = alpha == alpha_mode::mask || (alpha == alpha_mode::blend && options_.blend_cuts);
+    if (!options_.colors && !cuts) return std::nullopt;
     const std::int32_t texture = scene_texture(static_cast<std::size_t>(info.index));
     scene_.materials[material_index].texture = texture;
     if (texture == material::no_texture) return std::nullopt;

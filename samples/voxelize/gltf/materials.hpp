@@ -28,9 +28,9 @@ struct texture_coordinates {
 class material_reader {
 public:
     material_reader(const tinygltf::Model& model, const accessor_reader& accessors, const resources& bytes,
-                    scene& result)
-        : model_{model}, accessors_{accessors}, bytes_{bytes}, scene_{result}, texture_of_(model.textures.size()),
-          image_of_(bytes.image_count()) {}
+                    const gltf_options& options, scene& result)
+        : model_{model}, accessors_{accessors}, bytes_{bytes}, options_{options}, scene_{result},
+          texture_of_(model.textures.size()), image_of_(bytes.image_count()) {}
 
     // Fills scene.materials with the file's, all without their textures.
     void read_factors();
@@ -47,6 +47,7 @@ private:
     const tinygltf::Model& model_;
     const accessor_reader& accessors_;
     const resources& bytes_;
+    const gltf_options& options_;
     scene& scene_;
     // glTF index -> scene index once it has been tried; material::no_texture where it cannot be had.
     std::vector<std::optional<std::int32_t>> texture_of_;
