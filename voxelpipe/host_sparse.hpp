@@ -183,8 +183,8 @@ public:
                 });
             };
             // Bricks are looked up where the box has fewer than the table.
-            const glm::ivec3 first = (begin + t.offset) >> core::log2_brick_size,
-                             last = (end - 1 + t.offset) >> core::log2_brick_size, n = last - first + 1;
+            const glm::ivec3 first = (begin + t.offset) >> core::log2_sparse_brick,
+                             last = (end - 1 + t.offset) >> core::log2_sparse_brick, n = last - first + 1;
             if (static_cast<double>(n.x) * n.y * n.z > static_cast<double>(t.count)) {
                 for (std::uint64_t b = 0; b < t.count; ++b) visit(b);
                 return region;

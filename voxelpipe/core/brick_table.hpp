@@ -18,9 +18,9 @@ namespace voxelpipe {
 
 namespace core {
 
-inline constexpr int log2_brick_size = 3;
-inline constexpr int brick_size = 1 << log2_brick_size;
-inline constexpr int brick_voxels = brick_size * brick_size * brick_size;
+inline constexpr int log2_sparse_brick = 3;
+inline constexpr int sparse_brick_size = 1 << log2_sparse_brick;
+inline constexpr int sparse_brick_voxels = sparse_brick_size * sparse_brick_size * sparse_brick_size;
 
 [[nodiscard]] VOXELPIPE_HD inline unsigned count_ones(std::uint64_t word) {
 #if defined(__CUDA_ARCH__)
@@ -93,7 +93,7 @@ struct brick_table {
 
     // The first voxel of a brick, in the part's numbers: negative where a crop begins within the brick.
     [[nodiscard]] VOXELPIPE_HD glm::ivec3 brick_origin(std::uint64_t brick) const {
-        return core::morton_position(keys[brick]) * core::brick_size - offset;
+        return core::morton_position(keys[brick]) * core::sparse_brick_size - offset;
     }
 };
 

@@ -172,7 +172,7 @@ template <class T>
     } else {
         s.count = from.table.offsets[brick + 1] - from.table.offsets[brick];
     }
-    s.voxels = box_of(from.table.masks[brick], core::morton_position(from.table.keys[brick]) * core::brick_size);
+    s.voxels = box_of(from.table.masks[brick], core::morton_position(from.table.keys[brick]) * core::sparse_brick_size);
     return s;
 }
 
@@ -180,7 +180,7 @@ template <class T>
 void fill_leaf(const source<T>& from, std::uint64_t brick, leaf_node<T>& leaf) {
     std::memset(static_cast<void*>(&leaf), 0, sizeof(leaf));
     const statistics<T> s = leaf_statistics(from, brick);
-    const glm::ivec3 origin = core::morton_position(from.table.keys[brick]) * core::brick_size;
+    const glm::ivec3 origin = core::morton_position(from.table.keys[brick]) * core::sparse_brick_size;
     for (int a = 0; a < 3; ++a) {
         // The origin is found by rounding down to multiples of eight.
         leaf.head.low[a] = s.voxels.low[a];

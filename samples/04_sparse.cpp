@@ -1,0 +1,74 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// A coloured torus knot at 4096 voxels a side, which no dense grid would fit: its bricks, a NanoVDB file of its colours
+// (knot.nvdb), and a picture of it by rays through the octree (knot.ppm). Another resolution: 04_sparse 512.
+#include <cpu_ref/backend.hpp>
+#include <voxelpipe/io/nanovdb.hpp>
+#include <voxelpipe/octree.hpp>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <vector>
+
+namespace vp = voxelpipe;
+
+struct colored { // by the direction that the surface faces
+    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+        const glm::vec3 c = f.normal * 100.0f + 128.0f;
+        return vp::outputs(glm::u8vec4(c.x, c.y, c.z, 255));
+    }
+};
+
+int main(int argc, char** argv) {
+    constexpr int around = 2000, sides = 80; // a tube round a (2, 3) torus knot
+    std::vector<glm::vec3> positions;
+    std::vector<glm::uvec3> triangles;
+    const auto knot = [](double t) {
+        const double r = 2 + std::cos(3 * t);
+        return glm::dvec3(r * std::cos(2 * t), r * std::sin(2 * t), std::sin(3 * t));
+    };
+    for (unsigned i = 0; i < around; ++i) {
+        const double t = 6.283185307179586 * i / around;
+        const glm::dvec3 along = glm::normalize(knot(t + 1e-4) - knot(t - 1e-4));
+        const glm::dvec3 u = glm::normalize(glm::cross(along, glm::dvec3(0, 0.1, 1))), v = glm::cross(along, u);
+        for (unsigned s = 0; s < sides; ++s) {
+            const double a = 6.283185307179586 * s / sides;
+            positions.emplace_back(knot(t) + 0.5 * (std::cos(a) * u + std::sin(a) * v));
+            const unsigned j = (i + 1) % around, k = (s + 1) % sides, n = sides;
+            triangles.emplace_back(i * n + s, j * n + s, j * n + k);
+            triangles.emplace_back(i * n + s, j * n + k, i * n + k);
+        }
+    }
+    const int n = argc > 1 ? std::atoi(argv[1]) : 4096;
+    vp::cpu_backend backend;
+    const vp::grid grid = vp::fit_longest(vp::bounds(positions), n);
+    vp::sparse_framebuffer<vp::cpu_backend, vp::target<glm::u8vec4, vp::blend::replace>> surface{backend, grid.extent};
+    const vp::mesh mesh{backend, positions, triangles};
+    const auto drawn = vp::voxelize(backend, mesh, grid, vp::passthrough{}, colored{}, surface).or_throw();
+    const auto voxels = surface.to_host(backend);
+    std::printf("%llu voxels in %llu bricks, %.1f MB\n", static_cast<unsigned long long>(drawn.counts.voxels),
+                static_cast<unsigned long long>(voxels.num_bricks()), static_cast<double>(surface.num_bytes()) / 1e6);
+
+    std::ofstream file("knot.nvdb", std::ios::binary);
+    vp::io::nanovdb_file nvdb;
+    nvdb.add_target<0>("color", voxels);
+    nvdb.write(file);
+
+    const vp::octree tree(voxels);
+    constexpr int width = 800, height = 800;
+    const glm::dvec3 centre = glm::dvec3(grid.extent) * 0.5, step(1.1 * n / width);
+    std::ofstream picture("knot.ppm", std::ios::binary);
+    picture << "P6\n" << width << ' ' << height << "\n255\n";
+    int hits = 0;
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+            const glm::dvec3 from = centre + glm::dvec3(x - width / 2, height / 2 - y, 0) * step + glm::dvec3(0, 0, n);
+            const vp::voxel_hit hit = tree.first_hit(from, {0, 0, -1});
+            const glm::u8vec4 c = hit.found ? vp::get<0>(voxels)[hit.rank] : glm::u8vec4(240);
+            picture.put(static_cast<char>(c.r)).put(static_cast<char>(c.g)).put(static_cast<char>(c.b));
+            hits += hit.found ? 1 : 0;
+        }
+    return hits > width * height / 8 && voxels.num_voxels() == drawn.counts.voxels && file && picture ? 0 : 1;
+}

@@ -1,0 +1,287 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// An octree over a sparse framebuffer, on the host: nodes of 2, 4, 8 ... voxels a side, in the Morton order of their
+// places, so that the nodes below a node are a stretch of each level; values for every level by a reducer
+// (reducers.hpp); and a ray through it. A node exists if a voxel below it does: the levels are the OR of the finest,
+// not what a voxelization at half the resolution gives, which snaps otherwise.
+
+#include <voxelpipe/core/octree_view.hpp>
+#include <voxelpipe/host_sparse.hpp>
+#include <voxelpipe/reducers.hpp>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe {
+
+// Owns its nodes: 9 bytes each. Level l of 1 .. num_levels() has nodes of 2^l voxels a side, the last one the root
+// alone; level 0 are the voxels. Places count in the whole grid.
+class octree {
+public:
+    octree() = default;
+    // Up to the least root that holds the whole grid; no level where no voxel exists.
+    explicit octree(const brick_table& table, const glm::ivec3& whole_extent) { build(table, whole_extent); }
+    template <class... Targets>
+    explicit octree(const host_sparse<Targets...>& h) : octree(h.table(), h.where.whole_extent()) {}
+
+    [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); }
+    // Of a level from 0 on.
+    [[nodiscard]] std::uint64_t num_nodes(int level) const {
+        return level == 0 ? num_voxels_ : levels_[static_cast<std::size_t>(level) - 1].masks.size();
+    }
+    [[nodiscard]] std::uint64_t num_bytes() const {
+        std::uint64_t count = 0;
+        for (const auto& l : levels_) count += l.masks.size();
+        return count * (sizeof(std::uint8_t) + sizeof(std::uint64_t));
+    }
+    // Bit c of a node's mask: its child of Morton number c exists. first: the number of the first that does.
+    [[nodiscard]] std::span<const std::uint8_t> masks(int level) const {
+        return levels_[static_cast<std::size_t>(level) - 1].masks;
+    }
+    [[nodiscard]] std::span<const std::uint64_t> first(int level) const {
+        return levels_[static_cast<std::size_t>(level) - 1].first;
+    }
+    // Refers to the octree.
+    [[nodiscard]] octree_view view() const {
+        octree_view v;
+        v.num_levels = num_levels();
+        for (std::size_t l = 0; l < levels_.size(); ++l) {
+            v.masks[l] = levels_[l].masks.data();
+            v.first[l] = levels_[l].first.data();
+        }
+        return v;
+    }
+    // See octree_view.
+    [[nodiscard]] voxel_hit first_hit(const glm::dvec3& origin, const glm::dvec3& direction,
+                                      double limit = 1e300) const {
+        return view().first_hit(origin, direction, limit);
+    }
+
+    // Calls f(glm::ivec3 place, n) for every node of a level, in order; the node's first voxel is place << level.
+    template <class F>
+    void for_each_node(int level, F&& f) const {
+        if (num_levels() != 0) visit(num_levels(), 0, 0, level, f);
+    }
+
+private:
+    struct nodes {
+        std::vector<std::uint8_t> masks;
+        std::vector<std::uint64_t> first;
+    };
+
+    template <class F>
+    void visit(int at, std::uint64_t n, std::uint64_t key, int level, F& f) const {
+        if (at == level) {
+            f(core::morton_position(key), n);
+            return;
+        }
+        const nodes& l = levels_[static_cast<std::size_t>(at) - 1];
+        std::uint64_t child = l.first[n];
+        for (unsigned mask = l.masks[n]; mask != 0; mask &= mask - 1)
+            visit(at - 1, child++, key << 3 | static_cast<unsigned>(std::countr_zero(mask)), level, f);
+    }
+
+    void build(const brick_table& table, const glm::ivec3& whole_extent) {
+        num_voxels_ = table.num_voxels();
+        if (table.count == 0) return;
+        const int depth =
+            std::max(core::log2_sparse_brick,
+                     std::max({ceil_log2(whole_extent.x), ceil_log2(whole_extent.y), ceil_log2(whole_extent.z)}));
+        levels_.resize(static_cast<std::size_t>(depth));
+        // A brick is a node of level 3. Its mask has a word for each child and a byte for each grandchild.
+        for (std::uint64_t b = 0; b < table.count; ++b) {
+            std::uint64_t rank = table.offsets[b];
+            unsigned words = 0;
+            levels_[2].first.push_back(levels_[1].masks.size());
+            for (unsigned w = 0; w < 8; ++w) {
+                const std::uint64_t word = table.masks[b].words[w];
+                if (word == 0) continue;
+                words |= 1u << w;
+                unsigned bytes = 0;
+                levels_[1].first.push_back(levels_[0].masks.size());
+                for (unsigned i = 0; i < 8; ++i) {
+                    const auto byte = static_cast<std::uint8_t>(word >> (8 * i));
+                    if (byte == 0) continue;
+                    bytes |= 1u << i;
+                    levels_[0].masks.push_back(byte);
+                    levels_[0].first.push_back(rank);
+                    rank += static_cast<unsigned>(std::popcount(byte));
+                }
+                levels_[1].masks.push_back(static_cast<std::uint8_t>(bytes));
+            }
+            levels_[2].masks.push_back(static_cast<std::uint8_t>(words));
+        }
+        std::vector<std::uint64_t> keys(table.keys, table.keys + table.count), above;
+        for (std::size_t l = 3; l < levels_.size(); ++l) {
+            above.clear();
+            for (std::uint64_t i = 0; i < keys.size(); ++i) {
+                if (above.empty() || above.back() != keys[i] >> 3) {
+                    above.push_back(keys[i] >> 3);
+                    levels_[l].masks.push_back(0);
+                    levels_[l].first.push_back(i);
+                }
+                levels_[l].masks.back() |= static_cast<std::uint8_t>(1u << (keys[i] & 7u));
+            }
+            keys.swap(above);
+        }
+    }
+    [[nodiscard]] static int ceil_log2(int n) {
+        return n <= 1 ? 0 : static_cast<int>(std::bit_width(static_cast<unsigned>(n - 1)));
+    }
+
+    std::vector<nodes> levels_;
+    std::uint64_t num_voxels_ = 0;
+};
+
+// The values of a target on every level of an octree: at(level)[node], levels from 1 on.
+template <class T>
+class octree_levels {
+public:
+    [[nodiscard]] std::span<const T> at(int level) const { return levels_[static_cast<std::size_t>(level) - 1]; }
+    [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); }
+    std::vector<T>& add() { return levels_.emplace_back(); }
+
+private:
+    std::vector<std::vector<T>> levels_;
+};
+
+namespace core {
+
+template <class Reducer>
+inline constexpr bool sums_terms =
+    std::is_same_v<Reducer, reduce::sum> || std::is_same_v<Reducer, reduce::mean_of_voxels> ||
+    std::is_same_v<Reducer, reduce::mean_of_volume>;
+template <std::size_t C>
+inline constexpr bool sums_terms<reduce::mean<C>> = true;
+
+// The number of fragments of each voxel, where a reducer asks for them.
+template <class Reducer>
+struct counted_target {
+    template <class Host>
+    static std::uint64_t count(const Host&, std::uint64_t) {
+        return 1; // voxels
+    }
+};
+template <std::size_t C>
+struct counted_target<reduce::mean<C>> {
+    template <class Host>
+    static std::uint64_t count(const Host& h, std::uint64_t rank) {
+        return static_cast<std::uint64_t>(voxelpipe::get<C>(h)[rank]);
+    }
+};
+
+template <std::size_t I, class Host>
+using reduced_target = typename Host::template target_type<I>;
+
+template <std::size_t I, class Reducer, class Host>
+[[nodiscard]] auto reduce_terms(const octree& tree, const Host& h) {
+    using target = reduced_target<I, Host>;
+    using value = typename target::value_type;
+    using parts = components_of<value>;
+    using format = blend_tree_sum<typename target::blend_type, typename parts::scalar>;
+    constexpr bool divides = !std::is_same_v<Reducer, reduce::sum>;
+    using scalar = std::conditional_t<divides, typename format::quotient, typename format::total>;
+    using result = typename parts::template with<scalar>;
+    struct node {
+        std::array<typename format::sum, static_cast<std::size_t>(parts::count)> sums{};
+        std::uint64_t count = 0;
+    };
+    const auto& kept = voxelpipe::get<I>(h.sums);
+    const auto of_voxel = [&](std::uint64_t rank) {
+        node n;
+        n.count = counted_target<Reducer>::count(h, rank);
+        const value v = voxelpipe::get<I>(h)[rank];
+        for (int c = 0; c < parts::count; ++c) {
+            auto& sum = n.sums[static_cast<std::size_t>(c)];
+            if constexpr (has_wide_sums<target> && is_floating<typename parts::scalar>) {
+                if (!kept.empty()) {
+                    if constexpr (parts::count > 1)
+                        sum = widen(kept[rank].c[c]);
+                    else
+                        sum = widen(kept[rank]);
+                    continue;
+                }
+            }
+            sum = format::begin(parts::at(v, c));
+        }
+        return n;
+    };
+    octree_levels<result> levels;
+    std::vector<node> below, here;
+    for (int l = 1; l <= tree.num_levels(); ++l) {
+        const auto masks = tree.masks(l);
+        const auto first = tree.first(l);
+        here.assign(masks.size(), {});
+        std::vector<result>& out = levels.add();
+        out.resize(masks.size());
+        for (std::size_t i = 0; i < masks.size(); ++i) {
+            const auto children = static_cast<unsigned>(std::popcount(masks[i]));
+            for (std::uint64_t c = first[i]; c < first[i] + children; ++c) {
+                const node& from = l == 1 ? of_voxel(c) : below[c];
+                for (std::size_t k = 0; k < from.sums.size(); ++k) here[i].sums[k].add(from.sums[k]);
+                here[i].count += from.count;
+            }
+            std::uint64_t divisor = here[i].count;
+            if constexpr (std::is_same_v<Reducer, reduce::mean_of_volume>) divisor = std::uint64_t{1} << (3 * l);
+            for (int k = 0; k < parts::count; ++k) {
+                const auto& sum = here[i].sums[static_cast<std::size_t>(k)];
+                if constexpr (divides)
+                    components_of<result>::at(out[i], k) = divisor == 0 ? scalar{} : format::divide(sum, divisor);
+                else
+                    components_of<result>::at(out[i], k) = format::end(sum);
+            }
+        }
+        below.swap(here);
+    }
+    return levels;
+}
+
+} // namespace core
+
+// The values of target I on every level. `tree` is of `host`. Sums and means are exact and rounded once a node; the
+// others fold the up to 8 children of each node, in Morton order, level by level. Values that do not exist do not
+// count. The results have the target's type, bits as 0 and 1 in bytes; sums of integers are 64-bit, means of integers
+// doubles.
+template <std::size_t I, class Reducer, class... Targets>
+[[nodiscard]] auto reduce_levels(const octree& tree, const host_sparse<Targets...>& host, const Reducer& reducer) {
+    using host_type = host_sparse<Targets...>;
+    if (host.num_voxels() != tree.num_nodes(0) || !get<I>(host).enabled())
+        throw std::invalid_argument(
+            "voxelpipe::reduce_levels: the octree is of other voxels, or the target is disabled");
+    if constexpr (core::sums_terms<Reducer>) {
+        static_cast<void>(reducer);
+        return core::reduce_terms<I, Reducer>(tree, host);
+    } else {
+        using target_value = typename core::reduced_target<I, host_type>::value_type;
+        using value = std::conditional_t<std::is_same_v<target_value, bool>, std::uint8_t, target_value>;
+        octree_levels<value> levels;
+        std::array<value, 8> children;
+        for (int l = 1; l <= tree.num_levels(); ++l) {
+            const auto masks = tree.masks(l);
+            const auto first = tree.first(l);
+            const std::span<const value> below = l == 1 ? std::span<const value>() : levels.at(l - 1);
+            std::vector<value> out;
+            out.reserve(masks.size());
+            for (std::size_t i = 0; i < masks.size(); ++i) {
+                const auto n = static_cast<std::size_t>(std::popcount(masks[i]));
+                for (std::size_t c = 0; c < n; ++c)
+                    children[c] = l == 1 ? value(get<I>(host)[first[i] + c]) : below[first[i] + c];
+                out.push_back(core::fold_of<Reducer, value>::fold(reducer, std::span<const value>(children.data(), n)));
+            }
+            levels.add() = std::move(out);
+        }
+        return levels;
+    }
+}
+
+} // namespace voxelpipe

@@ -1,0 +1,96 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// An octree of which equal subtrees are stored once: a directed acyclic graph, geometry only. Built from the leaves up:
+// nodes of a level with the same mask and the same children become one.
+
+#include <voxelpipe/octree.hpp>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <vector>
+
+namespace voxelpipe {
+
+class octree_dag {
+public:
+    octree_dag() = default;
+    explicit octree_dag(const octree& tree) {
+        std::vector<std::uint32_t> below; // what each node of the level below has become
+        for (int l = 1; l <= tree.num_levels(); ++l) below = add_level(tree, l, below);
+    }
+
+    [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); }
+    // Of a level from 1 on; the last one has the root.
+    [[nodiscard]] std::uint64_t num_nodes(int level) const {
+        return levels_[static_cast<std::size_t>(level) - 1].masks.size();
+    }
+    // A byte a node, and four for each child and for the place of a node's children; level 1 has neither.
+    [[nodiscard]] std::uint64_t num_bytes() const {
+        std::uint64_t bytes = 0;
+        for (const auto& l : levels_)
+            bytes += l.masks.size() + (l.first.size() + l.children.size()) * sizeof(std::uint32_t);
+        return bytes;
+    }
+    // Whether a voxel exists, in the numbers of the whole grid; false outside.
+    [[nodiscard]] bool contains(const glm::ivec3& voxel) const {
+        if (levels_.empty()) return false;
+        for (int a = 0; a < 3; ++a)
+            if (voxel[a] < 0 || voxel[a] >> num_levels() != 0) return false;
+        std::uint32_t n = 0;
+        for (int l = num_levels();; --l) {
+            const level& at = levels_[static_cast<std::size_t>(l) - 1];
+            const auto c = static_cast<unsigned>((voxel.x >> (l - 1) & 1) | (voxel.y >> (l - 1) & 1) << 1 |
+                                                 (voxel.z >> (l - 1) & 1) << 2);
+            if ((at.masks[n] >> c & 1u) == 0) return false;
+            if (l == 1) return true;
+            n = at.children[at.first[n] + static_cast<unsigned>(std::popcount(at.masks[n] & ((1u << c) - 1)))];
+        }
+    }
+
+private:
+    struct level {
+        std::vector<std::uint8_t> masks;
+        std::vector<std::uint32_t> first, children;
+    };
+    using node = std::array<std::uint32_t, 9>; // the mask, and the children from the first on
+
+    std::vector<std::uint32_t> add_level(const octree& tree, int l, const std::vector<std::uint32_t>& below) {
+        const auto masks = tree.masks(l);
+        const auto first = tree.first(l);
+        std::vector<node> nodes(masks.size(), node{});
+        for (std::size_t i = 0; i < nodes.size(); ++i) {
+            nodes[i][0] = masks[i];
+            if (l == 1) continue;
+            const auto children = static_cast<unsigned>(std::popcount(masks[i]));
+            for (unsigned c = 0; c < children; ++c) nodes[i][c + 1] = below[first[i] + c];
+        }
+        std::vector<std::uint32_t> order(nodes.size()), number(nodes.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return nodes[a] < nodes[b]; });
+        level& out = levels_.emplace_back();
+        for (std::size_t i = 0; i < order.size(); ++i) {
+            const node& here = nodes[order[i]];
+            if (i == 0 || here != nodes[order[i - 1]]) {
+                out.masks.push_back(static_cast<std::uint8_t>(here[0]));
+                if (l != 1) {
+                    out.first.push_back(static_cast<std::uint32_t>(out.children.size()));
+                    const auto children = static_cast<std::ptrdiff_t>(std::popcount(here[0]));
+                    out.children.insert(out.children.end(), here.begin() + 1, here.begin() + 1 + children);
+                }
+            }
+            number[order[i]] = static_cast<std::uint32_t>(out.masks.size() - 1);
+        }
+        return number;
+    }
+
+    std::vector<level> levels_;
+};
+
+} // namespace voxelpipe
