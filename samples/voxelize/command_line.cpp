@@ -422,6 +422,21 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
     app.add_flag("--no-edges", raw.no_edges, "No lines between voxels")->group("Picture (.png)");
     app.add_flag("--no-ground", raw.no_ground, "No shadow on the ground")->group("Picture (.png)");
 
+    const auto choose_storage = [&options](storage_choice choice) {
+        if (options.storage != storage_choice::automatic && options.storage != choice)
+            throw usage_error("--sparse and --dense do not go together");
+        options.storage = choice;
+    };
+    app.add_flag_callback(
+           "--sparse", [choose_storage] { choose_storage(storage_choice::sparse); },
+           "Keep only voxels that something is drawn in: .npz and .npy then hold their coords, (n, 3), and values. By "
+           "itself where an output is .nvdb, or where a dense grid does not fit the memory and all outputs can do "
+           "without")
+        ->group("Machine");
+    app.add_flag_callback(
+           "--dense", [choose_storage] { choose_storage(storage_choice::dense); }, "Compute a dense grid in any case")
+        ->group("Machine");
+
     add_choice(app, "--up", options.write.up, {{"y", up_axis::y}, {"z", up_axis::z}},
                "Axis of the model that stands upright in .png, .vox and .schem: y or z. Default: y, as in glTF; many "
                ".stl have z")

@@ -6,6 +6,7 @@
 #include "formats/formats.hpp"
 #include "model_file.hpp"
 #include "placement.hpp"
+#include "sparse/sparse_voxelizer.hpp"
 #include "voxelizer.hpp"
 
 #include <cstdint>
@@ -27,6 +28,7 @@ struct command_line {
     // Targets that only some outputs ask for: those that show the voxels' shape or colours. Formats that hold every
     // target leave them out, so that one output does not change the content or the names of another.
     std::vector<target> implied;
+    storage_choice storage = storage_choice::automatic;
     write_options write;               // all but its progress
     std::uint64_t max_memory = 0;      // bytes, resident; 0: what the machine has
     std::vector<std::string> warnings; // of what makes sense, but hardly what was meant; one line each

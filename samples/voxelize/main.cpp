@@ -7,6 +7,8 @@
 #include "exit_code.hpp"
 #include "model_file.hpp"
 #include "report.hpp"
+#include "sparse/sparse_formats.hpp"
+#include "sparse/sparse_voxelizer.hpp"
 
 #include <chrono>
 #include <cstdio>
@@ -26,12 +28,27 @@ int fail(exit_code code, const std::string& why) {
 std::vector<std::filesystem::path> write_output(volume& voxels, const command_line& options,
                                                 const std::filesystem::path& output, const write_options& how) {
     std::vector<channel> aside;
-    if (find_format(output)->all_channels)
+    if (const format* const f = find_format(output); f->all_channels && !f->only_sparse)
         while (aside.size() < options.implied.size()) {
             aside.push_back(std::move(voxels.channels.back()));
             voxels.channels.pop_back();
         }
     std::vector<std::filesystem::path> files = write(voxels, output, how);
+    for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
+    return files;
+}
+
+// The same of a sparse volume; .nvdb takes the colours that --help promises too.
+std::vector<std::filesystem::path> write_output(sparse_volume& voxels, const command_line& options,
+                                                const std::filesystem::path& output, const write_options& how) {
+    memory::require(dense_bytes(voxels, output), "a dense grid for " + output.filename().string());
+    std::vector<channel> aside;
+    if (const format* const f = find_format(output); f->all_channels && !f->only_sparse)
+        while (aside.size() < options.implied.size()) {
+            aside.push_back(std::move(voxels.channels.back()));
+            voxels.channels.pop_back();
+        }
+    std::vector<std::filesystem::path> files = write_sparse(voxels, output, how);
     for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
     return files;
 }
@@ -92,9 +109,20 @@ void run(const command_line& options, clock::time_point begin) {
         report.warnings.push_back(std::move(warning));
     report.stats.milliseconds.emplace_back("place", milliseconds_since(start));
 
-    bar.start("voxelizing");
+    const storage_decision storage = choose_storage(options.storage, report.request, options.outputs);
+    const glm::ivec3 extent = report.request.grid.extent;
+    if (!options.quiet && !storage.reason.empty())
+        std::cerr << "voxelize: a sparse grid of " << extent.x << " x " << extent.y << " x " << extent.z
+                  << " voxels: " << storage.reason << '\n';
+    bar.start(storage.sparse ? "voxelizing into bricks" : "voxelizing");
     report.request.progress = [&bar](double done) { bar.show(done); };
-    volume voxels = run_voxelizer(std::move(model), report.request, report.stats);
+    volume voxels;
+    sparse_volume bricks;
+    if (storage.sparse)
+        bricks = run_sparse_voxelizer(std::move(model), report.request, report.stats);
+    else
+        voxels = run_voxelizer(std::move(model), report.request, report.stats);
+    const std::uint64_t num_bricks = bricks.keys.size(), brick_bytes = bricks.num_bytes();
     for (const std::string& warning : report.stats.warnings) report.warnings.push_back(warning);
     if (report.stats.triangles_dropped != 0)
         report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
@@ -106,7 +134,8 @@ void run(const command_line& options, clock::time_point begin) {
         write_options how = options.write;
         bar.start("writing " + output.filename().string());
         how.progress = [&bar](double done) { bar.show(done); };
-        for (std::filesystem::path& file : write_output(voxels, options, output, how))
+        for (std::filesystem::path& file :
+             storage.sparse ? write_output(bricks, options, output, how) : write_output(voxels, options, output, how))
             report.files.push_back(std::move(file));
     }
     bar.clear();
@@ -114,6 +143,7 @@ void run(const command_line& options, clock::time_point begin) {
     start = clock::now();
     model = {};
     voxels = {};
+    bricks = {};
     report.request.cuda.reset();
     report.stats.milliseconds.emplace_back("release", milliseconds_since(start));
     report.peak_memory = memory::peak();
@@ -122,10 +152,12 @@ void run(const command_line& options, clock::time_point begin) {
         print_warnings(report.warnings);
         // Standard output belongs to the object where one is asked for.
         std::ostream& stream = options.stats == stats_format::json ? std::cerr : std::cout;
-        const glm::ivec3 extent = report.request.grid.extent;
         for (const std::filesystem::path& file : report.files) stream << "wrote " << file.string() << '\n';
         stream << report.stats.voxels << " of " << extent.x << " x " << extent.y << " x " << extent.z
                << " voxels are covered\n";
+        if (storage.sparse)
+            stream << "they lie in " << num_bricks << " bricks of 8 x 8 x 8, "
+                   << memory::mebibytes(static_cast<double>(brick_bytes)) << " with their values\n";
     }
     add_rest(report, milliseconds_since(begin));
     if (options.stats == stats_format::text) print_text(std::cout, report);

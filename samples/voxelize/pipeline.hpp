@@ -154,7 +154,7 @@ public:
         return result;
     }
 
-private:
+protected: // sparse_pipeline draws the same into bricks
     template <class T>
     using buffer = typename Backend::template buffer<T>;
 
@@ -614,7 +614,11 @@ private:
                 found += normals[i] != glm::vec3(0) ? 1 : 0;
             with_normal += found;
         });
-        stats_.normals_cancelled = stats_.voxels - with_normal;
+        report_cancelled_normals(stats_.voxels - with_normal);
+    }
+
+    void report_cancelled_normals(std::uint64_t count) {
+        stats_.normals_cancelled = count;
         if (stats_.normals_cancelled != 0)
             stats_.warnings.push_back("the normals of " + std::to_string(stats_.normals_cancelled) + " of " +
                                       std::to_string(stats_.voxels) +

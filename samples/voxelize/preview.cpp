@@ -17,12 +17,11 @@
 namespace voxelize {
 namespace {
 
-void check(const volume& v, const preview_options& o) {
+void check(const preview_options& o) {
     const auto require = [](bool good, const char* message) {
         if (!good) throw std::invalid_argument(message);
     };
     constexpr int most_pixels = 16384;
-    require(v.occupancy() != nullptr, "the preview needs the occupancy");
     require(o.width >= 1 && o.height >= 1 && o.width <= most_pixels && o.height <= most_pixels,
             "the picture must have 1 to 16384 pixels a side");
     require(o.samples >= 1 && o.samples <= 8, "the samples of the picture must be 1 to 8");
@@ -55,19 +54,24 @@ std::optional<background> parse_background(std::string_view text) {
     return background{*top, *bottom, false};
 }
 
-const channel* find_colors(const volume& v) {
-    const auto usable = [](const channel* c) { return c != nullptr && c->type == scalar::u8 && c->components >= 3; };
-    if (const channel* c = v.find("color"); usable(c)) return c;
-    for (const channel& c : v.channels)
-        if (c.name.starts_with("color") && usable(&c)) return &c;
-    return nullptr;
+const channel* find_colors(std::span<const channel> channels) {
+    const channel* found = nullptr;
+    for (const channel& c : channels) {
+        if (!c.name.starts_with("color") || c.type != scalar::u8 || c.components < 3) continue;
+        if (c.name == "color") return &c;
+        if (found == nullptr) found = &c;
+    }
+    return found;
 }
 
-image render_preview(const volume& v, const preview_options& options, const std::function<void(double)>& progress) {
-    check(v, options);
+const channel* find_colors(const volume& v) { return find_colors(std::span<const channel>(v.channels)); }
+
+namespace {
+
+image render(const volume& v, const preview_scene& scene, const channel* colors, const preview_options& options,
+             const std::function<void(double)>& progress) {
     const int threads = thread_count(options.threads);
-    const preview_scene scene(v, threads);
-    const preview_shader shader(v, scene, options);
+    const preview_shader shader(v, scene, options, colors);
 
     image picture{options.width, options.height, options.backdrop.transparent ? 4 : 3, {}};
     const auto row_bytes = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.components);
@@ -88,6 +92,22 @@ image render_preview(const volume& v, const preview_options& options, const std:
         });
     if (progress) progress(1.0);
     return picture;
+}
+
+} // namespace
+
+image render_preview(const volume& v, const preview_options& options, const std::function<void(double)>& progress) {
+    if (v.occupancy() == nullptr) throw std::invalid_argument("the preview needs the occupancy");
+    check(options);
+    const preview_scene scene(v, thread_count(options.threads));
+    return render(v, scene, find_colors(v), options, progress);
+}
+
+image render_preview(const volume& v, const preview_bricks& bricks, const channel* colors,
+                     const preview_options& options, const std::function<void(double)>& progress) {
+    check(options);
+    const preview_scene scene(v, bricks);
+    return render(v, scene, colors, options, progress);
 }
 
 } // namespace voxelize

@@ -6,12 +6,14 @@
 // shadow on the ground, colours from the "color" channel. Takes a volume and a camera, gives 8-bit sRGB pixels; the
 // same pixels for any number of threads.
 
+#include "preview_scene.hpp"
 #include "volume.hpp"
 
 #include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -64,10 +66,15 @@ struct image {
 // The channel that gives voxels their colour: "color", or else the first that starts so (color_max, ...); u8 with three
 // or four components. Null when there is none.
 [[nodiscard]] const channel* find_colors(const volume& v);
+[[nodiscard]] const channel* find_colors(std::span<const channel> channels);
 
 // Needs the occupancy channel. `progress` is called with 0..1, from the calling thread. Throws std::invalid_argument
 // when an option lies outside its range.
 [[nodiscard]] image render_preview(const volume& v, const preview_options& options,
                                    const std::function<void(double)>& progress = {});
+// The same picture of the same voxels as bricks, without anything dense: of `v` extent and voxel size count alone, and
+// `colors`, which may be null, has a value for each voxel of the bricks, in their order.
+[[nodiscard]] image render_preview(const volume& v, const preview_bricks& bricks, const channel* colors,
+                                   const preview_options& options, const std::function<void(double)>& progress = {});
 
 } // namespace voxelize

@@ -13,15 +13,124 @@
 
 namespace voxelize {
 
+namespace {
+
+constexpr std::int64_t most_voxels = std::int64_t{1} << 30; // indices and their multiples of 64 stay in 32 bits
+
+// Every third bit of a Morton key, from bit `axis` on.
+std::int32_t coordinate_of(std::uint64_t key, int axis) {
+    std::uint32_t n = 0;
+    key >>= axis;
+    for (unsigned bit = 0; key != 0; ++bit, key >>= 3) n |= static_cast<std::uint32_t>(key & 1u) << bit;
+    return static_cast<std::int32_t>(n);
+}
+
+// The Morton number of a voxel within its brick.
+unsigned bit_of(std::int32_t x, std::int32_t y, std::int32_t z) {
+    constexpr std::array<unsigned, 8> spread{0, 1, 8, 9, 64, 65, 72, 73};
+    return spread[static_cast<std::size_t>(x & 7)] | spread[static_cast<std::size_t>(y & 7)] << 1 |
+           spread[static_cast<std::size_t>(z & 7)] << 2;
+}
+
+} // namespace
+
+preview_scene::preview_scene(const volume& v, const preview_bricks& bricks) : is_sparse_(true), sparse_(bricks) {
+    std::size_t num_nodes = 1;
+    for (std::size_t a = 0; a < 3; ++a) {
+        if (v.extent[a] > most_voxels)
+            throw std::invalid_argument("the preview draws at most 2^30 voxels along an axis");
+        extent_[a] = static_cast<std::int32_t>(v.extent[a]);
+        coarse_size_[a] = (extent_[a] + 63) / 64;
+        num_nodes *= static_cast<std::size_t>(coarse_size_[a]);
+    }
+    if (bricks.count >= UINT32_MAX - first_brick)
+        throw std::invalid_argument("the preview draws fewer than 2^32 - 3 bricks");
+    nodes_.resize(num_nodes);
+    bricks_.resize(bricks.count + first_brick);
+    low_ = extent_;
+    std::vector<std::size_t> layers(static_cast<std::size_t>((extent_[2] + 7) / 8) + 1);
+    for (std::uint32_t b = 0; b < bricks.count; ++b) {
+        const int3 at = brick_position(b);
+        std::uint32_t& node = nodes_[flag_index(coarse_size_, at[0] / 8, at[1] / 8, at[2] / 8)];
+        if (node == 0) {
+            tables_.resize(tables_.size() + 512, empty_brick);
+            node = static_cast<std::uint32_t>(tables_.size() / 512);
+        }
+        tables_[std::size_t{node - 1} * 512 + static_cast<std::size_t>((at[2] % 8 * 8 + at[1] % 8) * 8 + at[0] % 8)] =
+            b + first_brick;
+        ++layers[static_cast<std::size_t>(at[2]) + 1];
+        const std::uint64_t* const words = bricks.masks + std::size_t{b} * 8;
+        brick& rows = bricks_[b + first_brick];
+        for (std::int32_t z = 0; z < 8; ++z)
+            for (std::int32_t y = 0; y < 8; ++y)
+                for (std::int32_t x = 0; x < 8; ++x) {
+                    const unsigned bit = bit_of(x, y, z);
+                    if ((words[bit / 64] >> bit % 64 & 1u) == 0) continue;
+                    rows[static_cast<std::size_t>(z)] |= std::uint64_t{1} << (8 * y + x);
+                    const int3 voxel{8 * at[0] + x, 8 * at[1] + y, 8 * at[2] + z};
+                    for (std::size_t a = 0; a < 3; ++a) {
+                        low_[a] = std::min(low_[a], voxel[a]);
+                        high_[a] = std::max(high_[a], voxel[a] + 1);
+                    }
+                }
+    }
+    for (std::size_t z = 1; z < layers.size(); ++z) layers[z] += layers[z - 1];
+    by_layer_.resize(bricks.count);
+    for (std::uint32_t b = 0; b < bricks.count; ++b)
+        by_layer_[layers[static_cast<std::size_t>(brick_position(b)[2])]++] = b;
+}
+
+preview_scene::int3 preview_scene::brick_position(std::uint32_t brick) const {
+    const std::uint64_t key = sparse_.keys[brick];
+    return {coordinate_of(key, 0), coordinate_of(key, 1), coordinate_of(key, 2)};
+}
+
+std::uint32_t preview_scene::number_of(const int3& cell, bool& far_off) const {
+    const std::size_t coarse = flag_index(coarse_size_, cell[0] >> 6, cell[1] >> 6, cell[2] >> 6);
+    if (!is_sparse_) {
+        far_off = coarse_[coarse] == 0;
+        return far_off ? empty_brick : fine_[flag_index(fine_size_, cell[0] >> 3, cell[1] >> 3, cell[2] >> 3)];
+    }
+    const std::uint32_t node = nodes_[coarse];
+    far_off = node == 0;
+    if (far_off) return empty_brick;
+    const std::int32_t at = ((cell[2] >> 3 & 7) * 8 + (cell[1] >> 3 & 7)) * 8 + (cell[0] >> 3 & 7);
+    return tables_[std::size_t{node - 1} * 512 + static_cast<std::size_t>(at)];
+}
+
+void preview_scene::add_row_ends(std::uint32_t brick, std::vector<std::int32_t>& first,
+                                 std::vector<std::int32_t>& last) const {
+    const int3 at = brick_position(brick);
+    for (std::int32_t z = 0; z < 8; ++z)
+        for (std::int32_t y = 0; y < 8; ++y) {
+            const auto row = static_cast<std::uint32_t>(
+                bricks_[brick + first_brick][static_cast<std::size_t>(z)] >> (8 * y) & 0xffu);
+            if (row == 0) continue;
+            const auto n = static_cast<std::size_t>((8 * at[1] + y) * 8 + z);
+            first[n] = std::min(first[n], 8 * at[0] + std::countr_zero(row));
+            last[n] = std::max(last[n], 8 * at[0] + 31 - std::countl_zero(row));
+        }
+}
+
+std::uint64_t preview_scene::rank_of(const int3& voxel) const {
+    bool far_off;
+    const std::uint32_t brick = number_of(voxel, far_off) - first_brick;
+    const unsigned bit = bit_of(voxel[0], voxel[1], voxel[2]);
+    const std::uint64_t* const words = sparse_.masks + std::size_t{brick} * 8;
+    std::uint64_t rank = sparse_.offsets[brick];
+    for (unsigned w = 0; w < bit / 64; ++w) rank += static_cast<std::uint64_t>(std::popcount(words[w]));
+    return rank + static_cast<std::uint64_t>(std::popcount(words[bit / 64] & ((std::uint64_t{1} << bit % 64) - 1)));
+}
+
 preview_scene::preview_scene(const volume& v, int threads) {
     const channel& bits = *v.occupancy();
     bits_ = bits.data.data();
     row_bytes_ = v.words_per_row() * 4;
     slice_bytes_ = row_bytes_ * v.extent[1];
-    constexpr std::int64_t most = std::int64_t{1} << 30; // indices and their multiples of 64 stay in 32 bits
     std::size_t num_fine = 1, num_coarse = 1;
     for (std::size_t a = 0; a < 3; ++a) {
-        if (v.extent[a] > most) throw std::invalid_argument("the preview draws at most 2^30 voxels along an axis");
+        if (v.extent[a] > most_voxels)
+            throw std::invalid_argument("the preview draws at most 2^30 voxels along an axis");
         extent_[a] = static_cast<std::int32_t>(v.extent[a]);
         fine_size_[a] = (extent_[a] + 7) / 8;
         coarse_size_[a] = (extent_[a] + 63) / 64;
@@ -161,9 +270,8 @@ ray_hit preview_scene::first_hit(const vec3& origin, const vec3& direction, doub
         return next[axis] < t_end; // equal: the side is one of the bounds
     };
     while (true) {
-        const bool far_off = coarse_[flag_index(coarse_size_, cell[0] >> 6, cell[1] >> 6, cell[2] >> 6)] == 0;
-        const std::uint32_t number =
-            far_off ? empty_brick : fine_[flag_index(fine_size_, cell[0] >> 3, cell[1] >> 3, cell[2] >> 3)];
+        bool far_off;
+        const std::uint32_t number = number_of(cell, far_off);
         if (number == empty_brick) {
             const int level = far_off ? 6 : 3;
             for (std::size_t a = 0; a < 3; ++a) aim(a, level);
@@ -208,6 +316,17 @@ std::array<std::int32_t, 2> preview_scene::row_ends(std::int32_t j, std::int32_t
 // Voxels (i, j, k) .. (i + 31, j, k) as bits; whatever lies outside the grid is empty.
 std::uint32_t preview_scene::window(std::int32_t i, std::int32_t j, std::int32_t k) const {
     if (j < 0 || j >= extent_[1] || k < 0 || k >= extent_[2]) return 0;
+    if (is_sparse_) {
+        std::uint64_t bits = 0; // from the brick that i lies in
+        for (std::int32_t b = 0; b < 5; ++b) {
+            const std::int32_t x = ((i >> 3) + b) * 8;
+            if (x < 0 || x >= extent_[0]) continue;
+            bool far_off;
+            const std::uint64_t layer = bricks_[number_of({x, j, k}, far_off)][static_cast<std::size_t>(k & 7)];
+            bits |= (layer >> (8 * (j & 7)) & 0xffu) << (8 * b);
+        }
+        return static_cast<std::uint32_t>(bits >> (i & 7));
+    }
     const std::byte* row = bits_ + k * slice_bytes_ + j * row_bytes_;
     const std::int64_t at = i >> 5; // floor, also for negative i
     std::array<std::uint32_t, 2> words{};

@@ -4,11 +4,14 @@
 
 // The occupied voxels as something that rays can hit: bricks of 8^3 voxels, 64 bytes each and only where there are any,
 // found through a table, and above it a flag for each 64^3 voxels, so that empty space is crossed in large steps and a
-// ray reads little memory. Internal to the preview.
+// ray reads little memory. They come from packed bits, or from bricks of a sparse grid, whose table has a part for each
+// 64^3 voxels that has any. Internal to the preview.
 
 #include "volume.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -20,6 +23,15 @@ using vec3 = std::array<double, 3>;
 [[nodiscard]] constexpr vec3 operator-(const vec3& a, const vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 [[nodiscard]] constexpr vec3 operator*(const vec3& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
 [[nodiscard]] constexpr double dot(const vec3& a, const vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// Bricks of 8^3 voxels, none empty, by ascending Morton key of their position (bits of x, y and z in turn, x lowest).
+// Eight words of bits each, in Morton order too. offsets[i] is the number of occupied voxels in the bricks before.
+struct preview_bricks {
+    const std::uint64_t* keys = nullptr;
+    const std::uint64_t* masks = nullptr;
+    const std::uint64_t* offsets = nullptr;
+    std::size_t count = 0;
+};
 
 // Where a ray meets the first occupied voxel: on the side of `axis`, low or high.
 struct ray_hit {
@@ -33,6 +45,12 @@ class preview_scene {
 public:
     // `v` must outlive the scene and have an occupancy channel. Reads the bits once, on `threads` threads (>= 1).
     preview_scene(const volume& v, int threads);
+    // The same voxels as bricks, which must outlive the scene too; of `v` the extent counts alone.
+    preview_scene(const volume& v, const preview_bricks& bricks);
+
+    [[nodiscard]] bool is_sparse() const { return is_sparse_; }
+    // The number of an occupied voxel among those of the bricks.
+    [[nodiscard]] std::uint64_t rank_of(const std::array<std::int32_t, 3>& voxel) const;
 
     [[nodiscard]] bool empty() const { return high_[0] <= low_[0]; }
     // Bounds of the occupied voxels, in voxels: [low, high).
@@ -54,6 +72,10 @@ public:
     // occupied voxel bound; together these boxes have the convex hull of all occupied voxels.
     template <class Visit>
     void for_each_row(Visit visit) const {
+        if (is_sparse_) {
+            for_each_row_of_bricks(visit);
+            return;
+        }
         for (std::int32_t k = low_[2]; k < high_[2]; ++k)
             for (std::int32_t j = low_[1]; j < high_[1]; ++j) {
                 const auto [first, last] = row_ends(j, k);
@@ -71,6 +93,29 @@ private:
                    static_cast<std::size_t>(size[0]) +
                static_cast<std::size_t>(i);
     }
+    // Layer by layer of bricks: the ends of the layer's rows are known once its bricks are through.
+    template <class Visit>
+    void for_each_row_of_bricks(const Visit& visit) const {
+        const auto rows = std::size_t{8} * 8 * static_cast<std::size_t>((extent_[1] + 7) / 8); // y * 8 + z % 8
+        std::vector<std::int32_t> first(rows), last(rows);
+        for (std::size_t i = 0; i < by_layer_.size();) {
+            const std::int32_t layer = brick_position(by_layer_[i])[2];
+            std::fill(first.begin(), first.end(), extent_[0]);
+            std::fill(last.begin(), last.end(), -1);
+            for (; i < by_layer_.size() && brick_position(by_layer_[i])[2] == layer; ++i)
+                add_row_ends(by_layer_[i], first, last);
+            for (std::size_t row = 0; row < rows; ++row) {
+                if (last[row] < 0) continue;
+                const auto j = static_cast<double>(row / 8), k = 8.0 * layer + static_cast<double>(row % 8);
+                visit(vec3{static_cast<double>(first[row]), j, k}, vec3{last[row] + 1.0, j + 1.0, k + 1.0});
+            }
+        }
+    }
+    void add_row_ends(std::uint32_t brick, std::vector<std::int32_t>& first, std::vector<std::int32_t>& last) const;
+    [[nodiscard]] int3 brick_position(std::uint32_t brick) const;
+    // The number in bricks_ of a voxel's brick; far_off: there is none within 64^3 voxels.
+    [[nodiscard]] std::uint32_t number_of(const int3& cell, bool& far_off) const;
+
     // First and last occupied voxel of a row; first > last when there is none.
     [[nodiscard]] std::array<std::int32_t, 2> row_ends(std::int32_t j, std::int32_t k) const;
     [[nodiscard]] std::uint32_t window(std::int32_t i, std::int32_t j, std::int32_t k) const;
@@ -89,6 +134,13 @@ private:
     std::vector<std::uint32_t> fine_;  // for each 8^3 voxels the number of its brick
     std::vector<brick> bricks_;        // all empty ones are one, all full ones too
     std::vector<std::uint8_t> coarse_; // 1 for each 64^3 with an occupied voxel
+    // Of a sparse grid, in place of the two tables; brick i of the grid is bricks_[i + first_brick].
+    static constexpr std::uint32_t first_brick = full_brick + 1;
+    bool is_sparse_ = false;
+    preview_bricks sparse_;
+    std::vector<std::uint32_t> nodes_;    // for each 64^3 voxels the number of its table plus one, or 0
+    std::vector<std::uint32_t> tables_;   // 512 each, x fastest: numbers of bricks
+    std::vector<std::uint32_t> by_layer_; // the grid's bricks, by their z
     int3 low_{};
     int3 high_{};
 };

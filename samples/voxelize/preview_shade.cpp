@@ -66,8 +66,9 @@ vec3 divided(const vec3& a, const vec3& b) { return {a[0] / b[0], a[1] / b[1], a
 
 } // namespace
 
-preview_shader::preview_shader(const volume& v, const preview_scene& scene, const preview_options& options)
-    : volume_(v), scene_(scene), options_(options), colors_(options.use_color ? find_colors(v) : nullptr),
+preview_shader::preview_shader(const volume& v, const preview_scene& scene, const preview_options& options,
+                               const channel* colors)
+    : volume_(v), scene_(scene), options_(options), colors_(options.use_color ? colors : nullptr),
       axes_(axes_of(options.up)) {
     for (std::size_t n = 0; n < to_linear_.size(); ++n)
         to_linear_[n] = static_cast<float>(srgb_to_linear(static_cast<double>(n) / 255));
@@ -101,8 +102,9 @@ camera::ray preview_shader::ray_of(int x, int y) const {
 rgb_linear preview_shader::albedo_of(const ray_hit& hit, const vec3& at, double pixels_per_voxel) const {
     rgb_linear color{};
     if (colors_ != nullptr) {
-        const std::byte* value =
-            colors_->data.data() + volume_.index(hit.voxel[0], hit.voxel[1], hit.voxel[2]) * colors_->components;
+        const auto number = scene_.is_sparse() ? static_cast<std::int64_t>(scene_.rank_of(hit.voxel))
+                                               : volume_.index(hit.voxel[0], hit.voxel[1], hit.voxel[2]);
+        const std::byte* value = colors_->data.data() + number * colors_->components;
         for (std::size_t a = 0; a < 3; ++a) color[a] = to_linear_[std::to_integer<std::size_t>(value[a])];
     } else {
         for (std::size_t a = 0; a < 3; ++a) color[a] = to_linear_[clay[a]];

@@ -21,7 +21,9 @@ using rgb_linear = std::array<float, 3>;
 class preview_shader {
 public:
     // All three must outlive the shader; the options are checked already.
-    preview_shader(const volume& v, const preview_scene& scene, const preview_options& options);
+    // `colors` holds a value for each voxel of the volume or, if the scene is sparse, for each voxel of its bricks;
+    // null: no colours.
+    preview_shader(const volume& v, const preview_scene& scene, const preview_options& options, const channel* colors);
 
     // Pixel rows [from, to) of the picture into `pixels`, RGB or RGBA. May be called from several threads at once.
     void render_rows(int from, int to, int components, std::uint8_t* pixels) const;

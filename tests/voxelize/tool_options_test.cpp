@@ -52,6 +52,8 @@ std::set<std::string> all_options() {
             "--max-memory MIB",
             "--work-memory MIB",
             "--device-memory MIB",
+            "--sparse",
+            "--dense",
             "--image-size WxH",
             "--azimuth DEG",
             "--elevation DEG",

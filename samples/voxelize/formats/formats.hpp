@@ -38,6 +38,7 @@ struct format {
     bool all_channels;            // false: occupancy, with "color" where the format has colours
     bool shows_colors;            // takes the colours of find_colors() where there are any
     bool needs_cubes;             // knows one voxel size for all axes: without are_cubic() the writer refuses
+    bool only_sparse = false;     // holds the voxels that are occupied and no others
 };
 
 // Whether voxels of this size are cubes, but for what fitting a grid loses by rounding.

@@ -22,11 +22,15 @@ std::string_view dtype_of(scalar type) {
 } // namespace
 
 std::string npy_header(const volume& v, const channel& c) {
-    std::string text = "{'descr': '" + std::string(dtype_of(c.type)) + "', 'fortran_order': False, 'shape': (" +
-                       std::to_string(v.extent[2]) + ", " + std::to_string(v.extent[1]) + ", " +
-                       std::to_string(v.extent[0]);
-    if (c.components > 1) text += ", " + std::to_string(c.components);
-    text += "), }";
+    std::string shape = "(";
+    shape += std::to_string(v.extent[2]) + ", " + std::to_string(v.extent[1]) + ", " + std::to_string(v.extent[0]);
+    if (c.components > 1) shape += ", " + std::to_string(c.components);
+    return npy_header(c.type, shape + ")");
+}
+
+std::string npy_header(scalar type, const std::string& shape) {
+    std::string text =
+        "{'descr': '" + std::string(dtype_of(type)) + "', 'fortran_order': False, 'shape': " + shape + ", }";
     constexpr std::size_t prefix = 10; // magic, version, length
     const std::size_t padded = (prefix + text.size() + 1 + 63) / 64 * 64;
     text.append(padded - prefix - text.size() - 1, ' ');

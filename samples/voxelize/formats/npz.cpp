@@ -10,6 +10,7 @@
 
 #include <exception>
 #include <minizip/zip.h>
+#include <utility>
 #include <zlib.h>
 
 namespace voxelize {
@@ -60,66 +61,101 @@ int on_error(voidpf opaque, voidpf) { return static_cast<zip_sink*>(opaque)->fai
 
 } // namespace
 
+struct npz_archive::state {
+    state(const std::filesystem::path& path, int level) : out(path), sink{out}, compression(level) {
+        zlib_filefunc64_def callbacks{on_open, on_read, on_write, on_tell, on_seek, on_close, on_error, &sink};
+        archive = zipOpen2_64("", APPEND_STATUS_CREATE, nullptr, &callbacks);
+        if (archive == nullptr) throw write_error(path, "out of memory");
+        info.dosDate = 1u << 21 | 1u << 16; // 1980-01-01, the earliest that zip knows
+    }
+    output_file out;
+    zip_sink sink;
+    int compression;
+    zipFile archive = nullptr;
+    bool entry_open = false;
+    zip_fileinfo info{};
+};
+
+npz_archive::npz_archive(const std::filesystem::path& path, int compression)
+    : state_(std::make_unique<state>(path, compression)) {}
+
+npz_archive::~npz_archive() {
+    if (state_->archive == nullptr) return;                     // committed
+    if (state_->entry_open) zipCloseFileInZip(state_->archive); // frees minizip's state; its errors no longer matter
+    zipClose(state_->archive, nullptr);
+}
+
+void npz_archive::check(int code) {
+    if (code == ZIP_OK) return;
+    if (state_->sink.failure) std::rethrow_exception(state_->sink.failure);
+    throw write_error(state_->out.target(), "the zip library gave error " + std::to_string(code));
+}
+
+void npz_archive::add(const std::string& name, const std::string& header,
+                      const std::function<void(const array_sink&)>& stream) {
+    const int level = state_->compression;
+    check(zipOpenNewFileInZip64(state_->archive, (name + ".npy").c_str(), &state_->info, nullptr, 0, nullptr, 0,
+                                nullptr, level > 0 ? Z_DEFLATED : 0, level, 1));
+    state_->entry_open = true;
+    const auto write = [this](std::span<const std::byte> bytes) {
+        check(zipWriteInFileInZip(state_->archive, bytes.data(), static_cast<unsigned>(bytes.size())));
+    };
+    write(std::as_bytes(std::span{header}));
+    stream(write);
+    state_->entry_open = false;
+    check(zipCloseFileInZip(state_->archive));
+}
+
+void npz_archive::add_compressed(const std::string& name, const std::function<source(const array_sink&)>& stream) {
+    check(zipOpenNewFileInZip2_64(state_->archive, (name + ".npy").c_str(), &state_->info, nullptr, 0, nullptr, 0,
+                                  nullptr, Z_DEFLATED, state_->compression, 1, 1));
+    state_->entry_open = true;
+    const source whole = stream([this](std::span<const std::byte> bytes) {
+        check(zipWriteInFileInZip(state_->archive, bytes.data(), static_cast<unsigned>(bytes.size())));
+    });
+    state_->entry_open = false;
+    check(zipCloseFileInZipRaw64(state_->archive, whole.size, whole.crc));
+}
+
+void npz_archive::commit() {
+    const zipFile archive = std::exchange(state_->archive, nullptr);
+    check(zipClose(archive, nullptr)); // gives the archive back whatever it returns
+    state_->out.commit();
+}
+
 std::vector<std::filesystem::path> write_npz(const volume& v, const std::filesystem::path& path,
                                              const write_options& options) {
     std::uint64_t total = 0;
     for (const channel& c : v.channels) total += streamed_bytes(v, c, half_floats::keep);
     progress_meter meter(options.progress, total);
 
-    output_file out(path);
-    zip_sink sink{out};
-    zlib_filefunc64_def callbacks{on_open, on_read, on_write, on_tell, on_seek, on_close, on_error, &sink};
-    const zipFile archive = zipOpen2_64("", APPEND_STATUS_CREATE, nullptr, &callbacks);
-    if (archive == nullptr) throw write_error(path, "out of memory");
-    bool entry_open = false;
-    const auto check = [&](int code) {
-        if (code == ZIP_OK) return;
-        if (entry_open) zipCloseFileInZip(archive); // frees minizip's state; its own errors no longer matter
-        zipClose(archive, nullptr);
-        if (sink.failure) std::rethrow_exception(sink.failure);
-        throw write_error(path, "the zip library gave error " + std::to_string(code));
-    };
-
-    zip_fileinfo info{};
-    info.dosDate = 1u << 21 | 1u << 16; // 1980-01-01, the earliest that zip knows
+    npz_archive archive(path, options.compression);
     for (const channel& c : v.channels) {
-        const std::string name = c.name + ".npy";
         const std::string header = npy_header(v, c);
         if (options.compression > 0) {
             // Compressed here, on all threads; minizip writes what surrounds it.
-            check(zipOpenNewFileInZip2_64(archive, name.c_str(), &info, nullptr, 0, nullptr, 0, nullptr, Z_DEFLATED,
-                                          options.compression, 1, 1));
-            entry_open = true;
-            piece_compressor compressor(piece_compressor::form::stream_part, options.compression);
-            running_crc whole;
-            const auto add = [&](std::span<const std::byte> bytes) {
-                check(zipWriteInFileInZip(archive, bytes.data(), static_cast<unsigned>(bytes.size())));
-            };
-            compress_channel(v, c, half_floats::keep, std::as_bytes(std::span{header}), piece_bytes, options.threads,
-                             compressor, [&](const compressed_piece& piece) {
-                                 add(piece.bytes);
-                                 whole.add(piece);
-                                 meter.advance(piece.source_size);
-                             });
-            add(deflate_end);
-            entry_open = false;
-            check(zipCloseFileInZipRaw64(archive, whole.size, whole.crc));
-            continue;
+            archive.add_compressed(c.name, [&](const array_sink& add) {
+                piece_compressor compressor(piece_compressor::form::stream_part, options.compression);
+                running_crc whole;
+                compress_channel(v, c, half_floats::keep, std::as_bytes(std::span{header}), piece_bytes,
+                                 options.threads, compressor, [&](const compressed_piece& piece) {
+                                     add(piece.bytes);
+                                     whole.add(piece);
+                                     meter.advance(piece.source_size);
+                                 });
+                add(deflate_end);
+                return npz_archive::source{whole.size, whole.crc};
+            });
+        } else {
+            archive.add(c.name, header, [&](const array_sink& add) {
+                stream_values(v, c, half_floats::keep, [&](std::span<const std::byte> piece) {
+                    add(piece);
+                    meter.advance(piece.size());
+                });
+            });
         }
-        check(zipOpenNewFileInZip64(archive, name.c_str(), &info, nullptr, 0, nullptr, 0, nullptr, 0, 0, 1));
-        entry_open = true;
-        check(zipWriteInFileInZip(archive, header.data(), static_cast<unsigned>(header.size())));
-        stream_values(v, c, half_floats::keep, [&](std::span<const std::byte> piece) {
-            check(zipWriteInFileInZip(archive, piece.data(), static_cast<unsigned>(piece.size())));
-            meter.advance(piece.size());
-        });
-        entry_open = false;
-        check(zipCloseFileInZip(archive));
     }
-    const int code = zipClose(archive, nullptr); // gives the archive back whatever it returns
-    if (sink.failure) std::rethrow_exception(sink.failure);
-    if (code != ZIP_OK) throw write_error(path, "the zip library gave error " + std::to_string(code));
-    out.commit();
+    archive.commit();
     return {path};
 }
 

@@ -30,13 +30,13 @@ unsigned char* compress_png(unsigned char* data, int size, int* packed_size, int
 
 namespace voxelize {
 
-std::vector<std::filesystem::path> write_png(const volume& v, const std::filesystem::path& path,
-                                             const write_options& options) {
+std::vector<std::filesystem::path> write_picture(const std::filesystem::path& path, const write_options& options,
+                                                 const std::function<image(const preview_options&)>& render) {
     preview_options preview = options.preview;
     preview.up = options.up;
     preview.threads = options.threads;
     output_file out(path); // first, so that a path that cannot be written costs no rendering
-    const image picture = render_preview(v, preview, options.progress);
+    const image picture = render(preview);
 
     struct sink {
         output_file& out;
@@ -57,6 +57,12 @@ std::vector<std::filesystem::path> write_png(const volume& v, const std::filesys
     if (ok == 0) throw write_error(path, "out of memory");
     out.commit();
     return {path};
+}
+
+std::vector<std::filesystem::path> write_png(const volume& v, const std::filesystem::path& path,
+                                             const write_options& options) {
+    return write_picture(path, options,
+                         [&](const preview_options& preview) { return render_preview(v, preview, options.progress); });
 }
 
 } // namespace voxelize

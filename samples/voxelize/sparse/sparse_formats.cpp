@@ -1,0 +1,242 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "sparse_formats.hpp"
+
+#include "../formats/npy.hpp"
+#include "../formats/npz.hpp"
+#include "../formats/output_file.hpp"
+#include "../formats/png.hpp"
+#include "../formats/progress.hpp"
+
+#include <voxelpipe/host_sparse.hpp>
+#include <voxelpipe/io/nanovdb.hpp>
+
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <string>
+
+namespace voxelize {
+namespace {
+
+using voxelpipe::io::nanovdb_file;
+namespace nanovdb = voxelpipe::io::nanovdb;
+
+std::string extension_of(const std::filesystem::path& path) {
+    std::string extension = path.extension().string();
+    for (char& c : extension)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return extension;
+}
+
+// ---- .nvdb
+// ------------------------------------------------------------------------------------------------------------
+
+voxelpipe::grid grid_of(const volume& shape) {
+    voxelpipe::grid g;
+    for (int a = 0; a < 3; ++a) {
+        const auto i = static_cast<std::size_t>(a);
+        g.origin[a] = shape.origin[i];
+        g.voxel_size[a] = shape.voxel_size[i];
+        g.extent[a] = static_cast<int>(shape.extent[i]);
+    }
+    return g;
+}
+
+template <class T>
+void add_grid(nanovdb_file& file, const sparse_volume& v, const channel& c) {
+    T background;
+    const std::uint32_t empty = empty_value(c);
+    for (std::size_t at = 0; at < sizeof(T); at += sizeof(empty))
+        std::memcpy(reinterpret_cast<std::byte*>(&background) + at, &empty, sizeof(empty));
+    const std::byte* const data = c.data.data();
+    file.add<T>({c.name, v.table(), grid_of(v.shape), background, [data](std::uint64_t rank) {
+                     T value;
+                     std::memcpy(&value, data + rank * sizeof(T), sizeof(T));
+                     return value;
+                 }});
+}
+
+std::vector<std::filesystem::path> write_nvdb(const sparse_volume& v, const std::filesystem::path& path,
+                                              const write_options& options) {
+    nanovdb_file file;
+    for (const channel& c : v.channels) {
+        if (c.type == scalar::bit)
+            file.add<nanovdb::mask_value>({c.name, v.table(), grid_of(v.shape), false, {}});
+        else if (c.type == scalar::u8 && c.components == 4)
+            add_grid<nanovdb::rgba8>(file, v, c);
+        else if (c.type == scalar::u32 && c.components == 1)
+            add_grid<std::uint32_t>(file, v, c);
+        else if (c.type == scalar::i32 && c.components == 1)
+            add_grid<std::int32_t>(file, v, c);
+        else if (c.type == scalar::f32 && c.components == 1)
+            add_grid<float>(file, v, c);
+        else if (c.type == scalar::f32 && c.components == 3)
+            add_grid<glm::vec3>(file, v, c);
+        else
+            throw write_error(path, ".nvdb has no type for the values of channel " + c.name);
+    }
+    output_file out(path);
+    progress_meter meter(options.progress, file.size());
+    file.write([&](const void* bytes, std::size_t count) {
+        out.write(std::span{static_cast<const std::byte*>(bytes), count});
+        meter.advance(count);
+    });
+    out.commit();
+    return {path};
+}
+
+// ---- .npz and .npy
+// ----------------------------------------------------------------------------------------------------
+
+// One array: a row of `columns` values for each voxel; one column has no dimension of its own.
+struct array {
+    std::string name;
+    scalar type;
+    int columns;
+    std::uint64_t bytes;
+    std::function<void(const array_sink&)> stream; // hands out all bytes in order
+};
+
+std::string header_of(const array& a, std::uint64_t voxels) {
+    std::string shape = "(";
+    shape += std::to_string(voxels);
+    shape += ',';
+    if (a.columns > 1) shape += ' ';
+    if (a.columns > 1) shape += std::to_string(a.columns);
+    shape += ')';
+    return npy_header(a.type, shape);
+}
+
+std::vector<array> arrays_of(const sparse_volume& v) {
+    std::vector<array> arrays;
+    const std::uint64_t n = v.num_voxels();
+    const auto coords = [&v](const array_sink& sink) {
+        std::vector<std::int32_t> rows;
+        const voxelpipe::brick_table table = v.table();
+        for (std::uint64_t b = 0; b < table.count; ++b) {
+            voxelpipe::for_each_voxel_in(table, b, [&](const glm::ivec3& p, std::uint64_t) {
+                for (int a = 0; a < 3; ++a) rows.push_back(p[a]);
+            });
+            constexpr std::size_t piece = 1 << 18;
+            if (rows.size() < piece && b + 1 < table.count) continue;
+            sink(std::as_bytes(std::span{rows}));
+            rows.clear();
+        }
+    };
+    arrays.push_back({"coords", scalar::i32, 3, n * 12, coords});
+    for (const channel& c : v.channels) {
+        if (c.type == scalar::bit) continue; // every row is a voxel that is occupied
+        const auto values = [&c](const array_sink& sink) {
+            constexpr std::size_t piece = 1 << 20;
+            for (std::size_t at = 0; at < c.data.size(); at += piece)
+                sink(std::span{c.data}.subspan(at, std::min(piece, c.data.size() - at)));
+        };
+        arrays.push_back({c.name, c.type, c.components, c.data.size(), values});
+    }
+    return arrays;
+}
+
+std::uint64_t bytes_of(const std::vector<array>& arrays) {
+    std::uint64_t bytes = 0;
+    for (const array& a : arrays) bytes += a.bytes;
+    return bytes;
+}
+
+std::vector<std::filesystem::path> write_sparse_npz(const sparse_volume& v, const std::filesystem::path& path,
+                                                    const write_options& options) {
+    const std::vector<array> arrays = arrays_of(v);
+    progress_meter meter(options.progress, bytes_of(arrays));
+    npz_archive archive(path, options.compression);
+    for (const array& a : arrays)
+        archive.add(a.name, header_of(a, v.num_voxels()), [&](const array_sink& sink) {
+            a.stream([&](std::span<const std::byte> piece) {
+                sink(piece);
+                meter.advance(piece.size());
+            });
+        });
+    archive.commit();
+    return {path};
+}
+
+std::vector<std::filesystem::path> write_sparse_npy(const sparse_volume& v, const std::filesystem::path& path,
+                                                    const write_options& options) {
+    const std::vector<array> arrays = arrays_of(v);
+    progress_meter meter(options.progress, bytes_of(arrays));
+    std::vector<std::unique_ptr<output_file>> files;
+    for (const array& a : arrays) {
+        const bool beside = &a != &arrays.front();
+        files.push_back(std::make_unique<output_file>(
+            beside ? path.parent_path() / (path.stem().string() + "." + a.name + path.extension().string()) : path));
+        files.back()->write(header_of(a, v.num_voxels()));
+        a.stream([&](std::span<const std::byte> piece) {
+            files.back()->write(piece);
+            meter.advance(piece.size());
+        });
+    }
+    return commit_all(files);
+}
+
+// ---- .png
+// -------------------------------------------------------------------------------------------------------------
+
+std::vector<std::filesystem::path> write_sparse_png(const sparse_volume& v, const std::filesystem::path& path,
+                                                    const write_options& options) {
+    static_assert(sizeof(voxelpipe::brick_mask) == 8 * sizeof(std::uint64_t));
+    const preview_bricks bricks{v.keys.data(), v.masks.empty() ? nullptr : v.masks.front().words, v.offsets.data(),
+                                v.keys.size()};
+    return write_picture(path, options, [&](const preview_options& preview) {
+        return render_preview(v.shape, bricks, find_colors(v.channels), preview, options.progress);
+    });
+}
+
+// ---- the others: by a dense volume
+// ------------------------------------------------------------------------------------
+
+// Formats that hold all channels take them all, others the occupancy and colours.
+std::vector<channel> channels_for(const sparse_volume& v, const std::filesystem::path& path) {
+    const format* const f = find_format(path);
+    std::vector<channel> taken;
+    for (const channel& c : v.channels)
+        if (f == nullptr || f->all_channels || c.type == scalar::bit ||
+            (f->shows_colors && &c == find_colors(v.channels)))
+            taken.push_back(c);
+    return taken;
+}
+
+} // namespace
+
+bool is_sparse_format(const std::filesystem::path& path) { return extension_of(path) == ".nvdb"; }
+
+bool is_written_sparse(const std::filesystem::path& path) {
+    const std::string extension = extension_of(path);
+    return extension == ".nvdb" || extension == ".npz" || extension == ".npy" || extension == ".png";
+}
+
+double dense_bytes(const sparse_volume& v, const std::filesystem::path& path) {
+    if (is_written_sparse(path)) return 0;
+    double voxel = 0;
+    const format* const f = find_format(path);
+    for (const channel& c : v.channels)
+        if (f == nullptr || f->all_channels || c.type == scalar::bit || f->shows_colors)
+            voxel += c.type == scalar::bit ? 0.125 : static_cast<double>(size_of(c.type)) * c.components;
+    return voxel * static_cast<double>(v.shape.extent[0]) * static_cast<double>(v.shape.extent[1]) *
+           static_cast<double>(v.shape.extent[2]);
+}
+
+std::vector<std::filesystem::path> write_nvdb(const volume& v, const std::filesystem::path& path,
+                                              const write_options& options) {
+    return write_nvdb(make_sparse(v), path, options);
+}
+
+std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const std::filesystem::path& path,
+                                                const write_options& options) {
+    const std::string extension = extension_of(path);
+    if (extension == ".nvdb") return write_nvdb(v, path, options);
+    if (extension == ".npz") return write_sparse_npz(v, path, options);
+    if (extension == ".npy") return write_sparse_npy(v, path, options);
+    if (extension == ".png") return write_sparse_png(v, path, options);
+    return write(make_dense(v, channels_for(v, path)), path, options);
+}
+
+} // namespace voxelize

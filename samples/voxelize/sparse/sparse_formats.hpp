@@ -1,0 +1,34 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Writers of sparse volumes. .nvdb holds a grid for each channel (occupancy as a mask). .npz holds coords, (n, 3) int32
+// with columns x, y and z, in the Morton order of the voxels, and an array for each channel but the occupancy; .npy
+// holds the coords, and each channel in a file of its own beside it. .png is drawn from the bricks. Other formats are
+// written from a dense volume, made of the channels that they take.
+
+#include "../formats/formats.hpp"
+#include "sparse_volume.hpp"
+
+#include <filesystem>
+#include <vector>
+
+namespace voxelize {
+
+// Formats that hold occupied voxels alone.
+[[nodiscard]] bool is_sparse_format(const std::filesystem::path& path);
+// Formats that are written without a dense volume.
+[[nodiscard]] bool is_written_sparse(const std::filesystem::path& path);
+
+// The channels of a dense volume for this output, in bytes; 0 where none is made.
+[[nodiscard]] double dense_bytes(const sparse_volume& v, const std::filesystem::path& path);
+
+// As write() of formats.hpp, for a sparse volume.
+std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const std::filesystem::path& path,
+                                                const write_options& options);
+
+// The occupied voxels of a dense volume as .nvdb.
+std::vector<std::filesystem::path> write_nvdb(const volume& v, const std::filesystem::path& path,
+                                              const write_options& options);
+
+} // namespace voxelize

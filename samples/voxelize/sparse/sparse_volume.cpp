@@ -1,0 +1,102 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "sparse_volume.hpp"
+
+#include "../targets.hpp"
+
+#include <voxelpipe/host_sparse.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <utility>
+
+namespace voxelize {
+
+std::uint32_t empty_value(const channel& c) {
+    const std::optional<target> id = target_named(c.name);
+    return id ? info_of(*id).empty : 0;
+}
+
+volume make_dense(const sparse_volume& v, std::span<const channel> channels) {
+    volume dense = v.shape;
+    const voxelpipe::brick_table table = v.table();
+    for (const channel& from : channels) {
+        channel& to = dense.add(from.name, from.type, from.components);
+        if (from.type == scalar::bit) {
+            for (std::uint64_t b = 0; b < table.count; ++b)
+                voxelpipe::for_each_voxel_in(
+                    table, b, [&](const glm::ivec3& p, std::uint64_t) { dense.set_bit(to, p.x, p.y, p.z); });
+            continue;
+        }
+        const std::size_t size = size_of(from.type) * static_cast<std::size_t>(from.components);
+        if (const std::uint32_t empty = empty_value(from); empty != 0) // of four bytes
+            for (std::size_t at = 0; at < to.data.size(); at += sizeof(empty))
+                std::memcpy(to.data.data() + at, &empty, sizeof(empty));
+        for (std::uint64_t b = 0; b < table.count; ++b)
+            voxelpipe::for_each_voxel_in(table, b, [&](const glm::ivec3& p, std::uint64_t rank) {
+                std::memcpy(to.data.data() + static_cast<std::size_t>(dense.index(p.x, p.y, p.z)) * size,
+                            from.data.data() + rank * size, size);
+            });
+    }
+    return dense;
+}
+
+sparse_volume make_sparse(const volume& v) {
+    sparse_volume result;
+    result.shape.extent = v.extent;
+    result.shape.origin = v.origin;
+    result.shape.voxel_size = v.voxel_size;
+    const channel& bits = *v.occupancy();
+    // The bricks, as they come in storage order, then by their keys.
+    std::vector<std::pair<std::uint64_t, voxelpipe::brick_mask>> bricks;
+    const std::int64_t bricks_x = (v.extent[0] + 7) / 8, bricks_y = (v.extent[1] + 7) / 8;
+    std::vector<voxelpipe::brick_mask> layer(static_cast<std::size_t>(bricks_x * bricks_y));
+    for (std::int64_t k = 0; k < v.extent[2]; ++k) {
+        if (k % 8 == 0) std::fill(layer.begin(), layer.end(), voxelpipe::brick_mask{});
+        for (std::int64_t j = 0; j < v.extent[1]; ++j)
+            for (std::int64_t w = 0; w < v.words_per_row(); ++w)
+                for (std::uint32_t word = v.word(bits, w, j, k); word != 0; word &= word - 1) {
+                    const std::int64_t i = 32 * w + std::countr_zero(word);
+                    const auto bit = static_cast<std::size_t>(voxelpipe::core::morton_key(
+                        static_cast<int>(i % 8), static_cast<int>(j % 8), static_cast<int>(k % 8)));
+                    layer[static_cast<std::size_t>(j / 8 * bricks_x + i / 8)].words[bit / 64] |= std::uint64_t{1}
+                                                                                                 << bit % 64;
+                }
+        if (k % 8 != 7 && k + 1 != v.extent[2]) continue;
+        for (std::int64_t y = 0; y < bricks_y; ++y)
+            for (std::int64_t x = 0; x < bricks_x; ++x) {
+                const voxelpipe::brick_mask& mask = layer[static_cast<std::size_t>(y * bricks_x + x)];
+                if (mask.count() != 0)
+                    bricks.emplace_back(
+                        voxelpipe::core::morton_key(static_cast<int>(x), static_cast<int>(y), static_cast<int>(k / 8)),
+                        mask);
+            }
+    }
+    std::sort(bricks.begin(), bricks.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::uint64_t rank = 0;
+    for (const auto& [key, mask] : bricks) {
+        result.keys.push_back(key);
+        result.masks.push_back(mask);
+        result.offsets.push_back(rank);
+        rank += mask.count();
+    }
+    if (!bricks.empty()) result.offsets.push_back(rank);
+    const voxelpipe::brick_table table = result.table();
+    for (const channel& from : v.channels) {
+        channel to{from.name, from.type, from.components, {}};
+        if (&from != &bits) {
+            const std::size_t size = size_of(from.type) * static_cast<std::size_t>(from.components);
+            to.data.resize(static_cast<std::size_t>(rank) * size);
+            for (std::uint64_t b = 0; b < table.count; ++b)
+                voxelpipe::for_each_voxel_in(table, b, [&](const glm::ivec3& p, std::uint64_t r) {
+                    std::memcpy(to.data.data() + static_cast<std::size_t>(r) * size,
+                                from.data.data() + static_cast<std::size_t>(v.index(p.x, p.y, p.z)) * size, size);
+                });
+        }
+        result.channels.push_back(std::move(to));
+    }
+    return result;
+}
+
+} // namespace voxelize

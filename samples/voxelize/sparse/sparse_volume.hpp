@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// A volume of which only the voxels exist that something was drawn in: the library's bricks of 8^3, and for each
+// channel one value a voxel, in the Morton order of the voxels.
+
+#include "../volume.hpp"
+
+#include <voxelpipe/core/brick_table.hpp>
+
+#include <glm/vec3.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace voxelize {
+
+struct sparse_volume {
+    // Extent, origin and voxel size, without channels.
+    volume shape;
+    std::vector<std::uint64_t> keys;
+    std::vector<voxelpipe::brick_mask> masks;
+    std::vector<std::uint64_t> offsets;
+    // The channel "occupancy", which every voxel here has, holds no data.
+    std::vector<channel> channels;
+
+    // Refers to the arrays.
+    [[nodiscard]] voxelpipe::brick_table table() const {
+        return {keys.data(),
+                masks.data(),
+                offsets.data(),
+                keys.size(),
+                glm::ivec3(shape.extent[0], shape.extent[1], shape.extent[2]),
+                glm::ivec3(0)};
+    }
+    [[nodiscard]] std::uint64_t num_voxels() const { return table().num_voxels(); }
+    [[nodiscard]] std::uint64_t num_bytes() const {
+        std::uint64_t bytes = keys.size() * (sizeof(std::uint64_t) + sizeof(voxelpipe::brick_mask)) +
+                              offsets.size() * sizeof(std::uint64_t);
+        for (const channel& c : channels) bytes += c.data.size();
+        return bytes;
+    }
+    [[nodiscard]] const channel* find(std::string_view name) const {
+        for (const channel& c : channels)
+            if (c.name == name) return &c;
+        return nullptr;
+    }
+};
+
+// The bits of each component of a voxel that does not exist.
+[[nodiscard]] std::uint32_t empty_value(const channel& c);
+
+// The dense volume; with all channels, or only those named so. Its memory is the caller's to care for.
+[[nodiscard]] volume make_dense(const sparse_volume& v, std::span<const channel> channels);
+
+// The occupied voxels of a dense volume, with the values of its other channels. It has the channel "occupancy".
+[[nodiscard]] sparse_volume make_sparse(const volume& v);
+
+} // namespace voxelize

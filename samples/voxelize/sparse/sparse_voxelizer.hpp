@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// scene + options -> sparse volume, on the CPU: the values that run_voxelizer gives, of the voxels that exist.
+
+#include "../voxelizer.hpp"
+#include "sparse_volume.hpp"
+
+#include <filesystem>
+#include <span>
+#include <string>
+
+namespace voxelize {
+
+// Whether voxels are kept in bricks or in a dense grid.
+enum class storage_choice : std::uint8_t { automatic, sparse, dense };
+
+struct storage_decision {
+    bool sparse = false;
+    std::string reason; // half a line, if the choice was automatic and fell on bricks
+};
+
+// Bricks where an output has no dense form, or where all outputs are written from bricks and a dense grid does not fit
+// the run's memory. Throws backend_error where --sparse cannot be had.
+[[nodiscard]] storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
+                                              std::span<const std::filesystem::path> outputs);
+
+// Consumes the scene. Throws as run_voxelizer does.
+[[nodiscard]] sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
+
+} // namespace voxelize

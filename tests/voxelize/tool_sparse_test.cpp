@@ -1,0 +1,149 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// The voxelize program with --sparse, with .nvdb, and where it chooses bricks by itself: the voxels and values of dense
+// runs, the same pictures, the same files each time.
+#include "tool_runner.hpp"
+#include "tool_scenes.hpp"
+
+#include <targets.hpp>
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+using tool_test::array;
+using tool_test::outcome;
+using tool_test::read_file;
+using tool_test::read_npy;
+using tool_test::run;
+using tool_test::scratch_folder;
+
+namespace {
+
+constexpr const char* most_targets = "occupancy,count,color,color-max,color-replace,normal,material,triangle,depth";
+
+// Voxels of the coords in the dense arrays, and nothing else in those.
+void expect_same_voxels(const scratch_folder& folder) {
+    const array coords = read_npy(folder / "s.npy");
+    ASSERT_EQ("<i4", coords.type);
+    ASSERT_EQ(2U, coords.shape.size());
+    ASSERT_EQ(3U, coords.shape[1]);
+    const array bits = read_npy(folder / "d.occupancy.npy");
+    std::map<std::size_t, std::size_t> ranks; // by the dense index
+    for (std::size_t r = 0; r < coords.shape[0]; ++r) {
+        const auto x = coords.at<std::uint32_t>(3 * r), y = coords.at<std::uint32_t>(3 * r + 1),
+                   z = coords.at<std::uint32_t>(3 * r + 2);
+        ASSERT_TRUE(x < bits.shape[2] && y < bits.shape[1] && z < bits.shape[0]);
+        ranks[(z * bits.shape[1] + y) * bits.shape[2] + x] = r;
+    }
+    ASSERT_EQ(coords.shape[0], ranks.size());
+    ASSERT_LT(1000U, ranks.size());
+    std::size_t covered = 0;
+    for (std::size_t i = 0; i < bits.voxels(); ++i) {
+        covered += bits.at<std::uint8_t>(i);
+        ASSERT_EQ(bits.at<std::uint8_t>(i) != 0, ranks.contains(i)) << i;
+    }
+    EXPECT_EQ(ranks.size(), covered);
+    for (const voxelize::target_info& entry : voxelize::target_table) {
+        if (entry.id == voxelize::target::occupancy || entry.id == voxelize::target::color_outer) continue;
+        const std::string name(entry.name);
+        const array dense = read_npy(folder / ("d." + name + ".npy")),
+                    sparse = read_npy(folder / ("s." + name + ".npy"));
+        ASSERT_EQ(dense.type, sparse.type) << name;
+        ASSERT_EQ(ranks.size(), sparse.shape[0]) << name;
+        const std::size_t size = dense.data.size() / dense.voxels();
+        ASSERT_EQ(ranks.size() * size, sparse.data.size()) << name;
+        for (const auto& [i, r] : ranks)
+            ASSERT_EQ(0, std::memcmp(dense.data.data() + i * size, sparse.data.data() + r * size, size)) << name << i;
+    }
+}
+
+TEST(ToolSparse, HoldsTheVoxelsAndValuesOfADenseRun) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    for (const char* coverage : {"conservative", "thin"})
+        for (const char* padding : {"0", "5"}) {
+            const auto voxelize = [&](const char* out, const char* how) {
+                const outcome result = run(folder, {folder / "m.glb", "-o", folder / out, "-r", "48", "-t",
+                                                    most_targets, "--coverage", coverage, "--padding", padding, how});
+                ASSERT_EQ(0, result.code) << result.err;
+                EXPECT_EQ(std::string(how) == "--sparse", result.out.find("bricks of 8 x 8 x 8") != std::string::npos)
+                    << result.out;
+            };
+            voxelize("s.npy", "--sparse");
+            voxelize("d.npy", "--dense");
+            expect_same_voxels(folder);
+        }
+}
+
+// A picture drawn from bricks, a dense file made of them, and .nvdb by either way.
+TEST(ToolSparse, WritesTheSameFilesAsADenseRun) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const auto voxelize = [&](const std::string& name, std::vector<std::string> more) {
+        std::vector<std::string> arguments{folder / "m.glb", "-r", "90", "--image-size", "320x240"};
+        for (const char* extension : {".png", ".nvdb", ".vti", ".vox"}) {
+            arguments.emplace_back("-o");
+            arguments.push_back(folder / (name + extension));
+        }
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        const outcome result = run(folder, arguments);
+        ASSERT_EQ(0, result.code) << result.err;
+    };
+    voxelize("d", {"--dense"});
+    voxelize("s", {"--sparse"});
+    voxelize("one", {"--sparse", "-j", "1"});
+    voxelize("five", {"--sparse", "-j", "5"});
+    for (const std::string extension : {".png", ".nvdb", ".vti", ".vox"}) {
+        const std::string dense = read_file(folder / ("d" + extension));
+        EXPECT_LT(100U, dense.size());
+        for (const char* name : {"s", "one", "five"})
+            EXPECT_TRUE(dense == read_file(folder / (name + extension))) << name << extension;
+    }
+}
+
+TEST(ToolSparse, IsChosenWhereItHasToBeAndSaysSo) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const auto voxelize = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), folder / "m.glb");
+        return run(folder, more);
+    };
+    outcome result = voxelize({"-o", folder / "a.nvdb", "-r", "30"});
+    EXPECT_EQ(0, result.code) << result.err;
+    EXPECT_NE(std::string::npos, result.err.find("a sparse grid of")) << result.err;
+    EXPECT_NE(std::string::npos, result.err.find(".nvdb holds occupied voxels alone")) << result.err;
+    result = voxelize({"-o", folder / "a.npz", "-r", "30"});
+    EXPECT_EQ("", result.err); // dense
+    EXPECT_EQ(std::string::npos, result.out.find("bricks")) << result.out;
+    // 400^3 voxels of 20 bytes are 1.2 GiB.
+    result = voxelize({"-o", folder / "a.npz", "-o", folder / "a.png", "-r", "400", "-t", "depth,count,normal",
+                       "--max-memory", "200", "--image-size", "64x48"});
+    EXPECT_EQ(0, result.code) << result.err;
+    EXPECT_NE(std::string::npos, result.err.find("a dense one would take")) << result.err;
+    // .vti has to be dense, and says what is missing.
+    result = voxelize({"-o", folder / "a.vti", "-r", "400", "-t", "depth,count,normal", "--max-memory", "200"});
+    EXPECT_EQ(3, result.code) << result.err;
+    result =
+        voxelize({"-o", folder / "a.vti", "-r", "400", "-t", "depth,count,normal", "--max-memory", "200", "--sparse"});
+    EXPECT_EQ(3, result.code) << result.err;
+    EXPECT_NE(std::string::npos, result.err.find("a dense grid for a.vti")) << result.err;
+    result = voxelize({"-o", folder / "a.npz", "-t", "color-outer", "--sparse"});
+    EXPECT_EQ(5, result.code) << result.err;
+    EXPECT_NE(std::string::npos, result.err.find("color-outer needs a dense grid")) << result.err;
+    result = voxelize({"-o", folder / "a.nvdb", "-t", "color-outer", "-r", "30"}); // by a dense grid
+    EXPECT_EQ(0, result.code) << result.err;
+    result = voxelize({"-o", folder / "a.npz", "--sparse", "--dense"});
+    EXPECT_EQ(1, result.code) << result.err;
+}
+
+TEST(ToolSparse, TakesGridsFarBeyondDenseOnes) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const outcome result = run(folder, {folder / "m.glb", "-o", folder / "a.nvdb", "-o", folder / "a.png", "-r", "1500",
+                                        "-t", "occupancy", "--coverage", "thin", "--image-size", "64x48"});
+    EXPECT_EQ(0, result.code) << result.err;
+    EXPECT_LT(100000U, std::filesystem::file_size(folder / "a.nvdb"));
+}
+
+} // namespace
