@@ -57,15 +57,6 @@ struct brick_list {
     }
 };
 
-// Adds one wide sum to another, component by component where it is of a vector.
-template <class Sum>
-void add_sums(Sum& a, const Sum& b) {
-    if constexpr (requires { core::add_sum(a, b); })
-        core::add_sum(a, b);
-    else
-        for (std::size_t i = 0; i < std::size(a.c); ++i) core::add_sum(a.c[i], b.c[i]);
-}
-
 // What is the same for all tiles of a call.
 template <class... Targets>
 struct sparse_plan {
@@ -239,7 +230,7 @@ private:
                            ? get<I>(shaded.sums)[p.cell]
                            : traits::begin(loaded ? load<I>(p.cell) : traits::identity());
             sums.push_back(sum);
-            if (!loaded) add_sums(sum, cleared);
+            if (!loaded) core::add_sums(sum, cleared);
             map::store(to.data(), rank++, traits::end(sum));
         }
     }

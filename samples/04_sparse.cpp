@@ -44,17 +44,21 @@ int main(int argc, char** argv) {
     const int n = argc > 1 ? std::atoi(argv[1]) : 4096;
     vp::cpu_backend backend;
     const vp::grid grid = vp::fit_longest(vp::bounds(positions), n);
+    // snippet: draw
     vp::sparse_framebuffer<vp::cpu_backend, vp::target<glm::u8vec4, vp::blend::replace>> surface{backend, grid.extent};
     const vp::mesh mesh{backend, positions, triangles};
     const auto drawn = vp::voxelize(backend, mesh, grid, vp::passthrough{}, colored{}, surface).or_throw();
     const auto voxels = surface.to_host(backend);
+    // end snippet
     std::printf("%llu voxels in %llu bricks, %.1f MB\n", static_cast<unsigned long long>(drawn.counts.voxels),
                 static_cast<unsigned long long>(voxels.num_bricks()), static_cast<double>(surface.num_bytes()) / 1e6);
 
     std::ofstream file("knot.nvdb", std::ios::binary);
+    // snippet: file
     vp::io::nanovdb_file nvdb;
     nvdb.add_target<0>("color", voxels);
     nvdb.write(file);
+    // end snippet
 
     const vp::octree tree(voxels);
     constexpr int width = 800, height = 800;

@@ -6,7 +6,7 @@
 Inside voxelpipe/device/ an include names a file of the same folder or of a folder further down:
 
     device/ itself (backend, voxelize_async, ...)
-    solid
+    solid, sparse
     call
     tiles, fragments    (neither includes the other)
     raster
@@ -23,7 +23,7 @@ import pathlib
 import re
 import sys
 
-LAYERS = ["", "solid", "call", "tiles fragments", "raster", "targets", "scene", "base"]  # of device/, from the top down
+LAYERS = ["", "solid sparse", "call", "tiles fragments", "raster", "targets", "scene", "base"]  # of device/, from the top down
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in (folders.split() or [""])}
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
 

@@ -240,6 +240,17 @@ template <std::size_t I, class Backend, class... Targets>
 
 namespace core {
 
+// Adds one wide sum to another, component by component where it is of a vector.
+template <class Sum>
+VOXELPIPE_HD void add_sums(Sum& a, const Sum& b) {
+    if constexpr (requires { add_sum(a, b); }) {
+        add_sum(a, b);
+    } else {
+        constexpr int n = static_cast<int>(sizeof(a.c) / sizeof(a.c[0]));
+        for (int i = 0; i < n; ++i) add_sum(a.c[i], b.c[i]);
+    }
+}
+
 // Whether voxels that exist stay: some target keeps what it holds.
 template <class Backend, class... Targets>
 [[nodiscard]] bool keeps_voxels(const sparse_framebuffer<Backend, Targets...>& fb) {

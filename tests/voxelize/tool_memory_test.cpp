@@ -113,7 +113,7 @@ TEST(Memory, TheNeedThatIsNamedSuffices) {
     int tries = 0;
     for (outcome tight; tight.code != 0; ++tries) {
         ASSERT_GT(8, tries) << limit;
-        tight = voxelize("tight.npz", {"--max-memory", std::to_string(limit)});
+        tight = voxelize("tight.npz", {"--max-memory", std::to_string(limit), "--dense"});
         if (tight.code == 0) {
             const std::uint64_t peak = json::parse(tight.out)["peak_memory_bytes"];
             EXPECT_GE(static_cast<double>(limit), static_cast<double>(peak) / (1 << 20));
@@ -191,7 +191,7 @@ TEST(Memory, ResultsThatDoNotFitNameTheirSize) {
     const scratch_folder folder;
     gltf_test::small_world().write_glb(folder / "m.glb");
     const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "color,normal", "-r", "1000",
-                                        "--max-memory", "900", "--backend", "cpu"});
+                                        "--max-memory", "900", "--backend", "cpu", "--dense"});
     EXPECT_EQ(3, result.code);
     EXPECT_NE(std::string::npos, result.err.find("voxels: at least")) << result.err;
     EXPECT_NE(std::string::npos, result.err.find("900 MiB are allowed by --max-memory: take fewer targets or voxels"))

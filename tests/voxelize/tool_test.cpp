@@ -107,7 +107,7 @@ TEST(Tool, OtherFailuresHaveTheirOwnCodes) {
     EXPECT_EQ(4, output.code) << output.err;
     EXPECT_NE(std::string::npos, output.err.find("o.npy")) << output.err;
     const outcome large = run(folder, {model, "-o", folder / "o.npy", "--origin", "0,0,0", "--voxel-size", "1",
-                                       "--extent", "1000000,1000000,1000000"});
+                                       "--extent", "1000000,1000000,1000000", "--dense"});
     EXPECT_EQ(3, large.code) << large.err;
     EXPECT_NE(std::string::npos, large.err.find("MiB")) << large.err;
 }

@@ -15,6 +15,7 @@
 #include <voxelpipe/device/kernels.cuh>
 #include <voxelpipe/device/scene/check_indices.cuh>
 #include <voxelpipe/solid.hpp>
+#include <voxelpipe/sparse.hpp>
 #include <voxelpipe/tuning/tuning_strategy.hpp>
 
 #include <algorithm>
@@ -128,6 +129,15 @@ public:
     [[nodiscard]] status run_solid(std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
                                    abuffer<cuda_backend, Payload>& lists, const solid_options& options,
                                    std::uint64_t triangles_in);
+
+    // Implement voxelize and clear of sparse framebuffers. Arguments are validated. Defined in device/sparse.cuh.
+    template <class Mesh, class VertexShader, class FragmentShader, class... Targets,
+              class Coverage = core::known_coverage<>>
+    [[nodiscard]] status run_sparse(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
+                                    sparse_framebuffer<cuda_backend, Targets...>& fb, const voxelize_options& options,
+                                    std::uint64_t triangles_in, Coverage = {});
+    template <class... Targets>
+    [[nodiscard]] status clear_sparse(const grid& g, sparse_framebuffer<cuda_backend, Targets...>& fb);
 
     // Frees the memory that is kept between calls.
     void release() { workspace_.release(); }

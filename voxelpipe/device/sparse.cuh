@@ -1,0 +1,132 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Sparse framebuffers on a GPU: cuda_backend::run_sparse, with the bytes of cpu_backend. Its kernels are compiled by
+// programs that call it, and by no other. Fragments are listed with all their outputs, sorted by voxel; the voxels'
+// Morton keys give bricks and ranks, and a thread a voxel folds its fragments. Beside the result, memory is in
+// proportion to the fragments. At most 2^32 - 2 voxels.
+
+#include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/device/sparse/brick_build.cuh>
+#include <voxelpipe/device/sparse/voxel_fold.cuh>
+#include <voxelpipe/sparse.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <new>
+#include <span>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe {
+
+namespace device {
+
+// The lists become the framebuffer's contents. Throws cuda_failure, std::bad_alloc or std::runtime_error.
+template <class Payload, class... Targets>
+[[nodiscard]] status take_lists(cuda_backend& backend, const grid& g, const abuffer<cuda_backend, Payload>& lists,
+                                sparse_framebuffer<cuda_backend, Targets...>& fb) {
+    using contents = sparse_contents<cuda_backend, Targets...>;
+    const bool keeps = core::keeps_voxels(fb);
+    const std::uint64_t kept = keeps ? fb.num_voxels() : 0;
+    if (lists.num_voxels() + kept > core::max_numbered || (keeps && fb.num_bricks() > core::max_numbered / 8))
+        return core::failure(status_code::size_overflow);
+    const contents& before = fb.contents();
+    brick_table table;
+    if (keeps)
+        table = {
+            before.keys.data(), before.masks.data(), before.offsets.data(), before.keys.size(), g.extent, g.offset};
+    contents made(backend);
+    device_buffer<std::uint32_t> listed(backend, std::size_t{0}), existing(backend, std::size_t{0});
+    status limited;
+    struct beyond_limits {};
+    const auto allocate = [&](std::uint64_t bricks, std::uint64_t voxels) -> brick_arrays {
+        if (bricks > fb.limits().bricks || voxels > fb.limits().voxels) {
+            limited = core::failure(status_code::capacity_exceeded, stage::tile_resolve);
+            limited.required.bricks = bricks;
+            limited.required.voxels = voxels;
+            throw beyond_limits{};
+        }
+        made.num_voxels = voxels;
+        made.keys = device_buffer<std::uint64_t>(backend, bricks);
+        made.masks = device_buffer<brick_mask>(backend, bricks);
+        made.offsets = device_buffer<std::uint64_t>(backend, bricks == 0 ? 0 : bricks + 1);
+        listed = device_buffer<std::uint32_t>(backend, voxels);
+        existing = device_buffer<std::uint32_t>(backend, voxels);
+        return {made.keys.data(), made.masks.data(), made.offsets.data(), listed.data(), existing.data()};
+    };
+    try {
+        build_bricks(backend, lists.voxels.data(), static_cast<std::uint32_t>(lists.num_voxels()), g.extent, g.offset,
+                     g.whole_extent(), table, static_cast<std::uint32_t>(kept), allocate);
+    } catch (const beyond_limits&) {
+        return limited;
+    }
+    const auto background = fb.next_background();
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        using target = typename core::pack_element<I, Targets...>::type;
+        using map = core::rank_map<target>;
+        const auto& t = get<I>(fb.targets());
+        if (!t.enabled || made.num_voxels == 0) return;
+        auto& values = get<I>(made.values);
+        values = device_buffer<typename map::element>(backend, map::elements(made.num_voxels));
+        if (t.keeps_sums) get<I>(made.sums) = device_buffer<core::kept_sum<target>>(backend, made.num_voxels);
+        const fold_target<target> fold{get<I>(background),           t.load,        t.keeps_sums,
+                                       get<I>(before.values).data(), values.data(), get<I>(made.sums).data()};
+        launch_kernel(false, fold_voxels<I, target, Payload>, num_blocks(made.num_voxels), threads_per_block, 0,
+                      backend.stream, stage::tile_resolve, fold, made.num_voxels,
+                      static_cast<const std::uint32_t*>(listed.data()),
+                      static_cast<const std::uint32_t*>(existing.data()), lists.offsets.data(), lists.payloads.data());
+    });
+    check(cudaStreamSynchronize(backend.stream), stage::tile_resolve);
+    fb.take(std::move(made), g);
+    return {};
+}
+
+// take_lists, with what it throws as a status.
+template <class Payload, class... Targets>
+[[nodiscard]] status finish_sparse(cuda_backend& backend, const grid& g, const abuffer<cuda_backend, Payload>& lists,
+                                   sparse_framebuffer<cuda_backend, Targets...>& fb, const status& drawn) {
+    status s;
+    try {
+        s = take_lists(backend, g, lists, fb);
+    } catch (const cuda_failure& e) {
+        s = to_status(e);
+    } catch (const std::bad_alloc&) {
+        s = core::failure(status_code::out_of_memory, stage::tile_resolve);
+    } catch (const std::runtime_error&) { // of a buffer
+        s = core::failure(status_code::device_error, stage::tile_resolve);
+    }
+    if (s.ok()) return drawn;
+    s.counts.triangles_in = drawn.counts.triangles_in;
+    return s;
+}
+
+} // namespace device
+
+template <class Mesh, class VertexShader, class FragmentShader, class... Targets, class Coverage>
+status cuda_backend::run_sparse(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
+                                sparse_framebuffer<cuda_backend, Targets...>& fb, const voxelize_options& options,
+                                std::uint64_t triangles_in, Coverage) {
+    using shader = device::payload_shader<FragmentShader>;
+    using payload = typename device::outputs_payload<core::shader_output<Mesh, VertexShader, FragmentShader>>::type;
+    std::vector<draw<Mesh, VertexShader, shader>> listed;
+    for (const auto& d : draws) listed.push_back({d.mesh, d.vertex_shader, {d.fragment_shader}});
+    abuffer<cuda_backend, payload> lists(*this);
+    const status s =
+        run(std::span<const draw<Mesh, VertexShader, shader>>(listed), g, lists, options, triangles_in, Coverage{});
+    if (!s.ok()) return s;
+    status done = device::finish_sparse(*this, g, lists, fb, s);
+    if (!options.count_voxels) done.counts.voxels = 0;
+    return done;
+}
+
+template <class... Targets>
+status cuda_backend::clear_sparse(const grid& g, sparse_framebuffer<cuda_backend, Targets...>& fb) {
+    using payload = core::pack<typename Targets::value_type...>;
+    const abuffer<cuda_backend, payload> none(*this);
+    return device::finish_sparse(*this, g, none, fb, status{});
+}
+
+} // namespace voxelpipe

@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Values of the voxels of a sparse framebuffer: a thread a voxel folds its fragments in the order of their primitives,
+// which is the meaning of every blend. The fragments' outputs come from an A-buffer whose payload is all of them.
+
+#include <voxelpipe/device/base/launch.cuh>
+#include <voxelpipe/device/sparse/brick_build.cuh>
+#include <voxelpipe/sparse.hpp>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+// All outputs of a fragment shader as one value, the payload of an A-buffer.
+template <class Output>
+struct outputs_payload;
+template <class... Ts>
+struct outputs_payload<output<Ts...>> {
+    using type = core::pack<Ts...>;
+};
+
+template <class FragmentShader>
+struct payload_shader {
+    FragmentShader shader;
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& f) const {
+        const auto out = shader(f);
+        output<std::remove_cvref_t<decltype(out.values)>> payload{};
+        payload.values = core::make_pack(out.values);
+        payload.keep = out.keep;
+        return payload;
+    }
+};
+
+// One target of a call, in device memory.
+template <class Target>
+struct fold_target {
+    using map = core::rank_map<Target>;
+    typename Target::value_type background; // where a voxel starts that did not exist
+    load_operation load;
+    bool keeps_sums;
+    const typename map::element* before; // values by earlier rank
+    typename map::element* values;
+    core::kept_sum<Target>* sums;
+};
+
+template <std::size_t I, class Target, class Payload>
+__global__ void fold_voxels(const fold_target<Target> t, std::uint64_t num_voxels, const std::uint32_t* listed,
+                            const std::uint32_t* existing, const std::uint64_t* first, const Payload* payloads) {
+    using map = core::rank_map<Target>;
+    using traits = typename Target::traits;
+    const std::uint64_t rank = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    const bool in = rank < num_voxels;
+    typename Target::value_type value{};
+    if (in) {
+        const std::uint32_t from = listed[rank], old = existing[rank];
+        const bool loaded = old != no_source && t.load != load_operation::clear;
+        if (loaded)
+            value = map::load(t.before, old);
+        else
+            value = t.background;
+        // Sums that are kept begin without the clear value, which is added at the end.
+        if (t.load != load_operation::off || t.keeps_sums) {
+            auto sum = traits::begin(t.keeps_sums && !loaded ? traits::identity() : value);
+            if (t.load != load_operation::off && from != no_source)
+                for (std::uint64_t f = first[from]; f < first[from + 1]; ++f) traits::apply(sum, get<I>(payloads[f]));
+            if constexpr (core::has_wide_sums<Target>) {
+                if (t.keeps_sums) {
+                    t.sums[rank] = sum;
+                    if (!loaded) core::add_sums(sum, traits::begin(t.background));
+                }
+            }
+            if (t.keeps_sums || from != no_source) value = traits::end(sum);
+        }
+    }
+    if constexpr (map::is_bit) { // a word has the bits of a warp
+        const unsigned word = __ballot_sync(0xffffffffu, in && value);
+        if (in && rank % 32 == 0) t.values[rank / 32] = word;
+    } else {
+        if (in) map::store(t.values, rank, value);
+    }
+}
+
+} // namespace voxelpipe::device
