@@ -571,4 +571,12 @@ TEST(Solids, ExteriorOfAMaze) {
         add_quad(m, {4.5f, 0.0f, z}, {29.5f, 0.0f, z}, {29.5f, 24.0f, z}, {4.5f, 24.0f, z}, false);
     const drawing_of_bits maze{{m}, {{}}, {{true}}};
     maze.expect_same(box_grid({34, 24, 24}), {.repair = vp::repair::exterior});
+    for (const bool is_low_open : {true, false}) { // a long tube, whose one end is the only way in
+        mesh_data box;
+        add_box(box, {10.5f, 2.5f, 2.5f}, {100.5f, 9.5f, 8.5f});
+        const auto first = box.triangles.begin() + (is_low_open ? 0 : 2); // of the face at that end
+        box.triangles.erase(first, first + 2);
+        const drawing_of_bits tube{{box}, {{}}, {{true}}};
+        tube.expect_same(box_grid({110, 12, 12}), {.repair = vp::repair::exterior});
+    }
 }
