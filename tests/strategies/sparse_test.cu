@@ -11,17 +11,14 @@
 
 #include <cstring>
 
-namespace {
-
 namespace vp = voxelpipe;
 namespace blend = voxelpipe::blend;
+
+namespace sparse_values { // named: nvcc warns of members of unnamed ones that the host does not use
 
 struct record {
     std::uint64_t chain;
     std::uint32_t fragments, last;
-    bool operator==(const record& other) const {
-        return chain == other.chain && fragments == other.fragments && last == other.last;
-    }
 };
 struct chain {
     static constexpr bool order_free = false;
@@ -30,6 +27,13 @@ struct chain {
         return {(a.chain ^ b.chain) * 0x100000001b3u, a.fragments + b.fragments, b.last};
     }
 };
+} // namespace sparse_values
+
+namespace {
+
+using sparse_values::chain;
+using sparse_values::record;
+
 struct shader {
     VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
         const std::uint64_t m = unit::mark(f.primitive, f.voxel);
