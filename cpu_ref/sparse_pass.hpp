@@ -197,11 +197,14 @@ join_lists(const execution& how, Backend& backend, const sparse_plan<Targets...>
             out.offsets.data()[brick + b] = offset;
             offset += from.masks[b].count();
         }
+        // Targets that are off have no values, and most have no sums.
+        const auto append = [voxel](const auto& list, auto& all) {
+            if (!list.empty()) std::copy(list.begin(), list.end(), all.data() + voxel);
+        };
         core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
             using map = core::rank_map<typename core::pack_element<I, Targets...>::type>;
-            if constexpr (!map::is_bit)
-                std::copy(get<I>(from.values).begin(), get<I>(from.values).end(), get<I>(out.values).data() + voxel);
-            std::copy(get<I>(from.sums).begin(), get<I>(from.sums).end(), get<I>(out.sums).data() + voxel);
+            if constexpr (!map::is_bit) append(get<I>(from.values), get<I>(out.values));
+            append(get<I>(from.sums), get<I>(out.sums));
         });
         lists[i].reset();
     });
