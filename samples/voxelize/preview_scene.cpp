@@ -106,7 +106,7 @@ void preview_scene::add_row_ends(std::uint32_t brick, std::vector<std::int32_t>&
             const auto row = static_cast<std::uint32_t>(
                 bricks_[brick + first_brick][static_cast<std::size_t>(z)] >> (8 * y) & 0xffu);
             if (row == 0) continue;
-            const auto n = static_cast<std::size_t>((8 * at[1] + y) * 8 + z);
+            const std::size_t n = static_cast<std::size_t>(8 * at[1] + y) * 8 + static_cast<std::size_t>(z);
             first[n] = std::min(first[n], 8 * at[0] + std::countr_zero(row));
             last[n] = std::max(last[n], 8 * at[0] + 31 - std::countl_zero(row));
         }

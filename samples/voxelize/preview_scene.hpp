@@ -106,7 +106,8 @@ private:
                 add_row_ends(by_layer_[i], first, last);
             for (std::size_t row = 0; row < rows; ++row) {
                 if (last[row] < 0) continue;
-                const auto j = static_cast<double>(row / 8), k = 8.0 * layer + static_cast<double>(row % 8);
+                const std::size_t y = row / 8, z = row % 8;
+                const auto j = static_cast<double>(y), k = 8.0 * layer + static_cast<double>(z);
                 visit(vec3{static_cast<double>(first[row]), j, k}, vec3{last[row] + 1.0, j + 1.0, k + 1.0});
             }
         }

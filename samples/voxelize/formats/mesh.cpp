@@ -311,6 +311,7 @@ std::vector<std::filesystem::path> write_obj(const volume& v, const std::filesys
     const bool colored = find_colors(v) != nullptr;
     const coordinate_texts coordinates(v, 0, 1);
     std::vector<std::string> fractions;
+    fractions.reserve(256);
     for (int b = 0; b < 256; ++b) fractions.push_back(fraction_text(b));
     return write_parts(
         v, path, options, max_faces, [&](output_file& out, const welded_mesh& mesh, progress_meter& meter) {
