@@ -25,6 +25,7 @@ REPORTS = {
     "gpu.md": {"gpu.csv": "table.csv", "gpu_stages.csv": "stages.csv"},
     "gpu_scaling.md": {"gpu_scaling.csv": "scaling.csv"},
     "gpu_tune.md": {"gpu_tune.csv": "tune.csv"},
+    "gpu_solids.md": {"gpu_solids.csv": "solids.csv"},
     "cpu.md": {"cpu_scenes.csv": "table.csv", "cpu_stages.csv": "stages.csv", "cpu_published.csv": "published.csv"},
 }
 MEANS = "Geometric means"

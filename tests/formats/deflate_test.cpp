@@ -33,9 +33,9 @@ std::string inflated(const std::string& packed, int window, std::size_t size) {
     z.avail_out = static_cast<uInt>(out.size());
     EXPECT_EQ(inflate(&z, Z_FINISH), Z_STREAM_END);
     EXPECT_EQ(z.avail_in, 0u);
-    out.resize(out.size() - z.avail_out);
+    const auto length = static_cast<std::size_t>(z.total_out);
     inflateEnd(&z);
-    return out;
+    return out.substr(0, length);
 }
 
 } // namespace

@@ -91,6 +91,8 @@ struct pair {
     }
 };
 
+} // namespace
+
 TEST(DeviceSparse, GivesTheBytesOfTheCpu) {
     const glm::ivec3 extent{45, 34, 37};
     const vp::grid grid = unit::unit_grid(extent);
@@ -152,5 +154,3 @@ TEST(DeviceSparse, LimitsChangeNothing) {
     EXPECT_EQ(s.required.voxels, voxels);
     p.compare("limited");
 }
-
-} // namespace

@@ -167,7 +167,9 @@ TEST(Solid, ValuesInside) {
                 }
                 ASSERT_EQ(shows, triangle.at<std::int32_t>(i) >= 0);
                 ASSERT_EQ(shows, !std::isnan(depth.at<float>(i)));
-                if (!shows) ASSERT_EQ(glm::vec3(0), normal.at<glm::vec3>(i));
+                if (!shows) {
+                    ASSERT_EQ(glm::vec3(0), normal.at<glm::vec3>(i));
+                }
             }
             for (const char* name : {"color", "color-max", "color-outer"}) {
                 const array color = read(name);

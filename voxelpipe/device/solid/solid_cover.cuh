@@ -65,15 +65,15 @@ struct cover_cells {
     glm::ivec3 extent;
 
     [[nodiscard]] __device__ static core::voxel_box cells(const core::voxel_box& reach) { return reach; }
+    __device__ void set(int axis, int u, int v, int w0, int w1) const {
+        for (int w = w0; w <= w1; ++w) {
+            const auto p = core::to_xyz(axis, u, v, w);
+            atomicOr(mask + mask_target::map::cell(extent, p[0], p[1], p[2]), 1u << (p[0] & 31));
+        }
+    }
     [[nodiscard]] __device__ cell_counts count(const geometry& geo, const loaded_triangle& t, std::uint32_t,
                                                const core::voxel_box& box, bool) const {
         const int fraction = geo.snap.fraction;
-        const auto set = [&](int axis, int u, int v, int w0, int w1) {
-            for (int w = w0; w <= w1; ++w) {
-                const auto p = core::to_xyz(axis, u, v, w);
-                atomicOr(mask + mask_target::map::cell(extent, p[0], p[1], p[2]), 1u << (p[0] & 31));
-            }
-        };
         if (core::fits_narrow(t.a, t.b, t.c, fraction)) {
             const auto s = core::setup_triangle<core::span_rule::conservative, std::int64_t>(t.a, t.b, t.c, fraction);
             core::for_each_span<core::span_rule::conservative>(
