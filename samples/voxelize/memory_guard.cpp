@@ -9,6 +9,17 @@
 #include <cstdlib>
 #include <new>
 
+// Thread sanitizer has operators of its own that no program can replace: the budget is not kept there.
+#if defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+#define VOXELIZE_KEEPS_OPERATORS
+#endif
+#endif
+#ifdef __SANITIZE_THREAD__
+#define VOXELIZE_KEEPS_OPERATORS
+#endif
+
+#ifndef VOXELIZE_KEEPS_OPERATORS
 namespace {
 
 void* guarded(void* block, std::size_t wanted) {
@@ -75,3 +86,4 @@ void operator delete[](void* block, std::align_val_t) noexcept { release(block);
 void operator delete[](void* block, std::size_t, std::align_val_t) noexcept { release(block); }
 void operator delete[](void* block, const std::nothrow_t&) noexcept { release(block); }
 void operator delete[](void* block, std::align_val_t, const std::nothrow_t&) noexcept { release(block); }
+#endif

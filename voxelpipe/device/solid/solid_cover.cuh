@@ -57,33 +57,35 @@ __global__ __launch_bounds__(threads_per_block) void list_cover_kernel(const wor
 }
 
 // Grids and meshes that the 32-bit raster does not serve: sets the bits of voxels, as cells of count_and_emit.
+// A template although there is one coverage: nvcc's suppression of calls from host code works in templates only.
+template <coverage Rule>
 struct cover_cells {
-    static constexpr coverage rule = coverage::conservative;
+    static constexpr coverage rule = Rule;
     static constexpr std::int64_t small_columns = 256;
     static constexpr bool counts_triangles = true;
     word* mask;
     glm::ivec3 extent;
 
     [[nodiscard]] __device__ static core::voxel_box cells(const core::voxel_box& reach) { return reach; }
-    __device__ void set(int axis, int u, int v, int w0, int w1) const {
-        for (int w = w0; w <= w1; ++w) {
-            const auto p = core::to_xyz(axis, u, v, w);
-            atomicOr(mask + mask_target::map::cell(extent, p[0], p[1], p[2]), 1u << (p[0] & 31));
-        }
-    }
     [[nodiscard]] __device__ cell_counts count(const geometry& geo, const loaded_triangle& t, std::uint32_t,
                                                const core::voxel_box& box, bool) const {
         const int fraction = geo.snap.fraction;
+        constexpr auto spans = core::to_rule(Rule);
+        const auto set = [&](int axis, int u, int v, int w0, int w1) {
+            for (int w = w0; w <= w1; ++w) {
+                const auto p = core::to_xyz(axis, u, v, w);
+                atomicOr(mask + mask_target::map::cell(extent, p[0], p[1], p[2]), 1u << (p[0] & 31));
+            }
+        };
         if (core::fits_narrow(t.a, t.b, t.c, fraction)) {
-            const auto s = core::setup_triangle<core::span_rule::conservative, std::int64_t>(t.a, t.b, t.c, fraction);
-            core::for_each_span<core::span_rule::conservative>(
-                s, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
-                    set(s.axis, static_cast<int>(u), static_cast<int>(v), static_cast<int>(w0), static_cast<int>(w1));
-                });
+            const auto s = core::setup_triangle<spans, std::int64_t>(t.a, t.b, t.c, fraction);
+            core::for_each_span<spans>(s, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
+                set(s.axis, static_cast<int>(u), static_cast<int>(v), static_cast<int>(w0), static_cast<int>(w1));
+            });
         } else {
             const int axis = core::dominant_axis(t.a, t.b, t.c, fraction);
-            for_each_wide_span<core::span_rule::conservative>(
-                t.a, t.b, t.c, fraction, box, [&](const wide_span& s) { set(axis, s.u, s.v, s.w_first, s.w_last); });
+            for_each_wide_span<spans>(t.a, t.b, t.c, fraction, box,
+                                      [&](const wide_span& s) { set(axis, s.u, s.v, s.w_first, s.w_last); });
         }
         return {};
     }
@@ -162,7 +164,7 @@ void raster_cover(const cover_memory& m, const draw_geometry& of_draw, std::uint
     b.num_records = &m.state->fragment_records;
     b.num_cells = &m.state->list_fragments;
     check(cudaMemsetAsync(b.num_records, 0, sizeof(*b.num_records), stream), stage::fine_raster);
-    const cover_cells op{m.mask, g.extent};
+    const cover_cells<coverage::conservative> op{m.mask, g.extent};
     count_small_kernel<<<num_blocks(num_triangles), threads_per_block, 0, stream>>>(one, op, b, m.state);
     check(cudaGetLastError(), stage::fine_raster);
     count_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(one, op, b, m.state);
