@@ -297,11 +297,12 @@ void fill_internal(const statistics<T>& s, const stored_value<T>& background, co
 [[nodiscard]] inline affine_map map_of(const grid& g) {
     affine_map m{};
     for (int a = 0; a < 3; ++a) {
-        m.matrix[4 * a] = g.voxel_size[a];
-        m.inverse[4 * a] = 1.0 / g.voxel_size[a];
+        const std::size_t diagonal = 4 * static_cast<std::size_t>(a);
+        m.matrix[diagonal] = g.voxel_size[a];
+        m.inverse[diagonal] = 1.0 / g.voxel_size[a];
         m.translation[a] = exact::fma(0.5, g.voxel_size[a], g.origin[a]);
-        m.matrix_f[4 * a] = static_cast<float>(m.matrix[4 * a]);
-        m.inverse_f[4 * a] = static_cast<float>(m.inverse[4 * a]);
+        m.matrix_f[diagonal] = static_cast<float>(m.matrix[diagonal]);
+        m.inverse_f[diagonal] = static_cast<float>(m.inverse[diagonal]);
         m.translation_f[a] = static_cast<float>(m.translation[a]);
     }
     m.taper = 1.0;
@@ -313,10 +314,11 @@ void fill_internal(const statistics<T>& s, const stored_value<T>& background, co
 [[nodiscard]] inline world_box world_box_of(const affine_map& m, const box& voxels, bool empty) {
     world_box b{};
     for (int a = 0; a < 3; ++a) {
-        b.low[a] = empty ? std::numeric_limits<double>::max()
-                         : exact::fma(double(voxels.low[a]), m.matrix[4 * a], m.translation[a]);
+        const double scale = m.matrix[4 * static_cast<std::size_t>(a)];
+        b.low[a] =
+            empty ? std::numeric_limits<double>::max() : exact::fma(double(voxels.low[a]), scale, m.translation[a]);
         b.high[a] = empty ? std::numeric_limits<double>::lowest()
-                          : exact::fma(double(voxels.high[a]) + 1.0, m.matrix[4 * a], m.translation[a]);
+                          : exact::fma(double(voxels.high[a]) + 1.0, scale, m.translation[a]);
     }
     return b;
 }
