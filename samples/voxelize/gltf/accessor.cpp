@@ -58,6 +58,7 @@ void accessor_reader::read_draco() {
     const std::vector<draco_primitive>& primitives = document_.draco_primitives;
     if (primitives.empty()) return;
     std::vector<std::span<const std::byte>> compressed;
+    compressed.reserve(primitives.size());
     for (const draco_primitive& primitive : primitives) compressed.push_back(view(primitive.buffer_view));
     const std::vector<std::vector<std::byte>> decoded = decode_draco(primitives, compressed, memory_);
     for (std::size_t i = 0; i < primitives.size(); ++i) {

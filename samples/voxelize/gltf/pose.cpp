@@ -101,10 +101,14 @@ void pose_reader::bend(std::vector<double>& xyz, const tinygltf::Primitive& part
         const budget::scope temporary{memory_};
         const auto read = [&](int index, const std::string& name, bool normalized) {
             const tinygltf::Accessor& accessor = model_.accessors[static_cast<std::size_t>(index)];
-            if (accessor.type != TINYGLTF_TYPE_VEC4) throw gltf_error(where + ": " + name + " is not a VEC4");
-            if (accessor.count != vertices)
-                throw gltf_error(where + ": " + name + " has " + std::to_string(accessor.count) +
-                                 " elements, POSITION has " + std::to_string(vertices));
+            std::string message = where;
+            message.append(": ").append(name);
+            if (accessor.type != TINYGLTF_TYPE_VEC4) throw gltf_error(message.append(" is not a VEC4"));
+            if (accessor.count != vertices) {
+                message.append(" has ").append(std::to_string(accessor.count));
+                message.append(" elements, POSITION has ").append(std::to_string(vertices));
+                throw gltf_error(message);
+            }
             return accessors_.numbers(static_cast<std::size_t>(index), normalized, where);
         };
         const std::vector<double> numbers = read(*joints_index, joints_name, false);
