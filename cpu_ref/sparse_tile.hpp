@@ -185,7 +185,8 @@ private:
                             static_cast<std::uint16_t>((z * tile_size + y) * tile_size + x);
             return p;
         }();
-        const auto first = static_cast<std::size_t>((lead_.z * tile_size + lead_.y) * tile_size + lead_.x);
+        const auto z = static_cast<std::size_t>(lead_.z), y = static_cast<std::size_t>(lead_.y);
+        const std::size_t first = (z * tile_size + y) * tile_size + static_cast<std::size_t>(lead_.x);
         return std::size_t{places[word]} * 4 + places[bit] - first;
     }
     // cell_of, and which word and bit it is.

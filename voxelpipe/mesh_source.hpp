@@ -35,6 +35,7 @@ struct strided_view {
     [[nodiscard]] T operator[](std::size_t i) const {
         VOXELPIPE_EXPECTS(i < count);
         T value;
+        // NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): first is null where count is 0
         std::memcpy(&value, static_cast<const unsigned char*>(first) + i * stride, sizeof(T));
         return value;
     }

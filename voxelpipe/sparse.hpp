@@ -246,7 +246,7 @@ VOXELPIPE_HD void add_sums(Sum& a, const Sum& b) {
     if constexpr (requires { add_sum(a, b); }) {
         add_sum(a, b);
     } else {
-        constexpr int n = static_cast<int>(sizeof(a.c) / sizeof(a.c[0]));
+        constexpr int n = static_cast<int>(sizeof(a.c) / sizeof(a.c[0])); // NOLINT(bugprone-sizeof-expression)
         for (int i = 0; i < n; ++i) add_sum(a.c[i], b.c[i]);
     }
 }

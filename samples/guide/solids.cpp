@@ -61,6 +61,7 @@ int main() {
                                                  {.repair = vp::repair::close_holes});
     // closed.solid.holes is 1, and closed.solid.open_rows is 0 behind it
     // end snippet
-    good = good && closed.counts.voxels == 4U * 4U * 12U && closed.solid.holes == 1 && closed.solid.open_rows == 0;
+    good = good && closed.counts.voxels == std::uint64_t{4} * 4 * 12 && closed.solid.holes == 1 &&
+           closed.solid.open_rows == 0;
     return good ? 0 : 1;
 }

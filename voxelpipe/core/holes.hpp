@@ -93,6 +93,7 @@ private:
 [[nodiscard]] inline hole_cones close_holes(const std::vector<hole_part>& body, std::uint64_t max_hole_edges) {
     // Most edges cancel between the vertices as the mesh numbers them; a sum of chains may be taken in any order.
     std::vector<std::uint64_t> ends; // of each part's vertices, numbered through all parts
+    ends.reserve(body.size());
     std::uint64_t num_vertices = 0;
     for (const hole_part& p : body) ends.push_back(num_vertices += p.num_vertices);
     edge_chain all(num_vertices);
