@@ -124,7 +124,7 @@ public:
         s.or_throw();
         return s;
     }
-    // Of the call as a graph; nothing where no limits suffice.
+    // Times the call as a graph. Empty if no limits suffice.
     sample time_async(vp::fill_rule rule, const gpu::repetition& how, std::uint64_t crossings) {
         const vp::solid_options options{.rule = rule};
         vp::workspace_limits limits;
@@ -142,7 +142,7 @@ public:
         vp::read_status(backend_, workspace).or_throw();
         return t;
     }
-    // Of the baseline; throws where its bits are not those of the last call.
+    // Times the baseline. Throws if its bits differ from those of the last call.
     sample time_baseline(const gpu::repetition& how) {
         const std::size_t count = target::map::elements(grid_.extent);
         const gpu::device_array<std::uint32_t> words(count);

@@ -32,7 +32,7 @@ __global__ void start_flood_kernel(Word* reached, const __grid_constant__ bit_bo
     });
 }
 
-// Of a row, the open bits that its reached ones lead to. A thread a row.
+// Spreads the reached bits of each row over its open bits. One thread a row.
 template <class Word>
 __global__ __launch_bounds__(threads_per_block) void flood_rows_kernel(const Word* walls, Word* reached,
                                                                        const __grid_constant__ bit_box box,

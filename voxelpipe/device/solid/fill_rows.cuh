@@ -54,7 +54,7 @@ struct voxel_fold<framebuffer_view<Targets...>> {
             target<K>::traits::apply(voxelpipe::get<K>(a), voxelpipe::get<K>(values));
         });
     }
-    // Of the lanes that have fragments. All lanes take part: x0 is the first one's voxel.
+    // Writes the voxels of the lanes that have fragments. x0 is the voxel of lane 0; all lanes take part.
     __device__ VOXELPIPE_INLINE static void store(const framebuffer_view<Targets...>& fb, const accumulators& a,
                                                   bool has_any, int x0, int y, int z) {
         const int x = x0 + static_cast<int>(threadIdx.x % 32);

@@ -91,7 +91,7 @@ struct cover_cells {
     }
 };
 
-// Of a call that has no crossings: its triangles are counted as conservative coverage counts them. One thread.
+// Takes the counts of triangles from conservative coverage, for a call without crossings. One thread.
 template <class State>
 __global__ void take_counts_kernel(const State* from, State* to) {
     to->nonfinite = from->nonfinite;
