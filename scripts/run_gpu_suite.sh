@@ -146,12 +146,12 @@ for part in "${parts[@]}"; do
         ;;
     tool)
         samples=ON target=voxelize_gpu_files_test build_suite gpu-tool
-        run_program tool voxelize_gpu_files_test build/gpu-tool/tests/voxelize/voxelize_gpu_files_test
+        run_program tool voxelize_gpu_files_test build/gpu-tool/tests/tool/voxelize_gpu_files_test
         ;;
     sanitizer)
         [[ $step == build ]] || command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"
         # Of this commit, whatever lies there.
-        sanitized=(reduced reduced_lists counting_sort fragment_order fragment_sort direct repeated_calls tracked)
+        sanitized=(small_loads small_lists counting_sort fragment_order fragment_sort immediate kept_graphs tracked_changes)
         for program in "${sanitized[@]}"; do target=device_${program}_test build_suite gpu; done
         for tool in memcheck racecheck initcheck synccheck; do
             for program in "${sanitized[@]}"; do
@@ -159,9 +159,9 @@ for part in "${parts[@]}"; do
                 [[ $program != fragment_order ]] || filter='*AtTheLimits*:*OrdersDenseVoxels:*IfTheCallHasFailed'
                 [[ $program != fragment_sort ]] || filter='*ForEqualAndAlternatingKeys:*IfTheCallHasFailed'
                 [[ $program != counting_sort ]] || filter='*EveryLength:*BeyondTheCapacity*:*NotExpected:*IfTheCallHasFailed'
-                [[ $program != direct ]] || filter='*ManyTrianglesOfMediumSize*:*LargeTrianglesWithManyWorkItems*:*CloseTriangles*'
-                [[ $program != tracked ]] || filter='*SequencesByTouchedVoxelsLeave*:*Clears*'
-                [[ $program != repeated_calls ]] || filter='*AFewLargerTriangles*'
+                [[ $program != immediate ]] || filter='*ManyTrianglesOfMediumSize*:*LargeTrianglesWithManyWorkItems*:*CloseTriangles*'
+                [[ $program != tracked_changes ]] || filter='*SequencesByOccupancyMaskLeave*:*Clears*'
+                [[ $program != kept_graphs ]] || filter='*AFewLargerTriangles*'
                 run_program sanitizer "$tool, $program" compute-sanitizer --tool "$tool" --error-exitcode 9 \
                     "build/gpu/tests/strategies/device_${program}_test" --gtest_filter="$filter"
             done

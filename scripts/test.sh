@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # test.sh [PRESET [ctest option...]]: builds everything of a preset (default test: no nvcc, no GPU) and runs its tests. Installs
-# what the tests need, including the Python readers of tests/formats, and says first how long it will take.
+# what the tests need, including the Python readers of tests/tool/formats, and says first how long it will take.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 preset="${1:-test}"

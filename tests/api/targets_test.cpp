@@ -218,7 +218,7 @@ TEST(LoadOperation, UntouchedVoxelsKeepTheirBits) {
     }
 }
 
-// A framebuffer that tracks its changes holds the same values. tests/strategies/tracked_test.cu has targets that are
+// A framebuffer that tracks its changes holds the same values. tests/strategies/tracked_changes_test.cu has targets that are
 // large enough for partial clears.
 TEST(LoadOperation, TrackedChangesMakeNoDifference) {
     backend_type backend = unit::make_backend();

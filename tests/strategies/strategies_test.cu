@@ -38,7 +38,8 @@ void expect_refused(vp::cuda_backend& gpu, vp::framebuffer<vp::cuda_backend, Tar
     expect_same_bytes(before, vp::get<0>(fb).to_host(gpu), "as it was");
 }
 
-// A constant shader whose targets tell how many voxels were touched, if that is asked (CountedPlan tests say which do).
+// A constant shader whose targets tell how many voxels were touched, if that is asked (FragmentCountsPlan tests say
+// which do).
 template <class Framebuffer, class Shader>
 bool can_be_in_place(const Framebuffer& fb, const mesh_data& m, const Shader& shader, bool counts) {
     if constexpr (vp::device::strategies_of<Shader, Framebuffer>.immediate) {

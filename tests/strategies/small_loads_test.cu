@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Every kernel of render targets on small loads, quick enough for compute-sanitizer. Lists: reduced_lists_test.cu.
+// Every kernel of render targets on small loads, quick enough for compute-sanitizer. Lists: small_lists_test.cu.
 
 #include "cells.hpp"
 
@@ -22,7 +22,7 @@ struct on_both {
     }
 };
 
-TEST(Reduced, EveryKindOfTargetHoldsTheCpusBytes) {
+TEST(SmallLoads, EveryKindOfTargetHoldsTheCpusBytes) {
     for (const vp::coverage rule : both_rules) {
         with_every_kind<on_both>::compare(mixed_triangles(300, 30.0f, 60), box_grid({30, 21, 33}), rule);
         // More triangles in a tile than a work item holds.
@@ -30,7 +30,7 @@ TEST(Reduced, EveryKindOfTargetHoldsTheCpusBytes) {
     }
 }
 
-TEST(Reduced, LargeTrianglesWithoutTilesGiveTheCpusBytes) {
+TEST(SmallLoads, LargeTrianglesWithoutTilesGiveTheCpusBytes) {
     mesh_data m = mixed_triangles(1500, 4.0f, 61);
     add_triangle(m, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
     for (const vp::coverage rule : both_rules) {
@@ -42,7 +42,7 @@ TEST(Reduced, LargeTrianglesWithoutTilesGiveTheCpusBytes) {
 }
 
 // Sums that are counted until a last pass, which reads a small grid whole and only the marked chunks of a large one.
-TEST(Reduced, CountedSumsAreTheCpus) {
+TEST(SmallLoads, CountedSumsAreTheCpus) {
     mesh_data m = mixed_triangles(800, 40.0f, 68);
     add_triangle(m, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
     for (const vp::coverage rule : both_rules)
@@ -52,7 +52,7 @@ TEST(Reduced, CountedSumsAreTheCpus) {
 }
 
 // The third call and later ones use a graph.
-TEST(Reduced, RepeatedCallsGiveTheCpusBytes) {
+TEST(SmallLoads, RepeatedCallsGiveTheCpusBytes) {
     const mesh_data m = mixed_triangles(300, 30.0f, 69);
     const vp::grid g = box_grid({30, 21, 33});
     vp::cuda_backend gpu;
@@ -69,7 +69,7 @@ TEST(Reduced, RepeatedCallsGiveTheCpusBytes) {
 }
 
 // More fragments than one thread folds: a block folds one voxel after the other, or its threads fold in parallel.
-TEST(Reduced, LongVoxelsOfFoldedBlendsGiveTheCpusBytes) {
+TEST(SmallLoads, LongVoxelsOfFoldedBlendsGiveTheCpusBytes) {
     const vp::grid g = box_grid({36, 5, 6});
     mesh_data m = mixed_triangles(200, 36.0f, 74);
     append(m, triangles_in_voxel(2000, {3.0f, 2.0f, 4.0f}, 75));
@@ -80,14 +80,14 @@ TEST(Reduced, LongVoxelsOfFoldedBlendsGiveTheCpusBytes) {
 }
 
 // The identity of these blends is a set bit. Rows and bricks end within a word.
-TEST(Reduced, BitsClearedToOneAreTheCpus) {
+TEST(SmallLoads, BitsClearedToOneAreTheCpus) {
     expect_same<vp::target<vp::bit, blend::bit_and>, vp::target<vp::bit, blend::min, vp::layout::tiled>>(
         mixed_triangles(200, 30.0f, 67), box_grid({37, 21, 6}), vp::passthrough{}, vp::constant(false, false),
         vp::coverage::conservative);
 }
 
 // Fragments shaded and blended by voxel: voxels that span runs, voxels whose fragments are all discarded, and draws.
-TEST(Reduced, ListedFragmentsGiveTheCpusBytes) {
+TEST(SmallLoads, ListedFragmentsGiveTheCpusBytes) {
     mesh_data m = mixed_triangles(700, 30.0f, 70);
     append(m, triangles_in_voxel(3000, {3.0f, 2.0f, 4.0f}, 71));
     for (std::uint32_t x = 0; x < 20; ++x)
@@ -109,7 +109,7 @@ TEST(Reduced, ListedFragmentsGiveTheCpusBytes) {
     for (const double none : {times.coarse_raster, times.tile_split, times.abuffer_emit}) EXPECT_EQ(none, 0.0);
 }
 
-TEST(Reduced, StageTimesOfTilesAndOrderedTargetsAddUpToTheCall) {
+TEST(SmallLoads, StageTimesOfTilesAndOrderedTargetsAddUpToTheCall) {
     using fb_type = with_every_kind<vp::framebuffer, vp::cuda_backend>;
     const with_every_kind<any_values> shader;
     const mesh_data m = mixed_triangles(300, 30.0f, 63);
@@ -135,7 +135,7 @@ TEST(Reduced, StageTimesOfTilesAndOrderedTargetsAddUpToTheCall) {
     });
 }
 
-TEST(Reduced, StageTimesWithoutTilesAddUpToTheCall) {
+TEST(SmallLoads, StageTimesWithoutTilesAddUpToTheCall) {
     using fb_type = vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>>;
     const mesh_data m = mixed_triangles(300, 30.0f, 64);
     const auto times_of = [&](const vp::grid& g, bool count_voxels, indices known = indices::unknown) {

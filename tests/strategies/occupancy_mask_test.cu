@@ -70,7 +70,7 @@ void compare_constants(target_list<Targets...>, const Values& values, Clear... c
             }
 }
 
-TEST(Touched, BitsAreTheCpus) {
+TEST(OccupancyMask, BitsAreTheCpus) {
     using targets = target_list<bits<blend::bit_or>, bits<blend::replace>, bits<blend::bit_and>, bits<blend::max>,
                                 bits<blend::min, layout::tiled>, bits<blend::replace, layout::tiled>>;
     for (const bool value : {true, false})
@@ -79,7 +79,7 @@ TEST(Touched, BitsAreTheCpus) {
                               clear, clear, clear);
 }
 
-TEST(Touched, ValuesAreTheCpus) {
+TEST(OccupancyMask, ValuesAreTheCpus) {
     using targets = target_list<vp::target<float, blend::replace>, vp::target<float, blend::min>,
                                 vp::target<std::uint8_t, blend::max>, vp::target<std::uint64_t, blend::bit_or>,
                                 vp::target<std::uint16_t, blend::bit_and, layout::tiled>, bits<blend::bit_or>>;
@@ -94,7 +94,7 @@ TEST(Touched, ValuesAreTheCpus) {
         device_test::nan, -0.0f, std::uint8_t{3}, std::uint64_t{5}, std::uint16_t{1}, false);
 }
 
-TEST(Touched, VectorsAreTheCpus) {
+TEST(OccupancyMask, VectorsAreTheCpus) {
     using targets = target_list<vp::target<glm::vec4, blend::replace>, vp::target<glm::vec3, blend::replace>,
                                 vp::target<glm::vec3, blend::max, layout::planar>,
                                 vp::target<glm::vec4, blend::replace, layout::tiled>>;
@@ -105,7 +105,7 @@ TEST(Touched, VectorsAreTheCpus) {
 }
 
 // Positions that a vertex shader stores in memory, and a part of a grid.
-TEST(Touched, ShadedVerticesGiveTheCpusBytes) {
+TEST(OccupancyMask, ShadedVerticesGiveTheCpusBytes) {
     for (const vp::coverage rule : both_rules)
         expect_same<bits<blend::bit_or>, vp::target<float, blend::replace>>(
             mixed_triangles(700, 60.0f, 412), box_grid({60, 64, 70}).crop({7, 5, 3}, {41, 52, 60}), shift{0.25f},
@@ -113,7 +113,7 @@ TEST(Touched, ShadedVerticesGiveTheCpusBytes) {
 }
 
 // The same call by voxelize, in memory that other calls have used, and by voxelize_async.
-TEST(Touched, AlternatingCallsOfOneBackendGiveTheCpusBytes) {
+TEST(OccupancyMask, AlternatingCallsOfOneBackendGiveTheCpusBytes) {
     using single = target_list<bits<blend::bit_or>>;
     using draw = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<bool>>;
     vp::cpu_backend cpu;
@@ -205,7 +205,7 @@ void compare_parts(target_list<Targets...>, const std::vector<mesh_data>& parts,
 }
 
 // Three draws of one value, and draws of different values, which are drawn in place.
-TEST(Touched, SeveralDrawsGiveTheCpusBytes) {
+TEST(OccupancyMask, SeveralDrawsGiveTheCpusBytes) {
     mesh_data large = mixed_triangles(200, 40.0f, 440);
     add_triangle(large, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 50.0f}, {-300.0f, 500.0f, 20.0f});
     const std::vector<mesh_data> parts{large, mixed_triangles(600, 40.0f, 441), mixed_triangles(300, 40.0f, 442)};
@@ -222,7 +222,7 @@ TEST(Touched, SeveralDrawsGiveTheCpusBytes) {
 
 // Grids of more than 32 MB of bits are drawn in place. Without counters, so are grids of more than 1 MB with few
 // triangles or with known indices.
-TEST(Touched, LargeGridsOfBitsAreTheCpus) {
+TEST(OccupancyMask, LargeGridsOfBitsAreTheCpus) {
     const mesh_data m = mixed_triangles(60, 40.0f, 450);
     for (const bool count : {false, true})
         expect_same<bits<blend::bit_or>>(m, box_grid({416, 200, 200}), vp::passthrough{}, vp::constant(true),

@@ -52,7 +52,7 @@ struct by_atomics { // in place by atomics, or counted
     };
     static auto cleared(float v) { return std::pair(v, static_cast<std::uint32_t>(v)); }
 };
-struct by_touched_voxels { // constants by an occupancy mask; computed fragments by lists
+struct by_occupancy_mask { // constants by an occupancy mask; computed fragments by lists
     using first = vp::target<float, blend::replace>;
     using second = vp::target<glm::vec3, blend::max, vp::layout::planar>;
     static auto constant(float v) { return vp::constant(v, glm::vec3(v, 1, 2)); }
@@ -210,21 +210,27 @@ void expect_same_sequences(const glm::ivec3& extent) {
 }
 
 // Rows with and without 16-byte access, and rows of more than one word of marks.
-TEST(Tracked, SequencesByAtomicsLeaveTheCpusBytes) { expect_same_sequences<by_atomics>({256, 160, 206}); }
-TEST(Tracked, SequencesByAtomicsInOddRowsLeaveTheCpusBytes) { expect_same_sequences<by_atomics>({203, 211, 197}); }
-TEST(Tracked, SequencesByAtomicsInLongRowsLeaveTheCpusBytes) { expect_same_sequences<by_atomics>({1060, 95, 84}); }
-TEST(Tracked, SequencesByTouchedVoxelsLeaveTheCpusBytes) { expect_same_sequences<by_touched_voxels>({256, 160, 206}); }
-TEST(Tracked, SequencesByTouchedVoxelsInOddRowsLeaveTheCpusBytes) {
-    expect_same_sequences<by_touched_voxels>({1061, 95, 84});
+TEST(TrackedChanges, SequencesByAtomicsLeaveTheCpusBytes) { expect_same_sequences<by_atomics>({256, 160, 206}); }
+TEST(TrackedChanges, SequencesByAtomicsInOddRowsLeaveTheCpusBytes) {
+    expect_same_sequences<by_atomics>({203, 211, 197});
 }
-TEST(Tracked, SequencesByTouchedVoxelsOfVectorsLeaveTheCpusBytes) {
+TEST(TrackedChanges, SequencesByAtomicsInLongRowsLeaveTheCpusBytes) {
+    expect_same_sequences<by_atomics>({1060, 95, 84});
+}
+TEST(TrackedChanges, SequencesByOccupancyMaskLeaveTheCpusBytes) {
+    expect_same_sequences<by_occupancy_mask>({256, 160, 206});
+}
+TEST(TrackedChanges, SequencesByOccupancyMaskInOddRowsLeaveTheCpusBytes) {
+    expect_same_sequences<by_occupancy_mask>({1061, 95, 84});
+}
+TEST(TrackedChanges, SequencesByOccupancyMaskOfVectorsLeaveTheCpusBytes) {
     expect_same_sequences<by_touched_vectors>({160, 131, 140});
 }
-TEST(Tracked, SequencesInOrderLeaveTheCpusBytes) { expect_same_sequences<in_order>({203, 211, 197}); }
+TEST(TrackedChanges, SequencesInOrderLeaveTheCpusBytes) { expect_same_sequences<in_order>({203, 211, 197}); }
 
 // A clear does not write chunks that no call has drawn into. So values that other code wrote there stay, unless the
 // framebuffer is told.
-TEST(Tracked, ClearsOnlyWhatWasDrawn) {
+TEST(TrackedChanges, ClearsOnlyWhatWasDrawn) {
     vp::cuda_backend be;
     const glm::ivec3 extent(256, 160, 206);
     const vp::grid g = box_grid(extent);
@@ -332,12 +338,12 @@ void expect_chunks_cleared_of_all(bool counts) {
         expect_chunks_cleared<Kind>(typename Kind::shader{0.5f}, rule, "a shader that computes");
     }
 }
-TEST(Tracked, ClearsOnlyDrawnChunksByAtomics) { expect_chunks_cleared_of_all<by_atomics>(true); }
-TEST(Tracked, ClearsOnlyDrawnChunksByTouchedVoxels) { expect_chunks_cleared_of_all<by_touched_voxels>(false); }
-TEST(Tracked, ClearsOnlyDrawnChunksInOrder) { expect_chunks_cleared_of_all<in_order>(false); }
+TEST(TrackedChanges, ClearsOnlyDrawnChunksByAtomics) { expect_chunks_cleared_of_all<by_atomics>(true); }
+TEST(TrackedChanges, ClearsOnlyDrawnChunksByOccupancyMask) { expect_chunks_cleared_of_all<by_occupancy_mask>(false); }
+TEST(TrackedChanges, ClearsOnlyDrawnChunksInOrder) { expect_chunks_cleared_of_all<in_order>(false); }
 
 // Asynchronous calls captured in a graph. The device keeps the state between launches.
-TEST(Tracked, AGraphMayBeLaunchedAgain) {
+TEST(TrackedChanges, AGraphMayBeLaunchedAgain) {
     using target = vp::target<float, blend::add>;
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<float>>;
     const glm::ivec3 extent(256, 160, 206);

@@ -24,7 +24,7 @@ void compare(const mesh_data& m, const vp::grid& g) {
     }
 }
 
-TEST(Balance, OneTriangleOverTheWholeGridGivesTheCpusBytes) {
+TEST(AdversarialLoads, OneTriangleOverTheWholeGridGivesTheCpusBytes) {
     mesh_data m;
     add_triangle(m, {-3000.0f, -3000.0f, -100.0f}, {5000.0f, -3000.0f, 1500.0f}, {-3000.0f, 5000.0f, 600.0f});
     for (const vp::coverage rule : both_rules) {
@@ -34,7 +34,7 @@ TEST(Balance, OneTriangleOverTheWholeGridGivesTheCpusBytes) {
     compare(m, box_grid({300, 400, 500}));
 }
 
-TEST(Balance, TwoMillionTrianglesInOneVoxelGiveTheCpusBytes) {
+TEST(AdversarialLoads, TwoMillionTrianglesInOneVoxelGiveTheCpusBytes) {
     const mesh_data m = triangles_in_voxel(2000000, {17.0f, 5.0f, 30.0f}, 50);
     compare(m, box_grid({64, 64, 64}));
     expect_same_lists<void>(m, box_grid({64, 64, 64}), vp::passthrough{}, vp::constant(true),
@@ -42,7 +42,7 @@ TEST(Balance, TwoMillionTrianglesInOneVoxelGiveTheCpusBytes) {
 }
 
 // Folds: one voxel of 200,000 fragments, few and many neighbouring voxels of some thousands, and short ones.
-TEST(Balance, LongVoxelsOfFoldedBlendsGiveTheCpusBytes) {
+TEST(AdversarialLoads, LongVoxelsOfFoldedBlendsGiveTheCpusBytes) {
     mesh_data m = triangles_in_voxel(200000, {17.0f, 5.0f, 30.0f}, 56);
     append(m, mixed_triangles(60000, 64.0f, 57));
     for (std::uint32_t x = 0; x < 60; ++x) // the first voxels of the grid, so that one block gets them
@@ -57,7 +57,7 @@ TEST(Balance, LongVoxelsOfFoldedBlendsGiveTheCpusBytes) {
     }
 }
 
-TEST(Balance, GridLongSliversGiveTheCpusBytes) {
+TEST(AdversarialLoads, GridLongSliversGiveTheCpusBytes) {
     std::mt19937 random(51);
     std::uniform_real_distribution<float> unit(0.0f, 1.0f);
     mesh_data m;
@@ -72,7 +72,7 @@ TEST(Balance, GridLongSliversGiveTheCpusBytes) {
     compare(m, box_grid({256, 256, 256}));
 }
 
-TEST(Balance, ThreeMillionZeroAreaTrianglesGiveTheCpusBytes) {
+TEST(AdversarialLoads, ThreeMillionZeroAreaTrianglesGiveTheCpusBytes) {
     std::mt19937 random(52);
     std::uniform_real_distribution<float> unit(0.0f, 128.0f);
     mesh_data m;
@@ -86,7 +86,7 @@ TEST(Balance, ThreeMillionZeroAreaTrianglesGiveTheCpusBytes) {
 }
 
 // Everything at once, in several orders: order-free blends give one result.
-TEST(Balance, MixturesInAnyOrderGiveOneResult) {
+TEST(AdversarialLoads, MixturesInAnyOrderGiveOneResult) {
     mesh_data m = mixed_triangles(200000, 128.0f, 53);
     const vp::grid g = box_grid({128, 128, 128});
     compare(m, g);

@@ -97,7 +97,7 @@ std::vector<float> sums_through(Resource& resource, cudaStream_t stream) {
     return vp::get<0>(fb).to_host(be);
 }
 
-TEST(Variations, EveryFormOfMemoryResourceIsAccepted) {
+TEST(Invariance, EveryFormOfMemoryResourceIsAccepted) {
     resources::async_form first;
     resources::stream_first_form second;
     resources::library_form third;
@@ -169,7 +169,7 @@ several_results with(const mesh_data& m, const vp::grid& g, vp::coverage rule, v
     return results_of(be, fb, s);
 }
 
-TEST(Variations, ThePolicyDoesNotChangeTheResult) {
+TEST(Invariance, ThePolicyDoesNotChangeTheResult) {
     mesh_data m = mixed_triangles(4000, 60.0f, 91);
     add_triangle(m, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
     const vp::grid g = box_grid({61, 50, 67});
@@ -202,7 +202,7 @@ std::vector<std::uint32_t> bits_with(const mesh_data& m, const vp::grid& g, vp::
     return vp::get<0>(fb).to_host(be);
 }
 
-TEST(Variations, TheTileSizeOfBitsDoesNotChangeTheResult) {
+TEST(Invariance, TheTileSizeOfBitsDoesNotChangeTheResult) {
     mesh_data m = mixed_triangles(4000, 60.0f, 17);
     add_triangle(m, {-300.0f, -300.0f, -10.0f}, {500.0f, -300.0f, 150.0f}, {-300.0f, 500.0f, 60.0f});
     const vp::grid g = box_grid({61, 50, 67});
@@ -244,7 +244,7 @@ policy_run measure(const mesh_data& m, const vp::grid& g) {
     return r;
 }
 
-TEST(Variations, TheSelectorIsAskedForTheArchitectureThatRuns) {
+TEST(Invariance, TheSelectorIsAskedForTheArchitectureThatRuns) {
     const mesh_data m = mixed_triangles(60, 60.0f, 93); // few, so that the memory of the first attempt suffices
     const vp::grid g = box_grid({61, 50, 67});
     const policy_run small = measure<fixed_policy<32, 3, 1>>(m, g), large = measure<fixed_policy<512, 4, 1>>(m, g);
@@ -276,7 +276,7 @@ __global__ void keep_busy(unsigned long long cycles, unsigned* sink) {
 }
 
 // Other kernels occupy a changing part of the device, so that blocks start at other times and in another order.
-TEST(Variations, OtherWorkOnTheDeviceDoesNotChangeTheResult) {
+TEST(Invariance, OtherWorkOnTheDeviceDoesNotChangeTheResult) {
     const mesh_data m = mixed_triangles(60000, 100.0f, 92);
     const vp::grid g = box_grid({100, 90, 110});
     cudaStream_t other = nullptr;
@@ -309,7 +309,7 @@ TEST(Variations, OtherWorkOnTheDeviceDoesNotChangeTheResult) {
 
 // A mesh in parts. Each call draws one part and loads the targets. Order-free blends give the result of a single call
 // in any order of the parts.
-TEST(Variations, CallsInAnyOrderGiveOneResult) {
+TEST(Invariance, CallsInAnyOrderGiveOneResult) {
     const mesh_data m = mixed_triangles(8000, 60.0f, 93);
     const vp::grid g = box_grid({61, 50, 67});
     using targets = vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_xor>,

@@ -118,7 +118,7 @@ std::vector<T> constants() {
             -limits::quiet_NaN()};
 }
 
-TEST(Counted, SumsOfAnyConstantAreTheCpus) {
+TEST(FragmentCounts, SumsOfAnyConstantAreTheCpus) {
     const mesh_data m = crowded(36.0f, 200);
     const std::vector<float> values = constants<float>();
     const std::vector<double> wide_values = constants<double>();
@@ -129,7 +129,7 @@ TEST(Counted, SumsOfAnyConstantAreTheCpus) {
     }
 }
 
-TEST(Counted, SumsOntoAnyClearValueAreTheCpus) {
+TEST(FragmentCounts, SumsOntoAnyClearValueAreTheCpus) {
     const mesh_data m = crowded(36.0f, 201);
     const std::vector<float> values = constants<float>();
     const std::vector<double> wide_values = constants<double>();
@@ -140,7 +140,7 @@ TEST(Counted, SumsOntoAnyClearValueAreTheCpus) {
 }
 
 // Bricks, whose padding holds the clear value; extents from 1 voxel on.
-TEST(Counted, EveryLayoutAndExtentHoldsTheCpusBytes) {
+TEST(FragmentCounts, EveryLayoutAndExtentHoldsTheCpusBytes) {
     for (const glm::ivec3 extent : {odd_extent, glm::ivec3(1), glm::ivec3(3, 1, 2), glm::ivec3(40, 16, 24)})
         for (const float clear : {0.0f, 0.3f}) {
             const mesh_data m = crowded(static_cast<float>(extent.x), 202);
@@ -150,7 +150,7 @@ TEST(Counted, EveryLayoutAndExtentHoldsTheCpusBytes) {
 
 // Grids large enough for marks, whose last pass reads only marked chunks: rows with and without 16-byte access, extents
 // that end within a chunk, more chunks along x than a word has bits. Then a clear value for which everything is read.
-TEST(Counted, LargeGridsWithMarksHoldTheCpusBytes) {
+TEST(FragmentCounts, LargeGridsWithMarksHoldTheCpusBytes) {
     for (const glm::ivec3 extent : {glm::ivec3(320, 200, 140), glm::ivec3(333, 191, 141), glm::ivec3(1100, 92, 91)}) {
         ASSERT_GE(static_cast<std::size_t>(extent.x) * static_cast<std::size_t>(extent.y * extent.z) * sizeof(float),
                   vp::tuning::marked_bytes);
@@ -169,7 +169,7 @@ TEST(Counted, LargeGridsWithMarksHoldTheCpusBytes) {
 }
 
 // As few as the tiles took before there were marks.
-TEST(Counted, FewLargeTrianglesWithMarksGiveTheCpusBytes) {
+TEST(FragmentCounts, FewLargeTrianglesWithMarksGiveTheCpusBytes) {
     const glm::ivec3 extent(260, 210, 170);
     const glm::vec3 size(extent);
     mesh_data m;
@@ -180,7 +180,7 @@ TEST(Counted, FewLargeTrianglesWithMarksGiveTheCpusBytes) {
         compare<float_sum>({m}, extent, std::vector{vp::constant(value)}, vp::core::make_pack(0.0f));
 }
 
-TEST(Counted, SeveralDrawsGiveTheCpusBytes) {
+TEST(FragmentCounts, SeveralDrawsGiveTheCpusBytes) {
     const std::vector<mesh_data> meshes{crowded(36.0f, 203), mixed_triangles(300, 30.0f, 204), crowded(30.0f, 205)};
     const auto draw = [&](float a, float b, float c) {
         compare<float_sum>(meshes, odd_extent, std::vector{vp::constant(a), vp::constant(b), vp::constant(c)},
@@ -192,7 +192,7 @@ TEST(Counted, SeveralDrawsGiveTheCpusBytes) {
     draw(0.5f, 2.0f, -1.0f);
 }
 
-TEST(Counted, TargetsBesideBitsHoldTheCpusBytes) {
+TEST(FragmentCounts, TargetsBesideBitsHoldTheCpusBytes) {
     const mesh_data m = crowded(36.0f, 206);
     for (const float value : {1.0f, 0.1f})
         for (const bool set : {false, true})
@@ -201,7 +201,7 @@ TEST(Counted, TargetsBesideBitsHoldTheCpusBytes) {
 }
 
 // Blends that are counted only if the number of voxels is asked for, and another quantum of the sum.
-TEST(Counted, IntegersAndOtherQuantaAreTheCpus) {
+TEST(FragmentCounts, IntegersAndOtherQuantaAreTheCpus) {
     const mesh_data m = crowded(36.0f, 207);
     const std::int64_t pattern = 0x123456789abcdef, clear = -77;
     for (const float value : {0.3f, 1.0f, 1e-4f, 1e20f})
@@ -213,7 +213,7 @@ TEST(Counted, IntegersAndOtherQuantaAreTheCpus) {
 }
 
 // Terms whose sums are exact in any order.
-TEST(Counted, UnorderedSumsOfExactTermsAreTheCpus) {
+TEST(FragmentCounts, UnorderedSumsOfExactTermsAreTheCpus) {
     const mesh_data m = crowded(36.0f, 208);
     const float infinity = std::numeric_limits<float>::infinity();
     for (const float value : {0.125f, -0.0f, infinity})
@@ -222,7 +222,7 @@ TEST(Counted, UnorderedSumsOfExactTermsAreTheCpus) {
                                                              vp::core::make_pack(clear));
 }
 
-TEST(Counted, LoadedTargetsAreNotCounted) {
+TEST(FragmentCounts, LoadedTargetsAreNotCounted) {
     const mesh_data m = crowded(36.0f, 209);
     for (const bool count_voxels : {false, true})
         expect_same<float_sum>(m, box_grid(odd_extent), vp::passthrough{}, vp::constant(0.1f),
@@ -230,7 +230,7 @@ TEST(Counted, LoadedTargetsAreNotCounted) {
 }
 
 // More fragments than a float can count. The expected sum is exact in a double, because a fold on the host is slow.
-TEST(Counted, SixteenMillionFragmentsInAVoxelAreCountedExactly) {
+TEST(FragmentCounts, SixteenMillionFragmentsInAVoxelAreCountedExactly) {
     constexpr std::uint32_t n = (1u << 24) + 3;
     const glm::ivec3 extent(5, 4, 3);
     mesh_data m;
@@ -256,7 +256,7 @@ TEST(Counted, SixteenMillionFragmentsInAVoxelAreCountedExactly) {
     }
 }
 
-TEST(Counted, BadIndexWritesNothing) {
+TEST(FragmentCounts, BadIndexWritesNothing) {
     vp::cuda_backend be;
     mesh_data m = crowded(36.0f, 210);
     vp::framebuffer<vp::cuda_backend, float_sum> fb{be, odd_extent};
@@ -282,7 +282,7 @@ vp::framebuffer_view<Targets...> view_of(glm::ivec3 extent) {
     return fb;
 }
 
-TEST(CountedPlan, CountsOnlyIfNeeded) {
+TEST(FragmentCountsPlan, CountsOnlyIfNeeded) {
     const auto of_sum = [](std::vector<float> values, std::uint64_t n, bool count_voxels) {
         std::vector<vp::constant_output<float>> shaders;
         for (const float v : values) shaders.push_back(vp::constant(v));
@@ -305,7 +305,7 @@ TEST(CountedPlan, CountsOnlyIfNeeded) {
     EXPECT_FALSE(of_sum({0.0f, -0.0f}, 1000, false).possible);
 }
 
-TEST(CountedPlan, LetsAnotherTargetGiveTheNumberOfVoxels) {
+TEST(FragmentCountsPlan, LetsAnotherTargetGiveTheNumberOfVoxels) {
     auto fb = view_of<bits, float_sum>({32, 32, 32});
     const auto beside = [&](float value) { return plan(std::vector{vp::constant(true, value)}, fb, 1000, true); };
     // A target of bits gives the number of voxels after drawing,
@@ -342,7 +342,7 @@ TEST(CountedPlan, LetsAnotherTargetGiveTheNumberOfVoxels) {
 }
 
 // A few triangles in a large grid are not counted if the last pass would read the whole grid, which takes longer.
-TEST(CountedPlan, DoesNotCountAFewTrianglesIfTheWholeGridWouldBeRead) {
+TEST(FragmentCountsPlan, DoesNotCountAFewTrianglesIfTheWholeGridWouldBeRead) {
     const std::vector shaders{vp::constant(0.1f)};
     auto fb = view_of<float_sum>({1024, 1024, 1024});
     EXPECT_TRUE(plan(shaders, fb, 12, true).is_cheap);

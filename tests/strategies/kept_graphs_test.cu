@@ -126,12 +126,12 @@ void repeat_everywhere(const Shader& shader) {
     }
 }
 
-TEST(RepeatedCalls, WithoutTilesGiveTheCpusBytes) {
+TEST(KeptGraphs, WithoutTilesGiveTheCpusBytes) {
     repeat_everywhere<vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>>(vp::constant(true, 0.1f));
 }
 
 // The host does not poll for counters, because its threads are set to sleep while they wait for the device.
-TEST(RepeatedCalls, OfSleepingThreadsGiveTheCpusBytes) {
+TEST(KeptGraphs, OfSleepingThreadsGiveTheCpusBytes) {
     unsigned before = 0, now = 0;
     ASSERT_EQ(cudaGetDeviceFlags(&before), cudaSuccess);
     ASSERT_EQ(cudaSetDeviceFlags(cudaDeviceScheduleBlockingSync), cudaSuccess);
@@ -142,13 +142,13 @@ TEST(RepeatedCalls, OfSleepingThreadsGiveTheCpusBytes) {
 }
 
 // Through tiles, and through lists for the ordered blend.
-TEST(RepeatedCalls, ThroughTilesAndListsGiveTheCpusBytes) {
+TEST(KeptGraphs, ThroughTilesAndListsGiveTheCpusBytes) {
     using first = vp::target<std::int32_t, blend::max>;
     using second = vp::target<float, blend::replace>;
     repeat_everywhere<first, second>(any_values<first, second>{});
 }
 
-TEST(RepeatedCalls, OfListsGiveTheCpusBytes) {
+TEST(KeptGraphs, OfListsGiveTheCpusBytes) {
     for (const bool keeps : {true, false}) {
         SCOPED_TRACE(keeps);
         vp::cuda_backend on_default;
@@ -164,7 +164,7 @@ TEST(RepeatedCalls, OfListsGiveTheCpusBytes) {
 }
 
 // Framebuffers and lists of one backend alternate in the same memory.
-TEST(RepeatedCalls, OfListsAndFramebuffersGiveTheCpusBytes) {
+TEST(KeptGraphs, OfListsAndFramebuffersGiveTheCpusBytes) {
     const mesh_data m = mixed_triangles(800, 30.0f, 223);
     const vp::grid g = box_grid({31, 30, 29});
     vp::cuda_backend gpu;
@@ -238,7 +238,7 @@ void draw_in_turn(const std::vector<mesh_data>& meshes, const std::vector<int>& 
     }
 }
 
-TEST(RepeatedCalls, MayNeedTheSecondKernelOrNot) {
+TEST(KeptGraphs, MayNeedTheSecondKernelOrNot) {
     const std::vector<mesh_data> meshes{spread_triangles(3000, false), spread_triangles(3000, true)};
     for (const bool loads : {false, true})
         draw_in_turn<vp::target<float, blend::add>>(meshes, {0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1, 0, 1},
@@ -258,7 +258,7 @@ const std::vector<int> fine_sequence{few_left, few_left,  few_left, few_left, no
 const std::vector<int> fine_sequence_from_none{none_left,  none_left, few_left, few_left,
                                                large_left, few_left,  few_left};
 
-TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesGiveTheCpusBytes) {
+TEST(KeptGraphs, OfAFineMeshWithAFewLargerTrianglesGiveTheCpusBytes) {
     const std::vector<mesh_data> meshes = fine_meshes();
     for (const vp::coverage rule : both_rules)
         for (const auto& sequence : {fine_sequence, fine_sequence_from_none}) {
@@ -275,7 +275,7 @@ TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesGiveTheCpusBytes) {
         }
 }
 
-TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesShadedGiveTheCpusBytes) {
+TEST(KeptGraphs, OfAFineMeshWithAFewLargerTrianglesShadedGiveTheCpusBytes) {
     using sum = vp::target<float, blend::add>;
     using last = vp::target<double, blend::replace>;
     const std::vector<mesh_data> meshes = fine_meshes();
@@ -310,7 +310,7 @@ void list_in_turn(const MeshOf& mesh_of, const std::vector<int>& sequence, const
     }
 }
 
-TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesGiveTheCpusLists) {
+TEST(KeptGraphs, OfAFineMeshWithAFewLargerTrianglesGiveTheCpusLists) {
     const std::vector<mesh_data> meshes = fine_meshes();
     const auto mesh_of = [&](int which) { return meshes[static_cast<std::size_t>(which)]; };
     const vp::grid g = box_grid({47, 46, 45});
@@ -322,7 +322,7 @@ TEST(RepeatedCalls, OfAFineMeshWithAFewLargerTrianglesGiveTheCpusLists) {
 
 // Voxels of one fragment; for a window and a warp; for a block; dense ones, by bits; and merged runs, which need many
 // more triangles.
-TEST(RepeatedCalls, MayHaveLongVoxelsOrNot) {
+TEST(KeptGraphs, MayHaveLongVoxelsOrNot) {
     // The first `inside` triangles lie in one voxel.
     const auto meshes_of = [](bool is_many) {
         return [is_many](int inside) {
@@ -344,7 +344,7 @@ TEST(RepeatedCalls, MayHaveLongVoxelsOrNot) {
 
 // Many fragments a voxel, which are sorted by counting, and few, which are not. The earlier call decides, and the
 // memory then holds other data.
-TEST(RepeatedCalls, MayHaveManyFragmentsAVoxelOrFew) {
+TEST(KeptGraphs, MayHaveManyFragmentsAVoxelOrFew) {
     constexpr int count = 6400;
     using draw = vp::draw<vp::mesh_view<>, vp::passthrough, decltype(vp::constant(true))>;
     vp::cuda_backend gpu;
@@ -380,7 +380,7 @@ TEST(RepeatedCalls, MayHaveManyFragmentsAVoxelOrFew) {
     }
 }
 
-TEST(RepeatedCalls, WithAlternatingArgumentsGiveTheCpusBytes) {
+TEST(KeptGraphs, WithAlternatingArgumentsGiveTheCpusBytes) {
     const mesh_data m = mixed_triangles(800, 30.0f, 221);
     const vp::grid g = box_grid({31, 30, 29});
     vp::cuda_backend gpu;

@@ -12,7 +12,7 @@ using namespace device_test;
 
 namespace {
 
-TEST(ReducedLists, OfConstantAndComputedPayloadsAreTheCpus) {
+TEST(SmallLists, OfConstantAndComputedPayloadsAreTheCpus) {
     const mesh_data m = mixed_triangles(300, 30.0f, 62);
     const vp::grid g = box_grid({30, 21, 33});
     for (const vp::coverage rule : both_rules) {
@@ -57,7 +57,7 @@ void list_late(vp::coverage rule) {
     }
 }
 
-TEST(ReducedLists, ShadedInPlaceAreTheCpus) {
+TEST(SmallLists, ShadedInPlaceAreTheCpus) {
     for (const vp::coverage rule : both_rules) {
         list_late<float>(rule);
         list_late<void>(rule);
@@ -68,7 +68,7 @@ TEST(ReducedLists, ShadedInPlaceAreTheCpus) {
 const vp::grid large_grid = box_grid({2048, 2048, 2048});
 mesh_data far_triangles(std::uint32_t seed) { return translated(mixed_triangles(80, 25.0f, seed), glm::vec3(2020.0f)); }
 
-TEST(ReducedLists, OfVoxelNumbersBeyond32BitsAreTheCpus) {
+TEST(SmallLists, OfVoxelNumbersBeyond32BitsAreTheCpus) {
     for (const vp::coverage rule : both_rules) {
         expect_same_lists<void>(far_triangles(68), large_grid, vp::passthrough{}, vp::constant(true), rule);
         expect_same_lists<double>(far_triangles(69), large_grid, vp::passthrough{}, any_double{}, rule);
@@ -85,7 +85,7 @@ void compare_without_a_wait(const std::vector<mesh_data>& parts, const vp::grid&
     }
 }
 
-TEST(ReducedLists, OfAsynchronousCallsAreTheCpus) {
+TEST(SmallLists, OfAsynchronousCallsAreTheCpus) {
     const vp::grid g = box_grid({30, 21, 33});
     for (const vp::coverage rule : both_rules) {
         compare_without_a_wait<void>({mixed_triangles(300, 30.0f, 70)}, g, vp::constant(true), rule);
@@ -97,7 +97,7 @@ TEST(ReducedLists, OfAsynchronousCallsAreTheCpus) {
 }
 
 // One draw of a constant shader is listed by the raster; for several draws, vertices are shaded first.
-TEST(ReducedLists, StageTimesAddUpToTheCall) {
+TEST(SmallLists, StageTimesAddUpToTheCall) {
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<bool>>;
     const mesh_data m = mixed_triangles(300, 30.0f, 65);
     const vp::grid g = box_grid({30, 21, 33});

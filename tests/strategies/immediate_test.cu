@@ -74,17 +74,17 @@ void compare_integers(T value) {
     compare_constants(targets{}, vp::constant(value, value, value, value, value, value, value));
 }
 
-TEST(Direct, Unsigned32IsTheCpus) { compare_integers<std::uint32_t>(0x9234567u); }
-TEST(Direct, Signed32IsTheCpus) { compare_integers<std::int32_t>(-7654321); }
-TEST(Direct, Unsigned64IsTheCpus) { compare_integers<std::uint64_t>(0x923456789abcdef1u); }
-TEST(Direct, Signed64IsTheCpus) { compare_integers<std::int64_t>(-765432123456789); }
+TEST(Immediate, Unsigned32IsTheCpus) { compare_integers<std::uint32_t>(0x9234567u); }
+TEST(Immediate, Signed32IsTheCpus) { compare_integers<std::int32_t>(-7654321); }
+TEST(Immediate, Unsigned64IsTheCpus) { compare_integers<std::uint64_t>(0x923456789abcdef1u); }
+TEST(Immediate, Signed64IsTheCpus) { compare_integers<std::int64_t>(-765432123456789); }
 
-TEST(Direct, BitsAreTheCpus) {
+TEST(Immediate, BitsAreTheCpus) {
     for (const bool value : {false, true}) compare_constants(bit_targets{}, same_bits(value));
 }
 
 // The size classes between a thread's and a split triangle's. Their limits depend on the grid's fraction bits.
-TEST(Direct, TrianglesOfMediumSizeGiveTheCpusBytes) {
+TEST(Immediate, TrianglesOfMediumSizeGiveTheCpusBytes) {
     for (const glm::ivec3 extent : {glm::ivec3(120, 90, 100), glm::ivec3(300, 60, 50), glm::ivec3(40, 60, 1100)})
         for (const vp::coverage rule : both_rules) {
             expect_same<vp::target<vp::bit, blend::bit_or>>(middling_triangles(extent, 84), box_grid(extent),
@@ -97,7 +97,7 @@ TEST(Direct, TrianglesOfMediumSizeGiveTheCpusBytes) {
 }
 
 // From one triangle, whose work items are spread over the device, to more than it runs at once.
-TEST(Direct, FewAndManyLargeTrianglesGiveTheCpusBytes) {
+TEST(Immediate, FewAndManyLargeTrianglesGiveTheCpusBytes) {
     const glm::ivec3 extent(150, 130, 140);
     std::mt19937 random(86);
     std::uniform_real_distribution<float> unit(-0.3f, 1.3f);
@@ -113,7 +113,7 @@ TEST(Direct, FewAndManyLargeTrianglesGiveTheCpusBytes) {
 }
 
 // Enough of each size class that every thread has one, and that warps combine words of thin bits. Some lie outside.
-TEST(Direct, ManyTrianglesOfMediumSizeGiveTheCpusBytes) {
+TEST(Immediate, ManyTrianglesOfMediumSizeGiveTheCpusBytes) {
     const glm::ivec3 extent(190, 170, 180);
     const mesh_data m = middling_triangles(extent, 89, 150000, 16.0f);
     for (const vp::coverage rule : both_rules)
@@ -125,7 +125,7 @@ TEST(Direct, ManyTrianglesOfMediumSizeGiveTheCpusBytes) {
 }
 
 // Few triangles in a bit grid too large for an occupancy mask: bitwise or and and in place, onto loaded targets.
-TEST(Direct, FewTrianglesInManyBitsGiveTheCpusBytes) {
+TEST(Immediate, FewTrianglesInManyBitsGiveTheCpusBytes) {
     const glm::ivec3 extent(250, 200, 256);
     mesh_data m = middling_triangles(extent, 88);
     m.triangles.resize(300);
@@ -142,7 +142,7 @@ TEST(Direct, FewTrianglesInManyBitsGiveTheCpusBytes) {
 }
 
 // Many work items of each triangle, more than the device has warps.
-TEST(Direct, LargeTrianglesWithManyWorkItemsGiveTheCpusBytes) {
+TEST(Immediate, LargeTrianglesWithManyWorkItemsGiveTheCpusBytes) {
     const glm::ivec3 extent(420, 390, 400);
     const mesh_data m = long_triangles(extent, 1500, 87);
     for (const vp::coverage rule : both_rules) {
@@ -156,7 +156,7 @@ TEST(Direct, LargeTrianglesWithManyWorkItemsGiveTheCpusBytes) {
 
 // As many as there are kept set-ups, some of which are not split, and more: then no set-up is kept, and each work item
 // repeats it.
-TEST(Direct, MoreLargeTrianglesThanKeptSetUpsGiveTheCpusBytes) {
+TEST(Immediate, MoreLargeTrianglesThanKeptSetUpsGiveTheCpusBytes) {
     constexpr auto most = static_cast<int>(vp::tuning::max_setups);
     const glm::ivec3 extent(150, 160, 140);
     for (const int count : {most, most + most / 4}) {
@@ -169,7 +169,7 @@ TEST(Direct, MoreLargeTrianglesThanKeptSetUpsGiveTheCpusBytes) {
 
 // Floors, walls and ceilings, some tilted, at the centres and faces of voxels and in between, also outside the grid:
 // rows of one, of few and of many depths, along each axis.
-TEST(Direct, FlatLargeTrianglesGiveTheCpusBytes) {
+TEST(Immediate, FlatLargeTrianglesGiveTheCpusBytes) {
     const glm::ivec3 extent(130, 100, 110);
     mesh_data m;
     for (int axis = 0; axis < 3; ++axis)
@@ -200,7 +200,7 @@ TEST(Direct, FlatLargeTrianglesGiveTheCpusBytes) {
 // Many triangles for their grid (may_be_close), of which a warp's lie within two, three or five voxels, over a grid
 // whose rows are more than a word long, at its faces and beyond them; one in some batches is longer, lies apart or has
 // no area.
-TEST(Direct, CloseTrianglesGiveTheCpusBytes) {
+TEST(Immediate, CloseTrianglesGiveTheCpusBytes) {
     const glm::ivec3 extent(70, 30, 24);
     std::mt19937 random(91);
     std::uniform_real_distribution<float> unit(0.0f, 1.0f);
@@ -228,12 +228,12 @@ TEST(Direct, CloseTrianglesGiveTheCpusBytes) {
                                                                 vp::constant(true), {rule, counts}, how);
 }
 
-TEST(Direct, SumsAreTheCpus) {
+TEST(Immediate, SumsAreTheCpus) {
     for (const float value : {1.0f, -0.75f, 0.1f, 3e9f, 1e-20f, std::numeric_limits<float>::infinity()})
         compare_constants(sum_targets{}, same_sums(value, value));
 }
 
-TEST(Direct, SumsAreExactOnlyWhereProven) {
+TEST(Immediate, SumsAreExactOnlyWhereProven) {
     using vp::device::sums_are_exact;
     constexpr std::uint64_t limit = std::uint64_t{1} << 24;
     EXPECT_TRUE(sums_are_exact(1.0f, 0.0f, limit - 1, -32));
@@ -287,7 +287,7 @@ void compare_draws(const std::vector<VertexShader>& shaders) {
 }
 
 // Calls of one backend. Counters are read by a copy first and through pinned memory later, or not at all.
-TEST(Direct, ManyCallsOfOneBackendGiveTheCpusBytes) {
+TEST(Immediate, ManyCallsOfOneBackendGiveTheCpusBytes) {
     const vp::grid g = box_grid({60, 47, 71});
     for (const bool locks : {true, false}) {
         vp::cuda_backend gpu;
@@ -315,7 +315,7 @@ TEST(Direct, ManyCallsOfOneBackendGiveTheCpusBytes) {
     }
 }
 
-TEST(Direct, SeveralDrawsGiveTheCpusBytes) {
+TEST(Immediate, SeveralDrawsGiveTheCpusBytes) {
     glm::mat4 turned(1.0f);
     turned[0] = {0.0f, 1.0f, 0.0f, 0.0f};
     turned[1] = {1.0f, 0.0f, 0.0f, 0.0f};
@@ -324,7 +324,7 @@ TEST(Direct, SeveralDrawsGiveTheCpusBytes) {
 }
 
 // A bad index leaves the targets unchanged, cleared ones too, even if other meshes' indices are known.
-TEST(Direct, BadIndexWritesNothing) {
+TEST(Immediate, BadIndexWritesNothing) {
     vp::cuda_backend be;
     mesh_data m = mixed_triangles(500, 20.0f, 95);
     using target = vp::target<vp::bit, blend::bit_or>;
@@ -362,7 +362,7 @@ TEST(Direct, BadIndexWritesNothing) {
 }
 
 // Finds the greatest index at any position, for any number of triangles.
-TEST(Direct, FindsTheGreatestIndex) {
+TEST(Immediate, FindsTheGreatestIndex) {
     vp::cuda_backend be;
     std::mt19937 random(97);
     for (const std::size_t count : {1, 31, 1000, 300000}) {
