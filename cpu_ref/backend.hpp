@@ -8,7 +8,7 @@
 #include <cpu_ref/abuffer_pass.hpp>
 #include <cpu_ref/framebuffer_pass.hpp>
 #include <cpu_ref/solid.hpp>
-#include <cpu_ref/sparse_pass.hpp>
+#include <cpu_ref/sparse_solid.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <cstddef>
@@ -107,7 +107,7 @@ public:
     [[nodiscard]] status run_solid(std::span<const Draw> draws, const grid& g, Output& out,
                                    const solid_options& options, std::uint64_t triangles_in) {
         return guarded(triangles_in, [&](const cpu::execution& how) {
-            return cpu::run_solid(how, draws, g, options, [&](const auto& sweep, const status& result) {
+            return cpu::run_solid(how, draws, g, glm::ivec3(0), options, [&](const auto& sweep, const status& result) {
                 return solid_pass(how, sweep, draws, g, options, out, result);
             });
         });
@@ -125,10 +125,23 @@ public:
             });
         });
     }
+    // Used by voxelize_solid with one.
+    template <class Draw, class... Targets>
+    [[nodiscard]] status run_sparse_solid(std::span<const Draw> draws, const grid& g,
+                                          sparse_framebuffer<cpu_backend, Targets...>& out,
+                                          const solid_options& options, std::uint64_t triangles_in) {
+        return guarded(triangles_in, [&](const cpu::execution& how) {
+            const grid aligned = cpu::tile_aligned(g);
+            const auto finish = [&](auto& sweep, const status& result) {
+                return cpu::draw_sparse_solid(how, *this, sweep, draws, g, options, out, result);
+            };
+            return cpu::run_solid(how, draws, aligned, g.offset - aligned.offset, options, finish);
+        });
+    }
     template <class... Targets>
     [[nodiscard]] status clear_sparse(const grid& g, sparse_framebuffer<cpu_backend, Targets...>& out) {
         return guarded(0, [&](const cpu::execution& how) {
-            return cpu::draw_sparse(how, *this, g, cpu::empty_source{}, false, counters{}, out);
+            return cpu::draw_sparse(how, *this, g, cpu::empty_source{}, false, status{}, out);
         });
     }
 

@@ -107,6 +107,31 @@ VOXELPIPE_INLINE void blend_in_place(const target_view<Target>& t, int x, int y,
     }
 }
 
+// Blends a fragment's values into a voxel, x, y, z in the targets, row and column in the tile. Track: marks the voxel,
+// which sums need.
+template <bool Track, class Values, class... Targets>
+VOXELPIPE_INLINE void blend_in_tile(const framebuffer_view<Targets...>& fb, tile_scratch<Targets...>& scratch, int row,
+                                    int column, int x, int y, int z, const Values& values) {
+    bool first = false;
+    if constexpr (Track) {
+        std::uint32_t& word = scratch.touched[static_cast<std::size_t>(row)];
+        first = ((word >> column) & 1u) == 0;
+        word |= 1u << column;
+    }
+    core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        using target_type = typename core::pack_element<I, Targets...>::type;
+        const auto& t = get<I>(fb.targets);
+        if (t.load == load_operation::off) return;
+        if constexpr (works_in_place<target_type>) {
+            blend_in_place(t, x, y, z, get<I>(values));
+        } else {
+            auto& sum = get<I>(scratch.sums)[tile_voxel(row, column)];
+            if (first) sum = target_type::traits::begin(t.load == load_operation::clear ? t.clear_value : t(x, y, z));
+            target_type::traits::apply(sum, get<I>(values));
+        }
+    });
+}
+
 // `at`: position in the targets of the tile's lowest voxel.
 template <coverage Rule, bool Track, class Scene, class... Targets>
 void raster_tile(const Scene& s, const core::voxel_box& box, const glm::ivec3& at, const std::uint32_t* primitives,
@@ -123,26 +148,7 @@ void raster_tile(const Scene& s, const core::voxel_box& box, const glm::ivec3& a
                 return;
             }
             ++fragments;
-            const int row = k * tile_size + j, x = x0 + column, y = y0 + j, z = z0 + k;
-            bool first = false;
-            if constexpr (Track) {
-                std::uint32_t& word = scratch.touched[static_cast<std::size_t>(row)];
-                first = ((word >> column) & 1u) == 0;
-                word |= 1u << column;
-            }
-            core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-                using target_type = typename core::pack_element<I, Targets...>::type;
-                const auto& t = get<I>(fb.targets);
-                if (t.load == load_operation::off) return;
-                if constexpr (works_in_place<target_type>) {
-                    blend_in_place(t, x, y, z, get<I>(out.values));
-                } else {
-                    auto& sum = get<I>(scratch.sums)[tile_voxel(row, column)];
-                    if (first)
-                        sum = target_type::traits::begin(t.load == load_operation::clear ? t.clear_value : t(x, y, z));
-                    target_type::traits::apply(sum, get<I>(out.values));
-                }
-            });
+            blend_in_tile<Track>(fb, scratch, k * tile_size + j, column, x0 + column, y0 + j, z0 + k, out.values);
         });
     }
     scratch.counts.fragments += fragments;

@@ -19,9 +19,10 @@ namespace voxelpipe::cpu {
 template <class Mesh, class VertexShader, class SolidShader>
 [[nodiscard]] solid_geometry make_solid_geometry(const execution& how,
                                                  std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
-                                                 const grid& g, const solid_options& options) {
+                                                 const grid& g, const glm::ivec3& lead, const solid_options& options) {
     solid_geometry s;
     s.where = g;
+    s.lead = lead;
     s.snap = core::make_snap_transform(g);
     s.vertices = shade_vertices<no_varyings>(how, draws, s.snap);
     std::uint32_t first = 0;
@@ -89,15 +90,16 @@ template <class Crossing, class Finish>
             words = find_interior(how, s, options.closing, std::move(words));
         }
     }
-    const solid_sweep<Crossing> sweep(s.where.extent, options, needs_winding, std::move(crossings), std::move(words));
+    solid_sweep<Crossing> sweep(s.where.extent, options, needs_winding, std::move(crossings), std::move(words));
     return finish(sweep, result);
 }
 
-// finish is called with a sweep of either kind of crossings.
+// Of the voxels of `g` from `lead` on. finish is called with a sweep of either kind of crossings.
 template <class Mesh, class VertexShader, class SolidShader, class Finish>
 [[nodiscard]] status run_solid(const execution& how, std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
-                               const grid& g, const solid_options& options, const Finish& finish) {
-    solid_geometry s = make_solid_geometry(how, draws, g, options);
+                               const grid& g, const glm::ivec3& lead, const solid_options& options,
+                               const Finish& finish) {
+    solid_geometry s = make_solid_geometry(how, draws, g, lead, options);
     status result;
     if (options.repair == repair::close_holes && !add_cones(s, options.max_hole_edges, result.solid))
         return solid_failure(status_code::too_many_triangles, s);

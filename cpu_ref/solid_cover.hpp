@@ -36,12 +36,14 @@ inline void sort_words(std::vector<row_word>& words) {
     });
 }
 
-// Appends the words of one tile, whose touched voxels become untouched.
-inline void take_words(constant_scratch& scratch, std::uint32_t draw, std::uint32_t word, std::vector<row_word>& to) {
+// Appends the words of one tile, whose touched voxels become untouched. `lead`: where they begin in the tile.
+inline void take_words(constant_scratch& scratch, const glm::ivec3& lead, std::uint32_t draw, std::uint32_t word,
+                       std::vector<row_word>& to) {
+    const auto first = static_cast<std::uint32_t>(lead.z * tile_size + lead.y);
     for (std::size_t row = 0; row < tile_rows; ++row) {
         const std::uint32_t bits = scratch.touched[row];
         if (bits == 0) continue;
-        to.push_back({static_cast<std::uint32_t>(row), draw, word, bits});
+        to.push_back({first + static_cast<std::uint32_t>(row), draw, word, bits << lead.x});
         scratch.touched[row] = 0;
     }
 }
@@ -77,7 +79,8 @@ template <class Key>
         out.beam = beam_of(ranges[first[b]]);
         for (std::size_t r = first[b]; r < first[b + 1]; ++r) {
             const tile_range& range = ranges[r];
-            const core::voxel_box box = core::tile_box(tiles, range.tile, s.where.extent);
+            const core::voxel_box tile = core::tile_box(tiles, range.tile, s.where.extent);
+            const core::voxel_box box = core::intersect(tile, s.whole_box());
             const auto word = static_cast<std::uint32_t>(tiles.position(range.tile).x);
             for (std::size_t i = range.first; i < range.last;) {
                 // Primitives ascend, and so do their bodies.
@@ -91,7 +94,7 @@ template <class Key>
                 }
                 cover_tile<coverage::conservative, false>(s, box, &coarse.pairs[i].primitive, sizeof(tile_pair<Key>),
                                                           j - i, *scratch[worker]);
-                take_words(*scratch[worker], body, word, out.words);
+                take_words(*scratch[worker], lowest(box) - lowest(tile), body, word, out.words);
                 i = j;
             }
         }

@@ -51,8 +51,9 @@ struct row_numbers {
     [[nodiscard]] std::size_t words() const { return static_cast<std::size_t>(tiles.tiles.x); }
 };
 
-// Where a row crosses a triangle: the first voxel beyond it, from 0 to the extent, and twice that if it enters, one
-// more if it leaves. One body needs no draw; 32 bits number the rows of every grid that a framebuffer holds.
+// Where a row crosses a triangle: the first voxel beyond it, from the lowest that is drawn to the extent, and twice
+// that if it enters, one more if it leaves. One body needs no draw; 32 bits number the rows of every grid that a
+// framebuffer holds.
 struct call_crossing {
     std::uint32_t key; // row number
     std::uint32_t at;
@@ -112,7 +113,8 @@ template <class Crossing>
             if (box.empty()) continue;
             core::for_each_crossing<0, core::centre_offset<>>(
                 a, b, c, fraction, box, [&](std::int64_t y, std::int64_t z, std::int64_t first, int winding) {
-                    const auto x = static_cast<std::uint32_t>(std::clamp<std::int64_t>(first, 0, s.where.extent.x));
+                    const auto x =
+                        static_cast<std::uint32_t>(std::clamp<std::int64_t>(first, s.lead.x, s.where.extent.x));
                     found.emplace_back(rows.number(y, z), 2 * x + (winding > 0 ? 0 : 1), body);
                 });
         }

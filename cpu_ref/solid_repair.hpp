@@ -64,18 +64,19 @@ namespace voxelpipe::cpu {
 
 // ---- what exterior and vote have in common --------------------------------------------------------------------------
 
-// Appends the bits of one body to the beams, of which `beams` has all, in order.
+// Appends the bits of one body within `box` to the beams, of which `beams` has all, in order.
 template <class BitsAt>
-void add_bits(const execution& how, const row_numbers& rows, std::uint32_t draw, std::vector<beam_words>& beams,
-              const BitsAt& bits_at) {
+void add_bits(const execution& how, const row_numbers& rows, const core::voxel_box& box, std::uint32_t draw,
+              std::vector<beam_words>& beams, const BitsAt& bits_at) {
     parallel_for(how.threads, beams.size(), [&](unsigned, std::size_t b) {
         for (std::uint32_t place = 0; place < tile_rows; ++place) {
             const std::uint64_t row = b * tile_rows + place;
             const int y = rows.y(row), z = rows.z(row);
-            if (y >= rows.extent.y || z >= rows.extent.z) continue;
-            for (int x = 0; x < rows.extent.x; x += 32) {
+            if (y < box.lo[1] || z < box.lo[2] || y > box.hi[1] || z > box.hi[2]) continue;
+            for (int x = 0; x <= box.hi[0]; x += 32) {
                 std::uint32_t bits = bits_at(x, y, z);
-                if (rows.extent.x - x < 32) bits &= (1u << (rows.extent.x - x)) - 1;
+                if (box.hi[0] - x < 31) bits &= (1u << (box.hi[0] - x + 1)) - 1;
+                if (box.lo[0] > x) bits &= box.lo[0] - x < 32 ? ~0u << (box.lo[0] - x) : 0u;
                 if (bits != 0) beams[b].words.push_back({place, draw, static_cast<std::uint32_t>(x) / 32, bits});
             }
         }
@@ -207,7 +208,7 @@ inline void spread_in_row(std::uint64_t* from, const std::uint64_t* open, std::s
         grid = flood(grid);
         dilate(grid, closing, how.threads);
         if (draw == 0) beams = all_beams(rows); // behind the grid, which is what there may be no memory for
-        add_bits(how, rows, draw, beams,
+        add_bits(how, rows, s.whole_box(), draw, beams,
                  [&](int x, int y, int z) { return ~grid.get_bits(x + ring, y + ring, z + ring); });
     }
     end_beams(how, beams);
@@ -307,7 +308,7 @@ private:
         bit_grid touched(s.where.extent);
         for_each_word(cover, rows, draw,
                       [&](int x, int y, int z, std::uint32_t bits) { touched.set_bits(x, y, z, bits); });
-        add_bits(how, rows, draw, beams, [&](int x, int y, int z) {
+        add_bits(how, rows, s.whole_box(), draw, beams, [&](int x, int y, int z) {
             std::uint32_t a = 0, b = 0, c = 0, not_a = 0, not_b = 0, not_c = 0;
             x_rows->vote(x, y, z, a, not_a);
             y_rows->vote(x, y, z, b, not_b);

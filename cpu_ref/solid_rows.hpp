@@ -24,8 +24,9 @@ struct winding_span {
     std::int64_t winding;
 };
 
-// One body in one row: the voxels of `mask`, whose words from first_word to last_word alone may be other than 0, and
-// the winding numbers of all voxels of the row, if the sink asked for them.
+// One body in one row, or in the 32 voxels of it that lie in a tile: the voxels of `mask`, whose words from first_word
+// to last_word alone may be other than 0, and the winding numbers of all voxels, if the sink asked for them. Voxels
+// count from the first one that `mask` has a bit for.
 struct row_of_body {
     int y, z;
     std::uint32_t draw;
@@ -95,6 +96,25 @@ public:
     }
 
     [[nodiscard]] std::size_t num_beams() const { return beams_.size(); }
+    // Where the tiles of a beam lie; x is 0.
+    [[nodiscard]] glm::ivec3 first_tile(std::size_t item) const {
+        const std::uint64_t row = beams_[item].number * tile_rows;
+        return {0, rows_.y(row) / tile_size, rows_.z(row) / tile_size};
+    }
+    // Puts the crossings of each body in a row in order, for sweeps that are made more than once.
+    void sort_rows(const execution& how) {
+        parallel_for(how.threads, beams_.size(), [&](unsigned, std::size_t item) {
+            for (std::size_t c = beams_[item].first; c < beams_[item].last;) {
+                std::size_t end = c + 1;
+                while (end < beams_[item].last && crossings_[end].key == crossings_[c].key &&
+                       crossings_[end].draw == crossings_[c].draw)
+                    ++end;
+                std::sort(crossings_.begin() + c, crossings_.begin() + end,
+                          [](const Crossing& a, const Crossing& b) { return a.at < b.at; });
+                c = end;
+            }
+        });
+    }
     [[nodiscard]] std::uint64_t num_crossings() const { return crossings_.size(); }
 
     [[nodiscard]] std::unique_ptr<row_scratch> make_scratch() const {
@@ -106,6 +126,22 @@ public:
     }
 
     void sweep(std::size_t item, row_scratch& scratch, row_sink& sink) const {
+        sweep(item, {0, rows_.words()}, scratch, sink);
+    }
+    // The part in one tile of the beam. Counts mean nothing then.
+    void sweep_tile(std::size_t item, std::size_t tile, row_scratch& scratch, row_sink& sink) const {
+        sweep(item, {tile, tile + 1}, scratch, sink);
+    }
+
+private:
+    static constexpr std::uint64_t none = std::numeric_limits<std::uint64_t>::max();
+    // Words of a row, the last one not included.
+    struct window {
+        std::size_t begin, end;
+        [[nodiscard]] std::size_t size() const { return end - begin; }
+    };
+
+    void sweep(std::size_t item, const window& in, row_scratch& scratch, row_sink& sink) const {
         const beam& b = beams_[item];
         std::size_t c = b.first, k = 0;
         const std::size_t num_words = b.cover == nullptr ? 0 : b.cover->words.size();
@@ -124,14 +160,12 @@ public:
                 const std::size_t c0 = c, k0 = k;
                 while (crosses() && crossings_[c].draw == draw) ++c;
                 while (covers() && words[k].draw == draw) ++k;
-                body(y, z, draw, c0, c, words + k0, words + k, scratch, sink);
+                body(y, z, draw, in, c0, c, words + k0, words + k, scratch, sink);
             }
             sink.end_row(y, z);
         }
     }
 
-private:
-    static constexpr std::uint64_t none = std::numeric_limits<std::uint64_t>::max();
     struct beam {
         std::uint64_t number;
         std::size_t first, last; // crossings
@@ -145,21 +179,24 @@ private:
         }
     };
 
-    void body(int y, int z, std::uint32_t draw, std::size_t c0, std::size_t c1, const row_word* k0, const row_word* k1,
-              row_scratch& scratch, row_sink& sink) const {
-        word_range range{rows_.words(), 0}; // first > last: no voxels yet
+    void body(int y, int z, std::uint32_t draw, const window& in, std::size_t c0, std::size_t c1, const row_word* k0,
+              const row_word* k1, row_scratch& scratch, row_sink& sink) const {
+        word_range range{in.size(), 0}; // first > last: no voxels yet
         if (options_.rule == fill_rule::even_odd && !needs_winding_)
-            fill_parity(c0, c1, scratch, range);
+            fill_parity(in, c0, c1, scratch, range);
         else
-            fill_windings(c0, c1, scratch, range);
+            fill_windings(in, c0, c1, scratch, range);
         std::uint32_t* const mask = scratch.mask.data();
         for (const row_word* w = k0; w != k1; ++w) {
-            if (options_.extent == solid_extent::inner)
-                mask[w->word] &= ~w->bits;
-            else
-                mask[w->word] |= w->bits;
+            if (w->word < in.begin || w->word >= in.end) continue;
+            const std::size_t i = w->word - in.begin;
+            if (options_.extent == solid_extent::inner) {
+                mask[i] &= ~w->bits;
+            } else {
+                mask[i] |= w->bits;
+                range.include(i, i);
+            }
         }
-        if (k0 != k1 && options_.extent == solid_extent::outer) range.include(k0->word, (k1 - 1)->word);
         if (range.first > range.last) return;
         const row_of_body row{y, z, draw, mask, range.first, range.last, scratch.spans.data()}; // named for nvcc
         sink.add(row);
@@ -167,21 +204,26 @@ private:
     }
 
     // Even-odd without windings needs no order: a bit where each crossing is, then the parity of those up to each bit.
-    void fill_parity(std::size_t c0, std::size_t c1, row_scratch& scratch, word_range& range) const {
+    void fill_parity(const window& in, std::size_t c0, std::size_t c1, row_scratch& scratch, word_range& range) const {
         if ((c1 - c0) % 2 != 0) ++scratch.counts.open_rows;
         std::uint32_t* const mask = scratch.mask.data();
         const auto nx = static_cast<std::uint32_t>(rows_.extent.x);
-        bool odd = false;
+        bool odd = false, odd_before = false; // up to the end of the window, and before it
         for (std::size_t c = c0; c < c1; ++c) {
             const std::uint32_t x = crossing_voxel(crossings_[c].at);
-            if (x == nx) continue;
-            mask[x / 32] ^= 1u << x % 32;
-            range.include(x / 32, x / 32);
+            if (x == nx || x / 32 >= in.end) continue;
             odd = !odd;
+            if (x / 32 < in.begin) {
+                odd_before = !odd_before;
+                continue;
+            }
+            mask[x / 32 - in.begin] ^= 1u << x % 32;
+            range.include(x / 32 - in.begin, x / 32 - in.begin);
         }
-        if (odd) range.last = rows_.words() - 1;
-        std::uint32_t carry = 0;
-        for (std::size_t i = range.first; i <= range.last && i < rows_.words(); ++i) {
+        if (odd) range.last = in.size() - 1;
+        if (odd_before) range.include(0, 0);
+        std::uint32_t carry = odd_before ? ~0u : 0u;
+        for (std::size_t i = range.first; i <= range.last && i < in.size(); ++i) {
             std::uint32_t w = mask[i];
             w ^= w << 1;
             w ^= w << 2;
@@ -192,21 +234,28 @@ private:
             mask[i] = w;
             carry = (w >> 31) != 0 ? ~0u : 0u;
         }
-        if (odd && nx % 32 != 0) mask[rows_.words() - 1] &= (1u << nx % 32) - 1;
+        if (odd && nx % 32 != 0 && in.end == rows_.words()) mask[in.size() - 1] &= (1u << nx % 32) - 1;
     }
 
-    void fill_windings(std::size_t c0, std::size_t c1, row_scratch& scratch, word_range& range) const {
+    void fill_windings(const window& in, std::size_t c0, std::size_t c1, row_scratch& scratch,
+                       word_range& range) const {
         std::uint32_t* const order = scratch.order.data();
         const std::size_t n = c1 - c0;
         for (std::size_t i = 0; i < n; ++i) order[i] = crossings_[c0 + i].at;
-        std::sort(order, order + n);
+        if (!std::is_sorted(order, order + n)) std::sort(order, order + n);
         const auto nx = static_cast<std::uint32_t>(rows_.extent.x);
+        const auto low = static_cast<std::uint32_t>(in.begin) * 32;
+        const std::uint32_t high = std::min(nx, static_cast<std::uint32_t>(in.end) * 32);
         std::uint32_t* const mask = scratch.mask.data();
         winding_span* span = scratch.spans.data();
         std::int64_t winding = 0;
         std::uint64_t greatest = scratch.counts.max_winding;
         const auto end_span = [&](std::uint32_t begin, std::uint32_t end) {
-            if (begin == end) return;
+            begin = std::max(begin, low);
+            end = std::min(end, high);
+            if (begin >= end) return;
+            begin -= low;
+            end -= low;
             *span++ = {static_cast<int>(end), winding};
             if (winding == 0) return;
             greatest = std::max(greatest, static_cast<std::uint64_t>(std::abs(winding)));

@@ -182,6 +182,17 @@ private:
     counters counts_{};
 };
 
+// Adds up what the threads of a sweep have found.
+template <class Crossing>
+void add_counts(const solid_sweep<Crossing>& sweep, const std::vector<std::unique_ptr<row_scratch>>& scratch,
+                solid_counters& counts) {
+    for (const auto& s : scratch) {
+        counts.open_rows += s->counts.open_rows;
+        counts.max_winding = std::max(counts.max_winding, s->counts.max_winding);
+    }
+    counts.crossings += sweep.num_crossings();
+}
+
 // Sweeps all beams; `sinks` has one for each thread that may take part.
 template <class Crossing, class Sink>
 void sweep_all(const execution& how, const solid_sweep<Crossing>& sweep,
@@ -195,11 +206,7 @@ void sweep_all(const execution& how, const solid_sweep<Crossing>& sweep,
             meter.advance();
         });
     }
-    for (const auto& s : scratch) {
-        result.solid.open_rows += s->counts.open_rows;
-        result.solid.max_winding = std::max(result.solid.max_winding, s->counts.max_winding);
-    }
-    result.solid.crossings += sweep.num_crossings();
+    add_counts(sweep, scratch, result.solid);
 }
 
 // Whether all draws that give fragments give the same values.

@@ -8,8 +8,9 @@
 //
 // What is drawn comes from a source of fragments:
 //   num_tiles(), key(i)   the tiles that it may draw in: Morton keys in the whole grid, ascending
-//   draw(i, scratch)      blends the tile's fragments into scratch.view, marks their voxels (scratch.mark) and counts
-// so that another kind of coverage is another source.
+//   make_scratch()        a unique_ptr to what a thread needs to draw
+//   draw(i, ...)          blends the tile's fragments into scratch.view, counts, and ends the tile (scratch.end_...)
+// Triangles are a source (surface_source), and so are solids (sparse_solid.hpp).
 
 #include <cpu_ref/sparse_tile.hpp>
 
@@ -70,8 +71,12 @@ public:
     [[nodiscard]] std::size_t num_tiles() const { return ranges_.size(); }
     [[nodiscard]] std::uint64_t key(std::size_t i) const { return ranges_[i].tile; }
 
+    struct no_scratch {};
+    [[nodiscard]] std::unique_ptr<no_scratch> make_scratch() const { return nullptr; }
+    // `box`: the tile, or what is drawn of it.
     template <class... Targets>
-    void draw(std::size_t i, const core::voxel_box& box, bool keeps_sums, sparse_scratch<Targets...>& scratch) const {
+    void draw(std::size_t i, const core::voxel_box& box, bool keeps_sums, const no_scratch*,
+              sparse_scratch<Targets...>& scratch) const {
         const tile_range& range = ranges_[i];
         const std::uint32_t* const primitives = &pairs_[range.first].primitive;
         const std::size_t count = range.last - range.first;
@@ -79,21 +84,17 @@ public:
         if constexpr (core::is_constant<typename Scene::fragment_shader>) {
             if (all_same_ && !keeps_sums) {
                 if (needs_repeats(scratch.view)) {
-                    if (scratch.constant.repeats == nullptr)
-                        scratch.constant.repeats = std::make_unique<std::uint32_t[]>(tile_voxels);
+                    scratch.count_repeats();
                     cover_tile<Rule, true>(s_, box, primitives, stride, count, scratch.constant);
                 } else {
                     cover_tile<Rule, false>(s_, box, primitives, stride, count, scratch.constant);
                 }
-                scratch.mark(scratch.constant.touched.data());
-                resolve_constant_tile(glm::ivec3(0), scratch.view, s_.draws[0].fragment_shader.values,
-                                      scratch.constant);
+                scratch.end_constant(s_.draws[0].fragment_shader.values);
                 return;
             }
         }
         raster_tile<Rule, true>(s_, box, glm::ivec3(0), primitives, stride, count, scratch.view, scratch.shaded);
-        scratch.mark(scratch.shaded.touched.data());
-        resolve_tile(glm::ivec3(0), scratch.view, scratch.shaded);
+        scratch.end_shaded();
     }
 
 private:
@@ -107,8 +108,10 @@ private:
 struct empty_source {
     [[nodiscard]] std::size_t num_tiles() const { return 0; }
     [[nodiscard]] std::uint64_t key(std::size_t) const { return 0; }
+    struct no_scratch {};
+    [[nodiscard]] std::unique_ptr<no_scratch> make_scratch() const { return nullptr; }
     template <class... Targets>
-    void draw(std::size_t, const core::voxel_box&, bool, sparse_scratch<Targets...>&) const {}
+    void draw(std::size_t, const core::voxel_box&, bool, const no_scratch*, sparse_scratch<Targets...>&) const {}
 };
 
 // A tile that has bricks after the call, or may have: what is drawn there, and the bricks that it has before.
@@ -212,15 +215,12 @@ join_lists(const execution& how, Backend& backend, const sparse_plan<Targets...>
     return out;
 }
 
-// Draws a source in the grid `g` and makes the result the framebuffer's contents. `counts` has the source's counts of
-// triangles.
+// Draws a source in the grid `g` and makes the result the framebuffer's contents. `result` has what the source has
+// counted.
 template <class Backend, class Source, class... Targets>
 [[nodiscard]] status draw_sparse(const execution& how, Backend& backend, const grid& g, const Source& source,
-                                 bool count_voxels, const counters& counts,
-                                 sparse_framebuffer<Backend, Targets...>& fb) {
+                                 bool count_voxels, status result, sparse_framebuffer<Backend, Targets...>& fb) {
     how.enter(stage::fine_raster);
-    status result;
-    result.counts = counts;
     const sparse_plan<Targets...> plan{fb.targets(), fb.next_background(), core::keeps_voxels(fb)};
     bool keeps_sums = false;
     core::for_each_index<sizeof...(Targets)>(
@@ -231,7 +231,11 @@ template <class Backend, class Source, class... Targets>
     std::vector<std::unique_ptr<brick_list<Targets...>>> lists((tiles.size() + block - 1) / block);
     std::vector<std::unique_ptr<sparse_scratch<Targets...>>> scratch;
     const auto workers = static_cast<unsigned>(std::min<std::size_t>(how.threads, lists.size()));
-    for (unsigned w = 0; w < workers; ++w) scratch.push_back(std::make_unique<sparse_scratch<Targets...>>(plan));
+    std::vector<decltype(source.make_scratch())> of_source;
+    for (unsigned w = 0; w < workers; ++w) {
+        scratch.push_back(std::make_unique<sparse_scratch<Targets...>>(plan));
+        of_source.push_back(source.make_scratch());
+    }
     const core::voxel_box drawn = part_of_aligned(g);
     const glm::ivec3 corner = tile_aligned(g).offset / tile_size;
     std::atomic<std::uint64_t> bricks{0}, voxels{0};
@@ -250,7 +254,8 @@ template <class Backend, class Source, class... Targets>
                 mine.begin(lowest(box) - low);
                 if (tile.first_brick != tile.last_brick)
                     mine.take_over(fb.contents(), tile.first_brick, tile.last_brick);
-                if (tile.source != sparse_tile::none) source.draw(tile.source, box, keeps_sums, mine);
+                if (tile.source != sparse_tile::none)
+                    source.draw(tile.source, box, keeps_sums, of_source[worker].get(), mine);
                 mine.pack_bricks(tile.key);
                 meter.advance();
             }
@@ -262,7 +267,7 @@ template <class Backend, class Source, class... Targets>
     }
     if (bricks > fb.limits().bricks || voxels > fb.limits().voxels) {
         status failed = core::failure(status_code::capacity_exceeded, stage::fine_raster);
-        failed.counts.triangles_in = counts.triangles_in;
+        failed.counts.triangles_in = result.counts.triangles_in;
         failed.required.bricks = bricks;
         failed.required.voxels = voxels;
         return failed;
@@ -292,7 +297,9 @@ template <coverage Rule, class Backend, class Scene, class... Targets>
         failed.counts.triangles_in = s.first_primitive.back();
         return failed;
     }
-    return draw_sparse(how, backend, g, source, count_voxels, source.counts, fb);
+    status result;
+    result.counts = source.counts;
+    return draw_sparse(how, backend, g, source, count_voxels, result, fb);
 }
 
 } // namespace voxelpipe::cpu

@@ -120,13 +120,19 @@ public:
         }
     }
 
-    // Marks the voxels that keep a fragment: `touched` has tile_rows rows of bits.
-    void mark(const std::uint32_t* touched) {
-        for (std::size_t row = 0; row < tile_rows; ++row) {
-            if (touched[row] == 0) continue;
-            const int y = static_cast<int>(row) % tile_size, z = static_cast<int>(row) / tile_size;
-            set_row(drawn_, touched[row] << lead_.x, y + lead_.y, z + lead_.z);
-        }
+    // Before a constant shader's fragments are counted a voxel.
+    void count_repeats() {
+        if (constant.repeats == nullptr) constant.repeats = std::make_unique<std::uint32_t[]>(tile_voxels);
+    }
+    // What has been drawn becomes the voxels' values: of `shaded`, or of `constant`.
+    void end_shaded() {
+        mark(shaded.touched.data());
+        resolve_tile(glm::ivec3(0), view, shaded);
+    }
+    template <class Values>
+    void end_constant(const Values& values) {
+        mark(constant.touched.data());
+        resolve_constant_tile(glm::ivec3(0), view, values, constant);
     }
 
     // Ends the tile: its bricks go to `found`, and the scratch is as before.
@@ -157,6 +163,15 @@ public:
 private:
     template <std::size_t I>
     using target = typename core::pack_element<I, Targets...>::type;
+
+    // Marks the voxels that keep a fragment: `touched` has tile_rows rows of bits.
+    void mark(const std::uint32_t* touched) {
+        for (std::size_t row = 0; row < tile_rows; ++row) {
+            if (touched[row] == 0) continue;
+            const int y = static_cast<int>(row) % tile_size, z = static_cast<int>(row) / tile_size;
+            set_row(drawn_, touched[row] << lead_.x, y + lead_.y, z + lead_.z);
+        }
+    }
 
     // The value of a voxel before its first fragment. Sums that are kept do not begin with the clear value, which is
     // added at the end.

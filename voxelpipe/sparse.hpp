@@ -8,7 +8,7 @@
 // same input gives the same bytes.
 
 #include <voxelpipe/host_sparse.hpp>
-#include <voxelpipe/voxelize.hpp>
+#include <voxelpipe/solid.hpp>
 
 #include <bitset>
 #include <cstddef>
@@ -304,6 +304,26 @@ template <coverage... Known, class Backend, class Mesh, class VertexShader, clas
         return core::name_bad_triangle(
             backend, draws,
             backend.run_sparse(draws, g, fb, options, s.counts.triangles_in, core::known_coverage<Known...>{}));
+    } else {
+        return {}; // does not compile: a static_assert has said why
+    }
+}
+
+// Draws the inside of meshes into a sparse framebuffer: as into a framebuffer, with the same counts. Every voxel inside
+// exists, so that memory is in proportion to the volume.
+template <class Backend, class Mesh, class VertexShader, class SolidShader, class... Targets>
+[[nodiscard]] status voxelize_solid(Backend& backend, std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
+                                    const grid& g, sparse_framebuffer<Backend, Targets...>& fb,
+                                    const solid_options& options = {}) {
+    if constexpr (core::solid_fits_targets<Mesh, VertexShader, SolidShader, Targets...>()) {
+        if (const status s = validate(g); !s.ok()) return s;
+        if (const status s = core::validate(options, g); !s.ok()) return s;
+        if (const status s = core::validate_sparse(fb, g); !s.ok()) return s;
+        const status s = core::validate_draws(draws);
+        if (!s.ok()) return s;
+        if (s.counts.triangles_in == 0) return backend.clear_sparse(g, fb);
+        return core::name_bad_triangle(backend, draws,
+                                       backend.run_sparse_solid(draws, g, fb, options, s.counts.triangles_in));
     } else {
         return {}; // does not compile: a static_assert has said why
     }

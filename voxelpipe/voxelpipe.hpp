@@ -25,5 +25,6 @@
 #include <voxelpipe/device/solid.cuh>
 #include <voxelpipe/device/solid_async.cuh>
 #include <voxelpipe/device/sparse.cuh>
+#include <voxelpipe/device/sparse_solid.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>
 #endif

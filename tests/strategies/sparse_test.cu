@@ -43,6 +43,15 @@ struct shader {
             .discard_if(m % 3 == 0);
     }
 };
+// The same of a solid's fragments.
+struct solid_shader {
+    VOXELPIPE_HD auto operator()(const vp::solid_fragment& f) const {
+        vp::fragment<> g{};
+        g.primitive = f.draw * 31 + static_cast<std::uint32_t>(f.winding);
+        g.voxel = f.voxel;
+        return shader{}(g);
+    }
+};
 template <class Backend>
 using framebuffer =
     vp::sparse_framebuffer<Backend, vp::target<vp::bit, blend::bit_xor>, vp::target<std::uint32_t, blend::replace>,
@@ -76,6 +85,23 @@ struct pair {
         const vp::status b = vp::voxelize(host, here, grid, on_host, rule);
         ASSERT_TRUE(a.ok() && b.ok()) << what << ": " << a.message() << "; " << b.message();
         EXPECT_EQ(a.counts, b.counts) << what;
+        compare(what);
+    }
+    void draw_solid(const std::vector<unit::small_mesh>& meshes, const vp::grid& grid, const vp::solid_options& options,
+                    const char* what) {
+        std::vector<vp::mesh<vp::cuda_backend>> owners;
+        std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, solid_shader>> there, here;
+        owners.reserve(meshes.size());
+        for (const auto& m : meshes) {
+            owners.emplace_back(device, m.positions, m.triangles);
+            there.push_back({owners.back().view(), {}, {}});
+            here.push_back({m.view(), {}, {}});
+        }
+        const vp::status a = vp::voxelize_solid(device, there, grid, on_device, options);
+        const vp::status b = vp::voxelize_solid(host, here, grid, on_host, options);
+        ASSERT_TRUE(a.ok() && b.ok()) << what << ": " << a.message() << "; " << b.message();
+        EXPECT_EQ(a.counts, b.counts) << what;
+        EXPECT_EQ(a.solid, b.solid) << what;
         compare(what);
     }
     void compare(const char* what) {
@@ -153,4 +179,30 @@ TEST(DeviceSparse, LimitsChangeNothing) {
     EXPECT_EQ(s.required.bricks, bricks);
     EXPECT_EQ(s.required.voxels, voxels);
     p.compare("limited");
+}
+
+TEST(DeviceSparse, SolidsGiveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{45, 34, 37};
+    const vp::grid grid = unit::unit_grid(extent);
+    // Open, as random triangles are: rows have windings of all kinds.
+    const std::vector<unit::small_mesh> meshes{unit::make_mesh(6, 12, extent), unit::make_mesh(7, 9, extent)};
+    for (const vp::bodies bodies : {vp::bodies::call, vp::bodies::draw})
+        for (const vp::solid_options& o :
+             {vp::solid_options{.rule = vp::fill_rule::even_odd, .bodies = bodies},
+              vp::solid_options{.bodies = bodies, .extent = vp::solid_extent::outer},
+              vp::solid_options{
+                  .rule = vp::fill_rule::positive, .bodies = bodies, .extent = vp::solid_extent::inner}}) {
+            pair p(extent);
+            p.draw_solid(meshes, grid, o, "cleared");
+            EXPECT_GT(p.on_host.num_voxels(), 500u);
+            p.prepare([](auto& fb) {
+                vp::core::for_each_index<8>([&]<std::size_t I>() { vp::get<I>(fb).load(); });
+                vp::get<2>(fb).clear(1.5f);
+                fb.template keep_sums<2>();
+            });
+            p.draw_solid({unit::make_mesh(8, 9, extent)}, grid, o, "loaded");
+        }
+    const vp::grid part = grid.crop({19, 5, 3}, {21, 27, 33});
+    pair p(part.extent);
+    p.draw_solid(meshes, part, {.extent = vp::solid_extent::outer}, "a crop");
 }

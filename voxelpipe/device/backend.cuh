@@ -136,6 +136,11 @@ public:
     [[nodiscard]] status run_sparse(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                                     sparse_framebuffer<cuda_backend, Targets...>& fb, const voxelize_options& options,
                                     std::uint64_t triangles_in, Coverage = {});
+    // Implements voxelize_solid of sparse framebuffers. Defined in device/sparse_solid.cuh.
+    template <class Mesh, class VertexShader, class SolidShader, class... Targets>
+    [[nodiscard]] status run_sparse_solid(std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
+                                          sparse_framebuffer<cuda_backend, Targets...>& fb,
+                                          const solid_options& options, std::uint64_t triangles_in);
     template <class... Targets>
     [[nodiscard]] status clear_sparse(const grid& g, sparse_framebuffer<cuda_backend, Targets...>& fb);
 
