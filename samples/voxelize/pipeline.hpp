@@ -547,6 +547,19 @@ protected: // sparse_pipeline draws the same into bricks
         return wants(target::occupancy) ? info_of(target::occupancy).name : std::string_view(inside_name_);
     }
 
+    void add_solid_counts(const vp::status& status, const voxelpipe::grid& part) {
+        check(status, request_);
+        if (!draws_surface_) add_counts(status);
+        solid_counts& counts = stats_.solid ? *stats_.solid : stats_.solid.emplace();
+        counts.rows += static_cast<std::uint64_t>(part.extent.y) * static_cast<std::uint64_t>(part.extent.z);
+        counts.open_rows += status.solid.open_rows;
+        counts.crossings += status.solid.crossings;
+        counts.max_winding = std::max(counts.max_winding, status.solid.max_winding);
+        counts.hole_edges = status.solid.hole_edges;
+        counts.holes = status.solid.holes;
+        counts.closed_holes = status.solid.cones;
+    }
+
     // What is outside follows from the whole grid: a flood is drawn there, with the padding.
     void draw_solid(volume& result, const voxelpipe::grid& slab, int begin) {
         const bool is_flood = request_.solid->rule == solid_rule::exterior;
@@ -560,16 +573,7 @@ protected: // sparse_pipeline draws the same into bricks
             const stage_timer timer{*this, "voxelize"};
             status = vp::voxelize_solid(backend_, bits_draws_, part, framebuffer, solid_options());
         }
-        check(status, request_);
-        if (!draws_surface_) add_counts(status);
-        solid_counts& counts = stats_.solid ? *stats_.solid : stats_.solid.emplace();
-        counts.rows += static_cast<std::uint64_t>(part.extent.y) * static_cast<std::uint64_t>(part.extent.z);
-        counts.open_rows += status.solid.open_rows;
-        counts.crossings += status.solid.crossings;
-        counts.max_winding = std::max(counts.max_winding, status.solid.max_winding);
-        counts.hole_edges = status.solid.hole_edges;
-        counts.holes = status.solid.holes;
-        counts.closed_holes = status.solid.cones;
+        add_solid_counts(status, part);
         report_(1.0);
         const stage_timer timer{*this, "resolve"};
         if (part.extent == slab.extent) {
@@ -589,14 +593,18 @@ protected: // sparse_pipeline draws the same into bricks
     void finish_solid(volume& result) {
         const stage_timer timer{*this, "fill"};
         const channel& solid = *result.find(inside_name());
-        stats_.voxels = static_cast<std::uint64_t>(result.popcount(solid));
-        if (request_.solid->rule == solid_rule::exterior && stats_.voxels != 0 &&
-            static_cast<std::int64_t>(stats_.voxels) == result.popcount(*result.find(bits_name_)))
+        warn_of_solid(static_cast<std::uint64_t>(result.popcount(solid)),
+                      draws_surface_ ? static_cast<std::uint64_t>(result.popcount(*result.find(bits_name_))) : 0);
+        if (wants(target::count) && !counts_bodies()) count_bits(result, solid, request_.threads);
+        if (draws_surface_) fill_inside(result, solid, *result.find(bits_name_), *request_.solid, request_.threads);
+    }
+    // `voxels`: of the solid; `surface`: those of them that a triangle touches.
+    void warn_of_solid(std::uint64_t voxels, std::uint64_t surface) {
+        stats_.voxels = voxels;
+        if (request_.solid->rule == solid_rule::exterior && voxels != 0 && voxels == surface)
             stats_.warnings.push_back(
                 "--solid exterior finds nothing enclosed: all its voxels are the surface's. If the flood "
                 "leaked through gaps, --closing R closes those of about 2 R voxels");
-        if (wants(target::count) && !counts_bodies()) count_bits(result, solid, request_.threads);
-        if (draws_surface_) fill_inside(result, solid, *result.find(bits_name_), *request_.solid, request_.threads);
         if (std::string warning = open_warning(*request_.solid, *stats_.solid); !warning.empty())
             stats_.warnings.push_back(std::move(warning));
     }

@@ -18,7 +18,8 @@ namespace voxelize {
 
 namespace {
 
-using rgba8 = std::array<std::uint8_t, 4>;
+using rgba8 = color_mean::rgba8;
+constexpr double linear_scale = 65535;
 
 // VISIT(number of a voxel) for every bit of WORD(w, j, k) of a layer.
 template <class Word, class Visit>
@@ -29,36 +30,42 @@ void for_each_bit(const volume& v, std::int64_t k, const Word& word, const Visit
                 visit(static_cast<std::size_t>(v.index(32 * w + std::countr_zero(bits), j, k)));
 }
 
-// In linear light, weighted by alpha. Sums of integers, so that the order of the layers does not show.
 rgba8 mean_of(const volume& v, const channel& surface, const channel& colors, int threads) {
-    const color_tables tables = make_color_tables();
-    constexpr double scale = 65535;
-    std::array<std::uint64_t, 256> linear{};
-    for (std::size_t byte = 0; byte < linear.size(); ++byte)
-        linear[byte] = static_cast<std::uint64_t>(std::lround(scale * static_cast<double>(tables.linear[byte])));
+    const color_mean mean;
     std::array<std::atomic<std::uint64_t>, 4> sums{};
     parallel_for(static_cast<std::size_t>(v.extent[2]), threads, [&](std::size_t layer) {
-        std::array<std::uint64_t, 4> own{};
+        color_mean::sums own{};
         for_each_bit(
             v, static_cast<std::int64_t>(layer),
             [&](std::int64_t w, std::int64_t j, std::int64_t k) { return v.word(surface, w, j, k); },
             [&](std::size_t i) {
                 rgba8 color;
                 std::memcpy(color.data(), colors.data.data() + 4 * i, 4);
-                for (std::size_t a = 0; a < 3; ++a) own[a] += linear[color[a]] * color[3];
-                own[3] += color[3];
+                mean.add(own, color);
             });
         for (std::size_t a = 0; a < 4; ++a) sums[a] += own[a];
     });
-    if (sums[3] == 0) return {clay[0], clay[1], clay[2], 255};
-    rgba8 mean{0, 0, 0, 255};
-    for (std::size_t a = 0; a < 3; ++a)
-        mean[a] = encode_srgb(
-            tables, static_cast<float>(static_cast<double>(sums[a]) / (scale * static_cast<double>(sums[3]))));
-    return mean;
+    return mean.mean_of({sums[0], sums[1], sums[2], sums[3]});
 }
 
 } // namespace
+
+color_mean::color_mean() {
+    const color_tables tables = make_color_tables();
+    for (std::size_t byte = 0; byte < linear_.size(); ++byte)
+        linear_[byte] =
+            static_cast<std::uint64_t>(std::lround(linear_scale * static_cast<double>(tables.linear[byte])));
+}
+
+color_mean::rgba8 color_mean::mean_of(const sums& s) const {
+    if (s[3] == 0) return {clay[0], clay[1], clay[2], 255};
+    const color_tables tables = make_color_tables();
+    rgba8 mean{0, 0, 0, 255};
+    for (std::size_t a = 0; a < 3; ++a)
+        mean[a] = encode_srgb(
+            tables, static_cast<float>(static_cast<double>(s[a]) / (linear_scale * static_cast<double>(s[3]))));
+    return mean;
+}
 
 const char* to_string(solid_rule rule) {
     constexpr const char* names[] = {"nonzero", "even_odd", "positive", "each_draw", "exterior"};

@@ -57,6 +57,23 @@ struct solid_counts {
 // none, or the rule does without closed models.
 [[nodiscard]] std::string open_warning(const solid_request& request, const solid_counts& counts);
 
+// The mean of colours, in linear light, weighted by alpha, opaque; clay where none of them shows. Sums of integers, so
+// that the order in which colours are added does not show.
+class color_mean {
+public:
+    using rgba8 = std::array<std::uint8_t, 4>;
+    using sums = std::array<std::uint64_t, 4>;
+    color_mean();
+    void add(sums& to, const rgba8& color) const {
+        for (std::size_t a = 0; a < 3; ++a) to[a] += linear_[color[a]] * color[3];
+        to[3] += color[3];
+    }
+    [[nodiscard]] rgba8 mean_of(const sums& s) const;
+
+private:
+    std::array<std::uint64_t, 256> linear_{};
+};
+
 // Gives every channel but those of bits and the count its values where the solid and the surface differ. Voxels of
 // SOLID without a bit in SURFACE get the colour of the fill, opaque, or the target's empty value. Voxels with a bit in
 // SURFACE alone are emptied. Both are bit channels of V.

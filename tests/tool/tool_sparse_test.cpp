@@ -76,6 +76,34 @@ TEST(ToolSparse, HoldsTheVoxelsAndValuesOfADenseRun) {
         }
 }
 
+TEST(ToolSparse, SolidsHoldTheVoxelsAndValuesOfADenseRun) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const std::vector<std::vector<std::string>> solids{
+        {"--solid", "nonzero"},
+        {"--solid", "each_draw", "--solid-extent", "centre", "--fill-color", "#102030"},
+        {"--solid", "exterior", "--closing", "1", "--padding", "5"}};
+    for (const std::vector<std::string>& solid : solids) {
+        std::string messages[2];
+        for (const bool sparse : {false, true}) {
+            std::vector<std::string> arguments{folder / "m.glb",
+                                               "-o",
+                                               folder / (sparse ? "s.npy" : "d.npy"),
+                                               "-r",
+                                               "40",
+                                               "-t",
+                                               most_targets,
+                                               sparse ? "--sparse" : "--dense"};
+            arguments.insert(arguments.end(), solid.begin(), solid.end());
+            const outcome result = run(folder, arguments);
+            ASSERT_EQ(0, result.code) << result.err;
+            messages[sparse ? 1 : 0] = result.err;
+        }
+        EXPECT_EQ(messages[0], messages[1]);
+        expect_same_voxels(folder);
+    }
+}
+
 // A picture drawn from bricks, a dense file made of them, and .nvdb by either way.
 TEST(ToolSparse, WritesTheSameFilesAsADenseRun) {
     const scratch_folder folder;

@@ -3,9 +3,10 @@
 #pragma once
 
 // The tool's pipeline into a sparse framebuffer: the draws, targets and values of pipeline.hpp, resolved voxel by voxel
-// that exists. The whole grid in one call, for a backend in host memory.
+// that exists. The whole grid in one call, for a backend in host memory. A solid is drawn after its surface.
 
 #include "../pipeline.hpp"
+#include "sparse_solid.hpp"
 #include "sparse_volume.hpp"
 
 #include <cstddef>
@@ -33,13 +34,23 @@ public:
             result.shape.origin[axis] = whole.part_origin()[a];
             result.shape.voxel_size[axis] = whole.voxel_size[a];
         }
-        this->report_ = this->request_.progress ? this->request_.progress : [](double) {};
+        const int passes = (this->draws_surface_ ? 1 : 0) + (this->request_.solid ? 1 : 0);
+        const auto report_from = [this, passes](int pass) {
+            this->report_ = [this, passes, pass](double done) {
+                if (this->request_.progress) this->request_.progress((pass + done) / passes);
+            };
+        };
+        report_from(0);
         this->stats_.slabs = 1;
-        if (this->only_bits_)
-            draw_bits(result);
-        else
-            draw_surface(result);
-        return result;
+        if (this->draws_surface_) {
+            if (this->only_bits_)
+                draw_bits(result);
+            else
+                draw_surface(result);
+        }
+        if (!this->request_.solid) return result;
+        report_from(passes - 1);
+        return draw_solid(std::move(result));
     }
 
 private:
@@ -54,15 +65,16 @@ private:
 
     void draw_bits(sparse_volume& result) {
         std::bitset<2> enabled;
-        enabled[0] = !this->wants(target::count); // one target there has to be
-        enabled[1] = this->wants(target::count);
+        enabled[0] = !this->counts_fragments(); // one target there has to be
+        enabled[1] = this->counts_fragments();
         bits framebuffer(this->backend_, this->relative_grid_.extent, enabled);
         this->draw_reporting(this->bits_draws_, this->relative_grid_, framebuffer);
         const typename base::stage_timer timer{*this, "resolve"};
         take_bricks(result, framebuffer);
         for (const target wanted : this->request_.targets) {
             if (wanted == target::occupancy) add_occupancy(result);
-            if (wanted == target::count) copy<1, std::uint32_t>(result, wanted, framebuffer);
+            if (wanted == target::count && this->counts_fragments())
+                copy<1, std::uint32_t>(result, wanted, framebuffer);
         }
     }
 
@@ -80,6 +92,7 @@ private:
                 add_occupancy(result);
                 break;
             case target::count:
+                if (!this->counts_fragments()) break;
                 copy<base::count, std::uint32_t>(result, wanted, framebuffer);
                 break;
             case target::color:
@@ -113,6 +126,43 @@ private:
             }
         }
         if (this->wants(target::normal)) count_cancelled(result);
+    }
+
+    // The solid's bricks, and the values of the surface where that lies in them.
+    [[nodiscard]] sparse_volume draw_solid(sparse_volume&& surface_of) {
+        // What is outside follows from the whole grid: a flood is drawn there, with the padding.
+        const bool is_flood = this->request_.solid->rule == solid_rule::exterior;
+        const voxelpipe::grid part = is_flood ? this->relative_grid_.uncropped() : this->relative_grid_;
+        std::bitset<2> enabled;
+        enabled[0] = !this->counts_bodies();
+        enabled[1] = this->counts_bodies();
+        bits framebuffer(this->backend_, part.extent, enabled);
+        vp::status status;
+        {
+            const typename base::stage_timer timer{*this, "voxelize"};
+            this->backend_.progress = [this](std::uint64_t done, std::uint64_t total) {
+                this->report_(total == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(total));
+            };
+            status = vp::voxelize_solid(this->backend_, this->bits_draws_, part, framebuffer, this->solid_options());
+        }
+        this->add_solid_counts(status, part);
+        const typename base::stage_timer timer{*this, "fill"};
+        sparse_volume result;
+        result.shape = surface_of.shape;
+        take_bricks(result, framebuffer);
+        if (is_flood) keep_part(result, this->relative_grid_.offset, this->relative_grid_.extent);
+        this->warn_of_solid(result.num_voxels(), surface_of.num_voxels());
+        for (const target wanted : this->request_.targets) {
+            if (wanted == target::occupancy)
+                add_occupancy(result);
+            else if (wanted != target::count)
+                add_filled(result, surface_of, info_of(wanted).name, *this->request_.solid);
+            else if (this->counts_bodies())
+                copy<1, std::uint32_t>(result, wanted, framebuffer);
+            else
+                resolve<std::uint32_t>(result, wanted, [](std::size_t) { return 1U; });
+        }
+        return result;
     }
 
     template <class Framebuffer>

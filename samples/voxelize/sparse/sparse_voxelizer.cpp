@@ -34,7 +34,6 @@ storage_decision choose_storage(storage_choice choice, const voxelize_request& r
     if (!insists && !needs_bricks && (fits || !takes_bricks)) return {};
     const char* refused = nullptr;
     if (wants(request, target::color_outer)) refused = "--target color-outer needs a dense grid";
-    if (request.solid) refused = "--solid needs a dense grid";
     if (request.backend == backend_choice::cuda)
         refused = "the tool draws sparse grids on the CPU, not with --backend cuda";
     if (refused != nullptr) {

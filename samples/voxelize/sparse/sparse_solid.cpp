@@ -1,0 +1,93 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "sparse_solid.hpp"
+
+#include <voxelpipe/host_sparse.hpp>
+
+#include <array>
+#include <bit>
+#include <cstring>
+#include <utility>
+
+namespace voxelize {
+
+namespace {
+
+using rgba8 = color_mean::rgba8;
+
+rgba8 fill_color_of(const channel& colors, const solid_request& request) {
+    if (request.fill_color) return {(*request.fill_color)[0], (*request.fill_color)[1], (*request.fill_color)[2], 255};
+    const color_mean mean;
+    color_mean::sums sums{};
+    for (std::size_t at = 0; at < colors.data.size(); at += 4) {
+        rgba8 color;
+        std::memcpy(color.data(), colors.data.data() + at, 4);
+        mean.add(sums, color);
+    }
+    return mean.mean_of(sums);
+}
+
+} // namespace
+
+void keep_part(sparse_volume& v, const glm::ivec3& offset, const glm::ivec3& extent) {
+    const voxelpipe::brick_table table = v.table();
+    std::size_t kept = 0;
+    std::uint64_t rank = 0;
+    for (std::uint64_t b = 0; b < table.count; ++b) {
+        voxelpipe::brick_mask mask;
+        const glm::ivec3 origin = table.brick_origin(b);
+        for (unsigned w = 0; w < 8; ++w)
+            for (std::uint64_t word = v.masks[b].words[w]; word != 0; word &= word - 1) {
+                const unsigned bit = 64 * w + static_cast<unsigned>(std::countr_zero(word));
+                const glm::ivec3 at = origin + voxelpipe::core::morton_position(bit) - offset;
+                const bool is_in =
+                    at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x < extent.x && at.y < extent.y && at.z < extent.z;
+                if (is_in) mask.words[w] |= word & (~word + 1);
+            }
+        if (mask.count() == 0) continue;
+        v.keys[kept] = v.keys[b];
+        v.masks[kept] = mask;
+        v.offsets[kept++] = rank;
+        rank += mask.count();
+    }
+    v.keys.resize(kept);
+    v.masks.resize(kept);
+    v.offsets.resize(kept == 0 ? 0 : kept + 1);
+    if (kept != 0) v.offsets[kept] = rank;
+}
+
+void add_filled(sparse_volume& solid, sparse_volume& surface, std::string_view name, const solid_request& request) {
+    channel from;
+    for (channel& c : surface.channels)
+        if (c.name == name) from = std::move(c);
+    const std::size_t bytes = size_of(from.type) * static_cast<std::size_t>(from.components);
+    std::array<std::byte, 16> inside{};
+    const std::uint32_t empty = empty_value(from);
+    for (std::size_t at = 0; at + 4 <= bytes; at += 4) std::memcpy(inside.data() + at, &empty, 4);
+    if (name.starts_with("color")) {
+        const rgba8 color = fill_color_of(from, request);
+        std::memcpy(inside.data(), color.data(), 4);
+    }
+    channel to{from.name, from.type, from.components, {}};
+    to.data.resize(static_cast<std::size_t>(solid.num_voxels()) * bytes);
+    std::byte* at = to.data.data();
+    std::size_t s = 0; // bricks of the surface, in step with those of the solid
+    for (std::size_t b = 0; b < solid.keys.size(); ++b) {
+        while (s < surface.keys.size() && surface.keys[s] < solid.keys[b]) ++s;
+        const bool both = s < surface.keys.size() && surface.keys[s] == solid.keys[b];
+        std::uint64_t rank = both ? surface.offsets[s] : 0;
+        for (unsigned w = 0; w < 8; ++w) {
+            const std::uint64_t touched = both ? surface.masks[s].words[w] : 0;
+            for (std::uint64_t all = solid.masks[b].words[w]; all != 0; all &= all - 1, at += bytes) {
+                const std::uint64_t bit = all & (~all + 1);
+                const auto before = static_cast<unsigned>(std::popcount(touched & (bit - 1)));
+                const bool is_touched = (touched & bit) != 0;
+                std::memcpy(at, is_touched ? from.data.data() + (rank + before) * bytes : inside.data(), bytes);
+            }
+            rank += static_cast<unsigned>(std::popcount(touched));
+        }
+    }
+    solid.channels.push_back(std::move(to));
+}
+
+} // namespace voxelize
