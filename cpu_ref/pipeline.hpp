@@ -62,15 +62,20 @@ template <class Varyings, class Mesh, class VertexShader, class FragmentShader>
     for (std::size_t d = 0; d < draws.size(); ++d) {
         const auto& in = draws[d];
         auto& out = shaded[d];
-        const std::size_t n = in.mesh.positions.size();
+        const std::size_t each = in.mesh.positions.size(), n = in.mesh.num_vertices();
         out.positions = std::make_unique_for_overwrite<core::snapped_position[]>(n);
         if constexpr (!std::is_empty_v<Varyings>) out.varyings = std::make_unique_for_overwrite<Varyings[]>(n);
         constexpr std::size_t block = 16384;
         parallel_for(how.threads, (n + block - 1) / block, [&](unsigned, std::size_t b) {
             const std::size_t last = std::min(n, (b + 1) * block);
+            std::size_t instance = b * block / each, index = b * block % each;
             for (std::size_t i = b * block; i < last; ++i) {
-                const auto v =
-                    core::fetch_vertex(in.mesh, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(d));
+                const auto v = core::fetch_vertex(in.mesh, static_cast<std::uint32_t>(index),
+                                                  static_cast<std::uint32_t>(d), static_cast<std::uint32_t>(instance));
+                if (++index == each) {
+                    index = 0;
+                    ++instance;
+                }
                 const auto result = in.vertex_shader(v);
                 using widen = core::vertex_result<std::remove_cvref_t<decltype(result)>>;
                 const auto& o = widen::widen(result);
@@ -93,9 +98,9 @@ template <class Mesh, class VertexShader, class FragmentShader>
 // The geometry, without shaders. Code that needs only this is compiled once instead of once per shader.
 struct geometry {
     struct part { // one draw
-        array_view<const glm::uvec3> triangles;
-        const core::snapped_position* positions = nullptr; // owned by the scene
-        std::size_t num_vertices = 0;
+        core::instanced_triangles triangles;
+        const core::snapped_position* positions = nullptr; // of all instances; owned by the scene
+        std::uint32_t num_triangles = 0, num_vertices = 0; // of all instances
     };
     std::vector<part> parts;
     std::vector<std::uint32_t> first_primitive; // by draw, then the total
@@ -104,7 +109,7 @@ struct geometry {
     glm::ivec3 lead{0}; // lowest voxel of `where` that is drawn
 
     struct primitive {
-        std::uint32_t draw, triangle;
+        std::uint32_t draw, triangle, instance;
         glm::uvec3 index;
     };
     [[nodiscard]] primitive find(std::uint32_t id) const {
@@ -114,12 +119,19 @@ struct geometry {
                                            first_primitive.begin()) -
                 1;
         const std::uint32_t t = id - first_primitive[d];
-        return {d, t, parts[d].triangles[t]};
+        const auto at = parts[d].triangles.find(t);
+        return {d, at.triangle, at.instance, parts[d].triangles[t]};
     }
     [[nodiscard]] core::voxel_box whole_box() const {
         return {{{lead.x, lead.y, lead.z}}, {{where.extent.x - 1, where.extent.y - 1, where.extent.z - 1}}};
     }
 };
+
+template <class Mesh>
+[[nodiscard]] geometry::part make_part(const Mesh& mesh, const core::snapped_position* positions) {
+    return {core::triangles_of(mesh), positions, static_cast<std::uint32_t>(mesh.num_triangles()),
+            static_cast<std::uint32_t>(mesh.num_vertices())};
+}
 
 template <class Mesh, class VertexShader, class FragmentShader>
 struct scene : geometry {
@@ -145,9 +157,9 @@ make_scene(const execution& how, std::span<const draw<Mesh, VertexShader, Fragme
     std::uint32_t first = 0;
     for (std::size_t d = 0; d < draws.size(); ++d) {
         const auto& mesh = draws[d].mesh;
-        s.parts.push_back({mesh.triangles, s.vertices[d].positions.get(), mesh.positions.size()});
+        s.parts.push_back(make_part(mesh, s.vertices[d].positions.get()));
         s.first_primitive.push_back(first);
-        first += static_cast<std::uint32_t>(mesh.triangles.size());
+        first += s.parts.back().num_triangles;
     }
     s.first_primitive.push_back(first);
     return s;
@@ -316,6 +328,7 @@ VOXELPIPE_INLINE void shade_fragments(const Scene& s, std::uint32_t id, const co
     fragment<varyings> f{};
     f.triangle = tri.triangle;
     f.draw = tri.draw;
+    f.instance = tri.instance;
     f.primitive = id;
     for (int i = 0; i < 3; ++i) {
         if constexpr (std::is_empty_v<varyings>)

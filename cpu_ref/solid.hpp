@@ -28,11 +28,11 @@ template <class Mesh, class VertexShader, class SolidShader>
     std::uint32_t first = 0;
     for (std::size_t d = 0; d < draws.size(); ++d) {
         const auto& mesh = draws[d].mesh;
-        s.parts.push_back({mesh.triangles, s.vertices[d].positions.get(), mesh.positions.size()});
+        s.parts.push_back(make_part(mesh, s.vertices[d].positions.get()));
         s.body.push_back(options.bodies == bodies::draw ? static_cast<std::uint32_t>(d) : 0);
         s.is_repair.push_back(false);
         s.first_primitive.push_back(first);
-        first += static_cast<std::uint32_t>(mesh.triangles.size());
+        first += s.parts.back().num_triangles;
     }
     s.first_primitive.push_back(first);
     s.triangles_in = first;

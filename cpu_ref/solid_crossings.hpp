@@ -88,14 +88,18 @@ template <class Crossing>
     for (std::size_t i = begin; i < end;) {
         const std::uint32_t number = s.find(static_cast<std::uint32_t>(i)).draw;
         const geometry::part& part = s.parts[number];
-        const std::size_t last = std::min<std::size_t>(end, s.first_primitive[number + 1]);
-        const glm::uvec3* triangle = part.triangles.data() + (i - s.first_primitive[number]);
-        const core::snapped_position* const positions = part.positions;
+        // Up to the end of an instance.
+        const core::instanced_triangles& of_part = part.triangles;
+        const auto at = of_part.find(static_cast<std::uint32_t>(i - s.first_primitive[number]));
+        const std::size_t last = std::min<std::size_t>(end, i - at.triangle + of_part.each);
+        const glm::uvec3* triangle = of_part.triangles + at.triangle;
+        const core::snapped_position* const positions =
+            part.positions + std::size_t{at.instance} * of_part.vertices_each;
         const std::uint32_t body = s.body[number];
         std::uint64_t drawn = 0, outside = 0;
         for (; i < last; ++i, ++triangle) {
             const glm::uvec3 t = *triangle;
-            if (t.x >= part.num_vertices || t.y >= part.num_vertices || t.z >= part.num_vertices)
+            if (t.x >= of_part.vertices_each || t.y >= of_part.vertices_each || t.z >= of_part.vertices_each)
                 return status_code::index_out_of_range;
             const core::snapped_position &a = positions[t.x], &b = positions[t.y], &c = positions[t.z];
             if (!core::is_drawable(a) || !core::is_drawable(b) || !core::is_drawable(c)) {

@@ -31,7 +31,7 @@ namespace voxelpipe::cpu {
         std::vector<core::hole_part> of_body;
         for (; last < s.parts.size() && s.body[last] == s.body[first]; ++last) {
             const geometry::part& p = s.parts[last];
-            of_body.push_back({p.positions, p.num_vertices, p.triangles.data(), p.triangles.size()});
+            of_body.push_back({p.positions, p.num_vertices, p.triangles, p.num_triangles});
             parts.push_back(p);
             body.push_back(s.body[last]);
             is_repair.push_back(false);
@@ -41,8 +41,9 @@ namespace voxelpipe::cpu {
         counts.holes += cones.holes;
         counts.cones += cones.cones;
         if (!cones.triangles.empty()) {
-            parts.push_back({array_view<const glm::uvec3>(cones.triangles.data(), cones.triangles.size()),
-                             cones.positions.data(), cones.positions.size()});
+            const auto triangles = static_cast<std::uint32_t>(cones.triangles.size()),
+                       vertices = static_cast<std::uint32_t>(cones.positions.size());
+            parts.push_back({{cones.triangles.data(), triangles, vertices}, cones.positions.data(), triangles, vertices});
             body.push_back(s.body[first]);
             is_repair.push_back(true);
         }
@@ -55,7 +56,7 @@ namespace voxelpipe::cpu {
     std::uint64_t first = 0;
     for (const geometry::part& p : s.parts) {
         s.first_primitive.push_back(static_cast<std::uint32_t>(first));
-        first += p.triangles.size();
+        first += p.num_triangles;
         if (first > ~std::uint32_t{0}) return false;
     }
     s.first_primitive.push_back(static_cast<std::uint32_t>(first));
@@ -227,7 +228,8 @@ public:
         for (std::size_t part = 0; part < s.parts.size(); ++part) {
             if (s.body[part] != draw) continue;
             const geometry::part& in = s.parts[part];
-            for (const glm::uvec3& t : in.triangles) {
+            for (std::uint32_t i = 0; i < in.num_triangles; ++i) {
+                const glm::uvec3 t = in.triangles[i];
                 const core::snapped_position &a = in.positions[t.x], &b = in.positions[t.y], &c = in.positions[t.z];
                 if (!core::is_drawable(a) || !core::is_drawable(b) || !core::is_drawable(c)) continue;
                 const core::row_box box = core::rows_within<Axis>(a, b, c, s.snap.fraction, whole);

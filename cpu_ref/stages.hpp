@@ -26,7 +26,7 @@ vertex_shade(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, co
     const auto shaded = cpu::vertex_shade(cpu::execution{}, draws, core::make_snap_transform(g));
     std::vector<std::vector<core::snapped_position>> out;
     for (std::size_t d = 0; d < draws.size(); ++d)
-        out.emplace_back(shaded[d].positions.get(), shaded[d].positions.get() + draws[d].mesh.positions.size());
+        out.emplace_back(shaded[d].positions.get(), shaded[d].positions.get() + draws[d].mesh.num_vertices());
     return out;
 }
 

@@ -117,6 +117,7 @@ VOXELPIPE_INLINE void shade_in_tile(const Scene& s, std::uint32_t id, const core
         fragment<varyings> f{};
         f.triangle = tri.where.triangle;
         f.draw = tri.where.draw;
+        f.instance = tri.where.instance;
         f.primitive = id;
         for (int i = 0; i < 3; ++i) {
             if constexpr (std::is_empty_v<varyings>)

@@ -6,6 +6,7 @@
 // Positions are float32 in world (or object) space. A triangle is three vertex indices, counter-clockwise seen from its
 // front. Attributes are any number of per-vertex arrays of trivially copyable types, for the vertex shader.
 
+#include <voxelpipe/core/instances.hpp>
 #include <voxelpipe/core/pack.hpp>
 #include <voxelpipe/mesh_source.hpp>
 #include <voxelpipe/status.hpp>
@@ -28,6 +29,11 @@ struct checked_indices {
     std::uint64_t bound = 0; // greater than every index
 };
 
+// How often a mesh is drawn. The vertex shader gets the number of the copy, vertex::instance.
+struct instances {
+    std::uint64_t count = 1;
+};
+
 template <class... Attributes>
 struct mesh_view {
     static_assert((std::is_trivially_copyable_v<Attributes> && ...),
@@ -39,6 +45,12 @@ struct mesh_view {
     core::pack<array_view<const Attributes>...> attributes = {}; // each as long as positions
     // From check_indices or mesh. Ignored if it describes a different triangle array.
     checked_indices checked = {};
+    // Primitives are numbered by instance, then by triangle. 0 draws nothing.
+    instances copies = {};
+
+    // Of all instances.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_triangles() const { return triangles.size() * copies.count; }
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_vertices() const { return positions.size() * copies.count; }
 
     // True if all indices are known to name vertices. Otherwise calls check each of them.
     [[nodiscard]] bool has_checked_indices() const {
@@ -57,6 +69,13 @@ template <class Backend>
 }
 
 namespace core {
+
+// The triangles of a mesh, of all instances.
+template <class... Attributes>
+[[nodiscard]] VOXELPIPE_HD inline instanced_triangles triangles_of(const mesh_view<Attributes...>& m) {
+    return {m.triangles.data(), static_cast<std::uint32_t>(m.triangles.size()),
+            static_cast<std::uint32_t>(m.positions.size())};
+}
 
 // The largest index of triangles in host memory; 0 if there are none.
 [[nodiscard]] inline std::uint32_t max_index(array_view<const glm::uvec3> triangles) {
@@ -82,13 +101,15 @@ public:
                                                                             backend, attributes.view())...)},
           index_bound_(find_bound(backend, triangles)) {}
 
-    [[nodiscard]] mesh_view<Attributes...> view() const {
-        return [this]<std::size_t... I>(std::index_sequence<I...>) {
+    // copies: how often the view is drawn, as in forest.view(vp::instances{5000}).
+    [[nodiscard]] mesh_view<Attributes...> view(instances copies = {}) const {
+        return [&]<std::size_t... I>(std::index_sequence<I...>) {
             return mesh_view<Attributes...>{
                 positions_.view(),
                 triangles_.view(),
                 core::make_pack(array_view<const Attributes>(voxelpipe::get<I>(attributes_).view())...),
-                {triangles_.data(), triangles_.size(), index_bound_}};
+                {triangles_.data(), triangles_.size(), index_bound_},
+                copies};
         }
         (std::index_sequence_for<Attributes...>{});
     }

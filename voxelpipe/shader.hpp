@@ -41,6 +41,7 @@ struct vertex {
     std::uint32_t draw;  // number of the draw in the call
     glm::vec3 position;  // as in the mesh
     core::pack<Attributes...> attributes;
+    std::uint32_t instance = 0; // number of the mesh's copy
 };
 
 // Attribute I of the vertex.
@@ -91,7 +92,8 @@ template <class Varyings = no_varyings>
 struct fragment {
     std::uint32_t triangle;  // in its mesh
     std::uint32_t draw;      // number of the draw in the call
-    std::uint32_t primitive; // numbered through all draws: the order of replace and of A-buffers
+    std::uint32_t instance;  // number of the mesh's copy
+    std::uint32_t primitive; // numbered by draw, instance, triangle: the order of replace and of A-buffers
     int axis;                // dominant axis: 0 x, 1 y, 2 z
     bool front_facing;       // counter-clockwise seen from +infinity on the dominant axis; true if the area is zero
     glm::ivec3 voxel;        // index in the whole grid
@@ -251,10 +253,10 @@ template <class Mesh, class VertexShader, class FragmentShader>
 
 template <class... Attributes>
 [[nodiscard]] VOXELPIPE_HD vertex<Attributes...> fetch_vertex(const mesh_view<Attributes...>& m, std::uint32_t index,
-                                                              std::uint32_t draw) {
+                                                              std::uint32_t draw, std::uint32_t instance = 0) {
     return [&]<std::size_t... I>(std::index_sequence<I...>) {
         return vertex<Attributes...>{index, draw, m.positions[index],
-                                     make_pack(Attributes(voxelpipe::get<I>(m.attributes)[index])...)};
+                                     make_pack(Attributes(voxelpipe::get<I>(m.attributes)[index])...), instance};
     }
     (std::index_sequence_for<Attributes...>{});
 }
@@ -271,20 +273,23 @@ struct draw {
     FragmentShader fragment_shader;
 };
 
-// The draw of a call and the triangle of its mesh.
+// The draw of a call, the triangle of its mesh, and the copy of that.
 struct draw_triangle {
-    std::uint32_t draw = 0, triangle = 0;
+    std::uint32_t draw = 0, triangle = 0, instance = 0;
     friend bool operator==(const draw_triangle&, const draw_triangle&) = default;
 };
 
-// Maps fragment::primitive, which A-buffers store, back to draw and triangle. On the host. Holds the draws' sizes at
+// Maps fragment::primitive, which A-buffers store, back to draw, instance and triangle. On the host. Holds the draws' sizes at
 // its construction, and refers to nothing.
 class primitive_map {
 public:
     template <class Mesh, class VertexShader, class FragmentShader>
     explicit primitive_map(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws) {
         std::uint64_t end = 0;
-        for (const auto& d : draws) ends_.push_back(end += d.mesh.triangles.size());
+        for (const auto& d : draws) {
+            ends_.push_back(end += d.mesh.num_triangles());
+            each_.push_back(d.mesh.triangles.size());
+        }
     }
     template <class Mesh, class VertexShader, class FragmentShader>
     explicit primitive_map(const std::vector<draw<Mesh, VertexShader, FragmentShader>>& draws)
@@ -297,11 +302,15 @@ public:
         VOXELPIPE_EXPECTS(primitive < size());
         const auto at = std::upper_bound(ends_.begin(), ends_.end(), std::uint64_t{primitive});
         const std::uint64_t first = at == ends_.begin() ? 0 : *(at - 1);
-        return {static_cast<std::uint32_t>(at - ends_.begin()), static_cast<std::uint32_t>(primitive - first)};
+        const auto draw = static_cast<std::size_t>(at - ends_.begin());
+        const std::uint64_t i = primitive - first;
+        return {static_cast<std::uint32_t>(draw), static_cast<std::uint32_t>(i % each_[draw]),
+                static_cast<std::uint32_t>(i / each_[draw])};
     }
 
 private:
     std::vector<std::uint64_t> ends_; // number of primitives up to each draw's end
+    std::vector<std::uint64_t> each_; // triangles of each draw's mesh
 };
 
 } // namespace voxelpipe

@@ -123,7 +123,8 @@ template <class Mesh, class VertexShader, class FragmentShader>
         if ((m.positions.data() == nullptr && m.positions.size() != 0) ||
             (m.triangles.data() == nullptr && m.triangles.size() != 0))
             return failure(status_code::null_view);
-        if (m.positions.size() > std::numeric_limits<std::uint32_t>::max()) return failure(status_code::size_overflow);
+        constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
+        if (m.positions.size() > most) return failure(status_code::size_overflow);
         status_code attributes = status_code::ok;
         for_each_index<Mesh::num_attributes>([&]<std::size_t I>() {
             const auto& a = voxelpipe::get<I>(m.attributes);
@@ -133,14 +134,22 @@ template <class Mesh, class VertexShader, class FragmentShader>
                 attributes = status_code::null_view;
         });
         if (attributes != status_code::ok) return failure(attributes);
-        if (m.triangles.size() > std::numeric_limits<std::uint32_t>::max() - triangles)
-            return failure(status_code::too_many_triangles);
+        // Triangles and vertices of all instances are numbered with 32 bits.
+        const std::uint64_t each = m.triangles.size();
+        if (each > most || (each != 0 && m.copies.count > (most - triangles) / each)) {
+            status s = failure(status_code::too_many_triangles);
+            const auto all = static_cast<uint128>(each) * m.copies.count + triangles;
+            s.counts.triangles_in = all > ~std::uint64_t{0} ? ~std::uint64_t{0} : static_cast<std::uint64_t>(all);
+            return s;
+        }
+        if (m.positions.size() != 0 && m.copies.count > most / m.positions.size())
+            return failure(status_code::size_overflow);
         if constexpr (std::is_same_v<VertexShader, transform>) {
             const glm::mat4& t = d.vertex_shader.matrix;
             if (t[0][3] != 0.0f || t[1][3] != 0.0f || t[2][3] != 0.0f || t[3][3] != 1.0f)
                 return failure(status_code::not_affine);
         }
-        triangles += m.triangles.size();
+        triangles += m.num_triangles();
     }
     status s;
     s.counts.triangles_in = triangles;

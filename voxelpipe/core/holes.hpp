@@ -12,6 +12,7 @@
 // mesh and cones together have no boundary, and along every row the crossings sum to 0.
 
 #include <voxelpipe/core/fixed_point.hpp>
+#include <voxelpipe/core/instances.hpp>
 
 #include <glm/vec3.hpp>
 
@@ -31,8 +32,8 @@ namespace voxelpipe::core {
 struct hole_part {
     const snapped_position* positions;
     std::size_t num_vertices;
-    const glm::uvec3* triangles;
-    std::size_t num_triangles;
+    instanced_triangles triangles;
+    std::size_t num_triangles; // of all instances
 };
 
 struct hole_cones {
@@ -101,7 +102,7 @@ private:
         std::uint64_t first = 0;
         for (const hole_part& p : body) {
             for (std::size_t i = 0; i < p.num_triangles; ++i) {
-                const glm::uvec3& t = p.triangles[i];
+                const glm::uvec3 t = p.triangles[static_cast<std::uint32_t>(i)];
                 if (t.x >= p.num_vertices || t.y >= p.num_vertices || t.z >= p.num_vertices) continue;
                 if (!is_drawable(p.positions[t.x]) || !is_drawable(p.positions[t.y]) || !is_drawable(p.positions[t.z]))
                     continue;

@@ -125,7 +125,7 @@ private:
         constant_lists(const abuffer_call& c, arena& memory)
             : call(c), lists(take_lists<std::uint32_t, Payload>(memory, num_voxels(c.g), c.limits.fragments, true,
                                                                 c.may_count())),
-              positions(vertex_positions::take(memory, shades_in_raster ? 0 : c.draws[0].mesh.positions.size())),
+              positions(vertex_positions::take(memory, shades_in_raster ? 0 : c.draws[0].mesh.num_vertices())),
               deferred(deferred_triangles::take(memory, c.num_primitives)),
               order(order_memory::take(memory, c.limits.fragments)) {}
         template <coverage Rule>
@@ -133,7 +133,8 @@ private:
                                                                     const output_pointers& outputs) const {
             const draw_type& d = call.draws[0];
             const core::snap_transform snap = core::make_snap_transform(call.g);
-            const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
+            const auto num_vertices =
+                static_cast<std::uint32_t>(shades_in_raster ? d.mesh.positions.size() : d.mesh.num_vertices());
             const auto raster = [&](const auto& source) {
                 const raster_input<std::remove_cvref_t<decltype(source)>> in{source, call.num_primitives, snap.fraction,
                                                                              call.g.extent};
@@ -145,7 +146,7 @@ private:
             } else {
                 vertex_shade(d.mesh, d.vertex_shader, snap, 0, positions, static_cast<no_varyings*>(nullptr), stream);
                 end_stage(call.clock, &stage_times::vertex_shade);
-                raster(stored_source{{d.mesh.triangles.data(), positions, 0, num_vertices}});
+                raster(stored_source{geometry_from(d.mesh, positions, 0)});
             }
             end_stage(call.clock, &stage_times::fine_raster);
             fragment_lists<std::uint32_t, Payload> sorted = sort_unordered(

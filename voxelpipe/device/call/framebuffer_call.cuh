@@ -157,18 +157,23 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     // The size of the largest draw.
     [[nodiscard]] std::size_t max_triangles() const {
         std::size_t most = 0;
-        for (const draw_type& d : draws) most = std::max(most, d.mesh.triangles.size());
+        for (const draw_type& d : draws) most = std::max<std::size_t>(most, d.mesh.num_triangles());
         return most;
     }
     [[nodiscard]] std::size_t max_vertices() const {
         std::size_t most = 0;
-        for (const draw_type& d : draws) most = std::max(most, d.mesh.positions.size());
+        for (const draw_type& d : draws) most = std::max<std::size_t>(most, d.mesh.num_vertices());
         return most;
     }
     // The raster shades vertices itself if that costs no more than reading them: once per corner instead of once per
     // vertex.
     static constexpr bool shades_in_raster =
         is_cheap<VertexShader> && std::is_empty_v<typename scene_buffers::varyings>;
+
+    // The vertices that triangles of the raster's source may name.
+    [[nodiscard]] static std::uint32_t num_source_vertices(const mesh_type& m) {
+        return static_cast<std::uint32_t>(shades_in_raster ? m.positions.size() : m.num_vertices());
+    }
 
     // Calls raster(draw, source, is_first) for each draw that has triangles.
     template <class Raster>
@@ -178,7 +183,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         for (std::size_t i = 0; i < draws.size(); ++i) {
             const draw_type& d = draws[i];
             const auto number = static_cast<std::uint32_t>(i);
-            if (d.mesh.triangles.size() == 0) continue;
+            if (d.mesh.num_triangles() == 0) continue;
             if (i != 0) check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
             if constexpr (shades_in_raster) {
                 raster(d, shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, number}, i == 0);
@@ -186,16 +191,13 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
                 vertex_shade(d.mesh, d.vertex_shader, snap, number, positions, static_cast<no_varyings*>(nullptr),
                              stream); // there are no varyings
                 end_stage(clock, &stage_times::vertex_shade);
-                raster(d,
-                       stored_source{{d.mesh.triangles.data(), positions, 0,
-                                      static_cast<std::uint32_t>(d.mesh.positions.size())}},
-                       false);
+                raster(d, stored_source{geometry_from(d.mesh, positions, 0)}, false);
             }
         }
     }
     template <class Source>
     [[nodiscard]] raster_input<Source> raster_input_of(const draw_type& d, const Source& source) const {
-        return {source, static_cast<std::uint32_t>(d.mesh.triangles.size()), core::make_snap_transform(plan.g).fraction,
+        return {source, static_cast<std::uint32_t>(d.mesh.num_triangles()), core::make_snap_transform(plan.g).fraction,
                 plan.g.extent};
     }
     void clear_targets(const tracking_type& tracking, const pipeline_state* state, cudaStream_t stream) const {

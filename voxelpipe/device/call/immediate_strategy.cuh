@@ -85,8 +85,7 @@ private:
             const auto& t = voxelpipe::get<0>(plan.fb.targets);
             if (plan.targets.modes.of[0] == immediate_mode::blend && t.load != load_operation::off &&
                 voxelpipe::get<0>(d.fragment_shader.values)) {
-                draw_into(mask_output{t.elements, plan.g.extent, static_cast<std::uint32_t>(d.mesh.positions.size()),
-                                      state, true});
+                draw_into(mask_output{t.elements, plan.g.extent, Call::num_source_vertices(d.mesh), state, true});
                 return;
             }
         }

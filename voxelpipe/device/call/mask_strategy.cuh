@@ -30,7 +30,7 @@ struct mask_strategy {
     void launch(pipeline_state* state, cudaStream_t stream) const {
         call.raster_draws(positions, state, stream, [&](const auto& d, const auto& source, bool is_first) {
             using source_type = std::remove_cvref_t<decltype(source)>;
-            const auto num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
+            const auto num_vertices = Call::num_source_vertices(d.mesh);
             const raster_call<Rule, source_type, mask_output> raster{
                 call.raster_input_of(d, source),
                 {mask, call.plan.g.extent, num_vertices, state, false},

@@ -25,11 +25,10 @@ template <coverage Rule, class Call>
 void list_draws(const Call& call, const typename Call::scene_type& s, const vertex_positions& positions,
                 const deferred_triangles& deferred, std::uint32_t* voxels, std::uint32_t* primitives,
                 sort_preparation preparation, pipeline_state* state, cudaStream_t stream) {
-    draw_geometry geometry{call.draws[0].mesh.triangles.data(), positions, 0, 0};
+    draw_geometry geometry{{}, positions, 0, 0};
     for (const auto& d : call.draws) {
-        const auto num_triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
-        geometry.triangles = d.mesh.triangles.data();
-        geometry.num_vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
+        const auto num_triangles = static_cast<std::uint32_t>(d.mesh.num_triangles());
+        geometry = geometry_from(d.mesh, geometry.positions, geometry.first_primitive);
         if (num_triangles != 0) {
             if (geometry.first_primitive != 0)
                 check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));

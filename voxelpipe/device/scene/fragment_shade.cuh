@@ -27,6 +27,7 @@ struct fragment_source {
         : s(s_), d(s_.draw(t.draw)) {
         f.triangle = t.triangle;
         f.draw = t.draw;
+        f.instance = t.instance;
         f.primitive = id;
         for (int i = 0; i < 3; ++i) {
             if constexpr (std::is_empty_v<varyings>)
@@ -119,8 +120,7 @@ __device__ VOXELPIPE_INLINE auto shade_small_fragment(const Scene& s, std::uint3
     loaded_triangle tri; // positions are not set
     tri.draw = s.geo.find_draw(id);
     const draw_geometry& d = s.geo.draw(tri.draw);
-    tri.triangle = id - d.first_primitive;
-    tri.index = d.triangles[tri.triangle];
+    d.locate(id, tri);
     const int fraction = s.geo.snap.fraction;
     const int32_triangle r = load_int32(raster_input<stored_source>{{d}, 0, fraction, s.geo.extent}, tri.index);
     if (!AllSmall && (!r.fits_int32 || r.longest_side() > core::small_voxels(fraction)))

@@ -46,13 +46,23 @@ struct vertex_positions {
 };
 
 struct draw_geometry {
-    const glm::uvec3* triangles;
+    core::instanced_triangles triangles;
     vertex_positions positions;
-    std::uint32_t first_primitive, num_vertices;
+    std::uint32_t first_primitive, num_vertices; // vertices of all instances
+
+    // The triangle, instance and vertices of a primitive of this draw.
+    template <class Triangle>
+    VOXELPIPE_HD VOXELPIPE_INLINE void locate(std::uint32_t primitive, Triangle& t) const {
+        const std::uint32_t i = primitive - first_primitive;
+        const auto at = triangles.find(i);
+        t.triangle = at.triangle;
+        t.instance = at.instance;
+        t.index = triangles[i];
+    }
 };
 
 struct loaded_triangle {
-    std::uint32_t draw, triangle;
+    std::uint32_t draw, triangle, instance;
     glm::uvec3 index;
     bool index_ok;
     core::snapped_position a, b, c; // unset unless index_ok
@@ -86,8 +96,7 @@ struct geometry {
         loaded_triangle t;
         t.draw = find_draw(primitive);
         const draw_geometry& d = draw(t.draw);
-        t.triangle = primitive - d.first_primitive;
-        t.index = d.triangles[t.triangle];
+        d.locate(primitive, t);
         t.index_ok = t.index.x < d.num_vertices && t.index.y < d.num_vertices && t.index.z < d.num_vertices;
         if (t.index_ok) {
             t.a = d.positions.exact[t.index.x];

@@ -12,6 +12,12 @@
 
 namespace voxelpipe::device {
 
+template <class Mesh>
+[[nodiscard]] draw_geometry geometry_from(const Mesh& m, const vertex_positions& positions,
+                                          std::uint32_t first_primitive) {
+    return {core::triangles_of(m), positions, first_primitive, static_cast<std::uint32_t>(m.num_vertices())};
+}
+
 template <class Mesh, class VertexShader, class FragmentShader>
 struct scene_memory {
     using varyings = typename core::shaded<Mesh, VertexShader>::varyings;
@@ -25,7 +31,7 @@ struct scene_memory {
 
     scene_memory(arena& memory, std::span<const draw_type> draws) {
         std::size_t vertices = 0;
-        for (const auto& d : draws) vertices += d.mesh.positions.size();
+        for (const auto& d : draws) vertices += d.mesh.num_vertices();
         positions = vertex_positions::take(memory, vertices);
         vertex_varyings = memory.take<varyings>(std::is_empty_v<varyings> ? 0 : vertices);
         geometries = memory.take<draw_geometry>(draws.size() > 1 ? draws.size() : 0);
@@ -46,11 +52,11 @@ struct scene_memory {
         for (std::size_t d = 0; d < draws.size(); ++d) {
             const Mesh& m = draws[d].mesh;
             const vertex_positions of_draw = positions.from(vertex);
-            geometry_of[d] = {m.triangles.data(), of_draw, primitive, static_cast<std::uint32_t>(m.positions.size())};
+            geometry_of[d] = geometry_from(m, of_draw, primitive);
             vertex_shade(m, draws[d].vertex_shader, s.geo.snap, static_cast<std::uint32_t>(d), of_draw,
                          varyings_at(vertex), stream);
-            vertex += m.positions.size();
-            primitive += static_cast<std::uint32_t>(m.triangles.size());
+            vertex += m.num_vertices();
+            primitive += static_cast<std::uint32_t>(m.num_triangles());
         }
         s.geo.num_primitives = primitive;
         s.geo.one = geometry_of[0];
@@ -63,7 +69,7 @@ struct scene_memory {
                 shadings, draws.size(),
                 [&](std::size_t d) {
                     const typename scene_type::shading one{draws[d].fragment_shader, varyings_at(first)};
-                    first += draws[d].mesh.positions.size();
+                    first += draws[d].mesh.num_vertices();
                     return one;
                 },
                 stream);

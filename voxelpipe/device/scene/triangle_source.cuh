@@ -17,7 +17,8 @@ namespace voxelpipe::device {
 // ---- sources of vertices
 // ---------------------------------------------------------------------------------------------
 
-// Shades the mesh's vertices when they are loaded: for cheap vertex shaders without varyings.
+// Shades the mesh's vertices when they are loaded: for cheap vertex shaders without varyings, for which all instances
+// are equal.
 template <class Mesh, class VertexShader>
 struct shading_source {
     Mesh mesh;
@@ -47,7 +48,9 @@ struct shading_source {
         const glm::vec3 p = shade(vertex);
         return core::snap(snap, p.x, p.y, p.z);
     }
-    [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const { return mesh.triangles[i]; }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const {
+        return i < mesh.triangles.size() ? mesh.triangles[i] : mesh.triangles[i % mesh.triangles.size()];
+    }
 };
 
 // Reads the positions that vertex_shade stored.

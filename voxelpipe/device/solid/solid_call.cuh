@@ -96,8 +96,8 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         memory m;
         std::size_t vertices = 0, most = 0;
         for (const draw_type& d : draws) {
-            vertices += d.mesh.positions.size();
-            most = std::max(most, d.mesh.triangles.size());
+            vertices += d.mesh.num_vertices();
+            most = std::max<std::size_t>(most, d.mesh.num_triangles());
         }
         for (const cone_part& c : cones) most = std::max(most, std::size_t{c.num_triangles});
         if (!shades_on_the_spot()) m.positions = vertex_positions::take(a, vertices);
@@ -177,12 +177,11 @@ private:
         for (std::size_t d = 0; d < draws.size(); ++d) {
             const Mesh& mesh = draws[d].mesh;
             const vertex_positions positions = m.positions.from(vertex);
-            geometry_of.push_back(
-                {mesh.triangles.data(), positions, primitive, static_cast<std::uint32_t>(mesh.positions.size())});
+            geometry_of.push_back(geometry_from(mesh, positions, primitive));
             vertex_shade(mesh, draws[d].vertex_shader, geo.snap, static_cast<std::uint32_t>(d), positions,
                          static_cast<no_varyings*>(nullptr), stream); // a solid has none
-            vertex += mesh.positions.size();
-            primitive += static_cast<std::uint32_t>(mesh.triangles.size());
+            vertex += mesh.num_vertices();
+            primitive += static_cast<std::uint32_t>(mesh.num_triangles());
         }
         for (const cone_part& c : cones) {
             geometry_of.push_back(c.geometry);
@@ -210,7 +209,7 @@ private:
                     cudaStream_t stream) const {
         m.cover.clear(plan.g, stream);
         for (std::size_t d = first; d < last; ++d)
-            raster_cover(m.cover, geometry_of[d], static_cast<std::uint32_t>(draws[d].mesh.triangles.size()), geo,
+            raster_cover(m.cover, geometry_of[d], static_cast<std::uint32_t>(draws[d].mesh.num_triangles()), geo,
                          plan.g, state, stream);
         if (!cones.empty())
             raster_cover(m.cover, geometry_of[draws.size() + body], cones[body].num_triangles, geo, plan.g, state,

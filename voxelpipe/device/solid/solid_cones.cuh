@@ -57,8 +57,8 @@ template <class Mesh, class VertexShader, class SolidShader>
     std::vector<mesh_on_host> meshes;
     for (std::size_t d = 0; d < draws.size(); ++d) {
         const Mesh& mesh = draws[d].mesh;
-        const device_buffer<core::snapped_position> exact(from, mesh.positions.size());
-        const device_buffer<int32_position> near(from, mesh.positions.size());
+        const device_buffer<core::snapped_position> exact(from, mesh.num_vertices());
+        const device_buffer<int32_position> near(from, mesh.num_vertices());
         vertex_shade(mesh, draws[d].vertex_shader, snap, static_cast<std::uint32_t>(d),
                      {const_cast<core::snapped_position*>(exact.data()), const_cast<int32_position*>(near.data())},
                      static_cast<no_varyings*>(nullptr), from.stream);
@@ -73,8 +73,10 @@ template <class Mesh, class VertexShader, class SolidShader>
         const std::size_t last = is_split ? first + 1 : draws.size();
         std::vector<core::hole_part> body;
         for (std::size_t d = first; d < last; ++d)
-            body.push_back({meshes[d].positions.data(), meshes[d].positions.size(), meshes[d].triangles.data(),
-                            meshes[d].triangles.size()});
+            body.push_back({meshes[d].positions.data(), meshes[d].positions.size(),
+                            {meshes[d].triangles.data(), static_cast<std::uint32_t>(meshes[d].triangles.size()),
+                             static_cast<std::uint32_t>(draws[d].mesh.positions.size())},
+                            draws[d].mesh.num_triangles()});
         const core::hole_cones cones = core::close_holes(body, options.max_hole_edges);
         made.counts.hole_edges += cones.edges;
         made.counts.holes += cones.holes;
@@ -89,11 +91,12 @@ template <class Mesh, class VertexShader, class SolidShader>
         auto& triangle_memory = made.triangles.emplace_back(
             from, array_view<const glm::uvec3>(cones.triangles.data(), cones.triangles.size()));
         cone_part part;
-        part.geometry = {triangle_memory.data(),
+        const auto num_vertices = static_cast<std::uint32_t>(cones.positions.size());
+        part.num_triangles = static_cast<std::uint32_t>(cones.triangles.size());
+        part.geometry = {{triangle_memory.data(), part.num_triangles, num_vertices},
                          {exact_memory.data(), near_memory.data()},
                          0,
-                         static_cast<std::uint32_t>(cones.positions.size())};
-        part.num_triangles = static_cast<std::uint32_t>(cones.triangles.size());
+                         num_vertices};
         made.parts.push_back(part);
         made.num_triangles += cones.triangles.size();
         first = last;
