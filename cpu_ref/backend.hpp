@@ -7,6 +7,7 @@
 
 #include <cpu_ref/abuffer_pass.hpp>
 #include <cpu_ref/framebuffer_pass.hpp>
+#include <cpu_ref/list_source.hpp>
 #include <cpu_ref/solid.hpp>
 #include <cpu_ref/sparse_solid.hpp>
 #include <voxelpipe/voxelpipe.hpp>
@@ -17,6 +18,7 @@
 #include <limits>
 #include <memory>
 #include <new>
+#include <numeric>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -155,6 +157,53 @@ public:
             if (t.load == load_operation::clear) cpu::clear_target(how, t);
         });
         return {};
+    }
+
+    // ---- used by programs (program_call.hpp) ------------------------------------------------------------------------
+
+    // Calls f(i) for i below `count`, in any order.
+    template <class F>
+    void for_each(std::uint64_t count, const F& f) const {
+        constexpr std::uint64_t block = 1024;
+        cpu::parallel_for(execution(nullptr).threads, (count + block - 1) / block, [&](unsigned, std::size_t b) {
+            const std::uint64_t last = std::min<std::uint64_t>(count, (b + 1) * block);
+            for (std::uint64_t i = b * block; i < last; ++i) f(i);
+        });
+    }
+    // offsets[i] becomes the sum of the counts before i. The last count must be 0; returns the total.
+    std::uint64_t sum(const buffer<std::uint32_t>& counts, buffer<std::uint64_t>& offsets) const {
+        std::exclusive_scan(counts.data(), counts.data() + counts.size(), offsets.data(), std::uint64_t{0});
+        return offsets.data()[offsets.size() - 1];
+    }
+    // Sorts pairs by the lowest `bits` bits of the key, stably.
+    void sort_by_key(buffer<std::uint64_t>& keys, buffer<std::uint32_t>& values, int bits) const {
+        struct pair {
+            std::uint64_t key;
+            std::uint32_t value;
+        };
+        const unsigned workers = execution(nullptr).threads;
+        cpu::raw_array<pair> pairs(keys.size());
+        for_each(keys.size(), [&](std::uint64_t i) { pairs[i] = {keys.data()[i], values.data()[i]}; });
+        cpu::radix_sort(workers, pairs, bits);
+        for_each(keys.size(), [&](std::uint64_t i) {
+            keys.data()[i] = pairs[i].key;
+            values.data()[i] = pairs[i].value;
+        });
+    }
+    // Runs work(), which returns a status. Failed allocations become one.
+    template <class Work>
+    [[nodiscard]] status guard(const Work& work) {
+        return guarded(0, [&](const cpu::execution&) { return work(); });
+    }
+    // Lists with all outputs become the contents of a sparse framebuffer. `drawn` has the counts of the call.
+    template <class Payload, class... Targets>
+    [[nodiscard]] status store_sparse(const grid& g, const abuffer<cpu_backend, Payload>& lists,
+                                      sparse_framebuffer<cpu_backend, Targets...>& out, const status& drawn) {
+        return guarded(drawn.counts.triangles_in, [&](const cpu::execution& how) {
+            status s = cpu::draw_sparse(how, *this, g, cpu::list_source<Payload>(how, g, lists), false, counters{}, out);
+            if (s.ok()) s.counts = drawn.counts;
+            return s;
+        });
     }
 
 private:

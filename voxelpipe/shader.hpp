@@ -265,17 +265,27 @@ template <class... Attributes>
 
 // ---- draws ----------------------------------------------------------------------------------------------------------
 
+// No program between the vertex shader and the rasterizer (program.hpp).
+struct none {};
+
 // A mesh with its shaders; the functors carry the transform and the shader data. Does not own the mesh.
-template <class Mesh, class VertexShader, class FragmentShader>
+template <class Mesh, class VertexShader, class FragmentShader, class Amplify = none>
 struct draw {
+    Mesh mesh;
+    VertexShader vertex_shader;
+    Amplify amplify; // vp::tessellate, vp::geometry, or one after the other
+    FragmentShader fragment_shader;
+};
+template <class Mesh, class VertexShader, class FragmentShader>
+struct draw<Mesh, VertexShader, FragmentShader, none> {
     Mesh mesh;
     VertexShader vertex_shader;
     FragmentShader fragment_shader;
 };
 
-// The draw of a call, the triangle of its mesh, and the copy of that.
+// The draw of a call and the triangle of its mesh.
 struct draw_triangle {
-    std::uint32_t draw = 0, triangle = 0, instance = 0;
+    std::uint32_t draw = 0, triangle = 0;
     friend bool operator==(const draw_triangle&, const draw_triangle&) = default;
 };
 
@@ -299,16 +309,26 @@ public:
     [[nodiscard]] std::uint64_t size() const { return ends_.empty() ? 0 : ends_.back(); }
     // `primitive` must be below size().
     [[nodiscard]] draw_triangle operator()(std::uint32_t primitive) const {
-        VOXELPIPE_EXPECTS(primitive < size());
-        const auto at = std::upper_bound(ends_.begin(), ends_.end(), std::uint64_t{primitive});
-        const std::uint64_t first = at == ends_.begin() ? 0 : *(at - 1);
-        const auto draw = static_cast<std::size_t>(at - ends_.begin());
-        const std::uint64_t i = primitive - first;
-        return {static_cast<std::uint32_t>(draw), static_cast<std::uint32_t>(i % each_[draw]),
-                static_cast<std::uint32_t>(i / each_[draw])};
+        const auto [draw, i] = find(primitive);
+        return {draw, static_cast<std::uint32_t>(i % each_[draw])};
+    }
+    // The copy of the mesh, fragment::instance.
+    [[nodiscard]] std::uint32_t instance(std::uint32_t primitive) const {
+        const auto [draw, i] = find(primitive);
+        return static_cast<std::uint32_t>(i / each_[draw]);
     }
 
 private:
+    struct place {
+        std::uint32_t draw;
+        std::uint64_t triangle; // through all instances
+    };
+    [[nodiscard]] place find(std::uint32_t primitive) const {
+        VOXELPIPE_EXPECTS(primitive < size());
+        const auto at = std::upper_bound(ends_.begin(), ends_.end(), std::uint64_t{primitive});
+        const std::uint64_t first = at == ends_.begin() ? 0 : *(at - 1);
+        return {static_cast<std::uint32_t>(at - ends_.begin()), primitive - first};
+    }
     std::vector<std::uint64_t> ends_; // number of primitives up to each draw's end
     std::vector<std::uint64_t> each_; // triangles of each draw's mesh
 };

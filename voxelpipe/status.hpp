@@ -30,6 +30,8 @@ enum class status_code : std::uint8_t {
     capacity_exceeded,    // the caller's workspace is too small; `required` says what is needed
     strategy_unavailable, // the forced strategy cannot serve the call
     bad_solid_options,    // an option of voxelize_solid is out of its range
+    bad_level,            // a tessellation program gave a level below 1 or above its max_level
+    bad_count,            // a geometry program emitted more triangles than its type holds
     crop_without_whole,   // repair::exterior of a crop: what lies outside follows from the whole grid
     no_device,
     device_error, // `device_error` holds the CUDA error
@@ -125,6 +127,10 @@ struct required_sizes {
         return "strategy unavailable: the forced strategy cannot serve this call";
     case status_code::bad_solid_options:
         return "bad solid options: a value out of its range";
+    case status_code::bad_level:
+        return "bad level: a tessellation program's edge_level must be 1 to its max_level";
+    case status_code::bad_count:
+        return "bad count: a geometry program emitted more triangles than vp::triangles<N> holds";
     case status_code::crop_without_whole:
         return "crop without whole: the exterior of a crop follows from the whole grid, draw that";
     case status_code::no_device:

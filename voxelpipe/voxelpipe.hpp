@@ -11,7 +11,10 @@
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/framebuffer.hpp>
 #include <voxelpipe/grid.hpp>
+#include <voxelpipe/elements.hpp>
 #include <voxelpipe/mesh.hpp>
+#include <voxelpipe/program.hpp>
+#include <voxelpipe/program_call.hpp>
 #include <voxelpipe/shader.hpp>
 #include <voxelpipe/solid.hpp>
 #include <voxelpipe/sparse.hpp>

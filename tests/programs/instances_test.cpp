@@ -79,7 +79,8 @@ TEST(Instances, GiveTheListsAndBricksOfDraws) {
     const auto draws = as_instances(mesh.view());
     const vp::primitive_map map(draws);
     EXPECT_EQ(map.size(), 200u);
-    EXPECT_EQ(map(87), (vp::draw_triangle{0, 7, 2}));
+    EXPECT_EQ(map(87), (vp::draw_triangle{0, 7}));
+    EXPECT_EQ(map.instance(87), 2u);
 
     vp::sparse_framebuffer<backend_type, ids, sums> c(backend, extent), d(backend, extent);
     EXPECT_TRUE(vp::voxelize(backend, as_draws(mesh.view()), grid, c).ok());

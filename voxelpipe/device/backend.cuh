@@ -7,6 +7,7 @@
 // more for each try that did not fit.
 
 #include <voxelpipe/device/base/device_buffer.cuh>
+#include <voxelpipe/device/base/for_each.cuh>
 #include <voxelpipe/device/call/abuffer_call.cuh>
 #include <voxelpipe/device/call/attempt.cuh>
 #include <voxelpipe/device/call/call_workspace.cuh>
@@ -14,6 +15,7 @@
 #include <voxelpipe/device/call/list_arrays.cuh>
 #include <voxelpipe/device/kernels.cuh>
 #include <voxelpipe/device/scene/check_indices.cuh>
+#include <voxelpipe/device/scene/cub_sort.cuh>
 #include <voxelpipe/solid.hpp>
 #include <voxelpipe/sparse.hpp>
 #include <voxelpipe/tuning/tuning_strategy.hpp>
@@ -24,10 +26,18 @@
 #include <memory>
 #include <new>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
 namespace voxelpipe {
+
+class cuda_backend;
+namespace device { // device/sparse.cuh
+template <class Payload, class... Targets>
+[[nodiscard]] status finish_sparse(cuda_backend& backend, const grid& g, const abuffer<cuda_backend, Payload>& lists,
+                                   sparse_framebuffer<cuda_backend, Targets...>& fb, const status& drawn);
+} // namespace device
 
 // Has, from stream_memory, a `stream`, which it does not own, and the `resource` that all memory comes from.
 // May be used by one thread at a time, with its framebuffers, A-buffers and buffers: a call changes the workspace, the
@@ -143,6 +153,66 @@ public:
                                           const solid_options& options, std::uint64_t triangles_in);
     template <class... Targets>
     [[nodiscard]] status clear_sparse(const grid& g, sparse_framebuffer<cuda_backend, Targets...>& fb);
+
+    // ---- used by programs (program_call.hpp) ------------------------------------------------------------------------
+
+    // Calls f(i) for i below `count`, in any order, on the stream.
+    template <class F>
+    void for_each(std::uint64_t count, const F& f) const {
+        device::with_runtime_errors([&] { device::for_each(count, f, stage::vertex_shade, stream); });
+    }
+    // offsets[i] becomes the sum of the counts before i. The last count must be 0; returns the total. Waits.
+    template <int = 0>
+    std::uint64_t sum(const buffer<std::uint32_t>& counts, buffer<std::uint64_t>& offsets) {
+        const auto n = static_cast<std::uint32_t>(counts.size());
+        device::with_runtime_errors([&] {
+            const std::size_t bytes = device::cell_scan_bytes(n);
+            buffer<std::uint8_t> storage(*this, bytes);
+            device::sum_counts(counts.data(), reinterpret_cast<unsigned long long*>(offsets.data()), n, storage.data(),
+                               bytes, stage::vertex_shade, stream);
+        });
+        return read(backend_view<const std::uint64_t>{offsets.data() + n - 1, 1})[0];
+    }
+    // Sorts pairs by the lowest `bits` bits of the key, stably.
+    template <int = 0>
+    void sort_by_key(buffer<std::uint64_t>& keys, buffer<std::uint32_t>& values, int bits) {
+        const std::size_t n = keys.size();
+        if (n < 2) return;
+        buffer<std::uint64_t> other_keys(*this, n);
+        buffer<std::uint32_t> other_values(*this, n);
+        int result = 0;
+        device::with_runtime_errors([&] {
+            const std::size_t bytes = device::sort_bytes<std::uint64_t>(n, bits);
+            buffer<std::uint8_t> storage(*this, bytes);
+            std::uint64_t* const k[2] = {keys.data(), other_keys.data()};
+            std::uint32_t* const v[2] = {values.data(), other_values.data()};
+            result = device::sort_by_cell<std::uint64_t>(k, v, n, bits, storage.data(), bytes, stage::tile_sort, stream);
+        });
+        if (result == 0) return;
+        std::swap(keys, other_keys);
+        std::swap(values, other_values);
+    }
+    // Runs work(), which returns a status. Failed allocations and CUDA errors become one.
+    template <class Work>
+    [[nodiscard]] status guard(const Work& work) {
+        try {
+            return work();
+        } catch (const std::bad_alloc&) {
+            return core::failure(status_code::out_of_memory, stage::vertex_shade);
+        } catch (const std::length_error&) { // fragments that cannot be numbered
+            return core::failure(status_code::out_of_memory, stage::abuffer_emit);
+        } catch (const std::runtime_error&) { // of a buffer, or of a hook above
+            status s = core::failure(status_code::device_error, stage::vertex_shade);
+            s.device_error = static_cast<int>(cudaGetLastError());
+            return s;
+        }
+    }
+    // Lists with all outputs become the contents of a sparse framebuffer. `drawn` has the counts of the call.
+    template <class Payload, class... Targets>
+    [[nodiscard]] status store_sparse(const grid& g, const abuffer<cuda_backend, Payload>& lists,
+                                      sparse_framebuffer<cuda_backend, Targets...>& fb, const status& drawn) {
+        return device::finish_sparse(*this, g, lists, fb, drawn);
+    }
 
     // Frees the memory that is kept between calls.
     void release() { workspace_.release(); }

@@ -5,6 +5,7 @@
 // Values of the voxels of a sparse framebuffer: a thread a voxel folds its fragments in the order of their primitives,
 // which is the meaning of every blend. The fragments' outputs come from an A-buffer whose payload is all of them.
 
+#include <voxelpipe/all_outputs.hpp>
 #include <voxelpipe/device/base/launch.cuh>
 #include <voxelpipe/device/sparse/brick_build.cuh>
 #include <voxelpipe/sparse.hpp>
@@ -14,26 +15,8 @@
 
 namespace voxelpipe::device {
 
-// All outputs of a fragment shader as one value, the payload of an A-buffer.
-template <class Output>
-struct outputs_payload;
-template <class... Ts>
-struct outputs_payload<output<Ts...>> {
-    using type = core::pack<Ts...>;
-};
-
-template <class FragmentShader>
-struct payload_shader {
-    FragmentShader shader;
-    template <class Fragment>
-    VOXELPIPE_HD auto operator()(const Fragment& f) const {
-        const auto out = shader(f);
-        output<std::remove_cvref_t<decltype(out.values)>> payload{};
-        payload.values = core::make_pack(out.values);
-        payload.keep = out.keep;
-        return payload;
-    }
-};
+using core::outputs_payload;
+using core::payload_shader;
 
 // One target of a call, in device memory.
 template <class Target>

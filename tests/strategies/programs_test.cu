@@ -1,0 +1,167 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Instances, tessellation and geometry programs on the device: the bytes of cpu_backend, for every strategy, in lists and
+// in solids, for any chunk capacity.
+
+#include "../programs/amplify_cases.hpp"
+#include "device_test.hpp"
+
+#include <gtest/gtest.h>
+
+namespace programs_types { // named: nvcc warns of members of unnamed ones that the host does not use
+
+namespace vp = voxelpipe;
+
+// Copy i at place i, with or without a varying.
+struct placed {
+    VOXELPIPE_HD glm::vec3 operator()(const vp::vertex<>& v) const {
+        const auto s = static_cast<float>(v.instance);
+        return {vp::exact::fma(7.25f, s, v.position.x), vp::exact::fma(5.5f, s, v.position.y),
+                vp::exact::fma(-3.0f, s, v.position.z)};
+    }
+};
+struct spot {
+    float along;
+};
+struct placed_spot {
+    VOXELPIPE_HD auto operator()(const vp::vertex<>& v) const {
+        return vp::vertex_output{placed{}(v), spot{vp::exact::mul(static_cast<float>(v.instance), v.position.x)}};
+    }
+};
+struct shader {
+    VOXELPIPE_HD auto operator()(const vp::fragment<spot>& f) const {
+        return vp::outputs(glm::uvec4(f.instance, f.triangle, f.primitive, 1), f.varyings.along)
+            .discard_if(f.primitive % 5 == 0);
+    }
+};
+
+} // namespace programs_types
+
+namespace {
+
+namespace blend = voxelpipe::blend;
+using namespace device_test;
+using namespace programs_types;
+
+using bits = vp::target<vp::bit, blend::bit_or>;
+using counts = vp::target<std::uint32_t, blend::count>;
+using ids = vp::target<glm::uvec4, blend::replace>;
+using sums = vp::target<float, blend::add>;
+
+const glm::ivec3 extent{45, 39, 50};
+
+// The same call on both backends, with `copies` instances of a mesh; compares targets and counts.
+template <class... Targets, class VertexShader, class FragmentShader>
+void expect_same_instances(const mesh_data& m, std::uint64_t copies, const VertexShader& vs, const FragmentShader& fs,
+                           std::initializer_list<vp::strategy> strategies) {
+    const vp::grid g = box_grid(extent);
+    for (const vp::coverage rule : both_rules) {
+        vp::cpu_backend cpu;
+        vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
+        const vp::mesh<vp::cpu_backend> here(cpu, m.positions, m.triangles);
+        const vp::status sa = vp::voxelize(cpu, here.view(vp::instances{copies}), g, vs, fs, a, rule);
+        ASSERT_TRUE(sa.ok()) << sa.message();
+        EXPECT_EQ(sa.counts.triangles_in, copies * m.triangles.size());
+        for (const vp::strategy strategy : strategies) {
+            SCOPED_TRACE(vp::to_string(strategy));
+            vp::cuda_backend gpu;
+            gpu.strategy = strategy;
+            vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
+            const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
+            const vp::status sb = vp::voxelize(gpu, there.view(vp::instances{copies}), g, vs, fs, b, rule);
+            ASSERT_TRUE(sb.ok()) << sb.message();
+            expect_same_counts(sa.counts, sb.counts);
+            vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+                expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu), "target");
+            });
+        }
+    }
+}
+
+TEST(DeviceInstances, OfConstantsAreTheCpus) {
+    const mesh_data m = mixed_triangles(150, 30.0f, 3);
+    using vp::strategy;
+    expect_same_instances<bits, counts>(m, 4, placed{}, vp::constant(true, 1u), {strategy::immediate, strategy::tiled});
+    expect_same_instances<bits>(m, 4, placed{}, vp::constant(true), {strategy::occupancy_mask, strategy::immediate});
+    expect_same_instances<bits>(m, 3, vp::passthrough{}, vp::constant(true), {strategy::occupancy_mask});
+}
+
+TEST(DeviceInstances, OfShadersAreTheCpus) {
+    const mesh_data m = mixed_triangles(100, 30.0f, 4);
+    using vp::strategy;
+    expect_same_instances<ids, sums>(m, 5, placed_spot{}, shader{}, {strategy::sorted_reduce, strategy::tiled});
+}
+
+TEST(DeviceInstances, InListsAreTheCpus) {
+    const mesh_data m = mixed_triangles(100, 30.0f, 5);
+    const vp::grid g = box_grid(extent);
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    vp::abuffer<vp::cpu_backend> a{cpu};
+    vp::abuffer<vp::cuda_backend> b{gpu};
+    const vp::mesh<vp::cpu_backend> here(cpu, m.positions, m.triangles);
+    const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
+    const vp::status s = vp::voxelize(cpu, here.view(vp::instances{6}), g, placed{}, vp::constant(true), a);
+    const vp::status t = vp::voxelize(gpu, there.view(vp::instances{6}), g, placed{}, vp::constant(true), b);
+    ASSERT_TRUE(s.ok() && t.ok()) << s.message() << t.message();
+    expect_same_on_host(a.to_host(cpu), b.to_host(gpu));
+}
+
+TEST(DeviceInstances, OfSolidsAreTheCpus) {
+    const mesh_data m = mixed_triangles(60, 30.0f, 6);
+    const vp::grid g = box_grid(extent);
+    for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes}) {
+        vp::solid_options options;
+        options.repair = repair;
+        vp::cpu_backend cpu;
+        vp::cuda_backend gpu;
+        vp::framebuffer<vp::cpu_backend, bits> a{cpu, extent};
+        vp::framebuffer<vp::cuda_backend, bits> b{gpu, extent};
+        const vp::mesh<vp::cpu_backend> here(cpu, m.positions, m.triangles);
+        const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
+        const vp::status s =
+            vp::voxelize_solid(cpu, here.view(vp::instances{3}), g, placed{}, vp::constant(true), a, options);
+        const vp::status t =
+            vp::voxelize_solid(gpu, there.view(vp::instances{3}), g, placed{}, vp::constant(true), b, options);
+        ASSERT_TRUE(s.ok() && t.ok()) << s.message() << t.message();
+        EXPECT_EQ(s.solid, t.solid);
+        expect_same_bytes(vp::get<0>(a).to_host(cpu), vp::get<0>(b).to_host(gpu), "solid");
+    }
+}
+
+TEST(DeviceInstances, CheckTheirIndices) {
+    mesh_data m = mixed_triangles(20, 30.0f, 7);
+    m.triangles[11].z = static_cast<std::uint32_t>(m.positions.size());
+    vp::cuda_backend gpu;
+    vp::framebuffer<vp::cuda_backend, bits> b{gpu, extent};
+    const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
+    const vp::status s =
+        vp::voxelize(gpu, there.view(vp::instances{3}), box_grid(extent), placed{}, vp::constant(true), b);
+    EXPECT_EQ(s.code, vp::status_code::index_out_of_range);
+    EXPECT_EQ(s.triangle, 11u);
+}
+
+template <class Amplify>
+void expect_same_programs(std::uint64_t seed, int triangles, const Amplify& amplify) {
+    const unit::small_mesh m = unit::make_mesh(seed, triangles, extent);
+    const vp::grid g = box_grid(extent).crop({3, 1, 5}, {40, 36, 41});
+    for (const vp::coverage rule : both_rules) {
+        vp::cpu_backend cpu;
+        const programs::results expected = programs::draw_all(cpu, m, g, amplify, {rule});
+        EXPECT_GT(expected.counts.voxels, 100u);
+        for (const std::uint64_t chunk : {std::uint64_t{1} << 24, std::uint64_t{300}}) {
+            vp::cuda_backend gpu;
+            programs::expect_same(expected, programs::draw_all(gpu, m, g, amplify, {rule, chunk}));
+        }
+    }
+}
+TEST(DevicePrograms, TessellationIsTheCpus) {
+    expect_same_programs(1, 20, vp::tessellate{programs::waves{2.3f, 1.5f}});
+}
+TEST(DevicePrograms, GeometryIsTheCpus) { expect_same_programs(2, 60, vp::geometry{programs::prism{0.8f}}); }
+TEST(DevicePrograms, GeometryOfATessellationIsTheCpus) {
+    expect_same_programs(3, 20, vp::tessellate{programs::waves{4.1f, 1.0f}} | vp::geometry{programs::prism{0.8f}});
+}
+
+} // namespace
