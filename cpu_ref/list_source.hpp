@@ -53,8 +53,8 @@ private:
     [[nodiscard]] glm::ivec3 position(std::size_t i) const {
         const auto nx = static_cast<std::uint64_t>(extent_.x), ny = static_cast<std::uint64_t>(extent_.y);
         const std::uint64_t v = voxels_[i];
-        return lead_ + glm::ivec3(static_cast<int>(v % nx), static_cast<int>(v / nx % ny),
-                                  static_cast<int>(v / (nx * ny)));
+        return lead_ +
+               glm::ivec3(static_cast<int>(v % nx), static_cast<int>(v / nx % ny), static_cast<int>(v / (nx * ny)));
     }
     const std::uint64_t* offsets_;
     const Payload* payloads_;

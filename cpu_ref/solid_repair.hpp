@@ -43,7 +43,8 @@ namespace voxelpipe::cpu {
         if (!cones.triangles.empty()) {
             const auto triangles = static_cast<std::uint32_t>(cones.triangles.size()),
                        vertices = static_cast<std::uint32_t>(cones.positions.size());
-            parts.push_back({{cones.triangles.data(), triangles, vertices}, cones.positions.data(), triangles, vertices});
+            parts.push_back(
+                {{cones.triangles.data(), triangles, vertices}, cones.positions.data(), triangles, vertices});
             body.push_back(s.body[first]);
             is_repair.push_back(true);
         }

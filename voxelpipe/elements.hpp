@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Points and lines: views of vertices in a backend's memory, like mesh_view. They take the vertex and fragment shaders of
-// meshes, or feed a geometry program.
+// Points and lines: views of vertices in a backend's memory, like mesh_view. They take the vertex and fragment shaders
+// of meshes, or feed a geometry program.
 
 #include <voxelpipe/mesh.hpp>
 #include <voxelpipe/shader.hpp>
@@ -130,11 +130,6 @@ struct elements_of<points_view<Attributes...>> {
     }
     [[nodiscard]] static bool has_memory(const points_view<Attributes...>&) { return true; }
 };
-
-template <class View>
-inline constexpr bool is_mesh_view = false;
-template <class... Attributes>
-inline constexpr bool is_mesh_view<mesh_view<Attributes...>> = true;
 
 // Runs the vertex shader, on all instances.
 template <class Mesh, class VertexShader, class V>

@@ -236,9 +236,8 @@ template <class Backend, class Payload, class... Targets>
         using target = typename pack_element<I, Targets...>::type;
         const auto& t = voxelpipe::get<I>(fb.targets);
         if (t.load == load_operation::off) return;
-        backend.for_each(lists.num_voxels(), pool::fold<I, target, Payload>{t, lists.voxels.data(),
-                                                                           lists.offsets.data(),
-                                                                           lists.payloads.data()});
+        backend.for_each(lists.num_voxels(), pool::fold<I, target, Payload>{
+                                                 t, lists.voxels.data(), lists.offsets.data(), lists.payloads.data()});
     });
     return s;
 }

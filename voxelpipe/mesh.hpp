@@ -70,6 +70,13 @@ template <class Backend>
 
 namespace core {
 
+template <class View>
+inline constexpr bool is_mesh_view = false;
+template <class... Attributes>
+inline constexpr bool is_mesh_view<mesh_view<Attributes...>> = true;
+template <class View>
+concept triangle_mesh = is_mesh_view<View>;
+
 // The triangles of a mesh, of all instances.
 template <class... Attributes>
 [[nodiscard]] VOXELPIPE_HD inline instanced_triangles triangles_of(const mesh_view<Attributes...>& m) {

@@ -43,9 +43,9 @@ namespace core {
 
 } // namespace core
 
-// A point of a tessellated triangle. Values at a corner are the vertex's own, bit for bit. On an edge they come from the
-// edge's two vertices alone, in canonical order (by position), so that two triangles with a common edge get the same
-// points; a flat varying is that of the first of them there, and of the triangle's first vertex inside.
+// A point of a tessellated triangle. Values at a corner are the vertex's own, bit for bit. On an edge they come from
+// the edge's two vertices alone, in canonical order (by position), so that two triangles with a common edge get the
+// same points; a flat varying is that of the first of them there, and of the triangle's first vertex inside.
 template <class Varyings>
 class patch_point {
 public:
@@ -204,16 +204,18 @@ template <class Program, class V>
     constexpr bool copyable = std::is_trivially_copyable_v<Program>;
     static_assert(copyable, "voxelpipe: a tessellation program must be trivially copyable");
     constexpr bool has_levels = has_edge_level<Program, V>;
-    static_assert(has_levels, "voxelpipe: a tessellation program must have int edge_level(const vertex&, const vertex&) "
-                              "const, with the vertex_output that the vertex shader makes");
+    static_assert(has_levels,
+                  "voxelpipe: a tessellation program must have int edge_level(const vertex&, const vertex&) "
+                  "const, with the vertex_output that the vertex shader makes");
     constexpr bool has_max = has_max_level<Program>;
     static_assert(has_max, "voxelpipe: a tessellation program must have static constexpr int max_level");
     if constexpr (has_max) {
         constexpr bool in_range = Program::max_level >= 1 && Program::max_level <= max_tessellation_level;
         static_assert(in_range, "voxelpipe: max_level must be 1 to 1024");
         constexpr bool callable = std::is_invocable_v<const Program&, const patch_point<V>&>;
-        static_assert(callable, "voxelpipe: the tessellation program cannot be called with const patch_point<Varyings>& "
-                                "(is its operator() const, and does it take the varyings that the vertex shader makes?)");
+        static_assert(callable,
+                      "voxelpipe: the tessellation program cannot be called with const patch_point<Varyings>& "
+                      "(is its operator() const, and does it take the varyings that the vertex shader makes?)");
         if constexpr (copyable && has_levels && in_range && callable) {
             using result = std::remove_cvref_t<std::invoke_result_t<const Program&, const patch_point<V>&>>;
             constexpr bool known = is_vertex_result<result>;
@@ -229,8 +231,8 @@ template <class Program, class V>
     return false;
 }
 template <class Program, class V>
-using tessellated = typename vertex_result<
-    std::remove_cvref_t<std::invoke_result_t<const Program&, const patch_point<V>&>>>::varyings;
+using tessellated =
+    typename vertex_result<std::remove_cvref_t<std::invoke_result_t<const Program&, const patch_point<V>&>>>::varyings;
 
 template <class Program, class Input>
 [[nodiscard]] constexpr bool check_geometry() {

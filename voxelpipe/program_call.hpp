@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// voxelize with a program between the vertex shader and the rasterizer. The triangles that the programs make are numbered
-// by draw, instance, input primitive, and lattice or emission number. If all of them fit at once, they are drawn like any
-// mesh. If not, they are made and listed a chunk at a time, and the fragments of all chunks are sorted and folded at the
-// end: results are the same.
+// voxelize with a program between the vertex shader and the rasterizer. The triangles that the programs make are
+// numbered by draw, instance, input primitive, and lattice or emission number. If all of them fit at once, they are
+// drawn like any mesh. If not, they are made and listed a chunk at a time, and the fragments of all chunks are sorted
+// and folded at the end: results are the same.
 
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/fragment_pool.hpp>
@@ -33,8 +33,8 @@ struct program_options : voxelize_options {
     std::uint64_t chunk_triangles = std::uint64_t{1} << 24;
 
     program_options() = default;
-    program_options(const voxelize_options& o) : voxelize_options(o) {}                // NOLINT(*-explicit-*)
-    program_options(coverage rule_) : voxelize_options{rule_, true} {}                 // NOLINT(*-explicit-*)
+    program_options(const voxelize_options& o) : voxelize_options(o) {} // NOLINT(*-explicit-*)
+    program_options(coverage rule_) : voxelize_options{rule_, true} {}  // NOLINT(*-explicit-*)
     program_options(coverage rule_, std::uint64_t chunk_triangles_)
         : voxelize_options{rule_, true}, chunk_triangles(chunk_triangles_) {}
 };
@@ -70,7 +70,8 @@ struct program_types {
     using varyings = typename result::template varyings<>;
 };
 
-// Gives a fragment the numbers of the whole call. `origins`: input primitive of each triangle of the mesh that is drawn.
+// Gives a fragment the numbers of the whole call. `origins`: input primitive of each triangle of the mesh that is
+// drawn.
 template <class FragmentShader>
 struct origin_shader {
     FragmentShader shader;
@@ -134,9 +135,8 @@ protected:
         : backend_(backend), in_(elements::indices(mesh)), num_inputs_(elements::count(mesh) * mesh.copies.count),
           draw_(draw), vertices_(backend, mesh.positions.size() * mesh.copies.count) {
         const auto of_vertices = elements::vertices(mesh);
-        backend.for_each(vertices_.size(),
-                         shade_elements<std::remove_const_t<decltype(of_vertices)>, VertexShader, V>{
-                             of_vertices, shader, draw, vertices_.data()});
+        backend.for_each(vertices_.size(), shade_elements<std::remove_const_t<decltype(of_vertices)>, VertexShader, V>{
+                                               of_vertices, shader, draw, vertices_.data()});
     }
 
     Backend& backend_;
@@ -146,7 +146,8 @@ protected:
     buffer<vertex_output<V>> vertices_;
 };
 
-// total(): how many there are. is_one(most): they are one chunk. for_each_chunk(most, has_origins, visit) calls visit(first, mesh) for ranges of them.
+// total(): how many there are. is_one(most): they are one chunk. for_each_chunk(most, has_origins, visit) calls
+// visit(first, mesh) for ranges of them.
 template <class Backend, class Mesh, class VertexShader, class Amplify, class Stored>
 class program_draw;
 
@@ -234,10 +235,9 @@ private:
             const auto count = static_cast<std::uint32_t>(last - first);
             const element_indices<3> in{reinterpret_cast<const std::uint32_t*>(joined.triangles.data()),
                                         std::uint64_t{3} * count, 3, count, joined.num_vertices};
-            const second_pass pass(this->backend_, program_,
-                                   {joined.vertices.data(), in, count, joined.origins.data(), this->in_.each,
-                                    this->draw_},
-                                   counts_);
+            const second_pass pass(
+                this->backend_, program_,
+                {joined.vertices.data(), in, count, joined.origins.data(), this->in_.each, this->draw_}, counts_);
             visit(before, pass);
             before += pass.total();
         }
@@ -263,8 +263,12 @@ template <class Mesh, class VertexShader, class FragmentShader, class Amplify>
         if (const status s = validate_draws(std::span<const plain>(&vertices, 1)); !s.ok()) return s;
         if (!elements::has_memory(d.mesh)) return failure(status_code::null_view);
         const std::uint64_t each = elements::count(d.mesh);
-        if (each > most || (each != 0 && d.mesh.copies.count > (most - inputs) / each))
-            return failure(status_code::too_many_triangles);
+        if (each > most || (each != 0 && d.mesh.copies.count > (most - inputs) / each)) {
+            status s = failure(status_code::too_many_triangles);
+            const auto all = static_cast<uint128>(each) * d.mesh.copies.count + inputs;
+            s.counts.triangles_in = all > ~std::uint64_t{0} ? ~std::uint64_t{0} : static_cast<std::uint64_t>(all);
+            return s;
+        }
         inputs += each * d.mesh.copies.count;
     }
     return {};
@@ -272,8 +276,8 @@ template <class Mesh, class VertexShader, class FragmentShader, class Amplify>
 
 // Names the bad triangle of a mesh; other elements have no name in a status.
 template <class Backend, class Mesh, class VertexShader, class FragmentShader, class Amplify>
-[[nodiscard]] status name_bad_input(Backend& backend,
-                                    std::span<const draw<Mesh, VertexShader, FragmentShader, Amplify>> draws, status s) {
+[[nodiscard]] status
+name_bad_input(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader, Amplify>> draws, status s) {
     if constexpr (is_mesh_view<Mesh>) {
         std::vector<draw<Mesh, VertexShader, none>> plain;
         for (const auto& d : draws) plain.push_back({d.mesh, d.vertex_shader, {}});
@@ -332,8 +336,8 @@ public:
 
     // Counts all triangles; state() tells whether the call can go on. Waits.
     program_call(Backend& backend, std::span<const draw_type> draws, const grid& g, std::uint64_t chunk_triangles)
-        : backend_(backend), draws_(draws), most_(std::clamp<std::uint64_t>(chunk_triangles, 1, std::uint64_t{1} << 30)),
-          outside_(position_outside(g)),
+        : backend_(backend), draws_(draws),
+          most_(std::clamp<std::uint64_t>(chunk_triangles, 1, std::uint64_t{1} << 30)), outside_(position_outside(g)),
           counts_(backend, array_view<const std::uint64_t>(zeros.data(), zeros.size())) {
         std::uint64_t total = 0;
         for (std::size_t d = 0; d < draws.size(); ++d) {
@@ -375,8 +379,7 @@ public:
         std::uint64_t before = 0;
         for (std::size_t d = 0; d < draws_.size(); ++d) {
             amplified_[d]->for_each_chunk(most_, !IsPlain, outside_, [&](std::uint64_t first, const mesh_type& m) {
-                if (s.ok())
-                    s = run(draw_of_mesh(m, d, before + first), static_cast<std::uint32_t>(before + first));
+                if (s.ok()) s = run(draw_of_mesh(m, d, before + first), static_cast<std::uint32_t>(before + first));
             });
             before += amplified_[d]->total();
         }
@@ -418,8 +421,9 @@ template <class Mesh, class VertexShader, class FragmentShader, class Amplify>
             constexpr bool copyable = std::is_trivially_copyable_v<FragmentShader>;
             static_assert(copyable, "voxelpipe: a fragment shader must be trivially copyable");
             constexpr bool callable = std::is_invocable_v<const FragmentShader&, const fragment_type&>;
-            static_assert(callable, "voxelpipe: the fragment shader cannot be called with const fragment<Varyings>& (is its "
-                                    "operator() const, and does it take the varyings that the program makes?)");
+            static_assert(callable,
+                          "voxelpipe: the fragment shader cannot be called with const fragment<Varyings>& (is its "
+                          "operator() const, and does it take the varyings that the program makes?)");
             if constexpr (copyable && callable) {
                 using result = std::remove_cvref_t<std::invoke_result_t<const FragmentShader&, const fragment_type&>>;
                 static_assert(is_output<result>,
@@ -431,9 +435,8 @@ template <class Mesh, class VertexShader, class FragmentShader, class Amplify>
     return false;
 }
 template <class Mesh, class VertexShader, class FragmentShader, class Amplify>
-using program_output = std::remove_cvref_t<
-    std::invoke_result_t<const FragmentShader&,
-                         const fragment<typename program_types<Mesh, VertexShader, Amplify>::varyings>&>>;
+using program_output = std::remove_cvref_t<std::invoke_result_t<
+    const FragmentShader&, const fragment<typename program_types<Mesh, VertexShader, Amplify>::varyings>&>>;
 
 // What is checked of each kind of output before a call runs.
 template <class Output>
@@ -508,19 +511,17 @@ struct listing<abuffer<Backend, Payload>> {
 template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class Amplify,
           class Output>
 [[nodiscard]] status run_program(Backend& backend,
-                                 std::span<const draw<Mesh, VertexShader, FragmentShader, Amplify>> draws, const grid& g,
-                                 Output& out, const program_options& options) {
+                                 std::span<const draw<Mesh, VertexShader, FragmentShader, Amplify>> draws,
+                                 const grid& g, Output& out, const program_options& options) {
     using output_type = std::remove_const_t<Output>;
-    using call_type =
-        program_call<Backend, Mesh, VertexShader, FragmentShader, Amplify, is_constant<FragmentShader>>;
+    using call_type = program_call<Backend, Mesh, VertexShader, FragmentShader, Amplify, is_constant<FragmentShader>>;
     using emitted_draw = typename call_type::emitted_draw;
     const voxelize_options& plain = options;
     const call_type call(backend, draws, g, options.chunk_triangles);
     if (!call.state().ok()) return name_bad_input(backend, draws, call.state());
     if (call.fits())
-        return call.draw_at_once([&](std::span<const emitted_draw> emitted) {
-            return voxelize<Known...>(backend, emitted, g, out, plain);
-        });
+        return call.draw_at_once(
+            [&](std::span<const emitted_draw> emitted) { return voxelize<Known...>(backend, emitted, g, out, plain); });
 
     const auto list = [&]<class View, class Shader, class Emitted>(std::type_identity<draw<View, Shader, Emitted>>) {
         using listed = typename listing<output_type>::template shader<Emitted>;
@@ -577,10 +578,10 @@ using view_type_of = std::remove_cvref_t<decltype(view_of(std::declval<const Vie
 } // namespace core
 
 // Draws what programs make of meshes, lines or points, into a framebuffer, a framebuffer_view, an A-buffer or a sparse
-// framebuffer. Fragments have the number of the input primitive (triangle), its instance and draw; `primitive` numbers the
-// triangles that the programs make. counts.triangles_in counts those, without the ones that a tessellation leaves out.
-// Beside the errors of voxelize: bad_level, bad_count, and too_many_triangles for more than 2^32 - 1 triangles, whose true
-// number is in counts.triangles_in. A call that fails has written nothing. Waits.
+// framebuffer. Fragments have the number of the input primitive (triangle), its instance and draw; `primitive` numbers
+// the triangles that the programs make. counts.triangles_in counts those, without the ones that a tessellation leaves
+// out. Beside the errors of voxelize: bad_level, bad_count, and too_many_triangles for more than 2^32 - 1 triangles,
+// whose true number is in counts.triangles_in. A call that fails has written nothing. Waits.
 template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class Amplify,
           class Output>
 requires core::is_amplifier<Amplify>
@@ -596,8 +597,7 @@ requires core::is_amplifier<Amplify>
             if (const status s = core::output_kind<output_type>::validate(out, g); !s.ok()) return s;
             if (const status s = core::validate_program_draws(draws); !s.ok()) return s;
             core::known_coverage<Known...>::set(options);
-            return backend.guard(
-                [&] { return core::run_program<Known...>(backend, draws, g, out, options); });
+            return backend.guard([&] { return core::run_program<Known...>(backend, draws, g, out, options); });
         }
     }
     return {}; // does not compile: a static_assert has said why

@@ -3,9 +3,9 @@
 #pragma once
 
 // The passes of tessellation and geometry programs: count, prefix sum, emit. What they emit are ordinary meshes in the
-// backend's memory, any range of a draw's primitives at a time, so every strategy, list and solid draws them. The functors
-// run by Backend::for_each, the same on every backend. Each program is evaluated by one functor only, so that no two
-// copies of its code can round differently.
+// backend's memory, any range of a draw's primitives at a time, so every strategy, list and solid draws them. The
+// functors run by Backend::for_each, the same on every backend. Each program is evaluated by one functor only, so that
+// no two copies of its code can round differently.
 
 #include <voxelpipe/core/fixed_point.hpp>
 #include <voxelpipe/core/shared_counter.hpp>
@@ -257,8 +257,7 @@ struct run_geometry {
             const std::uint64_t number = first_triangle[i] + static_cast<std::uint32_t>(t);
             if (number < begin || number >= end) continue;
             const std::uint64_t to = number - begin;
-            for (int n = 0; n < 3; ++n)
-                sink.store(3 * to + static_cast<std::uint32_t>(n), made.vertices[3 * t + n]);
+            for (int n = 0; n < 3; ++n) sink.store(3 * to + static_cast<std::uint32_t>(n), made.vertices[3 * t + n]);
             const auto v = static_cast<std::uint32_t>(3 * to);
             triangles[to] = glm::uvec3(v, v + 1, v + 2);
             if (origins != nullptr) origins[to] = origin;
@@ -266,8 +265,8 @@ struct run_geometry {
     }
 };
 
-// The inputs that triangles [begin, end) come from: [to[0], to[1]). Inputs without triangles share their number with the
-// one behind them, which find_owner finds.
+// The inputs that triangles [begin, end) come from: [to[0], to[1]). Inputs without triangles share their number with
+// the one behind them, which find_owner finds.
 struct find_inputs {
     const std::uint64_t* first_triangle;
     std::uint64_t count, begin, end;
@@ -367,8 +366,8 @@ public:
                  {backend_, end - begin},
                  {backend_, end - begin},
                  static_cast<std::uint32_t>(points.count)};
-        emit_into(points, glm::vec3(0.0f), passes::joined_vertices<W>{j.vertices.data()}, begin, end,
-                  ~std::uint32_t{0}, j.triangles.data(), j.origins.data());
+        emit_into(points, glm::vec3(0.0f), passes::joined_vertices<W>{j.vertices.data()}, begin, end, ~std::uint32_t{0},
+                  j.triangles.data(), j.origins.data());
         return j;
     }
 
@@ -377,8 +376,9 @@ private:
         std::uint64_t first, count;
     };
     [[nodiscard]] passes::patches<V> all() const {
-        return {vertices_, in_, static_cast<std::uint32_t>(num_patches_), levels_.data(), first_triangle_.data(),
-                first_point_.data()};
+        return {
+            vertices_,          in_, static_cast<std::uint32_t>(num_patches_), levels_.data(), first_triangle_.data(),
+            first_point_.data()};
     }
     [[nodiscard]] points_range points_of(std::uint64_t begin, std::uint64_t end) const {
         buffer<std::uint64_t> range(backend_, 2);
@@ -390,7 +390,7 @@ private:
     void emit_into(const points_range& points, const glm::vec3& outside, const Sink& sink, std::uint64_t begin,
                    std::uint64_t end, std::uint32_t left_out, glm::uvec3* triangles, std::uint32_t* origins) const {
         backend_.for_each(points.count + 1, passes::emit_points<Program, V, W, Sink>{program_, all(), points.first,
-                                                                                    points.count, outside, sink});
+                                                                                     points.count, outside, sink});
         backend_.for_each(end - begin,
                           passes::emit_triangles<V>{all(), begin, points.first, left_out, triangles, origins});
     }
@@ -419,8 +419,10 @@ public:
         : backend_(backend), program_(program), inputs_(inputs), counts_(counts),
           first_triangle_(backend, inputs.count + 1) {
         buffer<std::uint32_t> num_triangles(backend, inputs.count + 1);
-        backend.for_each(inputs.count + 1, run_type{program, inputs, num_triangles.data(), nullptr, 0, 0, 0, {nullptr, nullptr},
-                                                    nullptr, nullptr, counts});
+        backend.for_each(
+            inputs.count + 1,
+            run_type{
+                program, inputs, num_triangles.data(), nullptr, 0, 0, 0, {nullptr, nullptr}, nullptr, nullptr, counts});
         total_ = backend.sum(num_triangles, first_triangle_);
     }
     [[nodiscard]] std::uint64_t total() const { return total_; }
@@ -430,8 +432,7 @@ public:
         emitted_mesh<Backend, Stored> m(backend_, 3 * (end - begin), end - begin, has_origins);
         if (begin == end) return m;
         buffer<std::uint64_t> range(backend_, 2);
-        backend_.for_each(1,
-                          passes::find_inputs{first_triangle_.data(), inputs_.count, begin, end, range.data()});
+        backend_.for_each(1, passes::find_inputs{first_triangle_.data(), inputs_.count, begin, end, range.data()});
         const std::vector<std::uint64_t> host = range.to_host(backend_);
         backend_.for_each(host[1] - host[0],
                           run_type{program_, inputs_, nullptr, first_triangle_.data(), begin, end, host[0], m.sink(),

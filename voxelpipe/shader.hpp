@@ -289,8 +289,8 @@ struct draw_triangle {
     friend bool operator==(const draw_triangle&, const draw_triangle&) = default;
 };
 
-// Maps fragment::primitive, which A-buffers store, back to draw, instance and triangle. On the host. Holds the draws' sizes at
-// its construction, and refers to nothing.
+// Maps fragment::primitive, which A-buffers store, back to draw, instance and triangle. On the host. Holds the draws'
+// sizes at its construction, and refers to nothing.
 class primitive_map {
 public:
     template <class Mesh, class VertexShader, class FragmentShader>

@@ -290,7 +290,8 @@ template <class Backend, class... Targets>
 
 // Draws meshes into a sparse framebuffer: as into a framebuffer, with the same counts. A target that loads needs the
 // grid of the call before (extent_mismatch otherwise): parts drawn apart are joined by merge().
-template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
+template <coverage... Known, class Backend, core::triangle_mesh Mesh, class VertexShader, class FragmentShader,
+          class... Targets>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, sparse_framebuffer<Backend, Targets...>& fb,
                               voxelize_options options = {}) {

@@ -233,7 +233,8 @@ template <class Backend, class... Targets>
 // done; on a GPU backend that is one wait. Without any triangles it clears, like vp::clear, and succeeds. A coverage
 // between angle brackets, as in voxelize<coverage::thin>(...), overrides the options, and the other coverage is not
 // compiled.
-template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
+template <coverage... Known, class Backend, core::triangle_mesh Mesh, class VertexShader, class FragmentShader,
+          class... Targets>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, const framebuffer_view<Targets...>& fb, voxelize_options options = {}) {
     if constexpr (core::shaders_fit_targets<Mesh, VertexShader, FragmentShader, Targets...>()) {
@@ -251,14 +252,16 @@ template <coverage... Known, class Backend, class Mesh, class VertexShader, clas
     }
 }
 
-template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class... Targets>
+template <coverage... Known, class Backend, core::triangle_mesh Mesh, class VertexShader, class FragmentShader,
+          class... Targets>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, framebuffer<Backend, Targets...>& fb, voxelize_options options = {}) {
     return voxelize<Known...>(backend, draws, g, fb.view(), options);
 }
 
 // Draws meshes into an A-buffer. The fragment shader's one output is the payload; it is ignored if the payload is void.
-template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class Payload>
+template <coverage... Known, class Backend, core::triangle_mesh Mesh, class VertexShader, class FragmentShader,
+          class Payload>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                               const grid& g, abuffer<Backend, Payload>& lists, voxelize_options options = {}) {
     if constexpr (core::shaders_fit_payload<Mesh, VertexShader, FragmentShader, Payload>()) {

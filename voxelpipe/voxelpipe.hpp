@@ -9,9 +9,11 @@
 #include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/blend.hpp>
 #include <voxelpipe/config.hpp>
+#include <voxelpipe/element_call.hpp>
+#include <voxelpipe/elements.hpp>
+#include <voxelpipe/field.hpp>
 #include <voxelpipe/framebuffer.hpp>
 #include <voxelpipe/grid.hpp>
-#include <voxelpipe/elements.hpp>
 #include <voxelpipe/mesh.hpp>
 #include <voxelpipe/program.hpp>
 #include <voxelpipe/program_call.hpp>

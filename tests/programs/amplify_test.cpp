@@ -45,7 +45,7 @@ TEST(GeometryProgram, DoesNotDependOnChunksOrThreads) {
 }
 TEST(GeometryProgram, FollowsATessellation) {
     expect_same_for_all_chunks(unit::make_mesh(3, 12, extent),
-                               vp::tessellate{waves{4.1f, 1.0f}} | vp::geometry{prism{0.8f}}, 500);
+                               vp::tessellate{waves{4.1f, 1.0f}} | vp::geometry{prism{0.8f}}, 40);
 }
 
 // A mesh with the program's levels 1 is drawn as without a program, byte for byte.
@@ -78,12 +78,8 @@ TEST(Programs, WithoutEffectGiveTheMesh) {
 
 struct fixed {
     static constexpr int max_level = 4;
-    VOXELPIPE_HD int edge_level(const vertex& a, const vertex& b) const {
-        return a.position.x == b.position.x ? 1 : 4;
-    }
-    VOXELPIPE_HD vertex operator()(const vp::patch_point<surface>& p) const {
-        return {p.position(), p.varyings()};
-    }
+    VOXELPIPE_HD int edge_level(const vertex& a, const vertex& b) const { return a.position.x == b.position.x ? 1 : 4; }
+    VOXELPIPE_HD vertex operator()(const vp::patch_point<surface>& p) const { return {p.position(), p.varyings()}; }
 };
 // Fragments know the input triangle, its instance and draw; primitives count every lattice number.
 TEST(Tessellation, NumbersItsTriangles) {

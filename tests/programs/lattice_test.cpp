@@ -88,8 +88,16 @@ TEST(Lattice, CoversThePatchOnceForEveryLevelUpTo12) {
 
 // The number of triangles that are left out, for levels beyond those above.
 TEST(Lattice, CountsWhatItLeavesOut) {
-    for (const auto& l : {std::array{1, 1, 1}, {2, 1, 1}, {1, 2, 1}, {1, 1, 2}, {64, 1, 1}, {1, 63, 64}, {101, 37, 2},
-                          {1024, 1, 1023}, {1, 1, 1024}, {512, 1024, 3}}) {
+    for (const auto& l : {std::array{1, 1, 1},
+                          {2, 1, 1},
+                          {1, 2, 1},
+                          {1, 1, 2},
+                          {64, 1, 1},
+                          {1, 63, 64},
+                          {101, 37, 2},
+                          {1024, 1, 1023},
+                          {1, 1, 1024},
+                          {512, 1024, 3}}) {
         const lattice patch(l[0], l[1], l[2]);
         std::uint32_t left_out = 0;
         for (std::uint32_t i = 0; i < patch.num_triangles(); ++i)

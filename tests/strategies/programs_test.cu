@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Instances, tessellation and geometry programs on the device: the bytes of cpu_backend, for every strategy, in lists and
-// in solids, for any chunk capacity.
+// Instances, tessellation and geometry programs, points and lines on the device: the bytes of cpu_backend, for every
+// strategy, in lists and in solids, for any chunk capacity.
 
 #include "../programs/amplify_cases.hpp"
+#include "../programs/elements_cases.hpp"
 #include "device_test.hpp"
 
 #include <gtest/gtest.h>
@@ -50,6 +51,11 @@ using ids = vp::target<glm::uvec4, blend::replace>;
 using sums = vp::target<float, blend::add>;
 
 const glm::ivec3 extent{45, 39, 50};
+
+template <class T>
+vp::array_view<const T> array_of(const std::vector<T>& v) {
+    return {v.data(), v.size()};
+}
 
 // The same call on both backends, with `copies` instances of a mesh; compares targets and counts.
 template <class... Targets, class VertexShader, class FragmentShader>
@@ -162,6 +168,24 @@ TEST(DevicePrograms, TessellationIsTheCpus) {
 TEST(DevicePrograms, GeometryIsTheCpus) { expect_same_programs(2, 60, vp::geometry{programs::prism{0.8f}}); }
 TEST(DevicePrograms, GeometryOfATessellationIsTheCpus) {
     expect_same_programs(3, 20, vp::tessellate{programs::waves{4.1f, 1.0f}} | vp::geometry{programs::prism{0.8f}});
+}
+
+TEST(DeviceElements, AreTheCpus) {
+    const std::vector<glm::vec3> vertices = elements::make_vertices(4, 120, extent);
+    const vp::grid g = box_grid(extent).crop({3, 1, 5}, {40, 36, 41});
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    const vp::cuda_backend::buffer<glm::vec3> there(gpu, array_of(vertices));
+    const vp::lines_view<> here_lines{.positions = vertices, .copies = {2}},
+        there_lines{.positions = there.view(), .copies = {2}};
+    const vp::points_view<> here_points{.positions = vertices, .copies = {2}},
+        there_points{.positions = there.view(), .copies = {2}};
+    for (const vp::coverage rule : both_rules) {
+        elements::expect_same(elements::draw_all(cpu, here_lines, g, rule),
+                              elements::draw_all(gpu, there_lines, g, rule));
+        elements::expect_same(elements::draw_all(cpu, here_points, g, rule),
+                              elements::draw_all(gpu, there_points, g, rule));
+    }
 }
 
 } // namespace

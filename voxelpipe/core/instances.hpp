@@ -13,8 +13,8 @@
 
 namespace voxelpipe::core {
 
-// An index of a triangle's vertices, moved to an instance whose vertices begin at `first`. An index that names no vertex
-// of the mesh names none of the instances either.
+// An index of a triangle's vertices, moved to an instance whose vertices begin at `first`. An index that names no
+// vertex of the mesh names none of the instances either.
 [[nodiscard]] VOXELPIPE_HD inline glm::uvec3 move_to_instance(const glm::uvec3& t, std::uint32_t num_vertices,
                                                               std::uint32_t first) {
     const bool ok = t.x < num_vertices && t.y < num_vertices && t.z < num_vertices;

@@ -5,15 +5,15 @@
 // The tessellator (docs/design.md, "Tessellation"): the triangles and points of a patch with three integer levels.
 //
 // A patch v0 v1 v2 whose edges v0 v1, v1 v2, v2 v0 have levels l0, l1, l2 is a uniform lattice of n^2 triangles,
-// n = max(l0, l1, l2). Row r of its points, from v0, holds r + 1 of them, from the side of v1; row r of its triangles holds
-// 2 r + 1, numbers r^2 to r^2 + 2 r. Only points on the patch's edges move: point i of edge e, counted in the direction
-// v0 -> v1 -> v2 -> v0, moves to k / l_e with k = floor((2 i l_e + n) / (2 n)), the nearest multiple. A triangle with two
-// equal points is left out; its number stays.
+// n = max(l0, l1, l2). Row r of its points, from v0, holds r + 1 of them, from the side of v1; row r of its triangles
+// holds 2 r + 1, numbers r^2 to r^2 + 2 r. Only points on the patch's edges move: point i of edge e, counted in the
+// direction v0 -> v1 -> v2 -> v0, moves to k / l_e with k = floor((2 i l_e + n) / (2 n)), the nearest multiple. A
+// triangle with two equal points is left out; its number stays.
 //
 // As i grows by 1, k grows by 0 or 1, because l_e <= n: so every k of 0 .. l_e is present, and n - l_e steps of an edge
-// collapse. For n >= 2 that leaves out sum (n - l_e) triangles: each collapsed step takes the one triangle that holds it.
-// A corner's triangle would be counted twice if both its steps collapsed; then the triangle across its third side is
-// left out as well, since both of that side's points lie on the corner. (n = 2 has no such corner.)
+// collapse. For n >= 2 that leaves out sum (n - l_e) triangles: each collapsed step takes the one triangle that holds
+// it. A corner's triangle would be counted twice if both its steps collapsed; then the triangle across its third side
+// is left out as well, since both of that side's points lie on the corner. (n = 2 has no such corner.)
 
 #include <voxelpipe/core/exact.hpp>
 
@@ -40,7 +40,8 @@ struct lattice_index {
         return static_cast<std::uint32_t>(row) * static_cast<std::uint32_t>(row + 1) / 2 +
                static_cast<std::uint32_t>(column);
     }
-    // The inverse. The root of a number below 2^52 is rounded correctly, and that of a square is exact: its floor is right.
+    // The inverse. The root of a number below 2^52 is rounded correctly, and that of a square is exact: its floor is
+    // right.
     [[nodiscard]] VOXELPIPE_HD static lattice_index of(std::uint32_t number) {
         const int row = (static_cast<int>(exact::sqrt(8.0 * number + 1.0)) - 1) / 2;
         return {row, static_cast<int>(number - lattice_index{row, 0}.number())};
@@ -64,7 +65,9 @@ class lattice {
 public:
     // Levels are 1 to max_tessellation_level.
     VOXELPIPE_HD constexpr lattice(int l0, int l1, int l2)
-        : level_{l0, l1, l2}, n_(l0 > l1 ? l0 > l2 ? l0 : l2 : l1 > l2 ? l1 : l2) {}
+        : level_{l0, l1, l2}, n_(l0 > l1   ? l0 > l2 ? l0 : l2
+                                 : l1 > l2 ? l1
+                                           : l2) {}
 
     // In 30 bits, and back.
     [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t packed() const {
@@ -78,9 +81,7 @@ public:
     [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t num_triangles() const {
         return static_cast<std::uint32_t>(n_) * static_cast<std::uint32_t>(n_);
     }
-    [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t num_points() const {
-        return lattice_index{n_ + 1, 0}.number();
-    }
+    [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t num_points() const { return lattice_index{n_ + 1, 0}.number(); }
     [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t num_left_out() const {
         return n_ == 1 ? 0 : static_cast<std::uint32_t>(3 * n_ - level_[0] - level_[1] - level_[2]);
     }

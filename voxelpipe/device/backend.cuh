@@ -186,7 +186,8 @@ public:
             buffer<std::uint8_t> storage(*this, bytes);
             std::uint64_t* const k[2] = {keys.data(), other_keys.data()};
             std::uint32_t* const v[2] = {values.data(), other_values.data()};
-            result = device::sort_by_cell<std::uint64_t>(k, v, n, bits, storage.data(), bytes, stage::tile_sort, stream);
+            result =
+                device::sort_by_cell<std::uint64_t>(k, v, n, bits, storage.data(), bytes, stage::tile_sort, stream);
         });
         if (result == 0) return;
         std::swap(keys, other_keys);

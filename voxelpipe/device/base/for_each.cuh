@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A functor for each of many numbers: the passes of programs (program_passes.hpp), points and lines. Compiled by programs
-// that use these, and by no other.
+// A functor for each of many numbers: the passes of programs (program_passes.hpp), points and lines. Compiled by
+// programs that use these, and by no other.
 
 #include <voxelpipe/device/base/launch.cuh>
 
@@ -22,7 +22,8 @@ __global__ __launch_bounds__(threads_per_block) void for_each_kernel(const __gri
 // Calls f(i) for i below `count`.
 template <class F>
 void for_each(std::uint64_t count, const F& f, stage where, cudaStream_t stream) {
-    static_assert(sizeof(F) <= 3900, "voxelpipe: a program or shader has too much data by value; let it hold a pointer");
+    static_assert(sizeof(F) <= 3900,
+                  "voxelpipe: a program or shader has too much data by value; let it hold a pointer");
     if (count == 0) return;
     const auto blocks = static_cast<unsigned>(std::min<std::uint64_t>((count - 1) / threads_per_block + 1, 1u << 20));
     launch_kernel(false, for_each_kernel<F>, blocks, threads_per_block, 0, stream, where, f, count);

@@ -37,7 +37,7 @@ void vertex_shade(const Mesh& mesh, const VertexShader& shader, const core::snap
     if (mesh.num_vertices() == 0) return;
     vertex_shade_kernel<Mesh, VertexShader, Varyings>
         <<<num_blocks(mesh.num_vertices()), threads_per_block, 0, stream>>>(mesh, shader, snap, draw, positions.exact,
-                                                                              positions.int32, varyings);
+                                                                            positions.int32, varyings);
     check(cudaGetLastError(), stage::vertex_shade);
 }
 

@@ -73,7 +73,8 @@ template <class Mesh, class VertexShader, class SolidShader>
         const std::size_t last = is_split ? first + 1 : draws.size();
         std::vector<core::hole_part> body;
         for (std::size_t d = first; d < last; ++d)
-            body.push_back({meshes[d].positions.data(), meshes[d].positions.size(),
+            body.push_back({meshes[d].positions.data(),
+                            meshes[d].positions.size(),
                             {meshes[d].triangles.data(), static_cast<std::uint32_t>(meshes[d].triangles.size()),
                              static_cast<std::uint32_t>(draws[d].mesh.positions.size())},
                             draws[d].mesh.num_triangles()});
