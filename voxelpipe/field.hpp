@@ -8,8 +8,9 @@
 //
 // Coordinates run from 0 to 1 along each axis and are wrapped first: repeat takes the fraction, mirror folds at every
 // integer, clamp cuts off; NaN is 0. Texel i of n has its centre at (i + 1/2) / n. Nearest takes texel floor(c n).
-// Linear computes x = c n - 1/2 with one rounding; its weight is x - floor(x), exact: a multiple of the float's last
-// place. Values are mixed along x, then y, then z, by a + t (b - a) in two roundings each (exact::lerp).
+// Linear computes x = c n - 1/2 with one rounding. Its weight is x - floor(x): exact from x = 0 on, a multiple of the
+// float's last place, and rounded once before the first texel's centre. Values are mixed along x, then y, then z, by a
+// + t (b - a) in two roundings each (exact::lerp).
 
 #include <voxelpipe/core/exact.hpp>
 #include <voxelpipe/core/value_traits.hpp>

@@ -6,6 +6,7 @@
 
 #include "../programs/amplify_cases.hpp"
 #include "../programs/elements_cases.hpp"
+#include "../programs/field_cases.hpp"
 #include "device_test.hpp"
 
 #include <gtest/gtest.h>
@@ -186,6 +187,17 @@ TEST(DeviceElements, AreTheCpus) {
         elements::expect_same(elements::draw_all(cpu, here_points, g, rule),
                               elements::draw_all(gpu, there_points, g, rule));
     }
+}
+
+TEST(DeviceField, GivesItsGoldenValues) {
+    vp::cuda_backend gpu;
+    const std::vector<glm::vec3> plane = fields::plane_texels();
+    const std::vector<float> box = fields::box_texels();
+    const vp::cuda_backend::buffer<glm::vec3> there_plane(gpu, array_of(plane));
+    const vp::cuda_backend::buffer<float> there_box(gpu, array_of(box));
+    vp::cuda_backend::buffer<glm::vec4> out(gpu, std::size_t{fields::num_samples});
+    gpu.for_each(fields::num_samples, fields::make_sampler(there_plane.data(), there_box.data(), out.data()));
+    EXPECT_EQ(fields::digest(out.to_host(gpu)), fields::golden);
 }
 
 } // namespace
