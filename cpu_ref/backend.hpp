@@ -200,8 +200,7 @@ public:
     [[nodiscard]] status store_sparse(const grid& g, const abuffer<cpu_backend, Payload>& lists,
                                       sparse_framebuffer<cpu_backend, Targets...>& out, const status& drawn) {
         return guarded(drawn.counts.triangles_in, [&](const cpu::execution& how) {
-            status s =
-                cpu::draw_sparse(how, *this, g, cpu::list_source<Payload>(how, g, lists), false, counters{}, out);
+            status s = cpu::draw_sparse(how, *this, g, cpu::list_source<Payload>(how, g, lists), false, status{}, out);
             if (s.ok()) s.counts = drawn.counts;
             return s;
         });

@@ -9,6 +9,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 namespace voxelpipe::cpu {
@@ -35,8 +36,11 @@ public:
     [[nodiscard]] std::size_t num_tiles() const { return ranges_.size(); }
     [[nodiscard]] std::uint64_t key(std::size_t i) const { return ranges_[i].tile; }
 
+    struct no_scratch {};
+    [[nodiscard]] std::unique_ptr<no_scratch> make_scratch() const { return nullptr; }
     template <class... Targets>
-    void draw(std::size_t i, const core::voxel_box& box, bool, sparse_scratch<Targets...>& scratch) const {
+    void draw(std::size_t i, const core::voxel_box& box, bool, const no_scratch*,
+              sparse_scratch<Targets...>& scratch) const {
         for (std::size_t p = ranges_[i].first; p < ranges_[i].last; ++p) {
             const std::size_t voxel = pairs_[p].primitive;
             const glm::ivec3 at = position(voxel) - lowest(box);
@@ -44,8 +48,7 @@ public:
                 blend_in_tile<true>(scratch.view, scratch.shaded, at.z * tile_size + at.y, at.x, at.x, at.y, at.z,
                                     payloads_[f]);
         }
-        scratch.mark(scratch.shaded.touched.data());
-        resolve_tile(glm::ivec3(0), scratch.view, scratch.shaded);
+        scratch.end_shaded();
     }
 
 private:
