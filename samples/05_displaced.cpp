@@ -22,6 +22,7 @@ struct unit_sphere { // normals of a sphere at the origin; scaled to the grid
     }
 };
 
+// snippet: tessellation
 struct stones { // a tessellation program
     static constexpr int max_level = 64;
     vp::field3d<float> height;
@@ -36,6 +37,7 @@ struct stones { // a tessellation program
         return {vp::exact::along(on_sphere, n, amount * height(0.9f * n)), surface{n}};
     }
 };
+// end snippet
 
 struct paint {
     VOXELPIPE_HD auto operator()(const vp::fragment<surface>& f) const {

@@ -23,6 +23,7 @@ struct comb { // positions, colours and radii of the curls' vertices
     }
 };
 
+// snippet: geometry
 struct tube { // a geometry program: a segment becomes a prism of six sides
     VOXELPIPE_HD vp::triangles<12, hair> operator()(const vp::line<hair>& l) const {
         const vertex &a = l.vertices[0], &b = l.vertices[1];
@@ -44,6 +45,7 @@ struct tube { // a geometry program: a segment becomes a prism of six sides
         return out;
     }
 };
+// end snippet
 
 struct paint {
     VOXELPIPE_HD auto operator()(const vp::fragment<hair>& f) const {

@@ -76,6 +76,7 @@ int main() {
             }
 
     vp::cpu_backend backend;
+    // snippet: points
     const vp::points_view<glm::vec3> points{.positions = positions,
                                             .attributes = vp::core::make_pack(vp::array_view<const glm::vec3>(colors))};
     vp::grid grid;
@@ -83,6 +84,7 @@ int main() {
     vp::framebuffer<vp::cpu_backend, vp::target<std::uint32_t, vp::blend::count>, vp::target<glm::vec3, vp::blend::add>>
         fb{backend, grid.extent};
     const vp::status s = vp::voxelize(backend, points, grid, scanner{}, collect{}, fb, vp::coverage::thin).or_throw();
+    // end snippet
     const auto counts = vp::get<0>(fb).to_host_target(backend);
     const auto sums = vp::get<1>(fb).to_host_target(backend);
     picture::write("scan.ppm", grid.extent, [&](int x, int y, int z) {

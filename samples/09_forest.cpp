@@ -26,6 +26,7 @@ VOXELPIPE_HD inline float ground(float x, float z) {
     return 14.0f + 7.0f * std::sin(0.035f * x) + 6.0f * std::cos(0.041f * z + 0.6f);
 }
 
+// snippet: instances
 struct plant {
     VOXELPIPE_HD auto operator()(const vp::vertex<glm::vec3>& v) const {
         const std::uint32_t n = 4 * v.instance;
@@ -37,6 +38,7 @@ struct plant {
                                  tree{(0.75f + 0.5f * random(n + 5)) * vp::get<0>(v)}};
     }
 };
+// end snippet
 struct hills {
     VOXELPIPE_HD auto operator()(const vp::vertex<glm::vec3>& v) const {
         return vp::vertex_output{glm::vec3(v.position.x, ground(v.position.x, v.position.z), v.position.z),

@@ -123,12 +123,13 @@ results draw_with(Backend& backend, const vp::grid& grid, const Draw& draw) {
     r.constants = vp::get<0>(occupied).to_host(backend);
     return r;
 }
-template <class Backend, class Amplify>
+// Known: the coverage, if only one is to be compiled.
+template <vp::coverage... Known, class Backend, class Amplify>
 results draw_all(Backend& backend, const unit::small_mesh& m, const vp::grid& grid, const Amplify& amplify,
                  const vp::program_options& options) {
     const vp::mesh<Backend> mesh(backend, m.positions, m.triangles);
     return draw_with(backend, grid, [&](const auto& fs, auto& out) {
-        return vp::voxelize(backend, mesh, grid, add_surface{}, amplify, fs, out, options);
+        return vp::voxelize<Known...>(backend, mesh, grid, add_surface{}, amplify, fs, out, options);
     });
 }
 template <class Backend>

@@ -59,45 +59,47 @@ vp::array_view<const T> array_of(const std::vector<T>& v) {
 }
 
 // The same call on both backends, with `copies` instances of a mesh; compares targets and counts.
-template <class... Targets, class VertexShader, class FragmentShader>
+template <vp::coverage Rule, class... Targets, class VertexShader, class FragmentShader>
 void expect_same_instances(const mesh_data& m, std::uint64_t copies, const VertexShader& vs, const FragmentShader& fs,
                            std::initializer_list<vp::strategy> strategies) {
     const vp::grid g = box_grid(extent);
-    for (const vp::coverage rule : both_rules) {
-        vp::cpu_backend cpu;
-        vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
-        const vp::mesh<vp::cpu_backend> here(cpu, m.positions, m.triangles);
-        const vp::status sa = vp::voxelize(cpu, here.view(vp::instances{copies}), g, vs, fs, a, rule);
-        ASSERT_TRUE(sa.ok()) << sa.message();
-        EXPECT_EQ(sa.counts.triangles_in, copies * m.triangles.size());
-        for (const vp::strategy strategy : strategies) {
-            SCOPED_TRACE(vp::to_string(strategy));
-            vp::cuda_backend gpu;
-            gpu.strategy = strategy;
-            vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
-            const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
-            const vp::status sb = vp::voxelize(gpu, there.view(vp::instances{copies}), g, vs, fs, b, rule);
-            ASSERT_TRUE(sb.ok()) << sb.message();
-            expect_same_counts(sa.counts, sb.counts);
-            vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-                expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu), "target");
-            });
-        }
+    vp::cpu_backend cpu;
+    vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
+    const vp::mesh<vp::cpu_backend> here(cpu, m.positions, m.triangles);
+    const vp::status sa = vp::voxelize<Rule>(cpu, here.view(vp::instances{copies}), g, vs, fs, a);
+    ASSERT_TRUE(sa.ok()) << sa.message();
+    EXPECT_EQ(sa.counts.triangles_in, copies * m.triangles.size());
+    for (const vp::strategy strategy : strategies) {
+        SCOPED_TRACE(vp::to_string(strategy));
+        vp::cuda_backend gpu;
+        gpu.strategy = strategy;
+        vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
+        const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
+        const vp::status sb = vp::voxelize<Rule>(gpu, there.view(vp::instances{copies}), g, vs, fs, b);
+        ASSERT_TRUE(sb.ok()) << sb.message();
+        expect_same_counts(sa.counts, sb.counts);
+        vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu), "target");
+        });
     }
 }
 
 TEST(DeviceInstances, OfConstantsAreTheCpus) {
     const mesh_data m = mixed_triangles(150, 30.0f, 3);
     using vp::strategy;
-    expect_same_instances<bits, counts>(m, 4, placed{}, vp::constant(true, 1u), {strategy::immediate, strategy::tiled});
-    expect_same_instances<bits>(m, 4, placed{}, vp::constant(true), {strategy::occupancy_mask, strategy::immediate});
-    expect_same_instances<bits>(m, 3, vp::passthrough{}, vp::constant(true), {strategy::occupancy_mask});
+    expect_same_instances<vp::coverage::conservative, bits, counts>(m, 4, placed{}, vp::constant(true, 1u),
+                                                                    {strategy::immediate, strategy::tiled});
+    expect_same_instances<vp::coverage::conservative, bits>(m, 4, placed{}, vp::constant(true),
+                                                            {strategy::occupancy_mask, strategy::immediate});
+    expect_same_instances<vp::coverage::conservative, bits>(m, 3, vp::passthrough{}, vp::constant(true),
+                                                            {strategy::occupancy_mask});
 }
 
 TEST(DeviceInstances, OfShadersAreTheCpus) {
     const mesh_data m = mixed_triangles(100, 30.0f, 4);
     using vp::strategy;
-    expect_same_instances<ids, sums>(m, 5, placed_spot{}, shader{}, {strategy::sorted_reduce, strategy::tiled});
+    expect_same_instances<vp::coverage::thin, ids, sums>(m, 5, placed_spot{}, shader{},
+                                                         {strategy::sorted_reduce, strategy::tiled});
 }
 
 TEST(DeviceInstances, InListsAreTheCpus) {
@@ -109,8 +111,10 @@ TEST(DeviceInstances, InListsAreTheCpus) {
     vp::abuffer<vp::cuda_backend> b{gpu};
     const vp::mesh<vp::cpu_backend> here(cpu, m.positions, m.triangles);
     const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
-    const vp::status s = vp::voxelize(cpu, here.view(vp::instances{6}), g, placed{}, vp::constant(true), a);
-    const vp::status t = vp::voxelize(gpu, there.view(vp::instances{6}), g, placed{}, vp::constant(true), b);
+    const vp::status s =
+        vp::voxelize<vp::coverage::thin>(cpu, here.view(vp::instances{6}), g, placed{}, vp::constant(true), a);
+    const vp::status t =
+        vp::voxelize<vp::coverage::thin>(gpu, there.view(vp::instances{6}), g, placed{}, vp::constant(true), b);
     ASSERT_TRUE(s.ok() && t.ok()) << s.message() << t.message();
     expect_same_on_host(a.to_host(cpu), b.to_host(gpu));
 }
@@ -143,8 +147,8 @@ TEST(DeviceInstances, CheckTheirIndices) {
     vp::cuda_backend gpu;
     vp::framebuffer<vp::cuda_backend, bits> b{gpu, extent};
     const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
-    const vp::status s =
-        vp::voxelize(gpu, there.view(vp::instances{3}), box_grid(extent), placed{}, vp::constant(true), b);
+    const vp::status s = vp::voxelize<vp::coverage::conservative>(gpu, there.view(vp::instances{3}), box_grid(extent),
+                                                                  placed{}, vp::constant(true), b);
     EXPECT_EQ(s.code, vp::status_code::index_out_of_range);
     EXPECT_EQ(s.triangle, 11u);
 }
@@ -153,14 +157,13 @@ template <class Amplify>
 void expect_same_programs(std::uint64_t seed, int triangles, const Amplify& amplify) {
     const unit::small_mesh m = unit::make_mesh(seed, triangles, extent);
     const vp::grid g = box_grid(extent).crop({3, 1, 5}, {40, 36, 41});
-    for (const vp::coverage rule : both_rules) {
-        vp::cpu_backend cpu;
-        const programs::results expected = programs::draw_all(cpu, m, g, amplify, {rule});
-        EXPECT_GT(expected.counts.voxels, 100u);
-        for (const std::uint64_t chunk : {std::uint64_t{1} << 24, std::uint64_t{300}}) {
-            vp::cuda_backend gpu;
-            programs::expect_same(expected, programs::draw_all(gpu, m, g, amplify, {rule, chunk}));
-        }
+    constexpr vp::coverage rule = vp::coverage::thin; // the raster's tests have both
+    vp::cpu_backend cpu;
+    const programs::results expected = programs::draw_all<rule>(cpu, m, g, amplify, {rule});
+    EXPECT_GT(expected.counts.voxels, 50u);
+    for (const std::uint64_t chunk : {std::uint64_t{1} << 24, std::uint64_t{300}}) {
+        vp::cuda_backend gpu;
+        programs::expect_same(expected, programs::draw_all<rule>(gpu, m, g, amplify, {rule, chunk}));
     }
 }
 TEST(DevicePrograms, TessellationIsTheCpus) {
