@@ -22,7 +22,7 @@ void write(const std::string& path, const glm::ivec3& extent, const Color& color
     const glm::vec3 e(extent), center = 0.5f * e;
     const glm::vec3 along = glm::normalize(glm::vec3(-0.55f, -0.5f, -1.0f));
     const glm::vec3 right = glm::normalize(glm::cross(along, glm::vec3(0, 1, 0))), up = glm::cross(right, along);
-    const float size = glm::length(e) / static_cast<float>(height);
+    const float size = 0.62f * glm::length(e) / static_cast<float>(height);
     std::vector<char> pixels;
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {
