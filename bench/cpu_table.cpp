@@ -129,40 +129,35 @@ cell_result run_cell(const bench::mesh_data& mesh, const vp::grid& grid, const c
     const bool baseline = !how.no_baseline && result.baseline_tests * 3e-9 < how.baseline_limit;
     const bench::repetition plain_runs{0, 1, 5, how.seconds};
     result.baseline_ran = baseline;
+    // One bit a voxel: draw(backend, framebuffer) is timed, and the baseline fills the same words.
+    const auto run_bits = [&](const auto& draw, const auto& draw_plain) {
+        using target = vp::target<vp::bit, blend::bit_or>;
+        std::vector<std::uint32_t> words(target::map::elements(grid.extent));
+        vp::framebuffer_view<target> fb{grid.extent, {}};
+        vp::get<0>(fb.targets) = {words.data(), grid.extent, vp::load_operation::clear, false};
+        for (const unsigned n : threads)
+            result.ours.push_back(time_ours(n, how, [&](vp::cpu_backend& b) { return draw(b, fb); }));
+        if (!baseline) return;
+        std::vector<std::uint32_t> plain(words.size());
+        result.baseline = bench::measure(plain_runs, [&] { draw_plain(plain); });
+        if (plain != words) differ(mesh, kind);
+    };
     switch (kind.output) {
-    case output_kind::bits: {
-        using target = vp::target<vp::bit, blend::bit_or>;
-        std::vector<std::uint32_t> words(target::map::elements(grid.extent));
-        vp::framebuffer_view<target> fb{grid.extent, {}};
-        vp::get<0>(fb.targets) = {words.data(), grid.extent, vp::load_operation::clear, false};
-        for (const unsigned n : threads)
-            result.ours.push_back(time_ours(n, how, [&](vp::cpu_backend& b) {
+    case output_kind::bits:
+        run_bits(
+            [&](vp::cpu_backend& b, auto& fb) {
                 return vp::voxelize(b, view, grid, vp::passthrough{}, vp::constant(true), fb, kind.rule);
-            }));
-        if (baseline) {
-            std::vector<std::uint32_t> plain(words.size());
-            result.baseline = bench::measure(plain_runs, [&] { bench::baseline::bits(mesh, grid, kind.rule, plain); });
-            if (plain != words) differ(mesh, kind);
-        }
+            },
+            [&](std::vector<std::uint32_t>& plain) { bench::baseline::bits(mesh, grid, kind.rule, plain); });
         break;
-    }
-    case output_kind::solid: {
-        using target = vp::target<vp::bit, blend::bit_or>;
-        std::vector<std::uint32_t> words(target::map::elements(grid.extent));
-        vp::framebuffer_view<target> fb{grid.extent, {}};
-        vp::get<0>(fb.targets) = {words.data(), grid.extent, vp::load_operation::clear, false};
-        for (const unsigned n : threads)
-            result.ours.push_back(time_ours(n, how, [&](vp::cpu_backend& b) {
+    case output_kind::solid:
+        run_bits(
+            [&](vp::cpu_backend& b, auto& fb) {
                 return vp::voxelize_solid(b, view, grid, vp::passthrough{}, vp::constant(true), fb,
                                           {.rule = kind.fill});
-            }));
-        if (baseline) {
-            std::vector<std::uint32_t> plain(words.size());
-            result.baseline = bench::measure(plain_runs, [&] { bench::baseline::solid_bits(mesh, grid, plain); });
-            if (plain != words) differ(mesh, kind);
-        }
+            },
+            [&](std::vector<std::uint32_t>& plain) { bench::baseline::solid_bits(mesh, grid, plain); });
         break;
-    }
     case output_kind::sums: {
         using target = vp::target<float, blend::add>;
         std::vector<float> values(target::map::elements(grid.extent));

@@ -6,6 +6,7 @@
 // voxel's list. Rows of voxels are then put into the grid's order. Memory is proportional to the fragments; only one
 // tile's counters per thread are dense.
 
+#include <cpu_ref/bin_triangles.hpp>
 #include <cpu_ref/tile_fragments.hpp>
 
 #include <array>
@@ -196,34 +197,25 @@ template <coverage Rule, class Key, class Scene, class Backend, class Payload>
 [[nodiscard]] status draw_abuffer(const execution& how, Backend& backend, const Scene& s,
                                   abuffer<Backend, Payload>& lists) {
     using payload = payload_storage<Payload>;
-    const core::tile_grid tiles(s.where.extent, log2_tile_size);
-    auto coarse = coarse_raster<Rule, Key>(how, s, tiles);
-    status result;
-    result.counts = coarse.counts;
-    if (coarse.code != status_code::ok) {
-        status failed = core::failure(coarse.code, stage::coarse_raster);
-        failed.counts.triangles_in = s.first_primitive.back();
-        return failed;
-    }
-    const std::vector<tile_range> ranges = tile_sort(how, coarse.pairs, tiles.count());
+    binned_triangles<Key> binned = bin_triangles<Rule, Key>(how, s);
+    if (!binned.result.ok()) return binned.result;
 
     how.enter(stage::fine_raster);
-    const unsigned workers =
-        static_cast<unsigned>(std::max<std::size_t>(1, std::min<std::size_t>(how.threads, ranges.size())));
+    const unsigned workers = binned.workers(how.threads);
     std::vector<std::unique_ptr<abuffer_scratch<payload>>> scratch;
     for (unsigned w = 0; w < workers; ++w) scratch.push_back(std::make_unique<abuffer_scratch<payload>>());
     {
         const stopwatch watch(how.times, &stage_times::fine_raster);
-        progress_meter meter(how, ranges.size());
-        parallel_for(how.threads, ranges.size(), [&](unsigned worker, std::size_t r) {
-            const tile_range& range = ranges[r];
-            bucket_tile<Rule>(s, tiles, range.tile, &coarse.pairs[range.first].primitive, sizeof(tile_pair<Key>),
+        progress_meter meter(how, binned.ranges.size());
+        parallel_for(how.threads, binned.ranges.size(), [&](unsigned worker, std::size_t r) {
+            const tile_range& range = binned.ranges[r];
+            bucket_tile<Rule>(s, binned.tiles, range.tile, &binned.pairs[range.first].primitive, sizeof(tile_pair<Key>),
                               range.last - range.first, worker, *scratch[worker]);
             meter.advance();
         });
     }
-    coarse.pairs = {};
-    return emit_lists(how, backend, s.where.extent, scratch, result, lists);
+    binned.pairs = {};
+    return emit_lists(how, backend, s.where.extent, scratch, binned.result, lists);
 }
 
 } // namespace voxelpipe::cpu

@@ -6,6 +6,7 @@
 // its targets. Blends with an accumulator format of their own (reproducible sums) use a tile of accumulators; all
 // others work in place. A shader whose values are constant is handled by constant_tile.hpp.
 
+#include <cpu_ref/bin_triangles.hpp>
 #include <cpu_ref/constant_tile.hpp>
 
 #include <array>
@@ -219,11 +220,7 @@ void raster_tiles(const execution& how, const Scene& s, const core::tile_grid& t
         }
         meter.advance();
     });
-    for (const auto& w : scratch) {
-        counts.fragments += w->counts.fragments;
-        counts.fragments_discarded += w->counts.fragments_discarded;
-        counts.voxels += w->counts.voxels;
-    }
+    add_counts(counts, scratch);
 }
 
 template <coverage Rule, class Key, class Scene, class... Targets>
@@ -253,39 +250,28 @@ void raster_constant_tiles(const execution& how, const Scene& s, const core::til
         resolve_constant_tile(lowest(box), fb, s.draws[0].fragment_shader.values, mine);
         meter.advance();
     });
-    for (const auto& w : scratch) {
-        counts.fragments += w->counts.fragments;
-        counts.voxels += w->counts.voxels;
-    }
+    add_counts(counts, scratch);
 }
 
 template <coverage Rule, class Key, class Scene, class... Targets>
 [[nodiscard]] status draw_framebuffer(const execution& how, const Scene& s, const framebuffer_view<Targets...>& fb,
                                       bool count_voxels) {
-    const core::tile_grid tiles(s.where.extent, log2_tile_size);
-    auto coarse = coarse_raster<Rule, Key>(how, s, tiles);
-    status result;
-    result.counts = coarse.counts;
-    if (coarse.code != status_code::ok) {
-        status failed = core::failure(coarse.code, stage::coarse_raster);
-        failed.counts.triangles_in = s.first_primitive.back();
-        return failed;
-    }
-    const std::vector<tile_range> ranges = tile_sort(how, coarse.pairs, tiles.count());
+    const binned_triangles<Key> binned = bin_triangles<Rule, Key>(how, s);
+    status result = binned.result;
+    if (!result.ok()) return result;
 
     how.enter(stage::fine_raster);
     if (fb.changes != nullptr)
         core::change_log::forget(fb.changes); // the targets are cleared whole, and no changes are logged
-    const unsigned workers =
-        static_cast<unsigned>(std::max<std::size_t>(1, std::min<std::size_t>(how.threads, ranges.size())));
+    const unsigned workers = binned.workers(how.threads);
     bool constant_output = false;
     if constexpr (core::is_constant<typename Scene::fragment_shader>) {
         constant_output = same_values(s);
         if (constant_output)
-            raster_constant_tiles<Rule>(how, s, tiles, ranges, coarse.pairs, workers, fb, result.counts);
+            raster_constant_tiles<Rule>(how, s, binned.tiles, binned.ranges, binned.pairs, workers, fb, result.counts);
     }
     if (!constant_output)
-        raster_tiles<Rule>(how, s, tiles, ranges, coarse.pairs, workers, fb, count_voxels, result.counts);
+        raster_tiles<Rule>(how, s, binned.tiles, binned.ranges, binned.pairs, workers, fb, count_voxels, result.counts);
     if (!count_voxels) result.counts.voxels = 0;
     return result;
 }

@@ -32,19 +32,26 @@ isolation_limits limits_for(std::uint64_t bytes, const gltf_limits& limits) {
 
 class picture_loader {
 public:
-    picture_loader(const assimp::model& source, const gltf_file_reader& read_file, gltf::budget& memory, scene& result)
-        : source_{source}, read_file_{read_file}, memory_{memory}, scene_{result} {}
+    picture_loader(const assimp::model& source, const gltf_file_reader& read_file, gltf::budget& memory, scene& result,
+                   const load_hooks& hooks)
+        : source_{source}, read_file_{read_file}, memory_{memory}, scene_{result}, hooks_{hooks} {}
+
+    // Material INDEX will show its texture. All that do are named before the first is loaded.
+    void will_show(std::size_t index) {
+        users_[key_of(source_.textures[index])].push_back(static_cast<std::uint32_t>(index));
+    }
 
     // The texture of material INDEX in the scene, or none and a warning.
     std::int32_t load(std::size_t index) {
         const assimp::texture_source& wanted = source_.textures[index];
-        const std::string key = wanted.path.empty() ? '*' + std::to_string(wanted.embedded) : wanted.path;
+        const std::string key = key_of(wanted);
         auto found = images_.find(key);
         if (found == images_.end()) {
             std::int32_t image = material::no_texture;
             try {
                 picture decoded = decode(wanted);
                 decoded.name = gltf::printable(key);
+                if (hooks_.picture) hooks_.picture(scene_, decoded, users_[key]);
                 image = static_cast<std::int32_t>(scene_.images.size());
                 scene_.images.push_back(std::move(decoded));
             } catch (const model_error& error) {
@@ -63,6 +70,10 @@ public:
     }
 
 private:
+    static std::string key_of(const assimp::texture_source& wanted) {
+        return wanted.path.empty() ? '*' + std::to_string(wanted.embedded) : wanted.path;
+    }
+
     picture decode(const assimp::texture_source& wanted) const {
         if (wanted.path.empty()) {
             const assimp::embedded_picture& embedded = source_.embedded[static_cast<std::size_t>(wanted.embedded)];
@@ -94,22 +105,29 @@ private:
     const gltf_file_reader& read_file_;
     gltf::budget& memory_;
     scene& scene_;
+    const load_hooks& hooks_;
     std::map<std::string, std::int32_t> images_;
+    std::map<std::string, std::vector<std::uint32_t>> users_; // the materials that show each picture
 };
 
-scene to_scene(assimp::model source, const gltf_file_reader& read_file, gltf::budget& memory) {
+scene to_scene(assimp::model source, const gltf_file_reader& read_file, gltf::budget& memory, const load_hooks& hooks) {
     scene result;
     result.warnings = std::move(source.warnings);
-    picture_loader pictures{source, read_file, memory, result};
-    std::vector<bool> shown(source.materials.size());
-    for (const instance& one : source.instances) shown[source.primitives[one.primitive].material] = true;
-    for (std::size_t i = 0; i < source.materials.size(); ++i)
-        if (shown[i] && source.textures[i].is_there()) source.materials[i].texture = pictures.load(i);
-    for (primitive& part : source.primitives)
-        if (source.materials[part.material].texture == material::no_texture) part.texcoords.clear();
     result.primitives = std::move(source.primitives);
     result.instances = std::move(source.instances);
     result.materials = std::move(source.materials);
+    if (hooks.geometry) hooks.geometry(result);
+    picture_loader pictures{source, read_file, memory, result, hooks};
+    std::vector<bool> shown(result.materials.size());
+    for (const instance& one : result.instances) {
+        const std::uint32_t index = result.primitives[one.primitive].material;
+        if (!shown[index] && source.textures[index].is_there()) pictures.will_show(index);
+        shown[index] = true;
+    }
+    for (std::size_t i = 0; i < result.materials.size(); ++i)
+        if (shown[i] && source.textures[i].is_there()) result.materials[i].texture = pictures.load(i);
+    for (primitive& part : result.primitives)
+        if (result.materials[part.material].texture == material::no_texture) part.texcoords.clear();
     return result;
 }
 
@@ -120,7 +138,7 @@ bool is_for_assimp(const std::string& extension) {
 }
 
 scene load_by_assimp(std::span<const std::byte> bytes, const std::string& name, const gltf_file_reader& read_file,
-                     const gltf_limits& limits) {
+                     const gltf_limits& limits, const load_hooks& hooks) {
     if (bytes.empty()) throw model_error("the file is empty");
     gltf::budget memory{limits};
     memory.grant_input(bytes.size());
@@ -134,12 +152,12 @@ scene load_by_assimp(std::span<const std::byte> bytes, const std::string& name, 
         throw;
     }
     memory.charge(reply.size(), 1, "the model");
-    return to_scene(assimp::from_bytes(reply), read_file, memory);
+    return to_scene(assimp::from_bytes(reply), read_file, memory, hooks);
 }
 
-scene load_by_assimp(const std::filesystem::path& file, const gltf_limits& limits) {
+scene load_by_assimp(const std::filesystem::path& file, const gltf_limits& limits, const load_hooks& hooks) {
     const std::vector<std::byte> bytes = gltf::read_whole_file(file, limits.max_file_bytes);
-    return load_by_assimp(bytes, file.filename().string(), gltf::folder_reader(file.parent_path()), limits);
+    return load_by_assimp(bytes, file.filename().string(), gltf::folder_reader(file.parent_path()), limits, hooks);
 }
 
 } // namespace voxelize

@@ -36,7 +36,7 @@ tinygltf::Model parse(const gltf::checked_document& document) {
 }
 
 void load(scene& result, std::span<const std::byte> bytes, const gltf_file_reader& read_file, const gltf_limits& limits,
-          const gltf_options& options) {
+          const gltf_options& options, const load_hooks& hooks) {
     gltf::leniency tolerance{options.lenient, result.warnings};
     gltf::budget memory{limits};
     memory.grant_input(bytes.size());
@@ -55,6 +55,8 @@ void load(scene& result, std::span<const std::byte> bytes, const gltf_file_reade
     for (const gltf::shown_mesh& shown : shown_scene.meshes)
         for (std::size_t part = 0; part < model.meshes[shown.mesh].primitives.size(); ++part)
             primitives.show(shown, part);
+    if (hooks.geometry) hooks.geometry(result);
+    materials.read_textures(hooks);
     primitives.finish();
     tolerance.finish();
 }
@@ -62,14 +64,14 @@ void load(scene& result, std::span<const std::byte> bytes, const gltf_file_reade
 } // namespace
 
 scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_file, const gltf_limits& limits,
-                const gltf_options& options) {
+                const gltf_options& options, const load_hooks& hooks) {
     scene result;
     const auto fail = [&](gltf_error error) {
         error.warnings = std::move(result.warnings);
         throw error;
     };
     try {
-        load(result, bytes, read_file, limits, options);
+        load(result, bytes, read_file, limits, options, hooks);
     } catch (const gltf_error& error) {
         fail(error);
     } catch (const std::bad_alloc&) { // an honest file that does not fit
@@ -80,9 +82,10 @@ scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_f
     return result;
 }
 
-scene load_gltf(const std::filesystem::path& file, const gltf_limits& limits, const gltf_options& options) {
+scene load_gltf(const std::filesystem::path& file, const gltf_limits& limits, const gltf_options& options,
+                const load_hooks& hooks) {
     const gltf::mapped_file mapped(file, limits.max_file_bytes);
-    return load_gltf(mapped.bytes(), gltf::folder_reader(file.parent_path()), limits, options);
+    return load_gltf(mapped.bytes(), gltf::folder_reader(file.parent_path()), limits, options, hooks);
 }
 
 } // namespace voxelize

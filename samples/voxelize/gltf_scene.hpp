@@ -70,10 +70,11 @@ using gltf_file_reader =
 // Loads FILE; a .gltf finds its buffers and images in its own folder or below it. Throws gltf_error, and std::bad_alloc
 // where a file whose claims are in order does not fit into memory.
 [[nodiscard]] scene load_gltf(const std::filesystem::path& file, const gltf_limits& limits = {},
-                              const gltf_options& options = {});
+                              const gltf_options& options = {}, const load_hooks& hooks = {});
 
 // The same from memory. Without a reader a file that names other files is refused.
 [[nodiscard]] scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_file = {},
-                              const gltf_limits& limits = {}, const gltf_options& options = {});
+                              const gltf_limits& limits = {}, const gltf_options& options = {},
+                              const load_hooks& hooks = {});
 
 } // namespace voxelize

@@ -6,6 +6,7 @@
 #include "cuda_device.hpp"
 #include "exit_code.hpp"
 #include "model_file.hpp"
+#include "picture_levels.hpp"
 #include "report.hpp"
 #include "sparse/sparse_formats.hpp"
 #include "sparse/sparse_voxelizer.hpp"
@@ -85,7 +86,9 @@ void run(const command_line& options, clock::time_point begin) {
 
     auto start = clock::now();
     report.request.cuda = start_cuda(options);
-    scene model = load_model(options.input, options.load);
+    load_options load = options.load;
+    load.picture_hook = picture_reducer{options.grid, options.voxelize};
+    scene model = load_model(options.input, load);
     report.warnings = options.warnings;
     report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
     report.vertices = model.vertex_count();

@@ -55,16 +55,39 @@ struct cover {
     }
 };
 
+// The mean of four texels, rounded as by the weights of `halved`: these are equal, so they cancel.
+texel16 mean_of_four(const std::array<texel16, 4>& texels, bool by_alpha) {
+    std::uint32_t sums[4] = {};
+    std::uint64_t shown[3] = {};
+    for (const texel16& texel : texels) {
+        for (int c = 0; c < 4; ++c) sums[c] += texel[c];
+        for (int c = 0; c < 3; ++c) shown[c] += std::uint64_t{texel.a} * texel[c];
+    }
+    texel16 out;
+    for (int c = 0; c < 4; ++c) out[c] = static_cast<std::uint16_t>((sums[c] + 2) / 4);
+    if (by_alpha && sums[3] != 0)
+        for (int c = 0; c < 3; ++c) out[c] = static_cast<std::uint16_t>((shown[c] + sums[3] / 2) / sums[3]);
+    return out;
+}
+
 // READ(x, y) gives the texel16s of a picture of `width` x `height`; the result is one level smaller. Sums fit: weights
 // add up to less than 2^28, a colour times an alpha is less than 2^32.
 template <class Read>
 std::vector<texel16> halved(std::uint32_t width, std::uint32_t height, bool by_alpha, int threads, const Read& read) {
     const std::uint32_t w = std::max(width / 2, 1U), h = std::max(height / 2, 1U);
     std::vector<texel16> result(std::size_t{w} * h);
+    const bool even = width % 2 == 0 && height % 2 == 0;
     constexpr std::uint32_t rows = 16;
     parallel_for((h + rows - 1) / rows, threads, [&](std::size_t block) {
         const auto from = static_cast<std::uint32_t>(block) * rows;
         for (std::uint32_t y = from; y < std::min(h, from + rows); ++y) {
+            if (even) {
+                for (std::uint32_t x = 0; x < w; ++x)
+                    result[std::size_t{y} * w + x] = mean_of_four({read(2 * x, 2 * y), read(2 * x + 1, 2 * y),
+                                                                   read(2 * x, 2 * y + 1), read(2 * x + 1, 2 * y + 1)},
+                                                                  by_alpha);
+                continue;
+            }
             const cover down(y, height, h);
             for (std::uint32_t x = 0; x < w; ++x) {
                 const cover across(x, width, w);
@@ -96,34 +119,38 @@ int mip_level_count(std::uint32_t width, std::uint32_t height) {
     return levels;
 }
 
-std::vector<glm::u8vec4> with_mip_levels(const picture& source, bool by_alpha, int threads) {
+std::vector<glm::u8vec4> with_mip_levels(const picture& source, bool by_alpha, int threads, int first) {
     static const converter convert;
     std::uint32_t width = source.width, height = source.height;
-    std::size_t total = 0;
-    for (int level = mip_level_count(width, height); level > 0; --level) {
-        total += std::size_t{width} * height;
+    const auto next_size = [&] {
         width = std::max(width / 2, 1U);
         height = std::max(height / 2, 1U);
-    }
+    };
+    const int count = mip_level_count(width, height);
+    std::size_t total = 0;
+    for (int level = 0; level < count; ++level, next_size())
+        if (level >= first) total += std::size_t{width} * height;
     std::vector<glm::u8vec4> texels;
     texels.reserve(total);
-    texels.resize(source.rgba.size() / 4);
-    std::memcpy(texels.data(), source.rgba.data(), source.rgba.size());
+    if (first == 0) {
+        texels.resize(source.rgba.size() / 4);
+        std::memcpy(texels.data(), source.rgba.data(), source.rgba.size());
+    }
 
     width = source.width;
     height = source.height;
-    std::vector<texel16> level;
-    while (width > 1 || height > 1) {
-        if (level.empty())
-            level = halved(width, height, by_alpha, threads, [&](std::uint32_t x, std::uint32_t y) {
-                return convert.widen(texels[std::size_t{y} * width + x]);
-            });
-        else
-            level = halved(width, height, by_alpha, threads,
-                           [&](std::uint32_t x, std::uint32_t y) { return level[std::size_t{y} * width + x]; });
-        width = std::max(width / 2, 1U);
-        height = std::max(height / 2, 1U);
-        for (const texel16& t : level) texels.push_back(convert.narrow(t));
+    std::vector<texel16> made;
+    for (int level = 1; level < count; ++level, next_size()) {
+        const auto from_picture = [&](std::uint32_t x, std::uint32_t y) {
+            glm::u8vec4 texel;
+            std::memcpy(&texel, source.rgba.data() + 4 * (std::size_t{y} * width + x), sizeof(texel));
+            return convert.widen(texel);
+        };
+        const auto from_level = [&](std::uint32_t x, std::uint32_t y) { return made[std::size_t{y} * width + x]; };
+        made = level == 1 ? halved(width, height, by_alpha, threads, from_picture)
+                          : halved(width, height, by_alpha, threads, from_level);
+        if (level < first) continue;
+        for (const texel16& t : made) texels.push_back(convert.narrow(t));
     }
     return texels;
 }

@@ -7,7 +7,10 @@
 #include "gltf_scene.hpp"
 #include "scene.hpp"
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <vector>
 
 namespace voxelize {
 
@@ -15,6 +18,8 @@ struct load_options {
     gltf_limits limits;
     gltf_options gltf;
     double scale = 1; // multiplies all lengths, about the origin; finite and positive
+    // Called with each picture as it is decoded; see load_hooks.
+    std::function<void(const scene&, picture&, const std::vector<std::uint32_t>& materials)> picture_hook;
 };
 
 // Throws model_error, and std::bad_alloc where an honest file does not fit into memory.

@@ -19,6 +19,7 @@
 #include <atomic>
 #include <bitset>
 #include <chrono>
+#include <cstring>
 #include <memory>
 #include <span>
 #include <string>
@@ -229,32 +230,36 @@ protected: // sparse_pipeline draws the same into bricks
 
     // ---- upload ----------------------------------------------------------------------------------------------------
 
-    [[nodiscard]] alpha_mode alpha_of(const material& m) const {
-        if (m.alpha != alpha_mode::blend || request_.alpha == blend_alpha::weight) return m.alpha;
-        return request_.alpha == blend_alpha::cutoff ? alpha_mode::mask : alpha_mode::opaque;
-    }
     [[nodiscard]] bool shades() const {
         return wants(target::color) || wants(target::color_max) || wants(target::color_replace) ||
                wants(target::color_outer);
     }
 
     // Each picture as its materials need it: colours by alpha where that counts, alone where none of them is opaque.
+    // Levels that the loader has made are taken as they are.
     void upload_pictures(scene& model) {
         const auto texels_for = [&](picture& source, bool by_alpha) {
-            std::vector<buffer<glm::u8vec4>> texels;
-            if (shades()) {
-                texels.push_back({backend_, with_mip_levels(source, by_alpha, thread_count(request_.threads))});
-            } else {
-                const auto* const rgba = reinterpret_cast<const glm::u8vec4*>(source.rgba.data());
-                texels.push_back({backend_, std::span<const glm::u8vec4>{rgba, source.rgba.size() / 4}});
+            std::vector<stored<glm::u8vec4>> texels;
+            std::vector<glm::u8vec4>& levels = source.levels[by_alpha ? 1 : 0];
+            if (!levels.empty()) {
+                texels.push_back({backend_, levels});
+                return texels;
             }
+            std::vector<glm::u8vec4> made;
+            if (shades()) {
+                made = with_mip_levels(source, by_alpha, thread_count(request_.threads));
+            } else {
+                made.resize(source.rgba.size() / 4);
+                std::memcpy(made.data(), source.rgba.data(), source.rgba.size());
+            }
+            texels.push_back({backend_, made});
             return texels;
         };
         std::vector<std::array<bool, 2>> needed(model.images.size()); // without and with the weight of alpha
         for (const material& m : model.materials)
             if (m.texture != material::no_texture)
                 needed[model.textures[static_cast<std::size_t>(m.texture)].image]
-                      [alpha_of(m) != alpha_mode::opaque ? 1 : 0] = true;
+                      [alpha_of(m, request_.alpha) != alpha_mode::opaque ? 1 : 0] = true;
         pictures_.resize(model.images.size());
         for (std::size_t image = 0; image < model.images.size(); ++image) {
             picture& source = model.images[image];
@@ -270,11 +275,13 @@ protected: // sparse_pipeline draws the same into bricks
         sampled_texture result;
         if (m.texture == material::no_texture) return result;
         const texture& source = model.textures[static_cast<std::size_t>(m.texture)];
-        result.texels = pictures_[source.image].texels[alpha_of(m) != alpha_mode::opaque ? 1 : 0].front().data();
-        if (shades())
-            result.levels = mip_level_count(model.images[source.image].width, model.images[source.image].height);
-        result.width = static_cast<int>(model.images[source.image].width);
-        result.height = static_cast<int>(model.images[source.image].height);
+        const std::size_t by_alpha = alpha_of(m, request_.alpha) != alpha_mode::opaque ? 1 : 0;
+        result.texels = pictures_[source.image].texels[by_alpha].front().data();
+        const picture& image = model.images[source.image];
+        if (shades()) result.levels = mip_level_count(image.width, image.height);
+        result.first_level = image.first_level;
+        result.width = static_cast<int>(image.width);
+        result.height = static_cast<int>(image.height);
         result.wrap_s = source.wrap_s;
         result.wrap_t = source.wrap_t;
         result.filter = source.filter;
@@ -336,7 +343,7 @@ protected: // sparse_pipeline draws the same into bricks
         if (textured) shader.texture = texture_of(m, model);
         shader.tables = tables_.front().data();
         shader.base_color = m.base_color;
-        shader.alpha = alpha_of(m);
+        shader.alpha = alpha_of(m, request_.alpha);
         shader.alpha_cutoff = m.alpha == alpha_mode::blend ? 0.5F : m.alpha_cutoff;
         shader.centers = {relative_grid_.origin, relative_grid_.voxel_size};
         shader.depth_axis = request_.depth_axis;
@@ -704,7 +711,7 @@ protected: // sparse_pipeline draws the same into bricks
     // The scene in the backend's memory; draws point into it.
     std::vector<buffer<color_tables>> tables_;
     struct uploaded_picture {
-        std::vector<buffer<glm::u8vec4>> texels[2]; // none or one: colours alike, colours by alpha
+        std::vector<stored<glm::u8vec4>> texels[2]; // none or one: colours alike, colours by alpha
     };
     std::vector<uploaded_picture> pictures_;
     struct uploaded_primitive {

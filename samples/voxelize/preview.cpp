@@ -76,21 +76,9 @@ image render(const volume& v, const preview_scene& scene, const channel* colors,
     image picture{options.width, options.height, options.backdrop.transparent ? 4 : 3, {}};
     const auto row_bytes = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.components);
     picture.pixels.resize(row_bytes * static_cast<std::size_t>(picture.height));
-    // Bands of rows: each is rendered by itself, so the pixels do not depend on who renders it, and memory stays small.
-    const int band_rows = std::clamp(options.height / (4 * threads), 8, 64);
-    const auto bands = static_cast<std::size_t>((options.height + band_rows - 1) / band_rows);
-    parallel_for(
-        bands, threads,
-        [&](std::size_t band) {
-            const int from = static_cast<int>(band) * band_rows;
-            const int to = std::min(from + band_rows, options.height);
-            shader.render_rows(from, to, picture.components,
-                               picture.pixels.data() + row_bytes * static_cast<std::size_t>(from));
-        },
-        [&](std::size_t finished) {
-            if (progress) progress(static_cast<double>(finished) / static_cast<double>(bands));
-        });
-    if (progress) progress(1.0);
+    shader.render(picture.components, picture.pixels.data(), threads, [&](int rows) {
+        if (progress) progress(static_cast<double>(rows) / options.height);
+    });
     return picture;
 }
 

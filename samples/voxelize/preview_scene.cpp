@@ -13,132 +13,20 @@
 
 namespace voxelize {
 
-namespace {
-
-constexpr std::int64_t most_voxels = std::int64_t{1} << 30; // indices and their multiples of 64 stay in 32 bits
-
-// Every third bit of a Morton key, from bit `axis` on.
-std::int32_t coordinate_of(std::uint64_t key, int axis) {
-    std::uint32_t n = 0;
-    key >>= axis;
-    for (unsigned bit = 0; key != 0; ++bit, key >>= 3) n |= static_cast<std::uint32_t>(key & 1u) << bit;
-    return static_cast<std::int32_t>(n);
-}
-
-// The Morton number of a voxel within its brick.
-unsigned bit_of(std::int32_t x, std::int32_t y, std::int32_t z) {
-    constexpr std::array<unsigned, 8> spread{0, 1, 8, 9, 64, 65, 72, 73};
-    return spread[static_cast<std::size_t>(x & 7)] | spread[static_cast<std::size_t>(y & 7)] << 1 |
-           spread[static_cast<std::size_t>(z & 7)] << 2;
-}
-
-} // namespace
-
-preview_scene::preview_scene(const volume& v, const preview_bricks& bricks) : is_sparse_(true), sparse_(bricks) {
-    std::size_t num_nodes = 1;
-    for (std::size_t a = 0; a < 3; ++a) {
-        if (v.extent[a] > most_voxels)
-            throw std::invalid_argument("the preview draws at most 2^30 voxels along an axis");
-        extent_[a] = static_cast<std::int32_t>(v.extent[a]);
-        coarse_size_[a] = (extent_[a] + 63) / 64;
-        num_nodes *= static_cast<std::size_t>(coarse_size_[a]);
-    }
-    if (bricks.count >= UINT32_MAX - first_brick)
-        throw std::invalid_argument("the preview draws fewer than 2^32 - 3 bricks");
-    nodes_.resize(num_nodes);
-    bricks_.resize(bricks.count + first_brick);
-    low_ = extent_;
-    std::vector<std::size_t> layers(static_cast<std::size_t>((extent_[2] + 7) / 8) + 1);
-    for (std::uint32_t b = 0; b < bricks.count; ++b) {
-        const int3 at = brick_position(b);
-        std::uint32_t& node = nodes_[flag_index(coarse_size_, at[0] / 8, at[1] / 8, at[2] / 8)];
-        if (node == 0) {
-            tables_.resize(tables_.size() + 512, empty_brick);
-            node = static_cast<std::uint32_t>(tables_.size() / 512);
-        }
-        tables_[std::size_t{node - 1} * 512 + static_cast<std::size_t>((at[2] % 8 * 8 + at[1] % 8) * 8 + at[0] % 8)] =
-            b + first_brick;
-        ++layers[static_cast<std::size_t>(at[2]) + 1];
-        const std::uint64_t* const words = bricks.masks + std::size_t{b} * 8;
-        brick& rows = bricks_[b + first_brick];
-        for (std::int32_t z = 0; z < 8; ++z)
-            for (std::int32_t y = 0; y < 8; ++y)
-                for (std::int32_t x = 0; x < 8; ++x) {
-                    const unsigned bit = bit_of(x, y, z);
-                    if ((words[bit / 64] >> bit % 64 & 1u) == 0) continue;
-                    rows[static_cast<std::size_t>(z)] |= std::uint64_t{1} << (8 * y + x);
-                    const int3 voxel{8 * at[0] + x, 8 * at[1] + y, 8 * at[2] + z};
-                    for (std::size_t a = 0; a < 3; ++a) {
-                        low_[a] = std::min(low_[a], voxel[a]);
-                        high_[a] = std::max(high_[a], voxel[a] + 1);
-                    }
-                }
-    }
-    for (std::size_t z = 1; z < layers.size(); ++z) layers[z] += layers[z - 1];
-    by_layer_.resize(bricks.count);
-    for (std::uint32_t b = 0; b < bricks.count; ++b)
-        by_layer_[layers[static_cast<std::size_t>(brick_position(b)[2])]++] = b;
-}
-
-preview_scene::int3 preview_scene::brick_position(std::uint32_t brick) const {
-    const std::uint64_t key = sparse_.keys[brick];
-    return {coordinate_of(key, 0), coordinate_of(key, 1), coordinate_of(key, 2)};
-}
-
-std::uint32_t preview_scene::number_of(const int3& cell, bool& far_off) const {
-    const std::size_t coarse = flag_index(coarse_size_, cell[0] >> 6, cell[1] >> 6, cell[2] >> 6);
-    if (!is_sparse_) {
-        far_off = coarse_[coarse] == 0;
-        return far_off ? empty_brick : fine_[flag_index(fine_size_, cell[0] >> 3, cell[1] >> 3, cell[2] >> 3)];
-    }
-    const std::uint32_t node = nodes_[coarse];
-    far_off = node == 0;
-    if (far_off) return empty_brick;
-    const std::int32_t at = ((cell[2] >> 3 & 7) * 8 + (cell[1] >> 3 & 7)) * 8 + (cell[0] >> 3 & 7);
-    return tables_[std::size_t{node - 1} * 512 + static_cast<std::size_t>(at)];
-}
-
-void preview_scene::add_row_ends(std::uint32_t brick, std::vector<std::int32_t>& first,
-                                 std::vector<std::int32_t>& last) const {
-    const int3 at = brick_position(brick);
-    for (std::int32_t z = 0; z < 8; ++z)
-        for (std::int32_t y = 0; y < 8; ++y) {
-            const auto row = static_cast<std::uint32_t>(
-                bricks_[brick + first_brick][static_cast<std::size_t>(z)] >> (8 * y) & 0xffu);
-            if (row == 0) continue;
-            const std::size_t n = static_cast<std::size_t>(8 * at[1] + y) * 8 + static_cast<std::size_t>(z);
-            first[n] = std::min(first[n], 8 * at[0] + std::countr_zero(row));
-            last[n] = std::max(last[n], 8 * at[0] + 31 - std::countl_zero(row));
-        }
-}
-
-std::uint64_t preview_scene::rank_of(const int3& voxel) const {
-    bool far_off;
-    const std::uint32_t brick = number_of(voxel, far_off) - first_brick;
-    const unsigned bit = bit_of(voxel[0], voxel[1], voxel[2]);
-    const std::uint64_t* const words = sparse_.masks + std::size_t{brick} * 8;
-    std::uint64_t rank = sparse_.offsets[brick];
-    for (unsigned w = 0; w < bit / 64; ++w) rank += static_cast<std::uint64_t>(std::popcount(words[w]));
-    return rank + static_cast<std::uint64_t>(std::popcount(words[bit / 64] & ((std::uint64_t{1} << bit % 64) - 1)));
-}
-
 preview_scene::preview_scene(const volume& v, int threads) {
     const channel& bits = *v.occupancy();
     bits_ = bits.data.data();
     row_bytes_ = v.words_per_row() * 4;
     slice_bytes_ = row_bytes_ * v.extent[1];
-    std::size_t num_fine = 1, num_coarse = 1;
+    std::size_t num_fine = 1;
     for (std::size_t a = 0; a < 3; ++a) {
-        if (v.extent[a] > most_voxels)
+        if (v.extent[a] > max_extent)
             throw std::invalid_argument("the preview draws at most 2^30 voxels along an axis");
         extent_[a] = static_cast<std::int32_t>(v.extent[a]);
         fine_size_[a] = (extent_[a] + 7) / 8;
-        coarse_size_[a] = (extent_[a] + 63) / 64;
         num_fine *= static_cast<std::size_t>(fine_size_[a]);
-        num_coarse *= static_cast<std::size_t>(coarse_size_[a]);
     }
     fine_.resize(num_fine);
-    coarse_.resize(num_coarse);
 
     low_ = extent_;
     std::mutex merging;
@@ -158,12 +46,43 @@ preview_scene::preview_scene(const volume& v, int threads) {
                 std::uint32_t& number = fine_[flag_index(fine_size_, i, j, k)];
                 if (number == empty_brick) continue;
                 if (number != full_brick) number = num_bricks++;
-                coarse_[flag_index(coarse_size_, i / 8, j / 8, k / 8)] = 1;
             }
     bricks_.resize(num_bricks);
     bricks_[full_brick].fill(~std::uint64_t{0});
     parallel_for(static_cast<std::size_t>(fine_size_[2]), threads,
                  [&](std::size_t layer) { fill_layer(static_cast<std::int32_t>(layer)); });
+    measure_distances(threads);
+}
+
+// Along one axis after the other: the distance in a plane is the least, over the cells of a line, of the greater of the
+// step along the line and the distance found so far.
+void preview_scene::measure_distances(int threads) {
+    constexpr auto most = static_cast<std::uint8_t>(max_distance);
+    std::vector<std::uint8_t> before(fine_.size()), after(fine_.size());
+    for (std::size_t i = 0; i < fine_.size(); ++i) before[i] = fine_[i] == empty_brick ? most : 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::ptrdiff_t stride = axis == 0   ? 1
+                                      : axis == 1 ? fine_size_[0]
+                                                  : std::ptrdiff_t{fine_size_[0]} * fine_size_[1];
+        const std::int32_t length = fine_size_[axis];
+        parallel_for(static_cast<std::size_t>(fine_size_[2]), threads, [&](std::size_t layer) {
+            int3 at{0, 0, static_cast<std::int32_t>(layer)};
+            std::size_t i = flag_index(fine_size_, 0, 0, at[2]);
+            for (at[1] = 0; at[1] < fine_size_[1]; ++at[1])
+                for (at[0] = 0; at[0] < fine_size_[0]; ++at[0], ++i) {
+                    const std::uint8_t* const here = before.data() + i;
+                    std::uint8_t least = *here;
+                    for (std::uint8_t step = 1; step < least; ++step) {
+                        if (at[axis] >= step) least = std::min(least, std::max(step, here[-step * stride]));
+                        if (at[axis] + step < length) least = std::min(least, std::max(step, here[step * stride]));
+                    }
+                    after[i] = least;
+                }
+        });
+        before.swap(after);
+    }
+    for (std::size_t i = 0; i < fine_.size(); ++i)
+        if (before[i] != 0) fine_[i] = no_brick + before[i];
 }
 
 // Which bricks of a layer are empty, full or neither (any other number), and the bounds of its voxels.
@@ -219,7 +138,35 @@ void preview_scene::fill_layer(std::int32_t layer) {
         }
 }
 
+template <bool Sparse>
+const std::array<std::uint64_t, 8>* preview_scene::brick_at(const int3& cell, int3& from, int3& end) const {
+    if constexpr (Sparse) {
+        bool far_off;
+        const std::uint32_t number = number_of(cell, far_off);
+        if (number != empty_brick) return &bricks_[number];
+        const int level = far_off ? 6 : 3;
+        for (std::size_t a = 0; a < 3; ++a) {
+            from[a] = cell[a] >> level << level;
+            end[a] = from[a] + (1 << level);
+        }
+    } else {
+        const std::uint32_t number = fine_[flag_index(fine_size_, cell[0] >> 3, cell[1] >> 3, cell[2] >> 3)];
+        if (number < no_brick) return &bricks_[number];
+        const auto distance = static_cast<std::int32_t>(number - no_brick);
+        for (std::size_t a = 0; a < 3; ++a) {
+            from[a] = std::max(((cell[a] >> 3) + 1 - distance) << 3, 0);
+            end[a] = ((cell[a] >> 3) + distance) << 3;
+        }
+    }
+    return nullptr;
+}
+
 ray_hit preview_scene::first_hit(const vec3& origin, const vec3& direction, double limit) const {
+    return is_sparse_ ? walk<true>(origin, direction, limit) : walk<false>(origin, direction, limit);
+}
+
+template <bool Sparse>
+ray_hit preview_scene::walk(const vec3& origin, const vec3& direction, double limit) const {
     // Enter the bounds: the cell on the way in lies behind the side that is met last. An axis along which the ray does
     // not move gets an inverse so large that its sides never come next.
     double t = 0;
@@ -255,13 +202,13 @@ ray_hit preview_scene::first_hit(const vec3& origin, const vec3& direction, doub
     int3 cell{};
     for (std::size_t a = 0; a < 3; ++a) cell[a] = cell_at(a, low_[a], high_[a] - 1);
 
-    // Leaves the cube of side 2^level around the cell through the side that comes first. Each t is computed from the
-    // side itself, so no error adds up, and the cell always advances along one axis, so the walk ends.
+    // Leaves a box around the cell through the side that comes first. Each t is computed from the side itself, so no
+    // error adds up, and the cell always advances along one axis, so the walk ends.
     int3 side{};
     vec3 next{};
-    const auto aim = [&](std::size_t a, int level) {
-        side[a] = ((cell[a] >> level) + ahead[a]) << level;
-        next[a] = (side[a] - origin[a]) * inverse[a];
+    const auto aim = [&](std::size_t a, std::int32_t at) {
+        side[a] = at;
+        next[a] = (at - origin[a]) * inverse[a];
     };
     const auto advance = [&] {
         axis = next[1] < next[0] ? 1 : 0;
@@ -270,29 +217,24 @@ ray_hit preview_scene::first_hit(const vec3& origin, const vec3& direction, doub
         return next[axis] < t_end; // equal: the side is one of the bounds
     };
     while (true) {
-        bool far_off;
-        const std::uint32_t number = number_of(cell, far_off);
-        if (number == empty_brick) {
-            const int level = far_off ? 6 : 3;
-            for (std::size_t a = 0; a < 3; ++a) aim(a, level);
+        int3 from{}, end{};
+        const brick* const voxels = brick_at<Sparse>(cell, from, end);
+        if (voxels == nullptr) {
+            for (std::size_t a = 0; a < 3; ++a) aim(a, ahead[a] != 0 ? end[a] : from[a]);
             if (!advance()) return {};
-            for (std::size_t a = 0; a < 3; ++a) {
-                const std::int32_t from = cell[a] >> level << level;
-                cell[a] = cell_at(a, from, std::min(from + (1 << level), extent_[a]) - 1);
-            }
+            for (std::size_t a = 0; a < 3; ++a) cell[a] = cell_at(a, from[a], std::min(end[a], extent_[a]) - 1);
             cell[axis] = side[axis] + ahead[axis] - 1;
         } else { // voxel by voxel to the end of the brick; only the axis that was crossed changes
-            const brick& voxels = bricks_[number];
-            for (std::size_t a = 0; a < 3; ++a) aim(a, 0);
+            for (std::size_t a = 0; a < 3; ++a) aim(a, cell[a] + ahead[a]);
             std::int32_t crossed;
             do {
-                const std::uint64_t layer = voxels[static_cast<std::size_t>(cell[2] & 7)];
+                const std::uint64_t layer = (*voxels)[static_cast<std::size_t>(cell[2] & 7)];
                 if ((layer >> (8 * (cell[1] & 7) + (cell[0] & 7)) & 1u) != 0)
                     return {t, cell, static_cast<int>(axis), direction[axis] < 0};
                 if (!advance()) return {};
                 crossed = cell[axis];
                 cell[axis] = side[axis] + ahead[axis] - 1;
-                aim(axis, 0);
+                aim(axis, cell[axis] + ahead[axis]);
             } while (crossed >> 3 == cell[axis] >> 3);
         }
     }
@@ -339,6 +281,12 @@ std::uint32_t preview_scene::window(std::int32_t i, std::int32_t j, std::int32_t
 
 vec3 preview_scene::surface_normal(const int3& voxel, const vec3& viewer, const vec3& voxel_size) const {
     constexpr int reach = 3, side = 2 * reach + 1, padded = side + 2;
+    // Processors without an instruction for it count bits by a call.
+    static constexpr auto ones = [] {
+        std::array<std::uint8_t, std::size_t{1} << side> table{};
+        for (std::size_t i = 1; i < table.size(); ++i) table[i] = static_cast<std::uint8_t>(table[i / 2] + i % 2);
+        return table;
+    }();
     constexpr std::uint32_t inner = ((1u << side) - 1) << 1; // without the one voxel of padding at either end
     std::array<std::array<std::uint32_t, padded>, padded> rows{};
     for (int z = 0; z < padded; ++z)
@@ -356,9 +304,9 @@ vec3 preview_scene::surface_normal(const int3& voxel, const vec3& viewer, const 
             const std::uint32_t here = row(0, 0) & inner;
             if (here == 0) continue;
             const std::uint32_t beside = viewer[0] > 0 ? row(0, 0) >> 1 : row(0, 0) << 1;
-            faces[0] += std::popcount(here & ~beside);
-            faces[1] += std::popcount(here & ~row(step_y, 0));
-            faces[2] += std::popcount(here & ~row(0, step_z));
+            faces[0] += ones[(here & ~beside) >> 1];
+            faces[1] += ones[(here & ~row(step_y, 0)) >> 1];
+            faces[2] += ones[(here & ~row(0, step_z)) >> 1];
         }
     vec3 normal{};
     for (std::size_t a = 0; a < 3; ++a) {

@@ -3,9 +3,9 @@
 #pragma once
 
 // The occupied voxels as something that rays can hit: bricks of 8^3 voxels, 64 bytes each and only where there are any,
-// found through a table, and above it a flag for each 64^3 voxels, so that empty space is crossed in large steps and a
-// ray reads little memory. They come from packed bits, or from bricks of a sparse grid, whose table has a part for each
-// 64^3 voxels that has any. Internal to the preview.
+// found through a table. An entry without a brick says how far the next brick is, so that empty space is crossed in
+// large steps and a ray reads little memory. They come from packed bits, or from bricks of a sparse grid, whose table
+// has a part for each 64^3 voxels that has any, and no distances. Internal to the preview.
 
 #include "volume.hpp"
 
@@ -86,6 +86,9 @@ public:
     }
 
 private:
+    // Voxels along an axis: indices and their multiples of 64 stay in 32 bits.
+    static constexpr std::int64_t max_extent = std::int64_t{1} << 30;
+
     using int3 = std::array<std::int32_t, 3>;
 
     static std::size_t flag_index(const int3& size, std::int32_t i, std::int32_t j, std::int32_t k) {
@@ -114,8 +117,20 @@ private:
     }
     void add_row_ends(std::uint32_t brick, std::vector<std::int32_t>& first, std::vector<std::int32_t>& last) const;
     [[nodiscard]] int3 brick_position(std::uint32_t brick) const;
-    // The number in bricks_ of a voxel's brick; far_off: there is none within 64^3 voxels.
-    [[nodiscard]] std::uint32_t number_of(const int3& cell, bool& far_off) const;
+    // The number in bricks_ of a voxel's brick, of a sparse grid; far_off: there is none within 64^3 voxels.
+    [[nodiscard]] std::uint32_t number_of(const int3& cell, bool& far_off) const {
+        const std::uint32_t node = nodes_[flag_index(coarse_size_, cell[0] >> 6, cell[1] >> 6, cell[2] >> 6)];
+        far_off = node == 0;
+        if (far_off) return empty_brick;
+        const std::int32_t at = ((cell[2] >> 3 & 7) * 8 + (cell[1] >> 3 & 7)) * 8 + (cell[0] >> 3 & 7);
+        return tables_[std::size_t{node - 1} * 512 + static_cast<std::size_t>(at)];
+    }
+    // The brick of a voxel, or null and the voxels [from, end) around it that are empty too.
+    template <bool Sparse>
+    [[nodiscard]] const std::array<std::uint64_t, 8>* brick_at(const int3& cell, int3& from, int3& end) const;
+    template <bool Sparse>
+    [[nodiscard]] ray_hit walk(const vec3& origin, const vec3& direction, double limit) const;
+    void measure_distances(int threads);
 
     // First and last occupied voxel of a row; first > last when there is none.
     [[nodiscard]] std::array<std::int32_t, 2> row_ends(std::int32_t j, std::int32_t k) const;
@@ -132,10 +147,13 @@ private:
     // Bit i of byte j of word k is voxel (i, j, k) of the brick.
     using brick = std::array<std::uint64_t, 8>;
     static constexpr std::uint32_t empty_brick = 0, full_brick = 1;
-    std::vector<std::uint32_t> fine_;  // for each 8^3 voxels the number of its brick
-    std::vector<brick> bricks_;        // all empty ones are one, all full ones too
-    std::vector<std::uint8_t> coarse_; // 1 for each 64^3 with an occupied voxel
-    // Of a sparse grid, in place of the two tables; brick i of the grid is bricks_[i + first_brick].
+    // For each 8^3 voxels the number of its brick, or no_brick plus the distance to the next brick: the greatest of the
+    // differences along the axes, in bricks, at most max_distance.
+    std::vector<std::uint32_t> fine_;
+    static constexpr std::uint32_t no_brick = std::uint32_t{1} << 31;
+    static constexpr std::uint32_t max_distance = 15;
+    std::vector<brick> bricks_; // all empty ones are one, all full ones too
+    // Of a sparse grid, in place of that table; brick i of the grid is bricks_[i + first_brick].
     static constexpr std::uint32_t first_brick = full_brick + 1;
     bool is_sparse_ = false;
     preview_bricks sparse_;

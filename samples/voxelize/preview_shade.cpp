@@ -3,6 +3,8 @@
 
 #include "preview_shade.hpp"
 
+#include "parallel.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -20,8 +22,7 @@ constexpr double sun_azimuth = -52; // degrees from the camera, so that the two 
 constexpr double sun_elevation = 48;
 constexpr double sun_softness = 0.045;   // radius of the sun's disc at distance 1
 constexpr double occlusion_share = 0.22; // reach of ambient occlusion, in diagonals of the model
-constexpr int occlusion_rays = 2;
-constexpr int smoothing = 4; // pixels to either side; with the pattern of 8 x 8 below all of it is seen
+constexpr int smoothing = 4;             // pixels to either side; with the pattern of 8 x 8 below all of it is seen
 
 constexpr double ray_lift = 1e-3; // voxels above the face where a secondary ray starts
 
@@ -50,10 +51,19 @@ float smooth_step(double from, double to, double value) {
 
 double srgb_to_linear(double v) { return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4); }
 
+// The least linear value of each byte of sRGB.
+std::array<float, 256> byte_thresholds() {
+    std::array<float, 256> thresholds{};
+    for (std::size_t byte = 1; byte < thresholds.size(); ++byte)
+        thresholds[byte] = static_cast<float>(srgb_to_linear((static_cast<double>(byte) - 0.5) / 255));
+    return thresholds;
+}
+
 std::uint8_t linear_to_srgb8(float linear) {
-    const double v = std::clamp(static_cast<double>(linear), 0.0, 1.0);
-    const double s = v <= 0.0031308 ? v * 12.92 : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
-    return static_cast<std::uint8_t>(std::lround(s * 255));
+    static const std::array<float, 256> thresholds = byte_thresholds();
+    std::size_t byte = 0;
+    for (std::size_t step = 128; step != 0; step /= 2) byte += linear >= thresholds[byte + step] ? step : 0;
+    return static_cast<std::uint8_t>(byte);
 }
 
 // Leaves values below the knee as they are and bends the rest towards 1.
@@ -92,6 +102,20 @@ preview_shader::preview_shader(const volume& v, const preview_scene& scene, cons
     sun_ = direction_of(axes_, options.azimuth + sun_azimuth, sun_elevation);
     sun_side_[0] = direction_of(axes_, options.azimuth + sun_azimuth + 90, 0);
     sun_side_[1] = direction_of(axes_, options.azimuth + sun_azimuth, sun_elevation + 90);
+    // Directions about the normal, more of them where they count more (cosine), from a point set that is even over each
+    // 8 x 8 pixels and rays together.
+    for (std::size_t n = 0; n < occlusion_pattern_.size(); ++n) {
+        const double u = (static_cast<double>(n) + 0.5) / (64.0 * occlusion_rays);
+        const double phi = 2 * std::numbers::pi * radical_inverse(static_cast<std::uint32_t>(n));
+        const double across = std::sqrt(u);
+        occlusion_pattern_[n] = {std::sqrt(1 - u), across * std::cos(phi), across * std::sin(phi)};
+    }
+    for (std::size_t n = 0; n < sun_pattern_.size(); ++n) {
+        const double r = std::sqrt((static_cast<double>(n) + 0.5) / 64) * sun_softness;
+        const double phi = 2 * std::numbers::pi * radical_inverse(static_cast<std::uint32_t>(n));
+        sun_pattern_[n] =
+            divided(sun_ + sun_side_[0] * (r * std::cos(phi)) + sun_side_[1] * (r * std::sin(phi)), voxel_size_);
+    }
 }
 
 camera::ray preview_shader::ray_of(int x, int y) const {
@@ -212,17 +236,11 @@ void preview_shader::gather_light(sample& s, int x, int y) const {
     const vec3 side_u{1 + sign * normal[0] * normal[0] * p, sign * q, -sign * normal[0]};
     const vec3 side_v{q, sign + normal[1] * normal[1] * p, -normal[1]};
 
-    const std::uint32_t rank = pattern_rank(x, y);
-    // Directions about the normal, more of them where they count more (cosine), from a point set that is even over each
-    // 8 x 8 pixels and rays together.
+    const std::size_t rank = pattern_rank(x, y);
     double hidden = 0;
-    for (int n = 0; n < occlusion_rays; ++n) {
-        const std::uint32_t index = static_cast<std::uint32_t>(n) * 64 + rank;
-        const double u = (index + 0.5) / (64.0 * occlusion_rays);
-        const double phi = 2 * std::numbers::pi * radical_inverse(index);
-        const double across = std::sqrt(u);
-        const vec3 direction =
-            normal * std::sqrt(1 - u) + side_u * (across * std::cos(phi)) + side_v * (across * std::sin(phi));
+    for (std::size_t n = 0; n < occlusion_rays; ++n) {
+        const vec3& pattern = occlusion_pattern_[n * 64 + rank];
+        const vec3 direction = normal * pattern[0] + side_u * pattern[1] + side_v * pattern[2];
         const ray_hit hit = scene_.first_hit(at, divided(direction, voxel_size_), occlusion_reach_);
         if (hit.axis >= 0) {
             const double near = 1 - hit.distance / occlusion_reach_;
@@ -233,10 +251,7 @@ void preview_shader::gather_light(sample& s, int x, int y) const {
 
     s.sunlit = 0;
     if (dot(sun_, normal) <= 0) return;
-    const double r = std::sqrt((rank + 0.5) / 64) * sun_softness;
-    const double phi = 2 * std::numbers::pi * radical_inverse(rank);
-    const vec3 direction = sun_ + sun_side_[0] * (r * std::cos(phi)) + sun_side_[1] * (r * std::sin(phi));
-    const ray_hit hit = scene_.first_hit(at, divided(direction, voxel_size_), std::numeric_limits<double>::infinity());
+    const ray_hit hit = scene_.first_hit(at, sun_pattern_[rank], std::numeric_limits<double>::infinity());
     s.sunlit = hit.axis < 0 ? 1.0f : 0.0f;
 }
 
@@ -285,53 +300,72 @@ rgb_linear preview_shader::backdrop_at(double x, double y) const {
     return out;
 }
 
-void preview_shader::render_rows(int from, int to, int components, std::uint8_t* pixels) const {
-    const int per_pixel = options_.samples * options_.samples;
-    pixel_rows rows;
-    rows.first = std::max(0, from - smoothing);
-    rows.rows = std::min(options_.height, to + smoothing) - rows.first;
-    rows.width = options_.width;
-    rows.per_pixel = per_pixel;
-    rows.samples.resize(static_cast<std::size_t>(rows.rows) * static_cast<std::size_t>(rows.width) *
-                        static_cast<std::size_t>(per_pixel));
-    if (!scene_.empty())
-        for (int row = 0; row < rows.rows; ++row) {
-            normal_cache cache;
-            for (int x = 0; x < rows.width; ++x) find_pixel(rows.at(x, row), x, rows.first + row, cache);
-        }
+void preview_shader::find_rows(pixel_rows& rows, int begin, int end, int threads) const {
+    const int held = std::max(rows.first + rows.rows - begin, 0); // of them, from `begin` on
+    const auto row_samples = static_cast<std::ptrdiff_t>(rows.width) * rows.per_pixel;
+    if (held != 0) rows.samples.erase(rows.samples.begin(), rows.samples.begin() + (begin - rows.first) * row_samples);
+    rows.first = begin;
+    rows.rows = end - begin;
+    rows.samples.resize(static_cast<std::size_t>(rows.rows * row_samples));
+    if (scene_.empty()) return;
+    parallel_for(static_cast<std::size_t>(rows.rows - held), threads, [&](std::size_t n) {
+        const int row = held + static_cast<int>(n);
+        normal_cache cache;
+        for (int x = 0; x < rows.width; ++x) find_pixel(rows.at(x, row), x, rows.first + row, cache);
+    });
+}
 
-    const float share = 1.0f / static_cast<float>(per_pixel);
-    std::vector<std::array<float, 2>> light(static_cast<std::size_t>(per_pixel)); // open and sunlit, smoothed
-    for (int y = from; y < to; ++y)
-        for (int x = 0; x < options_.width; ++x) {
-            const rgb_linear behind = backdrop_at((x + 0.5) / options_.width, (y + 0.5) / options_.height);
-            rgb_linear sum{};
-            float alpha = 0;
-            const sample* const samples = rows.at(x, y - rows.first);
-            for (int n = 0; n < per_pixel; ++n) {
-                const sample& hit = samples[n];
-                auto& [open, sunlit] = light[static_cast<std::size_t>(n)];
-                if (hit.light != n)
-                    light[static_cast<std::size_t>(n)] = light[static_cast<std::size_t>(hit.light)];
-                else if (hit.what != seen::nothing)
-                    smooth(rows, x, y - rows.first, hit, open, sunlit);
-                if (hit.what == seen::voxel) {
-                    const rgb_linear lit = shade(hit, open, sunlit);
-                    for (std::size_t a = 0; a < 3; ++a) sum[a] += lit[a] * share;
-                    alpha += share;
-                    continue;
-                }
-                const float shown = hit.what == seen::ground ? ground_shade(open, sunlit) : 1.0f;
-                if (components == 4)
-                    alpha += (1 - shown) * share; // black over whatever lies behind
-                else
-                    for (std::size_t a = 0; a < 3; ++a) sum[a] += behind[a] * shown * share;
+void preview_shader::shade_row(const pixel_rows& rows, int y, int components, std::uint8_t* out) const {
+    const float share = 1.0f / static_cast<float>(rows.per_pixel);
+    std::vector<std::array<float, 2>> light(static_cast<std::size_t>(rows.per_pixel)); // open and sunlit, smoothed
+    for (int x = 0; x < rows.width; ++x, out += components) {
+        const rgb_linear behind = backdrop_at((x + 0.5) / options_.width, (y + 0.5) / options_.height);
+        rgb_linear sum{};
+        float alpha = 0;
+        const sample* const samples = rows.at(x, y - rows.first);
+        for (int n = 0; n < rows.per_pixel; ++n) {
+            const sample& hit = samples[n];
+            auto& [open, sunlit] = light[static_cast<std::size_t>(n)];
+            if (hit.light != n)
+                light[static_cast<std::size_t>(n)] = light[static_cast<std::size_t>(hit.light)];
+            else if (hit.what != seen::nothing)
+                smooth(rows, x, y - rows.first, hit, open, sunlit);
+            if (hit.what == seen::voxel) {
+                const rgb_linear lit = shade(hit, open, sunlit);
+                for (std::size_t a = 0; a < 3; ++a) sum[a] += lit[a] * share;
+                alpha += share;
+                continue;
             }
-            std::uint8_t* out = pixels + (static_cast<std::ptrdiff_t>(y - from) * options_.width + x) * components;
-            const float scale = components == 4 && alpha > 0 ? 1 / alpha : 1.0f;
-            for (std::size_t a = 0; a < 3; ++a) out[a] = linear_to_srgb8(sum[a] * scale);
-            if (components == 4) out[3] = static_cast<std::uint8_t>(std::lround(std::clamp(alpha, 0.0f, 1.0f) * 255));
+            const float shown = hit.what == seen::ground ? ground_shade(open, sunlit) : 1.0f;
+            if (components == 4)
+                alpha += (1 - shown) * share; // black over whatever lies behind
+            else
+                for (std::size_t a = 0; a < 3; ++a) sum[a] += behind[a] * shown * share;
         }
+        const float scale = components == 4 && alpha > 0 ? 1 / alpha : 1.0f;
+        for (std::size_t a = 0; a < 3; ++a) out[a] = linear_to_srgb8(sum[a] * scale);
+        if (components == 4) out[3] = static_cast<std::uint8_t>(std::lround(std::clamp(alpha, 0.0f, 1.0f) * 255));
+    }
+}
+
+void preview_shader::render(int components, std::uint8_t* pixels, int threads,
+                            const std::function<void(int)>& progress) const {
+    pixel_rows rows;
+    rows.width = options_.width;
+    rows.per_pixel = options_.samples * options_.samples;
+    const std::size_t row_bytes =
+        static_cast<std::size_t>(rows.width) * static_cast<std::size_t>(rows.per_pixel) * sizeof(sample);
+    constexpr std::size_t band_bytes = std::size_t{64} << 20;
+    const int band = std::max(static_cast<int>(band_bytes / row_bytes), 4 * smoothing);
+    for (int from = 0; from < options_.height; from += band) {
+        const int to = std::min(from + band, options_.height);
+        find_rows(rows, std::max(0, from - smoothing), std::min(options_.height, to + smoothing), threads);
+        parallel_for(static_cast<std::size_t>(to - from), threads, [&](std::size_t n) {
+            const int y = from + static_cast<int>(n);
+            shade_row(rows, y, components, pixels + std::ptrdiff_t{y} * options_.width * components);
+        });
+        if (progress) progress(to);
+    }
 }
 
 } // namespace voxelize

@@ -5,13 +5,15 @@
 // Light and colour of the preview. Rows of the picture are rendered one band at a time: find what each sample sees,
 // gather ambient occlusion and sunlight with few rays, once for the samples of a pixel that lie on one surface, smooth
 // these over neighbouring pixels of the same surface, shade, and average. Which rays a sample casts depends on its
-// place alone, so the picture is the same on any number of threads. Internal to the preview.
+// place alone, and every row is found once and by itself, so the picture is the same on any number of threads.
+// Internal to the preview.
 
 #include "preview.hpp"
 #include "preview_camera.hpp"
 #include "preview_scene.hpp"
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 namespace voxelize {
@@ -25,8 +27,9 @@ public:
     // null: no colours.
     preview_shader(const volume& v, const preview_scene& scene, const preview_options& options, const channel* colors);
 
-    // Pixel rows [from, to) of the picture into `pixels`, RGB or RGBA. May be called from several threads at once.
-    void render_rows(int from, int to, int components, std::uint8_t* pixels) const;
+    // The whole picture into `pixels`, RGB or RGBA, on `threads` threads (>= 1). `progress`, which may be empty, is
+    // called with the rows that are done, from the calling thread.
+    void render(int components, std::uint8_t* pixels, int threads, const std::function<void(int)>& progress) const;
 
 private:
     // What a sample sees first.
@@ -46,7 +49,7 @@ private:
     struct pixel_rows {
         int first = 0; // row of the picture that row 0 is
         int rows = 0;
-        int width = 0;
+        int width = 0;               // pixels
         int per_pixel = 1;           // samples
         std::vector<sample> samples; // of each pixel, row by row
         [[nodiscard]] sample* at(int x, int row) {
@@ -57,6 +60,10 @@ private:
         }
     };
 
+    // Makes `rows` hold the rows [begin, end) of the picture, and finds those that it did not hold.
+    void find_rows(pixel_rows& rows, int begin, int end, int threads) const;
+    // Row `y` of the picture into `out`.
+    void shade_row(const pixel_rows& rows, int y, int components, std::uint8_t* out) const;
     [[nodiscard]] camera::ray ray_of(int x, int y) const;
     // The surface normal of the voxel that the last ray hit: neighbouring rays mostly hit the same one.
     struct normal_cache {
@@ -89,6 +96,11 @@ private:
     double occlusion_reach_ = 0;
     double ground_height_ = 0;
     std::array<float, 256> to_linear_{};
+    // For each rank of a pixel in the pattern: directions of its occlusion rays along the normal and across it, and the
+    // direction of its ray to the sun in voxels.
+    static constexpr int occlusion_rays = 2;
+    std::array<vec3, std::size_t{64} * occlusion_rays> occlusion_pattern_{};
+    std::array<vec3, 64> sun_pattern_{};
     std::array<rgb_linear, 2> backdrop_{}; // top, bottom
 };
 

@@ -8,9 +8,12 @@
 #include "affine.hpp"
 
 #include <glm/glm.hpp>
+#include <glm/gtc/type_precision.hpp>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -19,7 +22,7 @@ namespace voxelize {
 // How a texture coordinate outside [0, 1] finds its texel.
 enum class wrap_mode : std::uint8_t { repeat, clamp_to_edge, mirrored_repeat };
 
-// The nearest texel, or the bilinear mean of the four around the sample. There are no mip levels.
+// The nearest texel, or the bilinear mean of the four around the sample.
 enum class filter_mode : std::uint8_t { nearest, linear };
 
 // opaque ignores alpha, mask discards where alpha < cutoff, blend keeps every fragment (a voxel is there or not).
@@ -29,9 +32,13 @@ enum class alpha_mode : std::uint8_t { opaque, mask, blend };
 // them (they become linear when they are sampled), A is linear.
 struct picture {
     std::string name;
-    std::uint32_t width = 0;
+    std::uint32_t width = 0; // texels, as in the file
     std::uint32_t height = 0;
-    std::vector<std::uint8_t> rgba; // width * height * 4 bytes
+    std::vector<std::uint8_t> rgba; // width * height * 4 bytes; empty if the levels below take its place
+    // Mip levels from first_level on (mip_levels.hpp): [0] colours alone, [1] colours by their alpha. One that no
+    // material needs is empty.
+    int first_level = 0;
+    std::array<std::vector<glm::u8vec4>, 2> levels;
 };
 
 // A picture and the way it is sampled. Coordinates: (0, 0) is the top left corner of the picture, (1, 1) the bottom
@@ -92,6 +99,15 @@ struct scene {
         for (const instance& shown : instances) count += primitives[shown.primitive].triangles.size();
         return count;
     }
+};
+
+// What a caller wants of a loader while it loads, so that no more than one picture is held whole. Either may be empty.
+struct load_hooks {
+    // Called once, when all but the pictures is there. May change the scene.
+    std::function<void(scene&)> geometry;
+    // Called with each picture as it is decoded, and the numbers of the materials that may show it. May replace its
+    // texels by levels.
+    std::function<void(const scene&, picture&, const std::vector<std::uint32_t>& materials)> picture;
 };
 
 } // namespace voxelize

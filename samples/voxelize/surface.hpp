@@ -21,13 +21,14 @@ namespace vp = voxelpipe;
 
 // What the shaders need of a texture. Memory of the backend, not owned.
 struct sampled_texture {
-    const glm::u8vec4* texels = nullptr; // rows from the top; null: no texture
-    int width = 0;
+    const glm::u8vec4* texels = nullptr; // of first_level, rows from the top; null: no texture
+    int width = 0;                       // of level 0
     int height = 0;
     wrap_mode wrap_s = wrap_mode::repeat;
     wrap_mode wrap_t = wrap_mode::repeat;
     filter_mode filter = filter_mode::linear;
-    int levels = 1; // in texels, one after the other; see mip_levels.hpp
+    int levels = 1;      // of the picture; see mip_levels.hpp
+    int first_level = 0; // the first that is in texels, where the others follow. No fragment samples one before it
 };
 
 // A coordinate brought into [0, 1]; NaN gives 0.
@@ -86,15 +87,23 @@ struct sampled_texture {
     return result;
 }
 
-// Level of a texture as a texture of its own; levels above 0 are always filtered linearly.
+// Level of a texture as a texture of its own, from first_level on; levels above 0 are always filtered linearly.
 [[nodiscard]] VOXELPIPE_HD inline sampled_texture level_of(sampled_texture t, int level) {
     for (int i = 0; i < level; ++i) {
-        t.texels += static_cast<std::size_t>(t.width) * static_cast<std::size_t>(t.height);
+        if (i >= t.first_level) t.texels += static_cast<std::size_t>(t.width) * static_cast<std::size_t>(t.height);
         t.width = t.width > 1 ? t.width / 2 : 1;
         t.height = t.height > 1 ? t.height / 2 : 1;
     }
     if (level > 0) t.filter = filter_mode::linear;
+    t.first_level = 0;
     return t;
+}
+
+// The finest of a texture's levels that a footprint samples, in texels of level 0 a side.
+[[nodiscard]] VOXELPIPE_HD inline int finest_level(float footprint, int levels) {
+    if (levels <= 1 || !(footprint > 1.0f)) return 0;
+    const int level = static_cast<int>(vp::core::bit_cast<std::uint32_t>(footprint) >> 23) - 127; // floor of log2
+    return level < levels - 1 ? level : levels - 1;
 }
 
 // The mean of the texture around UV over FOOTPRINT texels of level 0 a side. Up to one texel that is the texture as
@@ -103,9 +112,9 @@ struct sampled_texture {
 [[nodiscard]] VOXELPIPE_HD inline glm::vec4 sample_footprint(const sampled_texture& t, const color_tables& tables,
                                                              glm::vec2 uv, float footprint) {
     if (t.levels <= 1 || !(footprint > 1.0f)) return sample(t, tables, uv);
+    const int level = finest_level(footprint, t.levels);
+    if (level == t.levels - 1) return sample(level_of(t, level), tables, uv);
     const auto bits = vp::core::bit_cast<std::uint32_t>(footprint);
-    const int level = static_cast<int>(bits >> 23) - 127; // floor of the logarithm
-    if (level >= t.levels - 1) return sample(level_of(t, t.levels - 1), tables, uv);
     const float above = vp::exact::sub(vp::core::bit_cast<float>((bits & 0x7fffffU) | 0x3f800000U), 1.0f);
     const sampled_texture fine = level_of(t, level);
     const glm::vec4 a = sample(fine, tables, uv);

@@ -31,6 +31,12 @@ enum class backend_choice : std::uint8_t { automatic, cpu, cuda };
 // What a BLEND material's alpha means: the weight of its colour, a cut at one half as by MASK, or nothing.
 enum class blend_alpha : std::uint8_t { weight, cutoff, ignore };
 
+// A material's alpha mode by that choice.
+[[nodiscard]] inline alpha_mode alpha_of(const material& m, blend_alpha choice) {
+    if (m.alpha != alpha_mode::blend || choice == blend_alpha::weight) return m.alpha;
+    return choice == blend_alpha::cutoff ? alpha_mode::mask : alpha_mode::opaque;
+}
+
 class cuda_start; // cuda_device.hpp
 
 struct voxelize_request {

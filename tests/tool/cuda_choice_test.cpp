@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // --backend cuda and auto where there is no GPU to use: what the program says, what it ends with, and that auto gives
 // the CPU's bytes. Machines that are not at hand are played by facts, and by driver libraries that the tests bring.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <backend_estimate.hpp>
 #include <cuda_device.hpp>
@@ -13,12 +12,9 @@
 
 #include <algorithm>
 
-namespace {
+using namespace tool_test;
 
-using tool_test::outcome;
-using tool_test::read_file;
-using tool_test::run;
-using tool_test::scratch_folder;
+namespace {
 
 // A machine on which everything is as it should be.
 voxelize::cuda_facts good_facts() {

@@ -3,8 +3,7 @@
 // The program on a GPU: with --backend cuda it writes the files that it writes with --backend cpu, byte for byte, for
 // models below VOXELPIPE_GLTF_DIR and one that the test writes; auto takes the GPU; too little of its memory is said.
 // Reported as not run (exit code 77) where the program finds no GPU that it can use.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <cuda_device.hpp>
 
@@ -15,14 +14,11 @@
 #include <cstdio>
 #include <cstdlib>
 
+using namespace tool_test;
+
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
-using tool_test::outcome;
-using tool_test::read_file;
-using tool_test::run;
-using tool_test::scratch_folder;
 
 const std::string all_targets =
     "occupancy,count,color,color-max,color-replace,color-outer,normal,material,triangle,depth";

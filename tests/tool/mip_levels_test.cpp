@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -68,6 +69,27 @@ TEST(MipLevels, LevelsLieOneAfterTheOther) {
     EXPECT_EQ(3, third.width);
     EXPECT_EQ(1, third.height);
     EXPECT_EQ(texels.data() + 13 * 4 + 6 * 2, third.texels);
+}
+
+TEST(MipLevels, ALaterFirstLevelLeavesOutTheLevelsBefore) {
+    for (const auto& [width, height] : {std::pair{64, 64}, {13, 4}, {1, 9}}) {
+        const picture source = random_picture(static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height));
+        for (const bool by_alpha : {false, true}) {
+            const auto all = voxelize::with_mip_levels(source, by_alpha, 1);
+            std::size_t offset = 0;
+            for (int first = 0, w = width, h = height; first < voxelize::mip_level_count(source.width, source.height);
+                 ++first, w = std::max(w / 2, 1), h = std::max(h / 2, 1)) {
+                const auto some = voxelize::with_mip_levels(source, by_alpha, 1, first);
+                ASSERT_EQ(all.size() - offset, some.size());
+                EXPECT_TRUE(std::equal(some.begin(), some.end(), all.begin() + static_cast<std::ptrdiff_t>(offset)));
+                sampled_texture whole{all.data(), width, height}, cut{some.data(), width, height};
+                cut.first_level = first;
+                EXPECT_EQ(voxelize::level_of(whole, first).texels - all.data() - static_cast<std::ptrdiff_t>(offset),
+                          voxelize::level_of(cut, first).texels - some.data());
+                offset += static_cast<std::size_t>(w) * static_cast<std::size_t>(h);
+            }
+        }
+    }
 }
 
 TEST(MipLevels, InvisibleTexelsDoNotColourVisibleOnes) {

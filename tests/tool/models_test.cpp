@@ -6,8 +6,7 @@
 // compares with it what g++ and clang++ make, what sanitizers see, and what -march=native with contraction gives.
 //
 // VOXELPIPE_WRITE_GOLDEN_VOLUMES=FILE in the environment writes the table of what is computed now, to be reviewed.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <gltf_scene.hpp>
 #include <placement.hpp>
@@ -22,11 +21,11 @@
 #include <span>
 #include <sstream>
 
+using namespace tool_test;
+
 namespace {
 
 namespace fs = std::filesystem;
-using tool_test::outcome;
-using tool_test::scratch_folder;
 
 std::vector<fs::path> shared_models() {
     std::vector<fs::path> list;

@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // What voxels look like: textures finer than voxels, alpha, walls with two sides. The program, end to end.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <outside.hpp>
 
@@ -11,13 +10,7 @@
 #include <algorithm>
 #include <set>
 
-using gltf_test::builder;
-using gltf_test::json;
-using tool_test::array;
-using tool_test::outcome;
-using tool_test::read_npy;
-using tool_test::run;
-using tool_test::scratch_folder;
+using namespace tool_test;
 
 namespace {
 

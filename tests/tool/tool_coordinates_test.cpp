@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models far from the origin: node transforms lose no digit on their way to the grid, and digits that the file itself
 // has not are a warning.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <placement.hpp>
 
@@ -12,12 +11,7 @@
 #include <cmath>
 #include <numbers>
 
-using gltf_test::builder;
-using gltf_test::json;
-using tool_test::outcome;
-using tool_test::read_npy;
-using tool_test::run;
-using tool_test::scratch_folder;
+using namespace tool_test;
 
 namespace {
 

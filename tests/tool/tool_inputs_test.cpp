@@ -1,16 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // The voxelize program and what it is given: warnings beside errors, --lenient.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <gtest/gtest.h>
 
-using gltf_test::builder;
-using gltf_test::json;
-using tool_test::outcome;
-using tool_test::run;
-using tool_test::scratch_folder;
+using namespace tool_test;
 
 namespace {
 

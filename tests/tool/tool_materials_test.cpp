@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the materials of a model come to in the voxelize program's files: pictures and how they are laid on, colours and
 // what they are multiplied with, masks, both sides of faces.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,13 +13,7 @@
 #include <numbers>
 #include <utility>
 
-using gltf_test::builder;
-using gltf_test::json;
-using tool_test::array;
-using tool_test::outcome;
-using tool_test::read_npy;
-using tool_test::run;
-using tool_test::scratch_folder;
+using namespace tool_test;
 
 namespace {
 

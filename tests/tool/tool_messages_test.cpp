@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the program says: choices in words, the reason why nothing is covered, one warning for one thing; and the
 // examples of --help, as they are printed.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,11 +10,7 @@
 #include <map>
 #include <sstream>
 
-using gltf_test::builder;
-using gltf_test::json;
-using tool_test::outcome;
-using tool_test::run;
-using tool_test::scratch_folder;
+using namespace tool_test;
 
 namespace {
 
@@ -157,8 +152,7 @@ TEST(Messages, ExamplesOfTheHelpWorkAsTheyArePrinted) {
     if (gltf_test::is_slow_build()) GTEST_SKIP() << "a picture of 256 voxels takes minutes";
     const scratch_folder folder;
     const outcome help = run(folder, {"--help"});
-    gltf_test::small_world().write_glb(folder / "helmet.glb");
-    gltf_test::small_world().write_glb(folder / "part.glb");
+    gltf_test::small_world().write_glb(folder / "model.glb");
     const std::filesystem::path before = std::filesystem::current_path();
     std::filesystem::current_path(folder.path());
     int count = 0;

@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // The options of the voxelize program: the help names them all, and those of pictures and files do what it says.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <formats/formats.hpp>
 #include <targets.hpp>
@@ -16,11 +15,7 @@
 #include <set>
 #include <sstream>
 
-using gltf_test::builder;
-using tool_test::outcome;
-using tool_test::read_file;
-using tool_test::run;
-using tool_test::scratch_folder;
+using namespace tool_test;
 
 namespace {
 

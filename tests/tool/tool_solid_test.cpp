@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // --solid: what is inside by each rule, the values there, the extents, open models, and what does not go together.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,13 +12,7 @@
 #include <cmath>
 #include <map>
 
-using gltf_test::builder;
-using gltf_test::json;
-using tool_test::array;
-using tool_test::outcome;
-using tool_test::read_npy;
-using tool_test::run;
-using tool_test::scratch_folder;
+using namespace tool_test;
 
 namespace {
 

@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The voxelize program with --sparse, with .nvdb, and where it chooses bricks by itself: the voxels and values of dense
 // runs, the same pictures, the same files each time.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <targets.hpp>
 
@@ -11,12 +10,7 @@
 
 #include <map>
 
-using tool_test::array;
-using tool_test::outcome;
-using tool_test::read_file;
-using tool_test::read_npy;
-using tool_test::run;
-using tool_test::scratch_folder;
+using namespace tool_test;
 
 namespace {
 

@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The voxelize program, end to end, on models that the tests write. Its options: tool_options_test.cpp; what materials
 // come to: tool_materials_test.cpp.
-#include "tool_runner.hpp"
-#include "tool_scenes.hpp"
+#include "tool_test.hpp"
 
 #include <formats/formats.hpp>
 #include <targets.hpp>
@@ -13,13 +12,7 @@
 #include <algorithm>
 #include <cmath>
 
-using gltf_test::builder;
-using gltf_test::json;
-using tool_test::array;
-using tool_test::outcome;
-using tool_test::read_npy;
-using tool_test::run;
-using tool_test::scratch_folder;
+using namespace tool_test;
 
 namespace {
 

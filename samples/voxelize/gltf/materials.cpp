@@ -5,6 +5,7 @@
 #include "text.hpp"
 
 #include <cmath>
+#include <utility>
 
 namespace voxelize::gltf {
 
@@ -54,19 +55,31 @@ void material_reader::read_factors() {
     }
 }
 
-std::optional<texture_coordinates> material_reader::read_texture(std::size_t material_index) {
+std::optional<texture_coordinates> material_reader::want_texture(std::size_t material_index) {
     const tinygltf::TextureInfo& info = model_.materials[material_index].pbrMetallicRoughness.baseColorTexture;
     if (info.index < 0) return std::nullopt;
     const alpha_mode alpha = scene_.materials[material_index].alpha;
     const bool cuts = alpha == alpha_mode::mask || (alpha == alpha_mode::blend && options_.blend_cuts);
     if (!options_.colors && !cuts) return std::nullopt;
-    const std::int32_t texture = scene_texture(static_cast<std::size_t>(info.index));
-    scene_.materials[material_index].texture = texture;
-    if (texture == material::no_texture) return std::nullopt;
+    if (!wanted_[material_index]) {
+        wanted_[material_index] = true;
+        queue_.push_back(material_index);
+        for (const std::uint32_t picture : bytes_.texture_images(static_cast<std::size_t>(info.index)))
+            users_[picture].push_back(static_cast<std::uint32_t>(material_index));
+    }
     return coordinates_of(info);
 }
 
-std::int32_t material_reader::scene_texture(std::size_t index) {
+void material_reader::read_textures(const load_hooks& hooks) {
+    for (const std::size_t index : queue_) {
+        const tinygltf::TextureInfo& info = model_.materials[index].pbrMetallicRoughness.baseColorTexture;
+        scene_.materials[index].texture = scene_texture(static_cast<std::size_t>(info.index), hooks);
+    }
+    for (primitive& part : scene_.primitives)
+        if (scene_.materials[part.material].texture == material::no_texture) part.texcoords = {};
+}
+
+std::int32_t material_reader::scene_texture(std::size_t index, const load_hooks& hooks) {
     std::optional<std::int32_t>& result = texture_of_[index];
     if (result) return *result;
     result = material::no_texture;
@@ -79,8 +92,10 @@ std::int32_t material_reader::scene_texture(std::size_t index) {
     }
     std::int32_t image = material::no_texture;
     for (std::size_t i = 0; i < pictures.size() && image == material::no_texture; ++i)
-        image = scene_image(pictures[i], i + 1 == pictures.size() ? "the colour factor is used alone"
-                                                                  : "the texture's other picture is tried");
+        image = scene_image(pictures[i],
+                            i + 1 == pictures.size() ? "the colour factor is used alone"
+                                                     : "the texture's other picture is tried",
+                            hooks);
     if (image == material::no_texture) return *result;
     texture entry;
     entry.image = static_cast<std::uint32_t>(image);
@@ -88,7 +103,7 @@ std::int32_t material_reader::scene_texture(std::size_t index) {
         const tinygltf::Sampler& sampler = model_.samplers[static_cast<std::size_t>(source.sampler)];
         entry.wrap_s = wrap_of(sampler.wrapS);
         entry.wrap_t = wrap_of(sampler.wrapT);
-        // There is no minification without mip levels: the magnification filter decides, linear where none is given.
+        // The magnification filter decides how level 0 is sampled, linear where none is given.
         if (sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST) entry.filter = filter_mode::nearest;
     }
     result = static_cast<std::int32_t>(scene_.textures.size());
@@ -96,14 +111,15 @@ std::int32_t material_reader::scene_texture(std::size_t index) {
     return *result;
 }
 
-std::int32_t material_reader::scene_image(std::size_t index, const char* instead) {
+std::int32_t material_reader::scene_image(std::size_t index, const char* instead, const load_hooks& hooks) {
     std::optional<std::int32_t>& result = image_of_[index];
     if (result) return *result;
     result = material::no_texture;
     try {
         const std::optional<std::uint32_t> view = bytes_.image_view(index);
-        scene_.images.push_back(
-            bytes_.decode_image(index, view ? accessors_.view(*view) : std::span<const std::byte>{}));
+        picture decoded = bytes_.decode_image(index, view ? accessors_.view(*view) : std::span<const std::byte>{});
+        if (hooks.picture) hooks.picture(scene_, decoded, users_[index]);
+        scene_.images.push_back(std::move(decoded));
         result = static_cast<std::int32_t>(scene_.images.size() - 1);
     } catch (const gltf_error& error) {
         scene_.warnings.push_back("images[" + std::to_string(index) + "] cannot be used: " + error.what() + "; " +

@@ -30,25 +30,33 @@ public:
     material_reader(const tinygltf::Model& model, const accessor_reader& accessors, const resources& bytes,
                     const gltf_options& options, scene& result)
         : model_{model}, accessors_{accessors}, bytes_{bytes}, options_{options}, scene_{result},
-          texture_of_(model.textures.size()), image_of_(bytes.image_count()) {}
+          wanted_(model.materials.size()), users_(bytes.image_count()), texture_of_(model.textures.size()),
+          image_of_(bytes.image_count()) {}
 
     // Fills scene.materials with the file's, all without their textures.
     void read_factors();
 
-    // Called for each material that is shown: decodes its texture the first time, sets material.texture, and gives the
-    // coordinates to use, or nothing where there is no texture.
-    [[nodiscard]] std::optional<texture_coordinates> read_texture(std::size_t material);
+    // Called for each primitive that is read: the coordinates of its material's texture, or nothing if it has none.
+    // Decodes nothing yet.
+    [[nodiscard]] std::optional<texture_coordinates> want_texture(std::size_t material);
+
+    // Called when all primitives are read: decodes the textures that they want, in the order in which they were asked
+    // for, and sets material.texture. Primitives whose texture cannot be had lose their coordinates.
+    void read_textures(const load_hooks& hooks);
 
 private:
-    [[nodiscard]] std::int32_t scene_texture(std::size_t texture);
+    [[nodiscard]] std::int32_t scene_texture(std::size_t texture, const load_hooks& hooks);
     // INSTEAD says in the warning what is done without the picture.
-    [[nodiscard]] std::int32_t scene_image(std::size_t image, const char* instead);
+    [[nodiscard]] std::int32_t scene_image(std::size_t image, const char* instead, const load_hooks& hooks);
 
     const tinygltf::Model& model_;
     const accessor_reader& accessors_;
     const resources& bytes_;
     const gltf_options& options_;
     scene& scene_;
+    std::vector<bool> wanted_;                      // by material: its texture is asked for
+    std::vector<std::size_t> queue_;                // materials whose texture is asked for, in that order
+    std::vector<std::vector<std::uint32_t>> users_; // by picture: the materials that may show it
     // glTF index -> scene index once it has been tried; material::no_texture where it cannot be had.
     std::vector<std::optional<std::int32_t>> texture_of_;
     std::vector<std::optional<std::int32_t>> image_of_;

@@ -280,7 +280,7 @@ const tinygltf::Accessor* primitive_reader::attribute(const tinygltf::Primitive&
 void primitive_reader::read_texcoords(primitive& result, const tinygltf::Primitive& source, const std::string& where) {
     if (source.material < 0) return;
     const std::optional<texture_coordinates> wanted =
-        materials_.read_texture(static_cast<std::size_t>(source.material));
+        materials_.want_texture(static_cast<std::size_t>(source.material));
     if (!wanted) return;
     const std::string name = "TEXCOORD_" + std::to_string(wanted->set);
     const tinygltf::Accessor* accessor = attribute(source, name, result.positions.size(), where);

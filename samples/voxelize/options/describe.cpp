@@ -1,0 +1,309 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "raw_options.hpp"
+#include "values.hpp"
+
+#include <voxelpipe/config.hpp>
+
+#include <CLI/CLI.hpp>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace voxelize {
+
+namespace {
+
+// An option that takes one of a few words.
+template <class T>
+struct choice_of {
+    using type = T;
+};
+template <class T>
+struct choice_of<std::optional<T>> {
+    using type = T;
+};
+template <class T>
+CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
+                        std::vector<std::pair<const char*, typename choice_of<T>::type>> choices,
+                        const std::string& description) {
+    const auto take = [&value, name, choices = std::move(choices)](const std::string& text) {
+        for (const auto& [word, meaning] : choices) {
+            if (lower(text) != word) continue;
+            value = meaning;
+            return;
+        }
+        throw usage_error(name + " takes " + in_words(choices) + ", not \"" + text + '"');
+    };
+    return app.add_option_function<std::string>(name, take, description);
+}
+
+void describe_files(CLI::App& app, command_line& options, raw_options& raw) {
+    app.add_option("INPUT", options.input,
+                   "Model: glTF 2.0 (.glb, .gltf), or .obj, .stl, .ply, .off and others that assimp reads")
+        ->required()
+        ->option_text(" ");
+    app.add_option("-o,--output", options.outputs, "Write the voxels to FILE (required); one -o for each file")
+        ->required()
+        ->allow_extra_args(false)
+        ->option_text("FILE")
+        ->group("Output");
+    app.add_option("-t,--target", raw.targets,
+                   "What to compute for each voxel, see TARGETS; may be repeated. Default: occupancy, with color where "
+                   "an output shows colours (.vox, .schem, .glb, .obj, .ply, .xyz, .png)")
+        ->allow_extra_args(false)
+        ->delimiter(',')
+        ->option_text("NAME")
+        ->group("Output");
+}
+
+void describe_grid(CLI::App& app, command_line& options, raw_options& raw) {
+    app.add_option("-r,--resolution", raw.resolution,
+                   "N voxels along the longest side of the model, cubic and centred; or exactly NX x NY x NZ of them "
+                   "around it. Default: 128")
+        ->option_text("N|NXxNYxNZ")
+        ->group("Grid");
+    app.add_option("--padding", options.grid.padding, "Keep the N outermost voxels on every side free. Default: 0")
+        ->option_text("N")
+        ->group("Grid");
+    app.add_option("-s,--voxel-size", raw.voxel_size,
+                   "Voxels of this size in the model's units instead, on the lattice of its multiples")
+        ->option_text("S[,SY,SZ]")
+        ->group("Grid");
+    app.add_option(
+           "--origin", raw.origin,
+           "With --voxel-size and --extent: the exact grid, its lowest corner at this point (three numbers may also "
+           "stand apart)")
+        ->option_text("X,Y,Z")
+        ->group("Grid");
+    app.add_option("--extent", raw.extent, "Voxels along each axis of the exact grid")
+        ->option_text("NX,NY,NZ")
+        ->group("Grid");
+}
+
+void describe_model(CLI::App& app, command_line& options) {
+    app.add_option(
+           "--scale", options.load.scale,
+           "Multiply all lengths of the model by this: 0.001 takes millimetres to metres. Default: 1, the file's "
+           "own units")
+        ->check(CLI::Range(1e-30, 1e30).description(""))
+        ->option_text("F")
+        ->group("Model");
+    auto* const animation =
+        app.add_option(
+               "--animation", options.load.gltf.animation,
+               "Pose a glTF model as this animation of the file (by name, or by number from 0) has it at --time")
+            ->option_text("NAME")
+            ->group("Model");
+    app.add_option("--time", options.load.gltf.seconds,
+                   "Moment of the animation in seconds; before its start and behind its end those hold. Default: 0")
+        ->check(CLI::Number.description(""))
+        ->needs(animation)
+        ->option_text("T")
+        ->group("Model");
+    app.add_flag("--lenient", options.load.gltf.lenient,
+                 "Go on with a warning where a file breaks the specification in a way that can be put right: unaligned "
+                 "data, a node in the scene twice")
+        ->group("Model");
+}
+
+void describe_values(CLI::App& app, command_line& options, raw_options& raw) {
+    using voxelpipe::coverage;
+    add_choice(app, "--coverage", raw.coverage, {{"conservative", coverage::conservative}, {"thin", coverage::thin}},
+               "conservative: every voxel that a triangle touches. thin: the fewest without a hole (6-separating). "
+               "Default: conservative")
+        ->option_text("RULE")
+        ->group("Coverage and values");
+
+    add_choice(app, "--depth-axis", options.voxelize.depth_axis, {{"x", 0}, {"y", 1}, {"z", 2}},
+               "Axis of --target depth: x, y or z. Default: z")
+        ->option_text("AXIS")
+        ->group("Coverage and values");
+    add_choice(app, "--alpha", options.voxelize.alpha,
+               {{"weight", blend_alpha::weight}, {"cutoff", blend_alpha::cutoff}, {"ignore", blend_alpha::ignore}},
+               "What alpha does in materials that blend. weight: colours count by it. cutoff: fragments below 0.5 are "
+               "not there. ignore: nothing. Default: weight")
+        ->option_text("RULE")
+        ->group("Coverage and values");
+}
+
+void describe_solids(CLI::App& app, raw_options& raw) {
+    add_choice(app, "--solid", raw.solid,
+               {{"nonzero", solid_rule::nonzero},
+                {"even_odd", solid_rule::even_odd},
+                {"positive", solid_rule::positive},
+                {"each_draw", solid_rule::each_draw},
+                {"exterior", solid_rule::exterior}},
+               "Fill the model instead: nonzero, even_odd, positive, each_draw or exterior, see SOLIDS. Not with "
+               "--coverage")
+        ->option_text("RULE")
+        ->group("Solids");
+    add_choice(app, "--solid-extent", raw.extent_of_solid,
+               {{"centre", solid_extent::centre}, {"outer", solid_extent::outer}, {"inner", solid_extent::inner}},
+               "centre: voxels whose centre is inside. outer: these and those that the surface touches. inner: these "
+               "without those. Default: outer")
+        ->option_text("WHICH")
+        ->group("Solids");
+    app.add_option(
+           "--close-holes", raw.close_holes,
+           "Put a lid on every hole of the model, of at most EDGES edges where that is given, before it is filled")
+        ->option_text("[=EDGES]")
+        ->group("Solids");
+    app.add_flag("--vote", raw.vote,
+                 "Inside is what most of the rows along x, y and z say, by whether they crossed the surface an odd "
+                 "number of times; open rows abstain")
+        ->group("Solids");
+    app.add_option("--closing", raw.closing,
+                   "With --solid exterior: close gaps of about 2 R voxels for the flood. Default: 0")
+        ->check(CLI::Range(0, 64).description(""))
+        ->option_text("R")
+        ->group("Solids");
+    app.add_option("--fill-color", raw.fill_color,
+                   "Colour of the voxels inside: #rrggbb, or mean, that of the surface's voxels. Default: mean")
+        ->option_text("COLOUR")
+        ->group("Solids");
+}
+
+void describe_machine(CLI::App& app, command_line& options) {
+    add_choice(
+        app, "--backend", options.voxelize.backend,
+        {{"auto", backend_choice::automatic}, {"cpu", backend_choice::cpu}, {"cuda", backend_choice::cuda}},
+        "cpu, cuda (the first GPU that CUDA shows), or auto: the quicker of the two for this model and grid, as far "
+        "as that can be told before. Both give the same bytes. Default: auto")
+        ->option_text("NAME")
+        ->group("Machine");
+    std::vector<std::pair<const char*, voxelpipe::strategy>> strategies{{"automatic", voxelpipe::strategy::automatic}};
+    for (const auto& rule : voxelpipe::device::rules) strategies.emplace_back(to_string(rule.value), rule.value);
+    add_choice(app, "--strategy", options.voxelize.strategy, std::move(strategies),
+               "How a GPU draws: occupancy_mask, immediate, sorted_reduce, sorted_fold, tiled (the pipeline of the "
+               "paper), or automatic. All give the same bytes; not all can draw all targets. Default: automatic")
+        ->option_text("NAME")
+        ->group("Machine");
+    app.add_option("-j,--threads", options.voxelize.threads, "Threads on the CPU. Default: 0, one for each core")
+        ->check(CLI::Range(0, 1024).description(""))
+        ->option_text("N")
+        ->group("Machine");
+    app.add_option_function<int>(
+           "--max-memory",
+           [&options](int mebibytes) { options.max_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
+           "The most MiB of this machine's memory that the run may hold at any time. Default: nine tenths of what "
+           "there is")
+        ->check(CLI::Range(1, 1 << 30).description(""))
+        ->option_text("MIB")
+        ->group("Machine");
+    app.add_option_function<int>(
+           "--work-memory",
+           [&options](int mebibytes) { options.voxelize.work_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
+           "MiB for sums that exist only on the way; a grid that needs more is computed in slabs, with the same "
+           "result. Default: 128, on a GPU up to 1024")
+        ->check(CLI::Range(1, 1 << 20).description(""))
+        ->option_text("MIB")
+        ->group("Machine");
+    app.add_option_function<int>(
+           "--device-memory",
+           [&options](int mebibytes) { options.voxelize.device_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
+           "The most MiB of a GPU's memory to take; where that is too little, auto turns to the CPU. Default: all that "
+           "is free")
+        ->check(CLI::Range(1, 1 << 20).description(""))
+        ->option_text("MIB")
+        ->group("Machine");
+
+    const auto choose_storage = [&options](storage_choice choice) {
+        if (options.storage != storage_choice::automatic && options.storage != choice)
+            throw usage_error("--sparse and --dense do not go together");
+        options.storage = choice;
+    };
+    app.add_flag_callback(
+           "--sparse", [choose_storage] { choose_storage(storage_choice::sparse); },
+           "Keep only voxels that something is drawn in: .npz and .npy then hold their coords, (n, 3), and values. By "
+           "itself where an output is .nvdb, or where a dense grid does not fit the memory and all outputs can do "
+           "without")
+        ->group("Machine");
+    app.add_flag_callback(
+           "--dense", [choose_storage] { choose_storage(storage_choice::dense); }, "Compute a dense grid in any case")
+        ->group("Machine");
+}
+
+void describe_picture(CLI::App& app, command_line& options, raw_options& raw) {
+    preview_options& picture = options.write.preview;
+    app.add_option("--image-size", raw.image_size, "Pixels. Default: 1280x960")
+        ->option_text("WxH")
+        ->group("Picture (.png)");
+    app.add_option("--azimuth", picture.azimuth, "Degrees around the model, 0 from its front. Default: 35")
+        ->option_text("DEG")
+        ->group("Picture (.png)");
+    app.add_option("--elevation", picture.elevation, "Degrees above the horizon. Default: 25")
+        ->check(CLI::Range(-90.0, 90.0).description(""))
+        ->option_text("DEG")
+        ->group("Picture (.png)");
+    app.add_option("--zoom", picture.zoom, "1 fits the model into the picture. Default: 1")
+        ->check(CLI::PositiveNumber.description(""))
+        ->option_text("F")
+        ->group("Picture (.png)");
+    app.add_option("--fov", picture.field_of_view, "Degrees from top to bottom, 0: orthographic. Default: 28")
+        ->check(CLI::Range(0.0, 150.0).description(""))
+        ->option_text("DEG")
+        ->group("Picture (.png)");
+    app.add_option("--samples", picture.samples, "Rays along each side of a pixel. Default: 2")
+        ->check(CLI::Range(1, 8).description(""))
+        ->option_text("N")
+        ->group("Picture (.png)");
+    app.add_option("--background", raw.background,
+                   "sky, white, dark, transparent, #rrggbb, or #rrggbb,#rrggbb from top to bottom. Default: sky")
+        ->option_text("COLOUR")
+        ->group("Picture (.png)");
+    app.add_flag("--no-color", raw.no_color, "Show all voxels in one colour")->group("Picture (.png)");
+    app.add_flag("--no-edges", raw.no_edges, "No lines between voxels")->group("Picture (.png)");
+    app.add_flag("--no-ground", raw.no_ground, "No shadow on the ground")->group("Picture (.png)");
+}
+
+void describe_output(CLI::App& app, command_line& options) {
+    add_choice(app, "--up", options.write.up, {{"y", up_axis::y}, {"z", up_axis::z}},
+               "Axis of the model that stands upright in .png, .vox and .schem: y or z. Default: y, as in glTF; many "
+               ".stl have z")
+        ->option_text("AXIS")
+        ->group("Files");
+    app.add_flag("--merge", options.write.merge_faces,
+                 "Join the faces of .glb, .obj and .ply: coplanar ones of equal colour become one rectangle")
+        ->group("Files");
+    app.add_flag("--points", options.write.points, "Write the centres of the voxels into .ply, not their outer sides")
+        ->group("Files");
+    app.add_option("--compression", options.write.compression,
+                   "Level of .npz, .vti, .nrrd and .schem, 0 to 9. Default: 1")
+        ->check(CLI::Range(0, 9).description(""))
+        ->option_text("N")
+        ->group("Files");
+}
+
+void describe_messages(CLI::App& app, command_line& options) {
+    add_choice(app, "--stats", options.stats, {{"text", stats_format::text}, {"json", stats_format::json}},
+               "Print counts, times and memory; `--stats json` for programs, one object on standard output")
+        ->option_text("[json]")
+        ->group("Messages");
+    app.add_flag("-q,--quiet", options.quiet, "Print errors (and --stats) only")->group("Messages");
+    app.set_help_flag("-h,--help", "Print this help")->group("Messages");
+    app.set_version_flag("--version",
+                         "voxelize " + std::to_string(VOXELPIPE_VERSION_MAJOR) + '.' +
+                             std::to_string(VOXELPIPE_VERSION_MINOR) + '.' + std::to_string(VOXELPIPE_VERSION_PATCH),
+                         "Print the version")
+        ->group("Messages");
+}
+
+} // namespace
+
+void describe(CLI::App& app, command_line& options, raw_options& raw) {
+    describe_files(app, options, raw);
+    describe_grid(app, options, raw);
+    describe_model(app, options);
+    describe_values(app, options, raw);
+    describe_solids(app, raw);
+    describe_machine(app, options);
+    describe_picture(app, options, raw);
+    describe_output(app, options);
+    describe_messages(app, options);
+}
+
+} // namespace voxelize

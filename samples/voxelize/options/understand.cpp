@@ -1,0 +1,170 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "raw_options.hpp"
+#include "values.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <optional>
+
+namespace voxelize {
+
+namespace {
+
+glm::dvec3 parse_point(const std::string& option, const std::string& text, std::size_t least) {
+    const std::vector<double> n = parse_list<double>(option, text, least);
+    return n.size() == 3 ? glm::dvec3(n[0], n[1], n[2]) : glm::dvec3(n[0]);
+}
+
+} // namespace
+
+void understand_solid(command_line& options, const raw_options& raw) {
+    if (raw.coverage) options.voxelize.coverage = *raw.coverage;
+    if (!raw.solid) {
+        const std::pair<const char*, bool> given[]{{"--solid-extent", raw.extent_of_solid.has_value()},
+                                                   {"--close-holes", !raw.close_holes.empty()},
+                                                   {"--vote", raw.vote},
+                                                   {"--closing", raw.closing.has_value()},
+                                                   {"--fill-color", !raw.fill_color.empty()}};
+        for (const auto& [name, is_given] : given)
+            if (is_given) throw usage_error(std::string(name) + " goes with --solid");
+        return;
+    }
+    if (raw.coverage)
+        throw usage_error("--solid and --coverage do not go together: a solid's surface is conservative, see "
+                          "--solid-extent");
+    solid_request& solid = options.voxelize.solid.emplace();
+    solid.rule = *raw.solid;
+    solid.extent = raw.extent_of_solid.value_or(solid_extent::outer);
+    solid.vote = raw.vote;
+    solid.closing = raw.closing.value_or(0);
+    const bool is_flood = solid.rule == solid_rule::exterior;
+    if (raw.closing && !is_flood) throw usage_error("--closing goes with --solid exterior");
+    if (raw.vote && (is_flood || solid.rule == solid_rule::each_draw))
+        throw usage_error(std::string("--vote does not go with --solid ") + to_string(solid.rule));
+    if ((is_flood || raw.vote) && solid.extent != solid_extent::outer)
+        throw usage_error(std::string(is_flood ? "--solid exterior" : "--vote") + " always has --solid-extent outer");
+    if (!raw.close_holes.empty()) {
+        if (is_flood || raw.vote)
+            throw usage_error(std::string("--close-holes does not go with ") +
+                              (is_flood ? "--solid exterior" : "--vote"));
+        solid.close_holes = UINT64_MAX;
+        if (raw.close_holes != "all") {
+            const char* const end = raw.close_holes.data() + raw.close_holes.size();
+            const auto [last, error] = std::from_chars(raw.close_holes.data(), end, solid.close_holes);
+            if (error != std::errc{} || last != end || solid.close_holes == 0)
+                throw usage_error(
+                    "--close-holes takes the number of edges of the largest hole to close, 1 or more, not "
+                    "\"" +
+                    raw.close_holes + '"');
+        }
+    }
+    if (raw.fill_color.empty() || lower(raw.fill_color) == "mean") return;
+    solid.fill_color = parse_color(raw.fill_color);
+    if (!solid.fill_color) throw usage_error("--fill-color takes mean or #rrggbb, not \"" + raw.fill_color + '"');
+}
+
+void understand_grid(command_line& options, const raw_options& raw) {
+    if (!raw.resolution.empty()) {
+        const std::vector<int> n = parse_list<int>("--resolution", raw.resolution, 1);
+        if (n.size() == 1)
+            options.grid.resolution = n[0];
+        else
+            options.grid.box = glm::ivec3(n[0], n[1], n[2]);
+    }
+    if (!raw.voxel_size.empty()) options.grid.voxel_size = parse_point("--voxel-size", raw.voxel_size, 1);
+    if (!raw.origin.empty()) options.grid.origin = parse_point("--origin", raw.origin, 3);
+    if (!raw.extent.empty()) {
+        const std::vector<int> n = parse_list<int>("--extent", raw.extent, 3);
+        options.grid.extent = glm::ivec3(n[0], n[1], n[2]);
+    }
+    // What can be told of the grid before the model is there.
+    bounding_box unit;
+    unit.high = glm::dvec3(1);
+    try {
+        grid_request probe = options.grid;
+        options.grid.coverage = options.voxelize.coverage;
+        if (probe.voxel_size && !probe.origin && !probe.extent) unit.high = *probe.voxel_size;
+        (void)place_grid(probe, unit);
+    } catch (const grid_error& error) {
+        throw usage_error(error.what());
+    }
+}
+
+void understand_outputs(command_line& options, const raw_options& raw) {
+    bool shows_colors = false;
+    bool needs_occupancy = false;
+    for (const std::filesystem::path& output : options.outputs) {
+        const format* found = find_format(output);
+        if (found == nullptr) {
+            throw usage_error("\"" + output.string() + "\": the extension of an output must be one of " +
+                              names(formats(), &format::extension));
+        }
+        if (std::count(options.outputs.begin(), options.outputs.end(), output) > 1)
+            throw usage_error("\"" + output.string() + "\" is given twice");
+        // Now, not when all is computed.
+        if (const auto& size = options.grid.voxel_size;
+            size && found->needs_cubes && !are_cubic({size->x, size->y, size->z}))
+            throw usage_error("\"" + output.string() + "\": " + std::string(found->extension) +
+                              " has one voxel size for all axes, --voxel-size has several");
+        needs_occupancy = needs_occupancy || found->needs_occupancy;
+        shows_colors = shows_colors || found->shows_colors;
+    }
+    std::vector<target>& targets = options.voxelize.targets;
+    targets.clear();
+    for (const std::string& name : raw.targets) {
+        const std::optional<target> id = target_named(lower(name));
+        if (!id)
+            throw usage_error("--target \"" + name + "\" is not one of " + names(target_table, &target_info::name));
+        if (std::find(targets.begin(), targets.end(), *id) == targets.end()) targets.push_back(*id);
+    }
+    for (const target id : targets) {
+        const std::string_view name = info_of(id).name;
+        const bool held = std::any_of(options.outputs.begin(), options.outputs.end(), [&](const auto& output) {
+            const format* const found = find_format(output);
+            return id == target::occupancy || found->all_channels || (found->shows_colors && name.starts_with("color"));
+        });
+        if (!held)
+            options.warnings.push_back("--target " + std::string(name) +
+                                       " is in none of the outputs: their formats hold no such values");
+    }
+    if (targets.empty()) {
+        targets.push_back(target::occupancy);
+        if (shows_colors && !raw.no_color) options.implied.push_back(target::color);
+    }
+    if (needs_occupancy && std::find(targets.begin(), targets.end(), target::occupancy) == targets.end())
+        options.implied.push_back(target::occupancy);
+    targets.insert(targets.end(), options.implied.begin(), options.implied.end());
+    options.load.gltf.colors =
+        std::any_of(targets.begin(), targets.end(), [](target id) { return info_of(id).name.starts_with("color"); });
+    options.load.gltf.blend_cuts = options.voxelize.alpha == blend_alpha::cutoff;
+}
+
+void understand_picture(command_line& options, const raw_options& raw) {
+    preview_options& picture = options.write.preview;
+    if (!raw.image_size.empty()) {
+        const char* const end = raw.image_size.data() + raw.image_size.size();
+        const auto [middle, first] = std::from_chars(raw.image_size.data(), end, picture.width);
+        const bool cross = first == std::errc{} && middle != end && *middle == 'x';
+        const auto [last, second] = cross ? std::from_chars(middle + 1, end, picture.height)
+                                          : std::from_chars_result{middle, std::errc::invalid_argument};
+        if (second != std::errc{} || last != end || picture.width < 1 || picture.width > 16384 || picture.height < 1 ||
+            picture.height > 16384)
+            throw usage_error("--image-size takes WIDTHxHEIGHT from 1x1 to 16384x16384, not \"" + raw.image_size + '"');
+    }
+    if (!raw.background.empty()) {
+        const std::optional<background> chosen = parse_background(raw.background);
+        if (!chosen) throw usage_error("--background \"" + raw.background + "\" is not known, see --help");
+        picture.backdrop = *chosen;
+    }
+    picture.use_color = !raw.no_color;
+    picture.edges = !raw.no_edges;
+    picture.ground = !raw.no_ground;
+    picture.up = options.write.up;
+    picture.threads = options.voxelize.threads;
+    options.write.threads = options.voxelize.threads;
+    options.load.gltf.threads = options.voxelize.threads;
+}
+
+} // namespace voxelize
