@@ -5,7 +5,8 @@
 
 Inside voxelpipe/device/ an include names a file of the same folder or of a folder further down:
 
-    device/ itself (backend, voxelize_async, ...)
+    optional            (compiled by programs that call it only: solids, sparse framebuffers)
+    device/ itself      (backend, voxelize_async, abuffer_async)
     solid, sparse
     call
     tiles, fragments    (neither includes the other)
@@ -15,7 +16,8 @@ Inside voxelpipe/device/ an include names a file of the same folder or of a fold
     base
 
 core/ includes core/, tuning/ and config.hpp only: no header of the API, nothing of device/. tuning/ includes core/ and tuning/
-only. cpu_ref/ includes nothing of device/, and of the API headers only voxelpipe.hpp includes device/. No include cycle anywhere.
+only. cpu_ref/ includes nothing of device/, and of the API headers only voxelpipe.hpp includes device/. No include cycle anywhere. At most
+four files lie directly in device/.
 
     scripts/check_includes.py [ROOT]
 """
@@ -23,7 +25,8 @@ import pathlib
 import re
 import sys
 
-LAYERS = ["", "solid sparse", "call", "tiles fragments", "raster", "targets", "scene", "base"]  # of device/, from the top down
+LAYERS = ["optional", "", "solid sparse", "call", "tiles fragments", "raster", "targets", "scene", "base"]  # of device/, from the top down
+MAX_LOOSE = 4  # files directly in device/: what a reader meets first
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in (folders.split() or [""])}
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
 
@@ -100,7 +103,10 @@ def main():
         print("cycle of includes: " + " -> ".join(cycle))
     if not files:
         print(f"no headers below {root}")
-    sys.exit(failed or bool(cycle) or not files)
+    loose = [name for name in names if name.startswith("voxelpipe/device/") and name.count("/") == 2]
+    if len(loose) > MAX_LOOSE:
+        print(f"{len(loose)} files lie directly in device/, more than {MAX_LOOSE}: " + ", ".join(loose))
+    sys.exit(failed or bool(cycle) or not files or len(loose) > MAX_LOOSE)
 
 
 main()

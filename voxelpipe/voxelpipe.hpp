@@ -27,9 +27,9 @@
 #if defined(__CUDACC__)
 #include <voxelpipe/device/abuffer_async.cuh>
 #include <voxelpipe/device/backend.cuh>
-#include <voxelpipe/device/solid.cuh>
-#include <voxelpipe/device/solid_async.cuh>
-#include <voxelpipe/device/sparse.cuh>
-#include <voxelpipe/device/sparse_solid.cuh>
+#include <voxelpipe/device/optional/solid.cuh>
+#include <voxelpipe/device/optional/solid_async.cuh>
+#include <voxelpipe/device/optional/sparse.cuh>
+#include <voxelpipe/device/optional/sparse_solid.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>
 #endif

@@ -13,7 +13,7 @@
 #include "session.hpp"
 #include "table.hpp"
 
-#include <voxelpipe/device/solid_async.cuh>
+#include <voxelpipe/device/optional/solid_async.cuh>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <CLI/CLI.hpp>

@@ -5,7 +5,7 @@
 // and load, crops, A-buffers, ties, large triangles, many draws, and calls that run again or fail.
 #include "device_test.hpp"
 
-#include <voxelpipe/device/solid_async.cuh>
+#include <voxelpipe/device/optional/solid_async.cuh>
 
 #include <algorithm>
 #include <bit>

@@ -12,8 +12,8 @@
 #include <voxelpipe/device/call/attempt.cuh>
 #include <voxelpipe/device/call/call_workspace.cuh>
 #include <voxelpipe/device/call/framebuffer_call.cuh>
+#include <voxelpipe/device/call/kernels.cuh>
 #include <voxelpipe/device/call/list_arrays.cuh>
-#include <voxelpipe/device/kernels.cuh>
 #include <voxelpipe/device/scene/check_indices.cuh>
 #include <voxelpipe/device/scene/cub_sort.cuh>
 #include <voxelpipe/solid.hpp>
@@ -130,7 +130,7 @@ public:
                              abuffer<cuda_backend, Payload>& lists, const voxelize_options& options,
                              std::uint64_t triangles_in, Coverage = {});
 
-    // Implements voxelize_solid. Arguments are validated. Defined in device/solid.cuh.
+    // Implements voxelize_solid. Arguments are validated. Defined in device/optional/solid.cuh.
     template <class Mesh, class VertexShader, class SolidShader, class... Targets>
     [[nodiscard]] status run_solid(std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
                                    const framebuffer_view<Targets...>& fb, const solid_options& options,
@@ -140,13 +140,14 @@ public:
                                    abuffer<cuda_backend, Payload>& lists, const solid_options& options,
                                    std::uint64_t triangles_in);
 
-    // Implement voxelize and clear of sparse framebuffers. Arguments are validated. Defined in device/sparse.cuh.
+    // Implement voxelize and clear of sparse framebuffers. Arguments are validated. Defined in
+    // device/optional/sparse.cuh.
     template <class Mesh, class VertexShader, class FragmentShader, class... Targets,
               class Coverage = core::known_coverage<>>
     [[nodiscard]] status run_sparse(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                                     sparse_framebuffer<cuda_backend, Targets...>& fb, const voxelize_options& options,
                                     std::uint64_t triangles_in, Coverage = {});
-    // Implements voxelize_solid of sparse framebuffers. Defined in device/sparse_solid.cuh.
+    // Implements voxelize_solid of sparse framebuffers. Defined in device/optional/sparse_solid.cuh.
     template <class Mesh, class VertexShader, class SolidShader, class... Targets>
     [[nodiscard]] status run_sparse_solid(std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
                                           sparse_framebuffer<cuda_backend, Targets...>& fb,
@@ -274,7 +275,7 @@ private:
 };
 
 // Outside the class, and so not inline: a unit that links voxelpipe::cuda_kernels does not compile the calls that the
-// library holds (device/kernels.cuh).
+// library holds (device/call/kernels.cuh).
 template <class Selector, class Mesh, class VertexShader, class FragmentShader, class... Targets, class Coverage>
 status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                          const framebuffer_view<Targets...>& fb, const voxelize_options& options,

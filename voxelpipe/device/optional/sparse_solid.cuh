@@ -6,8 +6,8 @@
 // over the rows lists the fragments with all their outputs, and the lists become bricks and values as those of
 // triangles do. Beside the result, memory is in proportion to the fragments. At most 2^32 - 2 voxels.
 
-#include <voxelpipe/device/solid.cuh>
-#include <voxelpipe/device/sparse.cuh>
+#include <voxelpipe/device/optional/solid.cuh>
+#include <voxelpipe/device/optional/sparse.cuh>
 
 #include <cstdint>
 #include <span>

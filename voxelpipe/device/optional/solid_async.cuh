@@ -7,7 +7,7 @@
 // triangles with rows, in, before and behind the grid, and for outer and inner the ends of covered runs as well, two a
 // run at most. fill_rule::even_odd of a constant into one cleared target of bits needs no limits.
 
-#include <voxelpipe/device/solid.cuh>
+#include <voxelpipe/device/optional/solid.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>
 
 namespace voxelpipe {
