@@ -4,6 +4,7 @@
 
 #include <voxelpipe/host_sparse.hpp>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
@@ -63,7 +64,8 @@ void add_filled(sparse_volume& solid, sparse_volume& surface, std::string_view n
     const std::size_t bytes = size_of(from.type) * static_cast<std::size_t>(from.components);
     std::array<std::byte, 16> inside{};
     const std::uint32_t empty = empty_value(from);
-    for (std::size_t at = 0; at + 4 <= bytes; at += 4) std::memcpy(inside.data() + at, &empty, 4);
+    for (std::size_t at = 0; at + 4 <= std::min(bytes, inside.size()); at += 4)
+        std::memcpy(inside.data() + at, &empty, 4);
     if (name.starts_with("color")) {
         const rgba8 color = fill_color_of(from, request);
         std::memcpy(inside.data(), color.data(), 4);
