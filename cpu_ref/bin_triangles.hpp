@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What framebuffers and A-buffers begin with: coarse raster and tile sort, and the sums of what the workers counted.
+// The start of framebuffers and A-buffers: coarse raster and tile sort; and the sums of the workers' counts.
 
 #include <cpu_ref/pipeline.hpp>
 

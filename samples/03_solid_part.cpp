@@ -37,7 +37,7 @@ int main() {
     part flange;
     flange.add_ring(64, 2.0F, 0.8F, 0.0F, 1.6F);   // the tube
     flange.add_ring(64, 3.0F, 0.8F, -0.5F, 0.25F); // the plate, which reaches into it
-    // Of a ring of 64 corners, and of the two parts: the tube above the plate, and the plate.
+    // Sizes of a ring of 64 corners, and of the two parts: the tube above the plate, and the plate.
     const auto area = [](double outside, double bore) {
         return 32 * std::sin(6.28318531 / 64) * (outside * outside - bore * bore);
     };

@@ -35,7 +35,7 @@ public:
     explicit octree(const host_sparse<Targets...>& h) : octree(h.table(), h.where.whole_extent()) {}
 
     [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); }
-    // Of a level from 0 on.
+    // A level, from 0 on.
     [[nodiscard]] std::uint64_t num_nodes(int level) const {
         return level == 0 ? num_voxels_ : levels_[static_cast<std::size_t>(level) - 1].masks.size();
     }

@@ -27,7 +27,7 @@ public:
     }
 
     [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); }
-    // Of a level from 1 on; the last one has the root.
+    // A level, from 1 on; the last one has the root.
     [[nodiscard]] std::uint64_t num_nodes(int level) const {
         return levels_[static_cast<std::size_t>(level) - 1].masks.size();
     }
@@ -38,7 +38,7 @@ public:
             bytes += l.masks.size() + (l.first.size() + l.children.size()) * sizeof(std::uint32_t);
         return bytes;
     }
-    // Whether a voxel exists, in the numbers of the whole grid; false outside.
+    // True if a voxel exists, in the numbers of the whole grid; false outside.
     [[nodiscard]] bool contains(const glm::ivec3& voxel) const {
         if (levels_.empty()) return false;
         for (int a = 0; a < 3; ++a)

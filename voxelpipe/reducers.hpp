@@ -183,7 +183,7 @@ struct blend_tree_sum<blend::add_quantum<Log2Quantum>, float> : float_tree_sum<f
     }
 };
 
-// Of a value: component by component.
+// A value is reduced component by component.
 template <class T>
 struct components_of {
     static constexpr int count = 1;

@@ -25,7 +25,7 @@ enum class baseline_output : std::uint8_t {
 void voxelize_baseline(cudaStream_t stream, const voxelpipe::mesh_view<>& mesh, const voxelpipe::grid& grid,
                        voxelpipe::coverage rule, baseline_output output, std::uint32_t* d_words, std::size_t count);
 
-// How many words differ; waits.
+// Number of words that differ; waits.
 [[nodiscard]] std::uint64_t count_differences(cudaStream_t stream, const std::uint32_t* d_a, const std::uint32_t* d_b,
                                               std::size_t count);
 

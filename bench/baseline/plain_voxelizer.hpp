@@ -19,7 +19,7 @@ namespace bench::baseline {
 
 namespace vp = voxelpipe;
 
-// Whether the closed voxel at (u, v, w), relative to the setup's origin, meets the closed triangle.
+// True if the closed voxel at (u, v, w), relative to the setup's origin, meets the closed triangle.
 template <class Int>
 bool covers(const vp::core::triangle_setup<Int>& t, Int u, Int v, Int w) {
     for (int i = 0; i < 3; ++i)

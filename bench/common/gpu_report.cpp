@@ -31,7 +31,7 @@ std::string ratio(double value) { return value > 0 ? significant(value, 3) : "";
 std::string short_ms(double value) { return value > 0 ? significant(value, 3) : "-"; }
 std::string times(double value) { return value > 0 ? significant(value, 3) + " ×" : "-"; }
 
-// Of the values above 0, which is no figure; 0 where there are none.
+// Takes the values above 0 only, since 0 is no figure; 0 if there are none.
 double min_of(const std::vector<double>& values) {
     double least = 0;
     for (const double v : values)

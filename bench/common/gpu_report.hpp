@@ -57,7 +57,7 @@ inline constexpr std::array<gpu_cell, 12> gpu_cells{
 [[nodiscard]] gpu_cell untracked(gpu_cell cell);
 [[nodiscard]] inline bool is_tracked(gpu_cell cell) { return untracked(cell) != cell; }
 
-// What is published for a cell of a scene; 0 or empty where nothing is. target: never under 1.3 x the published floor.
+// The published figures of a scene's cell; 0 or empty if there are none. target: never under 1.3 x the published floor.
 struct gpu_anchor {
     double original = 0; // 2011
     double peer = 0;
@@ -94,7 +94,7 @@ struct gpu_row {
 
 // Every column, in milliseconds with quartiles and extremes.
 [[nodiscard]] table gpu_table_all(const std::vector<gpu_row>& rows);
-// What a person reads.
+// The report for people.
 [[nodiscard]] table gpu_table_short(const std::vector<gpu_row>& rows);
 // Milliseconds of every stage beside the whole call's, in a column each; rows that have them.
 [[nodiscard]] table gpu_stage_table(const std::vector<gpu_row>& rows);

@@ -46,7 +46,7 @@ machine_record describe_machine() {
     m.compiler = "g++ " __VERSION__;
 #endif
     m.flags = VOXELPIPE_BENCH_FLAGS;
-    // What the program was built from, unless whoever carried it here says otherwise.
+    // The commit that the program was built from; the environment may name another, for programs that were copied here.
     const char* const told = std::getenv("VOXELPIPE_COMMIT");
     m.commit = told != nullptr ? told : VOXELPIPE_BENCH_COMMIT;
     const std::time_t now = std::time(nullptr);

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What stands beside every figure: processor, compiler, flags, commit, date, load. And the process's own peak memory.
+// The facts beside every figure: processor, compiler, flags, commit, date, load. And the process's own peak memory.
 
 #include <cstdint>
 #include <string>

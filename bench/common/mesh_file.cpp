@@ -30,7 +30,7 @@ static_assert(std::endian::native == std::endian::little, "the file's numbers ar
     throw std::runtime_error(file.string() + ": " + what);
 }
 
-// Whether `program arguments...` ended with success; what it prints is dropped.
+// True if `program arguments...` ended with success; its output is dropped.
 bool run_program(const std::string& program, const std::vector<std::string>& arguments) {
     std::vector<std::string> words{program};
     words.insert(words.end(), arguments.begin(), arguments.end());

@@ -24,7 +24,7 @@ inline constexpr std::array<std::string_view, 5> scene_names{"conference", "drag
 // of range.
 mesh_data read_vpm(const std::filesystem::path& file);
 
-// Whether load_scene(folder, name) can work: NAME.vpm is there, or NAME.vpz and a Python with numpy. Where not, `why`
+// True if load_scene(folder, name) can work: NAME.vpm is there, or NAME.vpz and a Python with numpy. If not, `why`
 // says why in half a line.
 bool has_scene(const std::filesystem::path& folder, std::string_view name, std::string& why);
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What every benchmark program writes besides its tables.
+// Output that every benchmark program writes besides its tables.
 
 #include <filesystem>
 #include <string>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What a set of repeated timings is summed up to, and means of ratios.
+// Summaries of repeated timings, and means of ratios.
 
 #include <vector>
 
@@ -16,7 +16,7 @@ struct sample {
 
 [[nodiscard]] sample summarize(std::vector<double> values);
 
-// Of the numbers above 0; 0 where there are none.
+// Counts the numbers above 0 only; 0 if there are none.
 [[nodiscard]] double geometric_mean(const std::vector<double>& values);
 
 } // namespace bench

@@ -26,7 +26,7 @@ public:
 
     // The whole of vp::voxelize, clear included; throws where it fails.
     virtual vp::counters call() = 0;
-    // Where call() adds up the time of each stage from now on; null: nowhere.
+    // call() adds the time of each stage to this from now on; null: to nothing.
     virtual void set_times(vp::stage_times* times) = 0;
 
     // vp::voxelize_async in memory that is found to suffice, for a cell that has been called; false where there is
@@ -43,7 +43,7 @@ public:
     virtual std::uint64_t differences() { return 0; }
 };
 
-// What is timed of a cell; runs = 0 where it has no such form. async: captured once as a CUDA graph, as a program would
+// The timings of a cell; runs = 0 if it has no such form. async: captured once as a CUDA graph, as a program would
 // that never waits.
 struct cell_times {
     vp::counters counts;

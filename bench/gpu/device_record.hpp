@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What stands beside every GPU figure: device, driver, CUDA, and the clocks while it was measured. Clocks come from
+// The facts beside every GPU figure: device, driver, CUDA, and the clocks while it was measured. Clocks come from
 // NVML, which is loaded at run time where the driver brings it; without it they are "unknown".
 
 #include <cuda_runtime_api.h>

@@ -144,7 +144,7 @@ void scaling::size() {
     for (const double edge : {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 0.8 * n}) {
         if (edge > 0.8 * n) continue;
         try_mesh("edges of " + plain(edge) + " voxels", [&] {
-            // How many fragments such a triangle gives, from a few of them.
+            // Fragments of such a triangle, estimated from a few of them.
             constexpr std::uint64_t some = 2000;
             const gpu::resident_mesh few = gpu::scattered_triangles(some, edge, n, 1);
             const std::uint64_t fragments = gpu::prepare(session_, few, g, pilot)->call().fragments;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What every GPU benchmark starts from: a stream, a memory pool that keeps what is freed (as that of a program that
+// The start of every GPU benchmark: a stream, a memory pool that keeps what is freed (as that of a program that
 // calls often would), meshes on the device, and the timing of calls. Plain C++: only the files that instantiate kernels
 // need nvcc. Everything throws std::runtime_error where CUDA reports an error, out_of_device_memory where it is that.
 
@@ -85,7 +85,7 @@ struct repetition {
     double seconds = 10;
 };
 
-// What a call that never waits puts on the session's stream, captured once as a CUDA graph and launched as often as
+// The work of a call that never waits, captured once from the session's stream as a CUDA graph and launched as often as
 // wanted.
 class captured_call {
 public:

@@ -32,7 +32,7 @@ struct affine {
         return product;
     }
 
-    // Whether it turns right hands into left hands.
+    // True if it turns right hands into left hands.
     [[nodiscard]] bool mirrors() const {
         const auto minor = [&](std::size_t a, std::size_t b) {
             return std::fma(m[1][a], m[2][b], -(m[1][b] * m[2][a]));

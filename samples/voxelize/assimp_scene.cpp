@@ -89,7 +89,7 @@ private:
         const std::optional<std::filesystem::path> path = assimp::local_file(wanted.path);
         if (!path) throw model_error("it is no file's name");
         if (!read_file_) throw model_error("other files are not read");
-        // Where the model says, else beside it.
+        // At the path that the model names, else beside the model.
         std::vector<std::byte> bytes;
         try {
             bytes = read_file_(*path, memory_.limits().max_file_bytes);

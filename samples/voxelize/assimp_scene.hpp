@@ -20,7 +20,7 @@
 
 namespace voxelize {
 
-// Whether files that end so (".obj", lower case) are for load_by_assimp. In a build without assimp it is those that
+// True if files with this extension (".obj", lower case) are for load_by_assimp. In a build without assimp: those that
 // assimp is best known for.
 [[nodiscard]] bool is_for_assimp(const std::string& extension);
 

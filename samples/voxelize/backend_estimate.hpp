@@ -23,13 +23,13 @@ struct work_size {
 // Of a request and a model with so many triangles and bytes.
 [[nodiscard]] work_size work_of(const voxelize_request& request, double triangles, double model_bytes);
 
-// What the CPU needs on that many threads.
+// Time on the CPU with that many threads.
 [[nodiscard]] double cpu_milliseconds(const work_size& work, int threads);
 
-// What a GPU needs, if CUDA began to start so long ago.
+// Time on a GPU, if CUDA began to start so long ago.
 [[nodiscard]] double cuda_milliseconds(const work_size& work, double started_milliseconds_ago);
 
-// Whether CUDA may turn out to be the quicker way for a file of that size, before it is read: then CUDA starts
+// True if CUDA may turn out to be the quicker way for a file of that size, before it is read: then CUDA starts
 // meanwhile.
 [[nodiscard]] bool cuda_may_pay(const grid_request& grid, const voxelize_request& request, double file_bytes);
 

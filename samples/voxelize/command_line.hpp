@@ -41,7 +41,7 @@ struct early_exit {
     std::string text;
 };
 
-// What is wrong with the command line, one line.
+// A fault of the command line, one line.
 struct usage_error : std::runtime_error {
     using std::runtime_error::runtime_error;
 };

@@ -67,7 +67,7 @@ std::uint64_t default_work_memory(const cuda_facts& facts) {
 std::string why_too_large(const cuda_facts& facts, const scene& model, const voxelize_request& request) {
     std::uint64_t room = facts.free_memory;
     if (request.device_memory != 0) room = std::min(room, request.device_memory);
-    // What the pipeline makes of a triangle comes on top; that is seen when it runs.
+    // The pipeline's own memory comes on top; it is known once the pipeline runs.
     const std::uint64_t needed = bytes_of(model);
     if (needed <= room) return {};
     return "the model needs " + at_least_mebibytes(needed) + " of GPU memory, and of the " +

@@ -53,7 +53,7 @@ private:
     std::jthread thread_;
 };
 
-// Whether this program has CUDA code at all.
+// True if this program has CUDA code at all.
 [[nodiscard]] bool built_with_cuda();
 
 // Why the pipeline cannot run there: the rest of a sentence, without a full stop. Empty where it can.

@@ -11,7 +11,7 @@
 // Skins, morph targets and instances of EXT_mesh_gpu_instancing stand in the pose that the file states, or in that of
 // one animation at one time.
 //
-// What is not supported: where geometry would be lost (required extensions that are not known, Draco or meshopt
+// Unsupported parts of a file: where geometry would be lost (required extensions that are not known, Draco or meshopt
 // compression in a build without the library) the load fails and says so; otherwise scene::warnings names it. Points
 // and lines have no surface and are left out.
 
@@ -47,7 +47,7 @@ struct gltf_limits {
     std::uint64_t import_seconds = 3;     // of processor time for assimp, and two more for each MiB of the file
 };
 
-// What a caller may choose.
+// The caller's choices.
 struct gltf_options {
     // Faults that can be put right (unaligned strides, a node in the scene twice, ...) become warnings.
     bool lenient = false;

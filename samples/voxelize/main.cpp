@@ -76,7 +76,7 @@ std::shared_ptr<cuda_start> start_cuda(const command_line& options) {
     return std::make_shared<cuda_start>();
 }
 
-// What comes after the command line; every way to fail is an exception. The program began at BEGIN.
+// Does the work, once the command line is read; every failure is an exception. The program began at BEGIN.
 void run(const command_line& options, clock::time_point begin) {
     run_report report;
     report.input = options.input;

@@ -49,7 +49,7 @@ void refused(std::size_t bytes) noexcept;
 // come to, more or less, to be named. HINT follows the figures.
 void require(double bytes, const std::string& what, const std::string& hint = "", double likely = 0);
 
-// What a std::bad_alloc was about: the need as far as it is known, LIKELY in all where that is more, and the limit.
+// The message for a std::bad_alloc: the need as far as it is known, LIKELY in all where that is more, and the limit.
 // HINT follows the figures.
 [[nodiscard]] std::string shortage(const std::string& hint = "", double likely = 0);
 

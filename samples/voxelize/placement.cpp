@@ -92,7 +92,7 @@ struct lattice_box {
     }
 };
 
-// Where the library snaps a position of the world, in units from the grid's lowest corner.
+// A position of the world as the library snaps it, in units from the grid's lowest corner.
 voxelpipe::core::snapped_position snapped(voxelpipe::grid grid, const glm::dvec3& position) {
     const glm::dvec3 reference = reference_point(grid);
     grid.origin -= reference;
@@ -184,7 +184,7 @@ bounding_box bounds_of(const scene& model, int threads) {
             for (std::size_t i = b * piece; i < std::min(positions.size(), (b + 1) * piece); ++i) {
                 if (!corners[shown.primitive][i]) continue;
                 const glm::dvec3 p = shown.to_world(positions[i]);
-                // What is no float is not drawn.
+                // Positions that are no floats are not drawn.
                 if (is_finite(glm::vec3(p))) boxes[b].include({p, p, false});
             }
         });

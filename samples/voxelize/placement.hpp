@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where the voxels lie: from what the user asks for and the bounds of the model to a grid.
+// Places the grid, from the user's request and the bounds of the model.
 
 #include "scene.hpp"
 
@@ -62,7 +62,7 @@ struct bounding_box {
 // left out. THREADS <= 0 takes one for each core.
 [[nodiscard]] bounding_box bounds_of(const scene& model, int threads = 0);
 
-// What positions are taken relative to before they are rounded to float, for the library to snap: the world's own
+// The origin of positions that are rounded to float for the library to snap: the world's own
 // origin, as long as a float there is no coarser than the grid's sub-voxel lattice at any corner of the grid; otherwise
 // the grid's lowest corner. So no precision is lost at any distance, and models near the origin are drawn by their
 // world positions.

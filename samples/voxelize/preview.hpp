@@ -24,7 +24,7 @@ enum class up_axis : std::uint8_t { y, z };
 
 using rgb8 = std::array<std::uint8_t, 3>; // sRGB
 
-// What voxels without a colour look like.
+// The look of voxels without a colour.
 inline constexpr rgb8 clay{222, 214, 203};
 
 struct background {

@@ -85,7 +85,7 @@ void preview_scene::measure_distances(int threads) {
         if (before[i] != 0) fine_[i] = no_brick + before[i];
 }
 
-// Which bricks of a layer are empty, full or neither (any other number), and the bounds of its voxels.
+// Marks the bricks of a layer as empty, full or neither (any other number), and finds the bounds of its voxels.
 void preview_scene::look_at_layer(const volume& v, const channel& bits, std::int32_t layer, int3& low, int3& high) {
     const auto words = static_cast<std::size_t>(v.words_per_row());
     const std::int32_t k_end = std::min(layer * 8 + 8, extent_[2]);

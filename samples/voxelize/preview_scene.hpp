@@ -33,7 +33,7 @@ struct preview_bricks {
     std::size_t count = 0;
 };
 
-// Where a ray meets the first occupied voxel: on the side of `axis`, low or high.
+// The first occupied voxel that a ray meets, on the side of `axis`, low or high.
 struct ray_hit {
     double distance = 0; // along the ray, in lengths of its direction
     std::array<std::int32_t, 3> voxel{};
@@ -153,7 +153,7 @@ private:
     static constexpr std::uint32_t no_brick = std::uint32_t{1} << 31;
     static constexpr std::uint32_t max_distance = 15;
     std::vector<brick> bricks_; // all empty ones are one, all full ones too
-    // Of a sparse grid, in place of that table; brick i of the grid is bricks_[i + first_brick].
+    // A sparse grid has these in place of that table; brick i of the grid is bricks_[i + first_brick].
     static constexpr std::uint32_t first_brick = full_brick + 1;
     bool is_sparse_ = false;
     preview_bricks sparse_;

@@ -32,7 +32,7 @@ public:
     void render(int components, std::uint8_t* pixels, int threads, const std::function<void(int)>& progress) const;
 
 private:
-    // What a sample sees first.
+    // The first thing that a sample sees.
     enum class seen : std::uint8_t { nothing, ground, voxel };
     struct sample {
         seen what = seen::nothing;
@@ -72,7 +72,7 @@ private:
     };
     [[nodiscard]] sample find(const camera::ray& ray, normal_cache& cache) const;
     [[nodiscard]] rgb_linear albedo_of(const ray_hit& hit, const vec3& at, double pixels_per_voxel) const;
-    // Whether light that falls on one sample falls on the other.
+    // True if light that falls on one sample falls on the other.
     [[nodiscard]] static bool on_one_surface(const sample& a, const sample& b);
     // The samples of pixel (x, y).
     void find_pixel(sample* samples, int x, int y, normal_cache& cache) const;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the program tells about its work: a progress bar on terminals, statistics as text or as one JSON object.
+// The program's account of its work: a progress bar on terminals, statistics as text or as one JSON object.
 
 #include "voxelizer.hpp"
 

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the tool voxelizes: triangles with the base colour of their materials, in plain vectors, each mesh once, and the
-// places where it stands. Nothing here knows of the file format that it came from. Everything is valid as it stands:
-// every index points into its list, every optional list is empty or has one entry a vertex.
+// The model that the tool voxelizes: triangles with the base colour of their materials, in plain vectors, each mesh
+// once, and the places where it stands. Nothing here knows of the file format that it came from. Everything is valid as
+// it stands: every index points into its list, every optional list is empty or has one entry a vertex.
 
 #include "affine.hpp"
 
@@ -88,7 +88,7 @@ struct scene {
     std::vector<picture> images;
     std::vector<std::string> warnings; // what was left out or put right; one line each
 
-    // Of all instances: a primitive that is shown twice counts twice.
+    // Sums over all instances: a primitive that is shown twice counts twice.
     [[nodiscard]] std::uint64_t vertex_count() const {
         std::uint64_t count = 0;
         for (const instance& shown : instances) count += primitives[shown.primitive].positions.size();
@@ -101,7 +101,7 @@ struct scene {
     }
 };
 
-// What a caller wants of a loader while it loads, so that no more than one picture is held whole. Either may be empty.
+// Calls that a loader makes while it loads, so that no more than one picture is held whole. Either may be empty.
 struct load_hooks {
     // Called once, when all but the pictures is there. May change the scene.
     std::function<void(scene&)> geometry;

@@ -19,7 +19,7 @@ namespace voxelize {
 
 namespace vp = voxelpipe;
 
-// What the shaders need of a texture. Memory of the backend, not owned.
+// A texture as the shaders see it. Memory of the backend, not owned.
 struct sampled_texture {
     const glm::u8vec4* texels = nullptr; // of first_level, rows from the top; null: no texture
     int width = 0;                       // of level 0
@@ -210,7 +210,7 @@ struct voxel_centers {
     const float v2 = vp::exact::sub(c.position[v], a.position[v]);
     const float area = vp::exact::fma(u1, v2, -vp::exact::mul(u2, v1));
     if (area == 0.0f) return 1.0f;
-    // What one step of a voxel along u, or along v, is in the texture.
+    // One step of a voxel along u, and along v, in texels.
     const float along_u = vp::exact::div(vp::exact::to_float(centers.voxel_size[u]), area);
     const float along_v = vp::exact::div(vp::exact::to_float(centers.voxel_size[v]), area);
     const float su = vp::exact::mul(vp::exact::fma(s1, v2, -vp::exact::mul(s2, v1)), along_u);
@@ -262,7 +262,7 @@ struct surface_vertex_shader {
     }
 };
 
-// What the fragment shader has to work out; the rest of its outputs are placeholders for targets that are off.
+// The outputs that the fragment shader computes; the others are placeholders for targets that are off.
 struct surface_outputs {
     bool linear_color = false;  // for the average
     bool encoded_color = false; // for max and replace
@@ -317,7 +317,8 @@ struct surface_fragment_shader {
         return color;
     }
 
-    // Whether a mask takes the fragment away. At the point itself: a mean over the voxel would let fine leaves vanish.
+    // True if a mask discards the fragment. Sampled at the point itself: a mean over the voxel would let fine leaves
+    // vanish.
     [[nodiscard]] VOXELPIPE_HD bool is_cut_off(const surface_varyings& at) const {
         glm::vec4 color(1.0f);
         if (texture.texels != nullptr) color = sample(texture, *tables, at.texcoord);

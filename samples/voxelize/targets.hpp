@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What can be computed for each voxel: the names of --target with the type and the meaning of the values. One table,
-// which --help prints too.
+// The values that can be computed for each voxel: the names of --target with the type and the meaning of the values.
+// One table, which --help prints too.
 
 #include "volume.hpp"
 

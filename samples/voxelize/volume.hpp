@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the voxelize tool hands from the pipeline to the writers: one grid with any number of named, dense channels.
+// The result that the pipeline hands to the writers: one grid with any number of named, dense channels.
 // Plain host memory, owned; it knows nothing of the library, so that writers and their tests build without it.
 //
 // Voxel (i,j,k) fills the box  origin + (i,j,k) * voxel_size  ..  origin + (i+1,j+1,k+1) * voxel_size  of world space.

@@ -28,7 +28,7 @@ namespace voxelize {
 
 enum class backend_choice : std::uint8_t { automatic, cpu, cuda };
 
-// What a BLEND material's alpha means: the weight of its colour, a cut at one half as by MASK, or nothing.
+// Meaning of a BLEND material's alpha: the weight of its colour, a cut at one half as by MASK, or nothing.
 enum class blend_alpha : std::uint8_t { weight, cutoff, ignore };
 
 // A material's alpha mode by that choice.

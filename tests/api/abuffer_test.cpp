@@ -200,7 +200,7 @@ TEST(Abuffer, HoldsManyFragmentsOfOneVoxel) {
     for (std::uint32_t i = 0; i < host.primitives.size(); ++i) ASSERT_EQ(host.primitives[i], i);
 }
 
-// What was copied to the host is a range of ranges that the standard's algorithms take; a voxel is found in it, and a
+// Lists copied to the host are a range of ranges that the standard's algorithms take; a voxel is found in it, and a
 // primitive number leads back to its draw and triangle.
 TEST(AbufferOnHost, IsARangeOfRangesInWhichVoxelsAreFound) {
     backend_type be = unit::make_backend();

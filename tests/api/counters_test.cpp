@@ -233,7 +233,7 @@ VOXELPIPE_HD bool is_kept(std::uint32_t primitive, glm::ivec3 voxel) { return un
 constexpr auto keep_all = [](std::uint32_t, glm::ivec3) { return true; };
 constexpr auto keep_most = [](std::uint32_t primitive, glm::ivec3 voxel) { return is_kept(primitive, voxel); };
 
-// What the tests below rely on: no two blocks are alike in any kind, so no block's count stands for another's or for
+// The tests below rely on this: no two blocks are alike in any kind, so no block's count stands for another's or for
 // the sum.
 TEST(CountersScene, HasEveryKindInEveryBlockInOtherNumbers) {
     const scene& s = shared_scene();

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// How many workers walk several lists: every chunk once, all lists at the same pace.
+// Several workers walk several lists: every chunk once, all lists at the same pace.
 
 #include <voxelpipe/device/raster/list_walk.hpp>
 

@@ -172,7 +172,7 @@ float fused(float a, float b, float c) { return unit::nearest_float(exact(a) * e
 float product(float a, float b) { return unit::nearest_float(exact(a) * exact(b)); }
 float difference(float a, float b) { return unit::nearest_float(exact(a) + -exact(b)); }
 
-// Whether `root` is the number of its format nearest to the square root: the square lies between those of the points
+// True if `root` is the number of its format nearest to the square root: the square lies between those of the points
 // half-way to its neighbours.
 bool is_nearest_root(const rational& square, double root, double below, double above) {
     const rational low = exact(root) + exact(below), high = exact(root) + exact(above); // doubled

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Whether a program of scenes_test.cpp has every scene and large grids, or small grids only. It is a constant, because
-// the list of tests is made before anything is initialized at run time.
+// True if a program of scenes_test.cpp has every scene and large grids, false if small grids only. It is a constant,
+// because the list of tests is made before anything is initialized at run time.
 
 namespace scenes {
 

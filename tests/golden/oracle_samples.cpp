@@ -87,7 +87,7 @@ std::vector<sample> pick_samples(const std::vector<std::uint32_t>& words, const 
     return samples;
 }
 
-// Whether the triangle gives a thin fragment in the voxel: the column's square meets the projection, and the floor of
+// True if the triangle gives a thin fragment in the voxel: the column's square meets the projection, and the floor of
 // the plane's depth at the column's centre is this voxel. `lo` and `hi`: the voxels that its bounds touch.
 bool covers_thin(const oracle::grid& g, int fraction, const oracle::snapped_triangle& t, const std::array<int, 3>& v,
                  const std::array<int, 3>& lo, const std::array<int, 3>& hi) {

@@ -4,7 +4,7 @@
 
 // Connects oracle and library for tests that compare the two: grids and triangles in the library's types, its results
 // as voxel sets per triangle, the number of triangles of a run, and messages from which a disagreement can be replayed.
-// Of the oracle's folder, only this file and the tests library_* use the library.
+// Only this file of the oracle's folder and the tests library_* use the library.
 
 #include "oracle.hpp"
 #include "triangles.hpp"

@@ -28,7 +28,7 @@ struct rational_point {
 };
 using polygon = std::vector<rational_point>;
 
-// What is left of a convex polygon (or segment, or point) on the closed side sign * (x[axis] - bound) >= 0.
+// The part of a convex polygon (or segment, or point) on the closed side sign * (x[axis] - bound) >= 0.
 polygon clip(const polygon& in, std::size_t axis, std::int64_t bound, int sign) {
     polygon out;
     const auto distance = [&](const rational_point& p) {

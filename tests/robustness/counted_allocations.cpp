@@ -38,7 +38,7 @@ void* operator new(std::size_t size) {
     return p;
 }
 
-// What cpu_backend's buffers take.
+// The allocations of cpu_backend's buffers.
 void* operator new(std::size_t size, std::align_val_t alignment) {
     const auto multiple = static_cast<std::size_t>(alignment);
     void* const p =

@@ -115,7 +115,7 @@ TEST_F(BadAddressDeathTest, OfAMeshWhoseFragmentsAreListed) {
     for (const broken what : {broken::positions, broken::triangles, broken::target})
         expect_none_wrong([&] { return draw_broken<tile_targets>(what, tile_values{}, true); });
 }
-// Where an error shows only at the end, the last stage is named; without tiles that is the raster.
+// An error that shows only at the end names the last stage; without tiles that is the raster.
 TEST_F(BadAddressDeathTest, OfAMeshThatIsDrawnWithoutTiles) {
     expect_none_wrong([] { return draw_broken<bits>(broken::positions, vp::constant(true)); },
                       "fine raster: device error \\(CUDA error 700\\)");

@@ -248,7 +248,7 @@ TEST(SparseErrors, ChangeNothing) {
               vp::status_code::null_view);
 }
 
-// What a voxel's sum keeps is its terms as the blend rounds them, without the clear value.
+// A voxel's sum keeps its terms as the blend rounds them, without the clear value.
 TEST(SparseSums, AreKeptWithoutTheClearValue) {
     const glm::ivec3 extent{40, 40, 40};
     backend_type backend = unit::make_backend();

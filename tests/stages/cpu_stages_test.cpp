@@ -111,7 +111,7 @@ oracle::grid as_oracle(const vp::grid& g) {
 
 using corner = std::array<int, 3>; // of a box, in voxels of the whole grid
 
-// Whether the closed box meets the triangle's plane.
+// True if the closed box meets the triangle's plane.
 bool plane_meets_box(int fraction, const oracle::snapped_triangle& t, const corner& lo, const corner& hi) {
     const auto n = oracle::normal(t);
     bool above = false, below = false;

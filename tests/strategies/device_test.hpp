@@ -230,7 +230,7 @@ struct call_options : vp::voxelize_options {
     call_options(const vp::voxelize_options& o) : vp::voxelize_options(o) {} // NOLINT(*-explicit-*)
 };
 
-// Whether calls know that a mesh's indices have been checked.
+// True if calls know that a mesh's indices have been checked.
 enum class indices { checked, unknown };
 
 template <class Backend>

@@ -183,7 +183,7 @@ TEST(Pipeline, ACallWithoutTrianglesClears) {
     EXPECT_EQ(lists.to_host(be).extent, g.extent);
 }
 
-// What the host gets of a target: a box of it, and nothing more; and what the device gets of page-locked memory, whose
+// Copies of a target to the host: a box of it, and nothing more; and copies of page-locked memory to the device, whose
 // owner may write to it as soon as the constructor returns.
 TEST(Pipeline, MemoryIsCopiedBothWays) {
     vp::cuda_backend be;

@@ -356,7 +356,7 @@ TEST(AssimpMalformed, MemoryIsBoundedByTheFilesSize) {
     if (gltf_test::is_slow_build()) GTEST_SKIP() << "sanitizers reserve memory: there is no bound on it";
     const std::string line = error_of("m.obj", bytes_of(text), limits);
     EXPECT_NE(std::string::npos, line.find("MiB")) << line;
-    // What the run may take is another matter: the file is not to blame.
+    // The run's own limit is another matter: the file is not to blame.
     voxelize::gltf_limits narrow;
     narrow.room = std::uint64_t{1} << 20;
     EXPECT_THROW((void)load("m.obj", bytes_of(text), {}, narrow), std::bad_alloc);

@@ -90,7 +90,7 @@ TEST(PublishedGpuFigures, TargetsFollowFromTheAnchors) {
         EXPECT_NEAR(s.target_bit, std::min(s.original_bit, s.peer_bit) / 3, rounding);
         EXPECT_NEAR(s.target_bit_thin, s.original_bit_thin / 3, rounding);
         EXPECT_NEAR(s.target_abuffer, s.original_abuffer / 3, rounding);
-        // What is left of a float target after a third of the 2011 time is two thirds of the clear. The float and the
+        // A third of the 2011 time leaves two thirds of the clear of a float target. The float and the
         // bit floor differ by the two clears.
         const double clear = (s.target_float - s.original_float / 3) * 1.5;
         EXPECT_GT(clear, 0);

@@ -78,7 +78,7 @@ TEST(CudaFacts, AModelLargerThanTheGpusMemoryIsSeenBeforehand) {
     EXPECT_EQ("", why_too_large(facts, model, request));
 }
 
-// What auto decides by: whole orders, not milliseconds.
+// The estimates of auto: whole orders, not milliseconds.
 TEST(BackendEstimate, CountsTheWork) {
     voxelize::voxelize_request request;
     const auto both = [&](int n, double triangles, bool shaded, int threads, double started = 0) {

@@ -22,7 +22,7 @@ namespace gltf_test {
 
 using nlohmann::json;
 
-// Whether this is run in a build with sanitizers, which asks for less of what goes through the same code again.
+// True in a build with sanitizers, which asks for less of what goes through the same code again.
 [[nodiscard]] inline bool is_slow_build() {
     const char* const scale = std::getenv("VOXELPIPE_TEST_SCALE");
     return scale != nullptr && std::strtod(scale, nullptr) < 1;

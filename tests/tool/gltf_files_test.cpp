@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What loading FILE comes to, one line for the result and one for each warning.
+// The result of loading FILE, one line, and one for each warning.
 std::string outcome(const fs::path& file) {
     try {
         const voxelize::scene scene = voxelize::load_gltf(file);

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// What a scene shows, and where: hidden nodes, nodes scaled to nothing, GPU instancing; and what --lenient puts right.
+// Nodes that a scene shows, and their transforms: hidden nodes, nodes scaled to nothing, GPU instancing; and what
+// --lenient puts right.
 #include "gltf_builder.hpp"
 
 #include <gltf_scene.hpp>
@@ -239,7 +240,7 @@ TEST(GltfLenient, OnlySoManyFaultsAreNamed) {
     EXPECT_EQ("79 more faults of the file were put right by --lenient", scene.warnings.back());
 }
 
-// What was found before it came to the error is not lost with it.
+// Warnings from before the error are not lost with it.
 TEST(GltfLenient, ErrorsBringTheWarningsBeforeThem) {
     builder file;
     file.triangle()["indices"] = file.accessor(std::vector<std::uint16_t>{0, 1, 9}, "SCALAR");

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// Where a material's colour comes from: the alternatives that extensions bring, and the formats of pictures.
+// Sources of a material's colour: the alternatives that extensions bring, and the formats of pictures.
 #include "gltf_builder.hpp"
 
 #include <gltf_scene.hpp>

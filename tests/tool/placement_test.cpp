@@ -59,7 +59,7 @@ volume voxelized(const voxelize::scene& model, double size, int padding, coverag
     return voxelized(model, request, rule);
 }
 
-// Whether empty voxels lead, face to face, from outside of the grid to voxel TO.
+// True if empty voxels lead, face to face, from outside of the grid to voxel TO.
 bool leaks(const volume& v, const glm::ivec3& to) {
     const glm::ivec3 size(v.extent[0] + 2, v.extent[1] + 2, v.extent[2] + 2); // a layer of outside around it
     const auto blocked = [&](const glm::ivec3& p) {

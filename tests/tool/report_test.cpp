@@ -17,7 +17,7 @@
 
 namespace {
 
-// What WORK writes to standard error while that is the slave end of a terminal, or of a pipe.
+// The text that WORK writes to standard error while that is the slave end of a terminal, or of a pipe.
 std::string standard_error_of(bool terminal, const std::function<void()>& work) {
     int reader = -1;
     int writer = -1;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// What voxels look like: textures finer than voxels, alpha, walls with two sides. The program, end to end.
+// Colours of voxels: textures finer than voxels, alpha, walls with two sides. The program, end to end.
 #include "tool_test.hpp"
 
 #include <outside.hpp>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// What the materials of a model come to in the voxelize program's files: pictures and how they are laid on, colours and
+// Materials of a model in the voxelize program's files: pictures and how they are laid on, colours and
 // what they are multiplied with, masks, both sides of faces.
 #include "tool_test.hpp"
 

@@ -210,7 +210,7 @@ void expect_refusal(const std::string& name, const std::string& bytes, int code)
     EXPECT_EQ(code, result.code) << name << ": " << result.err;
     EXPECT_NE(std::string::npos, result.err.find("MiB")) << name << ": " << result.err;
     EXPECT_EQ(1, std::count(result.err.begin(), result.err.end(), '\n')) << name << ": " << result.err;
-    // Of the processor, whatever else the machine does.
+    // Processor time, whatever else the machine does.
     EXPECT_GT(20, after.ru_utime.tv_sec - before.ru_utime.tv_sec + after.ru_stime.tv_sec - before.ru_stime.tv_sec)
         << name;
 }

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// What the program says: choices in words, the reason why nothing is covered, one warning for one thing; and the
+// The program's messages: choices in words, the reason why nothing is covered, one warning for one thing; and the
 // examples of --help, as they are printed.
 #include "tool_test.hpp"
 

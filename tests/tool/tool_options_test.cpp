@@ -106,7 +106,7 @@ TEST(Tool, HelpNamesEverything) {
     EXPECT_EQ(0U, version.out.find("voxelize ")) << version.out;
 }
 
-// Of a PNG: where its header has width and height (their low bytes; the high ones are 0 here) and the kind of its
+// Offsets in a PNG's header: width and height (their low bytes; the high ones are 0 here) and the kind of its
 // pixels.
 constexpr std::size_t png_width = 19, png_height = 23, png_kind = 25;
 
@@ -158,7 +158,7 @@ TEST(Tool, EveryPictureOptionChangesThePicture) {
     EXPECT_EQ(30, tall[png_width]);
     EXPECT_EQ(40, tall[png_height]);
 
-    // What leaves it as it is: the defaults, spelt out, and options of other files.
+    // Options that leave it as it is: the defaults, spelt out, and options of other files.
     EXPECT_TRUE(plain == picture({"--azimuth", "35", "--elevation", "25", "--zoom", "1", "--fov", "28", "--samples",
                                   "2", "--background", "sky", "--up", "y"}));
     EXPECT_TRUE(plain == picture({"--compression", "9", "--depth-axis", "x", "--threads", "1"}));
@@ -168,7 +168,7 @@ TEST(Tool, EveryPictureOptionChangesThePicture) {
     EXPECT_TRUE(picture({"--no-color"}) == picture({"--target", "occupancy"}));
 }
 
-// What a chunk of a .vox with one model holds.
+// The content of a chunk of a .vox with one model.
 std::string vox_chunk(const std::string& file, const std::string& name) {
     const std::size_t at = file.find(name); // then the length of the content, of the children, the content
     if (at == std::string::npos || at + 12 > file.size()) return {};
@@ -226,7 +226,7 @@ TEST(Tool, OutputsDoNotRenameEachOther) {
         voxelize({"-o", folder / "a.glb", "-o", beside, "-o", folder / "a.binvox", "-t", "count"});
         EXPECT_TRUE(read_file(alone) == read_file(beside)) << extension;
     }
-    // What is asked for is in all of them.
+    // Targets that are asked for are in all of them.
     voxelize({"-o", folder / "b.npy", "-o", folder / "b.vox", "-t", "occupancy,color"});
     EXPECT_TRUE(std::filesystem::exists(folder / "b.occupancy.npy"));
     EXPECT_TRUE(std::filesystem::exists(folder / "b.color.npy"));

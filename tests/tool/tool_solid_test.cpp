@@ -147,7 +147,7 @@ TEST(Solid, ValuesInside) {
                 const bool surface = x % 8 == 0 || x % 8 == 7 || y == 0 || y == 7 || z == 0 || z == 7;
                 const bool set = extent != "inner" || !surface;
                 ASSERT_EQ(set ? 1 : 0, occupancy.at<std::uint8_t>(i));
-                // Where a body's surface touches the other's voxels it counts there, too.
+                // A body's surface counts in the other's voxels that it touches, too.
                 const bool both = surface && extent == "outer" && (x == 7 || x == 8);
                 ASSERT_EQ(!set                                       ? 0U
                           : both && std::string(rule) == "each_draw" ? 2U

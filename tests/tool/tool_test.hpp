@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What every test of the voxelize program uses: the program, models for it, readers of its files.
+// Common to all tests of the voxelize program: the program, models for it, readers of its files.
 
 #include "tool_runner.hpp"
 #include "tool_scenes.hpp"

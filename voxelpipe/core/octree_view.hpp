@@ -13,7 +13,7 @@
 
 namespace voxelpipe {
 
-// What a ray meets first.
+// The first voxel that a ray meets.
 struct voxel_hit {
     bool found = false;
     double distance = 0;     // along the ray, in lengths of its direction
@@ -125,7 +125,7 @@ private:
     [[nodiscard]] VOXELPIPE_HD static int clamped(double a, int from, int to) {
         return a <= from ? from : a >= to ? to : static_cast<int>(a);
     }
-    // Which child of its node of this level a cell lies in.
+    // Number of the child of its node of this level that a cell lies in.
     [[nodiscard]] VOXELPIPE_HD static unsigned child_of(const int (&cell)[3], int level) {
         return static_cast<unsigned>((cell[0] >> (level - 1) & 1) | (cell[1] >> (level - 1) & 1) << 1 |
                                      (cell[2] >> (level - 1) & 1) << 2);

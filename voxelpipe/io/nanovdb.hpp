@@ -225,7 +225,7 @@ struct level {
     return l;
 }
 
-// Where the parts of a grid lie, in bytes from its start.
+// Offsets of the parts of a grid, in bytes from its start.
 template <class T>
 struct grid_plan {
     using lower_node = internal_node<T, 4>;

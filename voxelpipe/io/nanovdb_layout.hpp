@@ -50,7 +50,7 @@ struct rgba8 {
     std::uint32_t packed; // red in the lowest byte
 };
 
-// Of a type of values: its number, what nodes hold of it, and its statistics' type.
+// A type of values: its number, its form in nodes, and its statistics' type.
 template <class T>
 struct value_type;
 template <class T, grid_type Type, grid_class Class, class Statistic = float>
@@ -118,7 +118,7 @@ struct file_header {
 };
 static_assert(sizeof(file_header) == 16);
 
-// Of each grid, after the header; its name follows, with a zero at its end.
+// One a grid, after the header; its name follows, with a zero at its end.
 struct file_entry {
     std::uint64_t grid_size, file_size, name_hash, num_voxels;
     grid_type type;

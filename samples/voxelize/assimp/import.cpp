@@ -27,7 +27,7 @@ namespace {
 // ---- Files: the model itself from memory, others through the reader, none outside the model's folder
 // -----------------
 
-// What assimp does not see in time.
+// Faults that assimp finds too late.
 void check_text(std::span<const std::byte> bytes, const std::string& extension) {
     const std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
     if (extension == ".obj" && (text.starts_with("\xFE\xFF") || text.starts_with("\xFF\xFE")))
@@ -209,7 +209,7 @@ primitive read_mesh(const aiMesh& source, std::size_t index, const model& result
         }
         for (unsigned corner = 0; corner < face.mNumIndices; ++corner)
             if (face.mIndices[corner] >= source.mNumVertices) throw std::runtime_error("an index is out of range");
-        // What could not be triangulated is a fan.
+        // A polygon that could not be triangulated is a fan.
         for (unsigned corner = 2; corner < face.mNumIndices; ++corner)
             part.triangles.emplace_back(face.mIndices[0], face.mIndices[corner - 1], face.mIndices[corner]);
     }

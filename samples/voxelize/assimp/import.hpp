@@ -13,7 +13,7 @@
 
 namespace voxelize::assimp {
 
-// Whether assimp has an importer for files that end so (".obj", lower case).
+// True if assimp has an importer for files with this extension (".obj", lower case).
 [[nodiscard]] bool reads(const std::string& extension);
 
 // The model in BYTES, the content of the file NAME (without a folder; its extension chooses the importer). READ_FILE

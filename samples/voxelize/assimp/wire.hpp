@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the process that runs assimp sends back, as bytes. The reader trusts nothing: the sender has had a hostile file.
+// The bytes that the process that runs assimp sends back. The reader trusts nothing: the sender has had a hostile file.
 
 #include "../affine.hpp"
 #include "../model_error.hpp"

@@ -15,7 +15,7 @@
 
 namespace voxelize {
 
-// What a format does with half floats.
+// A format's treatment of half floats.
 enum class half_floats { keep, widen };
 
 // Receives the next piece; it is valid only during the call.

@@ -30,7 +30,7 @@ struct write_options {
     std::function<void(double)> progress; // called with 0..1 now and then, from the calling thread; may be empty
 };
 
-// What the tool shows in --help and checks before it starts to compute.
+// The facts of a format that --help shows and that are checked before the tool starts to compute.
 struct format {
     std::string_view extension;   // lower case, with the dot
     std::string_view description; // one line
@@ -41,7 +41,7 @@ struct format {
     bool only_sparse = false;     // holds the voxels that are occupied and no others
 };
 
-// Whether voxels of this size are cubes, but for what fitting a grid loses by rounding.
+// True if voxels of this size are cubes, but for what fitting a grid loses by rounding.
 [[nodiscard]] bool are_cubic(const std::array<double, 3>& voxel_size);
 
 // In the order in which --help lists them.

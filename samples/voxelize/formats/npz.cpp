@@ -16,7 +16,7 @@
 namespace voxelize {
 namespace {
 
-// What a thread compresses at once; numpy never sees it.
+// Bytes that a thread compresses at once; numpy never sees the pieces.
 constexpr std::size_t piece_bytes = std::size_t{256} << 10;
 
 // minizip writes through these callbacks into our output_file. A C library must not see an exception, so the first one

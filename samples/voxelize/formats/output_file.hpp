@@ -22,7 +22,7 @@ namespace voxelize {
 
 static_assert(std::endian::native == std::endian::little, "the writers copy values in memory order, little end first");
 
-// What a writer throws: the path and the reason in one line, ready to be shown to a person.
+// Thrown by writers: the path and the reason in one line, ready to be shown to a person.
 class write_error : public std::runtime_error {
 public:
     write_error(const std::filesystem::path& path, std::string_view reason);

@@ -11,7 +11,7 @@ namespace voxelize {
 std::vector<std::filesystem::path> write_png(const volume& v, const std::filesystem::path& path,
                                              const write_options& options);
 
-// What RENDER draws with the picture's options.
+// The picture that RENDER draws with the picture's options.
 std::vector<std::filesystem::path> write_picture(const std::filesystem::path& path, const write_options& options,
                                                  const std::function<image(const preview_options&)>& render);
 

@@ -103,7 +103,7 @@ private:
     std::vector<std::uint32_t> cells_; // `present` and the colour, or 0; all 0 between calls
 };
 
-// What one thread takes at a time: all layers along x in one column of words, or one layer along y or z.
+// The work that a thread takes at a time: all layers along x in one column of words, or one layer along y or z.
 class layer_group {
 public:
     layer_group(const volume& v, const voxel_reader& reader, std::size_t axis, std::int64_t number)

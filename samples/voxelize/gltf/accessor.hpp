@@ -33,7 +33,7 @@ public:
     // NORMALIZED as glTF maps them to [0, 1] or [-1, 1]. USER is named in errors.
     [[nodiscard]] std::vector<double> numbers(std::size_t index, bool normalized, const std::string& user) const;
 
-    // Where the elements of accessor INDEX lie in the file, one every `stride` bytes; nothing for an accessor that is
+    // The elements of accessor INDEX in the file, one every `stride` bytes; nothing for an accessor that is
     // sparse or without a buffer view, whose elements lie nowhere.
     struct elements_in_place {
         const std::byte* first;

@@ -10,7 +10,7 @@ namespace voxelize::gltf {
 
 namespace {
 
-// Where a moment lies among keys: between two of them, or on one of the ends.
+// A moment among keys: between two of them, or on one of the ends.
 struct moment {
     std::size_t key = 0;
     double fraction = 0; // of the way to the next key

@@ -41,7 +41,7 @@ public:
 
     [[nodiscard]] const gltf_limits& limits() const { return limits_; }
 
-    // What is charged while a scope lives is temporary: it is given back at the scope's end.
+    // Charges while a scope lives are temporary: the scope's end gives them back.
     class scope {
     public:
         explicit scope(budget& owner) : owner_{owner}, used_before_{owner.used_}, lasting_before_{owner.lasting_} {}

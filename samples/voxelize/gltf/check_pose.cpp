@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// What gives a mesh its pose: morph targets, skins, one animation.
+// Checks of the pose of meshes: morph targets, skins, one animation.
 #include "checker.hpp"
 
 #include <tiny_gltf.h>
@@ -14,7 +14,7 @@ void checker::check_numbers_list(const json_at& at, std::string_view key) const 
     if (const std::size_t size = at.array_size(key); size != 0) at.check_numbers(key, size);
 }
 
-// Of the targets only POSITION is used: nothing else moves a triangle.
+// Only POSITION of the targets is used: nothing else moves a triangle.
 void checker::check_targets(const json_at& primitive) const {
     memory_.charge(primitive.array_size("targets"), sizeof(std::map<std::string, int>), "morph targets");
     primitive.each_object("targets", [&](const json_at& target) {

@@ -30,7 +30,7 @@ public:
     [[nodiscard]] checked_document run();
 
 private:
-    // What the bounds checks need of a buffer view.
+    // A buffer view as the bounds checks see it.
     struct view {
         std::uint64_t byte_offset = 0;
         std::uint64_t byte_length = 0;

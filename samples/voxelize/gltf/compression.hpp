@@ -15,7 +15,7 @@
 
 namespace voxelize::gltf {
 
-// What this build has the libraries for.
+// The compressions that this build has libraries for.
 #ifdef VOXELIZE_HAS_MESHOPT
 inline constexpr bool reads_meshopt = true;
 #else
@@ -36,7 +36,7 @@ inline constexpr bool reads_draco = false;
 enum class meshopt_mode : std::uint8_t { attributes, triangles, indices };
 enum class meshopt_filter : std::uint8_t { none, octahedral, quaternion, exponential };
 
-// Where the compressed bytes of a buffer view lie, and what they become: count * stride bytes.
+// The compressed bytes of a buffer view; they become count * stride bytes.
 struct meshopt_view {
     std::uint32_t buffer = 0;
     std::uint64_t byte_offset = 0;

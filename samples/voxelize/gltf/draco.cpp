@@ -57,7 +57,7 @@ void with_component(std::uint32_t component_type, Visit&& visit) {
     }
 }
 
-// What one primitive comes to. Runs in the process of its own.
+// Decodes one primitive. Runs in the process of its own.
 void decode(const draco_primitive& primitive, std::span<const std::byte> compressed, std::vector<std::byte>& bytes) {
     const auto require = [&](bool holds, const char* what) {
         if (!holds) throw std::runtime_error(primitive.where + ": " + what);

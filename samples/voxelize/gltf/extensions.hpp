@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What each glTF extension means for a voxelization: one table.
+// The meaning of each glTF extension for a voxelization: one table.
 
 #include "compression.hpp"
 

@@ -125,7 +125,7 @@ public:
         return found->value_->get<double>();
     }
 
-    // Whether KEY is there; it must then be an array of COUNT numbers. They are made floats, since tinygltf cuts
+    // True if KEY is there; it must then be an array of COUNT numbers. They are made floats, since tinygltf cuts
     // integers to 32 bits.
     bool check_numbers(std::string_view key, std::size_t count) const {
         const auto found = member(key);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What becomes of a file that breaks the specification in a way that can be put right: an error, or with --lenient a
+// Treatment of files that break the specification in a way that can be put right: an error, or with --lenient a
 // warning.
 
 #include "../gltf_scene.hpp"

@@ -46,7 +46,7 @@ affine local_transform(const tinygltf::Node& node, std::size_t index) {
     return from_parts(translation, rotation, scale, node_name(index) + ".rotation");
 }
 
-// Whether local_transform does not throw.
+// True if local_transform does not throw.
 bool is_usable(const tinygltf::Node& node) {
     try {
         (void)local_transform(node, 0);
@@ -191,7 +191,7 @@ shown_scene shown_meshes(const tinygltf::Model& model, const accessor_reader& ac
         if (in_scene[index] || is_usable(model.nodes[index]))
             to_world[index] = local_transform(model.nodes[index], index);
         hidden[index] = is_hidden(model.nodes[index]);
-        // What a scene lists stands in the world, whatever is above it.
+        // Nodes that a scene lists stand in the world, whatever is above them.
         if (above == forest::none || is_root[index]) continue;
         to_world[index] = to_world[above].after(to_world[index]);
         hidden[index] = hidden[index] || hidden[above];

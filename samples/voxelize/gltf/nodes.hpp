@@ -27,10 +27,11 @@ struct shown_scene {
     std::vector<affine> node_to_world; // every node of the file, in the scene or not
 };
 
-// What the default scene shows, else scene 0, else every node without a parent; in document order of a depth-first
-// walk, the instances of EXT_mesh_gpu_instancing in theirs. Not shown: nodes that KHR_node_visibility hides, with all
-// below them, and meshes scaled to nothing. A file with meshes and neither scenes nor nodes, a library of parts, gives
-// each mesh once. Throws gltf_error where the nodes are no forest (a cycle, two parents) or a transform is not affine.
+// The meshes that the default scene shows, else scene 0, else every node without a parent; in document order of a
+// depth-first walk, the instances of EXT_mesh_gpu_instancing in theirs. Not shown: nodes that KHR_node_visibility
+// hides, with all below them, and meshes scaled to nothing. A file with meshes and neither scenes nor nodes, a library
+// of parts, gives each mesh once. Throws gltf_error where the nodes are no forest (a cycle, two parents) or a transform
+// is not affine.
 [[nodiscard]] shown_scene shown_meshes(const tinygltf::Model& model, const accessor_reader& accessors,
                                        leniency& tolerance);
 

@@ -28,7 +28,7 @@ public:
                 const std::vector<affine>& node_to_world, budget& memory)
         : model_{model}, accessors_{accessors}, node_to_world_{node_to_world}, memory_{memory} {}
 
-    // Whether PART looks different for the node of SHOWN than in its mesh's base shape.
+    // True if PART looks different for the node of SHOWN than in its mesh's base shape.
     [[nodiscard]] bool is_posed(const shown_mesh& shown, const tinygltf::Primitive& part) const;
 
     // The positions of PART, whose base shape is BASE (3 numbers a vertex), for SHOWN. WHERE is named in errors.

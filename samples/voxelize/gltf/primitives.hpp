@@ -49,7 +49,7 @@ public:
     void finish();
 
 private:
-    // What reading a primitive gives: nothing where it has no triangles.
+    // A primitive that has been read: nothing if it has no triangles.
     struct read_part {
         std::optional<std::uint32_t> primitive;
         double unit = 1;                  // of its positions: those of normalised integers stay integers

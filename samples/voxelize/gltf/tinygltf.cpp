@@ -8,7 +8,7 @@
 
 #include <fstream> // tinygltf's writer wants it even with TINYGLTF_NO_FS
 
-// What stb_image takes is counted as all else that the program takes.
+// Memory of stb_image is counted as all other memory of the program.
 #include <cstring>
 #include <new>
 static void* resized_block(void* block, std::size_t old_size, std::size_t new_size) {

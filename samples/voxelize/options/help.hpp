@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What --help says beside the options.
+// The text of --help beside the options.
 
 #include <cstddef>
 #include <string>

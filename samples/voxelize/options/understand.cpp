@@ -79,7 +79,7 @@ void understand_grid(command_line& options, const raw_options& raw) {
         const std::vector<int> n = parse_list<int>("--extent", raw.extent, 3);
         options.grid.extent = glm::ivec3(n[0], n[1], n[2]);
     }
-    // What can be told of the grid before the model is there.
+    // Errors of the grid that need no model to be seen.
     bounding_box unit;
     unit.high = glm::dvec3(1);
     try {

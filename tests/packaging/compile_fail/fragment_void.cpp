@@ -5,7 +5,7 @@
 
 #include "common.hpp"
 
-// What a host compiler sees of a shader for the device only: nvcc leaves out the body.
+// A shader for the device only, as a host compiler sees it: nvcc leaves out the body.
 struct shader {
 #ifndef VOXELPIPE_CONTROL
     auto operator()(const vp::fragment<>&) const {}

@@ -21,7 +21,7 @@ void require(bool holds, const char* what) {
     std::abort();
 }
 
-// What scene.hpp promises to everyone behind the loader, but for pictures.
+// The promises of scene.hpp to everyone behind the loader, but for pictures.
 void check(const std::vector<voxelize::primitive>& primitives, const std::vector<voxelize::instance>& instances,
            std::size_t num_materials) {
     for (const voxelize::primitive& part : primitives) {

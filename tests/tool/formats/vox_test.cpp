@@ -151,7 +151,7 @@ vox_file load(const std::filesystem::path& path) {
     return vox_parser(bytes).parse();
 }
 
-// Where a voxel of the volume stands in the file.
+// The position in the file of a voxel of the volume.
 point expected_place(const volume& v, up_axis up, const point& p) {
     return up == up_axis::y ? point{p[0], v.extent[2] - 1 - p[2], p[1]} : p;
 }

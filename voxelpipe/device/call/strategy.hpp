@@ -58,7 +58,7 @@ struct strategy_choice {
 
 namespace device {
 
-// Which strategies a program's types allow: only these are instantiated. `tiled` always is.
+// The strategies that a program's types allow: only these are instantiated. `tiled` always is.
 struct possible_strategies {
     bool occupancy_mask = false; // a constant shader, and blends that give the same for one fragment as for many
     bool immediate = false;      // a constant shader, and targets that are blended or counted where they lie

@@ -201,7 +201,7 @@ __global__ __launch_bounds__(tuning::dense_threads) void order_dense_kernel(cons
     }
 }
 
-// How many of n sorted numbers are less than w.
+// Number of n sorted numbers that are less than w.
 [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t count_less(const std::uint32_t* numbers, std::uint32_t n,
                                                                    std::uint32_t w) {
     std::uint32_t lo = 0;

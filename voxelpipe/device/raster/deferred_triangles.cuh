@@ -179,7 +179,7 @@ struct class_writer {
         if (threadIdx.x % 32 == 0)
             for (int k = 0; k < size_class::count; ++k) slots[k][threadIdx.x / 32] = static_cast<unsigned>(waiting[k]);
     }
-    // How many triangles wait in the block, or at least `many` if some of them are large. Synchronises the block.
+    // Number of triangles that wait in the block, or at least `many` if some of them are large. Synchronises the block.
     static constexpr int many = 32;
     [[nodiscard]] __device__ VOXELPIPE_INLINE int count() const {
         const bool has_large = (waiting[size_class::thread_heavy] | waiting[size_class::warp_group]) != 0;

@@ -19,7 +19,7 @@ struct dim3 {
     constexpr dim3(unsigned x_ = 1, unsigned y_ = 1, unsigned z_ = 1) : x(x_), y(y_), z(z_) {}
 };
 
-// Of the running thread.
+// The running thread's.
 extern uint3 threadIdx, blockIdx;
 extern dim3 blockDim, gridDim;
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// What a user's first program does: one square of two triangles into a grid of 4 x 4 x 4. The square lies on the border
+// A user's first program: one square of two triangles into a grid of 4 x 4 x 4. The square lies on the border
 // between the second and the third layer, so conservative coverage has to fill exactly those two.
 
 #include <cpu_ref/backend.hpp>
