@@ -219,8 +219,8 @@ TEST(Tool, ThreadsAndSlabsChangeNothing) {
     const scratch_folder folder;
     gltf_test::small_world().write_glb(folder / "m.glb");
     const auto voxelize = [&](const std::vector<std::string>& how) {
-        std::vector<std::string> arguments{folder / "m.glb", "-o",  folder / "o.npy", "-r", "45", "-t", all_targets,
-                                           "--stats",        "json"};
+        std::vector<std::string> arguments{folder / "m.glb", "-o",  folder / "o.npy", "-r",  "45", "-t", all_targets,
+                                           "--backend",      "cpu", "--stats",        "json"};
         arguments.insert(arguments.end(), how.begin(), how.end());
         const outcome result = run(folder, arguments);
         EXPECT_EQ(0, result.code) << result.err;

@@ -61,12 +61,14 @@ std::optional<texture_coordinates> material_reader::want_texture(std::size_t mat
     const alpha_mode alpha = scene_.materials[material_index].alpha;
     const bool cuts = alpha == alpha_mode::mask || (alpha == alpha_mode::blend && options_.blend_cuts);
     if (!options_.colors && !cuts) return std::nullopt;
+    const std::vector<std::uint32_t>& pictures = bytes_.texture_images(static_cast<std::size_t>(info.index));
     if (!wanted_[material_index]) {
         wanted_[material_index] = true;
         queue_.push_back(material_index);
-        for (const std::uint32_t picture : bytes_.texture_images(static_cast<std::size_t>(info.index)))
+        for (const std::uint32_t picture : pictures)
             users_[picture].push_back(static_cast<std::uint32_t>(material_index));
     }
+    if (pictures.empty()) return std::nullopt;
     return coordinates_of(info);
 }
 
