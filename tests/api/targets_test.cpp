@@ -218,8 +218,8 @@ TEST(LoadOperation, UntouchedVoxelsKeepTheirBits) {
     }
 }
 
-// A framebuffer that tracks its changes holds the same values. tests/strategies/tracked_changes_test.cu has targets that are
-// large enough for partial clears.
+// A framebuffer that tracks its changes holds the same values. tests/strategies/tracked_changes_test.cu has targets
+// that are large enough for partial clears.
 TEST(LoadOperation, TrackedChangesMakeNoDifference) {
     backend_type backend = unit::make_backend();
     two plain{backend, extent}, tracked{backend, extent};
