@@ -7,6 +7,7 @@
 #include "solid_support.hpp"
 
 #include <voxelpipe/core/crossing.hpp>
+#include <voxelpipe/core/small_crossing.hpp>
 
 #include <algorithm>
 #include <string>
@@ -165,6 +166,74 @@ TEST(Crossings, BothWidthsOfIntegersAgreeUpToTheLastBitOfTheNarrowOne) {
         EXPECT_EQ((crossings<1, std::int64_t>(both, clip)), (crossings<1, vp::int128>(both, clip)));
         EXPECT_EQ((crossings<2, std::int64_t>(both, clip)), (crossings<2, vp::int128>(both, clip)));
     }
+}
+
+// Rows along x as text, of triangles in 32 bits, whose box has at most small_voxels.
+std::string small_crossings(const snapped_mesh& s, const core::voxel_box& clip) {
+    std::string text;
+    for (const glm::uvec3& t : s.m.triangles) {
+        const core::snapped_position p[3] = {s.positions[t.x], s.positions[t.y], s.positions[t.z]};
+        const core::row_box rows = core::rows_within<0>(p[0], p[1], p[2], s.fraction, clip);
+        if (rows.empty()) continue;
+        const std::int64_t origin[3] = {core::min3(p[0].x, p[1].x, p[2].x) >> s.fraction,
+                                        core::min3(p[0].y, p[1].y, p[2].y) >> s.fraction,
+                                        core::min3(p[0].z, p[1].z, p[2].z) >> s.fraction};
+        core::small_triangle at{};
+        for (int v = 0; v < 3; ++v) {
+            const std::int64_t q[3] = {p[v].x, p[v].y, p[v].z};
+            for (int k = 0; k < 3; ++k) at.p[v][k] = static_cast<std::int32_t>(q[k] - (origin[k] << s.fraction));
+        }
+        const core::small_crossings c(at, s.fraction);
+        core::for_each_small_crossing(c, static_cast<int>(rows.u.lo - origin[1]),
+                                      static_cast<int>(rows.u.hi - origin[1]), static_cast<int>(rows.v.lo - origin[2]),
+                                      static_cast<int>(rows.v.hi - origin[2]), [&](int y, int z, int x) {
+                                          text += std::to_string(origin[1] + y) + " " + std::to_string(origin[2] + z) +
+                                                  " " + std::to_string(origin[0] + x) + " " +
+                                                  std::to_string(c.winding) + "\n";
+                                      });
+    }
+    return text;
+}
+
+TEST(Crossings, SmallTrianglesAreThoseOfTheWidePathUpToTheLargestOnes) {
+    splitmix64 random(7);
+    std::size_t found = 0;
+    for (const int extent : {1, 256, 512, 1024, 4096}) {
+        const int fraction = core::fraction_bits(extent);
+        const std::int64_t most = std::int64_t{core::small_voxels(fraction)} << fraction;
+        ASSERT_GT(most, 0);
+        for (int round = 0; round < 4000; ++round) {
+            // From specks to the largest box, often with corners on centres and on faces; and slivers.
+            const std::int64_t side = random.one_in(3) ? most : std::int64_t{1} << random.between(2, fraction + 3);
+            const std::int64_t grain = random.one_in(2) ? std::int64_t{1} << (fraction - 1) : 1;
+            std::int64_t corner[3];
+            for (auto& c : corner) c = random.between(-3, 3) << fraction;
+            mesh m;
+            m.triangles.push_back({0, 1, 2});
+            m.positions.resize(3);
+            snapped_mesh s(m, unit_grid(glm::ivec3(extent)));
+            for (int v = 0; v < 3; ++v) {
+                std::int64_t q[3];
+                for (int k = 0; k < 3; ++k) {
+                    const std::int64_t end = side < most ? side : most;
+                    q[k] = corner[k] + (random.one_in(6) ? 0
+                                        : random.one_in(6)
+                                            ? end - 1
+                                            : random.below(static_cast<std::uint64_t>(end)) / grain * grain);
+                }
+                s.positions[static_cast<std::size_t>(v)] = {q[0], q[1], q[2]};
+            }
+            if (random.one_in(4)) { // all but collinear
+                const auto &a = s.positions[0], &b = s.positions[1];
+                s.positions[2] = {(a.x + b.x) / 2, (a.y + b.y) / 2, ((a.z + b.z) / 2) ^ 1};
+            }
+            const core::voxel_box clip{{{-40, -40, -40}}, {{40, 40, 40}}};
+            const std::string wide = crossings<0, std::int64_t>(s, clip);
+            ASSERT_EQ(small_crossings(s, clip), wide) << "extent " << extent << ", round " << round;
+            found += wide.size();
+        }
+    }
+    EXPECT_GT(found, 100000u);
 }
 
 TEST(Crossings, MeshesOfTheGreatestSizeHaveTheOraclesWindings) {

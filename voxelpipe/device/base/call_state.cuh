@@ -42,7 +42,8 @@ struct pipeline_state {
         unsigned long long crossings;
         unsigned long long cover_ends; // listed: where runs of covered voxels begin and end
         unsigned long long open_rows, max_winding;
-    } solid; // solid/
+        unsigned long long next_large; // row_triangles
+    } solid;                           // solid/
 
     // For capacities::longest_ordered: 0 if the windows order all voxels, 1 if a block can take the longest that they
     // leave.

@@ -147,7 +147,9 @@ __global__ __launch_bounds__(threads_per_block) void fill_bit_rows_kernel(const 
                     target::traits::apply(from_set, voxelpipe::get<K>(values));
                     word* const w =
                         t.elements + target::map::cell(t.extent, static_cast<int>((first + lane) * 32), y, z);
-                    const word old = *w;
+                    const bool was_cleared =
+                        t.load == load_operation::clear && !t.clear_value; // and nobody else writes
+                    const word old = was_cleared ? 0 : *w;
                     *w = (old & ~mask) | (mask & ((from_set ? old : 0u) | (from_clear ? ~old : 0u)));
                 });
             __syncwarp();

@@ -8,13 +8,15 @@
 #include <voxelpipe/device/solid/solid_call.cuh>
 
 #define VOXELPIPE_EMIT_CROSSINGS(HOW, SINK, ...)                                                                       \
-    HOW void emit_crossings(const __VA_ARGS__&, const row_grid&, const SINK&, const row_triangles&,                    \
-                            const zeroed_memory&, pipeline_state*, cudaStream_t);
+    HOW void emit_crossings(const __VA_ARGS__&, const row_grid&, const SINK&, const row_triangles&, pipeline_state*,   \
+                            cudaStream_t);
 #define VOXELPIPE_SOLIDS(HOW)                                                                                          \
     VOXELPIPE_EMIT_CROSSINGS(HOW, crossing_appender, stored_triangles)                                                 \
     VOXELPIPE_EMIT_CROSSINGS(HOW, crossing_toggler, stored_triangles)                                                  \
     VOXELPIPE_EMIT_CROSSINGS(HOW, crossing_appender, shaded_triangles<mesh_view<>, passthrough>)                       \
     VOXELPIPE_EMIT_CROSSINGS(HOW, crossing_toggler, shaded_triangles<mesh_view<>, passthrough>)                        \
+    HOW void find_row_codes(const shaded_triangles<mesh_view<>, passthrough>&, const row_grid&, const zeroed_memory&,  \
+                            pipeline_state*, cudaStream_t);                                                            \
     HOW crossing_list sort_crossings<0>(const crossing_memory&, pipeline_state*, const capacities&, cudaStream_t);     \
     HOW void end_parities<0>(word*, const row_marks&, const row_grid&, bool, pipeline_state*, cudaStream_t);           \
     HOW void raster_cover<0>(const cover_memory&, const draw_geometry&, std::uint32_t, const geometry&, const grid&,   \

@@ -83,6 +83,7 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
 
     struct memory {
         vertex_positions positions{};
+        std::uint32_t* codes = nullptr; // of vertices, where they are shaded on the spot
         draw_geometry* geometries = nullptr;
         SolidShader* shaders = nullptr; // by draw, where they differ
         row_triangles kept{};
@@ -100,7 +101,10 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
             most = std::max<std::size_t>(most, d.mesh.num_triangles());
         }
         for (const cone_part& c : cones) most = std::max(most, std::size_t{c.num_triangles});
-        if (!shades_on_the_spot()) m.positions = vertex_positions::take(a, vertices);
+        if (shades_on_the_spot())
+            m.codes = a.take<std::uint32_t>(vertices);
+        else
+            m.positions = vertex_positions::take(a, vertices);
         m.geometries = a.take<draw_geometry>(num_parts() > 1 ? num_parts() : 0);
         if (is_split()) m.shaders = a.take<SolidShader>(draws.size());
         m.kept = row_triangles::take(a, plan.num_primitives);
@@ -130,7 +134,7 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         return sorted;
     }
     // Gives all crossings to a sink, and the list the cover where that is wanted. zeros: memory that is to be zero
-    // before.
+    // before; none unless shades_on_the_spot.
     template <class Sink>
     void emit(const memory& m, const Sink& sink, const zeroed_memory& zeros, pipeline_state* state,
               cudaStream_t stream) const {
@@ -138,19 +142,21 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         if constexpr (is_cheap<VertexShader>) {
             if (shades_on_the_spot()) {
                 const draw_type& d = draws[0];
-                emit_crossings(
-                    shaded_triangles<Mesh, VertexShader>{
-                        {d.mesh, d.vertex_shader, core::make_snap_transform(plan.g), 0},
-                        plan.num_primitives,
-                        static_cast<std::uint32_t>(d.mesh.positions.size())},
-                    rows(), sink, kept, zeros, state, stream);
+                const shaded_triangles<Mesh, VertexShader> triangles{
+                    {d.mesh, d.vertex_shader, core::make_snap_transform(plan.g), 0},
+                    m.codes,
+                    plan.num_primitives,
+                    static_cast<std::uint32_t>(d.mesh.positions.size())};
+                find_row_codes(triangles, rows(), zeros, state, stream);
+                end_stage(clock, &stage_times::vertex_shade);
+                emit_crossings(triangles, rows(), sink, kept, state, stream);
                 end_stage(clock, &stage_times::coarse_raster);
                 return;
             }
         }
         std::vector<draw_geometry> geometry_of;
         const geometry geo = shade(m, geometry_of, stream);
-        emit_crossings(stored_triangles{geo, plan.num_primitives, num_drawn(geometry_of)}, rows(), sink, kept, zeros,
+        emit_crossings(stored_triangles{geo, rows(), plan.num_primitives, num_drawn(geometry_of)}, rows(), sink, kept,
                        state, stream);
         end_stage(clock, &stage_times::coarse_raster);
         if constexpr (Sink::is_listing)
@@ -227,8 +233,8 @@ private:
             } else {
                 const std::uint32_t begin = geometry_of[first].first_primitive,
                                     end = last < draws.size() ? geometry_of[last].first_primitive : plan.num_primitives;
-                add_votes(m.vote, stored_triangles{geo, plan.num_primitives, plan.num_primitives}, begin, end - begin,
-                          rows(), m.cover.mask, state, stream);
+                add_votes(m.vote, stored_triangles{geo, rows(), plan.num_primitives, plan.num_primitives}, begin,
+                          end - begin, rows(), m.cover.mask, state, stream);
             }
             list_cover(m.cover, rows(), list, body, state, stream);
         });
@@ -268,7 +274,6 @@ struct solid_call<draw<Mesh, VertexShader, SolidShader>, framebuffer_view<Target
         return b;
     }
 
-    static constexpr std::uint64_t max_words_zeroed_by_block = 1u << 15;
     using parity = parity_target<SolidShader, framebuffer_type>;
     // Whether crossings change bits of the target where they lie. Then no capacity can be too small, and nothing fails
     // once indices are known to be right.
@@ -339,9 +344,8 @@ private:
         const auto words_x = static_cast<std::uint32_t>((rows.extent.x + 31) / 32);
         const std::uint64_t words = rows.num_rows() * words_x;
         zeroed_memory zeros;
-        // By the blocks of the first kernel, where there are enough of them.
-        if (words % 4 == 0 && reinterpret_cast<std::uintptr_t>(bits) % 16 == 0 &&
-            words <= max_words_zeroed_by_block * num_blocks(entries.plan.num_primitives))
+        // By the first kernel, if that does not wait for anything.
+        if (entries.shades_on_the_spot() && words % 4 == 0 && reinterpret_cast<std::uintptr_t>(bits) % 16 == 0)
             zeros = {reinterpret_cast<uint4*>(bits), words / 4};
         else
             clear_target(voxelpipe::get<0>(fb.targets), state, entries.plan.limits, stream);

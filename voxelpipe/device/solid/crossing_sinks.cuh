@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Where crossings go: into a list, or straight into bits.
+
+#include <voxelpipe/device/solid/crossing_list.cuh>
+#include <voxelpipe/device/solid/solid_source.cuh>
+
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+// Into the list, behind what is there. Order does not show.
+struct crossing_appender {
+    static constexpr bool is_listing = true;
+    crossing_list list;
+    bool is_split;           // a body a draw
+    std::uint32_t num_draws; // the cones of body k are draw num_draws + k
+
+    // at: the crossing's number in the list
+    __device__ VOXELPIPE_INLINE void emit(const row_grid& grid, unsigned long long at, std::uint32_t draw,
+                                          std::uint64_t row, std::int64_t first, int winding) const {
+        list.store(at, row,
+                   !is_split          ? 0
+                   : draw < num_draws ? draw
+                                      : draw - num_draws,
+                   entry_value::of(grid.position(first), winding > 0 ? entry_kind::enter : entry_kind::leave));
+    }
+};
+
+// The first bit behind the crossing changes; what lies further is for a later pass (solid/parity_rows.cuh). Rows that
+// are crossed are marked, a byte each, so that no atomic is needed, and those that are crossed behind the part an odd
+// number of times, by a bit each.
+struct crossing_toggler {
+    static constexpr bool is_listing = false;
+    word* bits;
+    std::uint8_t* marked;
+    word* odd_behind;
+    std::uint32_t words_x;
+
+    __device__ VOXELPIPE_INLINE void emit(const row_grid& grid, unsigned long long, std::uint32_t, std::uint64_t row,
+                                          std::int64_t first, int) const {
+        const std::uint32_t x = grid.position(first);
+        marked[row] = 1;
+        if (x < static_cast<std::uint32_t>(grid.extent.x))
+            atomicXor(bits + row * words_x + x / 32, 1u << (x & 31));
+        else
+            atomicXor(odd_behind + row / 32, 1u << (row & 31));
+    }
+};
+
+} // namespace voxelpipe::device
