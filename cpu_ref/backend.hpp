@@ -99,7 +99,8 @@ public:
     [[nodiscard]] status run(const Draws& draws, const grid& g, Output& out, const voxelize_options& options,
                              std::uint64_t triangles_in, Coverage = {}) {
         return guarded(triangles_in, [&](const cpu::execution& how) {
-            const auto s = cpu::make_scene(how, draws, g);
+            auto s = cpu::make_scene(how, draws, g);
+            s.is_crosshair = options.rule == coverage::crosshair;
             return Coverage::dispatch(options.rule, [&]<coverage Rule>() { return pass<Rule>(how, s, out, options); });
         });
     }
@@ -122,6 +123,7 @@ public:
         return guarded(triangles_in, [&](const cpu::execution& how) {
             auto s = cpu::make_scene(how, draws, cpu::tile_aligned(g));
             s.lead = g.offset - s.where.offset;
+            s.is_crosshair = options.rule == coverage::crosshair;
             return Coverage::dispatch(options.rule, [&]<coverage Rule>() {
                 return cpu::draw_sparse_surface<Rule>(how, *this, g, s, options.count_voxels, out);
             });

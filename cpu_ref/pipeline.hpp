@@ -106,7 +106,8 @@ struct geometry {
     std::vector<std::uint32_t> first_primitive; // by draw, then the total
     core::snap_transform snap{};
     grid where{};
-    glm::ivec3 lead{0}; // lowest voxel of `where` that is drawn
+    glm::ivec3 lead{0};        // lowest voxel of `where` that is drawn
+    bool is_crosshair = false; // the voxels of coverage::crosshair among the conservative ones
 
     struct primitive {
         std::uint32_t draw, triangle, instance;
@@ -238,7 +239,8 @@ template <coverage Rule, class Key>
             const auto &a = p[tri.index.x], &b_ = p[tri.index.y], &c = p[tri.index.z];
             core::voxel_box reach{};
             core::triangle_class kind = core::classify<Rule>(a, b_, c, s.snap.fraction, whole, reach);
-            if (Rule == coverage::thin && kind == core::triangle_class::drawn && core::has_zero_area(a, b_, c))
+            if ((Rule == coverage::thin || s.is_crosshair) && kind == core::triangle_class::drawn &&
+                core::has_zero_area(a, b_, c))
                 kind = core::triangle_class::zero_area;
             switch (kind) {
             case core::triangle_class::nonfinite:
@@ -340,18 +342,19 @@ VOXELPIPE_INLINE void shade_fragments(const Scene& s, std::uint32_t id, const co
         f.axis = t.zero_area ? 0 : t.axis;
         f.front_facing = t.normal[2] >= 0;
         f.normal = core::unit_normal(t, s.normal_factors);
-        core::for_each_span<core::to_rule(Rule)>(
-            t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) VOXELPIPE_INLINE_LAMBDA {
-                f.barycentric = core::barycentric(t, u, v);
-                if constexpr (!std::is_empty_v<varyings>)
-                    f.varyings = core::mix(*f.vertex_varyings[0], *f.vertex_varyings[1], *f.vertex_varyings[2],
-                                           f.barycentric.y, f.barycentric.z);
-                for (std::int64_t w = w0; w <= w1; ++w) {
-                    const auto p = core::to_xyz(t.axis, static_cast<int>(u), static_cast<int>(v), static_cast<int>(w));
-                    f.voxel = s.where.offset + glm::ivec3(p[0], p[1], p[2]);
-                    visit(p[0], p[1], p[2], d.fragment_shader(f));
-                }
-            });
+        const auto column = [&](std::int64_t u, std::int64_t v, std::int64_t w0,
+                                std::int64_t w1) VOXELPIPE_INLINE_LAMBDA {
+            f.barycentric = core::barycentric(t, u, v);
+            if constexpr (!std::is_empty_v<varyings>)
+                f.varyings = core::mix(*f.vertex_varyings[0], *f.vertex_varyings[1], *f.vertex_varyings[2],
+                                       f.barycentric.y, f.barycentric.z);
+            for (std::int64_t w = w0; w <= w1; ++w) {
+                const auto p = core::to_xyz(t.axis, static_cast<int>(u), static_cast<int>(v), static_cast<int>(w));
+                f.voxel = s.where.offset + glm::ivec3(p[0], p[1], p[2]);
+                visit(p[0], p[1], p[2], d.fragment_shader(f));
+            }
+        };
+        core::for_each_span<core::to_rule(Rule)>(t, box, column);
     };
     constexpr auto rule = core::to_rule(Rule);
     if (core::fits_narrow(a, b, c, s.snap.fraction))

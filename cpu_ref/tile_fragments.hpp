@@ -9,6 +9,7 @@
 #include <cpu_ref/pipeline.hpp>
 #include <cpu_ref/small_box.hpp>
 #include <cpu_ref/tile_columns.hpp>
+#include <cpu_ref/tile_crosshair.hpp>
 
 namespace voxelpipe::cpu {
 
@@ -31,12 +32,26 @@ private:
 
 // Visits the voxels of one triangle in the tile, each once: calls along_x(row, bits) with an interval of bits, or
 // across(row, stride, x, bits), which means bit x of the rows row + i * stride for the ones i of an interval of bits.
-// An interval may be empty.
+// An interval may be empty. is_crosshair: see geometry.
 template <coverage Rule, class AlongX, class Across>
-VOXELPIPE_INLINE void cover_in_tile(const gathered_triangle& tri, int fraction, const core::voxel_box& tile,
-                                    AlongX&& along_x, Across&& across) {
+VOXELPIPE_INLINE void cover_in_tile(const gathered_triangle& tri, int fraction, bool is_crosshair,
+                                    const core::voxel_box& tile, AlongX&& along_x, Across&& across) {
     constexpr auto rule = core::to_rule(Rule);
+    const auto column = [&](int axis, int u, int v, std::uint32_t bits) VOXELPIPE_INLINE_LAMBDA {
+        if (axis == 0)
+            along_x(v * tile_size + u, bits);
+        else if (axis == 1)
+            across(u * tile_size, 1, v, bits);
+        else
+            across(v, tile_size, u, bits);
+    };
     if constexpr (Rule == coverage::conservative) {
+        if (is_crosshair) {
+            tile_columns columns;
+            find_crosshair(tri.a, tri.b, tri.c, fraction, tile, columns);
+            for (const auto& c : columns) column(columns.axis, c.u, c.v, c.bits);
+            return;
+        }
         const core::voxel_box all = core::bounds(tri.a, tri.b, tri.c, fraction);
         const core::voxel_box here = core::intersect(all, tile);
         if (core::is_line_of_voxels(all)) { // all of it is covered
@@ -76,14 +91,8 @@ VOXELPIPE_INLINE void cover_in_tile(const gathered_triangle& tri, int fraction, 
         }
     }
     const auto run = [&](const auto& t) VOXELPIPE_INLINE_LAMBDA {
-        core::for_each_column<rule>(t, tile, [&](int u, int v, std::uint32_t bits) VOXELPIPE_INLINE_LAMBDA {
-            if (t.axis == 0)
-                along_x(v * tile_size + u, bits);
-            else if (t.axis == 1)
-                across(u * tile_size, 1, v, bits);
-            else
-                across(v, tile_size, u, bits);
-        });
+        core::for_each_column<rule>(
+            t, tile, [&](int u, int v, std::uint32_t bits) VOXELPIPE_INLINE_LAMBDA { column(t.axis, u, v, bits); });
     };
     if (core::fits_narrow(tri.a, tri.b, tri.c, fraction))
         run(core::setup_triangle<rule, std::int64_t>(tri.a, tri.b, tri.c, fraction));
@@ -100,7 +109,7 @@ VOXELPIPE_INLINE void shade_in_tile(const Scene& s, std::uint32_t id, const core
     if constexpr (core::is_constant<typename Scene::fragment_shader>) {
         const auto out = d.fragment_shader(tri); // a constant shader ignores its argument
         cover_in_tile<Rule>(
-            tri, s.snap.fraction, tile,
+            tri, s.snap.fraction, s.is_crosshair, tile,
             [&](int row, std::uint32_t bits) VOXELPIPE_INLINE_LAMBDA {
                 for (; bits != 0; bits &= bits - 1)
                     visit(std::countr_zero(bits), row % tile_size, row / tile_size, out);
@@ -133,7 +142,7 @@ VOXELPIPE_INLINE void shade_in_tile(const Scene& s, std::uint32_t id, const core
             f.front_facing = t.normal[2] >= 0;
             f.normal = core::unit_normal(t, s.normal_factors);
             const auto first = core::to_uvw(t.axis, tile.lo[0], tile.lo[1], tile.lo[2]);
-            core::for_each_column<rule>(t, tile, [&](int u, int v, std::uint32_t bits) VOXELPIPE_INLINE_LAMBDA {
+            const auto column = [&](int u, int v, std::uint32_t bits) VOXELPIPE_INLINE_LAMBDA {
                 f.barycentric = core::barycentric(t, first[0] + u, first[1] + v);
                 if constexpr (!std::is_empty_v<varyings>)
                     f.varyings = core::mix(*f.vertex_varyings[0], *f.vertex_varyings[1], *f.vertex_varyings[2],
@@ -143,7 +152,16 @@ VOXELPIPE_INLINE void shade_in_tile(const Scene& s, std::uint32_t id, const core
                     f.voxel = s.where.offset + corner + glm::ivec3(p[0], p[1], p[2]);
                     visit(p[0], p[1], p[2], d.fragment_shader(f));
                 }
-            });
+            };
+            if constexpr (Rule == coverage::conservative) {
+                if (s.is_crosshair) {
+                    tile_columns columns;
+                    find_crosshair(tri.a, tri.b, tri.c, s.snap.fraction, tile, columns);
+                    for (const auto& c : columns) column(c.u, c.v, c.bits);
+                    return;
+                }
+            }
+            core::for_each_column<rule>(t, tile, column);
         };
         if (core::fits_narrow(tri.a, tri.b, tri.c, s.snap.fraction))
             run(core::setup_triangle<rule, std::int64_t>(tri.a, tri.b, tri.c, s.snap.fraction));

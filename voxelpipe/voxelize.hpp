@@ -34,8 +34,8 @@ struct voxelize_options {
 
 namespace core {
 
-// Coverage known at compile time, as in voxelize<coverage::thin>(...). Empty: the call's options decide, and both are
-// compiled.
+// Coverage known at compile time, as in voxelize<coverage::thin>(...). Empty: the call's options decide, and thin and
+// conservative are compiled. A crosshair takes the code of conservative coverage, which leaves voxels out then.
 template <coverage... Known>
 struct known_coverage {
     static_assert(sizeof...(Known) <= 1, "voxelpipe: a call has one coverage");
@@ -43,7 +43,8 @@ struct known_coverage {
     template <class F>
     static decltype(auto) dispatch(coverage rule, F&& f) {
         if constexpr (sizeof...(Known) != 0)
-            return (f.template operator()<Known>(), ...);
+            return (f.template operator() < Known == coverage::thin ? coverage::thin : coverage::conservative > (),
+                    ...);
         else if (rule == coverage::thin)
             return f.template operator()<coverage::thin>();
         else

@@ -130,7 +130,7 @@ void run(const command_line& options, clock::time_point begin) {
     if (report.stats.triangles_dropped != 0)
         report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
                                   " triangles are dropped: a position is not finite, or too far from the grid");
-    if (report.stats.voxels == 0) report.warnings.push_back(why_empty(report.stats));
+    if (report.stats.voxels == 0) report.warnings.push_back(why_empty(report.stats, report.request.coverage));
 
     start = clock::now();
     for (const std::filesystem::path& output : options.outputs) {

@@ -112,7 +112,9 @@ void print_json(std::ostream& stream, const run_report& report) {
     root["grid"] = {{"extent", {grid.extent.x, grid.extent.y, grid.extent.z}},
                     {"origin", {grid.origin.x, grid.origin.y, grid.origin.z}},
                     {"voxel_size", {grid.voxel_size.x, grid.voxel_size.y, grid.voxel_size.z}}};
-    root["coverage"] = report.request.coverage == voxelpipe::coverage::thin ? "thin" : "conservative";
+    root["coverage"] = report.request.coverage == voxelpipe::coverage::thin        ? "thin"
+                       : report.request.coverage == voxelpipe::coverage::crosshair ? "crosshair"
+                                                                                   : "conservative";
     if (report.stats.solid && report.request.solid) {
         root.erase("coverage");
         root["solid"] = {{"rule", to_string(report.request.solid->rule)},

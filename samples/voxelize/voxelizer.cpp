@@ -149,17 +149,19 @@ volume with_ring(volume inside, const voxelize_request& request) {
 
 } // namespace
 
-std::string why_empty(const voxelize_stats& stats) {
+std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage) {
     const std::string text = "no voxel is covered: ";
     if (stats.fragments_discarded != 0)
         return text + "alpha discards all " + std::to_string(stats.fragments_discarded) + " fragments";
     if (stats.solid && stats.solid->crossings != 0)
         return text + "no centre of a voxel is inside the model (--solid-extent outer also takes the voxels that its "
                       "surface touches, --solid nonzero also what is wound inside out)";
+    if (stats.triangles_drawn != 0 && coverage == voxelpipe::coverage::crosshair)
+        return text + "no triangle meets an axis through a voxel's centre (--coverage conservative draws all)";
     if (stats.triangles_drawn != 0) return text + "what the triangles cover lies outside the grid";
     if (stats.triangles_flat != 0)
-        return text +
-               "the triangles have no area, and thin coverage draws areas only (--coverage conservative draws all)";
+        return text + "the triangles have no area, and thin and crosshair coverage draw areas only (--coverage "
+                      "conservative draws all)";
     if (stats.triangles != 0 && stats.triangles_dropped == stats.triangles)
         return text + "no triangle has three positions that can be drawn";
     return text + "the model lies outside the grid";

@@ -70,7 +70,7 @@ struct voxelize_stats {
     std::uint64_t triangles = 0;
     std::uint64_t triangles_dropped = 0;   // a position that is not finite, or too far from the grid to be snapped
     std::uint64_t triangles_drawn = 0;     // that reach into the grid, summed over slabs
-    std::uint64_t triangles_flat = 0;      // left out by thin coverage: they have no area; summed over slabs
+    std::uint64_t triangles_flat = 0;      // without area, which thin and crosshair leave out; summed over slabs
     std::uint64_t fragments = 0;           // kept, over all voxels; of a solid's surface where that is drawn
     std::uint64_t fragments_discarded = 0; // by an alpha mask
     std::uint64_t voxels = 0;              // with at least one fragment; of a solid where that is asked for
@@ -91,7 +91,7 @@ struct backend_error : std::runtime_error {
 [[nodiscard]] volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
 
 // Why no voxel is covered, one line; for stats that count none.
-[[nodiscard]] std::string why_empty(const voxelize_stats& stats);
+[[nodiscard]] std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage);
 
 // Bytes of the volume that a request gives.
 [[nodiscard]] double volume_bytes(const voxelize_request& request);

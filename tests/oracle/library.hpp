@@ -26,7 +26,10 @@
 
 namespace voxelpipe {
 
-inline void PrintTo(coverage rule, std::ostream* os) { *os << (rule == coverage::thin ? "thin" : "conservative"); }
+inline const char* name(coverage rule) {
+    return rule == coverage::thin ? "thin" : rule == coverage::crosshair ? "crosshair" : "conservative";
+}
+inline void PrintTo(coverage rule, std::ostream* os) { *os << name(rule); }
 
 } // namespace voxelpipe
 
@@ -91,7 +94,9 @@ inline vp::grid as_library(const grid& g, const part& p) {
 
 // The library's expected voxels according to the oracle.
 inline std::vector<voxel> expected_voxels(const grid& g, const snapped_triangle& t, vp::coverage rule, const part& p) {
-    return rule == vp::coverage::thin ? thin(g, t, p.as_region()) : conservative(g, t, p.as_region());
+    return rule == vp::coverage::thin        ? thin(g, t, p.as_region())
+           : rule == vp::coverage::crosshair ? crosshair(g, t, p.as_region())
+                                             : conservative(g, t, p.as_region());
 }
 
 // The library's A-buffer by triangle: for each of `triangles` its voxels, ascending, as indices of the whole grid.

@@ -73,10 +73,9 @@ void compare(const test_grid& where, const std::vector<world_triangle>& triangle
                                 std::back_inserter(extra));
             missing.resize(std::min<std::size_t>(missing.size(), 5));
             extra.resize(std::min<std::size_t>(extra.size(), 5));
-            FAIL() << where.name << (rule == vp::coverage::thin ? " thin " : " conservative ")
-                   << describe(g, triangles[n]) << "\nlibrary " << found[n].size() << " voxels, oracle "
-                   << voxels.size() << "; missing " << ::testing::PrintToString(missing) << ", too many "
-                   << ::testing::PrintToString(extra);
+            FAIL() << where.name << " " << vp::name(rule) << " " << describe(g, triangles[n]) << "\nlibrary "
+                   << found[n].size() << " voxels, oracle " << voxels.size() << "; missing "
+                   << ::testing::PrintToString(missing) << ", too many " << ::testing::PrintToString(extra);
         }
         expected.fragments += voxels.size();
         covered.insert(covered.end(), voxels.begin(), voxels.end());
@@ -138,7 +137,7 @@ TEST_P(LibraryCoverage, IsTheOraclesToTheVoxel) {
     const triangle_class kind = GetParam();
     const auto wanted = static_cast<std::uint64_t>(static_cast<double>(triangle_budget(1200000)) * share(kind)) + 1;
     splitmix64 random(seed(1000 + static_cast<std::uint64_t>(kind)));
-    totals sums;
+    totals sums, of_crosshair;
     std::set<std::string_view> grids_seen;
     for (std::uint64_t round = 0; sums.triangles < 2 * wanted; ++round) {
         test_grid where = test_grids()[round % test_grids().size()];
@@ -157,6 +156,8 @@ TEST_P(LibraryCoverage, IsTheOraclesToTheVoxel) {
             compare(where, triangles, rule, p, threads, sums);
             if (HasFailure()) return;
         }
+        if (round % 3 == 0) compare(where, triangles, vp::coverage::crosshair, p, threads, of_crosshair);
+        if (HasFailure()) return;
         grids_seen.insert(where.name);
     }
     RecordProperty("triangles", std::to_string(sums.triangles / 2));
@@ -165,6 +166,9 @@ TEST_P(LibraryCoverage, IsTheOraclesToTheVoxel) {
         EXPECT_EQ(sums.dropped, sums.triangles);
     } else {
         EXPECT_GT(sums.fragments, 0u);
+        const bool meets_arms = kind == triangle_class::small || kind == triangle_class::large ||
+                                kind == triangle_class::half_lattice || kind == triangle_class::diagonal_plane;
+        EXPECT_TRUE(of_crosshair.fragments > 0 || !meets_arms);
     }
     EXPECT_EQ(grids_seen.size(), test_grids().size());
 }
@@ -185,7 +189,7 @@ TEST(LibraryCoverage, HoldsForAllClassesInOneMesh) {
             for (int n = 0; n < (big ? 4 : 40); ++n) triangles.push_back(make_triangle(random, where, kind));
         }
         for (std::size_t n = triangles.size(); n > 1; --n) std::swap(triangles[n - 1], triangles[random.below(n)]);
-        for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin})
+        for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair})
             compare(where, triangles, rule, whole_of(where.g), 2, sums);
     }
     EXPECT_GT(sums.fragments, 100000u);

@@ -408,6 +408,56 @@ std::vector<voxel> thin(const grid& g, const snapped_triangle& t, const region& 
     return result;
 }
 
+namespace {
+
+// A segment meets a triangle that is not parallel to it iff its ends lie on different sides of the plane, or on it, and
+// its line passes all edges on the same side. Everything doubled, so that centres are integers.
+template <class Integer>
+bool meets_an_arm(const snapped_triangle& t, int fraction, const voxel& at) {
+    const Integer two(2), zero(0);
+    const point<Integer> v0 = vertex<Integer>(t, 0);
+    const point<Integer> n = cross(vertex<Integer>(t, 1) - v0, vertex<Integer>(t, 2) - v0);
+    const Integer normal[3] = {n.x, n.y, n.z};
+    const std::int64_t centre[3] = {(2 * std::int64_t{at.i} + 1) << fraction, (2 * std::int64_t{at.j} + 1) << fraction,
+                                    (2 * std::int64_t{at.k} + 1) << fraction};
+    for (int axis = 0; axis < 3; ++axis) {
+        if (normal[axis] == zero) continue;
+        int above = 0, below = 0;
+        for (const int end : {-1, 1}) {
+            Integer side = zero;
+            for (int k = 0; k < 3; ++k) {
+                const std::int64_t q = centre[k] + (k == axis ? end * (std::int64_t{1} << fraction) : 0);
+                side = side + normal[k] * (Integer(q) - two * Integer(t.v[0][k]));
+            }
+            above += zero < side ? 1 : 0;
+            below += side < zero ? 1 : 0;
+        }
+        if (above == 2 || below == 2) continue;
+        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+        bool left = false, right = false;
+        for (int k = 0; k < 3; ++k) {
+            const std::int64_t *from = t.v[k], *to = t.v[(k + 1) % 3];
+            const Integer side = (two * Integer(from[u]) - Integer(centre[u])) * (Integer(to[v]) - Integer(from[v])) -
+                                 (two * Integer(from[v]) - Integer(centre[v])) * (Integer(to[u]) - Integer(from[u]));
+            left = left || zero < side;
+            right = right || side < zero;
+        }
+        if (!left || !right) return true;
+    }
+    return false;
+}
+
+} // namespace
+
+std::vector<voxel> crosshair(const grid& g, const snapped_triangle& t, const region& part, arithmetic with) {
+    std::vector<voxel> result;
+    for (const voxel& at : conservative(g, t, part, with)) // which holds every point of an arm
+        if (with_integers(t, with,
+                          [&]<class Integer>(Integer) { return meets_an_arm<Integer>(t, fraction_bits(g), at); }))
+            result.push_back(at);
+    return result;
+}
+
 std::array<ratio, 3> barycentrics(const grid& g, const snapped_triangle& t, const voxel& at) {
     const int axis = dominant_axis(t);
     if (axis < 0) throw std::invalid_argument("oracle: barycentrics of a triangle without area");

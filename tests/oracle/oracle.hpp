@@ -87,6 +87,11 @@ std::vector<voxel> thin(const grid& g, const snapped_triangle& t, arithmetic wit
 std::vector<voxel> thin(const grid& g, const snapped_triangle& t, const region& part,
                         arithmetic with = arithmetic::automatic);
 
+// Voxels of which the triangle meets an arm that is not parallel to it: a closed segment along an axis, through the
+// centre, from face to face. Ascending.
+std::vector<voxel> crosshair(const grid& g, const snapped_triangle& t, const region& part,
+                             arithmetic with = arithmetic::automatic);
+
 // A rational number; the denominator is not zero but may be negative.
 struct ratio {
     wide numerator;

@@ -277,7 +277,8 @@ TEST_P(ABuffer, TwoDrawsAndTwoCallsAreOne) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(BothRules, ABuffer, ::testing::Values(vp::coverage::conservative, vp::coverage::thin),
+INSTANTIATE_TEST_SUITE_P(AllRules, ABuffer,
+                         ::testing::Values(vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair),
                          rule_of);
 
 } // namespace

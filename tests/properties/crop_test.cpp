@@ -129,7 +129,9 @@ TEST_P(Crop, PartsOfAHugeGridAgreeWhereTheyOverlap) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(BothRules, Crop, ::testing::Values(vp::coverage::conservative, vp::coverage::thin), rule_of);
+INSTANTIATE_TEST_SUITE_P(AllRules, Crop,
+                         ::testing::Values(vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair),
+                         rule_of);
 
 } // namespace
 } // namespace properties

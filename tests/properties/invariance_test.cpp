@@ -318,7 +318,8 @@ TEST_P(Invariance, MirroringMirrorsTheVoxels) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(BothRules, Invariance, ::testing::Values(vp::coverage::conservative, vp::coverage::thin),
+INSTANTIATE_TEST_SUITE_P(AllRules, Invariance,
+                         ::testing::Values(vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair),
                          rule_of);
 
 } // namespace

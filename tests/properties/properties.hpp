@@ -27,7 +27,7 @@ namespace vp = voxelpipe;
 
 using voxels = std::vector<voxel>;
 
-inline std::string rule_name(vp::coverage rule) { return rule == vp::coverage::thin ? "thin" : "conservative"; }
+inline std::string rule_name(vp::coverage rule) { return vp::name(rule); }
 inline std::string rule_of(const ::testing::TestParamInfo<vp::coverage>& info) { return rule_name(info.param); }
 
 // The library's voxels of each triangle, ascending, from one call.

@@ -170,7 +170,8 @@ TEST_P(Separation, HoldsWhereTheGridCutsTheSurface) {
     EXPECT_GT(bodies, 20u);
 }
 
-INSTANTIATE_TEST_SUITE_P(BothRules, Separation, ::testing::Values(vp::coverage::thin, vp::coverage::conservative),
+INSTANTIATE_TEST_SUITE_P(AllRules, Separation,
+                         ::testing::Values(vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair),
                          rule_of);
 
 // Controls: the flood fill finds leaks through a hole in the mesh, and through the corners of thin surfaces.
@@ -180,7 +181,7 @@ TEST(SeparationControl, AHoleLeaks) {
     auto placed = place(m, g);
     const auto side = inside_of(m, g, placed);
     placed.erase(placed.begin() + 17);
-    for (const vp::coverage rule : {vp::coverage::thin, vp::coverage::conservative})
+    for (const vp::coverage rule : {vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair})
         EXPECT_GT(flood(g, occupancy(placed, g, rule), side, rule == vp::coverage::conservative).leaks, 0u);
 }
 

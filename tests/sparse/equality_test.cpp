@@ -106,7 +106,8 @@ const std::vector<unit::small_mesh>& meshes() {
 constexpr auto as_made = [](auto&) {};
 
 class Sparse : public ::testing::TestWithParam<vp::coverage> {};
-INSTANTIATE_TEST_SUITE_P(Coverages, Sparse, ::testing::Values(vp::coverage::thin, vp::coverage::conservative));
+INSTANTIATE_TEST_SUITE_P(Coverages, Sparse,
+                         ::testing::Values(vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair));
 
 template <class Dense, class Shader>
 void check_targets(const Shader& shader, vp::coverage rule) {

@@ -170,11 +170,11 @@ inline mesh_data triangles_in_voxel(int count, glm::vec3 corner, std::uint32_t s
 // A payload for fragment lists.
 using any_double = any_values<vp::target<double, vp::blend::replace>>;
 
-// Every cell of the targets, both coverages, cleared and loaded.
+// Every cell of the targets, all coverages, cleared and loaded.
 template <class... Targets>
 void compare_cells() {
     const any_values<Targets...> shader;
-    for (const vp::coverage rule : both_rules) {
+    for (const vp::coverage rule : all_rules) {
         expect_same<Targets...>(mixed_triangles(1500, 40.0f, 1), box_grid({40, 33, 47}), vp::passthrough{}, shader,
                                 rule);
         expect_same<Targets...>(mixed_triangles(600, 30.0f, 2), box_grid({97, 9, 31}), vp::passthrough{}, shader, rule,

@@ -123,7 +123,7 @@ TEST(DeviceSparse, GivesTheBytesOfTheCpu) {
     const glm::ivec3 extent{45, 34, 37};
     const vp::grid grid = unit::unit_grid(extent);
     const std::vector<unit::small_mesh> meshes{unit::make_mesh(1, 25, extent), unit::make_mesh(2, 15, extent)};
-    for (const vp::coverage rule : {vp::coverage::thin, vp::coverage::conservative}) {
+    for (const vp::coverage rule : {vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair}) {
         pair p(extent);
         p.draw(meshes, grid, rule, "cleared");
         EXPECT_GT(p.on_host.num_voxels(), 1000u);

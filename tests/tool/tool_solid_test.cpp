@@ -96,6 +96,22 @@ TEST(Solid, ExtentsDifferByTheSurface) {
     EXPECT_EQ(16U, read_npy(folder / "o.npy").shape[0]);
 }
 
+// Beside the surface's other coverages: through voxels before their centres, the corners and edges of a box meet no
+// axis.
+TEST(Solid, CrosshairsOfASurface) {
+    const scratch_folder folder;
+    builder file;
+    add_box(file, {0.75F, 0.75F, 0.75F}, {9.25F, 9.25F, 9.25F});
+    EXPECT_EQ(1000U - 512U, covered(folder, file, {"--coverage", "conservative"}));
+    EXPECT_EQ(6U * 64U, covered(folder, file, {"--coverage", "crosshair"}));
+    builder speck; // between all axes
+    add_box(speck, {0.6F, 0.6F, 0.6F}, {0.9F, 0.9F, 0.9F});
+    speck.write_glb(folder / "speck.glb");
+    const outcome none =
+        run(folder, {folder / "speck.glb", "-s", "1", "-o", folder / "o.npy", "--coverage", "crosshair"});
+    EXPECT_NE(std::string::npos, none.err.find("no triangle meets an axis")) << none.err;
+}
+
 // The mean of the outermost voxels of the halves of a 16 x 8 x 8 grid, in linear light.
 glm::u8vec4 mean_of_surface(const array& color) {
     glm::dvec3 sum(0);

@@ -111,8 +111,9 @@ struct empty_lists {
 // With lists_fragments, the raster lists one draw of a shader that computes; discarded fragments must fit too. The
 // number of voxels is unknown: small triangles are assumed to share them.
 template <class Draw, class Payload>
-[[nodiscard]] abuffer_call<Draw, payload_storage<Payload>>
-make_list_call(std::span<const Draw> draws, const grid& g, std::uint64_t triangles, const workspace_limits& limits) {
+[[nodiscard]] abuffer_call<Draw, payload_storage<Payload>> make_list_call(std::span<const Draw> draws, const grid& g,
+                                                                          coverage rule, std::uint64_t triangles,
+                                                                          const workspace_limits& limits) {
     return {draws,
             g,
             static_cast<std::uint32_t>(triangles),
@@ -120,7 +121,8 @@ make_list_call(std::span<const Draw> draws, const grid& g, std::uint64_t triangl
             nullptr,
             limits.lists_fragments,
             true,
-            limits.fragments > 2 * triangles};
+            limits.fragments > 2 * triangles,
+            rule == coverage::crosshair};
 }
 
 } // namespace device
@@ -136,7 +138,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
     if (s.counts.triangles_in == 0) return sizeof(device::empty_lists);
     try {
         const auto call = device::make_list_call<draw<Mesh, VertexShader, FragmentShader>, Payload>(
-            draws, g, s.counts.triangles_in, limits);
+            draws, g, options.rule, s.counts.triangles_in, limits);
         return device::list_bytes(call, options.rule, lists);
     } catch (const device::cuda_failure&) {
         return 0;
@@ -171,7 +173,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                 return s;
             }
             const auto call = device::make_list_call<draw<Mesh, VertexShader, FragmentShader>, Payload>(
-                draws, g, s.counts.triangles_in, workspace.limits);
+                draws, g, options.rule, s.counts.triangles_in, workspace.limits);
             const std::size_t need = device::list_bytes(call, options.rule, lists);
             if (workspace.memory == nullptr || workspace.bytes < need) {
                 s.code = status_code::capacity_exceeded;

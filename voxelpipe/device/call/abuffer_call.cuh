@@ -35,6 +35,7 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     // result. filters: they are also shaded before the sort, to remove discarded ones.
     bool may_shade_late = false, filters = false;
     bool has_few_a_voxel = false; // fragments; see min_counted
+    bool is_crosshair = false;    // launched as conservative coverage
 
     // Everything that this call's launches depend on, if it is trivially copyable.
     static constexpr bool has_bytes = std::is_trivially_copyable_v<draw_type>;
@@ -49,13 +50,15 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
         b.add(may_shade_late);
         b.add(filters);
         b.add(has_few_a_voxel);
+        b.add(is_crosshair);
         return b;
     }
     // True if the raster lists the fragments, and a shader that is not constant runs afterwards.
     template <class Key>
     [[nodiscard]] bool is_listed_call() const {
-        return sizeof(Key) == sizeof(std::uint32_t) && (core::is_constant<FragmentShader> || may_shade_late) &&
-               draws.size() == 1 && is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
+        return sizeof(Key) == sizeof(std::uint32_t) && !is_crosshair &&
+               (core::is_constant<FragmentShader> || may_shade_late) && draws.size() == 1 &&
+               is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
     }
     // See framebuffer_call.
     [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t left) const { return defers_few(num_primitives, left); }
@@ -105,7 +108,7 @@ private:
         template <coverage Rule>
         [[nodiscard]] fragment_lists<Key, Payload> launch(pipeline_state* state, cudaStream_t stream,
                                                           const output_pointers& outputs) const {
-            const scene_type s = buffers.shade(call.draws, call.g, stream);
+            const scene_type s = buffers.shade(call.draws, call.g, stream, call.is_crosshair);
             end_stage(call.clock, &stage_times::vertex_shade);
             return build_lists<Rule, first_value>(s, lists, list_scratch.with(state), state, call.limits, true, stream,
                                                   call.clock, outputs);

@@ -74,7 +74,7 @@ struct call_facts {
     std::uint64_t num_voxels = 0;        // of the grid
     std::uint64_t mask_bytes = 0;        // of an occupancy mask
     std::uint64_t fragment_capacity = 0; // fragments that the lists hold
-    bool fits_int32 = false;             // the raster of 32 bits serves grid and mesh (int32_triangle)
+    bool fits_int32 = false;             // the raster of 32 bits serves grid, mesh and coverage (int32_triangle)
     bool all_draws_equal = false;        // constant shaders: each draw gives the same values
     bool blends_in_place = false;        // every target is blended or counted where it lies, for these values
     bool counts_are_cheap = false;       // and reading the counted ones costs less than tiles would

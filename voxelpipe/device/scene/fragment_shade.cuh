@@ -73,6 +73,17 @@ __device__ VOXELPIPE_INLINE void shade_fragments(const Scene& s, const loaded_tr
             visit(p[0], p[1], p[2], source.shade(p[0], p[1], p[2]));
         }
     };
+    if constexpr (Rule == coverage::conservative) {
+        if (s.geo.is_crosshair) {
+            const wide_triangle t = set_up_crosshair(tri.a, tri.b, tri.c, fraction, s.normal_factors);
+            source.begin_triangle(t);
+            for_each_crosshair(tri.a, tri.b, tri.c, fraction, box, [&](const wide_span& span) {
+                source.begin_column(span.barycentric);
+                column(t.axis, span.u, span.v, span.w_first, span.w_last);
+            });
+            return;
+        }
+    }
     if (core::fits_narrow(tri.a, tri.b, tri.c, fraction)) {
         const auto t = core::setup_triangle<rule, std::int64_t>(tri.a, tri.b, tri.c, fraction);
         source.begin_triangle(t);
