@@ -3,6 +3,8 @@
 
 #include "scenes.hpp"
 
+#include <utility>
+
 namespace solids {
 namespace {
 
@@ -31,6 +33,20 @@ TEST(SolidScenes, ConferenceIsOpen) {
     if (!conference) GTEST_SKIP() << why;
     EXPECT_EQ(scene_status(*conference, 1024, {.rule = vp::fill_rule::even_odd}).solid.open_rows, 73303u);
     EXPECT_EQ(scene_status(*conference, 1024, {}).solid.open_rows, 74566u);
+}
+
+TEST(SolidScenes, DragonsSurfaceHasTheKnownNumbersOfVoxels) {
+    std::string why;
+    const auto dragon = load_scene("dragon", why);
+    if (!dragon) GTEST_SKIP() << why;
+    vp::cpu_backend backend{2};
+    const vp::grid g = vp::fit(dragon->positions, glm::ivec3(1024));
+    vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, vp::blend::bit_or>> fb{backend, g.extent};
+    for (const auto& [rule, voxels] : {std::pair{vp::coverage::thin, 1599388u}, {vp::coverage::crosshair, 1528449u}})
+        EXPECT_EQ(vp::voxelize(backend, dragon->view(), g, vp::passthrough{}, vp::constant(true), fb, rule)
+                      .or_throw()
+                      .counts.voxels,
+                  voxels);
 }
 
 } // namespace
