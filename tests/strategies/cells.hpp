@@ -174,7 +174,7 @@ using any_double = any_values<vp::target<double, vp::blend::replace>>;
 template <class... Targets>
 void compare_cells() {
     const any_values<Targets...> shader;
-    for (const vp::coverage rule : all_rules) {
+    for (const vp::coverage rule : every_coverage) {
         expect_same<Targets...>(mixed_triangles(1500, 40.0f, 1), box_grid({40, 33, 47}), vp::passthrough{}, shader,
                                 rule);
         expect_same<Targets...>(mixed_triangles(600, 30.0f, 2), box_grid({97, 9, 31}), vp::passthrough{}, shader, rule,

@@ -22,7 +22,7 @@ void compare(const FragmentShader& shader, std::uint32_t seed) {
     vp::transform turned;
     turned.matrix =
         glm::mat4(0.0f, 0.9f, 0.0f, 0.0f, 0.0f, 0.0f, 1.1f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.5f, 0.0f, -2.0f, 1.0f);
-    for (const vp::coverage rule : all_rules)
+    for (const vp::coverage rule : every_coverage)
         for (const vp::grid& g : {box_grid({50, 43, 47}), crop}) {
             expect_same_lists<Payload>(m, g, vp::passthrough{}, shader, rule);
             expect_same_lists<Payload>(m, g, turned, shader, rule);
@@ -47,7 +47,7 @@ TEST(Lists, OfVoxelsWithManyFragmentsAreTheCpus) {
         }
     }
     std::shuffle(m.triangles.begin(), m.triangles.end(), random);
-    for (const vp::coverage rule : all_rules)
+    for (const vp::coverage rule : every_coverage)
         expect_same_lists<float>(m, box_grid({24, 20, 16}), vp::passthrough{}, vp::constant(2.0f), rule);
 }
 
@@ -111,7 +111,7 @@ TEST(Lists, OfRepeatedCallsFitInExactMemoryOrFail) {
 // Many work items of each triangle, more than the device has warps.
 TEST(Lists, OfLargeTrianglesWithManyWorkItemsAreTheCpus) {
     const glm::ivec3 extent(400, 390, 380);
-    for (const vp::coverage rule : all_rules)
+    for (const vp::coverage rule : every_coverage)
         expect_same_lists<void>(long_triangles(extent, 1200, 125), box_grid(extent), vp::passthrough{},
                                 vp::constant(true), rule);
 }
@@ -121,7 +121,7 @@ TEST(Lists, OfLargeTrianglesWithManyWorkItemsAreTheCpus) {
 TEST(Lists, OfTrianglesAtTheGridsFacesAreTheCpus) {
     const glm::ivec3 extent(80, 70, 60);
     for (const bool upper : {false, true})
-        for (const vp::coverage rule : all_rules)
+        for (const vp::coverage rule : every_coverage)
             expect_same_lists<void>(triangles_at_faces(extent, 25000, upper, 126), box_grid(extent), vp::passthrough{},
                                     vp::constant(true), rule);
 }
@@ -135,7 +135,7 @@ TEST(Lists, OfSliversAndZeroAreaTrianglesAreTheCpus) {
         add_triangle(m, {at, at, at}, {at + 1.0f, at + 1.0f, at + 1.0f}, {at + 0.5f, at + 0.5f, at + 0.5f});
         add_triangle(m, {at, 5.0f, 6.0f}, {at, 5.0f, 6.0f}, {at, 5.0f, 6.0f});
     }
-    for (const vp::coverage rule : all_rules)
+    for (const vp::coverage rule : every_coverage)
         expect_same_lists<void>(m, box_grid({64, 48, 40}), vp::passthrough{}, vp::constant(true), rule);
 }
 
