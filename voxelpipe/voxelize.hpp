@@ -42,9 +42,9 @@ struct known_coverage {
     // Calls f.operator()<Rule>().
     template <class F>
     static decltype(auto) dispatch(coverage rule, F&& f) {
+        constexpr coverage known = ((Known == coverage::thin) || ...) ? coverage::thin : coverage::conservative;
         if constexpr (sizeof...(Known) != 0)
-            return (f.template operator() < Known == coverage::thin ? coverage::thin : coverage::conservative > (),
-                    ...);
+            return f.template operator()<known>();
         else if (rule == coverage::thin)
             return f.template operator()<coverage::thin>();
         else

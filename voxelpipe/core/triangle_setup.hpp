@@ -20,7 +20,7 @@ namespace voxelpipe {
 // Which voxels a triangle covers. thin: one voxel per touched column of the dominant axis, 6-separating.
 // conservative: every voxel whose closed box meets the closed triangle, 26-separating. crosshair: every voxel of which
 // the triangle meets an arm, a segment through the centre from face to face along an axis, that is not parallel to it;
-// 6-separating (core/crosshair.hpp).
+// 6-separating (core/crosshair.hpp). Points and lines have no crosshair: it is conservative coverage there.
 enum class coverage : std::uint8_t { thin, conservative, crosshair };
 
 namespace core {
