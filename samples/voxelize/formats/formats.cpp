@@ -14,6 +14,7 @@
 #include "vox.hpp"
 #include "vti.hpp"
 
+#include "../page/page.hpp"
 #include "../sparse/sparse_formats.hpp"
 
 #include <array>
@@ -26,7 +27,7 @@ namespace {
 using writer = std::vector<std::filesystem::path> (*)(const volume&, const std::filesystem::path&,
                                                       const write_options&);
 
-constexpr std::array<format, 13> all_formats{{
+constexpr std::array<format, 14> all_formats{{
     {".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", false, true, false, false},
     {".npz", "NumPy archive with one array for each channel", false, true, false, false},
     {".vox", "MagicaVoxel model, split above 256 voxels, 255 colours", true, false, true, true},
@@ -39,11 +40,12 @@ constexpr std::array<format, 13> all_formats{{
     {".ply", "the same as a PLY of quads; with --points the centres of the voxels", true, false, true, false},
     {".xyz", "centres of the voxels as text: x y z and red green blue, 0 to 255", true, false, true, false},
     {".png", "shaded picture of the voxels", true, false, true, false},
+    {".html", "a page that shows the voxels in a browser: turn, cut, choose values", true, true, true, false},
     {".nvdb", "NanoVDB: a grid for each channel, of the occupied voxels alone", true, true, true, false, true},
 }};
-constexpr std::array<writer, 13> all_writers{write_npy, write_npz,  write_vox, write_schem, write_binvox,
+constexpr std::array<writer, 14> all_writers{write_npy, write_npz,  write_vox, write_schem, write_binvox,
                                              write_vti, write_nrrd, write_glb, write_obj,   write_ply,
-                                             write_xyz, write_png,  write_nvdb};
+                                             write_xyz, write_png,  write_page, write_nvdb};
 
 std::string extension_of(const std::filesystem::path& path) {
     std::string extension = path.extension().string();

@@ -7,6 +7,7 @@
 #include "../formats/output_file.hpp"
 #include "../formats/png.hpp"
 #include "../formats/progress.hpp"
+#include "../page/page.hpp"
 
 #include <voxelpipe/host_sparse.hpp>
 #include <voxelpipe/io/nanovdb.hpp>
@@ -210,7 +211,8 @@ bool is_sparse_format(const std::filesystem::path& path) { return extension_of(p
 
 bool is_written_sparse(const std::filesystem::path& path) {
     const std::string extension = extension_of(path);
-    return extension == ".nvdb" || extension == ".npz" || extension == ".npy" || extension == ".png";
+    return extension == ".nvdb" || extension == ".npz" || extension == ".npy" || extension == ".png" ||
+           extension == ".html";
 }
 
 double dense_bytes(const sparse_volume& v, const std::filesystem::path& path) {
@@ -236,6 +238,7 @@ std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const st
     if (extension == ".npz") return write_sparse_npz(v, path, options);
     if (extension == ".npy") return write_sparse_npy(v, path, options);
     if (extension == ".png") return write_sparse_png(v, path, options);
+    if (extension == ".html") return write_page(v, path, options);
     return write(make_dense(v, channels_for(v, path)), path, options);
 }
 
