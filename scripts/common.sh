@@ -52,6 +52,7 @@ present() {
         libmeshoptimizer-dev) has_header meshoptimizer.h ;;
         libgtest-dev) has_header gtest/gtest.h ;;
         libnanovdb-dev) has_header nanovdb/NanoVDB.h ;;
+        chromium) { command -v chromium || command -v chromium-browser || command -v google-chrome; } >/dev/null ;;
         libnanovdb-tools) command -v nanovdb_validate >/dev/null ;;
         libbenchmark-dev) has_header benchmark/benchmark.h ;;
         python3-venv) python3 -c 'import ensurepip, venv' 2>/dev/null ;;
@@ -94,8 +95,10 @@ Install them and run the same command again; on Debian or Ubuntu:
 build_packages=(g++ cmake ninja-build libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev zlib1g-dev
     libminizip-dev libdeflate-dev libwebp-dev libassimp-dev libdraco-dev libmeshoptimizer-dev)
 
-# What the tests need beside them: readers of NanoVDB files that are not ours.
+# What the tests need beside them: readers of NanoVDB files that are not ours, and a browser.
 test_packages=(libgtest-dev libnanovdb-dev libnanovdb-tools)
+# Ubuntu's package asks for a snap; without a browser the test of the page is left out there.
+grep -q '^ID=ubuntu' /etc/os-release 2>/dev/null || test_packages+=(chromium)
 
 # configure PRESET [cmake option...]: quiet unless it fails. Uses ccache where there is one, and the staged prefix.
 configure() {

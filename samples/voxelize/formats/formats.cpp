@@ -43,8 +43,8 @@ constexpr std::array<format, 14> all_formats{{
     {".html", "a page that shows the voxels in a browser: turn, cut, choose values", true, true, true, false},
     {".nvdb", "NanoVDB: a grid for each channel, of the occupied voxels alone", true, true, true, false, true},
 }};
-constexpr std::array<writer, 14> all_writers{write_npy, write_npz,  write_vox, write_schem, write_binvox,
-                                             write_vti, write_nrrd, write_glb, write_obj,   write_ply,
+constexpr std::array<writer, 14> all_writers{write_npy, write_npz,  write_vox,  write_schem, write_binvox,
+                                             write_vti, write_nrrd, write_glb,  write_obj,   write_ply,
                                              write_xyz, write_png,  write_page, write_nvdb};
 
 std::string extension_of(const std::filesystem::path& path) {

@@ -138,8 +138,8 @@ std::string describe(const sparse_volume& v, const std::vector<const channel*>& 
     std::string text = "{\"name\":" + json_string(path.stem().string()) + ",\"extent\":" + list_of(v.shape.extent) +
                        ",\"voxel_size\":" + list_of(v.shape.voxel_size) +
                        ",\"up\":" + (up == up_axis::y ? "\"y\"" : "\"z\"") +
-                       ",\"bricks\":" + std::to_string(v.keys.size()) + ",\"voxels\":" + std::to_string(v.num_voxels()) +
-                       ",\"channels\":[";
+                       ",\"bricks\":" + std::to_string(v.keys.size()) +
+                       ",\"voxels\":" + std::to_string(v.num_voxels()) + ",\"channels\":[";
     for (std::size_t i = 0; i < channels.size(); ++i) {
         if (i != 0) text += ',';
         text += "{\"name\":" + json_string(channels[i]->name) + ",\"type\":" + json_string(converted[i].type) +
@@ -188,8 +188,7 @@ std::vector<std::filesystem::path> write_page(const sparse_volume& v, const std:
     base64_stream encoded(out);
     piece_compressor compressor(piece_compressor::form::stream_part, std::max(1, options.compression));
     ordered_for(
-        pieces.size(), thread_count(options.threads),
-        [&](std::size_t i) { return compressor.compress(pieces[i], 4); },
+        pieces.size(), thread_count(options.threads), [&](std::size_t i) { return compressor.compress(pieces[i], 4); },
         [&](std::size_t i, const std::shared_ptr<const compressed_piece>& piece) {
             encoded.write(piece->bytes);
             meter.advance(pieces[i].size());

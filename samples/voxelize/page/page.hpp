@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Writes .html: one page that shows the voxels in a browser and needs no network. page.html is the page, with a description
-// of the data that are put into it; embedded at build time.
+// Writes .html: one page that shows the voxels in a browser and needs no network. page.html is the page, with a
+// description of the data that are put into it; embedded at build time.
 
 #include "../formats/formats.hpp"
 #include "../sparse/sparse_volume.hpp"

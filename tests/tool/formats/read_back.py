@@ -457,6 +457,56 @@ def check_png(case, files):
     assert colors > 20, f"only {colors} colours"
 
 
+def page_volume(file):
+    """(description, occupied (nz, ny, nx), {channel: values by voxel}, indices of the voxels) of a page, as page.html says."""
+    import base64
+    import re
+    import zlib
+
+    import numpy as np
+
+    text = file.read_text(encoding="utf-8")
+    assert not re.search(r"https?:", text, flags=re.I), "the page names an address"
+    shape = json.loads(re.search(r'<script id="shape" type="application/json">(.*?)</script>', text, flags=re.S)[1])
+    encoded = re.search(r'<script id="data" type="text/plain">(.*?)</script>', text, flags=re.S)[1]
+    data = zlib.decompressobj(-15).decompress(base64.b64decode(encoded, validate=True))
+    bricks = shape["bricks"]
+    position = np.frombuffer(data, "<u4", 3 * bricks).reshape(3, bricks).T.astype(np.int64)
+    masks = np.frombuffer(data, np.uint8, 64 * bricks, 12 * bricks).reshape(bricks, 64)
+    bits = np.unpackbits(masks, axis=1, bitorder="little")
+    brick, number = np.nonzero(bits)
+    within = np.stack([sum((number >> (3 * i + a) & 1) << i for i in range(3)) for a in range(3)], axis=1)
+    voxels = 8 * position[brick] + within
+    assert len(voxels) == shape["voxels"]
+    occupied = np.zeros(shape["extent"][::-1], bool)
+    occupied[tuple(voxels.T[::-1])] = True
+    at, values = 76 * bricks, {}
+    for c in shape["channels"]:
+        kind = {"u8": np.uint8, "u32": np.uint32, "i32": np.int32, "f32": np.float32}[c["type"]]
+        count = len(voxels) * c["components"]
+        rows = np.frombuffer(data, kind, count, at)
+        values[c["name"]] = rows if c["components"] == 1 else rows.reshape(-1, c["components"])
+        at += count * np.dtype(kind).itemsize
+    assert at == len(data), "bytes are left over"
+    return shape, occupied, values, voxels
+
+
+def check_html(case, files):
+    import numpy as np
+
+    shape, occupied, values, voxels = page_volume(files[0])
+    assert shape["extent"] == case["extent"] and shape["up"] == case["up"] and shape["name"] == case["name"]
+    close(shape["voxel_size"], case["voxel_size"], "voxel size")
+    place = tuple(voxels.T[::-1])
+    for n, (name, kind, _) in enumerate(case["channels"]):
+        want = expected(case, n)
+        if kind == "bit":
+            same(occupied, want.astype(bool), f"{files[0].name}: {name}")
+        else:
+            kept = want.dtype in (np.uint8, np.uint32, np.int32, np.float32)
+            same(values[name], want[place] if kept else want[place].astype(np.float32), f"{files[0].name}: {name}")
+
+
 def main():
     if sys.argv[1:] == ["--have-modules"]:
         return 0 if have_modules() else 1
