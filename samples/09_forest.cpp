@@ -16,11 +16,10 @@ struct tree {
 };
 
 VOXELPIPE_HD inline float random(std::uint32_t n) { // 0 to 1
-    n = (n ^ 61u) ^ (n >> 16);
-    n *= 9u;
-    n ^= n >> 4;
-    n *= 0x27d4eb2du;
-    return static_cast<float>((n ^ n >> 15) >> 8) * 0x1p-24f;
+    n = (n + 1) * 0x9e3779b9u;
+    n = (n ^ n >> 16) * 0x85ebca6bu;
+    n = (n ^ n >> 13) * 0xc2b2ae35u;
+    return static_cast<float>((n ^ n >> 16) >> 8) * 0x1p-24f;
 }
 VOXELPIPE_HD inline float ground(float x, float z) {
     return 14.0f + 7.0f * std::sin(0.035f * x) + 6.0f * std::cos(0.041f * z + 0.6f);
