@@ -88,7 +88,7 @@ int main() {
     picture::write("shell.ppm", grid.extent, [&](int x, int y, int z) {
         const bool is_cut = x > 64 && z > 64;
         if (is_cut || !inside(x, y, z)) return glm::vec3(-1.0f);
-        const bool is_face = x == 64 || z == 64; // where it is cut
+        const bool is_face = (x == 64 && z >= 64) || (z == 64 && x >= 64); // where it is cut
         return is_face ? glm::vec3(0.9f, 0.45f, 0.3f) : glm::vec3(0.45f, 0.66f, 0.72f);
     });
     return voxels[1] > 2 * voxels[0] && voxels[1] < 3 * voxels[0] ? 0 : 1;

@@ -54,9 +54,9 @@ case ${1:-} in
         "$gpu_folder/bench/gpu/bench_gpu_scaling" "${@:2}"
         plot "$results" "$results"
         ;;
-    --solids)
-        build_gpu bench_gpu_solids
-        "$gpu_folder/bench/gpu/bench_gpu_solids" --out "$results" "${@:2}"
+    --solids | --programs)
+        build_gpu "bench_gpu_${1#--}"
+        "$gpu_folder/bench/gpu/bench_gpu_${1#--}" --out "$results" "${@:2}"
         ;;
     --tune)
         build_gpu bench_gpu_tune
