@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// A scan: a turning laser on a tripod hits ground, a house and trees some 700,000 times. Its points become counts and
+// A scan: a turning laser on a tripod hits ground, a house and trees half a million times. Its points become counts and
 // mean colours of voxels, in one pass (scan.ppm).
 #include "picture.hpp"
 

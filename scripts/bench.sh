@@ -8,6 +8,7 @@
 #   scripts/bench.sh --gpu [OPTION...]       the GPU table (needs nvcc and a GPU)
 #   scripts/bench.sh --scaling [OPTION...]   the GPU's scaling curves, and plots of what is in build/bench-gpu/bench/results
 #   scripts/bench.sh --solids [OPTION...]    solids into bits on the GPU
+#   scripts/bench.sh --programs [OPTION...]  programs, instances, points and lines on the GPU
 #   scripts/bench.sh --tune [OPTION...]      sweeps the fine raster's policies on the GPU
 #   scripts/bench.sh --plot [FILE|FOLDER]    plots of that in build/plots, e.g. of records/h200; by default those of --scaling
 #   scripts/bench.sh --nvbench [OPTION...]   the table's cells under NVBench (its options; caches are flushed between calls)
