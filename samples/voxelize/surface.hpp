@@ -31,60 +31,29 @@ struct sampled_texture {
     int first_level = 0; // the first that is in texels, where the others follow. No fragment samples one before it
 };
 
-// A coordinate brought into [0, 1]; NaN gives 0.
-[[nodiscard]] VOXELPIPE_HD inline float wrap_coordinate(wrap_mode mode, float c) {
-    if (mode == wrap_mode::repeat) {
-        c = vp::exact::sub(c, std::floor(c));
-    } else if (mode == wrap_mode::mirrored_repeat) {
-        c = vp::exact::fma(-2.0f, std::floor(c * 0.5f), c);
-        if (c > 1.0f) c = vp::exact::sub(2.0f, c);
+// Linear colour and alpha of a texel's bytes, looked up.
+struct texel_decoder {
+    using texel = glm::u8vec4;
+    const color_tables* tables;
+    [[nodiscard]] VOXELPIPE_HD glm::vec4 operator()(const glm::u8vec4& t) const {
+        return {tables->linear[t.r], tables->linear[t.g], tables->linear[t.b], tables->fraction[t.a]};
     }
-    return c > 0.0f ? (c < 1.0f ? c : 1.0f) : 0.0f;
-}
+};
 
-// A texel index from -1 to size brought into the picture.
-[[nodiscard]] VOXELPIPE_HD inline int wrap_texel(wrap_mode mode, int i, int size) {
-    if (mode == wrap_mode::repeat) return i < 0 ? i + size : i >= size ? i - size : i;
-    return i < 0 ? 0 : i >= size ? size - 1 : i;
-}
-
-// Linear colour and alpha of one texel, bytes looked up.
-[[nodiscard]] VOXELPIPE_HD inline glm::vec4 fetch_texel(const sampled_texture& t, const color_tables& tables, int x,
-                                                        int y) {
-    const glm::u8vec4 texel =
-        t.texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(t.width) + static_cast<std::size_t>(x)];
-    return {tables.linear[texel.r], tables.linear[texel.g], tables.linear[texel.b], tables.fraction[texel.a]};
+[[nodiscard]] VOXELPIPE_HD inline vp::wrap_mode field_wrap(wrap_mode mode) {
+    return mode == wrap_mode::repeat            ? vp::wrap_mode::repeat
+           : mode == wrap_mode::mirrored_repeat ? vp::wrap_mode::mirror
+                                                : vp::wrap_mode::clamp;
 }
 
 // The texture at UV: (0, 0) is the top left corner of the picture, texel centres lie at halves.
 [[nodiscard]] VOXELPIPE_HD inline glm::vec4 sample(const sampled_texture& t, const color_tables& tables, glm::vec2 uv) {
-    const float u = wrap_coordinate(t.wrap_s, uv.x);
-    const float v = wrap_coordinate(t.wrap_t, uv.y);
-    const auto width = static_cast<float>(t.width);
-    const auto height = static_cast<float>(t.height);
-    if (t.filter == filter_mode::nearest) {
-        const int x = static_cast<int>(std::floor(vp::exact::mul(u, width)));
-        const int y = static_cast<int>(std::floor(vp::exact::mul(v, height)));
-        return fetch_texel(t, tables, wrap_texel(t.wrap_s, x, t.width), wrap_texel(t.wrap_t, y, t.height));
-    }
-    const float x = vp::exact::fma(u, width, -0.5f);
-    const float y = vp::exact::fma(v, height, -0.5f);
-    const float left = std::floor(x);
-    const float top = std::floor(y);
-    const float s = vp::exact::sub(x, left);
-    const float r = vp::exact::sub(y, top);
-    const int x0 = wrap_texel(t.wrap_s, static_cast<int>(left), t.width);
-    const int x1 = wrap_texel(t.wrap_s, static_cast<int>(left) + 1, t.width);
-    const int y0 = wrap_texel(t.wrap_t, static_cast<int>(top), t.height);
-    const int y1 = wrap_texel(t.wrap_t, static_cast<int>(top) + 1, t.height);
-    const glm::vec4 a = fetch_texel(t, tables, x0, y0);
-    const glm::vec4 b = fetch_texel(t, tables, x1, y0);
-    const glm::vec4 c = fetch_texel(t, tables, x0, y1);
-    const glm::vec4 d = fetch_texel(t, tables, x1, y1);
-    glm::vec4 result;
-    for (int i = 0; i < 4; ++i)
-        result[i] = vp::exact::lerp(vp::exact::lerp(a[i], b[i], s), vp::exact::lerp(c[i], d[i], s), r);
-    return result;
+    vp::field2d<glm::vec4, texel_decoder> field{t.texels, t.width, t.height};
+    if (t.filter == filter_mode::nearest) field.filter = vp::filter_mode::nearest;
+    field.wrap_x = field_wrap(t.wrap_s);
+    field.wrap_y = field_wrap(t.wrap_t);
+    field.decode = {&tables};
+    return field(uv);
 }
 
 // Level of a texture as a texture of its own, from first_level on; levels above 0 are always filtered linearly.
