@@ -33,7 +33,7 @@
 namespace voxelpipe {
 
 class cuda_backend;
-namespace device { // device/sparse.cuh
+namespace device { // device/optional/sparse.cuh
 template <class Payload, class... Targets>
 [[nodiscard]] status finish_sparse(cuda_backend& backend, const grid& g, const abuffer<cuda_backend, Payload>& lists,
                                    sparse_framebuffer<cuda_backend, Targets...>& fb, const status& drawn);

@@ -58,7 +58,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         require(path.is_relative() && *path.begin() != "..", "a path that leaves the folder");
         return std::vector<std::byte>(64, std::byte{1});
     };
-    // The length of the input decides between strict and lenient loading, and the file's pose and its first animation's.
+    // The length of the input decides between strict and lenient loading, and the file's pose and its first
+    // animation's.
     voxelize::gltf_options options;
     options.threads = 1;
     options.lenient = size % 2 != 0;
