@@ -3,15 +3,18 @@
 
 #include "vox.hpp"
 
+#include "../parallel.hpp"
 #include "palette.hpp"
 #include "progress.hpp"
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace voxelize {
 namespace {
@@ -64,15 +67,14 @@ struct block {
     std::uint64_t count = 0;
 };
 
-// Calls visit(i, j, k) for each set voxel of the block, in storage order.
+// Calls visit(i, j) for each set voxel of layer k of the block, in storage order.
 template <class Visit>
-void for_each_voxel(const volume& v, const channel& bits, const block& b, Visit visit) {
+void for_each_voxel(const volume& v, const channel& bits, const block& b, std::int64_t k, Visit visit) {
     const std::int64_t end = b.low[0] + b.size[0];
-    for (std::int64_t k = b.low[2]; k < b.low[2] + b.size[2]; ++k)
-        for (std::int64_t j = b.low[1]; j < b.low[1] + b.size[1]; ++j)
-            for (std::int64_t w = b.low[0] / 32; 32 * w < end; ++w)
-                for (std::uint32_t word = v.word(bits, w, j, k); word != 0; word &= word - 1)
-                    visit(32 * w + std::countr_zero(word), j, k);
+    for (std::int64_t j = b.low[1]; j < b.low[1] + b.size[1]; ++j)
+        for (std::int64_t w = b.low[0] / 32; 32 * w < end; ++w)
+            for (std::uint32_t word = v.word(bits, w, j, k); word != 0; word &= word - 1)
+                visit(32 * w + std::countr_zero(word), j);
 }
 
 std::uint64_t count_voxels(const volume& v, const channel& bits, const block& b) {
@@ -85,16 +87,17 @@ std::uint64_t count_voxels(const volume& v, const channel& bits, const block& b)
 }
 
 // Blocks of 256 with something in them; the first one if all are empty, since a file has at least one model.
-std::vector<block> split(const volume& v, const channel& bits) {
+std::vector<block> split(const volume& v, const channel& bits, int threads) {
     std::vector<block> blocks;
     for (std::int64_t k = 0; k < v.extent[2]; k += max_side)
         for (std::int64_t j = 0; j < v.extent[1]; j += max_side)
             for (std::int64_t i = 0; i < v.extent[0]; i += max_side) {
                 block b{{i, j, k}, {}, 0};
                 for (std::size_t a = 0; a < 3; ++a) b.size[a] = std::min(max_side, v.extent[a] - b.low[a]);
-                b.count = count_voxels(v, bits, b);
-                if (b.count != 0) blocks.push_back(b);
+                blocks.push_back(b);
             }
+    parallel_for(blocks.size(), threads, [&](std::size_t n) { blocks[n].count = count_voxels(v, bits, blocks[n]); });
+    std::erase_if(blocks, [](const block& b) { return b.count == 0; });
     if (blocks.empty()) {
         block b{{0, 0, 0}, {}, 0};
         for (std::size_t a = 0; a < 3; ++a) b.size[a] = std::min(max_side, v.extent[a]);
@@ -135,18 +138,20 @@ struct coloring {
     }
 };
 
-coloring make_coloring(const volume& v, const channel& bits, const std::vector<block>& blocks) {
+coloring make_coloring(const volume& v, const channel& bits, const std::vector<block>& blocks, int threads) {
     coloring result;
     result.colors = find_colors(v);
     if (result.colors == nullptr) {
         result.colors_used.entries = {clay};
         return result;
     }
-    std::vector<std::uint32_t> histogram(std::size_t{1} << 24);
+    std::vector<std::uint32_t> histogram(std::size_t{1} << 24); // a file has fewer than 2^29 voxels
     for (const block& b : blocks)
-        for_each_voxel(v, bits, b, [&](std::int64_t i, std::int64_t j, std::int64_t k) {
-            std::uint32_t& count = histogram[result.rgb(v, i, j, k)];
-            if (count != std::numeric_limits<std::uint32_t>::max()) ++count;
+        parallel_for(static_cast<std::size_t>(b.size[2]), threads, [&](std::size_t layer) {
+            const std::int64_t k = b.low[2] + static_cast<std::int64_t>(layer);
+            for_each_voxel(v, bits, b, k, [&](std::int64_t i, std::int64_t j) {
+                std::atomic_ref(histogram[result.rgb(v, i, j, k)]).fetch_add(1, std::memory_order_relaxed);
+            });
         });
     std::vector<counted_color> distinct;
     std::vector<std::uint32_t> values;
@@ -165,26 +170,26 @@ coloring make_coloring(const volume& v, const channel& bits, const std::vector<b
 }
 
 void write_model(output_file& out, const volume& v, const channel& bits, const block& b, const axes& to_file,
-                 const coloring& colors) {
+                 const coloring& colors, int threads) {
     chunk_bytes size;
     for (const std::int64_t s : to_file.size(b.size)) size.integer(s);
     write_chunk(out, "SIZE", size);
     write_chunk_head(out, "XYZI", 4 + 4 * b.count, 0);
     out.write_value(static_cast<std::int32_t>(b.count));
     const int3 low = to_file.low(b.low, b.size);
-    std::vector<std::byte> row;
-    std::int64_t row_at = -1;
-    for_each_voxel(v, bits, b, [&](std::int64_t i, std::int64_t j, std::int64_t k) {
-        if (k != row_at) { // a layer at a time
-            out.write(row);
-            row.clear();
-            row_at = k;
-        }
-        const int3 at = to_file.low({i, j, k}, {1, 1, 1});
-        for (std::size_t a = 0; a < 3; ++a) row.push_back(static_cast<std::byte>(at[a] - low[a]));
-        row.push_back(static_cast<std::byte>(colors.index(v, i, j, k)));
-    });
-    out.write(row);
+    ordered_for(
+        static_cast<std::size_t>(b.size[2]), threads,
+        [&](std::size_t n) {
+            const std::int64_t k = b.low[2] + static_cast<std::int64_t>(n);
+            std::vector<std::byte> layer;
+            for_each_voxel(v, bits, b, k, [&](std::int64_t i, std::int64_t j) {
+                const int3 at = to_file.low({i, j, k}, {1, 1, 1});
+                for (std::size_t a = 0; a < 3; ++a) layer.push_back(static_cast<std::byte>(at[a] - low[a]));
+                layer.push_back(static_cast<std::byte>(colors.index(v, i, j, k)));
+            });
+            return layer;
+        },
+        [&](std::size_t, const std::vector<std::byte>& layer) { out.write(layer); });
 }
 
 // Root transform 0 -> group 1 -> for model n: transform 2 + 2n -> shape 3 + 2n. A transform carries the model's centre,
@@ -242,7 +247,8 @@ std::vector<std::pair<std::string_view, chunk_bytes>> scene_graph(const volume& 
 std::vector<std::filesystem::path> write_vox(const volume& v, const std::filesystem::path& path,
                                              const write_options& options) {
     const channel& bits = *v.occupancy();
-    const std::vector<block> blocks = split(v, bits);
+    const int threads = thread_count(options.threads);
+    const std::vector<block> blocks = split(v, bits, threads);
     const axes to_file(v, options.up);
     const bool single = *std::max_element(v.extent.begin(), v.extent.end()) <= max_side;
 
@@ -255,14 +261,14 @@ std::vector<std::filesystem::path> write_vox(const volume& v, const std::filesys
     if (children > static_cast<std::uint64_t>(std::numeric_limits<std::int32_t>::max()))
         throw write_error(path, "too large for .vox, whose chunks end at 2 GiB; use .npz, .vti or .nrrd");
 
-    const coloring colors = make_coloring(v, bits, blocks);
+    const coloring colors = make_coloring(v, bits, blocks, threads);
     progress_meter meter(options.progress, blocks.size());
     output_file out(path);
     out.write("VOX ");
     out.write_value<std::int32_t>(single ? 150 : 200);
     write_chunk_head(out, "MAIN", 0, children);
     for (const block& b : blocks) {
-        write_model(out, v, bits, b, to_file, colors);
+        write_model(out, v, bits, b, to_file, colors, threads);
         meter.advance(1);
     }
     for (const auto& [id, content] : graph) write_chunk(out, id, content);

@@ -5,8 +5,7 @@
 // The kernels of the counting sort (fragments/counting_sort.cuh), and their launches.
 
 #include <voxelpipe/device/fragments/counting_sort.cuh>
-
-#include <cuda/atomic>
+#include <voxelpipe/device/fragments/lookback.cuh>
 
 #include <cstdint>
 
@@ -59,31 +58,17 @@ __global__ __launch_bounds__(threads_per_block) void number_fragments_kernel(
 // Words that tiles publish for later tiles: numbers of fragments and, from bit `voxels` on, of voxels that have some.
 struct tile_sums {
     static constexpr int voxels = 31;
-    static constexpr unsigned long long own = 1ull << 62, all = 2ull << 62, value = own - 1, low = (1ull << voxels) - 1;
+    static constexpr unsigned long long low = (1ull << voxels) - 1;
 
-    // The sums of all earlier tiles; `sums` are this tile's. All lanes of one warp call it. See count_before.
+    // The sums of all earlier tiles; `sums` are this tile's. All lanes of one warp call it.
     [[nodiscard]] __device__ static unsigned long long before(unsigned long long* words, std::uint32_t tile,
                                                               unsigned long long sums) {
-        using word = ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device>;
-        const auto lane = threadIdx.x % 32;
-        if (lane == 0 && tile != 0) word(words[tile]).store(own | sums, ::cuda::memory_order_relaxed);
-        unsigned long long sum = 0;
-        for (std::int64_t last = std::int64_t{tile} - 1; tile != 0; last -= 32) { // lane k reads tile last - k
-            const std::int64_t mine = last - lane;
-            unsigned long long w = all; // before the first tile
-            if (mine >= 0) do
-                    w = word(words[mine]).load(::cuda::memory_order_relaxed);
-                while ((w & ~value) == 0);
-            const unsigned with_all = __ballot_sync(0xffffffffu, (w & all) != 0);
-            const unsigned nearest = with_all == 0 ? 31 : static_cast<unsigned>(__ffs(static_cast<int>(with_all))) - 1;
-            w = lane <= nearest ? w & value : 0;
-            const unsigned fragments = __reduce_add_sync(0xffffffffu, static_cast<unsigned>(w & low));
-            const unsigned of_voxels = __reduce_add_sync(0xffffffffu, static_cast<unsigned>(w >> voxels));
-            sum += static_cast<unsigned long long>(of_voxels) << voxels | fragments;
-            if (with_all != 0) break;
-        }
-        if (lane == 0) word(words[tile]).store(all | (sum + sums), ::cuda::memory_order_relaxed);
-        return sum;
+        if (threadIdx.x % 32 == 0) lookback::publish(words, tile, sums);
+        return lookback::before(words, tile, sums, [](unsigned long long part) {
+            const unsigned fragments = __reduce_add_sync(0xffffffffu, static_cast<unsigned>(part & low));
+            const unsigned of_voxels = __reduce_add_sync(0xffffffffu, static_cast<unsigned>(part >> voxels));
+            return static_cast<unsigned long long>(of_voxels) << voxels | fragments;
+        });
     }
 };
 

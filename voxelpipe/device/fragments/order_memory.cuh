@@ -120,7 +120,6 @@ struct output_pointers {
 // Number of voxels that begin in each tile of windows, published for later tiles: one word each, zero before.
 struct tile_counts {
     static constexpr std::uint32_t length = tuning::order_warps * tuning::window_length; // fragments of a tile
-    static constexpr unsigned long long own = 1ull << 62, all = 2ull << 62, value = own - 1;
     unsigned long long* words;
 
     [[nodiscard]] VOXELPIPE_HD static std::uint64_t num(std::uint64_t capacity) {

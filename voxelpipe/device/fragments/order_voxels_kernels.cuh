@@ -4,11 +4,10 @@
 
 // Kernels and launches of the fragment order (fragments/order_voxels.cuh).
 
+#include <voxelpipe/device/fragments/lookback.cuh>
 #include <voxelpipe/device/fragments/order_long_voxels.cuh>
 #include <voxelpipe/device/fragments/order_voxels.cuh>
 #include <voxelpipe/device/fragments/warp_sort.cuh>
-
-#include <cuda/atomic>
 
 #include <algorithm>
 #include <bit>
@@ -16,38 +15,12 @@
 
 namespace voxelpipe::device {
 
-// ---- words that tiles publish ---------------------------------------------------------------------------------------
-
-using tile_word = ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device>;
-
-// Publishes for later tiles how many voxels begin in this one. One thread calls it.
-__device__ VOXELPIPE_INLINE void publish(const tile_counts& tiles, std::uint32_t tile, unsigned long long count) {
-    if (tile != 0) tile_word(tiles.words[tile]).store(tile_counts::own | count, ::cuda::memory_order_relaxed);
-}
 // Number of voxels that begin in earlier tiles; `count` begin in this one, as published. All lanes of one warp call it.
-// Blocks start in the order of their tiles, so all earlier ones are running or done.
 [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long count_before(const tile_counts& tiles, std::uint32_t tile,
                                                                           unsigned long long count) {
-    const auto lane = threadIdx.x % 32;
-    unsigned long long sum = 0;
-    if (tile != 0) {
-        for (std::int64_t last = std::int64_t{tile} - 1;; last -= 32) { // lane k reads tile last - k
-            const std::int64_t mine = last - lane;
-            unsigned long long w = tile_counts::all; // before the first tile
-            if (mine >= 0) do
-                    w = tile_word(tiles.words[mine]).load(::cuda::memory_order_relaxed);
-                while ((w & ~tile_counts::value) == 0);
-            const unsigned with_all = __ballot_sync(0xffffffffu, (w & tile_counts::all) != 0);
-            const unsigned nearest = with_all == 0 ? 31 : static_cast<unsigned>(__ffs(static_cast<int>(with_all))) - 1;
-            unsigned part =
-                lane <= nearest ? static_cast<unsigned>(w & tile_counts::value) : 0; // fewer than 2^32 fragments
-            part = __reduce_add_sync(0xffffffffu, part);
-            sum += part;
-            if (with_all != 0) break;
-        }
-    }
-    if (lane == 0) tile_word(tiles.words[tile]).store(tile_counts::all | (sum + count), ::cuda::memory_order_relaxed);
-    return sum;
+    return lookback::before(tiles.words, tile, count, [](unsigned long long part) { // fewer than 2^32 fragments
+        return __reduce_add_sync(0xffffffffu, static_cast<unsigned>(part));
+    });
 }
 
 // ---- windows --------------------------------------------------------------------------------------------------------
@@ -317,7 +290,8 @@ __global__ __launch_bounds__(32 * tuning::order_warps,
         earlier += w < warp ? counts[w] : 0;
         all += counts[w];
     }
-    if (threadIdx.x == 0) publish(b.tiles, tile, all); // before the sort, so that later tiles need not wait
+    if (threadIdx.x == 0)
+        lookback::publish(b.tiles.words, tile, all); // before the sort, so that later tiles need not wait
     window.keep(windows[warp]);
     window.template order<Narrow>(to.primitives);
     if (warp == 0) {
