@@ -108,6 +108,36 @@ def summary():
     return head_line("h200") + "\n\n" + table(head, body)
 
 
+def solid_rows():
+    return {(r["scene"], int(r["resolution"]), r["rule"]): r for r in read(ROOT / "h200" / "solids.csv")}
+
+
+def solids():
+    """Solids into bits: both rules beside the published figure, the baseline and the floor."""
+    rows = solid_rows()
+    body = []
+    for (scene, n, rule), r in rows.items():
+        if rule != "even_odd" or not r["peer_ms"]:
+            continue
+        other = rows[scene, n, "nonzero"]
+        body.append([f"{scene} {n}"] + [short(v) for v in (r["ms"], r["async_ms"], other["ms"], r["peer_ms"])] +
+                    [f"{float(r['peer_ms']) / float(r['async_ms']):.2f} ×", short(r["baseline_ms"]), short(r["floor_ms"])])
+    head = ["scene, N", "even_odd", "even_odd, async", "nonzero", "fastest published", "published / async", "baseline", "floor"]
+    return head_line("h200", "solids.csv") + " Milliseconds, medians of 15 calls.\n\n" + table(head, body)
+
+
+def solid_summary():
+    """Two scenes at 512, and the mean over all scenes from 512 on."""
+    rows = solid_rows()
+    body = []
+    for rule in ("even_odd", "nonzero"):
+        pair = [rows[scene, 512, rule] for scene in ("dragon", "conference")]
+        values = [float(r["peer_ms"]) / float(r["ms"]) for (_, n, which), r in rows.items() if which == rule and n >= 512]
+        body.append([f"solid bits, {rule}"] + [short(r[c]) for r in pair for c in ("ms", "peer_ms")] + [f"{mean(values):.1f} ×"])
+    head = ["512³ voxels, milliseconds", "dragon", "fastest published", "conference", "fastest published", "mean of 5 scenes at 512³, 1024³"]
+    return head_line("h200", "solids.csv") + "\n\n" + table(head, body)
+
+
 def icosphere():
     rows = read(ROOT / "xeon" / "published.csv")
     ours = ["VoxelPipe, 1 thread", "VoxelPipe, 2 threads"]
@@ -116,7 +146,8 @@ def icosphere():
     return head_line("xeon", "published.csv") + " Milliseconds.\n\n" + table(["N"] + ours + others, body)
 
 
-TABLES = {"times": times, "means": means, "summary": summary, "icosphere": icosphere}
+TABLES = {"times": times, "means": means, "summary": summary, "icosphere": icosphere, "solids": solids,
+          "solid_summary": solid_summary}
 
 
 def main():
