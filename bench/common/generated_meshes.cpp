@@ -252,10 +252,10 @@ mesh_data room(std::uint32_t clutter, std::uint64_t seed) {
     random_numbers random(seed);
     for (std::uint32_t i = 0; i < clutter; ++i) {
         const bool corner = random.below(4) != 0;
-        const vec place = random_vec(random);
-        const vec centre =
-            corner ? vec{std::fma(place.x, 0.02, 2.5), std::fma(place.y, 0.02, 1.5), std::fma(place.z, 0.02, -0.8)}
-                   : vec{place.x * 2.9, place.y * 1.9, place.z * 0.9};
+        const vec position = random_vec(random);
+        const vec centre = corner ? vec{std::fma(position.x, 0.02, 2.5), std::fma(position.y, 0.02, 1.5),
+                                        std::fma(position.z, 0.02, -0.8)}
+                                  : vec{position.x * 2.9, position.y * 1.9, position.z * 0.9};
         const double size = corner ? 0.002 : 0.02;
         const auto n = static_cast<std::uint32_t>(m.positions.size());
         for (int k = 0; k < 3; ++k) m.positions.push_back(to_float(along(centre, size, random_vec(random))));

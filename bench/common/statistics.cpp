@@ -13,10 +13,10 @@ sample summarize(std::vector<double> values) {
     if (values.empty()) return {};
     std::sort(values.begin(), values.end());
     const auto at = [&](double fraction) {
-        const double place = fraction * static_cast<double>(values.size() - 1);
-        const auto below = static_cast<std::size_t>(place);
+        const double rank = fraction * static_cast<double>(values.size() - 1);
+        const auto below = static_cast<std::size_t>(rank);
         const std::size_t above = std::min(below + 1, values.size() - 1);
-        return values[below] + (place - static_cast<double>(below)) * (values[above] - values[below]);
+        return values[below] + (rank - static_cast<double>(below)) * (values[above] - values[below]);
     };
     return {at(0.5), at(0.25), at(0.75), values.front(), values.back(), static_cast<int>(values.size())};
 }

@@ -20,8 +20,8 @@ namespace bench::gpu {
 // The m that comes closest to so many triangles.
 [[nodiscard]] std::uint64_t quads_for(std::uint64_t triangles);
 
-// Equilateral triangles with edges of `edge` voxels, at random places and turned at random, all of them inside a grid
-// of n^3. edge <= 0.8 n.
+// Equilateral triangles with edges of `edge` voxels, at random positions and turned at random, all of them inside a
+// grid of n^3. edge <= 0.8 n.
 [[nodiscard]] resident_mesh scattered_triangles(std::uint64_t count, double edge, int n, std::uint64_t seed);
 
 enum class placement : std::uint8_t {

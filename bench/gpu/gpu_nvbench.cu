@@ -39,8 +39,8 @@ const loaded_scene& scene(const std::string& name) {
     const char* const told = std::getenv("VOXELPIPE_SCENES");
     const std::string folder = told != nullptr ? told : VOXELPIPE_SCENES_DIR;
     std::vector<std::string> notes;
-    const auto place = std::find(scene_names.begin(), scene_names.end(), name) - scene_names.begin();
-    mesh_data data = find_mesh(folder, available_scenes(folder, notes).at(static_cast<std::size_t>(place)));
+    const auto scene_number = std::find(scene_names.begin(), scene_names.end(), name) - scene_names.begin();
+    mesh_data data = find_mesh(folder, available_scenes(folder, notes).at(static_cast<std::size_t>(scene_number)));
     gpu::resident_mesh mesh = gpu::upload(data);
     kept = std::make_unique<loaded_scene>(loaded_scene{name, std::move(data), std::move(mesh)});
     return *kept;

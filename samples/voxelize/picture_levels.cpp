@@ -24,7 +24,7 @@ int axis_of(const vp::core::snapped_position& a, const vp::core::snapped_positio
     return vp::core::fits_narrow(a, b, c, fraction) ? axis(std::int64_t{0}) : axis(vp::int128{0});
 }
 
-// One primitive at one place, as the library will draw it.
+// One instance of a primitive, as the library will draw it.
 struct placed_primitive {
     const primitive& source;
     placed_vertex_shader place;

@@ -720,7 +720,7 @@ protected: // sparse_pipeline draws the same into bricks
         std::vector<stored<glm::uvec3>> mirrored_triangles; // one, where an instance mirrors
         stored<glm::vec2> texcoords;
         stored<glm::vec4> colors;
-        surface_vertex_shader vertex_shader; // all but its place
+        surface_vertex_shader vertex_shader; // all but its transform
         surface_fragment_shader fragment_shader;
         std::int32_t material;
         bool double_sided;

@@ -29,7 +29,7 @@ constexpr double margin = 1e-4;
                      " voxels along " + "xyz"[axis] + ", the most is " + std::to_string(voxelpipe::grid::max_extent));
 }
 
-// Sub-voxel units: places that a position can be snapped to, along one voxel.
+// Sub-voxel units: positions that can be snapped to, along one voxel.
 double units(const glm::ivec3& extent) {
     return static_cast<double>(std::int64_t{1}
                                << voxelpipe::core::fraction_bits(std::max({extent.x, extent.y, extent.z})));

@@ -5,7 +5,7 @@
 // Light and colour of the preview. Rows of the picture are rendered one band at a time: find what each sample sees,
 // gather ambient occlusion and sunlight with few rays, once for the samples of a pixel that lie on one surface, smooth
 // these over neighbouring pixels of the same surface, shade, and average. Which rays a sample casts depends on its
-// place alone, and every row is found once and by itself, so the picture is the same on any number of threads.
+// position alone, and every row is found once and by itself, so the picture is the same on any number of threads.
 // Internal to the preview.
 
 #include "preview.hpp"

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The model that the tool voxelizes: triangles with the base colour of their materials, in plain vectors, each mesh
-// once, and the places where it stands. Nothing here knows of the file format that it came from. Everything is valid as
-// it stands: every index points into its list, every optional list is empty or has one entry a vertex.
+// once, and the transforms of its instances. Nothing here knows of the file format that it came from. Everything is
+// valid as it stands: every index points into its list, every optional list is empty or has one entry a vertex.
 
 #include "affine.hpp"
 
@@ -73,8 +73,8 @@ struct primitive {
     std::uint32_t material = 0;        // index into scene::materials
 };
 
-// A primitive at one place of the world. Nothing is copied for it. A transform that mirrors exchanges the last two
-// corners of every triangle, so that fronts stay fronts.
+// A primitive with one transform to the world. Nothing is copied for it. A transform that mirrors exchanges the last
+// two corners of every triangle, so that fronts stay fronts.
 struct instance {
     std::uint32_t primitive = 0; // index into scene::primitives
     affine to_world;             // to the file's units and axes; finite

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The tool's shaders: triangles of a mesh and the place where it stands in, one value for each of the tool's render
+// The tool's shaders: triangles of a mesh and its transform in, one value for each of the tool's render
 // targets out. Base colour = factor * texture * vertex colour, in linear light. Plain functors over pointers, for every
 // backend; floats follow the rule of voxelpipe/core/exact.hpp, so the CPU and a GPU give the same bits.
 

@@ -45,9 +45,9 @@ struct result {
     std::string warnings;
 };
 
-// Voxels that one of the two covers and the other does not. Positions are rounded to float at two places of the world,
-// so that a vertex may be snapped to the neighbouring of 65536 places a voxel: a voxel that a triangle just touches may
-// come or go.
+// Voxels that one of the two covers and the other does not. Positions are rounded to float at two positions of the
+// world, so that a vertex may be snapped to the neighbouring of 65536 positions a voxel: a voxel that a triangle just
+// touches may come or go.
 std::size_t differing(const result& a, const result& b) {
     EXPECT_EQ(a.bits.shape, b.bits.shape);
     EXPECT_LT(2000, a.stats["voxels"]);
@@ -119,12 +119,12 @@ TEST(Coordinates, AnExactGridFarAwayIsFilledAsOneNearby) {
 TEST(Coordinates, MirroringKeepsFrontsInFront) {
     const scratch_folder folder;
     const auto check = [&](const std::vector<std::vector<double>>& scales,
-                           const std::vector<std::vector<double>>& places) {
+                           const std::vector<std::vector<double>>& translations) {
         builder file;
         gltf_test::add_cube(file, {0, 0, 0}, 1, gltf_test::add_material(file, {1, 1, 1, 1}));
         file.root["nodes"] = json::array();
         for (std::size_t i = 0; i < scales.size(); ++i)
-            file.append("nodes", {{"mesh", 0}, {"scale", scales[i]}, {"translation", places[i]}});
+            file.append("nodes", {{"mesh", 0}, {"scale", scales[i]}, {"translation", translations[i]}});
         file.write_glb(folder / "m.glb");
         const outcome done = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "normal", "--origin=0,0,0",
                                           "-s", "0.25", "--extent", "12,4,4", "--backend", "cpu"});

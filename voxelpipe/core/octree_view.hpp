@@ -3,7 +3,7 @@
 #pragma once
 
 // An octree over the voxels of a sparse grid, as host and device read it: level l has nodes of 2^l voxels a side in the
-// Morton order of their places, each with a mask of its children and the number of the first of them in the level
+// Morton order of their positions, each with a mask of its children and the number of the first of them in the level
 // below; level 0 are the voxels themselves, numbered by rank. And the first voxel that a ray meets.
 
 #include <voxelpipe/core/brick_table.hpp>

@@ -178,7 +178,7 @@ struct alignas(32) root_data {
     statistic average, deviation;
 
     struct alignas(32) tile {
-        std::uint64_t key;  // the upper node's place: x in the highest bits, then y, then z
+        std::uint64_t key;  // the upper node's position: x in the highest bits, then y, then z
         std::int64_t child; // from the root
         std::uint32_t state;
         stored value;

@@ -193,7 +193,7 @@ void write_model(output_file& out, const volume& v, const channel& bits, const b
 }
 
 // Root transform 0 -> group 1 -> for model n: transform 2 + 2n -> shape 3 + 2n. A transform carries the model's centre,
-// floor(size / 2), to its place.
+// floor(size / 2), to its position.
 std::vector<std::pair<std::string_view, chunk_bytes>> scene_graph(const volume& v, const std::vector<block>& blocks,
                                                                   const axes& to_file) {
     std::vector<std::pair<std::string_view, chunk_bytes>> chunks;

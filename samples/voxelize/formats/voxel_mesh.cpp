@@ -169,20 +169,20 @@ std::array<std::array<std::uint32_t, 3>, 4> corners_of(const voxel_face& face) {
     return corners;
 }
 
-// Numbers the corners of one plane of constant z: for each place the list of its colours.
+// Numbers the corners of one plane of constant z: for each corner the list of its colours.
 class plane_welder {
 public:
     plane_welder(std::int64_t nx, std::int64_t ny)
         : width_(static_cast<std::size_t>(nx) + 1), first_(width_ * (static_cast<std::size_t>(ny) + 1), none) {}
 
     std::uint32_t number_of(const std::array<std::uint32_t, 3>& corner, std::uint32_t rgb) {
-        const std::size_t place = static_cast<std::size_t>(corner[1]) * width_ + corner[0];
-        for (std::uint32_t n = first_[place]; n != none; n = next_[n])
+        const std::size_t corner_index = static_cast<std::size_t>(corner[1]) * width_ + corner[0];
+        for (std::uint32_t n = first_[corner_index]; n != none; n = next_[n])
             if (vertices[n].rgb == rgb) return n;
         const auto number = static_cast<std::uint32_t>(vertices.size());
         vertices.push_back({corner, rgb});
-        next_.push_back(first_[place]);
-        first_[place] = number;
+        next_.push_back(first_[corner_index]);
+        first_[corner_index] = number;
         return number;
     }
     // Ready for another plane; the vertices of this one are given away.
@@ -198,7 +198,7 @@ public:
 private:
     static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
     std::size_t width_;
-    std::vector<std::uint32_t> first_; // vertex of a place, then along next_
+    std::vector<std::uint32_t> first_; // vertex of a corner, then along next_
     std::vector<std::uint32_t> next_;
 };
 
@@ -253,7 +253,7 @@ welded_mesh weld(std::span<const voxel_face> faces, const std::array<std::int64_
     mesh.quads.resize(faces.size());
     std::vector<std::vector<welded_mesh::vertex>> vertices(planes);
     const int workers = thread_count(threads);
-    // A few runs of planes for each thread: the table of places is made once a run.
+    // A few runs of planes for each thread: the table of corners is made once a run.
     const std::size_t runs = std::min(planes, static_cast<std::size_t>(4 * workers));
     parallel_for(runs, workers, [&](std::size_t run) {
         plane_welder welder(extent[0], extent[1]);

@@ -121,7 +121,7 @@ std::vector<std::byte> accessor_reader::packed(std::size_t index, std::size_t el
     if (!accessor.sparse.isSparse) return elements;
 
     const auto count = static_cast<std::size_t>(accessor.sparse.count);
-    const std::span<const std::byte> places =
+    const std::span<const std::byte> indices =
         view(static_cast<std::size_t>(accessor.sparse.indices.bufferView))
             .subspan(static_cast<std::size_t>(accessor.sparse.indices.byteOffset));
     const std::span<const std::byte> values = view(static_cast<std::size_t>(accessor.sparse.values.bufferView))
@@ -130,13 +130,13 @@ std::vector<std::byte> accessor_reader::packed(std::size_t index, std::size_t el
         using Component = decltype(component);
         std::uint64_t least = 0;
         for (std::size_t i = 0; i < count; ++i) {
-            const std::uint64_t place = load<Component>(&places[i * sizeof(Component)]);
-            if (place < least || place >= accessor.count)
-                throw gltf_error(user + ": sparse index " + std::to_string(place) + " of accessors[" +
+            const std::uint64_t target_index = load<Component>(&indices[i * sizeof(Component)]);
+            if (target_index < least || target_index >= accessor.count)
+                throw gltf_error(user + ": sparse index " + std::to_string(target_index) + " of accessors[" +
                                  std::to_string(index) + "] is " +
-                                 (place < least ? "not in ascending order" : "out of range"));
-            std::memcpy(&elements[place * element_bytes], &values[i * element_bytes], element_bytes);
-            least = place + 1;
+                                 (target_index < least ? "not in ascending order" : "out of range"));
+            std::memcpy(&elements[target_index * element_bytes], &values[i * element_bytes], element_bytes);
+            least = target_index + 1;
         }
     });
     return elements;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A place in a JSON document that knows how it was reached, so that whatever is wrong there is said with its path:
+// A value of a JSON document that knows how it was reached, so that whatever is wrong there is said with its path:
 // "meshes[2].primitives[0].indices: 9 is not in accessors, which has 4". Getters give nothing for an absent member and
 // throw gltf_error for one of the wrong type or range.
 
@@ -31,7 +31,7 @@ public:
 
     [[nodiscard]] json& value() const { return *value_; }
 
-    // Of an array's element: its place in there.
+    // Index of an array's element.
     [[nodiscard]] std::size_t index_in_list() const { return index_; }
 
     [[nodiscard]] std::string path() const {

@@ -135,7 +135,7 @@ bool is_scaled_to_nothing(const affine& transform) {
     return true;
 }
 
-// The places of EXT_mesh_gpu_instancing in the node's own space; nothing where the node has no such extension.
+// The transforms of EXT_mesh_gpu_instancing in the node's own space; nothing where the node has no such extension.
 std::optional<std::vector<affine>> instances_of(const tinygltf::Model& model, const tinygltf::Node& node,
                                                 std::size_t index, const accessor_reader& accessors) {
     const auto found = node.extensions.find("EXT_mesh_gpu_instancing");
@@ -152,8 +152,8 @@ std::optional<std::vector<affine>> instances_of(const tinygltf::Model& model, co
     const std::vector<double> translations = read("TRANSLATION");
     const std::vector<double> rotations = read("ROTATION");
     const std::vector<double> scales = read("SCALE");
-    std::vector<affine> places;
-    places.reserve(count);
+    std::vector<affine> transforms;
+    transforms.reserve(count);
     for (std::size_t i = 0; i < count; ++i) {
         std::array<double, 3> translation{0, 0, 0};
         std::array<double, 4> rotation{0, 0, 0, 1};
@@ -161,9 +161,9 @@ std::optional<std::vector<affine>> instances_of(const tinygltf::Model& model, co
         if (!translations.empty()) std::copy_n(&translations[3 * i], 3, translation.begin());
         if (!rotations.empty()) std::copy_n(&rotations[4 * i], 4, rotation.begin());
         if (!scales.empty()) std::copy_n(&scales[3 * i], 3, scale.begin());
-        places.push_back(from_parts(translation, rotation, scale, where + ": ROTATION " + std::to_string(i)));
+        transforms.push_back(from_parts(translation, rotation, scale, where + ": ROTATION " + std::to_string(i)));
     }
-    return places;
+    return transforms;
 }
 
 } // namespace
@@ -206,18 +206,18 @@ shown_scene shown_meshes(const tinygltf::Model& model, const accessor_reader& ac
         pending.insert(pending.end(), nodes.children[index].rbegin(), nodes.children[index].rend());
         const tinygltf::Node& node = model.nodes[index];
         if (node.mesh < 0) continue;
-        const auto show = [&](const affine& place) {
+        const auto show = [&](const affine& transform) {
             // A skin decides in place of the node where its mesh stands, see skins.hpp.
-            if (hidden[index] || (node.skin < 0 && is_scaled_to_nothing(place)))
+            if (hidden[index] || (node.skin < 0 && is_scaled_to_nothing(transform)))
                 ++num_hidden;
-            else if (node.skin < 0 && !place.is_finite())
+            else if (node.skin < 0 && !transform.is_finite())
                 ++num_without_place;
             else
                 result.meshes.push_back(
-                    {static_cast<std::size_t>(node.mesh), place, static_cast<std::int32_t>(index), node.skin});
+                    {static_cast<std::size_t>(node.mesh), transform, static_cast<std::int32_t>(index), node.skin});
         };
-        if (const auto places = instances_of(model, node, index, accessors))
-            for (const affine& place : *places) show(to_world[index].after(place));
+        if (const auto transforms = instances_of(model, node, index, accessors))
+            for (const affine& transform : *transforms) show(to_world[index].after(transform));
         else
             show(to_world[index]);
     }
