@@ -16,6 +16,7 @@ namespace voxelpipe::device {
 inline constexpr int small_row_blocks = 3;        // of a multiprocessor
 inline constexpr std::uint32_t looks_at_once = 4; // triangles of a lane whose corners are loaded together
 inline constexpr int lines_at_once = 16;          // of a triangle, whose rows are kept
+inline constexpr int small_crossing_count = 64;   // about, of a lane's triangle; one of more is cut
 
 // Memory that is to be zero before crossings come: whole uint4s, or none.
 struct zeroed_memory {
@@ -120,12 +121,14 @@ struct small_rows {
                 for (int v = 0; v < 3; ++v) at.p[v][k] = t.q[v][k] - (origin[k] << grid.fraction);
             }
         }
-        if (__ballot_sync(0xffffffffu, static_cast<int>(has_rows && !is_small)) != 0)
-            leave(has_rows && !is_small, i, t.rows);
-        if (__ballot_sync(0xffffffffu, static_cast<int>(is_small)) == 0) return;
         if (!is_small) at = core::small_triangle{};
         const core::small_crossings crossings(at, grid.fraction);
-        if (crossings.winding == 0) is_small = false; // no area either
+        // Twice the area that rows see tells how many there are.
+        const bool has_many = is_small && crossings.plane[0] >> (2 * grid.fraction + 1) > small_crossing_count;
+        const bool is_large = has_rows && (!is_small || has_many);
+        if (__ballot_sync(0xffffffffu, static_cast<int>(is_large)) != 0) leave(is_large, i, t.rows);
+        is_small = is_small && !has_many && crossings.winding != 0; // others have no crossing
+        if (__ballot_sync(0xffffffffu, static_cast<int>(is_small)) == 0) return;
         // Relative to the origin; none if there is no triangle.
         const int y0 = static_cast<int>(t.rows.u.lo) - origin[1], last = static_cast<int>(t.rows.u.hi - t.rows.u.lo);
         int z = static_cast<int>(t.rows.v.lo) - origin[2];
