@@ -22,7 +22,7 @@ void expect_same_for_all_chunks(const unit::small_mesh& m, const Amplify& amplif
         for (const vp::coverage rule : {vp::coverage::thin, vp::coverage::conservative}) {
             results first;
             bool is_first = true;
-            for (const unsigned threads : {1u, 3u})
+            for (const unsigned threads : {1u, 8u})
                 for (const std::uint64_t chunk : {std::uint64_t{1} << 24, std::uint64_t{1} << 10, std::uint64_t{77}}) {
                     backend_type backend = unit::make_backend(threads);
                     const results r = draw_all(backend, m, grid, amplify, {rule, chunk});

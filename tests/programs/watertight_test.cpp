@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Tessellated closed meshes stay closed, whatever the levels of their edges, the displacement, and where each triangle
-// begins: no edge of the snapped triangles is left over, no row of the solid is open, and thin coverage stops every
-// 6-connected path. VOXELPIPE_TEST_SCALE sets the number of meshes: 1 draws 10,000 patches.
+// begins: no edge of the snapped triangles is left over, no row of the solid is open, and thin coverage and the
+// crosshair stop every 6-connected path. VOXELPIPE_TEST_SCALE sets the number of meshes: 1 draws 10,000 patches.
 
 #include "amplify_cases.hpp"
 
@@ -121,10 +121,11 @@ TEST(Watertight, ACrackIsFound) {
 }
 
 // From voxels of the inside no path of empty face neighbours leads to the outside.
-TEST(Watertight, ThinCoverageStopsEveryPath) {
+TEST(Watertight, ThinAndCrosshairStopEveryPath) {
     unit::splitmix64 random(13);
     backend_type backend = unit::make_backend();
-    for (int i = 0; i < 25; ++i) {
+    for (int i = 0; i < 30; ++i) {
+        const vp::coverage rule = i % 2 == 0 ? vp::coverage::thin : vp::coverage::crosshair;
         const unit::small_mesh m = closed_mesh(random, 2);
         const auto seed = static_cast<std::uint32_t>(random.between(0, 1 << 30));
         const auto mesh = m.on(backend);
@@ -132,9 +133,7 @@ TEST(Watertight, ThinCoverageStopsEveryPath) {
         const vp::grid g = centred_grid();
         vp::framebuffer<backend_type, vp::target<vp::bit, blend::bit_or>> walls{backend, extent},
             inside{backend, extent};
-        ASSERT_TRUE(
-            vp::voxelize(backend, mesh, g, vp::passthrough{}, program, vp::constant(true), walls, vp::coverage::thin)
-                .ok());
+        ASSERT_TRUE(vp::voxelize(backend, mesh, g, vp::passthrough{}, program, vp::constant(true), walls, rule).ok());
         vp::solid_options options;
         options.rule = vp::fill_rule::nonzero;
         ASSERT_TRUE(

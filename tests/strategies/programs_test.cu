@@ -47,7 +47,6 @@ using namespace device_test;
 using namespace programs_types;
 
 using bits = vp::target<vp::bit, blend::bit_or>;
-using counts = vp::target<std::uint32_t, blend::count>;
 using ids = vp::target<glm::uvec4, blend::replace>;
 using sums = vp::target<float, blend::add>;
 
@@ -87,8 +86,6 @@ void expect_same_instances(const mesh_data& m, std::uint64_t copies, const Verte
 TEST(DeviceInstances, OfConstantsAreTheCpus) {
     const mesh_data m = mixed_triangles(150, 30.0f, 3);
     using vp::strategy;
-    expect_same_instances<vp::coverage::conservative, bits, counts>(m, 4, placed{}, vp::constant(true, 1u),
-                                                                    {strategy::immediate, strategy::tiled});
     expect_same_instances<vp::coverage::conservative, bits>(m, 4, placed{}, vp::constant(true),
                                                             {strategy::occupancy_mask, strategy::immediate});
     expect_same_instances<vp::coverage::conservative, bits>(m, 3, vp::passthrough{}, vp::constant(true),
@@ -117,28 +114,6 @@ TEST(DeviceInstances, InListsAreTheCpus) {
         vp::voxelize<vp::coverage::thin>(gpu, there.view(vp::instances{6}), g, placed{}, vp::constant(true), b);
     ASSERT_TRUE(s.ok() && t.ok()) << s.message() << t.message();
     expect_same_on_host(a.to_host(cpu), b.to_host(gpu));
-}
-
-TEST(DeviceInstances, OfSolidsAreTheCpus) {
-    const mesh_data m = mixed_triangles(60, 30.0f, 6);
-    const vp::grid g = box_grid(extent);
-    for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes}) {
-        vp::solid_options options;
-        options.repair = repair;
-        vp::cpu_backend cpu;
-        vp::cuda_backend gpu;
-        vp::framebuffer<vp::cpu_backend, bits> a{cpu, extent};
-        vp::framebuffer<vp::cuda_backend, bits> b{gpu, extent};
-        const vp::mesh<vp::cpu_backend> here(cpu, m.positions, m.triangles);
-        const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
-        const vp::status s =
-            vp::voxelize_solid(cpu, here.view(vp::instances{3}), g, placed{}, vp::constant(true), a, options);
-        const vp::status t =
-            vp::voxelize_solid(gpu, there.view(vp::instances{3}), g, placed{}, vp::constant(true), b, options);
-        ASSERT_TRUE(s.ok() && t.ok()) << s.message() << t.message();
-        EXPECT_EQ(s.solid, t.solid);
-        expect_same_bytes(vp::get<0>(a).to_host(cpu), vp::get<0>(b).to_host(gpu), "solid");
-    }
 }
 
 TEST(DeviceInstances, CheckTheirIndices) {

@@ -518,6 +518,31 @@ TEST(Solids, Async) {
     }
 }
 
+// Two instances that lie in the same place, each with vertices of its own.
+TEST(Solids, InstancesAreTheCpus) {
+    const mesh_data m = tied_bodies(22.0f, 8, 9);
+    const vp::grid g = box_grid({40, 24, 22});
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    const vp::mesh<vp::cpu_backend> here(cpu, m.positions, m.triangles);
+    const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
+    bit_target<vp::cpu_backend> a{cpu, g.extent};
+    bit_target<vp::cuda_backend> b{gpu, g.extent};
+    for (const auto extent : {vp::solid_extent::centre, vp::solid_extent::outer})
+        for (const auto repair : {vp::repair::none, vp::repair::close_holes}) {
+            const vp::solid_options options{.rule = vp::fill_rule::nonzero, .extent = extent, .repair = repair};
+            const vp::status sa = vp::voxelize_solid(cpu, here.view(vp::instances{2}), g, vp::passthrough{},
+                                                     vp::constant(true), a, options);
+            const vp::status sb = vp::voxelize_solid(gpu, there.view(vp::instances{2}), g, vp::passthrough{},
+                                                     vp::constant(true), b, options);
+            ASSERT_TRUE(sa.ok() && sb.ok()) << sa.message() << sb.message();
+            EXPECT_EQ(sa.counts.triangles_in, 2 * m.triangles.size());
+            expect_same_counts(sa.counts, sb.counts);
+            EXPECT_EQ(sa.solid, sb.solid);
+            expect_same_bytes(vp::get<0>(a).to_host(cpu), vp::get<0>(b).to_host(gpu), "bits");
+        }
+}
+
 // ---- repairs --------------------------------------------------------------------------------------------------------
 
 TEST(Solids, ClosedHoles) {

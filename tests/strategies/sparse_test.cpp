@@ -1,0 +1,208 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Sparse framebuffers on the device: the bytes of cpu_backend, for every blend, clear and load and off, kept sums,
+// crops, several draws, and grids beyond 32-bit cells.
+
+#include "api_model.hpp"
+#include "device_test.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+namespace vp = voxelpipe;
+namespace blend = voxelpipe::blend;
+
+namespace sparse_values { // named: nvcc warns of members of unnamed ones that the host does not use
+
+struct record {
+    std::uint64_t chain;
+    std::uint32_t fragments, last;
+};
+struct chain {
+    static constexpr bool order_free = false;
+    VOXELPIPE_HD record identity() const { return {0xcbf29ce484222325u, 0, 0xffffffffu}; }
+    VOXELPIPE_HD record combine(record a, record b) const {
+        return {(a.chain ^ b.chain) * 0x100000001b3u, a.fragments + b.fragments, b.last};
+    }
+};
+} // namespace sparse_values
+
+namespace {
+
+using sparse_values::chain;
+using sparse_values::record;
+
+struct shader {
+    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+        const std::uint64_t m = unit::mark(f.primitive, f.voxel);
+        const auto number = static_cast<float>(static_cast<std::int32_t>(m)) * 0x1p-10f;
+        return vp::outputs((m >> 20 & 3u) != 0, f.primitive, number, glm::dvec2(number, f.barycentric.x),
+                           static_cast<std::int16_t>(m), vp::half(number * 0x1p-14f), m, record{m, 1, f.primitive})
+            .discard_if(m % 3 == 0);
+    }
+};
+// The same of a solid's fragments.
+struct solid_shader {
+    VOXELPIPE_HD auto operator()(const vp::solid_fragment& f) const {
+        vp::fragment<> g{};
+        g.primitive = f.draw * 31 + static_cast<std::uint32_t>(f.winding);
+        g.voxel = f.voxel;
+        return shader{}(g);
+    }
+};
+template <class Backend>
+using framebuffer =
+    vp::sparse_framebuffer<Backend, vp::target<vp::bit, blend::bit_xor>, vp::target<std::uint32_t, blend::replace>,
+                           vp::target<float, blend::add>, vp::target<glm::dvec2, blend::add, vp::layout::planar>,
+                           vp::target<std::int16_t, blend::add_saturate>, vp::target<vp::half, blend::min>,
+                           vp::target<std::uint64_t, blend::count>, vp::target<record, chain>>;
+
+// The same call on both; compares everything that comes of it.
+struct pair {
+    vp::cuda_backend device;
+    vp::cpu_backend host{2};
+    framebuffer<vp::cuda_backend> on_device;
+    framebuffer<vp::cpu_backend> on_host;
+    explicit pair(const glm::ivec3& extent) : on_device(device, extent), on_host(host, extent) {}
+
+    template <class F>
+    void prepare(const F& f) {
+        f(on_device);
+        f(on_host);
+    }
+    void draw(const std::vector<unit::small_mesh>& meshes, const vp::grid& grid, vp::coverage rule, const char* what) {
+        std::vector<vp::mesh<vp::cuda_backend>> owners;
+        std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, shader>> there, here;
+        owners.reserve(meshes.size());
+        for (const auto& m : meshes) {
+            owners.emplace_back(device, m.positions, m.triangles);
+            there.push_back({owners.back().view(), {}, {}});
+            here.push_back({m.view(), {}, {}});
+        }
+        const vp::status a = vp::voxelize(device, there, grid, on_device, rule);
+        const vp::status b = vp::voxelize(host, here, grid, on_host, rule);
+        ASSERT_TRUE(a.ok() && b.ok()) << what << ": " << a.message() << "; " << b.message();
+        EXPECT_EQ(a.counts, b.counts) << what;
+        compare(what);
+    }
+    void draw_solid(const std::vector<unit::small_mesh>& meshes, const vp::grid& grid, const vp::solid_options& options,
+                    const char* what) {
+        std::vector<vp::mesh<vp::cuda_backend>> owners;
+        std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, solid_shader>> there, here;
+        owners.reserve(meshes.size());
+        for (const auto& m : meshes) {
+            owners.emplace_back(device, m.positions, m.triangles);
+            there.push_back({owners.back().view(), {}, {}});
+            here.push_back({m.view(), {}, {}});
+        }
+        const vp::status a = vp::voxelize_solid(device, there, grid, on_device, options);
+        const vp::status b = vp::voxelize_solid(host, here, grid, on_host, options);
+        ASSERT_TRUE(a.ok() && b.ok()) << what << ": " << a.message() << "; " << b.message();
+        EXPECT_EQ(a.counts, b.counts) << what;
+        EXPECT_EQ(a.solid, b.solid) << what;
+        compare(what);
+    }
+    void compare(const char* what) {
+        const auto a = on_device.to_host(device);
+        const auto b = on_host.to_host(host);
+        EXPECT_EQ(a.keys, b.keys) << what;
+        EXPECT_TRUE(a.masks == b.masks) << what;
+        EXPECT_EQ(a.offsets, b.offsets) << what;
+        vp::core::for_each_index<8>([&]<std::size_t I>() {
+            EXPECT_TRUE(unit::same_bytes(vp::get<I>(a.values), vp::get<I>(b.values))) << what << ", target " << I;
+            EXPECT_TRUE(unit::same_bytes(vp::get<I>(a.sums), vp::get<I>(b.sums))) << what << ", sums of " << I;
+        });
+    }
+};
+
+} // namespace
+
+TEST(DeviceSparse, GivesTheBytesOfTheCpu) {
+    const glm::ivec3 extent{45, 34, 37};
+    const vp::grid grid = unit::unit_grid(extent);
+    const std::vector<unit::small_mesh> meshes{unit::make_mesh(1, 25, extent), unit::make_mesh(2, 15, extent)};
+    for (const vp::coverage rule : {vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair}) {
+        pair p(extent);
+        p.draw(meshes, grid, rule, "cleared");
+        EXPECT_GT(p.on_host.num_voxels(), 500u);
+        const std::vector<unit::small_mesh> more{unit::make_mesh(3, 20, extent)};
+        p.prepare([](auto& fb) { vp::core::for_each_index<8>([&]<std::size_t I>() { vp::get<I>(fb).load(); }); });
+        p.draw(more, grid, rule, "loaded");
+        p.prepare([](auto& fb) {
+            vp::get<2>(fb).off();
+            vp::get<1>(fb).clear(7u);
+            vp::get<0>(fb).clear(true);
+            vp::get<3>(fb).clear({2.5, -1.0});
+            fb.template keep_sums<2>();
+            fb.template keep_sums<3>();
+        });
+        p.draw(meshes, grid, rule, "cleared, loaded, off, sums kept");
+        p.prepare([](auto& fb) { vp::core::for_each_index<8>([&]<std::size_t I>() { vp::get<I>(fb).load(); }); });
+        p.draw(more, grid, rule, "sums kept, loaded");
+        p.prepare([](auto& fb) { vp::get<4>(fb).clear(3); });
+        p.draw({}, grid, rule, "no draws");
+        p.prepare([](auto& fb) { vp::core::for_each_index<8>([&]<std::size_t I>() { vp::get<I>(fb).clear({}); }); });
+        EXPECT_TRUE(vp::clear(p.device, p.on_device));
+        EXPECT_TRUE(vp::clear(p.host, p.on_host));
+        p.compare("nothing");
+        EXPECT_EQ(p.on_device.num_voxels(), 0u);
+    }
+}
+
+TEST(DeviceSparse, GivesTheBytesOfTheCpuInPartsOfLargeGrids) {
+    const vp::grid whole = unit::unit_grid({65536, 65536, 65536});
+    unit::small_mesh mesh = unit::make_mesh(4, 15, {40, 40, 40});
+    for (glm::vec3& p : mesh.positions) p += glm::vec3(65000, 30001, 20007);
+    const vp::grid part = whole.crop({64990, 29999, 20003}, {45, 41, 46});
+    pair p(part.extent);
+    p.draw({mesh}, part, vp::coverage::conservative, "a crop");
+    EXPECT_GT(p.on_host.num_voxels(), 300u);
+    pair all(whole.extent);
+    all.draw({mesh}, whole, vp::coverage::conservative, "the whole");
+    EXPECT_GT(all.on_host.num_voxels(), p.on_host.num_voxels());
+}
+
+TEST(DeviceSparse, LimitsChangeNothing) {
+    const glm::ivec3 extent{30, 30, 30};
+    const vp::grid grid = unit::unit_grid(extent);
+    const unit::small_mesh mesh = unit::make_mesh(5, 10, extent);
+    pair p(extent);
+    p.draw({mesh}, grid, vp::coverage::thin, "drawn");
+    const std::uint64_t bricks = p.on_device.num_bricks(), voxels = p.on_device.num_voxels();
+    p.on_device.limit({bricks, voxels - 1});
+    const vp::mesh<vp::cuda_backend> there(p.device, mesh.positions, mesh.triangles);
+    const vp::status s =
+        vp::voxelize(p.device, there, grid, vp::passthrough{}, shader{}, p.on_device, vp::coverage::thin);
+    EXPECT_EQ(s.code, vp::status_code::capacity_exceeded);
+    EXPECT_EQ(s.required.bricks, bricks);
+    EXPECT_EQ(s.required.voxels, voxels);
+    p.compare("limited");
+}
+
+TEST(DeviceSparse, SolidsGiveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{45, 34, 37};
+    const vp::grid grid = unit::unit_grid(extent);
+    // Open, as random triangles are: rows have windings of all kinds.
+    const std::vector<unit::small_mesh> meshes{unit::make_mesh(6, 12, extent), unit::make_mesh(7, 9, extent)};
+    for (const vp::bodies bodies : {vp::bodies::call, vp::bodies::draw})
+        for (const vp::solid_options& o :
+             {vp::solid_options{.rule = vp::fill_rule::even_odd, .bodies = bodies},
+              vp::solid_options{.bodies = bodies, .extent = vp::solid_extent::outer},
+              vp::solid_options{
+                  .rule = vp::fill_rule::positive, .bodies = bodies, .extent = vp::solid_extent::inner}}) {
+            pair p(extent);
+            p.draw_solid(meshes, grid, o, "cleared");
+            EXPECT_GT(p.on_host.num_voxels(), 500u);
+            p.prepare([](auto& fb) {
+                vp::core::for_each_index<8>([&]<std::size_t I>() { vp::get<I>(fb).load(); });
+                vp::get<2>(fb).clear(1.5f);
+                fb.template keep_sums<2>();
+            });
+            p.draw_solid({unit::make_mesh(8, 9, extent)}, grid, o, "loaded");
+        }
+    const vp::grid part = grid.crop({19, 5, 3}, {21, 27, 33});
+    pair p(part.extent);
+    p.draw_solid(meshes, part, {.extent = vp::solid_extent::outer}, "a crop");
+}
