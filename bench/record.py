@@ -26,6 +26,7 @@ REPORTS = {
     "gpu_scaling.md": {"gpu_scaling.csv": "scaling.csv"},
     "gpu_tune.md": {"gpu_tune.csv": "tune.csv"},
     "gpu_solids.md": {"gpu_solids.csv": "solids.csv"},
+    "gpu_programs.md": {"gpu_programs.csv": "programs.csv"},
     "cpu.md": {"cpu_scenes.csv": "table.csv", "cpu_stages.csv": "stages.csv", "cpu_published.csv": "published.csv"},
 }
 MEANS = "Geometric means"
