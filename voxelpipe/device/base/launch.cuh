@@ -22,8 +22,8 @@ namespace voxelpipe::device {
 // time at most one earlier kernel is unfinished. All threads call it.
 __device__ VOXELPIPE_INLINE void await_stream() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
-    (void)0;
-    (void)0;
+    asm volatile("griddepcontrol.wait;" ::: "memory");
+    asm volatile("griddepcontrol.launch_dependents;" ::: "memory");
 #endif
 }
 
@@ -135,7 +135,7 @@ __global__ void write_chunk(T* to, const __grid_constant__ argument_chunk<T, N> 
 
 template <class T, int N>
 void write_arguments(T* to, const argument_chunk<T, N>& chunk, int count, cudaStream_t stream) {
-    (void)::emulation::launch([=](const auto&... a) { write_chunk<T, N>(a...); }, 1, 256, 0, stream, to, chunk, count);
+    write_chunk<T, N><<<1, 256, 0, stream>>>(to, chunk, count);
     check(cudaGetLastError(), stage::vertex_shade);
 }
 

@@ -150,9 +150,9 @@ private:
         arrays_type exact(from_, num_voxels, num_fragments);
         if (num_fragments != 0) {
             if (call_.clock != nullptr) call_.clock->start(); // leaves out the wait and the allocations
-            (void)::emulation::launch([=](const auto&... a) { copy_lists_kernel(a...); }, fill_device(num_fragments), threads_per_block, 0, from_.stream, sorted, num_voxels, num_fragments, exact.voxels.data(), exact.offsets.data(), exact.primitives.data(), exact.payloads.data())
-
-;
+            copy_lists_kernel<<<fill_device(num_fragments), threads_per_block, 0, from_.stream>>>(
+                sorted, num_voxels, num_fragments, exact.voxels.data(), exact.offsets.data(), exact.primitives.data(),
+                exact.payloads.data());
             check(cudaGetLastError(), where);
             end_stage(call_.clock, &stage_times::abuffer_emit);
         }

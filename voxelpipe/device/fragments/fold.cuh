@@ -147,8 +147,8 @@ __global__ void fold_kernel(const __grid_constant__ fragment_lists<Key, Values> 
 template <class Key, class Values, class Framebuffer, std::size_t... I>
 void launch_fold(const fragment_lists<Key, Values>& lists, const Framebuffer& fb, bool count_voxels,
                  pipeline_state* state, const capacities& limits, std::index_sequence<I...>, cudaStream_t stream) {
-    (void)::emulation::launch([=](const auto&... a) { fold_kernel<Key, Values, Framebuffer, I...>(a...); }, fill_device(limits.fragments), threads_per_block, 0, stream, lists, fb, state, limits, count_voxels)
-;
+    fold_kernel<Key, Values, Framebuffer, I...>
+        <<<fill_device(limits.fragments), threads_per_block, 0, stream>>>(lists, fb, state, limits, count_voxels);
     check(cudaGetLastError(), stage::fine_raster);
 }
 

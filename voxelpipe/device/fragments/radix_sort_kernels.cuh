@@ -160,7 +160,7 @@ __global__ __launch_bounds__(tuning::sort_threads,
     constexpr unsigned items = Items;
     constexpr std::uint32_t most = sort_tile(Items);
     static_assert(items % 2 == 0 && most < 1 << 16);
-    unsigned char* const dynamic_memory = reinterpret_cast<unsigned char*>(::emulation::dynamic_shared());
+    extern __shared__ __align__(16) unsigned char dynamic_memory[];
     auto& shared = *reinterpret_cast<tile_memory*>(dynamic_memory);
     // By digit: the offset within the tile, later the difference from it to the global offset.
     __shared__ std::uint32_t offsets[DigitsEach * tuning::sort_threads];
@@ -201,7 +201,7 @@ __global__ __launch_bounds__(tuning::sort_threads,
     }
     // Makes the compiler recompute the counts' addresses below: held until then, they would not fit the registers.
 #pragma unroll
-    for (std::uint32_t i = 0; i < items; ++i) ::emulation::ptx::keep(key[i]);
+    for (std::uint32_t i = 0; i < items; ++i) asm volatile("" : "+r"(key[i]));
     __syncthreads();
     // For the thread's digits: prefix sums over the warps, and totals.
     const std::uint32_t first_digit = DigitsEach * threadIdx.x;

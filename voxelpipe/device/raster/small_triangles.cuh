@@ -35,14 +35,14 @@ struct lane_rows {
 
     __device__ VOXELPIPE_INLINE explicit lane_rows(kept_rows& of_warp) {
         const auto at = static_cast<std::uint32_t>(__cvta_generic_to_shared(of_warp.words[0] + threadIdx.x % 32));
-        ::emulation::ptx::mov_u32(first, at);
+        asm volatile("mov.u32 %0, %1;" : "=r"(first) : "r"(at));
     }
     __device__ VOXELPIPE_INLINE void set(int i, word w) const {
-        ::emulation::ptx::st_shared_u32(first + 128 * static_cast<unsigned>(i), w);
+        asm volatile("st.shared.u32 [%0], %1;" ::"r"(first + 128 * static_cast<unsigned>(i)), "r"(w) : "memory");
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE word get(int i) const {
         word w = 0;
-        ::emulation::ptx::ld_shared_u32(w, first + 128 * static_cast<unsigned>(i));
+        asm volatile("ld.shared.u32 %0, [%1];" : "=r"(w) : "r"(first + 128 * static_cast<unsigned>(i)) : "memory");
         return w;
     }
 };

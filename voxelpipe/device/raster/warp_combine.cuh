@@ -33,12 +33,12 @@ struct word_slots {
         const std::uint32_t slot = number * 0x9e3779b1u >> (32 - log2_count);
         const auto at = static_cast<std::uint32_t>(__cvta_generic_to_shared(slots + slot));
         std::uint32_t seen = 0;
-        ::emulation::ptx::atom_shared_cas_b32(seen, at, none, number)
-
-
-;
+        asm volatile("atom.relaxed.cta.shared.cas.b32 %0, [%1], %2, %3;"
+                     : "=r"(seen)
+                     : "r"(at), "r"(none), "r"(number)
+                     : "memory");
         if (seen == none || seen == number)
-            ::emulation::ptx::red_shared_or_b32_second(at, bits);
+            asm volatile("red.relaxed.cta.shared.or.b32 [%0 + 4], %1;" ::"r"(at), "r"(bits) : "memory");
         else
             reduce_or(words + number, bits);
     }

@@ -236,7 +236,7 @@ __global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) v
 template <class Op>
 void count_large_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state,
                        void* scan_storage, std::size_t scan_bytes, stage where, cudaStream_t stream) {
-    (void)::emulation::launch([=](const auto&... a) { count_large_kernel(a...); }, fill_device(b.record_capacity * 32), threads_per_block, 0, stream, geo, op, b, state);
+    count_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state);
     check(cudaGetLastError(), where);
     sum_counts(b.counts, b.offsets, geo.num_primitives, scan_storage, scan_bytes, where, stream);
 }
@@ -245,7 +245,7 @@ void count_large_cells(const geometry& geo, const Op& op, const cell_buffers& b,
 template <class Op>
 void count_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state, void* scan_storage,
                  std::size_t scan_bytes, stage where, cudaStream_t stream) {
-    (void)::emulation::launch([=](const auto&... a) { count_small_kernel(a...); }, num_blocks(geo.num_primitives), threads_per_block, 0, stream, geo, op, b, state);
+    count_small_kernel<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state);
     check(cudaGetLastError(), where);
     count_large_cells(geo, op, b, state, scan_storage, scan_bytes, where, stream);
 }
@@ -253,14 +253,14 @@ void count_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipel
 template <class Op>
 void emit_large_cells(const geometry& geo, const Op& op, const cell_buffers& b, const pipeline_state* state,
                       const capacities& limits, stage where, cudaStream_t stream) {
-    (void)::emulation::launch([=](const auto&... a) { emit_large_kernel(a...); }, fill_device(b.record_capacity * 32), threads_per_block, 0, stream, geo, op, b, state, limits);
+    emit_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
     check(cudaGetLastError(), where);
 }
 
 template <class Op>
 void emit_cells(const geometry& geo, const Op& op, const cell_buffers& b, const pipeline_state* state,
                 const capacities& limits, stage where, cudaStream_t stream) {
-    (void)::emulation::launch([=](const auto&... a) { emit_small_kernel(a...); }, num_blocks(geo.num_primitives), threads_per_block, 0, stream, geo, op, b, state, limits);
+    emit_small_kernel<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
     check(cudaGetLastError(), where);
     emit_large_cells(geo, op, b, state, limits, where, stream);
 }

@@ -178,12 +178,12 @@ template <class Source>
 // Copy a word, or four if both addresses are multiples of 16 bytes, to an address in shared memory, asynchronously and
 // through no register. await_copies waits for the thread's own copies.
 __device__ VOXELPIPE_INLINE void copy_word(std::uint32_t to, const std::uint32_t* from) {
-    ::emulation::ptx::cp_async_4(to, __cvta_generic_to_global(from));
+    asm volatile("cp.async.ca.shared.global [%0], [%1], 4;" ::"r"(to), "l"(__cvta_generic_to_global(from)) : "memory");
 }
 __device__ VOXELPIPE_INLINE void copy_four_words(std::uint32_t to, const uint4* from) {
-    ::emulation::ptx::cp_async_16(to, __cvta_generic_to_global(from));
+    asm volatile("cp.async.cg.shared.global [%0], [%1], 16;" ::"r"(to), "l"(__cvta_generic_to_global(from)) : "memory");
 }
-__device__ VOXELPIPE_INLINE void await_copies() { ::emulation::ptx::cp_async_wait_all(); }
+__device__ VOXELPIPE_INLINE void await_copies() { asm volatile("cp.async.wait_all;" ::: "memory"); }
 
 // Prefetches the corners of a warp's next triangles into shared memory, while the previous ones are drawn: there are
 // too few registers to hold them so long. Each lane has its own column of words, so no lane waits for another.

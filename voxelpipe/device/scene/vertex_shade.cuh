@@ -35,9 +35,9 @@ template <class Mesh, class VertexShader, class Varyings>
 void vertex_shade(const Mesh& mesh, const VertexShader& shader, const core::snap_transform& snap, std::uint32_t draw,
                   const vertex_positions& positions, Varyings* varyings, cudaStream_t stream) {
     if (mesh.num_vertices() == 0) return;
-    (void)::emulation::launch([=](const auto&... a) { vertex_shade_kernel<Mesh, VertexShader, Varyings>(a...); }, num_blocks(mesh.num_vertices()), threads_per_block, 0, stream, mesh, shader, snap, draw, positions.exact, positions.int32, varyings)
-
-;
+    vertex_shade_kernel<Mesh, VertexShader, Varyings>
+        <<<num_blocks(mesh.num_vertices()), threads_per_block, 0, stream>>>(mesh, shader, snap, draw, positions.exact,
+                                                                            positions.int32, varyings);
     check(cudaGetLastError(), stage::vertex_shade);
 }
 

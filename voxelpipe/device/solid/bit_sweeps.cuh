@@ -124,9 +124,9 @@ template <int = 0>
 void dilate(word* bits, word* spare, const bit_box& box, int r, cudaStream_t stream) {
     if (r == 0) return;
     const unsigned blocks = fill_device(box.num_words(), 16);
-    (void)::emulation::launch([=](const auto&... a) { dilate_x_kernel<word>(a...); }, blocks, threads_per_block, 0, stream, bits, spare, box, r);
-    (void)::emulation::launch([=](const auto&... a) { dilate_lines_kernel<word>(a...); }, blocks, threads_per_block, 0, stream, spare, bits, box, 1, r);
-    (void)::emulation::launch([=](const auto&... a) { dilate_lines_kernel<word>(a...); }, blocks, threads_per_block, 0, stream, bits, spare, box, 2, r);
+    dilate_x_kernel<word><<<blocks, threads_per_block, 0, stream>>>(bits, spare, box, r);
+    dilate_lines_kernel<word><<<blocks, threads_per_block, 0, stream>>>(spare, bits, box, 1, r);
+    dilate_lines_kernel<word><<<blocks, threads_per_block, 0, stream>>>(bits, spare, box, 2, r);
     check(cudaGetLastError(), stage::fine_raster);
     check(cudaMemcpyAsync(bits, spare, box.num_words() * sizeof(word), cudaMemcpyDeviceToDevice, stream),
           stage::fine_raster);

@@ -140,20 +140,20 @@ void fill_to_exterior(const exterior_memory& m, word* mask, cudaStream_t stream)
     const auto& [grid, box, closing, walls, reached, changed] = m;
     const int ring = closing + 1;
     const unsigned blocks = fill_device(box.num_words(), 16);
-    (void)::emulation::launch([=](const auto&... a) { place_walls_kernel<word>(a...); }, blocks, threads_per_block, 0, stream, mask, grid, ring, walls, box);
+    place_walls_kernel<word><<<blocks, threads_per_block, 0, stream>>>(mask, grid, ring, walls, box);
     dilate(walls, reached, box, closing, stream);
-    (void)::emulation::launch([=](const auto&... a) { start_flood_kernel<word>(a...); }, blocks, threads_per_block, 0, stream, reached, box);
+    start_flood_kernel<word><<<blocks, threads_per_block, 0, stream>>>(reached, box);
     for (unsigned goes_on = 1; goes_on != 0;) {
         check(cudaMemsetAsync(changed, 0, sizeof(unsigned), stream), stage::fine_raster);
-        (void)::emulation::launch([=](const auto&... a) { flood_rows_kernel<word>(a...); }, blocks, threads_per_block, 0, stream, walls, reached, box, changed);
+        flood_rows_kernel<word><<<blocks, threads_per_block, 0, stream>>>(walls, reached, box, changed);
         for (const int axis : {1, 2})
-            (void)::emulation::launch([=](const auto&... a) { flood_lines_kernel<word>(a...); }, blocks, threads_per_block, 0, stream, walls, reached, box, axis, changed);
+            flood_lines_kernel<word><<<blocks, threads_per_block, 0, stream>>>(walls, reached, box, axis, changed);
         check(cudaGetLastError(), stage::fine_raster);
         check(cudaMemcpyAsync(&goes_on, changed, sizeof(unsigned), cudaMemcpyDeviceToHost, stream), stage::fine_raster);
         check(cudaStreamSynchronize(stream), stage::fine_raster);
     }
     dilate(reached, walls, box, closing, stream);
-    (void)::emulation::launch([=](const auto&... a) { take_interior_kernel<word>(a...); }, blocks, threads_per_block, 0, stream, reached, box, ring, mask, grid);
+    take_interior_kernel<word><<<blocks, threads_per_block, 0, stream>>>(reached, box, ring, mask, grid);
     check(cudaGetLastError(), stage::fine_raster);
 }
 

@@ -173,7 +173,7 @@ struct solid_lists {
                const solid_list_arrays<Payload>& to, cudaStream_t stream) const {
         if (entries.clock != nullptr) entries.clock->start(); // leaves the wait and the allocations out
         sweep(sorted, m, to, on_host.list_fragments, body_shaders_of(m), stream);
-        (void)::emulation::launch([=](const auto&... a) { end_offsets_kernel<Payload>(a...); }, 1, 1, 0, stream, to, on_host.voxels, on_host.fragments);
+        end_offsets_kernel<Payload><<<1, 1, 0, stream>>>(to, on_host.voxels, on_host.fragments);
         check(cudaGetLastError(), stage::abuffer_emit);
         end_stage(entries.clock, &stage_times::abuffer_emit);
     }

@@ -165,11 +165,11 @@ void raster_cover(const cover_memory& m, const draw_geometry& of_draw, std::uint
     b.num_cells = &m.state->list_fragments;
     check(cudaMemsetAsync(b.num_records, 0, sizeof(*b.num_records), stream), stage::fine_raster);
     const cover_cells<coverage::conservative> op{m.mask, g.extent};
-    (void)::emulation::launch([=](const auto&... a) { count_small_kernel(a...); }, num_blocks(num_triangles), threads_per_block, 0, stream, one, op, b, m.state);
+    count_small_kernel<<<num_blocks(num_triangles), threads_per_block, 0, stream>>>(one, op, b, m.state);
     check(cudaGetLastError(), stage::fine_raster);
-    (void)::emulation::launch([=](const auto&... a) { count_large_kernel(a...); }, fill_device(b.record_capacity * 32), threads_per_block, 0, stream, one, op, b, m.state);
+    count_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(one, op, b, m.state);
     check(cudaGetLastError(), stage::fine_raster);
-    (void)::emulation::launch([=](const auto&... a) { note_records_kernel<pipeline_state>(a...); }, 1, 1, 0, stream, m.state, state);
+    note_records_kernel<pipeline_state><<<1, 1, 0, stream>>>(m.state, state);
     check(cudaGetLastError(), stage::fine_raster);
 }
 
@@ -185,7 +185,7 @@ void list_cover(const cover_memory& m, const row_grid& grid, const crossing_list
 // Of a call without crossings.
 template <int = 0>
 void take_counts(const cover_memory& m, pipeline_state* state, cudaStream_t stream) {
-    (void)::emulation::launch([=](const auto&... a) { take_counts_kernel<pipeline_state>(a...); }, 1, 1, 0, stream, m.state, state);
+    take_counts_kernel<pipeline_state><<<1, 1, 0, stream>>>(m.state, state);
     check(cudaGetLastError(), stage::fine_raster);
 }
 

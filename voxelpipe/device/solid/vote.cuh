@@ -183,18 +183,18 @@ void add_votes(const vote_memory& m, const stored_triangles& source, std::uint32
     masks.clear(box, stream);
     const unsigned blocks = fill_device(std::uint64_t{num_triangles} * 32, 4);
     const auto toggle = [&]<int Axis>() {
-        (void)::emulation::launch([=](const auto&... a) { toggle_along_kernel<Axis, pipeline_state>(a...); }, blocks, threads_per_block, 0, stream, source, first_triangle, num_triangles, grid, box, masks.inside[Axis], masks.open[Axis], state)
-;
+        toggle_along_kernel<Axis, pipeline_state><<<blocks, threads_per_block, 0, stream>>>(
+            source, first_triangle, num_triangles, grid, box, masks.inside[Axis], masks.open[Axis], state);
         check(cudaGetLastError(), stage::coarse_raster);
     };
     toggle.template operator()<0>();
     toggle.template operator()<1>();
     toggle.template operator()<2>();
     const unsigned for_words = fill_device(box.num_words(), 16);
-    (void)::emulation::launch([=](const auto&... a) { accumulate_rows_kernel<word>(a...); }, for_words, threads_per_block, 0, stream, masks.inside[0], box);
+    accumulate_rows_kernel<word><<<for_words, threads_per_block, 0, stream>>>(masks.inside[0], box);
     for (const int axis : {1, 2})
-        (void)::emulation::launch([=](const auto&... a) { accumulate_lines_kernel<word>(a...); }, for_words, threads_per_block, 0, stream, masks.inside[axis], box, axis);
-    (void)::emulation::launch([=](const auto&... a) { count_votes_kernel<pipeline_state>(a...); }, for_words, threads_per_block, 0, stream, masks, box, mask, state);
+        accumulate_lines_kernel<word><<<for_words, threads_per_block, 0, stream>>>(masks.inside[axis], box, axis);
+    count_votes_kernel<pipeline_state><<<for_words, threads_per_block, 0, stream>>>(masks, box, mask, state);
     check(cudaGetLastError(), stage::fine_raster);
 }
 

@@ -19,35 +19,35 @@ namespace voxelpipe::device {
 // return a value, for which a warp would wait, nor handles addresses that are not global, as it does for floating-point
 // sums.
 __device__ VOXELPIPE_INLINE void reduce_or(word* at, word bits) {
-    ::emulation::ptx::red_or_b32(__cvta_generic_to_global(at), bits);
+    asm volatile("red.relaxed.gpu.global.or.b32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(bits) : "memory");
 }
 __device__ VOXELPIPE_INLINE void reduce_and(word* at, word bits) {
-    ::emulation::ptx::red_and_b32(__cvta_generic_to_global(at), bits);
+    asm volatile("red.relaxed.gpu.global.and.b32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(bits) : "memory");
 }
 __device__ VOXELPIPE_INLINE void reduce_add(float* at, float v) {
-    ::emulation::ptx::red_add_f32(__cvta_generic_to_global(at), v);
+    asm volatile("red.relaxed.gpu.global.add.f32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "f"(v) : "memory");
 }
 __device__ VOXELPIPE_INLINE void reduce_add(double* at, double v) {
-    ::emulation::ptx::red_add_f64(__cvta_generic_to_global(at), v);
+    asm volatile("red.relaxed.gpu.global.add.f64 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "d"(v) : "memory");
 }
 // The same if wanted, without a branch.
 __device__ VOXELPIPE_INLINE void reduce_add_where(float* at, float v, bool wanted) {
-    ::emulation::ptx::red_add_f32_where(__cvta_generic_to_global(at), v, static_cast<unsigned>(wanted))
-
-
-;
+    asm volatile("{ .reg .pred p; setp.ne.u32 p, %2, 0; @p red.relaxed.gpu.global.add.f32 [%0], %1; }" ::"l"(
+                     __cvta_generic_to_global(at)),
+                 "f"(v), "r"(static_cast<unsigned>(wanted))
+                 : "memory");
 }
 __device__ VOXELPIPE_INLINE void reduce_add_where(double* at, double v, bool wanted) {
-    ::emulation::ptx::red_add_f64_where(__cvta_generic_to_global(at), v, static_cast<unsigned>(wanted))
-
-
-;
+    asm volatile("{ .reg .pred p; setp.ne.u32 p, %2, 0; @p red.relaxed.gpu.global.add.f64 [%0], %1; }" ::"l"(
+                     __cvta_generic_to_global(at)),
+                 "d"(v), "r"(static_cast<unsigned>(wanted))
+                 : "memory");
 }
 __device__ VOXELPIPE_INLINE void reduce_add(unsigned* at, unsigned n) {
-    ::emulation::ptx::red_add_u32(__cvta_generic_to_global(at), n);
+    asm volatile("red.relaxed.gpu.global.add.u32 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "r"(n) : "memory");
 }
 __device__ VOXELPIPE_INLINE void reduce_add(unsigned long long* at, unsigned long long n) {
-    ::emulation::ptx::red_add_u64(__cvta_generic_to_global(at), n);
+    asm volatile("red.relaxed.gpu.global.add.u64 [%0], %1;" ::"l"(__cvta_generic_to_global(at)), "l"(n) : "memory");
 }
 
 // global_blend<Blend, T>: blends a fragment of value v into a stored T.
@@ -94,17 +94,17 @@ struct global_blend<blend::count, T> {
     __device__ static bool apply_first(T* at, const V&) {
         if constexpr (sizeof(T) == 4) {
             unsigned old = 0;
-            ::emulation::ptx::atom_increment_u32(old, __cvta_generic_to_global(at))
-
-
-;
+            asm volatile("atom.relaxed.gpu.global.add.u32 %0, [%1], 1;"
+                         : "=r"(old)
+                         : "l"(__cvta_generic_to_global(at))
+                         : "memory");
             return old == 0;
         } else {
             unsigned long long old = 0;
-            ::emulation::ptx::atom_increment_u64(old, __cvta_generic_to_global(at))
-
-
-;
+            asm volatile("atom.relaxed.gpu.global.add.u64 %0, [%1], 1;"
+                         : "=l"(old)
+                         : "l"(__cvta_generic_to_global(at))
+                         : "memory");
             return old == 0;
         }
     }

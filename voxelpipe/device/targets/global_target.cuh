@@ -30,15 +30,15 @@ template <class Target, class Value>
 template <class Target>
 __device__ VOXELPIPE_INLINE void reduce_word(word* at, word bits) {
     if constexpr (bit_blend<typename Target::blend_type>::sets)
-        ::emulation::ptx::red_or_b32_where(__cvta_generic_to_global(at), bits)
-
-
-;
+        asm volatile("{ .reg .pred any; setp.ne.u32 any, %1, 0; @any red.relaxed.gpu.global.or.b32 [%0], %1; }" ::"l"(
+                         __cvta_generic_to_global(at)),
+                     "r"(bits)
+                     : "memory");
     else
-        ::emulation::ptx::red_and_b32_where(__cvta_generic_to_global(at), bits, ~bits)
-
-
-;
+        asm volatile("{ .reg .pred any; setp.ne.u32 any, %1, 0; @any red.relaxed.gpu.global.and.b32 [%0], %2; }" ::"l"(
+                         __cvta_generic_to_global(at)),
+                     "r"(bits), "r"(~bits)
+                     : "memory");
 }
 // Number of a voxel's word in rows with fewer than 2^30 words, modulo 2^32: the voxel may lie outside the extent.
 template <class Target>

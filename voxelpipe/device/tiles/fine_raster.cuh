@@ -242,7 +242,7 @@ __global__ __launch_bounds__(Threads, MinBlocks) void fine_raster_kernel(const _
                                                                          const __grid_constant__ Framebuffer fb,
                                                                          const __grid_constant__ fine_raster_input in,
                                                                          pipeline_state* state, capacities limits) {
-    word* const tile_words = reinterpret_cast<word*>(::emulation::dynamic_shared());
+    extern __shared__ __align__(16) word tile_words[];
     __shared__ unsigned int next;
     if (has_failed(*state, limits)) return;
     const unsigned num_items = state->num_items;

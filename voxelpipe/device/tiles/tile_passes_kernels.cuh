@@ -53,7 +53,7 @@ __global__ void tile_split_kernel(const std::uint32_t* keys, Buffers out, pipeli
 
 VOXELPIPE_DEFINES_KERNELS void tile_split(const std::uint32_t* keys, const split_buffers& out, pipeline_state* state,
                                           const capacities& limits, cudaStream_t stream) {
-    (void)::emulation::launch([=](const auto&... a) { tile_split_kernel(a...); }, num_blocks(limits.tile_pairs), threads_per_block, 0, stream, keys, out, state, limits);
+    tile_split_kernel<<<num_blocks(limits.tile_pairs), threads_per_block, 0, stream>>>(keys, out, state, limits);
     check(cudaGetLastError(), stage::tile_split);
 }
 
@@ -63,7 +63,7 @@ __global__ void restart_items_kernel(State* state) {
 }
 
 VOXELPIPE_DEFINES_KERNELS void restart_items(pipeline_state* state, cudaStream_t stream) {
-    (void)::emulation::launch([=](const auto&... a) { restart_items_kernel(a...); }, 1, 1, 0, stream, state);
+    restart_items_kernel<<<1, 1, 0, stream>>>(state);
     check(cudaGetLastError(), stage::fine_raster);
 }
 

@@ -172,12 +172,12 @@ void draw_tiles(const Scene& s, const Framebuffer& fb, const fine_raster_input& 
     check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, Threads, Image::bytes), stage::fine_raster);
     if (blocks_per_sm != 0 && blocks_per_sm < blocks) blocks = blocks_per_sm;
     restart_items(state, stream);
-    (void)::emulation::launch([=](const auto&... a) { kernel(a...); }, static_cast<unsigned>((blocks < 1 ? 1 : blocks) * num_multiprocessors()), Threads, Image::bytes, stream, s, fb, in, state, limits)
-;
+    kernel<<<static_cast<unsigned>((blocks < 1 ? 1 : blocks) * num_multiprocessors()), Threads, Image::bytes, stream>>>(
+        s, fb, in, state, limits);
     check(cudaGetLastError(), stage::fine_raster);
     end_stage(clock, &stage_times::fine_raster);
-    (void)::emulation::launch([=](const auto&... a) { tile_resolve_kernel<Image, Scene, Framebuffer>(a...); }, fill_device(std::uint64_t{1} << 40, 4), threads_per_block, 0, stream, s, fb, in, splits, state, limits)
-;
+    tile_resolve_kernel<Image, Scene, Framebuffer>
+        <<<fill_device(std::uint64_t{1} << 40, 4), threads_per_block, 0, stream>>>(s, fb, in, splits, state, limits);
     check(cudaGetLastError(), stage::tile_resolve);
     end_stage(clock, &stage_times::tile_resolve);
 }
