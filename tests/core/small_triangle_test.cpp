@@ -14,6 +14,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <random>
@@ -48,7 +49,7 @@ struct generator {
     }
 
     void triangle(snapped_position (&v)[3]) {
-        const std::int64_t size = number(0, std::int64_t{1} << number(2, small_edge_bits - 1));
+        const std::int64_t size = number(0, std::int64_t{1} << number(2, std::min(small_edge_bits - 1, fraction + 5)));
         const std::int64_t far = std::int64_t{1} << 24;
         const snapped_position corner{number(-far, far), number(-far, far), number(-far, far)};
         for (auto& p : v) p = vertex(corner, size);
@@ -112,7 +113,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
     std::uint64_t limits_clipped = 0, sure_limits = 0, whole_limits = 0;
     int compared = 0, tiny = 0, sixteens = 0;
     std::uint64_t covered = 0;
-    for (const int fraction : {12, 13, 14, 15, 16}) {
+    for (const int fraction : {4, 8, 10, 12, 13, 14, 15, 16, 17, 19}) {
         g.fraction = fraction;
         for (int i = 0; i < unit::cases(40000); ++i) {
             snapped_position v[3];
@@ -253,7 +254,7 @@ TEST(SmallTriangle, ConservativeRowsAreTheGeneralSet) {
 TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
     generator g;
     int compared = 0, cubes = 0, beyond = 0;
-    for (const int fraction : {12, 13, 14, 15, 16}) {
+    for (const int fraction : {4, 8, 10, 12, 13, 14, 15, 16, 17, 19}) {
         g.fraction = fraction;
         for (int i = 0; i < unit::cases(40000); ++i) {
             snapped_position v[3];
@@ -340,7 +341,7 @@ TEST(SmallTriangle, ThinColumnsAreTheGeneralSet) {
 TEST(BrickTriangle, BricksMakeTheGeneralSet) {
     generator g;
     std::uint64_t covered = 0, tested = 0, met = 0, runs = 0, long_runs = 0;
-    for (const int fraction : {12, 13, 14, 15, 16}) {
+    for (const int fraction : {4, 8, 10, 12, 13, 14, 15, 16, 17, 19}) {
         g.fraction = fraction;
         for (int i = 0; i < unit::cases(600); ++i) {
             snapped_position v[3];

@@ -59,27 +59,39 @@ using framebuffer =
                            vp::target<std::int16_t, blend::add_saturate>, vp::target<vp::half, blend::min>,
                            vp::target<std::uint64_t, blend::count>, vp::target<record, chain>>;
 
-// The same call on both; compares everything that comes of it.
-struct pair {
+// Every blend whose value follows from the number of fragments of one value.
+template <class Backend>
+using constant_framebuffer =
+    vp::sparse_framebuffer<Backend, vp::target<vp::bit, blend::bit_or>, vp::target<vp::bit, blend::bit_xor>,
+                           vp::target<float, blend::add>, vp::target<std::uint32_t, blend::count>,
+                           vp::target<glm::u8vec4, blend::replace, vp::layout::planar>,
+                           vp::target<std::int16_t, blend::max>, vp::target<std::uint64_t, blend::add>>;
+const auto constant_shader =
+    vp::constant(true, true, 0.1f, 0u, glm::u8vec4(1, 2, 3, 4), std::int16_t{-5}, std::uint64_t{7});
+
+template <template <class> class Framebuffer, std::size_t Targets>
+struct any_pair {
     vp::cuda_backend device;
     vp::cpu_backend host{2};
-    framebuffer<vp::cuda_backend> on_device;
-    framebuffer<vp::cpu_backend> on_host;
-    explicit pair(const glm::ivec3& extent) : on_device(device, extent), on_host(host, extent) {}
+    Framebuffer<vp::cuda_backend> on_device;
+    Framebuffer<vp::cpu_backend> on_host;
+    explicit any_pair(const glm::ivec3& extent) : on_device(device, extent), on_host(host, extent) {}
 
     template <class F>
     void prepare(const F& f) {
         f(on_device);
         f(on_host);
     }
-    void draw(const std::vector<unit::small_mesh>& meshes, const vp::grid& grid, vp::coverage rule, const char* what) {
+    template <class Shader = shader>
+    void draw(const std::vector<unit::small_mesh>& meshes, const vp::grid& grid, vp::coverage rule, const char* what,
+              const Shader& shade = {}) {
         std::vector<vp::mesh<vp::cuda_backend>> owners;
-        std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, shader>> there, here;
+        std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, Shader>> there, here;
         owners.reserve(meshes.size());
         for (const auto& m : meshes) {
             owners.emplace_back(device, m.positions, m.triangles);
-            there.push_back({owners.back().view(), {}, {}});
-            here.push_back({m.view(), {}, {}});
+            there.push_back({owners.back().view(), {}, shade});
+            here.push_back({m.view(), {}, shade});
         }
         const vp::status a = vp::voxelize(device, there, grid, on_device, rule);
         const vp::status b = vp::voxelize(host, here, grid, on_host, rule);
@@ -110,12 +122,15 @@ struct pair {
         EXPECT_EQ(a.keys, b.keys) << what;
         EXPECT_TRUE(a.masks == b.masks) << what;
         EXPECT_EQ(a.offsets, b.offsets) << what;
-        vp::core::for_each_index<8>([&]<std::size_t I>() {
+        vp::core::for_each_index<Targets>([&]<std::size_t I>() {
             EXPECT_TRUE(unit::same_bytes(vp::get<I>(a.values), vp::get<I>(b.values))) << what << ", target " << I;
             EXPECT_TRUE(unit::same_bytes(vp::get<I>(a.sums), vp::get<I>(b.sums))) << what << ", sums of " << I;
         });
     }
 };
+// The same call on both; compares everything that comes of it.
+using pair = any_pair<framebuffer, 8>;
+using constant_pair = any_pair<constant_framebuffer, 7>;
 
 } // namespace
 
@@ -162,6 +177,43 @@ TEST(DeviceSparse, GivesTheBytesOfTheCpuInPartsOfLargeGrids) {
     pair all(whole.extent);
     all.draw({mesh}, whole, vp::coverage::conservative, "the whole");
     EXPECT_GT(all.on_host.num_voxels(), p.on_host.num_voxels());
+}
+
+// Constant shaders: masks by the raster. In whole grids, crops that begin on bricks, within them, and at the end; in
+// grids that need nodes.
+TEST(DeviceSparse, ConstantShadersGiveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{61, 50, 53};
+    const vp::grid whole = unit::unit_grid(extent);
+    const std::vector<unit::small_mesh> meshes{unit::make_mesh(11, 60, extent), unit::make_mesh(12, 25, extent)};
+    for (const vp::coverage rule : {vp::coverage::thin, vp::coverage::conservative})
+        for (const vp::grid& g : {whole, whole.crop({8, 16, 24}, {40, 19, 21}), whole.crop({13, 5, 3}, {31, 45, 46}),
+                                  whole.crop({52, 30, 0}, {9, 20, 53})}) {
+            constant_pair p(g.extent);
+            p.prepare([](auto& fb) {
+                vp::get<2>(fb).clear(0.7f);
+                vp::get<4>(fb).off();
+                vp::get<6>(fb).clear(1u << 20);
+            });
+            p.draw(meshes, g, rule, "cleared", constant_shader);
+            EXPECT_GT(p.on_host.num_voxels(), 10u);
+            p.prepare([](auto& fb) { vp::get<2>(fb).load(); });
+            p.draw({unit::make_mesh(13, 20, extent)}, g, rule, "loaded", constant_shader);
+        }
+    for (const int side : {4096, 65536}) {
+        const vp::grid large = unit::unit_grid({side, side, side});
+        std::vector<unit::small_mesh> moved{unit::make_mesh(14, 25, {40, 40, 40}), unit::make_mesh(15, 3, {300, 9, 9})};
+        for (unit::small_mesh& m : moved)
+            for (glm::vec3& q : m.positions) q += glm::vec3(static_cast<float>(side - 400), 1920, 250);
+        for (const vp::coverage rule : {vp::coverage::thin, vp::coverage::conservative}) {
+            constant_pair all(large.extent);
+            all.draw(moved, large, rule, "a large grid", constant_shader);
+            EXPECT_GT(all.on_host.num_voxels(), 300u);
+            const vp::grid part = large.crop({side - 411, 1901, 249}, {211, 133, 100});
+            constant_pair few(part.extent);
+            few.draw(moved, part, rule, "a crop of it", constant_shader);
+            EXPECT_GT(few.on_host.num_voxels(), 100u);
+        }
+    }
 }
 
 TEST(DeviceSparse, LimitsChangeNothing) {

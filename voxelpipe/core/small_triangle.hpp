@@ -23,12 +23,15 @@ inline constexpr int small_max_voxels = 32; // a row is one word
 
 // The most voxels along a side of a small triangle's bounding box.
 [[nodiscard]] VOXELPIPE_HD constexpr int small_voxels(int fraction) {
-    if (2 * small_edge_bits + 3 - fraction > 31) return 0;
+    // Few fraction bits bound the edges of a box of small_max_voxels more closely.
+    const int edge_bits = fraction + 5 < small_edge_bits ? fraction + 5 : small_edge_bits;
+    if (2 * edge_bits + 3 - fraction > 31) return 0;
     const int n = 1 << (fraction < small_edge_bits ? small_edge_bits - fraction : 0);
     return n < small_max_voxels ? n : small_max_voxels;
 }
 static_assert(3 * small_edge_bits + 3 <= 63, "the plane of a small triangle would overflow 64 bits");
-static_assert(small_voxels(16) == 16 && small_voxels(14) == 32 && small_voxels(12) == 32 && small_voxels(11) == 0);
+static_assert(small_voxels(16) == 16 && small_voxels(14) == 32 && small_voxels(12) == 32 && small_voxels(4) == 32);
+static_assert(small_max_voxels == 1 << 5 && small_voxels(19) == 2);
 
 // A triangle relative to the corner of the lowest voxel of its bounding box: 0 < p <= 2^small_edge_bits.
 struct small_triangle {

@@ -12,6 +12,7 @@
 #include <voxelpipe/device/call/sorted_strategy.cuh>
 #include <voxelpipe/device/call/strategy.hpp>
 #include <voxelpipe/device/call/tiled_strategy.cuh>
+#include <voxelpipe/device/raster/raster_draws.cuh>
 
 #include <algorithm>
 #include <cstdint>
@@ -179,21 +180,8 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     template <class Raster>
     void raster_draws(const vertex_positions& positions, pipeline_state* state, cudaStream_t stream,
                       const Raster& raster) const {
-        const core::snap_transform snap = core::make_snap_transform(plan.g);
-        for (std::size_t i = 0; i < draws.size(); ++i) {
-            const draw_type& d = draws[i];
-            const auto number = static_cast<std::uint32_t>(i);
-            if (d.mesh.num_triangles() == 0) continue;
-            if (i != 0) check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
-            if constexpr (shades_in_raster) {
-                raster(d, shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, number}, i == 0);
-            } else {
-                vertex_shade(d.mesh, d.vertex_shader, snap, number, positions, static_cast<no_varyings*>(nullptr),
-                             stream); // there are no varyings
-                end_stage(clock, &stage_times::vertex_shade);
-                raster(d, stored_source{geometry_from(d.mesh, positions, 0)}, false);
-            }
-        }
+        raster_each_draw<shades_in_raster>(draws, core::make_snap_transform(plan.g), positions, state, clock, stream,
+                                           raster);
     }
     template <class Source>
     [[nodiscard]] raster_input<Source> raster_input_of(const draw_type& d, const Source& source) const {

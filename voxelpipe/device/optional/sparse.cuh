@@ -9,6 +9,7 @@
 
 #include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/device/sparse/brick_build.cuh>
+#include <voxelpipe/device/sparse/brick_masks.cuh>
 #include <voxelpipe/device/sparse/voxel_fold.cuh>
 #include <voxelpipe/sparse.hpp>
 
@@ -84,13 +85,12 @@ template <class Payload, class... Targets>
     return {};
 }
 
-// take_lists, with what it throws as a status.
-template <class Payload, class... Targets>
-[[nodiscard]] status finish_sparse(cuda_backend& backend, const grid& g, const abuffer<cuda_backend, Payload>& lists,
-                                   sparse_framebuffer<cuda_backend, Targets...>& fb, const status& drawn) {
+// The status of work(), or what that throws as a status.
+template <class Work>
+[[nodiscard]] status with_status(std::uint64_t triangles_in, const Work& work) {
     status s;
     try {
-        s = take_lists(backend, g, lists, fb);
+        s = work();
     } catch (const cuda_failure& e) {
         s = to_status(e);
     } catch (const std::bad_alloc&) {
@@ -98,9 +98,16 @@ template <class Payload, class... Targets>
     } catch (const std::runtime_error&) { // of a buffer
         s = core::failure(status_code::device_error, stage::tile_resolve);
     }
-    if (s.ok()) return drawn;
-    s.counts.triangles_in = drawn.counts.triangles_in;
+    s.counts.triangles_in = triangles_in;
     return s;
+}
+
+// take_lists, with what it throws as a status.
+template <class Payload, class... Targets>
+[[nodiscard]] status finish_sparse(cuda_backend& backend, const grid& g, const abuffer<cuda_backend, Payload>& lists,
+                                   sparse_framebuffer<cuda_backend, Targets...>& fb, const status& drawn) {
+    const status s = with_status(drawn.counts.triangles_in, [&] { return take_lists(backend, g, lists, fb); });
+    return s.ok() ? drawn : s;
 }
 
 } // namespace device
@@ -109,6 +116,19 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
 status cuda_backend::run_sparse(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                                 sparse_framebuffer<cuda_backend, Targets...>& fb, const voxelize_options& options,
                                 std::uint64_t triangles_in, Coverage) {
+    if constexpr (device::may_follow_from_masks<FragmentShader, Targets...>)
+        if (device::follows_from_masks(draws, g, triangles_in, fb))
+            return device::with_status(triangles_in, [&] {
+                std::optional<device::stage_clock> clock;
+                if (times != nullptr) clock.emplace(stream);
+                device::mask_call<draw<Mesh, VertexShader, FragmentShader>, Targets...> call(*this, draws, g,
+                                                                                             clock ? &*clock : nullptr);
+                const status s = Coverage::dispatch(options.rule, [&]<coverage Rule>() {
+                    return call.template run<Rule>(fb, options.count_voxels, triangles_in);
+                });
+                if (clock) clock->read(*times);
+                return s;
+            });
     using shader = device::payload_shader<FragmentShader>;
     using payload = typename device::outputs_payload<core::shader_output<Mesh, VertexShader, FragmentShader>>::type;
     std::vector<draw<Mesh, VertexShader, shader>> listed;

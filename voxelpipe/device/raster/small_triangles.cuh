@@ -20,8 +20,11 @@ namespace voxelpipe::device {
 // ---- small triangles ------------------------------------------------------------------------------------------------
 
 // Longest side of a bounding box, in voxels, for which 32 bits suffice.
-[[nodiscard]] __device__ VOXELPIPE_INLINE int max_group_side(int fraction) { return fraction < 16 ? 32 : 16; }
-static_assert(core::small_voxels(16) == 16 && core::small_voxels(15) == 32 && core::small_voxels(12) == 32);
+[[nodiscard]] __device__ VOXELPIPE_INLINE int max_group_side(int fraction) {
+    return fraction < 16 ? 32 : 1 << (core::small_edge_bits - fraction);
+}
+static_assert(core::small_voxels(16) == 16 && core::small_voxels(15) == 32 && core::small_voxels(0) == 32 &&
+              core::small_voxels(core::small_edge_bits) == 1);
 
 // Storage for a warp: each lane has a column of words for its triangle (small_conservative::rows_of_16,
 // small_thin::columns).

@@ -1,0 +1,222 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Sparse framebuffers on a GPU, by scene and grid: occupancy, and the sum of four varyings with a count, from which a
+// shaded mean comes; the most device memory that a call takes, and what its result takes; at 1024 the same into dense
+// targets, with their clear; and the fastest published figure. Prints a table of medians; --out writes it as CSV too.
+
+#include "device_record.hpp"
+#include "output.hpp"
+#include "scene_choice.hpp"
+#include "session.hpp"
+#include "table.hpp"
+
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <iostream>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace vp = voxelpipe;
+using namespace bench;
+
+struct options {
+    std::string scenes = VOXELPIPE_SCENES_DIR, out;
+    std::vector<std::string> names;
+    std::vector<int> resolutions{1024, 4096, 16384};
+    gpu::repetition repeat;
+    int largest_mean = 4096, largest_dense = 1024;
+};
+
+struct published_sparse {
+    std::string_view scene;
+    int resolution;
+    double peer; // ms
+};
+// The fastest of five public sparse voxelizers on an H200; some leave out a part of the cover.
+constexpr published_sparse published[] = {
+    {"conference", 1024, 4.38}, {"dragon", 1024, 1.95},      {"blade", 1024, 1.60},
+    {"hairball", 1024, 14.4},   {"asiandragon", 1024, 2.79},
+};
+double published_peer(std::string_view scene, int n) {
+    for (const auto& p : published)
+        if (p.scene == scene && p.resolution == n) return p.peer;
+    return 0;
+}
+
+// ---- the two shaders ------------------------------------------------------------------------------------------------
+
+struct position_varying {
+    glm::vec4 value;
+};
+struct pass_position {
+    template <class Vertex>
+    VOXELPIPE_HD vp::vertex_output<position_varying> operator()(const Vertex& v) const {
+        return {v.position, {glm::vec4(v.position, 1.0f)}};
+    }
+};
+struct give_position {
+    VOXELPIPE_HD vp::output<glm::vec4, std::uint32_t> operator()(const vp::fragment<position_varying>& f) const {
+        return vp::outputs(f.varyings.value, 1u);
+    }
+};
+
+using bit = vp::target<vp::bit, vp::blend::bit_or>;
+using sum = vp::target<glm::vec4, vp::blend::add>;
+using count = vp::target<std::uint32_t, vp::blend::count>;
+
+// The memory that the device's pool has given out.
+class pool_watch {
+public:
+    pool_watch() {
+        int device = 0;
+        gpu::check(cudaGetDevice(&device), "pool");
+        gpu::check(cudaDeviceGetDefaultMemPool(&pool_, device), "pool");
+    }
+    void start() {
+        std::uint64_t zero = 0;
+        gpu::check(cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrUsedMemHigh, &zero), "pool");
+    }
+    [[nodiscard]] std::uint64_t peak() const {
+        std::uint64_t bytes = 0;
+        gpu::check(cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrUsedMemHigh, &bytes), "pool");
+        return bytes;
+    }
+
+private:
+    cudaMemPool_t pool_ = nullptr;
+};
+
+struct measured {
+    double ms = 0;
+    std::uint64_t bricks = 0, voxels = 0, fragments = 0, bytes = 0, peak = 0;
+};
+
+// One kind of output of one scene in one grid. A backend of its own, so that no memory is there before.
+template <class Framebuffer, class VertexShader, class Shader>
+measured measure(gpu::session& s, const gpu::resident_mesh& mesh, const vp::grid& g, const Shader& shader,
+                 const gpu::repetition& how) {
+    s.wait();
+    s.trim();
+    vp::cuda_backend backend(s.stream());
+    vp::mesh_view<> view{{mesh.positions.data(), mesh.positions.size()},
+                         {mesh.triangles.data(), mesh.triangles.size()}};
+    view.checked = vp::check_indices(backend, view.triangles);
+    pool_watch watch;
+    Framebuffer framebuffer(backend, g.extent);
+    vp::status last;
+    const auto call = [&] {
+        last = vp::voxelize(backend, view, g, VertexShader{}, shader, framebuffer);
+        if (last.code == vp::status_code::out_of_memory) throw gpu::out_of_device_memory(last.message());
+        last.or_throw();
+    };
+    measured m;
+    watch.start();
+    call();
+    s.wait();
+    m.peak = watch.peak();
+    m.voxels = last.counts.voxels;
+    m.fragments = last.counts.fragments;
+    if constexpr (requires { framebuffer.num_bricks(); }) {
+        m.bricks = framebuffer.num_bricks();
+        m.bytes = framebuffer.num_bytes();
+    }
+    m.ms = gpu::time_calls(s, how, call).median;
+    return m;
+}
+
+std::string mib(std::uint64_t bytes) {
+    return bytes == 0 ? std::string{} : significant(static_cast<double>(bytes) / (1 << 20), 4);
+}
+
+int run(const options& how, const std::string& command) {
+    using sparse_bits = vp::sparse_framebuffer<vp::cuda_backend, bit>;
+    using sparse_mean = vp::sparse_framebuffer<vp::cuda_backend, sum, count>;
+    using dense_bits = vp::framebuffer<vp::cuda_backend, bit>;
+    using dense_mean = vp::framebuffer<vp::cuda_backend, sum, count>;
+    gpu::session session;
+    gpu::clock_watch watch;
+    table rows({"scene", "resolution", "output", "bricks", "voxels", "fragments", "ms", "dense_ms", "peer_ms",
+                "dense/ours", "peer/ours", "result_MiB", "peak_MiB", "peak/result"});
+    std::vector<std::string> notes;
+    const std::vector<std::string> names = how.names.empty() ? available_scenes(how.scenes, notes) : how.names;
+    const auto ms = [](double value) { return value > 0 ? significant(value, 4) : std::string{}; };
+    const auto ratio = [](double a, double b) { return a > 0 && b > 0 ? significant(a / b) : std::string{}; };
+    bool failed = false;
+    for (const std::string& name : names) {
+        const mesh_data data = find_mesh(how.scenes, name);
+        const gpu::resident_mesh mesh = gpu::upload(data);
+        for (const int n : how.resolutions)
+            for (const bool is_mean : {false, true}) {
+                if (is_mean && n > how.largest_mean) continue;
+                try {
+                    const vp::grid g = vp::fit(data.positions, glm::ivec3(n));
+                    const auto bits = vp::constant(true);
+                    measured m, dense;
+                    if (n <= how.largest_dense)
+                        dense = is_mean
+                                    ? measure<dense_mean, pass_position>(session, mesh, g, give_position{}, how.repeat)
+                                    : measure<dense_bits, vp::passthrough>(session, mesh, g, bits, how.repeat);
+                    m = is_mean ? measure<sparse_mean, pass_position>(session, mesh, g, give_position{}, how.repeat)
+                                : measure<sparse_bits, vp::passthrough>(session, mesh, g, bits, how.repeat);
+                    watch.read();
+                    const double peer = is_mean ? 0 : published_peer(data.name, n);
+                    rows.add_row({data.name, std::to_string(n), is_mean ? "mean" : "occupancy",
+                                  std::to_string(m.bricks), std::to_string(m.voxels), std::to_string(m.fragments),
+                                  ms(m.ms), ms(dense.ms), ms(peer), ratio(dense.ms, m.ms), ratio(peer, m.ms),
+                                  mib(m.bytes), mib(m.peak),
+                                  ratio(static_cast<double>(m.peak), static_cast<double>(m.bytes))});
+                    say(data.name + " " + std::to_string(n) + (is_mean ? " mean " : " occupancy ") + significant(m.ms) +
+                        " ms, peak " + mib(m.peak) + " MiB");
+                } catch (const std::exception& e) {
+                    failed = true;
+                    notes.push_back("failed: " + name + " " + std::to_string(n) + (is_mean ? " mean: " : ": ") +
+                                    e.what());
+                    say(notes.back());
+                    (void)cudaGetLastError();
+                }
+            }
+    }
+    std::string text = "# Sparse framebuffers on a GPU\n\n" + gpu::describe_device(watch) +
+                       "- clocks over the run: " + watch.range() + "\n- command: `" + command +
+                       "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
+                       " calls, CUDA events around the whole call, allocations and waits included, mesh on the device\n"
+                       "- conservative coverage; mean: the sums of four floats that vary and a count\n"
+                       "- peak: device memory that the first call takes in all, its result included\n"
+                       "- peer: quoted, the fastest of five public sparse voxelizers on an NVIDIA H200\n";
+    for (const std::string& note : notes) text += "- " + note + "\n";
+    text += "\n" + rows.markdown();
+    std::cout << text;
+    if (!how.out.empty()) {
+        write_file(std::filesystem::path(how.out) / "gpu_sparse.md", text);
+        write_file(std::filesystem::path(how.out) / "gpu_sparse.csv", rows.csv());
+    }
+    return failed ? 1 : 0;
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+    options how;
+    CLI::App app{"cuda_backend's times and memory of sparse framebuffers next to dense ones and published figures"};
+    app.add_option("--scenes", how.scenes, "Folder of the benchmark scenes (.vpm or .vpz)")->capture_default_str();
+    app.add_option("--mesh", how.names, "A scene, a generated mesh or a file; may be repeated. Default: five scenes");
+    app.add_option("--resolution", how.resolutions, "Voxels a side; may be repeated")->capture_default_str();
+    app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
+    app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
+    app.add_option("--largest-mean", how.largest_mean, "Largest grid of the mean")->capture_default_str();
+    app.add_option("--largest-dense", how.largest_dense, "Largest grid of dense targets")->capture_default_str();
+    app.add_option("--out", how.out, "Folder for gpu_sparse.md and gpu_sparse.csv");
+    CLI11_PARSE(app, argc, argv);
+    try {
+        return run(how, bench::command_line(argc, argv));
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "bench_gpu_sparse: %s\n", e.what());
+        return 1;
+    }
+}

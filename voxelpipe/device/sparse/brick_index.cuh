@@ -1,0 +1,182 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The bricks that a call may touch, as bits in Morton order, and the numbers that follow from the bits before each: a
+// brick's number among them, which is its place in the arrays of the result, without a sort. Large grids have two
+// levels: nodes of 16^3 bricks, and words for those nodes alone that something lies in.
+
+#include <voxelpipe/core/brick_table.hpp>
+#include <voxelpipe/device/base/device_buffer.cuh>
+#include <voxelpipe/device/base/launch.cuh>
+#include <voxelpipe/device/scene/cub_sort.cuh>
+
+#include <glm/vec3.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+// Bits of 4^3 neighbours, and the number of bits in all words before.
+struct alignas(16) index_word {
+    unsigned long long bits;
+    std::uint32_t before;
+    std::uint32_t unused;
+};
+
+// Reads and sets the bits of one level, bricks or nodes. Names memory of a brick_index.
+struct index_level {
+    static constexpr int log2_node = 4, log2_node_words = 6; // bricks along a side; words of a node
+    index_word* nodes;                                       // null if `words` has all there are
+    index_word* words;
+
+    // The word of a key, whose node has been marked.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE index_word* word_of(std::uint64_t key) const {
+        const std::uint64_t number = key >> 6;
+        if (nodes == nullptr) return words + number;
+        const index_word& n = nodes[number >> 12];
+        const auto bit = static_cast<unsigned>(number >> log2_node_words & 63u);
+        const std::uint32_t node = n.before + static_cast<unsigned>(__popcll(n.bits & ((1ull << bit) - 1)));
+        return words + (std::uint64_t{node} << log2_node_words | (number & 63u));
+    }
+    // Sets bits of the word of a key.
+    __device__ VOXELPIPE_INLINE void set(std::uint64_t key, unsigned long long bits) const {
+        index_word* const w = word_of(key);
+        // The word may be stale: bits are never cleared, so that is safe.
+        if ((bits & ~__ldca(&w->bits)) != 0) atomicOr(&w->bits, bits);
+    }
+    // The number of a key whose bit is set.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t number_of(std::uint64_t key) const {
+        const index_word& w = *word_of(key);
+        return w.before + static_cast<unsigned>(__popcll(w.bits & ((1ull << (key & 63u)) - 1)));
+    }
+};
+
+// core::morton_key of a brick or node, mostly in 32 bits.
+[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint64_t short_morton_key(int x, int y, int z) {
+    const auto of_ten_bits = [](unsigned a, unsigned b, unsigned c) VOXELPIPE_INLINE_LAMBDA {
+        const auto spread = [](unsigned n) VOXELPIPE_INLINE_LAMBDA {
+            n &= 1023u;
+            n = (n | n << 16) & 0x030000ffu;
+            n = (n | n << 8) & 0x0300f00fu;
+            n = (n | n << 4) & 0x030c30c3u;
+            return (n | n << 2) & 0x09249249u;
+        };
+        return spread(a) | spread(b) << 1 | spread(c) << 2;
+    };
+    const auto a = static_cast<unsigned>(x), b = static_cast<unsigned>(y), c = static_cast<unsigned>(z);
+    std::uint64_t key = of_ten_bits(a, b, c);
+    if ((a | b | c) >> 10 != 0) key |= std::uint64_t{of_ten_bits(a >> 10, b >> 10, c >> 10)} << 30;
+    return key;
+}
+
+// ---- numbers --------------------------------------------------------------------------------------------------------
+
+template <int = 0> // compiled where it is called
+__global__ void count_word_bits(const index_word* words, std::uint32_t count, std::uint32_t* counts) {
+    const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    if (i < count) counts[i] = static_cast<unsigned>(__popcll(words[i].bits));
+}
+template <int = 0> // compiled where it is called
+__global__ void number_words(index_word* words, std::uint32_t count, const unsigned long long* before,
+                             unsigned long long* total) {
+    const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    if (i >= count) return;
+    words[i].before = static_cast<std::uint32_t>(before[i]);
+    if (i + 1 == count) *total = before[i] + static_cast<unsigned>(__popcll(words[i].bits));
+}
+// The keys of all bits, in order. node_keys: of the nodes that the words belong to; null if there are no nodes.
+template <int = 0> // compiled where it is called
+__global__ void list_keys(const index_word* words, std::uint32_t count, const std::uint64_t* node_keys,
+                          std::uint64_t* keys) {
+    const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    if (i >= count) return;
+    const index_word w = words[i];
+    if (w.bits == 0) return;
+    const std::uint64_t number =
+        node_keys == nullptr ? i
+                             : node_keys[i >> index_level::log2_node_words] << index_level::log2_node_words | (i & 63u);
+    std::uint64_t at = w.before;
+    for (unsigned long long bits = w.bits; bits != 0; bits &= bits - 1)
+        keys[at++] = number << 6 | static_cast<unsigned>(__ffsll(static_cast<long long>(bits)) - 1);
+}
+
+// Memory and numbers of an index for bricks of a grid of at most 2^16 voxels a side. Marking comes in between: first
+// nodes(), if has_nodes(); make_words(); then bricks(); make_numbers().
+class brick_index {
+public:
+    static constexpr int max_extent = 1 << 16;
+    static constexpr int max_bricks_without_nodes = 256; // along a side
+
+    // Throws as device_buffer does.
+    brick_index(const stream_memory& memory, const glm::ivec3& whole)
+        : memory_(memory), nodes_(memory, std::size_t{0}), words_(memory, std::size_t{0}),
+          node_keys_(memory, std::size_t{0}), total_(memory, std::size_t{1}) {
+        const auto largest = static_cast<unsigned>(std::max({whole.x, whole.y, whole.z}));
+        const unsigned side = std::bit_ceil((largest + 7) / 8);
+        has_nodes_ = side > max_bricks_without_nodes;
+        index_word_buffer& all = has_nodes_ ? nodes_ : words_;
+        const std::uint64_t cells = has_nodes_ ? side >> index_level::log2_node : side;
+        all = index_word_buffer(memory, std::max<std::uint64_t>(1, cells * cells * cells / 64));
+        clear(all);
+    }
+    [[nodiscard]] bool has_nodes() const { return has_nodes_; }
+    [[nodiscard]] index_level nodes() { return {nullptr, nodes_.data()}; }
+    // After the nodes have been marked. Waits.
+    void make_words() {
+        const std::uint64_t num = number(nodes_);
+        node_keys_ = device_buffer<std::uint64_t>(memory_, num);
+        if (num != 0)
+            launch_kernel(false, list_keys<0>, num_blocks(nodes_.size()), threads_per_block, 0, memory_.stream,
+                          stage::tile_sort, static_cast<const index_word*>(nodes_.data()),
+                          static_cast<std::uint32_t>(nodes_.size()), static_cast<const std::uint64_t*>(nullptr),
+                          node_keys_.data());
+        words_ = index_word_buffer(memory_, std::max<std::uint64_t>(1, num << index_level::log2_node_words));
+        clear(words_);
+    }
+    [[nodiscard]] index_level bricks() { return {has_nodes_ ? nodes_.data() : nullptr, words_.data()}; }
+    // After the bricks have been marked: their number. Waits.
+    [[nodiscard]] std::uint64_t make_numbers() { return number(words_); }
+    // Of all bricks, in order.
+    void write_keys(std::uint64_t* keys) {
+        launch_kernel(false, list_keys<0>, num_blocks(words_.size()), threads_per_block, 0, memory_.stream,
+                      stage::tile_sort, static_cast<const index_word*>(words_.data()),
+                      static_cast<std::uint32_t>(words_.size()),
+                      static_cast<const std::uint64_t*>(has_nodes_ ? node_keys_.data() : nullptr), keys);
+    }
+
+private:
+    using index_word_buffer = device_buffer<index_word>;
+    void clear(index_word_buffer& words) {
+        check(cudaMemsetAsync(words.data(), 0, words.size() * sizeof(index_word), memory_.stream), stage::tile_sort);
+    }
+    // Numbers the bits; how many there are. Waits.
+    [[nodiscard]] std::uint64_t number(index_word_buffer& words) {
+        const auto n = static_cast<std::uint32_t>(words.size());
+        const cudaStream_t stream = memory_.stream;
+        constexpr stage where = stage::tile_sort;
+        device_buffer<std::uint32_t> counts(memory_, n);
+        device_buffer<unsigned long long> before(memory_, n);
+        device_buffer<std::byte> storage(memory_, cell_scan_bytes(n));
+        launch_kernel(false, count_word_bits<0>, num_blocks(n), threads_per_block, 0, stream, where,
+                      static_cast<const index_word*>(words.data()), n, counts.data());
+        sum_counts(counts.data(), before.data(), n, storage.data(), storage.size(), where, stream);
+        launch_kernel(false, number_words<0>, num_blocks(n), threads_per_block, 0, stream, where, words.data(), n,
+                      static_cast<const unsigned long long*>(before.data()), total_.data());
+        unsigned long long total = 0;
+        check(cudaMemcpyAsync(&total, total_.data(), sizeof(total), cudaMemcpyDeviceToHost, stream), where);
+        check(cudaStreamSynchronize(stream), where);
+        return total;
+    }
+
+    stream_memory memory_;
+    index_word_buffer nodes_, words_;
+    device_buffer<std::uint64_t> node_keys_;
+    device_buffer<unsigned long long> total_;
+    bool has_nodes_ = false;
+};
+
+} // namespace voxelpipe::device
