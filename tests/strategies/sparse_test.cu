@@ -167,16 +167,21 @@ TEST(DeviceSparse, GivesTheBytesOfTheCpu) {
 }
 
 TEST(DeviceSparse, GivesTheBytesOfTheCpuInPartsOfLargeGrids) {
-    const vp::grid whole = unit::unit_grid({65536, 65536, 65536});
-    unit::small_mesh mesh = unit::make_mesh(4, 15, {40, 40, 40});
+    unit::small_mesh mesh = unit::make_mesh(4, 15, {40, 40, 40}), more = unit::make_mesh(9, 9, {45, 40, 40});
     for (glm::vec3& p : mesh.positions) p += glm::vec3(65000, 30001, 20007);
-    const vp::grid part = whole.crop({64990, 29999, 20003}, {45, 41, 46});
-    pair p(part.extent);
-    p.draw({mesh}, part, vp::coverage::conservative, "a crop");
-    EXPECT_GT(p.on_host.num_voxels(), 300u);
-    pair all(whole.extent);
-    all.draw({mesh}, whole, vp::coverage::conservative, "the whole");
-    EXPECT_GT(all.on_host.num_voxels(), p.on_host.num_voxels());
+    for (glm::vec3& p : more.positions) p += glm::vec3(65000, 30001, 20007);
+    for (const int side : {65536, 1 << 20}) { // the index ends at the first
+        const vp::grid whole = unit::unit_grid({side, side, side});
+        const vp::grid part = whole.crop({64990, 29999, 20003}, {45, 41, 46});
+        pair p(part.extent);
+        p.draw({mesh}, part, vp::coverage::conservative, "a crop");
+        EXPECT_GT(p.on_host.num_voxels(), 300u);
+        pair all(whole.extent);
+        all.draw({mesh}, whole, vp::coverage::conservative, "the whole");
+        EXPECT_GT(all.on_host.num_voxels(), p.on_host.num_voxels());
+        all.prepare([](auto& fb) { vp::core::for_each_index<8>([&]<std::size_t I>() { vp::get<I>(fb).load(); }); });
+        all.draw({more}, whole, vp::coverage::thin, "the whole, loaded");
+    }
 }
 
 // Constant shaders: masks by the raster. In whole grids, crops that begin on bricks, within them, and at the end; in

@@ -43,7 +43,16 @@ template <class Payload, class... Targets>
     device_buffer<std::uint32_t> listed(backend, std::size_t{0}), existing(backend, std::size_t{0});
     status limited;
     struct beyond_limits {};
-    const auto allocate = [&](std::uint64_t bricks, std::uint64_t voxels) -> brick_arrays {
+    const auto arrays = [&]() -> brick_arrays {
+        return {made.keys.data(), made.masks.data(), made.offsets.data(), listed.data(), existing.data()};
+    };
+    const auto allocate_bricks = [&](std::uint64_t bricks) {
+        made.keys = device_buffer<std::uint64_t>(backend, bricks);
+        made.masks = device_buffer<brick_mask>(backend, bricks);
+        made.offsets = device_buffer<std::uint64_t>(backend, bricks == 0 ? 0 : bricks + 1);
+        return arrays();
+    };
+    const auto allocate_voxels = [&](std::uint64_t bricks, std::uint64_t voxels) {
         if (bricks > fb.limits().bricks || voxels > fb.limits().voxels) {
             limited = core::failure(status_code::capacity_exceeded, stage::tile_resolve);
             limited.required.bricks = bricks;
@@ -51,16 +60,15 @@ template <class Payload, class... Targets>
             throw beyond_limits{};
         }
         made.num_voxels = voxels;
-        made.keys = device_buffer<std::uint64_t>(backend, bricks);
-        made.masks = device_buffer<brick_mask>(backend, bricks);
-        made.offsets = device_buffer<std::uint64_t>(backend, bricks == 0 ? 0 : bricks + 1);
         listed = device_buffer<std::uint32_t>(backend, voxels);
         existing = device_buffer<std::uint32_t>(backend, voxels);
-        return {made.keys.data(), made.masks.data(), made.offsets.data(), listed.data(), existing.data()};
+        return arrays();
     };
     try {
-        build_bricks(backend, lists.voxels.data(), static_cast<std::uint32_t>(lists.num_voxels()), g.extent, g.offset,
-                     g.whole_extent(), table, static_cast<std::uint32_t>(kept), allocate);
+        build_bricks(backend,
+                     {lists.voxels.data(), static_cast<std::uint32_t>(lists.num_voxels()), g.extent, g.offset,
+                      g.whole_extent(), table, static_cast<std::uint32_t>(kept)},
+                     allocate_bricks, allocate_voxels);
     } catch (const beyond_limits&) {
         return limited;
     }

@@ -106,6 +106,7 @@ __global__ void list_keys(const index_word* words, std::uint32_t count, const st
 
 // Memory and numbers of an index for bricks of a grid of at most 2^16 voxels a side. Marking comes in between: first
 // nodes(), if has_nodes(); make_words(); then bricks(); make_numbers().
+template <int = 0> // so that programs that do not call it compile no kernels
 class brick_index {
 public:
     static constexpr int max_extent = 1 << 16;

@@ -13,6 +13,7 @@
 #include <voxelpipe/device/fragments/list_sink.cuh>
 #include <voxelpipe/device/raster/raster_draws.cuh>
 #include <voxelpipe/device/sparse/brick_sinks.cuh>
+#include <voxelpipe/device/sparse/mask_counts.cuh>
 #include <voxelpipe/device/targets/fill_from_mask.cuh>
 #include <voxelpipe/device/targets/repeated_fold.hpp>
 #include <voxelpipe/sparse.hpp>
@@ -38,7 +39,7 @@ template <class Draw, class... Targets>
 [[nodiscard]] bool follows_from_masks(std::span<const Draw> draws, const grid& g, std::uint64_t triangles_in,
                                       const sparse_framebuffer<cuda_backend, Targets...>& fb) {
     const glm::ivec3 whole = g.whole_extent();
-    if (core::keeps_voxels(fb) || std::max({whole.x, whole.y, whole.z}) > brick_index::max_extent ||
+    if (core::keeps_voxels(fb) || std::max({whole.x, whole.y, whole.z}) > brick_index<>::max_extent ||
         draws.size() > tuning::max_raster_draws ||
         !is_listable(triangles_in, core::make_snap_transform(g).fraction, g.extent))
         return false;
@@ -54,23 +55,11 @@ template <class Draw, class... Targets>
 // ---- kernels --------------------------------------------------------------------------------------------------------
 
 // What the host reads when the masks are complete.
-struct mask_totals {
+struct mask_call_state {
     pipeline_state state;
-    unsigned long long voxels;
-    std::uint32_t empty_bricks;
+    mask_totals masks;
 };
 
-template <int = 0> // compiled where it is called
-__global__ void count_masks(const brick_mask* masks, std::uint32_t count, std::uint32_t* counts, mask_totals* totals) {
-    const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    const unsigned voxels = i < count ? masks[i].count() : 0;
-    if (i < count) counts[i] = voxels;
-    const unsigned long long sum = block_sum(voxels);
-    const int empty = __syncthreads_count(static_cast<int>(i < count && voxels == 0));
-    if (threadIdx.x != 0) return;
-    if (sum != 0) atomicAdd(&totals->voxels, sum);
-    if (empty != 0) atomicAdd(&totals->empty_bricks, static_cast<unsigned>(empty));
-}
 template <int = 0> // compiled where it is called
 __global__ void flag_bricks(const std::uint32_t* counts, std::uint32_t count, std::uint32_t* flags) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
@@ -134,7 +123,7 @@ public:
         arena carved(memory_.data());
         positions_ = vertex_positions::take(carved, shades_in_raster ? 0 : max_vertices());
         deferred_ = deferred_triangles::take(carved, max_triangles());
-        clear(totals_.data(), sizeof(mask_totals));
+        clear(totals_.data(), sizeof(mask_call_state));
         if (clock_ != nullptr) clock_->start();
     }
 
@@ -165,18 +154,20 @@ public:
             return out;
         });
         device_buffer<std::uint32_t> counts(backend_, bricks);
-        if (bricks != 0) count(made, counts);
+        if (bricks != 0)
+            rank_bricks(backend_, made.masks.data(), static_cast<std::uint32_t>(bricks), counts.data(),
+                        made.offsets.data(), &totals_.data()->masks, stage::fine_raster);
         end_stage(clock_, &stage_times::fine_raster);
-        mask_totals totals{};
+        mask_call_state totals{};
         check(cudaMemcpyAsync(&totals, totals_.data(), sizeof(totals), cudaMemcpyDeviceToHost, stream_));
         check(cudaStreamSynchronize(stream_), stage::fine_raster);
         if (totals.state.index_error != 0) return core::failure(status_code::index_out_of_range, stage::coarse_raster);
-        made.num_voxels = totals.voxels;
-        const std::uint64_t kept = bricks - totals.empty_bricks;
-        if (kept > fb.limits().bricks || totals.voxels > fb.limits().voxels) {
+        made.num_voxels = totals.masks.voxels;
+        const std::uint64_t kept = bricks - totals.masks.empty_bricks;
+        if (kept > fb.limits().bricks || totals.masks.voxels > fb.limits().voxels) {
             status limited = core::failure(status_code::capacity_exceeded, stage::tile_resolve);
             limited.required.bricks = kept;
-            limited.required.voxels = totals.voxels;
+            limited.required.voxels = totals.masks.voxels;
             return limited;
         }
         make_values<Rule>(fb, made);
@@ -186,7 +177,7 @@ public:
         fb.take(std::move(made), g_);
         status s = to_status(totals.state);
         s.counts.triangles_in = triangles_in;
-        s.counts.voxels = count_voxels ? totals.voxels : 0;
+        s.counts.voxels = count_voxels ? totals.masks.voxels : 0;
         return s;
     }
 
@@ -244,20 +235,6 @@ private:
             return out;
         });
         end_stage(clock_, &stage_times::coarse_raster);
-    }
-    template <class Contents>
-    void count(Contents& made, device_buffer<std::uint32_t>& counts) {
-        const auto bricks = static_cast<std::uint32_t>(made.keys.size());
-        constexpr stage where = stage::fine_raster;
-        device_buffer<std::byte> storage(backend_, cell_scan_bytes(bricks));
-        launch_kernel(false, count_masks<0>, num_blocks(bricks), threads_per_block, 0, stream_, where,
-                      static_cast<const brick_mask*>(made.masks.data()), bricks, counts.data(), totals_.data());
-        static_assert(sizeof(unsigned long long) == sizeof(std::uint64_t));
-        sum_counts(counts.data(), reinterpret_cast<unsigned long long*>(made.offsets.data()), bricks, storage.data(),
-                   storage.size(), where, stream_);
-        check(cudaMemcpyAsync(made.offsets.data() + bricks, &totals_.data()->voxels, sizeof(std::uint64_t),
-                              cudaMemcpyDeviceToDevice, stream_),
-              where);
     }
     template <coverage Rule, class Contents>
     void make_values(const framebuffer& fb, Contents& made) {
@@ -357,9 +334,9 @@ private:
     const grid& g_;
     core::snap_transform snap_;
     stage_clock* clock_;
-    device_buffer<mask_totals> totals_;
+    device_buffer<mask_call_state> totals_;
     device_buffer<pipeline_state> coarse_state_;
-    brick_index index_;
+    brick_index<> index_;
     device_buffer<std::byte> memory_; // of the raster
     vertex_positions positions_{};
     deferred_triangles deferred_{};
