@@ -17,7 +17,9 @@ struct list_counts {
     std::uint64_t voxels, fragments;
 };
 
-// Copies the lists, or only the payloads if the rest is in place. All threads of the launch call it.
+// Copies the lists, or only the payloads if the rest is in place. All threads of the launch call it. The padding of a
+// payload, which nobody has written and nobody reads, is copied with it: tools that look for uninitialised memory
+// report that.
 template <class Key, class Payload>
 __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint64_t num_voxels,
                            std::uint64_t num_fragments, std::uint64_t* voxels, std::uint64_t* offsets,

@@ -1,0 +1,230 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Leaves and nodes of a NanoVDB file, made from bricks: a leaf is a brick, with z fastest instead of Morton order.
+
+#include <voxelpipe/core/brick_table.hpp>
+#include <voxelpipe/grid.hpp>
+#include <voxelpipe/host_sparse.hpp>
+#include <voxelpipe/io/nanovdb_statistics.hpp>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace voxelpipe::io::nanovdb {
+
+static_assert(std::endian::native == std::endian::little,
+              "voxelpipe: files of NanoVDB are written on such machines only");
+
+// ---- leaves
+// -----------------------------------------------------------------------------------------------------------
+
+// The place in a leaf, (x * 8 + y) * 8 + z, of each voxel of a brick in Morton order.
+inline constexpr auto leaf_places = [] {
+    std::array<std::uint16_t, 512> p{};
+    for (int x = 0; x < 8; ++x)
+        for (int y = 0; y < 8; ++y)
+            for (int z = 0; z < 8; ++z) p[core::morton_key(x, y, z)] = static_cast<std::uint16_t>((x * 8 + y) * 8 + z);
+    return p;
+}();
+
+// The box of a brick's voxels, in the whole grid.
+[[nodiscard]] inline box box_of(const brick_mask& mask, const glm::ivec3& origin) {
+    box b{{7, 7, 7}, {0, 0, 0}};
+    for (unsigned w = 0; w < 8; ++w) {
+        for (std::uint64_t word = mask.words[w]; word != 0; word &= word - 1) {
+            const glm::ivec3 p = core::morton_position(64 * w + static_cast<unsigned>(std::countr_zero(word)));
+            for (int a = 0; a < 3; ++a) {
+                b.low[a] = std::min(b.low[a], p[a]);
+                b.high[a] = std::max(b.high[a], p[a]);
+            }
+        }
+    }
+    for (int a = 0; a < 3; ++a) {
+        b.low[a] += origin[a];
+        b.high[a] += origin[a];
+    }
+    return b;
+}
+
+template <class T>
+using stored_value = typename value_type<T>::stored;
+
+// A grid to write. value(rank) is asked for voxels that exist; a mask has no values.
+template <class T>
+struct source {
+    std::string name; // at most 255 bytes
+    brick_table table;
+    grid where;
+    stored_value<T> background{}; // what absent voxels read as
+    std::function<stored_value<T>(std::uint64_t rank)> value;
+};
+
+template <class T>
+[[nodiscard]] statistics<T> leaf_statistics(const source<T>& from, std::uint64_t brick) {
+    statistics<T> s;
+    if constexpr (value_type<T>::has_statistics) {
+        for (std::uint64_t r = from.table.offsets[brick]; r < from.table.offsets[brick + 1]; ++r) s.add(from.value(r));
+    } else {
+        s.count = from.table.offsets[brick + 1] - from.table.offsets[brick];
+    }
+    s.voxels = box_of(from.table.masks[brick], core::morton_position(from.table.keys[brick]) * core::sparse_brick_size);
+    return s;
+}
+
+template <class T>
+void fill_leaf(const source<T>& from, std::uint64_t brick, leaf_node<T>& leaf) {
+    std::memset(static_cast<void*>(&leaf), 0, sizeof(leaf));
+    const statistics<T> s = leaf_statistics(from, brick);
+    const glm::ivec3 origin = core::morton_position(from.table.keys[brick]) * core::sparse_brick_size;
+    for (int a = 0; a < 3; ++a) {
+        // The origin is found by rounding down to multiples of eight.
+        leaf.head.low[a] = s.voxels.low[a];
+        leaf.head.size[a] = static_cast<std::uint8_t>(s.voxels.high[a] - s.voxels.low[a]);
+        VOXELPIPE_ASSERT((s.voxels.low[a] & ~7) == origin[a]);
+    }
+    static_cast<void>(origin);
+    leaf.head.flags = 2; // has a box
+    const brick_mask& mask = from.table.masks[brick];
+    std::uint64_t rank = from.table.offsets[brick];
+    if constexpr (!std::is_same_v<T, bool> && !std::is_same_v<T, mask_value>) {
+        s.write_to(leaf);
+        std::fill(std::begin(leaf.values), std::end(leaf.values), from.background);
+    }
+    for (unsigned w = 0; w < 8; ++w) {
+        for (std::uint64_t word = mask.words[w]; word != 0; word &= word - 1, ++rank) {
+            const unsigned place = leaf_places[64 * w + static_cast<unsigned>(std::countr_zero(word))];
+            leaf.head.mask[place / 64] |= std::uint64_t{1} << (place % 64);
+            if constexpr (std::is_same_v<T, bool>)
+                leaf.values[place / 64] |= std::uint64_t{from.value(rank)} << (place % 64);
+            else if constexpr (!std::is_same_v<T, mask_value>)
+                leaf.values[place] = from.value(rank);
+        }
+    }
+}
+
+// ---- the nodes above
+// --------------------------------------------------------------------------------------------------
+
+// Nodes of one level: their Morton keys, and the first child of each among the level below, and one more.
+struct level {
+    std::vector<std::uint64_t> keys, first;
+};
+[[nodiscard]] inline level parents_of(const std::uint64_t* keys, std::uint64_t count, int shift) {
+    level l;
+    for (std::uint64_t i = 0; i < count; ++i) {
+        if (!l.keys.empty() && l.keys.back() == keys[i] >> shift) continue;
+        l.keys.push_back(keys[i] >> shift);
+        l.first.push_back(i);
+    }
+    l.first.push_back(count);
+    return l;
+}
+
+// Offsets of the parts of a grid, in bytes from its start.
+template <class T>
+struct grid_plan {
+    using lower_node = internal_node<T, 4>;
+    using upper_node = internal_node<T, 5>;
+    level lower, upper;
+    std::vector<std::uint64_t> root_order; // upper nodes by the keys of root tiles
+    std::uint64_t root, first_upper, first_lower, first_leaf, size;
+
+    explicit grid_plan(const brick_table& table)
+        : lower(parents_of(table.keys, table.count, 12)), upper(parents_of(lower.keys.data(), lower.keys.size(), 15)) {
+        root = sizeof(grid_data) + sizeof(tree_data);
+        first_upper = root + sizeof(root_data<T>) + upper.keys.size() * sizeof(typename root_data<T>::tile);
+        first_lower = first_upper + upper.keys.size() * sizeof(upper_node);
+        first_leaf = first_lower + lower.keys.size() * sizeof(lower_node);
+        size = first_leaf + table.count * sizeof(leaf_node<T>);
+        for (std::uint64_t i = 0; i < upper.keys.size(); ++i) root_order.push_back(i);
+        std::sort(root_order.begin(), root_order.end(),
+                  [&](std::uint64_t a, std::uint64_t b) { return tile_key(upper.keys[a]) < tile_key(upper.keys[b]); });
+    }
+    [[nodiscard]] static std::uint64_t tile_key(std::uint64_t key) {
+        const glm::ivec3 p = core::morton_position(key);
+        return static_cast<std::uint64_t>(p.x) << 42 | static_cast<std::uint64_t>(p.y) << 21 |
+               static_cast<std::uint64_t>(p.z);
+    }
+};
+
+// A node whose children are [first, last) of the level below, child i at `child(i)` bytes from the node.
+template <int Log2Size, class T, class Child>
+void fill_internal(const statistics<T>& s, const stored_value<T>& background, const std::uint64_t* keys,
+                   std::uint64_t first, std::uint64_t last, const Child& child, internal_node<T, Log2Size>& node) {
+    std::memset(static_cast<void*>(&node), 0, sizeof(node));
+    node.voxels = s.voxels;
+    node.flags = 2; // has voxels
+    s.write_to(node);
+    for (auto& e : node.table) e.value = background;
+    for (std::uint64_t i = first; i < last; ++i) {
+        const glm::ivec3 p = core::morton_position(keys[i] & (internal_node<T, Log2Size>::num_children - 1));
+        const auto n = static_cast<std::size_t>((p.x << (2 * Log2Size)) | (p.y << Log2Size) | p.z);
+        node.child_mask[n / 64] |= std::uint64_t{1} << (n % 64);
+        node.table[n].child = child(i);
+    }
+}
+
+[[nodiscard]] inline std::uint32_t crc32(const void* bytes, std::size_t count) {
+    static constexpr auto table = [] {
+        std::array<std::uint32_t, 256> t{};
+        for (std::uint32_t n = 0; n < 256; ++n) {
+            std::uint32_t c = n;
+            for (int i = 0; i < 8; ++i) c = (c >> 1) ^ ((c & 1u) != 0 ? 0xedb88320u : 0);
+            t[n] = c;
+        }
+        return t;
+    }();
+    std::uint32_t c = ~0u;
+    for (std::size_t i = 0; i < count; ++i)
+        c = table[(c ^ static_cast<const unsigned char*>(bytes)[i]) & 255u] ^ (c >> 8);
+    return ~c;
+}
+
+[[nodiscard]] inline std::uint64_t hash_of(const std::string& name) {
+    std::uint64_t hash = 0;
+    for (const char c : name) {
+        const std::uint64_t overflow = hash >> 56;
+        hash = hash * 67 + static_cast<unsigned char>(c) + overflow;
+    }
+    return hash;
+}
+
+[[nodiscard]] inline affine_map map_of(const grid& g) {
+    affine_map m{};
+    for (int a = 0; a < 3; ++a) {
+        const std::size_t diagonal = 4 * static_cast<std::size_t>(a);
+        m.matrix[diagonal] = g.voxel_size[a];
+        m.inverse[diagonal] = 1.0 / g.voxel_size[a];
+        m.translation[a] = exact::fma(0.5, g.voxel_size[a], g.origin[a]);
+        m.matrix_f[diagonal] = static_cast<float>(m.matrix[diagonal]);
+        m.inverse_f[diagonal] = static_cast<float>(m.inverse[diagonal]);
+        m.translation_f[a] = static_cast<float>(m.translation[a]);
+    }
+    m.taper = 1.0;
+    m.taper_f = 1.0f;
+    return m;
+}
+
+// From the mapped index of the lowest voxel to that past the highest, as NanoVDB's own tools write it.
+[[nodiscard]] inline world_box world_box_of(const affine_map& m, const box& voxels, bool empty) {
+    world_box b{};
+    for (int a = 0; a < 3; ++a) {
+        const double scale = m.matrix[4 * static_cast<std::size_t>(a)];
+        b.low[a] =
+            empty ? std::numeric_limits<double>::max() : exact::fma(double(voxels.low[a]), scale, m.translation[a]);
+        b.high[a] = empty ? std::numeric_limits<double>::lowest()
+                          : exact::fma(double(voxels.high[a]) + 1.0, scale, m.translation[a]);
+    }
+    return b;
+}
+
+} // namespace voxelpipe::io::nanovdb
