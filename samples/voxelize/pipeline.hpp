@@ -412,12 +412,15 @@ protected: // sparse_pipeline draws the same into bricks
         status.or_throw();
     }
 
+    // False if the framebuffer's limits are too small; nothing is drawn then.
     template <class Draw, class Framebuffer>
-    void draw(const std::vector<Draw>& draws, const voxelpipe::grid& part, Framebuffer& framebuffer) {
+    bool draw(const std::vector<Draw>& draws, const voxelpipe::grid& part, Framebuffer& framebuffer) {
         const vp::status status = vp::voxelize(backend_, std::span<const Draw>(draws), part, framebuffer,
                                                vp::voxelize_options{request_.coverage});
+        if (status.code == vp::status_code::capacity_exceeded) return false;
         check(status, request_);
         add_counts(status);
+        return true;
     }
 
     void add_counts(const vp::status& status) {
@@ -647,17 +650,18 @@ protected: // sparse_pipeline draws the same into bricks
         return std::as_const(vp::get<I>(framebuffer).view().elements);
     }
 
-    // The backend counts work of its own; the bar runs from 0 to 1 for each slab.
+    // The backend counts work of its own; the bar runs from 0 to 1 for each slab. Returns what draw() does.
     template <class Draw, class Framebuffer>
-    void draw_reporting(const std::vector<Draw>& draws, const voxelpipe::grid& part, Framebuffer& framebuffer) {
+    bool draw_reporting(const std::vector<Draw>& draws, const voxelpipe::grid& part, Framebuffer& framebuffer) {
         const stage_timer timer{*this, "voxelize"};
         if constexpr (requires { backend_.progress; }) {
             backend_.progress = [this](std::uint64_t done, std::uint64_t total) {
                 report_(total == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(total));
             };
         }
-        draw(draws, part, framebuffer);
+        const bool is_drawn = draw(draws, part, framebuffer);
         report_(1.0);
+        return is_drawn;
     }
 
     // ---- resolve: slab -> volume -----------------------------------------------------------------------------------

@@ -116,10 +116,11 @@ TEST(ToolSparse, WritesTheSameFilesAsADenseRun) {
     voxelize("s", {"--sparse"});
     voxelize("one", {"--sparse", "-j", "1"});
     voxelize("five", {"--sparse", "-j", "5"});
+    voxelize("slabs", {"--sparse", "--work-memory", "1"});
     for (const std::string extension : {".png", ".nvdb", ".vti", ".vox"}) {
         const std::string dense = read_file(folder / ("d" + extension));
         EXPECT_LT(100U, dense.size());
-        for (const char* name : {"s", "one", "five"})
+        for (const char* name : {"s", "one", "five", "slabs"})
             EXPECT_TRUE(dense == read_file(folder / (name + extension))) << name << extension;
     }
 }

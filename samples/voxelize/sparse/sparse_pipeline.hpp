@@ -3,15 +3,23 @@
 #pragma once
 
 // The tool's pipeline into a sparse framebuffer: the draws, targets and values of pipeline.hpp, resolved voxel by voxel
-// that exists. The whole grid in one call, for a backend in host memory. A solid is drawn after its surface.
+// that exists, for a backend in host memory. Slab by slab, so that the sums of colours are held for one slab at a time.
+// A solid is drawn after its surface, the whole grid in one call.
 
+#include "../memory.hpp"
 #include "../pipeline.hpp"
 #include "sparse_solid.hpp"
 #include "sparse_volume.hpp"
 
+#include <algorithm>
+#include <bitset>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace voxelize {
 
@@ -35,21 +43,16 @@ public:
             result.shape.voxel_size[axis] = whole.voxel_size[a];
         }
         const int passes = (this->draws_surface_ ? 1 : 0) + (this->request_.solid ? 1 : 0);
-        const auto report_from = [this, passes](int pass) {
-            this->report_ = [this, passes, pass](double done) {
-                if (this->request_.progress) this->request_.progress((pass + done) / passes);
+        // A pass from `begin` to `end` of its work.
+        const auto report_from = [this, passes](int pass, double begin, double end) {
+            this->report_ = [=, this](double done) {
+                if (this->request_.progress) this->request_.progress((pass + begin + done * (end - begin)) / passes);
             };
         };
-        report_from(0);
         this->stats_.slabs = 1;
-        if (this->draws_surface_) {
-            if (this->only_bits_)
-                draw_bits(result);
-            else
-                draw_surface(result);
-        }
+        if (this->draws_surface_) draw_slabs(result, report_from);
         if (!this->request_.solid) return result;
-        report_from(passes - 1);
+        report_from(passes - 1, 0, 1);
         return draw_solid(std::move(result));
     }
 
@@ -63,12 +66,85 @@ private:
     using surface = typename twin<typename base::surface_framebuffer>::type;
     using bits = typename twin<typename base::bits_framebuffer>::type;
 
-    void draw_bits(sparse_volume& result) {
+    // ---- slabs of the surface --------------------------------------------------------------------------------------
+
+    // Bytes of a voxel while a slab is drawn: the targets, once more while they are packed, and the channels.
+    [[nodiscard]] double voxel_bytes() const {
+        double bytes = 0.25;
+        if (this->only_bits_)
+            bytes += this->counts_fragments() ? 8 : 0;
+        else
+            bytes += 2 * this->surface_voxel_bytes();
+        for (const target wanted : this->request_.targets)
+            bytes += static_cast<double>(size_of(info_of(wanted).type)) * info_of(wanted).components;
+        return bytes;
+    }
+    // How many voxels the surface has, more or less: its projections along the three axes, in voxels.
+    [[nodiscard]] double likely_voxels() const {
+        const glm::dvec3 size = this->relative_grid_.voxel_size;
+        double voxels = 0;
+        for (const auto& d : this->bits_draws_)
+            for (const glm::uvec3& t : d.mesh.triangles) {
+                const auto at = [&](unsigned i) { return glm::dvec3(d.vertex_shader(d.mesh.positions[i])) / size; };
+                const glm::dvec3 a = at(t.x), u = at(t.y) - a, v = at(t.z) - a;
+                const double all =
+                    std::abs(u.y * v.z - u.z * v.y) + std::abs(u.z * v.x - u.x * v.z) + std::abs(u.x * v.y - u.y * v.x);
+                if (std::isfinite(all)) voxels += all / 2;
+            }
+        return voxels;
+    }
+    // As many slabs as keep within the working memory; one that would not is halved, down to a tile's height. Their
+    // borders are borders of bricks.
+    template <class Report>
+    void draw_slabs(sparse_volume& result, const Report& report_from) {
+        const voxelpipe::grid& all = this->relative_grid_;
+        constexpr double least_work = 64 << 20;
+        const double work = this->request_.work_memory != 0
+                                ? static_cast<double>(this->request_.work_memory)
+                                : std::max(least_work, static_cast<double>(memory::room()) / 4);
+        const auto budget = static_cast<std::uint64_t>(work / voxel_bytes());
+        const double slabs = std::ceil(likely_voxels() / static_cast<double>(budget));
+        constexpr int tile = 32;
+        const auto whole_tiles = [](double depth) { return std::max(1, static_cast<int>(depth / tile)) * tile; };
+        int depth = slabs <= 1 ? all.extent.z + tile : whole_tiles(all.extent.z / slabs);
+        std::vector<sparse_volume> parts;
+        for (int begin = 0; begin < all.extent.z;) {
+            const int border = (all.offset.z + begin) / tile * tile + depth - all.offset.z;
+            const int end = std::min(border, all.extent.z);
+            const voxelpipe::grid slab = all.crop({0, 0, begin}, {all.extent.x, all.extent.y, end - begin});
+            report_from(0, static_cast<double>(begin) / all.extent.z, static_cast<double>(end) / all.extent.z);
+            sparse_volume part;
+            part.shape = result.shape;
+            const bool is_least = end - begin <= tile;
+            const std::uint64_t most = is_least ? std::numeric_limits<std::uint64_t>::max() : budget;
+            if (this->only_bits_ ? draw_bits(part, slab, most) : draw_surface(part, slab, most)) {
+                parts.push_back(std::move(part));
+                begin = end;
+            } else {
+                depth = whole_tiles((end - begin) / 2.0);
+            }
+        }
+        this->stats_.slabs = static_cast<int>(parts.size());
+        const typename base::stage_timer timer{*this, "resolve"};
+        result = join_slabs(std::move(parts));
+        if (this->wants(target::normal)) count_cancelled(result);
+    }
+    // False if there are more than `most` voxels; nothing is drawn then.
+    template <class Draw, class Framebuffer>
+    [[nodiscard]] bool draw_part(const std::vector<Draw>& draws, const voxelpipe::grid& slab, Framebuffer& framebuffer,
+                                 std::uint64_t most) {
+        vp::sparse_limits limits;
+        limits.voxels = most;
+        framebuffer.limit(limits);
+        return this->draw_reporting(draws, slab, framebuffer);
+    }
+
+    [[nodiscard]] bool draw_bits(sparse_volume& result, const voxelpipe::grid& slab, std::uint64_t most) {
         std::bitset<2> enabled;
         enabled[0] = !this->counts_fragments(); // one target there has to be
         enabled[1] = this->counts_fragments();
-        bits framebuffer(this->backend_, this->relative_grid_.extent, enabled);
-        this->draw_reporting(this->bits_draws_, this->relative_grid_, framebuffer);
+        bits framebuffer(this->backend_, slab.extent, enabled);
+        if (!draw_part(this->bits_draws_, slab, framebuffer, most)) return false;
         const typename base::stage_timer timer{*this, "resolve"};
         take_bricks(result, framebuffer);
         for (const target wanted : this->request_.targets) {
@@ -76,14 +152,15 @@ private:
             if (wanted == target::count && this->counts_fragments())
                 copy<1, std::uint32_t>(result, wanted, framebuffer);
         }
+        return true;
     }
 
-    void draw_surface(sparse_volume& result) {
+    [[nodiscard]] bool draw_surface(sparse_volume& result, const voxelpipe::grid& slab, std::uint64_t most) {
         auto enabled = this->enabled_targets();
         if (enabled.count() > 1) enabled[base::occupancy] = false;
-        surface framebuffer(this->backend_, this->relative_grid_.extent, enabled);
+        surface framebuffer(this->backend_, slab.extent, enabled);
         if (enabled[base::triangle]) vp::get<base::triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
-        this->draw_reporting(this->draws_, this->relative_grid_, framebuffer);
+        if (!draw_part(this->draws_, slab, framebuffer, most)) return false;
         const typename base::stage_timer timer{*this, "resolve"};
         take_bricks(result, framebuffer);
         for (const target wanted : this->request_.targets) {
@@ -125,7 +202,7 @@ private:
                 break;
             }
         }
-        if (this->wants(target::normal)) count_cancelled(result);
+        return true;
     }
 
     // The solid's bricks, and the values of the surface where that lies in them.

@@ -42,6 +42,47 @@ volume make_dense(const sparse_volume& v, std::span<const channel> channels) {
     return dense;
 }
 
+sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
+    if (parts.size() == 1) return std::move(parts.front());
+    struct place {
+        std::uint64_t key;
+        std::uint32_t part, brick;
+    };
+    std::vector<place> places;
+    for (std::size_t p = 0; p < parts.size(); ++p)
+        for (std::size_t b = 0; b < parts[p].keys.size(); ++b)
+            places.push_back({parts[p].keys[b], static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(b)});
+    std::sort(places.begin(), places.end(), [](const place& a, const place& b) { return a.key < b.key; });
+    sparse_volume result;
+    result.shape = parts.front().shape;
+    std::uint64_t rank = 0;
+    for (const place& at : places) {
+        result.keys.push_back(at.key);
+        result.masks.push_back(parts[at.part].masks[at.brick]);
+        result.offsets.push_back(rank);
+        rank += result.masks.back().count();
+    }
+    if (!places.empty()) result.offsets.push_back(rank);
+    for (std::size_t c = 0; c < parts.front().channels.size(); ++c) {
+        const channel& like = parts.front().channels[c];
+        channel to{like.name, like.type, like.components, {}};
+        const std::size_t size = size_of(to.type) * static_cast<std::size_t>(to.components);
+        to.data.resize(static_cast<std::size_t>(rank) * size);
+        std::byte* out = to.data.data();
+        for (const place& at : places) {
+            if (size == 0) break; // of bits: every voxel here has them
+            const sparse_volume& from = parts[at.part];
+            const std::uint64_t first = from.offsets[at.brick], last = from.offsets[at.brick + 1];
+            std::memcpy(out, from.channels[c].data.data() + first * size,
+                        static_cast<std::size_t>(last - first) * size);
+            out += (last - first) * size;
+        }
+        for (sparse_volume& from : parts) from.channels[c].data = channel_bytes();
+        result.channels.push_back(std::move(to));
+    }
+    return result;
+}
+
 sparse_volume make_sparse(const volume& v) {
     sparse_volume result;
     result.shape.extent = v.extent;
