@@ -149,6 +149,13 @@ public:
         });
     }
 
+    // Used by brick_slots.
+    static void fill_brick_slots(const brick_table& table, std::uint32_t* slots, int log2_slots) {
+        std::fill_n(slots, std::size_t{1} << log2_slots, brick_lookup::free_slot);
+        for (std::uint64_t b = 0; b < table.count; ++b)
+            core::insert_brick(slots, log2_slots, table.keys[b], static_cast<std::uint32_t>(b));
+    }
+
     // Used by vp::clear, and by voxelize without triangles, with validated arguments.
     template <class... Targets>
     [[nodiscard]] status clear(const framebuffer_view<Targets...>& fb) {

@@ -7,6 +7,7 @@
 // hold a mask of the voxels that exist; their values lie in the Morton order of the voxels, one array a target. The
 // same input gives the same bytes.
 
+#include <voxelpipe/core/brick_lookup.hpp>
 #include <voxelpipe/host_sparse.hpp>
 #include <voxelpipe/solid.hpp>
 

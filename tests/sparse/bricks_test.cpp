@@ -90,6 +90,7 @@ TEST(SparseBricks, AreSortedMaskedAndRankedInMortonOrder) {
     ASSERT_EQ(host.offsets.size(), host.keys.size() + 1);
     EXPECT_EQ(host.offsets.back(), expected.size());
     EXPECT_EQ(fb.num_bytes(), host.num_bricks() * 80 + 8 + expected.size() * 8 + (expected.size() + 31) / 32 * 4);
+    const vp::brick_slots slots{backend, fb};
     auto at = expected.begin();
     std::uint64_t rank = 0;
     for (std::size_t b = 0; b < host.keys.size(); ++b) {
@@ -102,6 +103,7 @@ TEST(SparseBricks, AreSortedMaskedAndRankedInMortonOrder) {
             EXPECT_EQ(at->first, host.keys[b] * 512 + bit);
             EXPECT_EQ(vp::get<0>(host)[rank], at->second.last);
             EXPECT_EQ(host.table().find(at->second.voxel), rank);
+            EXPECT_EQ(slots.lookup().find(host.table(), at->second.voxel), rank);
             EXPECT_TRUE(vp::get<2>(host)[rank]);
             ++at;
             ++rank;
@@ -116,6 +118,11 @@ TEST(SparseBricks, AreSortedMaskedAndRankedInMortonOrder) {
         EXPECT_EQ(fb.view().template read<0>(voxel), vp::get<0>(host)[r]);
     });
     EXPECT_EQ(visited, host.num_voxels());
+    // A lookup by hash finds what bisection finds, within the part and around it.
+    unit::for_each_voxel(extent + 2, [&](int x, int y, int z) {
+        const glm::ivec3 voxel = glm::ivec3(x, y, z) - 1;
+        ASSERT_EQ(slots.lookup().find(host.table(), voxel), host.table().find(voxel));
+    });
     std::uint64_t counted = 0;
     for (const auto& brick : host.bricks()) {
         EXPECT_EQ(brick.first, counted);

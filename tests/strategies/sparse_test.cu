@@ -221,6 +221,26 @@ TEST(DeviceSparse, ConstantShadersGiveTheBytesOfTheCpu) {
     }
 }
 
+__global__ void find_by_hash(const vp::brick_lookup lookup, const vp::brick_table table, std::uint64_t* ranks) {
+    const int x = static_cast<int>(threadIdx.x), y = static_cast<int>(blockIdx.x);
+    for (int z = 0; z < table.extent.z; ++z)
+        if (x < table.extent.x) ranks[(z * table.extent.y + y) * table.extent.x + x] = lookup.find(table, {x, y, z});
+}
+
+TEST(DeviceSparse, LookupsByHashFindTheRanks) {
+    const glm::ivec3 extent{40, 33, 29};
+    pair p(extent);
+    p.draw({unit::make_mesh(21, 12, extent)}, unit::unit_grid(extent), vp::coverage::thin, "drawn");
+    const vp::brick_slots slots{p.device, p.on_device};
+    vp::cuda_backend::buffer<std::uint64_t> ranks(p.device, static_cast<std::size_t>(40 * 33 * 29));
+    find_by_hash<<<33, 64, 0, p.device.stream>>>(slots.lookup(), p.on_device.view().table, ranks.data());
+    const std::vector<std::uint64_t> found = ranks.to_host(p.device);
+    const auto host = p.on_host.to_host(p.host);
+    unit::for_each_voxel(extent, [&](int x, int y, int z) {
+        ASSERT_EQ(found[unit::linear(extent, {x, y, z})], host.table().find({x, y, z}));
+    });
+}
+
 TEST(DeviceSparse, LimitsChangeNothing) {
     const glm::ivec3 extent{30, 30, 30};
     const vp::grid grid = unit::unit_grid(extent);

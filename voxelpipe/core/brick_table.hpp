@@ -81,13 +81,19 @@ struct brick_table {
 
     // The rank of a voxel of the part; `none` where it does not exist or lies outside.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t find(const glm::ivec3& voxel) const {
-        for (int a = 0; a < 3; ++a)
-            if (voxel[a] < 0 || voxel[a] >= extent[a]) return none;
+        if (!is_in_part(voxel)) return none;
         const std::uint64_t key = core::morton_key(voxel + offset);
-        const std::uint64_t brick = find_brick(key >> 9);
-        if (brick == none) return none;
-        const auto bit = static_cast<unsigned>(key & 511u);
-        if (!masks[brick].has(bit)) return none;
+        return rank_of(find_brick(key / core::sparse_brick_voxels), key);
+    }
+    [[nodiscard]] VOXELPIPE_HD bool is_in_part(const glm::ivec3& voxel) const {
+        bool is_in = true;
+        for (int a = 0; a < 3; ++a) is_in = is_in && voxel[a] >= 0 && voxel[a] < extent[a];
+        return is_in;
+    }
+    // The rank of the voxel with this Morton key in a brick, or in `none`.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t rank_of(std::uint64_t brick, std::uint64_t voxel_key) const {
+        const auto bit = static_cast<unsigned>(voxel_key % core::sparse_brick_voxels);
+        if (brick == none || !masks[brick].has(bit)) return none;
         return offsets[brick] + masks[brick].before(bit);
     }
 

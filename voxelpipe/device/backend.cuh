@@ -155,6 +155,10 @@ public:
     template <class... Targets>
     [[nodiscard]] status clear_sparse(const grid& g, sparse_framebuffer<cuda_backend, Targets...>& fb);
 
+    // Used by brick_slots; table and slots are in device memory. Throws std::runtime_error with the CUDA error. Defined
+    // in device/optional/sparse.cuh.
+    template <int = 0>
+    void fill_brick_slots(const brick_table& table, std::uint32_t* slots, int log2_slots);
     // ---- used by programs (program_call.hpp) ------------------------------------------------------------------------
 
     // Calls f(i) for i below `count`, in any order, on the stream.

@@ -16,6 +16,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <new>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -24,6 +25,16 @@
 namespace voxelpipe {
 
 namespace device {
+
+template <int = 0> // compiled where it is called
+__global__ void fill_slots(const brick_table table, std::uint32_t* slots, int log2_slots) {
+    const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    if (i >= table.count) return;
+    const std::uint64_t last = (std::uint64_t{1} << log2_slots) - 1;
+    std::uint64_t at = brick_lookup::first_slot(table.keys[i], log2_slots);
+    while (atomicCAS(slots + at, brick_lookup::free_slot, static_cast<std::uint32_t>(i)) != brick_lookup::free_slot)
+        at = (at + 1) & last;
+}
 
 // The lists become the framebuffer's contents. Throws cuda_failure, std::bad_alloc or std::runtime_error.
 template <class Payload, class... Targets>
@@ -110,6 +121,23 @@ template <class Work>
     return s;
 }
 
+// A call that follows_from_masks.
+template <class Coverage, class Draw, class... Targets>
+[[nodiscard]] status run_masks(cuda_backend& backend, std::span<const Draw> draws, const grid& g,
+                               sparse_framebuffer<cuda_backend, Targets...>& fb, const voxelize_options& options,
+                               std::uint64_t triangles_in) {
+    return with_status(triangles_in, [&] {
+        std::optional<stage_clock> clock;
+        if (backend.times != nullptr) clock.emplace(backend.stream);
+        mask_call<Draw, Targets...> call(backend, draws, g, clock ? &*clock : nullptr);
+        const status s = Coverage::dispatch(options.rule, [&]<coverage Rule>() {
+            return call.template run<Rule>(fb, options.count_voxels, triangles_in);
+        });
+        if (clock) clock->read(*backend.times);
+        return s;
+    });
+}
+
 // take_lists, with what it throws as a status.
 template <class Payload, class... Targets>
 [[nodiscard]] status finish_sparse(cuda_backend& backend, const grid& g, const abuffer<cuda_backend, Payload>& lists,
@@ -126,17 +154,7 @@ status cuda_backend::run_sparse(std::span<const draw<Mesh, VertexShader, Fragmen
                                 std::uint64_t triangles_in, Coverage) {
     if constexpr (device::may_follow_from_masks<FragmentShader, Targets...>)
         if (device::follows_from_masks(draws, g, triangles_in, fb))
-            return device::with_status(triangles_in, [&] {
-                std::optional<device::stage_clock> clock;
-                if (times != nullptr) clock.emplace(stream);
-                device::mask_call<draw<Mesh, VertexShader, FragmentShader>, Targets...> call(*this, draws, g,
-                                                                                             clock ? &*clock : nullptr);
-                const status s = Coverage::dispatch(options.rule, [&]<coverage Rule>() {
-                    return call.template run<Rule>(fb, options.count_voxels, triangles_in);
-                });
-                if (clock) clock->read(*times);
-                return s;
-            });
+            return device::run_masks<Coverage>(*this, draws, g, fb, options, triangles_in);
     using shader = device::payload_shader<FragmentShader>;
     using payload = typename device::outputs_payload<core::shader_output<Mesh, VertexShader, FragmentShader>>::type;
     std::vector<draw<Mesh, VertexShader, shader>> listed;
@@ -148,6 +166,16 @@ status cuda_backend::run_sparse(std::span<const draw<Mesh, VertexShader, Fragmen
     status done = device::finish_sparse(*this, g, lists, fb, s);
     if (!options.count_voxels) done.counts.voxels = 0;
     return done;
+}
+
+template <int>
+void cuda_backend::fill_brick_slots(const brick_table& table, std::uint32_t* slots, int log2_slots) {
+    device::with_runtime_errors([&] {
+        device::check(cudaMemsetAsync(slots, 0xff, sizeof(std::uint32_t) << log2_slots, stream));
+        if (table.count != 0)
+            device::launch_kernel(false, device::fill_slots<0>, device::num_blocks(table.count),
+                                  device::threads_per_block, 0, stream, stage::tile_resolve, table, slots, log2_slots);
+    });
 }
 
 template <class... Targets>
