@@ -108,6 +108,52 @@ def check_npz(case, files):
             same(archive[name], expected(case, n), f"{files[0].name}: {name}")
 
 
+def morton(coords):
+    """The Morton keys of rows x, y, z, x the lowest bit of each triple."""
+    import numpy as np
+
+    keys = np.zeros(len(coords), np.uint64)
+    for bit in range(21):
+        for axis in range(3):
+            keys |= (coords[:, axis].astype(np.uint64) >> np.uint64(bit) & np.uint64(1)) << np.uint64(3 * bit + axis)
+    return keys
+
+
+def check_sparse_values(case, coords, values):
+    """coords (n, 3), columns x, y, z, in Morton order; values by channel name: those of the occupied voxels."""
+    import numpy as np
+
+    assert coords.dtype == np.int32 and coords.ndim == 2 and coords.shape[1] == 3, (coords.dtype, coords.shape)
+    names = [c[0] for c in case["channels"]]
+    occupied = expected(case, names.index("occupancy"))
+    x, y, z = coords.T
+    found = np.zeros_like(occupied)
+    found[z, y, x] = 1
+    same(found, occupied, "coords")
+    assert len(coords) == np.count_nonzero(occupied), "a voxel comes twice"
+    keys = morton(coords)
+    assert np.all(keys[1:] > keys[:-1]), "not in Morton order"
+    assert sorted(values) == sorted(n for n in names if n != "occupancy"), sorted(values)
+    for n, name in enumerate(names):
+        if name != "occupancy":
+            same(values[name], expected(case, n)[z, y, x], name)
+
+
+def check_sparse_npz(case, files):
+    import numpy as np
+
+    with np.load(files[0]) as archive:
+        assert archive.files[0] == "coords", archive.files
+        check_sparse_values(case, archive["coords"], {name: archive[name] for name in archive.files[1:]})
+
+
+def check_sparse_npy(case, files):
+    import numpy as np
+
+    values = {file.name.split(".")[1]: np.load(file) for file in files[1:]}
+    check_sparse_values(case, np.load(files[0]), values)
+
+
 def check_vti(case, files):
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOXML import vtkXMLImageDataReader

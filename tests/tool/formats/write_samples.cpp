@@ -5,6 +5,7 @@
 
 #include "formats/formats.hpp"
 #include "formats/schem.hpp"
+#include "sparse/sparse_formats.hpp"
 #include "test_volumes.hpp"
 
 #include <cstdio>
@@ -131,6 +132,12 @@ int main(int argc, char** argv) {
             for (const std::string& extension : c.extensions)
                 for (const auto& path : write(c.v, folder / (c.name + extension), c.options))
                     files[extension].push_back(path.filename().string());
+            if (c.density != 0 && c.extensions.front() == ".npy") {
+                const sparse_volume bricks = make_sparse(c.v);
+                for (const std::string extension : {".npz", ".npy"})
+                    for (const auto& path : write_sparse(bricks, folder / (c.name + "_sparse" + extension), c.options))
+                        files[".sparse_" + extension.substr(1)].push_back(path.filename().string());
+            }
             if (!manifest.empty()) manifest += ",\n";
             manifest += describe(c, files);
         }
