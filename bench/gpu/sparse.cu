@@ -95,6 +95,7 @@ private:
 struct measured {
     double ms = 0;
     std::uint64_t bricks = 0, voxels = 0, fragments = 0, bytes = 0, peak = 0;
+    vp::stage_times stages; // of one more call
 };
 
 // One kind of output of one scene in one grid. A backend of its own, so that no memory is there before.
@@ -127,6 +128,8 @@ measured measure(gpu::session& s, const gpu::resident_mesh& mesh, const vp::grid
         m.bytes = framebuffer.num_bytes();
     }
     m.ms = gpu::time_calls(s, how, call).median;
+    backend.times = &m.stages;
+    call();
     return m;
 }
 
@@ -142,7 +145,8 @@ int run(const options& how, const std::string& command) {
     gpu::session session;
     gpu::clock_watch watch;
     table rows({"scene", "resolution", "output", "bricks", "voxels", "fragments", "ms", "dense_ms", "peer_ms",
-                "dense/ours", "peer/ours", "result_MiB", "peak_MiB", "peak/result"});
+                "dense/ours", "peer/ours", "result_MiB", "peak_MiB", "peak/result", "coarse_ms", "sort_ms", "fine_ms",
+                "resolve_ms"});
     std::vector<std::string> notes;
     const std::vector<std::string> names = how.names.empty() ? available_scenes(how.scenes, notes) : how.names;
     const auto ms = [](double value) { return value > 0 ? significant(value, 4) : std::string{}; };
@@ -166,11 +170,12 @@ int run(const options& how, const std::string& command) {
                                 : measure<sparse_bits, vp::passthrough>(session, mesh, g, bits, how.repeat);
                     watch.read();
                     const double peer = is_mean ? 0 : published_peer(data.name, n);
-                    rows.add_row({data.name, std::to_string(n), is_mean ? "mean" : "occupancy",
-                                  std::to_string(m.bricks), std::to_string(m.voxels), std::to_string(m.fragments),
-                                  ms(m.ms), ms(dense.ms), ms(peer), ratio(dense.ms, m.ms), ratio(peer, m.ms),
-                                  mib(m.bytes), mib(m.peak),
-                                  ratio(static_cast<double>(m.peak), static_cast<double>(m.bytes))});
+                    rows.add_row(
+                        {data.name, std::to_string(n), is_mean ? "mean" : "occupancy", std::to_string(m.bricks),
+                         std::to_string(m.voxels), std::to_string(m.fragments), ms(m.ms), ms(dense.ms), ms(peer),
+                         ratio(dense.ms, m.ms), ratio(peer, m.ms), mib(m.bytes), mib(m.peak),
+                         ratio(static_cast<double>(m.peak), static_cast<double>(m.bytes)), ms(m.stages.coarse_raster),
+                         ms(m.stages.tile_sort), ms(m.stages.fine_raster), ms(m.stages.tile_resolve)});
                     say(data.name + " " + std::to_string(n) + (is_mean ? " mean " : " occupancy ") + significant(m.ms) +
                         " ms, peak " + mib(m.peak) + " MiB");
                 } catch (const std::exception& e) {

@@ -15,8 +15,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -84,6 +86,9 @@ struct channel {
     scalar type = scalar::bit;
     int components = 1; // 1..4; always 1 for `bit`
     channel_bytes data;
+    // In place of data: writes the values of the voxels from number `first` on, in storage order, as many as `to` has
+    // room for; bits as bytes 0 and 1. Any thread may call it. Only dense_stream.hpp reads such channels; f16 has none.
+    std::function<void(std::uint64_t first, std::span<std::byte> to)> read = {};
 };
 
 struct volume {
@@ -200,7 +205,7 @@ struct volume {
             if (find(c.name) != &c) throw std::invalid_argument("two channels are named '" + c.name + "'");
             if (c.components < 1 || c.components > 4 || (c.type == scalar::bit && c.components != 1))
                 throw std::invalid_argument("channel '" + c.name + "' has an impossible number of components");
-            if (c.data.size() != num_bytes(c.type, c.components))
+            if (!c.read && c.data.size() != num_bytes(c.type, c.components))
                 throw std::invalid_argument("channel '" + c.name + "' does not hold one value per voxel");
         }
     }

@@ -144,13 +144,17 @@ TEST(ToolSparse, IsChosenWhereItHasToBeAndSaysSo) {
                        "--max-memory", "200", "--image-size", "64x48"});
     EXPECT_EQ(0, result.code) << result.err;
     EXPECT_NE(std::string::npos, result.err.find("a dense one would take")) << result.err;
-    // .vti has to be dense, and says what is missing.
-    result = voxelize({"-o", folder / "a.vti", "-r", "400", "-t", "depth,count,normal", "--max-memory", "200"});
+    // .vti is dense, but never as a whole.
+    result = voxelize({"-o", folder / "a.vti", "-r", "400", "-t", "depth", "--max-memory", "150"});
+    EXPECT_EQ(0, result.code) << result.err;
+    EXPECT_NE(std::string::npos, result.err.find("a dense one would take")) << result.err;
+    // .glb is made of a dense grid, and says what is missing.
+    result = voxelize({"-o", folder / "a.glb", "-r", "400", "-t", "occupancy,color", "--max-memory", "200"});
     EXPECT_EQ(3, result.code) << result.err;
     result =
-        voxelize({"-o", folder / "a.vti", "-r", "400", "-t", "depth,count,normal", "--max-memory", "200", "--sparse"});
+        voxelize({"-o", folder / "a.glb", "-r", "400", "-t", "occupancy,color", "--max-memory", "200", "--sparse"});
     EXPECT_EQ(3, result.code) << result.err;
-    EXPECT_NE(std::string::npos, result.err.find("a dense grid for a.vti")) << result.err;
+    EXPECT_NE(std::string::npos, result.err.find("a dense grid for a.glb")) << result.err;
     result = voxelize({"-o", folder / "a.npz", "-t", "color-outer", "--sparse"});
     EXPECT_EQ(5, result.code) << result.err;
     EXPECT_NE(std::string::npos, result.err.find("color-outer needs a dense grid")) << result.err;

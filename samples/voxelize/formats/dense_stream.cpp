@@ -71,6 +71,13 @@ std::uint64_t streamed_bytes(const volume& v, const channel& c, half_floats halv
 
 std::span<const std::byte> streamed_piece(const volume& v, const channel& c, half_floats halves, std::uint64_t begin,
                                           std::size_t size, std::vector<std::byte>& room) {
+    if (c.read) { // from the value that begins at or before `begin`
+        const std::uint64_t each = streamed_bytes(v, c, halves) / static_cast<std::uint64_t>(v.num_voxels());
+        const std::uint64_t first = begin / each, last = (begin + size + each - 1) / each;
+        room.resize(static_cast<std::size_t>((last - first) * each));
+        c.read(first, room);
+        return std::span{room}.subspan(static_cast<std::size_t>(begin - first * each), size);
+    }
     if (c.type == scalar::bit) {
         room.resize(size);
         expand_bits(v, c, begin, room);

@@ -194,6 +194,9 @@ std::vector<std::filesystem::path> write_sparse_png(const sparse_volume& v, cons
 // ---- the others: by a dense volume
 // ------------------------------------------------------------------------------------
 
+// Formats whose writers take the channels piece by piece, so that no dense one is ever there.
+bool is_streamed(const std::string& extension) { return extension == ".vti" || extension == ".nrrd"; }
+
 // Formats that hold all channels take them all, others the occupancy and colours.
 std::vector<channel> channels_for(const sparse_volume& v, const std::filesystem::path& path) {
     const format* const f = find_format(path);
@@ -212,7 +215,7 @@ bool is_sparse_format(const std::filesystem::path& path) { return extension_of(p
 bool is_written_sparse(const std::filesystem::path& path) {
     const std::string extension = extension_of(path);
     return extension == ".nvdb" || extension == ".npz" || extension == ".npy" || extension == ".png" ||
-           extension == ".html";
+           extension == ".html" || is_streamed(extension);
 }
 
 double dense_bytes(const sparse_volume& v, const std::filesystem::path& path) {
@@ -239,6 +242,7 @@ std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const st
     if (extension == ".npy") return write_sparse_npy(v, path, options);
     if (extension == ".png") return write_sparse_png(v, path, options);
     if (extension == ".html") return write_page(v, path, options);
+    if (is_streamed(extension)) return write(as_dense(v, v.channels), path, options); // they hold all channels
     return write(make_dense(v, channels_for(v, path)), path, options);
 }
 

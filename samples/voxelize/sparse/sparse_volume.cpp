@@ -4,11 +4,13 @@
 
 #include "../targets.hpp"
 
+#include <voxelpipe/core/brick_lookup.hpp>
 #include <voxelpipe/host_sparse.hpp>
 
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <memory>
 #include <utility>
 
 namespace voxelize {
@@ -38,6 +40,78 @@ volume make_dense(const sparse_volume& v, std::span<const channel> channels) {
                 std::memcpy(to.data.data() + static_cast<std::size_t>(dense.index(p.x, p.y, p.z)) * size,
                             from.data.data() + rank * size, size);
             });
+    }
+    return dense;
+}
+
+namespace {
+
+// Reads rows of voxels from bricks.
+class brick_reader {
+public:
+    explicit brick_reader(const sparse_volume& v)
+        : v_(v), log2_slots_(voxelpipe::brick_lookup::log2_slots_for(v.keys.size())) {
+        slots_.assign(std::size_t{1} << log2_slots_, voxelpipe::brick_lookup::free_slot);
+        for (std::size_t b = 0; b < v.keys.size(); ++b)
+            voxelpipe::core::insert_brick(slots_.data(), log2_slots_, v.keys[b], static_cast<std::uint32_t>(b));
+    }
+    // visit(number from `first` on, rank) for the voxels that exist among `count` in storage order.
+    template <class Visit>
+    void for_each(std::uint64_t first, std::uint64_t count, const Visit& visit) const {
+        const voxelpipe::brick_table table = v_.table();
+        const voxelpipe::brick_lookup lookup{slots_.data(), log2_slots_};
+        const auto nx = static_cast<std::uint64_t>(v_.shape.extent[0]),
+                   ny = static_cast<std::uint64_t>(v_.shape.extent[1]);
+        for (std::uint64_t at = first; at < first + count;) {
+            const std::uint64_t x = at % nx, end = std::min({first + count - at + x, nx, (x / 8 + 1) * 8});
+            const auto y = static_cast<int>(at / nx % ny), z = static_cast<int>(at / (nx * ny));
+            const std::uint64_t brick =
+                lookup.find_brick(table, voxelpipe::core::morton_key(static_cast<int>(x / 8), y / 8, z / 8));
+            if (brick != voxelpipe::brick_table::none)
+                for (std::uint64_t i = x; i < end; ++i) {
+                    const auto bit =
+                        static_cast<unsigned>(voxelpipe::core::morton_key(static_cast<int>(i % 8), y % 8, z % 8));
+                    if (table.masks[brick].has(bit))
+                        visit(at + (i - x) - first, table.offsets[brick] + table.masks[brick].before(bit));
+                }
+            at += end - x;
+        }
+    }
+
+private:
+    const sparse_volume& v_;
+    int log2_slots_;
+    std::vector<std::uint32_t> slots_;
+};
+
+} // namespace
+
+volume as_dense(const sparse_volume& v, std::span<const channel> channels) {
+    volume dense = v.shape;
+    const auto reader = std::make_shared<brick_reader>(v);
+    for (const channel& from : channels) {
+        channel to{from.name, from.type, from.components, {}};
+        if (from.type == scalar::bit) {
+            to.read = [reader](std::uint64_t first, std::span<std::byte> bytes) {
+                std::fill(bytes.begin(), bytes.end(), std::byte{0});
+                reader->for_each(first, bytes.size(), [&](std::uint64_t i, std::uint64_t) {
+                    bytes[static_cast<std::size_t>(i)] = std::byte{1};
+                });
+            };
+        } else {
+            const std::size_t size = size_of(from.type) * static_cast<std::size_t>(from.components);
+            to.read = [reader, size, &from, empty = empty_value(from)](std::uint64_t first,
+                                                                       std::span<std::byte> bytes) {
+                std::fill(bytes.begin(), bytes.end(), std::byte{0});
+                if (empty != 0) // of four bytes
+                    for (std::size_t at = 0; at < bytes.size(); at += sizeof(empty))
+                        std::memcpy(bytes.data() + at, &empty, sizeof(empty));
+                reader->for_each(first, bytes.size() / size, [&](std::uint64_t i, std::uint64_t rank) {
+                    std::memcpy(bytes.data() + i * size, from.data.data() + rank * size, size);
+                });
+            };
+        }
+        dense.channels.push_back(std::move(to));
     }
     return dense;
 }

@@ -57,6 +57,10 @@ struct sparse_volume {
 // The dense volume; with all channels, or only those named so. Its memory is the caller's to care for.
 [[nodiscard]] volume make_dense(const sparse_volume& v, std::span<const channel> channels);
 
+// The dense volume without its memory: channels that read the bricks, as those do that can be streamed. Refers to V and
+// to the channels.
+[[nodiscard]] volume as_dense(const sparse_volume& v, std::span<const channel> channels);
+
 // One volume of parts of one grid that share no brick; they have the same channels, which are freed one by one.
 [[nodiscard]] sparse_volume join_slabs(std::vector<sparse_volume>&& parts);
 

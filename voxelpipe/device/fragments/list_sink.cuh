@@ -286,10 +286,15 @@ struct list_output {
     }
 };
 
+// True if the raster without tiles serves a draw, whose triangles have at most so many work items.
+[[nodiscard]] inline bool is_rastered(std::uint64_t num_triangles, int fraction, glm::ivec3 extent,
+                                      std::uint64_t most_work_items) {
+    return core::small_voxels(fraction) > 0 && std::max({extent.x, extent.y, extent.z}) <= max_immediate_extent &&
+           deferred_triangles::holds(num_triangles, most_work_items);
+}
 // True if the fragments of a draw can be listed this way.
 [[nodiscard]] inline bool is_listable(std::uint64_t num_triangles, int fraction, glm::ivec3 extent) {
-    return core::small_voxels(fraction) > 0 && std::max({extent.x, extent.y, extent.z}) <= max_immediate_extent &&
-           deferred_triangles::holds(num_triangles, max_work_items(extent));
+    return is_rastered(num_triangles, fraction, extent, max_work_items(extent));
 }
 
 // Appends the fragments of a draw to two arrays of limits.fragments elements each, and counts them in the state.

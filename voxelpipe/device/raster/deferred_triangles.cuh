@@ -10,6 +10,7 @@
 #include <voxelpipe/device/raster/size_class.cuh>
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
 
 namespace voxelpipe::device {
@@ -58,7 +59,7 @@ struct deferred_triangles {
 
     // Split triangles, each with the number of its first work item: a warp finds the triangle of a work item by
     // bisection. `next` packs the numbers of triangles and work items, so that one atomic reserves both.
-    static constexpr int work_item_bits = 36;
+    int work_item_bits; // the lowest; those above them number all triangles
     std::uint32_t* split;
     unsigned long long* first_work_items;
     unsigned long long* next;
@@ -77,6 +78,7 @@ struct deferred_triangles {
 
     [[nodiscard]] static deferred_triangles take(arena& memory, std::size_t num_triangles) {
         deferred_triangles l{};
+        l.work_item_bits = work_item_bits_for(num_triangles);
         // A block's part holds whole batches of all threads of a persistent kernel.
         const std::size_t threads = std::max(static_cast<std::size_t>(num_multiprocessors()) * 2048,
                                              num_triangles / warp_triangles::max_rounds + tuning::raster_threads);
@@ -98,9 +100,12 @@ struct deferred_triangles {
         l.setups_ready = &state->deferred.setups_ready;
         return l;
     }
+    [[nodiscard]] static constexpr int work_item_bits_for(std::uint64_t triangles) {
+        return 64 - static_cast<int>(std::bit_width(triangles));
+    }
+    // Fewer than 2^32 triangles, with fewer than 2^31 work items each.
     [[nodiscard]] static constexpr bool holds(std::uint64_t triangles, std::uint64_t work_items_each) {
-        return triangles < (std::uint64_t{1} << (64 - work_item_bits)) &&
-               triangles * work_items_each < (std::uint64_t{1} << work_item_bits);
+        return triangles * work_items_each < (std::uint64_t{1} << work_item_bits_for(triangles));
     }
     __device__ std::uint32_t& at(int size, unsigned long long i) const {
         std::uint32_t* const array = arrays[size / 2];

@@ -180,8 +180,8 @@ struct split_work_items {
 
     __device__ VOXELPIPE_INLINE explicit split_work_items(const deferred_triangles& lists) {
         const unsigned long long packed = uniform(*lists.next);
-        work_items = packed & ((1ull << deferred_triangles::work_item_bits) - 1);
-        triangles = packed >> deferred_triangles::work_item_bits;
+        work_items = packed & ((1ull << lists.work_item_bits) - 1);
+        triangles = packed >> lists.work_item_bits;
     }
     // True if all triangles are set up before their work items are drawn: if each warp has several.
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool want_setups(const deferred_triangles& lists, unsigned warps) const {

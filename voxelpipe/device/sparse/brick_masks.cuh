@@ -36,12 +36,15 @@ template <class FragmentShader, class... Targets>
 inline constexpr bool may_follow_from_masks = core::is_constant<FragmentShader> && (follows_from_count<Targets> && ...);
 
 template <class Draw, class... Targets>
-[[nodiscard]] bool follows_from_masks(std::span<const Draw> draws, const grid& g, std::uint64_t triangles_in,
+[[nodiscard]] bool follows_from_masks(std::span<const Draw> draws, const grid& g, coverage rule,
+                                      std::uint64_t triangles_in,
                                       const sparse_framebuffer<cuda_backend, Targets...>& fb) {
     const glm::ivec3 whole = g.whole_extent();
     if (core::keeps_voxels(fb) || std::max({whole.x, whole.y, whole.z}) > brick_index<>::max_extent ||
         draws.size() > tuning::max_raster_draws ||
-        !is_listable(triangles_in, core::make_snap_transform(g).fraction, g.extent))
+        !is_rastered(triangles_in, core::make_snap_transform(g).fraction, g.extent,
+                     rule == coverage::thin ? split_pieces<coverage::thin>::max_work_items(g.extent)
+                                            : split_pieces<coverage::conservative>::max_work_items(g.extent)))
         return false;
     bool keeps_sums = false;
     core::for_each_index<sizeof...(Targets)>(
