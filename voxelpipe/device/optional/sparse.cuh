@@ -3,9 +3,9 @@
 #pragma once
 
 // Sparse framebuffers on a GPU: cuda_backend::run_sparse, with the bytes of cpu_backend. Its kernels are compiled by
-// programs that call it, and by no other. Fragments are listed with all their outputs, sorted by voxel; the voxels'
-// Morton keys give bricks and ranks, and a thread a voxel folds its fragments. Beside the result, memory is in
-// proportion to the fragments. At most 2^32 - 2 voxels.
+// programs that call it, and by no other. Constant shaders go by masks (brick_masks.cuh). Fragments of others are
+// listed with all their outputs; the listed voxels become bricks and ranks, and a thread a voxel folds its fragments:
+// beside the result, memory is in proportion to the fragments, at most 2^32 - 2 voxels.
 
 #include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/device/sparse/brick_build.cuh>

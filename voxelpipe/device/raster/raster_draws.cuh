@@ -22,17 +22,14 @@ void raster_each_draw(std::span<const draw<Mesh, VertexShader, FragmentShader>> 
     for (std::size_t i = 0; i < draws.size(); ++i) {
         const auto& d = draws[i];
         const auto number = static_cast<std::uint32_t>(i);
-        if (d.mesh.triangles.size() == 0) continue;
+        if (d.mesh.num_triangles() == 0) continue;
         if (i != 0) check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
         if constexpr (ShadesInRaster) {
             raster(d, shading_source<Mesh, VertexShader>{d.mesh, d.vertex_shader, snap, number}, i == 0);
         } else {
             vertex_shade(d.mesh, d.vertex_shader, snap, number, positions, static_cast<no_varyings*>(nullptr), stream);
             end_stage(clock, &stage_times::vertex_shade);
-            raster(d,
-                   stored_source{
-                       {d.mesh.triangles.data(), positions, 0, static_cast<std::uint32_t>(d.mesh.positions.size())}},
-                   false);
+            raster(d, stored_source{geometry_from(d.mesh, positions, 0)}, false);
         }
     }
 }

@@ -40,8 +40,8 @@ template <class Draw, class... Targets>
                                       std::uint64_t triangles_in,
                                       const sparse_framebuffer<cuda_backend, Targets...>& fb) {
     const glm::ivec3 whole = g.whole_extent();
-    if (core::keeps_voxels(fb) || std::max({whole.x, whole.y, whole.z}) > brick_index<>::max_extent ||
-        draws.size() > tuning::max_raster_draws ||
+    if (rule == coverage::crosshair || core::keeps_voxels(fb) ||
+        std::max({whole.x, whole.y, whole.z}) > brick_index<>::max_extent || draws.size() > tuning::max_raster_draws ||
         !is_rastered(triangles_in, core::make_snap_transform(g).fraction, g.extent,
                      rule == coverage::thin ? split_pieces<coverage::thin>::max_work_items(g.extent)
                                             : split_pieces<coverage::conservative>::max_work_items(g.extent)))
@@ -187,12 +187,12 @@ public:
 private:
     [[nodiscard]] std::size_t max_triangles() const {
         std::size_t most = 0;
-        for (const draw_type& d : draws_) most = std::max(most, d.mesh.triangles.size());
+        for (const draw_type& d : draws_) most = std::max<std::size_t>(most, d.mesh.num_triangles());
         return most;
     }
     [[nodiscard]] std::size_t max_vertices() const {
         std::size_t most = 0;
-        for (const draw_type& d : draws_) most = std::max(most, d.mesh.positions.size());
+        for (const draw_type& d : draws_) most = std::max<std::size_t>(most, d.mesh.num_vertices());
         return most;
     }
     [[nodiscard]] std::size_t plan_memory() const {
@@ -210,8 +210,9 @@ private:
             draws_, snap_, positions_, state, clock_, stream_,
             [&](const draw_type& d, const auto& source, bool is_first) {
                 using source_type = std::remove_cvref_t<decltype(source)>;
-                const auto vertices = static_cast<std::uint32_t>(d.mesh.positions.size());
-                const auto triangles = static_cast<std::uint32_t>(d.mesh.triangles.size());
+                const auto vertices =
+                    static_cast<std::uint32_t>(shades_in_raster ? d.mesh.positions.size() : d.mesh.num_vertices());
+                const auto triangles = static_cast<std::uint32_t>(d.mesh.num_triangles());
                 const output_base base{glm::ivec3(0), vertices, state, d.mesh.has_checked_indices()};
                 const auto out = output(base);
                 const raster_call<Rule, source_type, std::remove_cvref_t<decltype(out)>> call{
