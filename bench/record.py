@@ -27,6 +27,8 @@ REPORTS = {
     "gpu_tune.md": {"gpu_tune.csv": "tune.csv"},
     "gpu_solids.md": {"gpu_solids.csv": "solids.csv"},
     "gpu_programs.md": {"gpu_programs.csv": "programs.csv"},
+    "gpu_sparse.md": {"gpu_sparse.csv": "sparse.csv"},
+    "cpu_sparse.md": {"cpu_sparse.csv": "sparse.csv"},
     "cpu.md": {"cpu_scenes.csv": "table.csv", "cpu_stages.csv": "stages.csv", "cpu_published.csv": "published.csv"},
 }
 MEANS = "Geometric means"

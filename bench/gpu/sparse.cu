@@ -6,6 +6,7 @@
 // targets, with their clear; and the fastest published figure. Prints a table of medians; --out writes it as CSV too.
 
 #include "device_record.hpp"
+#include "machine.hpp"
 #include "output.hpp"
 #include "scene_choice.hpp"
 #include "session.hpp"
@@ -188,6 +189,7 @@ int run(const options& how, const std::string& command) {
             }
     }
     std::string text = "# Sparse framebuffers on a GPU\n\n" + gpu::describe_device(watch) +
+                       "- commit: " + describe_machine().commit + "\n- date: " + describe_machine().date + "\n" +
                        "- clocks over the run: " + watch.range() + "\n- command: `" + command +
                        "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
                        " calls, CUDA events around the whole call, allocations and waits included, mesh on the device\n"
