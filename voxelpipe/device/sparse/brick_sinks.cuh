@@ -179,14 +179,16 @@ struct marking_output : output_base {
 
 // The brick that a thread has written to last.
 struct last_brick {
-    std::uint64_t key = ~std::uint64_t{0};
+    std::uint64_t place = ~std::uint64_t{0}; // 21 bits an axis
     std::uint32_t number = 0;
 
     __device__ VOXELPIPE_INLINE void find(const index_level& bricks, int x, int y, int z) {
-        const std::uint64_t wanted = short_morton_key(x, y, z);
-        if (wanted == key) return;
-        key = wanted;
-        number = bricks.number_of(wanted);
+        const std::uint64_t wanted = static_cast<std::uint32_t>(x) |
+                                     std::uint64_t{static_cast<std::uint32_t>(y)} << 21 |
+                                     std::uint64_t{static_cast<std::uint32_t>(z)} << 42;
+        if (wanted == place) return;
+        place = wanted;
+        number = bricks.number_of(short_morton_key(x, y, z));
     }
 };
 [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned word_in_brick(int x, int y, int z) {
