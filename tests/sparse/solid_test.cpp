@@ -39,8 +39,8 @@ std::vector<small_mesh> bodies(std::uint64_t seed, const glm::ivec3& extent) {
         for (int i = 0; i < 5; ++i) {
             glm::vec3 low, high;
             for (int a = 0; a < 3; ++a) {
-                low[a] = static_cast<float>(random.between(-8, 2 * extent[a] - 4)) * 0.5f;
-                high[a] = low[a] + static_cast<float>(random.between(1, 2 * extent[a])) * 0.5f;
+                low[a] = static_cast<float>(random.between(-8, std::int64_t{2} * extent[a] - 4)) * 0.5f;
+                high[a] = low[a] + static_cast<float>(random.between(1, std::int64_t{2} * extent[a])) * 0.5f;
             }
             add_box(m, low, high, random.between(0, 2) == 0);
         }
@@ -81,6 +81,7 @@ struct both {
     std::uint64_t draw(const std::vector<small_mesh>& meshes, const vp::grid& g, const vp::solid_options& options,
                        const Shade& shade, const std::string& what) {
         std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, decltype(shade(0u))>> draws;
+        draws.reserve(meshes.size());
         for (const small_mesh& m : meshes)
             draws.push_back({m.view(), {}, shade(static_cast<std::uint32_t>(draws.size()))});
         const vp::status a = vp::voxelize_solid(backend, draws, g, dense, options);
@@ -163,6 +164,7 @@ TEST(SparseSolids, KeepSumsAndLimits) {
     const vp::grid grid = unit::unit_grid(extent);
     const std::vector<small_mesh> meshes = bodies(4, extent);
     std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, shader>> draws;
+    draws.reserve(meshes.size());
     for (const small_mesh& m : meshes) draws.push_back({m.view(), {}, {}});
     backend_type one = unit::make_backend(1), two = unit::make_backend(2);
     image<vp::sparse_framebuffer> a{one, extent}, b{two, extent};
