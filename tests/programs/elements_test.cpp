@@ -75,7 +75,7 @@ TEST(Segments, CoverWhatTheOracleSays) {
             }
         std::uint64_t covered = 0;
         for (std::uint32_t i = 0; i < 250; ++i) {
-            const auto snapped = snap(o, vertices[2 * i], vertices[2 * i + 1]);
+            const auto snapped = snap(o, vertices[std::size_t{2} * i], vertices[std::size_t{2} * i + 1]);
             const std::vector<oracle::voxel> expected =
                 snapped ? voxels_of(o, *snapped, rule) : std::vector<oracle::voxel>{};
             ASSERT_EQ(found[i], expected) << "segment " << i;

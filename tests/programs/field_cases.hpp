@@ -46,13 +46,13 @@ inline std::vector<float> texels_of(std::size_t n, std::uint32_t factor) {
     return t;
 }
 inline std::vector<glm::vec3> plane_texels() {
-    const std::vector<float> t = texels_of(3 * width * height, 2654435761u);
+    const std::vector<float> t = texels_of(std::size_t{3} * width * height, 2654435761u);
     std::vector<glm::vec3> v;
     for (std::size_t i = 0; i < t.size(); i += 3) v.emplace_back(t[i], t[i + 1], t[i + 2]);
     return vp::with_levels<glm::vec3>(v, width, height);
 }
 inline std::vector<float> box_texels() {
-    return vp::with_levels<float>(texels_of(width * height * depth, 2246822519u), width, height, depth);
+    return vp::with_levels<float>(texels_of(std::size_t{width} * height * depth, 2246822519u), width, height, depth);
 }
 inline sampler make_sampler(const glm::vec3* plane, const float* box, glm::vec4* out) {
     return {{plane, width, height, 4}, {box, width, height, depth, 4}, out};
