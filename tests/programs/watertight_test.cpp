@@ -46,6 +46,7 @@ struct rough {
 // random corner, and every vertex is doubled for each triangle, with -0 for +0 here and there.
 unit::small_mesh closed_mesh(unit::splitmix64& random, int splits) {
     std::vector<glm::vec3> p;
+    p.reserve(4 + static_cast<std::size_t>(splits));
     const auto coordinate = [&] { return static_cast<float>(random.uniform(-9.0, 9.0)); };
     for (int i = 0; i < 4; ++i)
         p.emplace_back(coordinate(), random.between(0, 3) == 0 ? 0.0f : coordinate(), coordinate());
