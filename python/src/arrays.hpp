@@ -1,0 +1,102 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the module's functions have in common: arrays of NumPy as the library's views, names of options, a failed status
+// as a Python exception, and results that NumPy owns.
+
+#include <cpu_ref/backend.hpp>
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <initializer_list>
+#include <memory>
+#include <new>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe::python {
+
+namespace nb = nanobind;
+
+// Arrays in host memory, C order.
+template <class T, std::size_t Dimensions>
+using array = nb::ndarray<T, nb::ndim<Dimensions>, nb::c_contig, nb::device::cpu>;
+
+// A mesh as voxelpipe/_mesh.py prepares it: (v, 3) float32 and (f, 3) uint32.
+using position_array = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using triangle_array = nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+
+// Refers to the arrays.
+[[nodiscard]] inline mesh_view<> view_of(const position_array& positions, const triangle_array& triangles) {
+    static_assert(sizeof(glm::vec3) == 3 * sizeof(float) && sizeof(glm::uvec3) == 3 * sizeof(std::uint32_t));
+    return {array_view<const glm::vec3>(reinterpret_cast<const glm::vec3*>(positions.data()), positions.shape(0)),
+            array_view<const glm::uvec3>(reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0))};
+}
+
+// "conservative" or "thin". Throws ValueError.
+[[nodiscard]] inline coverage coverage_named(std::string_view name) {
+    if (name == "conservative") return coverage::conservative;
+    if (name == "thin") return coverage::thin;
+    throw nb::value_error(("coverage is 'conservative' or 'thin', not '" + std::string(name) + "'").c_str());
+}
+
+// Whether a (nz, ny, nx, ...) array has the grid's shape, and rows of `columns` values. Throws ValueError.
+template <class Array>
+void expect_shape(const Array& out, const grid& g, std::initializer_list<std::size_t> tail = {},
+                  std::size_t last_axis = 0) {
+    const auto extent = [&](int a) { return static_cast<std::size_t>(g.extent[a]); };
+    bool fits = out.ndim() == 3 + tail.size() && out.shape(0) == extent(2) && out.shape(1) == extent(1) &&
+                out.shape(2) == (last_axis != 0 ? last_axis : extent(0));
+    std::size_t axis = 3;
+    for (const std::size_t n : tail) fits = fits && out.shape(axis++) == n;
+    if (!fits) throw nb::value_error("the array to draw into does not have the grid's shape (nz, ny, nx)");
+}
+
+// The counters of a call as a dict; raises what a failed call means in Python: IndexError with the triangle of an index
+// out of range, MemoryError, ValueError.
+[[nodiscard]] inline nb::dict report(const status& s) {
+    if (!s.ok()) {
+        if (s.code == status_code::index_out_of_range) throw nb::index_error(s.message().c_str());
+        if (s.code == status_code::out_of_memory) throw std::bad_alloc();
+        throw nb::value_error(s.message().c_str());
+    }
+    nb::dict d;
+    d["triangles"] = s.counts.triangles_in;
+    d["triangles_dropped"] = s.counts.triangles_dropped();
+    d["triangles_zero_area"] = s.counts.triangles_zero_area;
+    d["triangles_outside"] = s.counts.triangles_outside;
+    d["triangles_drawn"] = s.counts.triangles_drawn;
+    d["fragments"] = s.counts.fragments;
+    d["voxels"] = s.counts.voxels;
+    return d;
+}
+
+// An array of NumPy that owns `values`.
+template <class Container>
+[[nodiscard]] nb::object to_numpy(Container&& values, std::initializer_list<std::size_t> shape) {
+    using owned = std::remove_cvref_t<Container>;
+    using element = std::remove_cvref_t<decltype(*values.data())>;
+    auto* const kept = new owned(std::forward<Container>(values));
+    nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<owned*>(p); });
+    return nb::cast(nb::ndarray<nb::numpy, element>(kept->data(), shape, owner));
+}
+
+void bind_grid(nb::module_& m);
+void bind_surface(nb::module_& m);
+void bind_solid(nb::module_& m);
+void bind_bake_float(nb::module_& m);
+void bind_bake_integer(nb::module_& m);
+void bind_sparse_float(nb::module_& m);
+void bind_sparse_integer(nb::module_& m);
+void bind_files(nb::module_& m);
+
+} // namespace voxelpipe::python

@@ -1,0 +1,132 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Attributes that are baked into voxels: rows of values, one for each vertex or one for each triangle. The shaders read
+// them by pointer, so that one pipeline serves both.
+
+#include "arrays.hpp"
+
+#include <cpu_ref/parallel.hpp>
+
+#include <algorithm>
+#include <thread>
+#include <type_traits>
+
+namespace voxelpipe::python {
+
+// A scalar where there is one component.
+template <class T, int Components>
+using value_of = std::conditional_t<Components == 1, T, glm::vec<Components, T>>;
+
+// Components [first, first + n) of each row of `values`. Values of vertices are interpolated at the fragment's point on
+// its triangle, as varyings are; integers are taken from the triangle's first vertex.
+template <class T>
+struct value_rows {
+    const T* values = nullptr;
+    std::size_t columns = 0;
+    const glm::uvec3* triangles = nullptr; // null: one row for each triangle
+
+    template <int Components>
+    [[nodiscard]] value_of<T, Components> at(const fragment<>& f) const {
+        value_of<T, Components> result{};
+        const auto set = [&](int c, T v) {
+            if constexpr (Components == 1)
+                result = v;
+            else
+                result[c] = v;
+        };
+        if (triangles == nullptr) {
+            for (int c = 0; c < Components; ++c) set(c, row(f.triangle)[c]);
+            return result;
+        }
+        const glm::uvec3 t = triangles[f.triangle];
+        if constexpr (std::is_integral_v<T>) {
+            for (int c = 0; c < Components; ++c) set(c, row(t.x)[c]);
+        } else {
+            const glm::vec3 b = f.clamped_barycentric();
+            for (int c = 0; c < Components; ++c)
+                set(c, core::member_traits<float>::mix(row(t.x)[c], row(t.y)[c], row(t.z)[c], b.y, b.z));
+        }
+        return result;
+    }
+
+private:
+    [[nodiscard]] const T* row(std::uint32_t i) const { return values + i * columns; }
+};
+
+template <class T, int Components>
+struct counted_value_shader {
+    value_rows<T> rows;
+    auto operator()(const fragment<>& f) const { return outputs(rows.template at<Components>(f), 1U); }
+};
+
+using number_of_fragments = target<std::uint32_t, blend::add>;
+
+// A call's mesh, grid and values. The arrays are the caller's.
+template <class T>
+struct bake_call {
+    mesh_view<> mesh;
+    grid where;
+    coverage rule = coverage::conservative;
+    value_rows<T> rows;
+    unsigned threads = 0;
+};
+
+struct column_range {
+    std::size_t first = 0, count = 1;
+};
+
+// Throws ValueError where the values are not one row for each vertex, or each triangle, or lack such columns.
+template <class T>
+[[nodiscard]] bake_call<T> make_bake_call(const position_array& positions, const triangle_array& triangles,
+                                          const grid& g, const std::string& rule, const array<const T, 2>& values,
+                                          column_range columns, bool per_triangle, unsigned threads) {
+    bake_call<T> call{view_of(positions, triangles), g, coverage_named(rule), {}, threads};
+    const std::size_t rows = per_triangle ? call.mesh.triangles.size() : call.mesh.positions.size();
+    if (values.shape(0) != rows) throw nb::value_error("values need one row for each vertex, or for each triangle");
+    if (columns.first > values.shape(1) || columns.count > values.shape(1) - columns.first)
+        throw nb::value_error("values have no such columns");
+    call.rows = {values.data() + columns.first, values.shape(1), per_triangle ? nullptr : call.mesh.triangles.data()};
+    return call;
+}
+
+// How a voxel's fragments become one value: "mean", "sum", "min", "max" or "last". A mean is a sum that is divided.
+// Calls f.template operator()<Blend>(). Throws ValueError for another name.
+template <class F>
+auto with_blend(std::string_view name, F&& f) {
+    if (name == "sum" || name == "mean") return f.template operator()<blend::add>();
+    if (name == "min") return f.template operator()<blend::min>();
+    if (name == "max") return f.template operator()<blend::max>();
+    if (name == "last") return f.template operator()<blend::replace>();
+    throw nb::value_error(
+        ("blend is 'mean', 'sum', 'min', 'max' or 'last', not '" + std::string(name) + "'").c_str());
+}
+
+// Divides the sums of a mean, each quotient rounded once, and puts `fill` where there is no fragment. `values` has
+// `components` for each of the counts.
+template <class T>
+void finish(T* values, const std::uint32_t* counts, std::size_t n, std::size_t components, bool is_mean, T fill,
+            unsigned threads) {
+    constexpr std::size_t block = std::size_t{1} << 16;
+    const unsigned workers = threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
+    cpu::parallel_for(workers, (n + block - 1) / block, [&](unsigned, std::size_t b) {
+        for (std::size_t i = b * block; i < std::min(n, (b + 1) * block); ++i) {
+            T* const value = values + i * components;
+            if (counts[i] == 0)
+                std::fill_n(value, components, fill);
+            else if (is_mean)
+                for (std::size_t c = 0; c < components; ++c) value[c] /= static_cast<T>(counts[i]);
+        }
+    });
+}
+
+// Calls f.template operator()<Components>() for 1 or 3, the numbers that are compiled; callers draw more in passes.
+template <class F>
+auto with_components(std::size_t n, F&& f) {
+    if (n == 1) return f.template operator()<1>();
+    if (n == 3) return f.template operator()<3>();
+    throw nb::value_error("a pass takes 1 or 3 columns");
+}
+
+} // namespace voxelpipe::python

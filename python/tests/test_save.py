@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+import shutil
+import struct
+import subprocess
+import zlib
+
+import numpy as np
+import pytest
+import voxelpipe as vp
+
+from meshes import sphere
+
+
+@pytest.fixture(scope="module")
+def scene():
+    mesh = sphere(levels=3)
+    grid = vp.fit(mesh, 32)
+    rgb = ((mesh[0] + 1) * 127).astype(np.uint8)
+    return mesh, grid, vp.voxelize(mesh, grid), vp.bake(mesh, grid, {"color": rgb})["color"]
+
+
+def decode(png):
+    """Pixels of a PNG without filters."""
+    assert png[:8] == b"\x89PNG\r\n\x1a\n"
+    at, data = 8, b""
+    while at < len(png):
+        (length,) = struct.unpack(">I", png[at : at + 4])
+        kind, body = png[at + 4 : at + 8], png[at + 8 : at + 8 + length]
+        assert struct.unpack(">I", png[at + 8 + length : at + 12 + length])[0] == zlib.crc32(kind + body)
+        if kind == b"IHDR":
+            width, height, depth, color = struct.unpack(">IIBB", body[:10])
+            assert depth == 8
+        if kind == b"IDAT":
+            data += body
+        at += 12 + length
+    components = {2: 3, 6: 4}[color]
+    rows = np.frombuffer(zlib.decompress(data), np.uint8).reshape(height, 1 + width * components)
+    assert (rows[:, 0] == 0).all()
+    return rows[:, 1:].reshape(height, width, components)
+
+
+def test_picture_shows_the_model(scene, tmp_path):
+    _, grid, surface, color = scene
+    vp.save(tmp_path / "a.png", color, grid, occupied=surface, size=(160, 120), background="transparent")
+    pixels = decode((tmp_path / "a.png").read_bytes())
+    assert pixels.shape == (120, 160, 4)
+    assert (pixels[60, 80, 3], pixels[2, 2, 3]) == (255, 0)
+    assert np.array_equal(pixels, vp.render({"c": color}, grid, occupied=surface, size=(160, 120), background="transparent"))
+    assert not np.array_equal(pixels[..., :3], vp.render(surface, grid, size=(160, 120)))
+
+
+def test_float_colours_are_those_of_bytes(scene):
+    _, grid, surface, color = scene
+    a = vp.render(color, grid, occupied=surface, size=(80, 60))
+    b = vp.render((color / 255).astype(np.float32), grid, occupied=surface, size=(80, 60), threads=2)
+    assert np.array_equal(a, b)
+
+
+def test_numpy_files(scene, tmp_path):
+    mesh, grid, surface, color = scene
+    vp.save(tmp_path / "a.npy", surface, grid)
+    assert np.array_equal(np.load(tmp_path / "a.npy"), surface)
+    vp.save(tmp_path / "a.npz", {"surface": surface, "color": color}, grid)
+    with np.load(tmp_path / "a.npz") as f:
+        assert np.array_equal(f["color"], color) and np.array_equal(f["surface"], surface)
+        assert tuple(f["origin"]) == grid.origin and tuple(f["voxel_size"]) == grid.voxel_size
+    listed = vp.sparse(mesh, grid, {"a": mesh[0][:, 0]})
+    vp.save(tmp_path / "b.npz", listed, grid)
+    with np.load(tmp_path / "b.npz") as f:
+        assert np.array_equal(f["coords"], listed[0]) and np.array_equal(f["a"], listed[1]["a"])
+
+
+def test_nanovdb(scene, tmp_path):
+    mesh, grid, surface, color = scene
+    values = {"occupancy": surface, "color": color, "height": vp.bake(mesh, grid, {"h": mesh[0][:, 1]})["h"]}
+    path = tmp_path / "a.nvdb"
+    vp.save(path, values, grid)
+    again = tmp_path / "again.nvdb"
+    vp.save(again, values, grid)
+    assert path.read_bytes() == again.read_bytes()
+    listed = tmp_path / "listed.nvdb"
+    voxels, attributes = vp.sparse(mesh, grid, {"height": mesh[0][:, 1]})
+    vp.save(listed, (voxels, attributes), grid)
+    shuffled = np.random.default_rng(1).permutation(len(voxels))
+    vp.save(again, (voxels[shuffled], {"height": attributes["height"][shuffled]}), grid)
+    assert listed.read_bytes() == again.read_bytes()
+    if shutil.which("nanovdb_print"):
+        text = subprocess.run(["nanovdb_print", path], check=True, capture_output=True, text=True).stdout
+        assert str(int(surface.sum())) in text.replace(",", "") and "height" in text
+        subprocess.run(["nanovdb_validate", path], check=True, capture_output=True)
+
+
+def test_failures_leave_no_file(scene, tmp_path):
+    _, grid, surface, color = scene
+    with pytest.raises(ValueError, match="formats are"):
+        vp.save(tmp_path / "a.xyz", surface, grid)
+    with pytest.raises(ValueError, match="one array"):
+        vp.save(tmp_path / "a.npy", {"a": surface, "b": color}, grid)
+    with pytest.raises(ValueError, match="shape"):
+        vp.save(tmp_path / "a.png", surface[1:], grid)
+    with pytest.raises(ValueError, match="background"):
+        vp.save(tmp_path / "a.png", surface, grid, background="pink")
+    with pytest.raises(IndexError):
+        vp.save(tmp_path / "a.nvdb", (np.array([[0, 0, 99]], np.int32), {}), grid)
+    with pytest.raises(TypeError, match="png"):
+        vp.save(tmp_path / "a.npy", surface, grid, zoom=2)
+    with pytest.raises(OSError):
+        vp.save(tmp_path / "none" / "a.npy", surface, grid)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+"""Exact voxelization of triangle meshes.
+
+Which voxels a triangle covers is decided in integers: no voxel is missed, none is added, and the same input gives the
+same bytes on every machine and any number of threads.
+
+    import voxelpipe as vp
+    grid = vp.fit(mesh, 256)
+    surface = vp.voxelize(mesh, grid)        # bool, (nz, ny, nx)
+    inside = vp.solid(mesh, grid)            # the same, filled
+    vp.save("surface.png", surface, grid)
+
+A mesh is a pair (vertices, triangles) of arrays, a mesh of trimesh, Open3D or PyVista, a path, or a list of those.
+Arrays of voxels are indexed [z, y, x].
+"""
+
+from importlib.metadata import PackageNotFoundError, version
+
+from ._bake import bake, sparse
+from ._core import Grid
+from ._fit import fit
+from ._save import render, save
+from ._solid import OpenMeshWarning, solid
+from ._surface import DroppedTrianglesWarning, Fragments, fragments, voxelize
+
+try:
+    __version__ = version("voxelpipe")
+except PackageNotFoundError:  # the folder alone, not installed
+    __version__ = "0"
+
+__all__ = [
+    "DroppedTrianglesWarning",
+    "Fragments",
+    "Grid",
+    "OpenMeshWarning",
+    "bake",
+    "fit",
+    "fragments",
+    "render",
+    "save",
+    "solid",
+    "sparse",
+    "voxelize",
+]

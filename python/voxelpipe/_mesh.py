@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes of other libraries as two arrays, without a copy where the array fits already."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any, Callable, Sequence
+
+import numpy as np
+
+from ._core import Grid
+
+# What functions take as a mesh; see as_mesh.
+MeshLike = Any
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A mesh in host memory."""
+
+    vertices: np.ndarray  # (v, 3), float32, or float64 where that holds positions that float32 does not
+    triangles: np.ndarray  # (f, 3) uint32, C order
+    first_triangles: tuple[int, ...]  # of each part
+    to_caller: Callable[[np.ndarray], Any]  # a result as the caller's kind of array
+
+    def positions(self, grid: Grid) -> tuple[np.ndarray, Grid]:
+        """Positions in float32, and the grid in which they are to be drawn.
+
+        Positions in double lose nothing but what lies beyond float32 after the grid's origin has been taken away.
+        """
+        if self.vertices.dtype == np.float32:
+            return self.vertices, grid
+        with np.errstate(over="ignore", invalid="ignore"):
+            relative = (self.vertices - np.asarray(grid._whole_origin)).astype(np.float32)
+        return np.ascontiguousarray(relative), grid._relative_to_origin()
+
+
+def to_numpy(a: Any, what: str) -> np.ndarray:
+    """An array of any library in host memory; shares its memory where it can."""
+    if isinstance(a, np.ndarray):
+        return a
+    if hasattr(a, "__cuda_array_interface__") or getattr(getattr(a, "device", None), "type", "cpu") == "cuda":
+        raise TypeError(f"{what} is in a GPU's memory: copy it to the host, as with .cpu() or .get()")
+    if hasattr(a, "detach"):  # a tensor of torch that records gradients
+        a = a.detach()
+    if hasattr(a, "__dlpack__") and not hasattr(a, "__array__"):
+        return np.from_dlpack(a)
+    return np.asarray(a)
+
+
+def _is_torch(a: Any) -> bool:
+    return type(a).__module__.split(".")[0] == "torch"
+
+
+def _converter(a: Any) -> Callable[[np.ndarray], Any]:
+    if _is_torch(a):
+        import torch
+
+        return torch.from_numpy
+    return lambda array: array
+
+
+def _vertices(a: Any) -> np.ndarray:
+    v = to_numpy(a, "the array of vertices")
+    if v.ndim != 2 or v.shape[1] != 3:
+        raise ValueError(f"vertices are an array (v, 3), not {v.shape}")
+    if v.dtype.kind not in "fiu":
+        raise ValueError(f"vertices are numbers, not {v.dtype}")
+    if v.dtype == np.float32:
+        return np.ascontiguousarray(v)
+    v = v.astype(np.float64, copy=False)
+    with np.errstate(over="ignore"):
+        single = v.astype(np.float32)
+    if np.array_equal(single.astype(np.float64), v, equal_nan=True):
+        return np.ascontiguousarray(single)
+    return np.ascontiguousarray(v)
+
+
+def _triangles(a: Any) -> np.ndarray:
+    t = to_numpy(a, "the array of triangles")
+    if t.ndim != 2 or t.shape[1] != 3:
+        raise ValueError(f"triangles are an array (f, 3) of vertex numbers, not {t.shape}")
+    if t.dtype.kind not in "iu":
+        raise ValueError(f"triangles are integers, not {t.dtype}")
+    if t.dtype in (np.uint32, np.int32):  # a negative number becomes one that no mesh has
+        return np.ascontiguousarray(t).view(np.uint32)
+    bad = (t < 0) | (t > np.iinfo(np.uint32).max)
+    if bad.any():
+        row = int(np.argmax(bad.any(axis=1)))
+        raise IndexError(f"triangle {row} names a vertex that does not exist: {tuple(int(i) for i in t[row])}")
+    return np.ascontiguousarray(t, dtype=np.uint32)
+
+
+def _from_path(path: str) -> tuple[Any, Any]:
+    try:
+        import trimesh
+    except ImportError:
+        raise ImportError("reading a model from a path needs trimesh: pip install trimesh") from None
+    return _parts_of(trimesh.load_mesh(path, process=False))
+
+
+def _pyvista(mesh: Any) -> tuple[Any, Any]:
+    surface = mesh if mesh.is_all_triangles else mesh.triangulate()
+    return surface.points, np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
+
+
+def _parts_of(mesh: MeshLike) -> tuple[Any, Any]:
+    """(vertices, triangles) of one mesh, as the caller's arrays."""
+    if isinstance(mesh, (str, os.PathLike)):
+        return _from_path(os.fspath(mesh))
+    if isinstance(mesh, tuple) and len(mesh) == 2:
+        return mesh
+    if hasattr(mesh, "geometry") and hasattr(mesh, "graph"):  # a scene of trimesh
+        mesh = mesh.to_mesh() if hasattr(mesh, "to_mesh") else mesh.dump(concatenate=True)
+    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
+        return mesh.vertices, mesh.faces
+    if hasattr(mesh, "vertices") and hasattr(mesh, "triangles"):  # Open3D
+        return mesh.vertices, mesh.triangles
+    if hasattr(mesh, "vertex") and hasattr(mesh, "triangle"):  # Open3D, tensors
+        return mesh.vertex.positions.numpy(), mesh.triangle.indices.numpy()
+    if hasattr(mesh, "points") and hasattr(mesh, "is_all_triangles"):
+        return _pyvista(mesh)
+    raise TypeError(
+        f"{type(mesh).__name__} is no mesh: give (vertices, triangles), a mesh of trimesh, Open3D or PyVista, a path, "
+        "or a list of those"
+    )
+
+
+def as_mesh(mesh: MeshLike) -> Mesh:
+    """Converts what the caller has. The parts of a list stay apart as bodies of solids, and are one mesh otherwise."""
+    parts: Sequence[MeshLike] = mesh if isinstance(mesh, list) else [mesh]
+    pairs = [_parts_of(part) for part in parts]
+    vertices = [_vertices(v) for v, _ in pairs]
+    triangles = [_triangles(t) for _, t in pairs]
+    to_caller = _converter(pairs[0][0]) if pairs else lambda array: array
+    if len(pairs) == 1:
+        return Mesh(vertices[0], triangles[0], (0,), to_caller)
+    if not pairs:
+        return Mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32), (0,), to_caller)
+    if any(v.dtype == np.float64 for v in vertices):
+        vertices = [v.astype(np.float64) for v in vertices]
+    for v, t in zip(vertices, triangles):  # joined, a bad number might name a vertex of another part
+        bad = (t >= len(v)).any(axis=1)
+        if bad.any():
+            raise IndexError(f"triangle {int(np.argmax(bad))} of a part names a vertex that does not exist")
+    first_vertex = np.cumsum([0] + [len(v) for v in vertices[:-1]])
+    joined = np.concatenate([t + np.uint32(first) for t, first in zip(triangles, first_vertex)])
+    first_triangle = np.cumsum([0] + [len(t) for t in triangles[:-1]])
+    return Mesh(np.concatenate(vertices), joined, tuple(int(i) for i in first_triangle), to_caller)

@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+"""Voxels as files and pictures."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from typing import Any, Mapping
+
+import numpy as np
+
+from . import _core
+from ._core import Grid
+from ._mesh import to_numpy
+
+FORMATS = (".npy", ".npz", ".nvdb", ".png")
+
+
+def _named(values: Any) -> dict[str, np.ndarray]:
+    if isinstance(values, Mapping):
+        return {name: to_numpy(a, name) for name, a in values.items()}
+    a = to_numpy(values, "values")
+    return {"occupancy" if a.dtype == np.bool_ else "values": a}
+
+
+def _occupied(named: dict[str, np.ndarray], occupied: Any) -> np.ndarray:
+    """bool (nz, ny, nx): as given, or else a mask among the values, or else where any value is not zero."""
+    if occupied is not None:
+        return to_numpy(occupied, "occupied").astype(np.bool_, copy=False)
+    for a in named.values():
+        if a.dtype == np.bool_:
+            return a
+    masks = [a != 0 if a.ndim == 3 else (a != 0).any(axis=-1) for a in named.values()]
+    return np.logical_or.reduce(masks)
+
+
+def _as_colors(a: np.ndarray) -> np.ndarray:
+    """uint8 colours; floats are from 0 to 1."""
+    if a.dtype.kind == "f":
+        return np.rint(np.clip(np.nan_to_num(a), 0, 1) * 255).astype(np.uint8)
+    return a.astype(np.uint8, copy=False)
+
+
+def render(
+    values: Any,
+    grid: Grid,
+    *,
+    occupied: Any = None,
+    size: tuple[int, int] = (1280, 960),
+    azimuth: float = 35,
+    elevation: float = 25,
+    zoom: float = 1,
+    up: str = "y",
+    background: str = "sky",
+    threads: int = 0,
+) -> np.ndarray:
+    """A picture of voxels: uint8, (height, width, 3), or 4 with background="transparent".
+
+    values: bool (nz, ny, nx), which is shown in one colour; or colours (nz, ny, nx, 3 or 4), uint8 or floats from 0 to
+        1; or a dict of those.
+    occupied: the voxels to show, bool; by default those whose value is not zero.
+    size: width and height in pixels. azimuth, elevation: where the viewer stands, in degrees. up: "y" or "z".
+    background: "sky", "white", "dark", "transparent", "#rrggbb", or "#rrggbb,#rrggbb" from top to bottom.
+    """
+    named = _named(values)
+    shown = np.ascontiguousarray(_occupied(named, occupied)).view(np.uint8)
+    colors = next((a for a in named.values() if a.ndim == 4 and a.shape[-1] in (3, 4)), None)
+    if colors is not None:
+        colors = np.ascontiguousarray(_as_colors(colors))
+    return _core.render(
+        shown, colors, grid, size[0], size[1], azimuth, elevation, zoom, up, background, threads
+    )  # fmt: skip
+
+
+def png_bytes(picture: np.ndarray) -> bytes:
+    """A picture (height, width, 3 or 4) of uint8 as a PNG file."""
+    height, width, components = picture.shape
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    rows = np.zeros((height, 1 + width * components), np.uint8)  # each row: no filter, then its pixels
+    rows[:, 1:] = picture.reshape(height, -1)
+    header = struct.pack(">IIBBBBB", width, height, 8, {3: 2, 4: 6}[components], 0, 0, 0)
+    body = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + body
+
+
+def _nvdb_values(name: str, a: np.ndarray) -> np.ndarray | None:
+    """Rows as .nvdb has them; None for a mask."""
+    if a.dtype == np.bool_:
+        return None
+    rows = a.reshape(len(a), -1)
+    if rows.dtype == np.uint8 and rows.shape[1] in (3, 4):
+        if rows.shape[1] == 3:
+            rows = np.concatenate([rows, np.full((len(rows), 1), 255, np.uint8)], axis=1)
+    elif rows.dtype.kind == "f":
+        rows = rows.astype(np.float32, copy=False)
+    elif rows.dtype.kind in "iu" and rows.shape[1] == 1:
+        kind = np.uint32 if rows.dtype.kind == "u" else np.int32
+        if rows.size and (rows.min() < np.iinfo(kind).min or rows.max() > np.iinfo(kind).max):
+            raise ValueError(f"{name}: .nvdb holds integers of 32 bits")
+        rows = rows.astype(kind)
+    return np.ascontiguousarray(rows)
+
+
+def _write_nvdb(path: str, values: Any, grid: Grid, occupied: Any) -> None:
+    if isinstance(values, tuple) and len(values) == 2:  # of sparse()
+        voxels = to_numpy(values[0], "voxels")
+        rows = {name: to_numpy(a, name) for name, a in values[1].items()} or {"occupancy": np.ones(len(voxels), np.bool_)}
+    else:
+        named = _named(values)
+        mask = _occupied(named, occupied)
+        at = np.nonzero(mask)
+        voxels = np.stack(at[::-1], axis=1)
+        rows = {name: a[at] for name, a in named.items()}
+    grids = [(name, _nvdb_values(name, a)) for name, a in rows.items()]
+    _core.write_nvdb(path, grid, np.ascontiguousarray(voxels, np.int32), grids)
+
+
+def save(path: str | os.PathLike[str], values: Any, grid: Grid, *, occupied: Any = None, **picture: Any) -> None:
+    """Writes voxels to a file, as its name ends. The file appears whole or not at all.
+
+    .npy: one array, as it is. .npz: the arrays by name, with origin and voxel_size. .nvdb (NanoVDB): the occupied
+    voxels with their values, a grid for each name. .png: a picture, with the parameters of render().
+
+    values: an array, a dict of arrays, or what sparse() returned. occupied: bool (nz, ny, nx); by default the voxels
+    whose value is not zero.
+    """
+    name = os.fspath(path)
+    extension = os.path.splitext(name)[1].lower()
+    if extension not in FORMATS:
+        raise ValueError(f"{name}: the formats are {', '.join(FORMATS)}; the voxelize tool has more")
+    if picture and extension != ".png":
+        raise TypeError(f"{', '.join(picture)}: for .png only")
+    temporary = f"{name}.{os.getpid()}.part"
+    try:
+        if extension == ".nvdb":
+            _write_nvdb(temporary, values, grid, occupied)
+        elif extension == ".png":
+            with open(temporary, "wb") as f:
+                f.write(png_bytes(render(values, grid, occupied=occupied, **picture)))
+        else:
+            is_list = isinstance(values, tuple) and len(values) == 2
+            named = {"coords": to_numpy(values[0], "voxels"), **_named(values[1])} if is_list else _named(values)
+            with open(temporary, "wb") as f:
+                if extension == ".npz":
+                    np.savez_compressed(f, origin=grid.origin, voxel_size=grid.voxel_size, **named)
+                elif len(named) != 1:
+                    raise ValueError(f"{name}: .npy holds one array; .npz holds several")
+                else:
+                    np.save(f, next(iter(named.values())))
+        os.replace(temporary, name)
+    except BaseException:
+        if os.path.exists(temporary):
+            os.remove(temporary)
+        raise
