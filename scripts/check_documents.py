@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Checks README.md, CHANGELOG.md and the Markdown files of docs/, bench/ and records/ against the repository.
+"""Checks README.md, CHANGELOG.md and the Markdown files of docs/, bench/, python/ and records/ against the repository.
 
     check_documents.py [--update]
 
 1. A block of code behind `<!-- samples/FILE -->` is that sample without its licence lines; behind `<!-- samples/FILE: NAME -->`
-   it is the part between `// snippet: NAME` and `// end snippet`, also of files of tests/. All of them are built and run. --update
+   it is the part between `// snippet: NAME` and `// end snippet` (`#` in Python), also of files of tests/ and python/. All of them are built and run. --update
    writes them.
 2. Links to files of the repository lead somewhere, and to headings that exist.
 3. Names of sources in backticks (`*.hpp`, `*.cuh`, `*.cpp`, `*.cu`, `*.py`, `*.sh`) are names of files that exist.
@@ -21,7 +21,7 @@ import sys
 import textwrap
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-BLOCK = re.compile(r"(<!-- ((?:samples|tests)/[^ :]+)(?:: ([^>]+?))? -->\n```\w*\n)(.*?)(^```$)", flags=re.S | re.M)
+BLOCK = re.compile(r"(<!-- ((?:samples|tests|python)/[^ :]+)(?:: ([^>]+?))? -->\n```\w*\n)(.*?)(^```$)", flags=re.S | re.M)
 FENCED = re.compile(r"^```.*?^```$", flags=re.S | re.M)
 
 
@@ -35,11 +35,11 @@ def sample(path, snippet):
     """The whole sample, or its part of that name, less what the part is indented by."""
     lines = (ROOT / path).read_text(encoding="utf-8").splitlines()
     if snippet is None:
-        return "\n".join(line for line in lines if not line.startswith("// SPDX-")) + "\n"
-    starts = [i for i, line in enumerate(lines) if line.strip() == f"// snippet: {snippet}"]
+        return "\n".join(line for line in lines if not line.startswith(("// SPDX-", "# SPDX-"))) + "\n"
+    starts = [i for i, line in enumerate(lines) if line.strip() in (f"// snippet: {snippet}", f"# snippet: {snippet}")]
     if len(starts) != 1:
         raise ValueError(f"{path} has {len(starts)} snippets called {snippet}")
-    end = next((i for i in range(starts[0], len(lines)) if lines[i].strip() == "// end snippet"), None)
+    end = next((i for i in range(starts[0], len(lines)) if lines[i].strip() in ("// end snippet", "# end snippet")), None)
     if end is None:
         raise ValueError(f"{path}: snippet {snippet} has no end")
     return textwrap.dedent("\n".join(lines[starts[0] + 1:end])) + "\n"
@@ -77,7 +77,7 @@ def main():
     update = parser.parse_args().update
     files = tracked()
     errors = []
-    for name in (f for f in files if re.fullmatch(r"(README|CHANGELOG)\.md|(docs|bench|records|tests)/.*\.md", f)):
+    for name in (f for f in files if re.fullmatch(r"(README|CHANGELOG)\.md|(docs|bench|python|records|tests)/.*\.md", f)):
         path = ROOT / name
         text = path.read_text(encoding="utf-8")
         try:
