@@ -56,6 +56,7 @@ present() {
         libnanovdb-tools) command -v nanovdb_validate >/dev/null ;;
         libbenchmark-dev) has_header benchmark/benchmark.h ;;
         python3-venv) python3 -c 'import ensurepip, venv' 2>/dev/null ;;
+        python3-dev) python3 -c 'import os, sys, sysconfig; sys.exit(not os.path.exists(sysconfig.get_path("include") + "/Python.h"))' ;;
         *) [[ $(dpkg-query -W -f='${Status}' "$1" 2>/dev/null) == "install ok installed" ]] ;;
     esac
 }
