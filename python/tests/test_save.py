@@ -1,5 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
+import base64
+import json
+import re
 import shutil
 import struct
 import subprocess
@@ -89,6 +92,30 @@ def test_nanovdb(scene, tmp_path):
         text = subprocess.run(["nanovdb_print", path], check=True, capture_output=True, text=True).stdout
         assert str(int(surface.sum())) in text.replace(",", "") and "height" in text
         subprocess.run(["nanovdb_validate", path], check=True, capture_output=True)
+
+
+def test_page(scene, tmp_path):
+    """The data of the page, decoded as page.html describes them, are the voxels and their values."""
+    mesh, grid, surface, color = scene
+    vp.save(tmp_path / "a.html", {"occupancy": surface, "color": color, "big": np.full(grid.shape, 7, np.int64)}, grid, up="z")
+    text = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert "http:" not in text and "https:" not in text
+    shape = json.loads(re.search(r'<script id="shape" type="application/json">(.*?)</script>', text, re.S)[1])
+    data = zlib.decompress(base64.b64decode(re.search(r'<script id="data" type="text/plain">(.*?)</script>', text, re.S)[1]), -15)
+    assert shape["extent"] == [32, 32, 32] and shape["up"] == "z" and shape["voxels"] == surface.sum()
+    assert [(c["name"], c["type"], c["components"]) for c in shape["channels"]] == [("color", "u8", 3), ("big", "f32", 1)]
+    n = shape["bricks"]
+    position = np.frombuffer(data, "<u4", 3 * n).reshape(3, n).T
+    brick, m = np.nonzero(np.unpackbits(np.frombuffer(data, np.uint8, 64 * n, 12 * n).reshape(n, 64), axis=1, bitorder="little"))
+    x, y, z = (8 * position[brick, a] + sum((m >> (3 * i + a) & 1) << i for i in range(3)) for a in range(3))
+    drawn = np.zeros_like(surface)
+    drawn[z, y, x] = True
+    assert np.array_equal(drawn, surface)
+    assert np.array_equal(np.frombuffer(data, np.uint8, 3 * len(x), 76 * n).reshape(-1, 3), color[z, y, x])
+    assert len(data) == 76 * n + 7 * len(x)
+    listed = vp.view(vp.sparse(mesh, grid), grid)
+    assert listed._repr_html_().startswith("<iframe srcdoc=") and json.dumps("occupancy") not in listed.html
+    assert vp.view(np.zeros(grid.shape, bool), grid).html.count("<canvas") == 2
 
 
 def test_failures_leave_no_file(scene, tmp_path):

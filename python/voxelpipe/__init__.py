@@ -23,6 +23,7 @@ from ._fit import fit
 from ._save import render, save
 from ._solid import OpenMeshWarning, solid
 from ._surface import DroppedTrianglesWarning, Fragments, fragments, voxelize
+from ._view import View, view
 
 try:
     __version__ = version("voxelpipe")
@@ -34,6 +35,7 @@ __all__ = [
     "Fragments",
     "Grid",
     "OpenMeshWarning",
+    "View",
     "bake",
     "fit",
     "fragments",
@@ -41,5 +43,6 @@ __all__ = [
     "save",
     "solid",
     "sparse",
+    "view",
     "voxelize",
 ]

@@ -7,33 +7,17 @@ from __future__ import annotations
 import os
 import struct
 import zlib
-from typing import Any, Mapping
+from typing import Any
 
 import numpy as np
 
 from . import _core
 from ._core import Grid
+from ._listed import is_list, listed, named, occupied_of
 from ._mesh import to_numpy
+from ._view import view
 
-FORMATS = (".npy", ".npz", ".nvdb", ".png")
-
-
-def _named(values: Any) -> dict[str, np.ndarray]:
-    if isinstance(values, Mapping):
-        return {name: to_numpy(a, name) for name, a in values.items()}
-    a = to_numpy(values, "values")
-    return {"occupancy" if a.dtype == np.bool_ else "values": a}
-
-
-def _occupied(named: dict[str, np.ndarray], occupied: Any) -> np.ndarray:
-    """bool (nz, ny, nx): as given, or else a mask among the values, or else where any value is not zero."""
-    if occupied is not None:
-        return to_numpy(occupied, "occupied").astype(np.bool_, copy=False)
-    for a in named.values():
-        if a.dtype == np.bool_:
-            return a
-    masks = [a != 0 if a.ndim == 3 else (a != 0).any(axis=-1) for a in named.values()]
-    return np.logical_or.reduce(masks)
+FORMATS = (".npy", ".npz", ".nvdb", ".png", ".html")
 
 
 def _as_colors(a: np.ndarray) -> np.ndarray:
@@ -64,9 +48,9 @@ def render(
     size: width and height in pixels. azimuth, elevation: where the viewer stands, in degrees. up: "y" or "z".
     background: "sky", "white", "dark", "transparent", "#rrggbb", or "#rrggbb,#rrggbb" from top to bottom.
     """
-    named = _named(values)
-    shown = np.ascontiguousarray(_occupied(named, occupied)).view(np.uint8)
-    colors = next((a for a in named.values() if a.ndim == 4 and a.shape[-1] in (3, 4)), None)
+    arrays = named(values)
+    shown = np.ascontiguousarray(occupied_of(arrays, occupied)).view(np.uint8)
+    colors = next((a for a in arrays.values() if a.ndim == 4 and a.shape[-1] in (3, 4)), None)
     if colors is not None:
         colors = np.ascontiguousarray(_as_colors(colors))
     return _core.render(
@@ -106,25 +90,12 @@ def _nvdb_values(name: str, a: np.ndarray) -> np.ndarray | None:
     return np.ascontiguousarray(rows)
 
 
-def _write_nvdb(path: str, values: Any, grid: Grid, occupied: Any) -> None:
-    if isinstance(values, tuple) and len(values) == 2:  # of sparse()
-        voxels = to_numpy(values[0], "voxels")
-        rows = {name: to_numpy(a, name) for name, a in values[1].items()} or {"occupancy": np.ones(len(voxels), np.bool_)}
-    else:
-        named = _named(values)
-        mask = _occupied(named, occupied)
-        at = np.nonzero(mask)
-        voxels = np.stack(at[::-1], axis=1)
-        rows = {name: a[at] for name, a in named.items()}
-    grids = [(name, _nvdb_values(name, a)) for name, a in rows.items()]
-    _core.write_nvdb(path, grid, np.ascontiguousarray(voxels, np.int32), grids)
-
-
-def save(path: str | os.PathLike[str], values: Any, grid: Grid, *, occupied: Any = None, **picture: Any) -> None:
+def save(path: str | os.PathLike[str], values: Any, grid: Grid, *, occupied: Any = None, **options: Any) -> None:
     """Writes voxels to a file, as its name ends. The file appears whole or not at all.
 
     .npy: one array, as it is. .npz: the arrays by name, with origin and voxel_size. .nvdb (NanoVDB): the occupied
-    voxels with their values, a grid for each name. .png: a picture, with the parameters of render().
+    voxels with their values, a grid for each name. .png: a picture, with the parameters of render(). .html: a page, with those
+    of view().
 
     values: an array, a dict of arrays, or what sparse() returned. occupied: bool (nz, ny, nx); by default the voxels
     whose value is not zero.
@@ -133,25 +104,28 @@ def save(path: str | os.PathLike[str], values: Any, grid: Grid, *, occupied: Any
     extension = os.path.splitext(name)[1].lower()
     if extension not in FORMATS:
         raise ValueError(f"{name}: the formats are {', '.join(FORMATS)}; the voxelize tool has more")
-    if picture and extension != ".png":
-        raise TypeError(f"{', '.join(picture)}: for .png only")
+    if options and extension not in (".png", ".html"):
+        raise TypeError(f"{', '.join(options)}: for .png and .html only")
     temporary = f"{name}.{os.getpid()}.part"
     try:
         if extension == ".nvdb":
-            _write_nvdb(temporary, values, grid, occupied)
+            voxels, rows = listed(values, occupied)
+            _core.write_nvdb(temporary, grid, voxels, [(n, _nvdb_values(n, a)) for n, a in rows.items()])
+        elif extension == ".html":
+            stem = os.path.splitext(os.path.basename(name))[0]
+            view(values, grid, occupied=occupied, name=stem, **options).save(temporary)
         elif extension == ".png":
             with open(temporary, "wb") as f:
-                f.write(png_bytes(render(values, grid, occupied=occupied, **picture)))
+                f.write(png_bytes(render(values, grid, occupied=occupied, **options)))
         else:
-            is_list = isinstance(values, tuple) and len(values) == 2
-            named = {"coords": to_numpy(values[0], "voxels"), **_named(values[1])} if is_list else _named(values)
+            arrays = {"coords": to_numpy(values[0], "voxels"), **named(values[1])} if is_list(values) else named(values)
             with open(temporary, "wb") as f:
                 if extension == ".npz":
-                    np.savez_compressed(f, origin=grid.origin, voxel_size=grid.voxel_size, **named)
-                elif len(named) != 1:
+                    np.savez_compressed(f, origin=grid.origin, voxel_size=grid.voxel_size, **arrays)  # type: ignore[arg-type]
+                elif len(arrays) != 1:
                     raise ValueError(f"{name}: .npy holds one array; .npz holds several")
                 else:
-                    np.save(f, next(iter(named.values())))
+                    np.save(f, next(iter(arrays.values())))
         os.replace(temporary, name)
     except BaseException:
         if os.path.exists(temporary):
