@@ -42,7 +42,8 @@ def voxelize(
     """The voxels that a surface covers: bool, (nz, ny, nx).
 
     coverage: "conservative", every voxel whose closed box a triangle touches; "thin", one voxel in each column along a
-        triangle's main axis, which leaves no hole between face neighbours.
+        triangle's main axis, which leaves no hole between face neighbours; "crosshair", those of which a triangle meets a
+        segment through the centre along an axis: still fewer, without a hole, and the same however a face is cut.
     packed: uint32 (nz, ny, ceil(nx / 32)) in place of bool, a bit for each voxel, lowest bit first. An eighth of the
         memory.
     threads: 0 takes all cores. The result is the same for any number.
