@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// The call that voxelpipe.voxelize makes, from C++: reads vertices and triangles as raw float32 and uint32, draws into a byte a
-// voxel, and prints the median of so many runs in milliseconds, with the number of voxels. Used by compare.py.
+// The call that voxelpipe.voxelize makes, from C++: reads vertices and triangles as raw float32 and uint32, draws into
+// a byte a voxel, and prints the median of so many runs in milliseconds, with the number of voxels. Used by compare.py.
 #include <cpu_ref/backend.hpp>
 
 #include <algorithm>

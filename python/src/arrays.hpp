@@ -47,7 +47,8 @@ using triangle_array = nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_
     if (name == "conservative") return coverage::conservative;
     if (name == "thin") return coverage::thin;
     if (name == "crosshair") return coverage::crosshair;
-    throw nb::value_error(("coverage is 'conservative', 'thin' or 'crosshair', not '" + std::string(name) + "'").c_str());
+    throw nb::value_error(
+        ("coverage is 'conservative', 'thin' or 'crosshair', not '" + std::string(name) + "'").c_str());
 }
 
 // Whether a (nz, ny, nx, ...) array has the grid's shape, and rows of `columns` values. Throws ValueError.

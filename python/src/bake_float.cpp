@@ -24,8 +24,8 @@ nb::dict bake(const position_array& positions, const triangle_array& triangles, 
     const std::size_t components = out.shape(3);
     expect_shape(out, g, {components});
     expect_shape(counts, g);
-    const auto call = make_bake_call<float>(positions, triangles, g, rule, values, {first_column, components},
-                                            per_triangle, threads);
+    const auto call =
+        make_bake_call<float>(positions, triangles, g, rule, values, {first_column, components}, per_triangle, threads);
     return report(with_components(components, [&]<int Components>() {
         return with_blend(blend_name, [&]<class Blend>() {
             const nb::gil_scoped_release released;

@@ -120,9 +120,8 @@ listed_bricks make_bricks(const array<const std::int32_t, 2>& voxels, const grid
 template <class T>
 void add_grid(io::nanovdb_file& file, const std::string& name, const listed_bricks& bricks, const void* values) {
     const auto* const rows = static_cast<const T*>(values);
-    file.add<T>({name, bricks.table(), bricks.where, T{}, [rows, &bricks](std::uint64_t rank) {
-                     return rows[bricks.row_of[rank]];
-                 }});
+    file.add<T>({name, bricks.table(), bricks.where, T{},
+                 [rows, &bricks](std::uint64_t rank) { return rows[bricks.row_of[rank]]; }});
 }
 
 using any_array = nb::ndarray<nb::ro, nb::ndim<2>, nb::c_contig, nb::device::cpu>;

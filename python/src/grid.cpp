@@ -52,8 +52,8 @@ std::string describe(const grid& g) {
     text.precision(10);
     const glm::dvec3 corner = g.part_origin();
     text << "Grid(origin=(" << corner.x << ", " << corner.y << ", " << corner.z << "), voxel_size=(" << g.voxel_size.x
-         << ", " << g.voxel_size.y << ", " << g.voxel_size.z << "), shape=(" << g.extent.z << ", " << g.extent.y
-         << ", " << g.extent.x << "))";
+         << ", " << g.voxel_size.y << ", " << g.voxel_size.z << "), shape=(" << g.extent.z << ", " << g.extent.y << ", "
+         << g.extent.x << "))";
     return text.str();
 }
 
@@ -90,14 +90,15 @@ void bind_grid(nb::module_& m) {
                 return part;
             },
             nb::arg("begin"), nb::arg("shape"),
-            "The part of `shape` (nz, ny, nx) that begins at voxel `begin` (z, y, x). What is drawn into a crop is, bit\n"
+            "The part of `shape` (nz, ny, nx) that begins at voxel `begin` (z, y, x). What is drawn into a crop is, "
+            "bit\n"
             "for bit, that part of what is drawn into the whole. Raises ValueError where it is not within the grid.")
         .def(
             "voxel_center",
             [](const grid& g, const triple_of_int& voxel) {
-                return to_tuple(g.to_world(to_vector({static_cast<double>(voxel[0]) + 0.5,
-                                                       static_cast<double>(voxel[1]) + 0.5,
-                                                       static_cast<double>(voxel[2]) + 0.5})));
+                return to_tuple(
+                    g.to_world(to_vector({static_cast<double>(voxel[0]) + 0.5, static_cast<double>(voxel[1]) + 0.5,
+                                          static_cast<double>(voxel[2]) + 0.5})));
             },
             nb::arg("voxel"), "World position of the centre of voxel (i, j, k), counted along x, y and z.")
         .def(
@@ -109,7 +110,8 @@ void bind_grid(nb::module_& m) {
             },
             "The same grid where its whole grid's low corner is 0: for positions from which that was taken away.")
         .def_prop_ro("_whole_origin", [](const grid& g) { return to_tuple(g.origin); })
-        .def("__eq__", [](const grid& a, const grid& b) { return a == b; }, nb::is_operator())
+        .def(
+            "__eq__", [](const grid& a, const grid& b) { return a == b; }, nb::is_operator())
         .def("__hash__",
              [](const grid& g) {
                  return nb::hash(nb::make_tuple(g.origin.x, g.origin.y, g.origin.z, g.voxel_size.x, g.voxel_size.y,

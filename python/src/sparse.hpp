@@ -37,8 +37,8 @@ template <class T, int Components, class Blend>
     cpu_backend backend{call.threads};
     sparse_framebuffer<cpu_backend, target<value, Blend>, number_of_fragments> fb{backend, call.where.extent};
     sparse_values<T> drawn;
-    drawn.result = voxelize(backend, call.mesh, call.where, passthrough{}, counted_value_shader<T, Components>{call.rows},
-                            fb, voxelize_options{call.rule});
+    drawn.result = voxelize(backend, call.mesh, call.where, passthrough{},
+                            counted_value_shader<T, Components>{call.rows}, fb, voxelize_options{call.rule});
     if (!drawn.result.ok()) return drawn;
     drawn.num_voxels = fb.num_voxels();
     const auto& values = get<0>(fb.contents().values);

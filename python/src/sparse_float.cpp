@@ -25,8 +25,8 @@ nb::tuple bake(const position_array& positions, const triangle_array& triangles,
 
 void bind_sparse_float(nb::module_& m) {
     m.def("sparse_float", &bake, nb::arg("positions"), nb::arg("triangles"), nb::arg("grid"), nb::arg("coverage"),
-          nb::arg("values"), nb::arg("first_column"), nb::arg("num_columns"), nb::arg("per_triangle"),
-          nb::arg("blend"), nb::arg("threads"));
+          nb::arg("values"), nb::arg("first_column"), nb::arg("num_columns"), nb::arg("per_triangle"), nb::arg("blend"),
+          nb::arg("threads"));
 }
 
 } // namespace voxelpipe::python

@@ -66,8 +66,7 @@ nb::tuple list_fragments(const position_array& positions, const triangle_array& 
     std::vector<float> barycentrics(3 * num_fragments);
     static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
     if (num_fragments != 0) std::memcpy(barycentrics.data(), lists.payloads.data(), num_fragments * sizeof(glm::vec3));
-    return nb::make_tuple(to_numpy(std::move(voxels), {num_voxels, 3}),
-                          to_numpy(std::move(offsets), {num_voxels + 1}),
+    return nb::make_tuple(to_numpy(std::move(voxels), {num_voxels, 3}), to_numpy(std::move(offsets), {num_voxels + 1}),
                           to_numpy(std::move(lists.primitives), {num_fragments}),
                           to_numpy(std::move(barycentrics), {num_fragments, 3}), counts);
 }

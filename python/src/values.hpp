@@ -99,8 +99,7 @@ auto with_blend(std::string_view name, F&& f) {
     if (name == "min") return f.template operator()<blend::min>();
     if (name == "max") return f.template operator()<blend::max>();
     if (name == "last") return f.template operator()<blend::replace>();
-    throw nb::value_error(
-        ("blend is 'mean', 'sum', 'min', 'max' or 'last', not '" + std::string(name) + "'").c_str());
+    throw nb::value_error(("blend is 'mean', 'sum', 'min', 'max' or 'last', not '" + std::string(name) + "'").c_str());
 }
 
 // Divides the sums of a mean, each quotient rounded once, and puts `fill` where there is no fragment. `values` has
