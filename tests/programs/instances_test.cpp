@@ -5,7 +5,13 @@
 
 #include "api_model.hpp"
 
+#include <voxelpipe/core/instances.hpp>
+
 #include <gtest/gtest.h>
+
+#include <cstdint>
+#include <random>
+#include <vector>
 
 namespace {
 
@@ -144,6 +150,26 @@ TEST(Instances, HaveLimitsAndCheckedIndices) {
     const vp::status bad = run(3);
     EXPECT_EQ(bad.code, vp::status_code::index_out_of_range);
     EXPECT_EQ(bad.triangle, 4u);
+}
+
+// The quotient is estimated from below: numbers around multiples of the divisor show a wrong step.
+TEST(Instances, RemainderWithoutADivision) {
+    const std::vector<std::uint32_t> edges{
+        0, 1, 2, 3, 7, 255, 256, 65535U, 65536U, 0x7fffffffU, 0x80000000U, 0x80000001U, 0xfffffffeU, 0xffffffffU};
+    const auto check = [](std::uint32_t n, std::uint32_t divisor) {
+        if (divisor == 0) return;
+        EXPECT_EQ(n % divisor, vp::core::remainder_by(divisor).of(n)) << n << " by " << divisor;
+    };
+    for (const std::uint32_t n : edges)
+        for (const std::uint32_t divisor : edges) check(n, divisor);
+    std::mt19937 random(1);
+    for (int i = 0; i < 100000; ++i) {
+        const auto n = static_cast<std::uint32_t>(random()), divisor = static_cast<std::uint32_t>(random()) >> (i % 32);
+        check(n, divisor);
+        if (divisor != 0) check(n / divisor * divisor, divisor);
+        if (divisor != 0) check(n / divisor * divisor - 1, divisor);
+    }
+    EXPECT_EQ(0U, vp::core::remainder_by(0).of(5)); // a mesh without triangles
 }
 
 } // namespace

@@ -13,6 +13,26 @@
 
 namespace voxelpipe::core {
 
+// Remainders of 32-bit numbers by one that is known before, without a division or a branch.
+class remainder_by {
+public:
+    remainder_by() = default;
+    // 0 counts as 1.
+    VOXELPIPE_HD explicit constexpr remainder_by(std::uint32_t divisor)
+        : divisor_(divisor != 0 ? divisor : 1),
+          reciprocal_(divisor_ != 1 ? static_cast<std::uint32_t>((std::uint64_t{1} << 32) / divisor_) : ~0u) {}
+
+    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::uint32_t of(std::uint32_t n) const {
+        // The reciprocal is rounded down by less than 1, so that the quotient is at most 1 too small.
+        const auto quotient = static_cast<std::uint32_t>((std::uint64_t{n} * reciprocal_) >> 32);
+        const std::uint32_t rest = n - quotient * divisor_, less = rest - divisor_;
+        return rest < less ? rest : less; // below the divisor, `less` wraps around
+    }
+
+private:
+    std::uint32_t divisor_ = 1, reciprocal_ = ~0u;
+};
+
 // An index of a triangle's vertices, moved to an instance whose vertices begin at `first`. An index that names no
 // vertex of the mesh names none of the instances either.
 [[nodiscard]] VOXELPIPE_HD inline glm::uvec3 move_to_instance(const glm::uvec3& t, std::uint32_t num_vertices,

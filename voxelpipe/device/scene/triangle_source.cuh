@@ -5,6 +5,7 @@
 // Loads triangles for a raster without tiles: vertices from the mesh or from vertex_shade, positions in 32 bits if they
 // fit, bounding boxes, and prefetching of the next triangles.
 
+#include <voxelpipe/core/instances.hpp>
 #include <voxelpipe/core/small_triangle.hpp>
 #include <voxelpipe/device/scene/scene.cuh>
 #include <voxelpipe/device/scene/vertex_shade.cuh>
@@ -25,6 +26,7 @@ struct shading_source {
     VertexShader shader;
     core::snap_transform snap;
     std::uint32_t draw;
+    core::remainder_by triangle_of_mesh = core::remainder_by(static_cast<std::uint32_t>(mesh.triangles.size()));
 
     [[nodiscard]] __device__ VOXELPIPE_INLINE glm::vec3 shade(std::uint32_t vertex) const {
         const auto result = shader(core::fetch_vertex(mesh, vertex, draw));
@@ -48,8 +50,9 @@ struct shading_source {
         const glm::vec3 p = shade(vertex);
         return core::snap(snap, p.x, p.y, p.z);
     }
+    // Without a branch: one kept loads of several triangles from being in flight together, for up to 20 % of a call.
     [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const {
-        return i < mesh.triangles.size() ? mesh.triangles[i] : mesh.triangles[i % mesh.triangles.size()];
+        return mesh.triangles[triangle_of_mesh.of(i)];
     }
 };
 
