@@ -21,7 +21,7 @@ using voxelize::sampled_texture;
 const color_tables tables = voxelize::make_color_tables();
 
 picture random_picture(std::uint32_t width, std::uint32_t height) {
-    picture result{"", width, height, {}};
+    picture result{"", width, height, {}, 0, {}};
     std::mt19937 random(width * 7919 + height);
     for (std::size_t i = 0; i < std::size_t{4} * width * height; ++i)
         result.rgba.push_back(static_cast<std::uint8_t>(random() & 255U));
@@ -93,10 +93,10 @@ TEST(MipLevels, ALaterFirstLevelLeavesOutTheLevelsBefore) {
 }
 
 TEST(MipLevels, InvisibleTexelsDoNotColourVisibleOnes) {
-    const picture source{"", 2, 1, {255, 0, 0, 255, 0, 255, 0, 0}};
+    const picture source{"", 2, 1, {255, 0, 0, 255, 0, 255, 0, 0}, 0, {}};
     EXPECT_EQ(glm::u8vec4(255, 0, 0, 128), voxelize::with_mip_levels(source, true, 1).back());
     EXPECT_EQ(glm::u8vec4(188, 188, 0, 128), voxelize::with_mip_levels(source, false, 1).back());
-    const picture none{"", 2, 1, {255, 0, 0, 0, 0, 255, 0, 0}};
+    const picture none{"", 2, 1, {255, 0, 0, 0, 0, 255, 0, 0}, 0, {}};
     EXPECT_EQ(glm::u8vec4(188, 188, 0, 0), voxelize::with_mip_levels(none, true, 1).back());
 }
 
