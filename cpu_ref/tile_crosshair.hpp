@@ -7,6 +7,7 @@
 // compile nothing twice.
 
 #include <cpu_ref/pipeline.hpp>
+#include <cpu_ref/tile_columns.hpp>
 #include <voxelpipe/core/crosshair.hpp>
 
 #include <array>

@@ -31,7 +31,8 @@ TEST(Messages, ChoicesAreListedInWords) {
         return result.err.substr(0, result.err.find('\n'));
     };
     EXPECT_EQ("voxelize: --up takes y or z, not \"x\"", error({"--up", "x"}));
-    EXPECT_EQ("voxelize: --coverage takes conservative or thin, not \"thick\"", error({"--coverage", "thick"}));
+    EXPECT_EQ("voxelize: --coverage takes conservative, thin or crosshair, not \"thick\"",
+              error({"--coverage", "thick"}));
     EXPECT_EQ("voxelize: --depth-axis takes x, y or z, not \"w\"", error({"--depth-axis", "w"}));
     EXPECT_EQ("voxelize: --alpha takes weight, cutoff or ignore, not \"0.5\"", error({"--alpha", "0.5"}));
     EXPECT_EQ("voxelize: --backend takes auto, cpu or cuda, not \"gpu\"", error({"--backend", "gpu"}));
