@@ -216,10 +216,8 @@ TEST(Crossings, SmallTrianglesAreThoseOfTheWidePathUpToTheLargestOnes) {
                 std::int64_t q[3];
                 for (int k = 0; k < 3; ++k) {
                     const std::int64_t end = side < most ? side : most;
-                    q[k] = corner[k] + (random.one_in(6) ? 0
-                                        : random.one_in(6)
-                                            ? end - 1
-                                            : random.below(static_cast<std::uint64_t>(end)) / grain * grain);
+                    const auto inside = static_cast<std::int64_t>(random.below(static_cast<std::uint64_t>(end)));
+                    q[k] = corner[k] + (random.one_in(6) ? 0 : random.one_in(6) ? end - 1 : inside / grain * grain);
                 }
                 s.positions[static_cast<std::size_t>(v)] = {q[0], q[1], q[2]};
             }
