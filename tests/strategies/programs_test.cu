@@ -40,7 +40,7 @@ struct shader {
 
 } // namespace programs_types
 
-namespace {
+namespace programs_tests { // named for the same reason
 
 namespace blend = voxelpipe::blend;
 using namespace device_test;
@@ -178,4 +178,4 @@ TEST(DeviceField, GivesItsGoldenValues) {
     EXPECT_EQ(fields::digest(out.to_host(gpu)), fields::golden);
 }
 
-} // namespace
+} // namespace programs_tests
