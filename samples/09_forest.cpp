@@ -73,9 +73,10 @@ int main() {
     std::vector<glm::vec3> flat, grass;
     std::vector<glm::uvec3> squares;
     for (unsigned i = 0; i <= 64 * 65 + 64; ++i) {
-        flat.emplace_back(4.0f * static_cast<float>(i % 65), 0.0f, 4.0f * static_cast<float>(i / 65));
+        const unsigned column = i % 65, row = i / 65;
+        flat.emplace_back(4.0f * static_cast<float>(column), 0.0f, 4.0f * static_cast<float>(row));
         grass.emplace_back(0.45f, 0.52f + 0.1f * random(i), 0.28f);
-        if (i % 65 == 64 || i / 65 == 64) continue;
+        if (column == 64 || row == 64) continue;
         squares.emplace_back(i, i + 65, i + 1);
         squares.emplace_back(i + 1, i + 65, i + 66);
     }
