@@ -129,7 +129,7 @@ template <class Coverage, class Draw, class... Targets>
     return with_status(triangles_in, [&] {
         std::optional<stage_clock> clock;
         if (backend.times != nullptr) clock.emplace(backend.stream);
-        mask_call<Draw, Targets...> call(backend, draws, g, clock ? &*clock : nullptr);
+        mask_call<Draw, cuda_backend, Targets...> call(backend, draws, g, clock ? &*clock : nullptr);
         const status s = Coverage::dispatch(options.rule, [&]<coverage Rule>() {
             return call.template run<Rule>(fb, options.count_voxels, triangles_in);
         });

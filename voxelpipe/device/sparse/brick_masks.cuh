@@ -35,10 +35,9 @@ inline constexpr bool follows_from_count =
 template <class FragmentShader, class... Targets>
 inline constexpr bool may_follow_from_masks = core::is_constant<FragmentShader> && (follows_from_count<Targets> && ...);
 
-template <class Draw, class... Targets>
+template <class Draw, class Backend, class... Targets>
 [[nodiscard]] bool follows_from_masks(std::span<const Draw> draws, const grid& g, coverage rule,
-                                      std::uint64_t triangles_in,
-                                      const sparse_framebuffer<cuda_backend, Targets...>& fb) {
+                                      std::uint64_t triangles_in, const sparse_framebuffer<Backend, Targets...>& fb) {
     const glm::ivec3 whole = g.whole_extent();
     if (rule == coverage::crosshair || core::keeps_voxels(fb) ||
         std::max({whole.x, whole.y, whole.z}) > brick_index<>::max_extent || draws.size() > tuning::max_raster_draws ||
@@ -109,17 +108,18 @@ __global__ void fold_bit_counts(word* values, std::uint64_t voxels, const std::u
 
 // ---- the call -------------------------------------------------------------------------------------------------------
 
-template <class Draw, class... Targets>
+// Backend is cuda_backend, which includes what is below it and is not known here.
+template <class Draw, class Backend, class... Targets>
 class mask_call;
-template <class Mesh, class VertexShader, class FragmentShader, class... Targets>
-class mask_call<draw<Mesh, VertexShader, FragmentShader>, Targets...> {
+template <class Mesh, class VertexShader, class FragmentShader, class Backend, class... Targets>
+class mask_call<draw<Mesh, VertexShader, FragmentShader>, Backend, Targets...> {
     using draw_type = draw<Mesh, VertexShader, FragmentShader>;
-    using framebuffer = sparse_framebuffer<cuda_backend, Targets...>;
+    using framebuffer = sparse_framebuffer<Backend, Targets...>;
     static constexpr bool shades_in_raster = is_cheap<VertexShader>;
 
 public:
     // Throws cuda_failure, std::bad_alloc or std::runtime_error.
-    mask_call(cuda_backend& backend, std::span<const draw_type> draws, const grid& g, stage_clock* clock)
+    mask_call(Backend& backend, std::span<const draw_type> draws, const grid& g, stage_clock* clock)
         : backend_(backend), stream_(backend.stream), draws_(draws), g_(g), snap_(core::make_snap_transform(g)),
           clock_(clock), totals_(backend, std::size_t{1}), coarse_state_(backend, std::size_t{1}),
           index_(backend, g.whole_extent()), memory_(backend, plan_memory()) {
@@ -141,7 +141,7 @@ public:
         end_stage(clock_, &stage_times::tile_sort);
         if (bricks > core::max_numbered) return core::failure(status_code::size_overflow, stage::coarse_raster);
 
-        sparse_contents<cuda_backend, Targets...> made(backend_);
+        sparse_contents<Backend, Targets...> made(backend_);
         made.keys = device_buffer<std::uint64_t>(backend_, bricks);
         made.masks = device_buffer<brick_mask>(backend_, bricks);
         made.offsets = device_buffer<std::uint64_t>(backend_, bricks == 0 ? 0 : bricks + 1);
@@ -332,7 +332,7 @@ private:
         made.offsets = std::move(offsets);
     }
 
-    cuda_backend& backend_;
+    Backend& backend_;
     cudaStream_t stream_;
     std::span<const draw_type> draws_;
     const grid& g_;
