@@ -7,8 +7,8 @@
 // Positions are in the file's own units and axes: nothing is rescaled or turned, but where a format states its unit or
 // upright axis and assimp follows that (Collada), which is a warning. Colours of materials and vertices are taken as
 // sRGB, what a screen shows; a surface without either is white. A texture is looked for beside the model or below its
-// folder, by its last name where its path leads elsewhere; one that cannot be had is a warning. Points and lines have
-// no surface, meshes with bones stand as they were bound.
+// folder, by its last name where its path leads elsewhere; one that cannot be had is a warning. Meshes with bones stand
+// as they were bound. The vertices of a mesh without faces are points.
 
 #include "gltf_scene.hpp"
 #include "scene.hpp"

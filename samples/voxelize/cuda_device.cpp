@@ -25,7 +25,8 @@ std::uint64_t bytes_of(const std::vector<T>& list) {
 std::uint64_t bytes_of(const scene& model) {
     std::uint64_t bytes = 0;
     for (const primitive& part : model.primitives)
-        bytes += bytes_of(part.positions) + bytes_of(part.triangles) + bytes_of(part.texcoords) + bytes_of(part.colors);
+        bytes += bytes_of(part.positions) + bytes_of(part.triangles) + bytes_of(part.lines) + bytes_of(part.texcoords) +
+                 bytes_of(part.colors);
     for (const picture& image : model.images)
         bytes += bytes_of(image.rgba) + bytes_of(image.levels[0]) + bytes_of(image.levels[1]);
     return bytes;

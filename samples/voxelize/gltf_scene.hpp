@@ -12,8 +12,7 @@
 // one animation at one time.
 //
 // Unsupported parts of a file: where geometry would be lost (required extensions that are not known, Draco or meshopt
-// compression in a build without the library) the load fails and says so; otherwise scene::warnings names it. Points
-// and lines have no surface and are left out.
+// compression in a build without the library) the load fails and says so; otherwise scene::warnings names it.
 
 #include "model_error.hpp"
 #include "scene.hpp"

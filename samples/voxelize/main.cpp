@@ -100,12 +100,15 @@ void run(const command_line& options, clock::time_point begin) {
         error.warnings = report.warnings;
         throw error;
     };
-    if (model.triangle_count() == 0) refuse("there are no triangles to voxelize");
-    if (model.triangle_count() > UINT32_MAX)
-        refuse("there are " + std::to_string(model.triangle_count()) + " triangles, more than the " +
+    const std::uint64_t elements = model.triangle_count() + model.line_count();
+    if (elements == 0) refuse("there are no triangles, lines or points to voxelize");
+    if (model.triangle_count() == 0 && options.voxelize.solid)
+        refuse("there are only lines and points, which enclose nothing: --solid needs triangles");
+    if (elements > UINT32_MAX)
+        refuse("there are " + std::to_string(elements) + " triangles, lines and points, more than the " +
                std::to_string(UINT32_MAX) + " that can be numbered");
     const bounding_box bounds = bounds_of(model, options.voxelize.threads);
-    if (bounds.empty) refuse("no triangle has a corner at a finite position");
+    if (bounds.empty) refuse("nothing to voxelize has a corner at a finite position");
     report.request.grid = place_grid(options.grid, bounds);
     report.request.padding = options.grid.padding;
     if (std::string warning = precision_warning(model, report.request.grid); !warning.empty())

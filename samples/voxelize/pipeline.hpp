@@ -85,14 +85,20 @@ public:
         reference_ = reference_point(request.grid);
         relative_grid_ = request.grid;
         relative_grid_.origin -= reference_;
-        for (const instance& shown : model.instances)
-            num_triangles_ += model.primitives[shown.primitive].triangles.size();
-        if (wants(target::triangle) && num_triangles_ > INT32_MAX)
-            throw std::runtime_error("more triangles than --target triangle can number");
+        num_triangles_ = model.triangle_count();
+        const std::uint64_t num_lines = model.line_count();
+        draws_lines_ = num_lines != 0 && !request.solid;
+        if (num_lines != 0 && request.solid)
+            stats.warnings.push_back(std::to_string(num_lines) +
+                                     " line(s) and point(s) enclose nothing: --solid leaves them out");
+        keeps_bits_ = keeps_bits_ || draws_lines_; // of which the voxels are counted
+        if (wants(target::triangle) && num_triangles_ + num_lines > INT32_MAX)
+            throw std::runtime_error("more triangles and lines than --target triangle can number");
         upload_primitives(model);
         draw_table_.push_back({backend_, numbered_draws_});
         stats_.triangles = num_triangles_;
-        only_bits_ = !any_mask_ && !wants(target::color) && !wants(target::color_max) &&
+        stats_.lines = draws_lines_ ? num_lines : 0;
+        only_bits_ = !any_mask_ && !draws_lines_ && !wants(target::color) && !wants(target::color_max) &&
                      !wants(target::color_replace) && !wants(target::normal) && !wants(target::material) &&
                      !wants(target::triangle) && !wants(target::depth);
     }
@@ -127,6 +133,8 @@ public:
                                              else
                                                  draw_surface(result, part, begin);
                                          });
+        if (draws_lines_) // a voxel may have been drawn twice
+            stats_.voxels = static_cast<std::uint64_t>(result.popcount(*result.find(bits_name_)));
         if (wants(target::normal)) count_cancelled_normals(result);
         if (wants(target::color_outer)) {
             const voxelize_stats counted = stats_; // the same fragments again
@@ -179,6 +187,8 @@ protected: // sparse_pipeline draws the same into bricks
     };
     using mesh_view = vp::mesh_view<>;
     using surface_draw = vp::draw<mesh_view, surface_vertex_shader, surface_fragment_shader>;
+    using lines_view = vp::lines_view<>;
+    using line_draw = vp::draw<lines_view, surface_vertex_shader, line_fragment_shader<surface_fragment_shader>>;
     using bits_draw = vp::draw<mesh_view, placed_vertex_shader, vp::constant_output<bool, std::uint32_t>>;
 
     // In the order of surface_fragment_shader's outputs.
@@ -189,6 +199,7 @@ protected: // sparse_pipeline draws the same into bricks
                         vp::target<glm::u8vec4, vp::blend::replace>, vp::target<glm::vec3, vp::blend::add>,
                         vp::target<std::uint32_t, vp::blend::replace>, vp::target<float, vp::blend::min>>;
     using outer_draw = vp::draw<mesh_view, surface_vertex_shader, outer_fragment_shader>;
+    using outer_line_draw = vp::draw<lines_view, surface_vertex_shader, line_fragment_shader<outer_fragment_shader>>;
     using outer_framebuffer = vp::framebuffer<Backend, vp::target<std::uint64_t, vp::blend::max>>;
     using bits_target = vp::target<vp::bit, vp::blend::bit_or>;
     using bits_map = typename bits_target::map;
@@ -305,6 +316,7 @@ protected: // sparse_pipeline draws the same into bricks
             uploaded_primitive& done =
                 primitives_.emplace_back(uploaded_primitive{{backend_, part.positions},
                                                             {backend_, part.triangles},
+                                                            {backend_, part.lines},
                                                             {},
                                                             {backend_, part.texcoords},
                                                             {backend_, part.colors},
@@ -323,6 +335,7 @@ protected: // sparse_pipeline draws the same into bricks
         std::uint64_t first_triangle = 0;
         for (const instance& shown : model.instances) {
             const uploaded_primitive& part = primitives_[shown.primitive];
+            if (part.lines.size() != 0) continue;
             const auto& triangles = shown.to_world.mirrors() ? part.mirrored_triangles.front() : part.triangles;
             mesh_view mesh{part.positions.view(), triangles.view()};
             // The scene's indices are in range.
@@ -335,6 +348,18 @@ protected: // sparse_pipeline draws the same into bricks
             draw_is_double_sided_.push_back(part.double_sided ? 1 : 0);
             numbered_draws_.push_back({first_triangle, part.material});
             first_triangle += mesh.triangles.size();
+        }
+        for (const instance& shown : model.instances) {
+            const uploaded_primitive& part = primitives_[shown.primitive];
+            if (part.lines.size() == 0 || !draws_lines_) continue;
+            lines_view lines{.positions = part.positions.view()};
+            lines.indices = {reinterpret_cast<const std::uint32_t*>(part.lines.data()), 2 * part.lines.size()};
+            surface_vertex_shader vertex_shader = part.vertex_shader;
+            vertex_shader.place = {shown.to_world, reference_};
+            line_draws_.push_back(
+                {lines, vertex_shader, {part.fragment_shader, static_cast<std::uint32_t>(num_triangles_)}});
+            numbered_draws_.push_back({first_triangle, part.material});
+            first_triangle += part.lines.size();
         }
     }
 
@@ -414,17 +439,30 @@ protected: // sparse_pipeline draws the same into bricks
 
     // False if the framebuffer's limits are too small; nothing is drawn then.
     template <class Draw, class Framebuffer>
-    bool draw(const std::vector<Draw>& draws, const voxelpipe::grid& part, Framebuffer& framebuffer) {
+    bool draw(const std::vector<Draw>& draws, const voxelpipe::grid& part, Framebuffer& framebuffer,
+              std::uint64_t& dropped) {
         const vp::status status = vp::voxelize(backend_, std::span<const Draw>(draws), part, framebuffer,
                                                vp::voxelize_options{request_.coverage});
         if (status.code == vp::status_code::capacity_exceeded) return false;
         check(status, request_);
+        dropped = status.counts.triangles_dropped();
         add_counts(status);
         return true;
     }
+    // Lines into the `enabled` targets of a framebuffer that triangles have been drawn into; it loads them from then
+    // on. False as draw().
+    template <class Draw, class Framebuffer, std::size_t N>
+    bool draw_lines(const std::vector<Draw>& draws, const voxelpipe::grid& part, Framebuffer& framebuffer,
+                    std::bitset<N> enabled) {
+        if (draws.empty()) return true;
+        const stage_timer timer{*this, "voxelize"};
+        vp::core::for_each_index<N>([&]<std::size_t I>() {
+            if (enabled[I]) vp::get<I>(framebuffer).load();
+        });
+        return draw(draws, part, framebuffer, stats_.lines_dropped);
+    }
 
     void add_counts(const vp::status& status) {
-        stats_.triangles_dropped = status.counts.triangles_dropped();
         stats_.triangles_drawn += status.counts.triangles_drawn;
         stats_.triangles_flat += status.counts.triangles_zero_area;
         stats_.fragments += status.counts.fragments;
@@ -454,9 +492,12 @@ protected: // sparse_pipeline draws the same into bricks
     }
 
     void draw_surface(volume& result, const voxelpipe::grid& part, int begin) {
-        surface_framebuffer& framebuffer = framebuffer_for(surface_framebuffer_, part.extent, enabled_targets());
-        if (enabled_targets()[triangle]) vp::get<triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
+        if (draws_lines_) surface_framebuffer_.reset(); // it loads its targets
+        const std::bitset<num_targets> enabled = enabled_targets();
+        surface_framebuffer& framebuffer = framebuffer_for(surface_framebuffer_, part.extent, enabled);
+        if (enabled[triangle]) vp::get<triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
         draw_reporting(draws_, part, framebuffer);
+        draw_lines(line_draws_, part, framebuffer, enabled);
         const stage_timer timer{*this, "resolve"};
         if (keeps_bits_) copy<occupancy>(result, bits_name_, framebuffer, begin);
         if (counts_fragments()) copy<count>(result, target::count, framebuffer, begin);
@@ -485,6 +526,8 @@ protected: // sparse_pipeline draws the same into bricks
         for (std::size_t i = 0; i < draws_.size(); ++i)
             outer_draws_.push_back(
                 {draws_[i].mesh, draws_[i].vertex_shader, {draws_[i].fragment_shader, draw_is_double_sided_[i] != 0}});
+        for (const line_draw& d : line_draws_)
+            outer_line_draws_.push_back({d.mesh, d.vertex_shader, {{d.fragment_shader.of_triangles}}});
         return sides_that_see(result, *result.find(bits_name_), request_.threads);
     }
 
@@ -500,8 +543,15 @@ protected: // sparse_pipeline draws the same into bricks
         }
         std::bitset<1> all;
         all.set();
+        for (outer_line_draw& draw : outer_line_draws_) {
+            draw.fragment_shader.of_triangles.sides = of_slab.data();
+            draw.fragment_shader.of_triangles.first = part.offset;
+            draw.fragment_shader.of_triangles.extent = part.extent;
+        }
+        if (draws_lines_) outer_framebuffer_.reset();
         outer_framebuffer& framebuffer = framebuffer_for(outer_framebuffer_, part.extent, all);
         draw_reporting(outer_draws_, part, framebuffer);
+        draw_lines(outer_line_draws_, part, framebuffer, all);
         const stage_timer timer{*this, "resolve"};
         resolve<glm::u8vec4>(result, target::color_outer, part.extent, begin, outer_color{elements_of<0>(framebuffer)});
     }
@@ -559,7 +609,10 @@ protected: // sparse_pipeline draws the same into bricks
 
     void add_solid_counts(const vp::status& status, const voxelpipe::grid& part) {
         check(status, request_);
-        if (!draws_surface_) add_counts(status);
+        if (!draws_surface_) {
+            stats_.triangles_dropped = status.counts.triangles_dropped();
+            add_counts(status);
+        }
         solid_counts& counts = stats_.solid ? *stats_.solid : stats_.solid.emplace();
         counts.rows += static_cast<std::uint64_t>(part.extent.y) * static_cast<std::uint64_t>(part.extent.z);
         counts.open_rows += status.solid.open_rows;
@@ -641,7 +694,7 @@ protected: // sparse_pipeline draws the same into bricks
             stats_.warnings.push_back("the normals of " + std::to_string(stats_.normals_cancelled) + " of " +
                                       std::to_string(stats_.voxels) +
                                       " voxels cancel out (two sides of a thin wall in one voxel, or triangles without "
-                                      "area); --target normal is 0 there");
+                                      "area, lines and points); --target normal is 0 there");
     }
 
     // Elements of a target, in the backend's memory.
@@ -659,7 +712,7 @@ protected: // sparse_pipeline draws the same into bricks
                 report_(total == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(total));
             };
         }
-        const bool is_drawn = draw(draws, part, framebuffer);
+        const bool is_drawn = draw(draws, part, framebuffer, stats_.triangles_dropped);
         report_(1.0);
         return is_drawn;
     }
@@ -705,6 +758,7 @@ protected: // sparse_pipeline draws the same into bricks
     bool any_mask_ = false;
     bool only_bits_ = false;
     bool draws_surface_ = false; // else a solid's bits are all there is
+    bool draws_lines_ = false;   // after the triangles
     bool keeps_bits_ = false;    // of the surface, in the channel bits_name_
     std::string bits_name_ = "occupancy";
     const std::string inside_name_ = "inside"; // the channel of a solid's bits where no occupancy is asked for
@@ -721,6 +775,7 @@ protected: // sparse_pipeline draws the same into bricks
     struct uploaded_primitive {
         stored<glm::vec3> positions;
         stored<glm::uvec3> triangles;
+        stored<glm::uvec2> lines;
         std::vector<stored<glm::uvec3>> mirrored_triangles; // one, where an instance mirrors
         stored<glm::vec2> texcoords;
         stored<glm::vec4> colors;
@@ -731,12 +786,14 @@ protected: // sparse_pipeline draws the same into bricks
     };
     std::vector<uploaded_primitive> primitives_;
     std::vector<surface_draw> draws_;
+    std::vector<line_draw> line_draws_;
     std::vector<bits_draw> bits_draws_;
     std::unique_ptr<surface_framebuffer> surface_framebuffer_;
     std::unique_ptr<bits_framebuffer> bits_framebuffer_;
     std::unique_ptr<bits_framebuffer> solid_framebuffer_;
     std::vector<char> draw_is_double_sided_;
     std::vector<outer_draw> outer_draws_;
+    std::vector<outer_line_draw> outer_line_draws_;
     std::unique_ptr<outer_framebuffer> outer_framebuffer_;
     std::vector<numbered_draw> numbered_draws_;
     std::vector<buffer<numbered_draw>> draw_table_;

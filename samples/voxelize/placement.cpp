@@ -159,6 +159,8 @@ bounding_box bounds_of(const scene& model, int threads) {
         corners[n].resize(part.positions.size());
         for (const glm::uvec3& triangle : part.triangles)
             for (int i = 0; i < 3; ++i) corners[n][triangle[i]] = true;
+        for (const glm::uvec2& line : part.lines)
+            for (int i = 0; i < 2; ++i) corners[n][line[i]] = true;
         for (std::size_t i = 0; i < part.positions.size(); ++i)
             if (const glm::vec3& p = part.positions[i]; !is_finite(p))
                 corners[n][i] = false;

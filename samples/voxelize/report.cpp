@@ -81,6 +81,11 @@ void print_text(std::ostream& stream, const run_report& report) {
     line("triangles") << report.stats.triangles;
     if (report.stats.triangles_dropped != 0) stream << " (" << report.stats.triangles_dropped << " dropped)";
     stream << '\n';
+    if (report.stats.lines != 0) {
+        line("lines and points") << report.stats.lines;
+        if (report.stats.lines_dropped != 0) stream << " (" << report.stats.lines_dropped << " dropped)";
+        stream << '\n';
+    }
     line("vertices") << report.vertices << '\n';
     line("fragments") << report.stats.fragments;
     if (report.stats.fragments_discarded != 0) stream << " (" << report.stats.fragments_discarded << " more discarded)";
@@ -142,6 +147,10 @@ void print_json(std::ostream& stream, const run_report& report) {
     root["slabs"] = report.stats.slabs;
     root["triangles"] = report.stats.triangles;
     root["triangles_dropped"] = report.stats.triangles_dropped;
+    if (report.stats.lines != 0) {
+        root["lines"] = report.stats.lines;
+        root["lines_dropped"] = report.stats.lines_dropped;
+    }
     root["vertices"] = report.vertices;
     root["fragments"] = report.stats.fragments;
     root["fragments_discarded"] = report.stats.fragments_discarded;

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The model that the tool voxelizes: triangles with the base colour of their materials, in plain vectors, each mesh
-// once, and the transforms of its instances. Nothing here knows of the file format that it came from. Everything is
-// valid as it stands: every index points into its list, every optional list is empty or has one entry a vertex.
+// The model that the tool voxelizes: triangles, lines and points with the base colour of their materials, in plain
+// vectors, each mesh once, and the transforms of its instances. Nothing here knows of the file format that it came
+// from. Everything is valid as it stands: every index points into its list, every optional list is empty or has one
+// entry a vertex.
 
 #include "affine.hpp"
 
@@ -63,11 +64,13 @@ struct material {
     bool double_sided = false;
 };
 
-// One list of triangles with one material, in the coordinates of its mesh. It is shown only where an instance says so.
+// One list of triangles, or one of lines, with one material, in the coordinates of its mesh. It is shown only where an
+// instance says so.
 struct primitive {
     std::string name;                  // the mesh's name, or where it stands in the file; for messages
     std::vector<glm::vec3> positions;  // the mesh's own coordinates, as the file has them
     std::vector<glm::uvec3> triangles; // indices into positions, counter-clockwise seen from the front
+    std::vector<glm::uvec2> lines;     // indices into positions; a point is a line from a vertex to itself
     std::vector<glm::vec2> texcoords;  // of the base-colour texture, its transform applied; empty: no texture
     std::vector<glm::vec4> colors;     // linear vertex colours and alpha; empty: white
     std::uint32_t material = 0;        // index into scene::materials
@@ -82,7 +85,8 @@ struct instance {
 
 struct scene {
     std::vector<primitive> primitives;
-    std::vector<instance> instances; // what is drawn, in this order; later triangles win where only one can
+    // What is drawn, in this order, triangles before lines; later ones win where only one can.
+    std::vector<instance> instances;
     std::vector<material> materials; // the file's, in its order; then, where one is needed, the default material
     std::vector<texture> textures;
     std::vector<picture> images;
@@ -97,6 +101,12 @@ struct scene {
     [[nodiscard]] std::uint64_t triangle_count() const {
         std::uint64_t count = 0;
         for (const instance& shown : instances) count += primitives[shown.primitive].triangles.size();
+        return count;
+    }
+    // Points count as lines.
+    [[nodiscard]] std::uint64_t line_count() const {
+        std::uint64_t count = 0;
+        for (const instance& shown : instances) count += primitives[shown.primitive].lines.size();
         return count;
     }
 };

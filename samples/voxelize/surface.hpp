@@ -305,6 +305,25 @@ private:
     }
 };
 
+// The shader of triangles for the fragments of lines and points, whose numbers follow those of the triangles. A line's
+// fragment may interpolate beyond its ends; it takes the nearer end's values there. In color-outer a line, which has no
+// normal, comes after every triangle.
+template <class Shader>
+struct line_fragment_shader {
+    Shader of_triangles;
+    std::uint32_t first_number = 0;
+
+    VOXELPIPE_HD auto operator()(vp::fragment<surface_varyings> f) const {
+        for (int end = 0; end < 2; ++end) {
+            if (!(f.barycentric[1 - end] < 0.0f)) continue;
+            f.varyings = *f.vertex_varyings[end];
+            f.barycentric = glm::vec3(end == 0 ? 1.0f : 0.0f, end == 0 ? 0.0f : 1.0f, 0.0f);
+        }
+        f.primitive += first_number;
+        return of_triangles(f);
+    }
+};
+
 // For --target color-outer: the fragment's colour as a number that is greater the farther out the fragment lies, so
 // that the greatest of a voxel wins in any order. From high bits to low: whether the fragment turns its front (either
 // side, if its material is double-sided) to a side of the grid that sees the voxel; how far the triangle's plane lies

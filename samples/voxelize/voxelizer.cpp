@@ -55,6 +55,7 @@ struct scene_bytes {
     double vertices = 0;  // as they are snapped: at least
     double varyings = 0;  // what shaders hand on
     double triangles = 0; // their pairs with tiles, one for most, listed and sorted
+    double lines = 0;     // the fragments of a voxel each, listed and sorted: at least
 };
 
 scene_bytes bytes_of(const scene& model, const voxelize_request& request) {
@@ -63,14 +64,14 @@ scene_bytes bytes_of(const scene& model, const voxelize_request& request) {
     for (const material& m : model.materials) shaded = shaded || m.alpha == alpha_mode::mask;
     const auto vertices = static_cast<double>(model.vertex_count());
     return {vertices * sizeof(vp::core::snapped_position), shaded ? vertices * sizeof(surface_varyings) : 0,
-            static_cast<double>(model.triangle_count()) * 24};
+            static_cast<double>(model.triangle_count()) * 24, static_cast<double>(model.line_count()) * 128};
 }
 
 volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats) {
     const int threads = thread_count(request.threads);
     const scene_bytes parts = bytes_of(model, request);
     const double least = parts.vertices + volume_bytes(request);
-    const double likely = least + parts.varyings + parts.triangles;
+    const double likely = least + parts.varyings + parts.triangles + parts.lines;
     memory::require(least,
                     "a scene of " + std::to_string(model.vertex_count()) + " vertices and " +
                         std::to_string(model.triangle_count()) + " triangles",
@@ -103,8 +104,8 @@ std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_
     const auto start = std::chrono::steady_clock::now();
     const bool is_forced = request.strategy != voxelpipe::strategy::automatic; // how a GPU draws
     if (request.backend == backend_choice::automatic && !is_forced && built_with_cuda()) {
-        const work_size work =
-            work_of(request, static_cast<double>(model.triangle_count()), static_cast<double>(model_bytes(model)));
+        const work_size work = work_of(request, static_cast<double>(model.triangle_count() + model.line_count()),
+                                       static_cast<double>(model_bytes(model)));
         const double on_cpu = cpu_milliseconds(work, thread_count(request.threads));
         const double on_cuda = cuda_milliseconds(work, request.cuda ? request.cuda->milliseconds_ago() : 0);
         stats.estimate = in_words(on_cpu, on_cuda);
@@ -162,6 +163,8 @@ std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage)
     if (stats.triangles_flat != 0)
         return text + "the triangles have no area, and thin and crosshair coverage draw areas only (--coverage "
                       "conservative draws all)";
+    if (stats.lines != 0 && stats.triangles_dropped + stats.lines_dropped == stats.triangles + stats.lines)
+        return text + "no triangle, line or point has positions that can be drawn";
     if (stats.triangles != 0 && stats.triangles_dropped == stats.triangles)
         return text + "no triangle has three positions that can be drawn";
     return text + "the model lies outside the grid";

@@ -209,10 +209,25 @@ TEST(Obj, Utf16IsNamed) {
     EXPECT_EQ("assimp: the file is text in UTF-16, not UTF-8", error_of("wide.obj", bytes));
 }
 
-TEST(Obj, LinesAndPointsAreLeftOutWithAWarning) {
-    const scene scene = load("mixed.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nl 2 3\n");
+TEST(Obj, LinesAndPointsComeBesideTriangles) {
+    const scene scene = load("mixed.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nl 2 3\nf 1 2 3\np 2\n");
+    EXPECT_EQ(1U, scene.triangle_count());
+    EXPECT_EQ(3U, scene.line_count());
+    EXPECT_EQ("", text_of(scene.warnings));
+    for (const voxelize::primitive& part : scene.primitives) EXPECT_TRUE(part.triangles.empty() || part.lines.empty());
+}
+
+TEST(Ply, VerticesWithoutFacesArePoints) {
+    const scene scene =
+        load("cloud.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                          "property float z\nproperty uchar red\nproperty uchar green\n"
+                          "property uchar blue\nend_header\n0 0 0 255 0 0\n1 2 3 0 255 0\n4 5 6 0 0 255\n");
     EXPECT_EQ(0U, scene.triangle_count());
-    EXPECT_EQ("2 point(s), line(s) or set(s) of them have no surface and are left out\n", text_of(scene.warnings));
+    EXPECT_EQ(3U, scene.line_count());
+    ASSERT_EQ(1U, scene.primitives.size());
+    EXPECT_EQ((std::vector<glm::uvec2>{{0, 0}, {1, 1}, {2, 2}}), scene.primitives[0].lines);
+    ASSERT_EQ(3U, scene.primitives[0].colors.size());
+    EXPECT_EQ(glm::vec4(0, 1, 0, 1), scene.primitives[0].colors[1]);
 }
 
 constexpr const char* triangle_stl = "solid one\nfacet normal 0 0 1\nouter loop\nvertex 0 0 7\nvertex 3 0 7\n"

@@ -26,8 +26,9 @@ std::string outcome(const fs::path& file) {
     try {
         const voxelize::scene scene = voxelize::load_gltf(file);
         std::ostringstream text;
-        text << "ok: " << scene.instances.size() << " primitives, " << scene.triangle_count() << " triangles, "
-             << scene.vertex_count() << " vertices, " << scene.images.size() << " images\n";
+        text << "ok: " << scene.instances.size() << " primitives, " << scene.triangle_count() << " triangles, ";
+        if (scene.line_count() != 0) text << scene.line_count() << " lines and points, ";
+        text << scene.vertex_count() << " vertices, " << scene.images.size() << " images\n";
         for (const std::string& warning : scene.warnings) text << "  warning: " << warning << '\n';
         return text.str();
     } catch (const voxelize::gltf_error& error) {

@@ -109,14 +109,39 @@ TEST(GltfScene, LeftoverIndicesMakeNoTriangle) {
     EXPECT_TRUE(warns(scene, "left over"));
 }
 
-TEST(GltfScene, PointsAndLinesAreLeftOutWithAWarning) {
-    for (int mode = 0; mode < 4; ++mode) {
-        builder file;
-        file.triangle()["mode"] = mode;
+TEST(GltfScene, PointsAndLinesAreListed) {
+    const auto lines = [](int mode, int corners, bool expect_warning = false) {
+        builder file = zigzag(corners);
+        file.root["meshes"][0]["primitives"][0]["mode"] = mode;
         const scene scene = load(file);
-        EXPECT_TRUE(scene.primitives.empty());
-        EXPECT_TRUE(warns(scene, "points or lines"));
-    }
+        EXPECT_EQ(expect_warning, warns(scene, "left over that make no line")) << mode << ' ' << corners;
+        EXPECT_EQ(0U, scene.triangle_count());
+        return scene.primitives.empty() ? std::vector<glm::uvec2>{} : scene.primitives.at(0).lines;
+    };
+    using list = std::vector<glm::uvec2>;
+    EXPECT_EQ((list{{0, 0}, {1, 1}, {2, 2}}), lines(0, 3));
+    EXPECT_EQ((list{{0, 1}, {2, 3}}), lines(1, 4));
+    EXPECT_EQ((list{{0, 1}, {2, 3}}), lines(1, 5, true));
+    EXPECT_EQ((list{{0, 1}, {1, 2}, {2, 3}, {3, 0}}), lines(2, 4));
+    EXPECT_EQ((list{{0, 1}, {1, 2}, {2, 3}}), lines(3, 4));
+    EXPECT_EQ((list{{0, 1}, {1, 0}}), lines(2, 2));
+    EXPECT_EQ(list{}, lines(2, 1, true));
+    EXPECT_EQ(list{}, lines(3, 1, true));
+    EXPECT_EQ(list{}, lines(1, 1, true));
+}
+
+TEST(GltfScene, IndicesOfLinesAreFollowedAndChecked) {
+    const auto file = [](const std::vector<std::uint16_t>& indices) {
+        builder result = zigzag(4);
+        json& primitive = result.root["meshes"][0]["primitives"][0];
+        primitive["mode"] = 3;
+        primitive["indices"] = result.accessor(indices, "SCALAR");
+        return result;
+    };
+    const scene scene = load(file({3, 0, 2}));
+    EXPECT_EQ((std::vector<glm::uvec2>{{3, 0}, {0, 2}}), scene.primitives.at(0).lines);
+    EXPECT_EQ(2U, scene.line_count());
+    EXPECT_THROW((void)load(file({3, 0, 4})), voxelize::gltf_error);
 }
 
 TEST(GltfScene, QuantizedPositionsAreIntegersOrFractions) {

@@ -80,6 +80,17 @@ void expect_same_files(const scratch_folder& folder, const fs::path& model, std:
     }
 }
 
+TEST(GpuFiles, OfLinesAndPoints) {
+    const scratch_folder folder;
+    const std::string model = folder / "m.glb";
+    gltf_test::lined_world().write_glb(model);
+    for (const char* coverage : {"conservative", "thin"}) {
+        expect_same_files(folder, model, {"-r", "64", "--coverage", coverage, "-t", all_targets}, {"a.npz"});
+        expect_same_files(folder, model, {"-r", "120", "--coverage", coverage, "--work-memory", "1", "-t", all_targets},
+                          {"a.npz"});
+    }
+}
+
 TEST(GpuFiles, OfAModelWithEverythingInIt) {
     const scratch_folder folder;
     const std::string model = folder / "m.glb";

@@ -39,10 +39,10 @@ std::vector<fs::path> shared_models() {
     return list;
 }
 
-bool has_triangles(const fs::path& file) {
+bool is_drawable(const fs::path& file) {
     try {
         const voxelize::scene scene = voxelize::load_gltf(file);
-        return scene.triangle_count() != 0 && !voxelize::bounds_of(scene).empty;
+        return scene.triangle_count() + scene.line_count() != 0 && !voxelize::bounds_of(scene).empty;
     } catch (const voxelize::gltf_error&) {
         return false;
     }
@@ -60,7 +60,7 @@ TEST(Models, EveryFileVoxelizesOrSaysWhyNot) {
         const std::string out = folder / "o.npz";
         const outcome result =
             tool_test::run(folder, {file.string(), "-o", out, "-r", "12", "-t", "occupancy,color,normal"});
-        if (has_triangles(file)) {
+        if (is_drawable(file)) {
             EXPECT_EQ(0, result.code) << file << ": " << result.err;
             EXPECT_TRUE(fs::remove(out)) << file;
         } else {
@@ -103,6 +103,7 @@ TEST(Models, VolumesAreTheGoldenOnes) {
     const scratch_folder folder;
     fs::create_directories(folder / "generated");
     gltf_test::small_world().write_glb(folder / "generated/small_world");
+    gltf_test::lined_world().write_glb(folder / "generated/lined_world");
 
     std::map<std::string, std::string> found;
     const auto add = [&](const fs::path& root, const std::string& name) {
@@ -111,6 +112,7 @@ TEST(Models, VolumesAreTheGoldenOnes) {
             found[name + ' ' + label] = summary(root / name, 96, coverage);
     };
     add(folder.path(), "generated/small_world");
+    add(folder.path(), "generated/lined_world");
     const fs::path shared = VOXELPIPE_GLTF_DIR;
     if (shared.empty()) {
         std::puts("VOXELPIPE_GLTF_DIR is not set: only the model that the test writes");

@@ -12,12 +12,11 @@ namespace {
 TEST(ToolInputs, WarningsAreShownWhenNothingIsLeftToDraw) {
     const scratch_folder folder;
     builder file;
-    file.triangle()["mode"] = 1; // lines
-    const std::string model = folder / "lines.glb";
+    file.triangle()["attributes"].erase("POSITION");
+    const std::string model = folder / "nowhere.glb";
     file.write_glb(model);
-    const std::string warning =
-        "voxelize: warning: 1 primitive(s) of points or lines have no surface and are left out\n";
-    const std::string error = "voxelize: " + model + ": there are no triangles to voxelize\n";
+    const std::string warning = "voxelize: warning: 1 primitive(s) without POSITION are left out\n";
+    const std::string error = "voxelize: " + model + ": there are no triangles, lines or points to voxelize\n";
     const outcome loud = run(folder, {model, "-o", folder / "o.npy"});
     EXPECT_EQ(2, loud.code);
     EXPECT_EQ(warning + error, loud.err);

@@ -63,4 +63,31 @@ inline builder small_world() {
     return file;
 }
 
+// A list of vertices drawn in MODE, with their colours.
+inline json& add_vertices(builder& file, int mode, const std::vector<float>& positions,
+                          const std::vector<float>& colors) {
+    const int color = file.accessor(colors, "VEC3");
+    json& primitive = file.mesh({{"POSITION", file.accessor(positions, "VEC3")}, {"COLOR_0", color}});
+    primitive["mode"] = mode;
+    return primitive;
+}
+
+// A cube and a square with lines and points: a loop before all triangles, a strip of a material that blends, two
+// segments, one of which lies in a face of the cube, and points inside, outside and on a face.
+inline builder lined_world() {
+    builder file;
+    add_vertices(file, 2, {-0.2F, 0.5F, 0.5F, 0.5F, 1.6F, 0.4F, 1.3F, 0.3F, 0.7F}, {1, 0, 0, 0, 1, 0, 0, 0, 1});
+    add_cube(file, {0, 0, 0}, 1, add_material(file, {0.8, 0.1, 0.05, 1}, {{"name", "brick"}}));
+    add_square(file, 1.4F);
+    const int glass = add_material(file, {0.1, 0.2, 0.9, 0.5}, {{"alphaMode", "BLEND"}});
+    add_vertices(file, 3, {0, 0, 1.2F, 1, 0.2F, 1.3F, 0.5F, 1.1F, 1.1F, 0, 0.4F, 1.5F},
+                 {1, 1, 1, 1, 1, 1, 0.5F, 0.5F, 0.5F, 1, 1, 0})["material"] = glass;
+    add_vertices(file, 1, {0.1F, 0.1F, 1, 0.9F, 0.8F, 1, 0.5F, 0.5F, -0.3F, 0.5F, 0.5F, 1.6F},
+                 {0, 1, 0, 0, 1, 1, 1, 0, 1, 1, 1, 1});
+    add_vertices(file, 0, {0.5F, 0.5F, 0.5F, 1.2F, 1.2F, 1.2F, 0.25F, 0.25F, 1, -0.1F, -0.1F, -0.1F},
+                 {1, 0.5F, 0, 0, 0.5F, 1, 1, 1, 0, 0.2F, 0.2F, 0.2F});
+    file.root["nodes"].back()["rotation"] = {0.05, 0.1, 0.02, 0.99};
+    return file;
+}
+
 } // namespace gltf_test

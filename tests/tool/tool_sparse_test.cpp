@@ -54,20 +54,24 @@ void expect_same_voxels(const scratch_folder& folder) {
 
 TEST(ToolSparse, HoldsTheVoxelsAndValuesOfADenseRun) {
     const scratch_folder folder;
-    gltf_test::small_world().write_glb(folder / "m.glb");
-    for (const char* coverage : {"conservative", "thin"})
-        for (const char* padding : {"0", "5"}) {
-            const auto voxelize = [&](const char* out, const char* how) {
-                const outcome result = run(folder, {folder / "m.glb", "-o", folder / out, "-r", "48", "-t",
-                                                    most_targets, "--coverage", coverage, "--padding", padding, how});
-                ASSERT_EQ(0, result.code) << result.err;
-                EXPECT_EQ(std::string(how) == "--sparse", result.out.find("bricks of 8 x 8 x 8") != std::string::npos)
-                    << result.out;
-            };
-            voxelize("s.npy", "--sparse");
-            voxelize("d.npy", "--dense");
-            expect_same_voxels(folder);
-        }
+    gltf_test::small_world().write_glb(folder / "world.glb");
+    gltf_test::lined_world().write_glb(folder / "lines.glb");
+    for (const char* model : {"world.glb", "lines.glb"})
+        for (const char* coverage : {"conservative", "thin"})
+            for (const char* padding : {"0", "5"}) {
+                const auto voxelize = [&](const char* out, const char* how) {
+                    const outcome result =
+                        run(folder, {folder / model, "-o", folder / out, "-r", "48", "-t", most_targets, "--coverage",
+                                     coverage, "--padding", padding, how});
+                    ASSERT_EQ(0, result.code) << result.err;
+                    EXPECT_EQ(std::string(how) == "--sparse",
+                              result.out.find("bricks of 8 x 8 x 8") != std::string::npos)
+                        << result.out;
+                };
+                voxelize("s.npy", "--sparse");
+                voxelize("d.npy", "--dense");
+                expect_same_voxels(folder);
+            }
 }
 
 TEST(ToolSparse, SolidsHoldTheVoxelsAndValuesOfADenseRun) {

@@ -184,12 +184,12 @@ void add_embedded(model& result, const aiTexture& source) {
 // ------------------------------------------------------------------------------------------------
 
 struct left_out {
-    std::size_t no_surface = 0; // faces of points and lines, meshes without faces
-    std::size_t bent = 0;       // meshes with bones
-    std::size_t unusable = 0;   // vertices
-    std::size_t no_place = 0;   // instances
+    std::size_t bent = 0;     // meshes with bones
+    std::size_t unusable = 0; // vertices
+    std::size_t no_place = 0; // instances
 };
 
+// Triangles and lines in one list of vertices; see parts_of.
 primitive read_mesh(const aiMesh& source, std::size_t index, const model& result, left_out& without) {
     primitive part;
     part.name = source.mName.length != 0 ? gltf::printable(source.mName.C_Str()) : "mesh " + std::to_string(index);
@@ -203,18 +203,16 @@ primitive read_mesh(const aiMesh& source, std::size_t index, const model& result
     part.triangles.reserve(source.mNumFaces);
     for (unsigned i = 0; i < source.mNumFaces; ++i) {
         const aiFace& face = source.mFaces[i];
-        if (face.mNumIndices < 3) {
-            ++without.no_surface;
-            continue;
-        }
         for (unsigned corner = 0; corner < face.mNumIndices; ++corner)
             if (face.mIndices[corner] >= source.mNumVertices) throw std::runtime_error("an index is out of range");
+        if (face.mNumIndices == 1 || face.mNumIndices == 2)
+            part.lines.emplace_back(face.mIndices[0], face.mIndices[face.mNumIndices - 1]);
         // A polygon that could not be triangulated is a fan.
         for (unsigned corner = 2; corner < face.mNumIndices; ++corner)
             part.triangles.emplace_back(face.mIndices[0], face.mIndices[corner - 1], face.mIndices[corner]);
     }
-    if (source.mNumFaces == 0) ++without.no_surface;
-    if (part.triangles.empty()) return part;
+    if (source.mNumFaces == 0)
+        for (unsigned i = 0; i < source.mNumVertices; ++i) part.lines.emplace_back(i, i);
     for (const glm::vec3& p : part.positions)
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) ++without.unusable;
     if (source.HasBones()) ++without.bent;
@@ -234,13 +232,27 @@ primitive read_mesh(const aiMesh& source, std::size_t index, const model& result
     return part;
 }
 
+// The primitives of a mesh: none, its triangles, its lines, or both.
+std::vector<primitive> parts_of(primitive&& mesh) {
+    std::vector<primitive> parts;
+    if (mesh.lines.empty() && mesh.triangles.empty()) return parts;
+    if (!mesh.lines.empty() && !mesh.triangles.empty()) {
+        parts.push_back(mesh);
+        parts[0].lines.clear();
+        mesh.triangles.clear();
+    }
+    parts.push_back(std::move(mesh));
+    return parts;
+}
+
 affine transform_of(const aiMatrix4x4& m) {
     affine result;
     result.m = {{{m.a1, m.a2, m.a3, m.a4}, {m.b1, m.b2, m.b3, m.b4}, {m.c1, m.c2, m.c3, m.c4}}};
     return result;
 }
 
-void read_nodes(model& result, const aiNode& root, const std::vector<std::int64_t>& primitive_of, left_out& without) {
+void read_nodes(model& result, const aiNode& root, const std::vector<std::vector<std::uint32_t>>& primitives_of,
+                left_out& without) {
     struct visit {
         const aiNode* node;
         affine to_world;
@@ -251,12 +263,14 @@ void read_nodes(model& result, const aiNode& root, const std::vector<std::int64_
         pending.pop_back();
         for (unsigned i = 0; i < current.node->mNumMeshes; ++i) {
             const unsigned mesh = current.node->mMeshes[i];
-            if (mesh >= primitive_of.size()) throw std::runtime_error("a node shows a mesh that is not there");
-            if (primitive_of[mesh] < 0) continue;
-            if (current.to_world.is_finite())
-                result.instances.push_back({static_cast<std::uint32_t>(primitive_of[mesh]), current.to_world});
-            else
+            if (mesh >= primitives_of.size()) throw std::runtime_error("a node shows a mesh that is not there");
+            if (primitives_of[mesh].empty()) continue;
+            if (!current.to_world.is_finite()) {
                 ++without.no_place;
+                continue;
+            }
+            for (const std::uint32_t number : primitives_of[mesh])
+                result.instances.push_back({number, current.to_world});
         }
         for (unsigned i = current.node->mNumChildren; i-- > 0;) {
             const aiNode* const child = current.node->mChildren[i];
@@ -303,18 +317,17 @@ model read_model(std::span<const std::byte> bytes, const std::string& name, cons
         for (material& entry : result.materials) entry.base_color = glm::vec4(1);
     }
     left_out without;
-    std::vector<std::int64_t> primitive_of; // by mesh; -1: it has no triangles
-    for (unsigned i = 0; i < scene->mNumMeshes; ++i) {
-        primitive part = read_mesh(*scene->mMeshes[i], i, result, without);
-        primitive_of.push_back(part.triangles.empty() ? -1 : static_cast<std::int64_t>(result.primitives.size()));
-        if (!part.triangles.empty()) result.primitives.push_back(std::move(part));
-    }
-    read_nodes(result, *scene->mRootNode, primitive_of, without);
+    std::vector<std::vector<std::uint32_t>> primitives_of(scene->mNumMeshes); // by mesh
+    for (unsigned i = 0; i < scene->mNumMeshes; ++i)
+        for (primitive& part : parts_of(read_mesh(*scene->mMeshes[i], i, result, without))) {
+            primitives_of[i].push_back(static_cast<std::uint32_t>(result.primitives.size()));
+            result.primitives.push_back(std::move(part));
+        }
+    read_nodes(result, *scene->mRootNode, primitives_of, without);
     warn_of_units(result, *scene->mRootNode, extension);
     const auto warn = [&](std::size_t count, const char* what) {
         if (count != 0) result.warnings.push_back(std::to_string(count) + ' ' + what);
     };
-    warn(without.no_surface, "point(s), line(s) or set(s) of them have no surface and are left out");
     warn(without.bent, "mesh(es) with bones are shown as they were bound");
     warn(without.unusable, "vertices at positions that are not finite: their triangles will be dropped");
     warn(without.no_place, "mesh(es) with a transform that is not finite are left out");

@@ -15,6 +15,7 @@ std::vector<std::byte> to_bytes(const model& source) {
         out.list(part.name);
         out.list(part.positions);
         out.list(part.triangles);
+        out.list(part.lines);
         out.list(part.texcoords);
         out.list(part.colors);
         out.value(part.material);
@@ -56,6 +57,8 @@ void check(const model& m) {
         require(part.colors.empty() || part.colors.size() == part.positions.size());
         for (const glm::uvec3& t : part.triangles)
             require(t.x < part.positions.size() && t.y < part.positions.size() && t.z < part.positions.size());
+        for (const glm::uvec2& l : part.lines) require(l.x < part.positions.size() && l.y < part.positions.size());
+        require(part.triangles.empty() || part.lines.empty());
     }
     for (const instance& shown : m.instances)
         require(shown.primitive < m.primitives.size() && shown.to_world.is_finite());
@@ -82,6 +85,7 @@ model from_bytes(std::span<const std::byte> bytes) {
         part.name = gltf::printable(text());
         in.list(part.positions);
         in.list(part.triangles);
+        in.list(part.lines);
         in.list(part.texcoords);
         in.list(part.colors);
         in.value(part.material);

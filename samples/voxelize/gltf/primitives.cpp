@@ -42,7 +42,36 @@ std::vector<glm::uvec3> unrolled(int mode, const std::vector<std::uint32_t>& ind
     return triangles;
 }
 
+std::uint64_t line_count(int mode, std::uint64_t count) {
+    if (mode == TINYGLTF_MODE_POINTS) return count;
+    if (mode == TINYGLTF_MODE_LINE) return count / 2;
+    return count < 2 ? 0 : mode == TINYGLTF_MODE_LINE_LOOP ? count : count - 1;
+}
+
+std::vector<glm::uvec2> unrolled_lines(int mode, const std::vector<std::uint32_t>& indices, std::uint64_t count) {
+    const auto index = [&](std::uint64_t i) {
+        return indices.empty() ? static_cast<std::uint32_t>(i) : indices[static_cast<std::size_t>(i)];
+    };
+    const std::uint64_t num_lines = line_count(mode, count);
+    std::vector<glm::uvec2> lines;
+    lines.reserve(static_cast<std::size_t>(num_lines));
+    for (std::uint64_t i = 0; i < num_lines; ++i) {
+        if (mode == TINYGLTF_MODE_POINTS)
+            lines.emplace_back(index(i), index(i));
+        else if (mode == TINYGLTF_MODE_LINE)
+            lines.emplace_back(index(2 * i), index(2 * i + 1));
+        else
+            lines.emplace_back(index(i), index(i + 1 == count ? 0 : i + 1));
+    }
+    return lines;
+}
+
 namespace {
+
+gltf_error out_of_range(const std::string& where, std::uint32_t index, std::size_t place, std::size_t vertices) {
+    return gltf_error(where + ": index " + std::to_string(index) + " at place " + std::to_string(place) +
+                      " is out of range, there are " + std::to_string(vertices) + " vertices");
+}
 
 void check_position_type(const tinygltf::Accessor& accessor, const std::string& where) {
     if (accessor.type != TINYGLTF_TYPE_VEC3 || accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
@@ -53,7 +82,7 @@ void check_position_type(const tinygltf::Accessor& accessor, const std::string& 
 
 void primitive_reader::show(const shown_mesh& shown, std::size_t part) {
     const tinygltf::Primitive& source = model_.meshes[shown.mesh].primitives[part];
-    const bool posed = source.mode >= TINYGLTF_MODE_TRIANGLES && poses_.is_posed(shown, source);
+    const bool posed = poses_.is_posed(shown, source);
     const std::tuple key{shown.mesh, part, posed ? shown.node : -1};
     auto found = known_.find(key);
     if (found == known_.end()) found = known_.emplace(key, read(shown, part, posed)).first;
@@ -77,10 +106,6 @@ primitive_reader::read_part primitive_reader::read(const shown_mesh& shown, std:
     const std::size_t mesh = shown.mesh;
     const tinygltf::Primitive& source = model_.meshes[mesh].primitives[part];
     const std::string where = "meshes[" + std::to_string(mesh) + "].primitives[" + std::to_string(part) + "]";
-    if (source.mode < TINYGLTF_MODE_TRIANGLES) {
-        ++counted_["primitive(s) of points or lines have no surface and are left out"];
-        return {};
-    }
     const auto position = source.attributes.find("POSITION");
     if (position == source.attributes.end()) {
         ++counted_["primitive(s) without POSITION are left out"];
@@ -90,10 +115,16 @@ primitive_reader::read_part primitive_reader::read(const shown_mesh& shown, std:
     if (vertices > UINT32_MAX) throw gltf_error(where + ": has more vertices than an index can count");
     const std::uint64_t count =
         source.indices >= 0 ? model_.accessors[static_cast<std::size_t>(source.indices)].count : vertices;
-    const std::uint64_t num_triangles = triangle_count(source.mode, count);
-    if (source.mode == TINYGLTF_MODE_TRIANGLES ? count % 3 != 0 : count < 3)
-        ++counted_["primitive(s) have indices left over that make no triangle"];
-    memory_.charge(num_triangles, sizeof(glm::uvec3), where);
+    const bool is_lines = source.mode < TINYGLTF_MODE_TRIANGLES;
+    if (is_lines) {
+        if (source.mode == TINYGLTF_MODE_LINE ? count % 2 != 0 : source.mode != TINYGLTF_MODE_POINTS && count < 2)
+            ++counted_["primitive(s) have indices left over that make no line"];
+        memory_.charge(line_count(source.mode, count), sizeof(glm::uvec2), where);
+    } else {
+        if (source.mode == TINYGLTF_MODE_TRIANGLES ? count % 3 != 0 : count < 3)
+            ++counted_["primitive(s) have indices left over that make no triangle"];
+        memory_.charge(triangle_count(source.mode, count), sizeof(glm::uvec3), where);
+    }
 
     primitive result;
     result.name = model_.meshes[mesh].name.empty() ? where : printable(model_.meshes[mesh].name);
@@ -103,12 +134,17 @@ primitive_reader::read_part primitive_reader::read(const shown_mesh& shown, std:
         known = read_posed(result, source, shown, where);
     else
         known.unit = read_positions(result, source, where);
-    read_triangles(result, source, vertices, where);
+    if (is_lines) {
+        const budget::scope temporary{memory_};
+        result.lines = unrolled_lines(source.mode, read_indices(source, vertices, where), count);
+    } else {
+        read_triangles(result, source, vertices, where);
+    }
     if (known.mirrored)
         for (glm::uvec3& triangle : result.triangles) std::swap(triangle.y, triangle.z);
     read_texcoords(result, source, where);
     read_colors(result, source, where);
-    if (result.triangles.empty()) return {};
+    if (result.triangles.empty() && result.lines.empty()) return {};
     known.primitive = static_cast<std::uint32_t>(scene_.primitives.size());
     scene_.primitives.push_back(std::move(result));
     return known;
@@ -116,11 +152,6 @@ primitive_reader::read_part primitive_reader::read(const shown_mesh& shown, std:
 
 void primitive_reader::read_triangles(primitive& result, const tinygltf::Primitive& source, std::size_t vertices,
                                       const std::string& where) const {
-    const budget::scope temporary{memory_};
-    const auto out_of_range = [&](std::uint32_t index, std::size_t place) {
-        return gltf_error(where + ": index " + std::to_string(index) + " at place " + std::to_string(place) +
-                          " is out of range, there are " + std::to_string(vertices) + " vertices");
-    };
     const auto accessor = static_cast<std::size_t>(source.indices);
     if (source.mode == TINYGLTF_MODE_TRIANGLES && source.indices >= 0)
         if (const auto in_place = accessors_.in_place(accessor)) {
@@ -151,7 +182,7 @@ void primitive_reader::read_triangles(primitive& result, const tinygltf::Primiti
                 });
                 for (std::size_t i = count / 3 * 3; i < count; ++i) // left over, but checked
                     if (at(i) >= vertices && first_fault == count) first_fault = i;
-                if (first_fault != count) throw out_of_range(at(first_fault), first_fault);
+                if (first_fault != count) throw out_of_range(where, at(first_fault), first_fault, vertices);
             };
             switch (model_.accessors[accessor].componentType) {
             case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
@@ -162,12 +193,19 @@ void primitive_reader::read_triangles(primitive& result, const tinygltf::Primiti
                 return read(std::uint32_t{});
             }
         }
-    std::vector<std::uint32_t> indices;
-    if (source.indices >= 0) indices = accessors_.indices(accessor, where);
+    const budget::scope temporary{memory_};
+    const std::vector<std::uint32_t> indices = read_indices(source, vertices, where);
+    result.triangles = unrolled(source.mode, indices, source.indices >= 0 ? indices.size() : vertices);
+}
+
+// Empty where the vertices count up.
+std::vector<std::uint32_t> primitive_reader::read_indices(const tinygltf::Primitive& source, std::size_t vertices,
+                                                          const std::string& where) const {
+    if (source.indices < 0) return {};
+    std::vector<std::uint32_t> indices = accessors_.indices(static_cast<std::size_t>(source.indices), where);
     for (std::size_t i = 0; i < indices.size(); ++i)
-        if (indices[i] >= vertices) throw out_of_range(indices[i], i);
-    const std::uint64_t count = source.indices >= 0 ? indices.size() : vertices;
-    result.triangles = unrolled(source.mode, indices, count);
+        if (indices[i] >= vertices) throw out_of_range(where, indices[i], i, vertices);
+    return indices;
 }
 
 // Positions that a node bends. Those of a skin are in the world; far from its origin they are kept relative to a place

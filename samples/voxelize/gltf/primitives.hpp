@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A glTF primitive -> triangles with the attributes that the tool uses, once, and an instance for each node that shows
-// it.
+// A glTF primitive -> triangles or lines with the attributes that the tool uses, once, and an instance for each node
+// that shows it.
 
 #include "accessor.hpp"
 #include "materials.hpp"
@@ -34,6 +34,12 @@ namespace voxelize::gltf {
 [[nodiscard]] std::vector<glm::uvec3> unrolled(int mode, const std::vector<std::uint32_t>& indices,
                                                std::uint64_t count);
 
+// The lines of MODE: POINTS, LINES, LINE_LOOP or LINE_STRIP. A last vertex of LINES without a partner is dropped; a
+// loop or strip of one vertex has none.
+[[nodiscard]] std::uint64_t line_count(int mode, std::uint64_t count);
+[[nodiscard]] std::vector<glm::uvec2> unrolled_lines(int mode, const std::vector<std::uint32_t>& indices,
+                                                     std::uint64_t count);
+
 class primitive_reader {
 public:
     primitive_reader(const tinygltf::Model& model, const accessor_reader& accessors, material_reader& materials,
@@ -42,14 +48,14 @@ public:
           materials_{materials}, poses_{poses}, memory_{memory}, scene_{result}, threads_{thread_count(threads)} {}
 
     // Shows primitive PART of the mesh of SHOWN once more. The first call for it (where a node poses it: for it and the
-    // node) appends it to the scene, or warns where it has no triangles.
+    // node) appends it to the scene, or warns where it has no triangles and no lines.
     void show(const shown_mesh& shown, std::size_t part);
 
     // Appends the warnings that are counted over the whole file.
     void finish();
 
 private:
-    // A primitive that has been read: nothing if it has no triangles.
+    // A primitive that has been read: nothing if it has no triangles and no lines.
     struct read_part {
         std::optional<std::uint32_t> primitive;
         double unit = 1;                  // of its positions: those of normalised integers stay integers
@@ -72,6 +78,8 @@ private:
     }
     void read_triangles(primitive& result, const tinygltf::Primitive& source, std::size_t vertices,
                         const std::string& where) const;
+    [[nodiscard]] std::vector<std::uint32_t> read_indices(const tinygltf::Primitive& source, std::size_t vertices,
+                                                          const std::string& where) const;
     void read_texcoords(primitive& result, const tinygltf::Primitive& source, const std::string& where);
     void read_colors(primitive& result, const tinygltf::Primitive& source, const std::string& where) const;
     [[nodiscard]] std::uint32_t material_index(const tinygltf::Primitive& source);

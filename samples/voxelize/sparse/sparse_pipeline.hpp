@@ -91,6 +91,14 @@ private:
                     std::abs(u.y * v.z - u.z * v.y) + std::abs(u.z * v.x - u.x * v.z) + std::abs(u.x * v.y - u.y * v.x);
                 if (std::isfinite(all)) voxels += all / 2;
             }
+        for (const auto& d : this->line_draws_)
+            for (std::size_t i = 0; i + 1 < d.mesh.indices.size(); i += 2) {
+                const auto at = [&](std::size_t k) {
+                    return glm::dvec3(d.vertex_shader.place(d.mesh.positions[d.mesh.indices[i + k]])) / size;
+                };
+                const glm::dvec3 along = glm::abs(at(1) - at(0));
+                if (const double all = along.x + along.y + along.z; std::isfinite(all)) voxels += 1 + all;
+            }
         return voxels;
     }
     // As many slabs as keep within the working memory; one that would not is halved, down to a tile's height. Their
@@ -127,6 +135,7 @@ private:
         this->stats_.slabs = static_cast<int>(parts.size());
         const typename base::stage_timer timer{*this, "resolve"};
         result = join_slabs(std::move(parts));
+        if (this->draws_lines_) this->stats_.voxels = result.num_voxels(); // a voxel may have been drawn twice
         if (this->wants(target::normal)) count_cancelled(result);
     }
     // False if there are more than `most` voxels; nothing is drawn then.
@@ -160,7 +169,9 @@ private:
         if (enabled.count() > 1) enabled[base::occupancy] = false;
         surface framebuffer(this->backend_, slab.extent, enabled);
         if (enabled[base::triangle]) vp::get<base::triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
-        if (!draw_part(this->draws_, slab, framebuffer, most)) return false;
+        if (!draw_part(this->draws_, slab, framebuffer, most) ||
+            !this->draw_lines(this->line_draws_, slab, framebuffer, enabled))
+            return false;
         const typename base::stage_timer timer{*this, "resolve"};
         take_bricks(result, framebuffer);
         for (const target wanted : this->request_.targets) {
