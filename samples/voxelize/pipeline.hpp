@@ -5,12 +5,14 @@
 // in cuda_device.cu. Takes a scene, uploads it, draws every slab of the grid into a framebuffer of all wanted targets
 // and resolves it into the volume. A solid is drawn after its surface, and the voxels inside are filled on the host.
 
-#include "mip_levels.hpp"
+#include "backend_memory.hpp"
 #include "outside.hpp"
 #include "parallel.hpp"
 #include "placement.hpp"
 #include "resolve.hpp"
+#include "solid_options.hpp"
 #include "surface.hpp"
+#include "uploaded_scene.hpp"
 #include "voxelizer.hpp"
 
 #include <voxelpipe/voxelpipe.hpp>
@@ -29,22 +31,6 @@
 #include <vector>
 
 namespace voxelize {
-
-// How the host reads a backend's memory. This is for memory that it reads where it lies; other backends specialise it
-// before the pipeline is instantiated.
-template <class Backend>
-struct memory_access {
-    static constexpr bool on_host = true;
-
-    // out[i] = value(i) for every i < count. `out` is host memory, what `value` reads is the backend's.
-    template <class T, class Value>
-    static void read(Backend&, T* out, std::size_t count, const Value& value, int threads) {
-        constexpr std::size_t block = 1 << 16;
-        parallel_for((count + block - 1) / block, threads, [&](std::size_t b) {
-            for (std::size_t i = b * block; i < std::min(count, (b + 1) * block); ++i) out[i] = value(i);
-        });
-    }
-};
 
 // Puts the library's stages, without those named in `absent`, in the place of their sum, "voxelize". `rest`: what the
 // sum holds beside them; empty where that is nothing to show.
@@ -79,26 +65,19 @@ public:
         // What the sides of the grid see, and what lies inside, is known once all voxels are.
         keeps_bits_ = request.solid ? draws_surface_ : wants(target::occupancy) || wants(target::color_outer);
         if (request.solid) bits_name_ = "surface";
-        const stage_timer timer{*this, "upload"};
-        tables_.push_back({backend_, one(make_color_tables())});
-        upload_pictures(model);
-        reference_ = reference_point(request.grid);
-        relative_grid_ = request.grid;
-        relative_grid_.origin -= reference_;
-        num_triangles_ = model.triangle_count();
         const std::uint64_t num_lines = model.line_count();
         draws_lines_ = num_lines != 0 && !request.solid;
         if (num_lines != 0 && request.solid)
             stats.warnings.push_back(std::to_string(num_lines) +
                                      " line(s) and point(s) enclose nothing: --solid leaves them out");
         keeps_bits_ = keeps_bits_ || draws_lines_; // of which the voxels are counted
-        if (wants(target::triangle) && num_triangles_ + num_lines > INT32_MAX)
-            throw std::runtime_error("more triangles and lines than --target triangle can number");
-        upload_primitives(model);
-        draw_table_.push_back({backend_, numbered_draws_});
-        stats_.triangles = num_triangles_;
+        stats_.triangles = model.triangle_count();
         stats_.lines = draws_lines_ ? num_lines : 0;
-        only_bits_ = !any_mask_ && !draws_lines_ && !wants(target::color) && !wants(target::color_max) &&
+        if (wants(target::triangle) && stats_.triangles + num_lines > INT32_MAX)
+            throw std::runtime_error("more triangles and lines than --target triangle can number");
+        const stage_timer timer{*this, "upload"};
+        uploaded_ = std::make_unique<uploaded_scene<Backend>>(backend, model, request, wanted_, draws_lines_);
+        only_bits_ = !uploaded_->has_masks() && !draws_lines_ && !wants(target::color) && !wants(target::color_max) &&
                      !wants(target::color_replace) && !wants(target::normal) && !wants(target::material) &&
                      !wants(target::triangle) && !wants(target::depth);
     }
@@ -167,30 +146,6 @@ protected: // sparse_pipeline draws the same into bricks
     template <class T>
     using buffer = typename Backend::template buffer<T>;
 
-    // A list of the scene where the backend reads it: taken over where that is host memory, otherwise copied.
-    template <class T>
-    class stored {
-    public:
-        stored(Backend& backend, std::vector<T>& source) {
-            if constexpr (memory_access<Backend>::on_host)
-                host_ = std::move(source);
-            else
-                copy_.push_back({backend, source});
-        }
-        [[nodiscard]] const T* data() const { return copy_.empty() ? host_.data() : copy_.front().data(); }
-        [[nodiscard]] std::size_t size() const { return copy_.empty() ? host_.size() : copy_.front().size(); }
-        [[nodiscard]] vp::array_view<const T> view() const { return {data(), size()}; }
-
-    private:
-        std::vector<T> host_;
-        std::vector<buffer<T>> copy_;
-    };
-    using mesh_view = vp::mesh_view<>;
-    using surface_draw = vp::draw<mesh_view, surface_vertex_shader, surface_fragment_shader>;
-    using lines_view = vp::lines_view<>;
-    using line_draw = vp::draw<lines_view, surface_vertex_shader, line_fragment_shader<surface_fragment_shader>>;
-    using bits_draw = vp::draw<mesh_view, placed_vertex_shader, vp::constant_output<bool, std::uint32_t>>;
-
     // In the order of surface_fragment_shader's outputs.
     enum : std::size_t { occupancy, count, color_sum, color_max, color_last, normal_sum, triangle, depth, num_targets };
     using surface_framebuffer =
@@ -198,8 +153,9 @@ protected: // sparse_pipeline draws the same into bricks
                         vp::target<glm::vec4, vp::blend::add>, vp::target<glm::u8vec4, vp::blend::max>,
                         vp::target<glm::u8vec4, vp::blend::replace>, vp::target<glm::vec3, vp::blend::add>,
                         vp::target<std::uint32_t, vp::blend::replace>, vp::target<float, vp::blend::min>>;
-    using outer_draw = vp::draw<mesh_view, surface_vertex_shader, outer_fragment_shader>;
-    using outer_line_draw = vp::draw<lines_view, surface_vertex_shader, line_fragment_shader<outer_fragment_shader>>;
+    using outer_draw = vp::draw<vp::mesh_view<>, surface_vertex_shader, outer_fragment_shader>;
+    using outer_line_draw =
+        vp::draw<vp::lines_view<>, surface_vertex_shader, line_fragment_shader<outer_fragment_shader>>;
     using outer_framebuffer = vp::framebuffer<Backend, vp::target<std::uint64_t, vp::blend::max>>;
     using bits_target = vp::target<vp::bit, vp::blend::bit_or>;
     using bits_map = typename bits_target::map;
@@ -233,150 +189,6 @@ protected: // sparse_pipeline draws the same into bricks
     }
 
     [[nodiscard]] bool wants(target id) const { return wanted_[static_cast<std::size_t>(id)]; }
-
-    template <class T>
-    static std::vector<T> one(const T& value) {
-        return {value};
-    }
-
-    // ---- upload ----------------------------------------------------------------------------------------------------
-
-    [[nodiscard]] bool shades() const {
-        return wants(target::color) || wants(target::color_max) || wants(target::color_replace) ||
-               wants(target::color_outer);
-    }
-
-    // Each picture as its materials need it: colours by alpha where that counts, alone where none of them is opaque.
-    // Levels that the loader has made are taken as they are.
-    void upload_pictures(scene& model) {
-        const auto texels_for = [&](picture& source, bool by_alpha) {
-            std::vector<stored<glm::u8vec4>> texels;
-            std::vector<glm::u8vec4>& levels = source.levels[by_alpha ? 1 : 0];
-            if (!levels.empty()) {
-                texels.push_back({backend_, levels});
-                return texels;
-            }
-            std::vector<glm::u8vec4> made;
-            if (shades()) {
-                made = with_mip_levels(source, by_alpha, thread_count(request_.threads));
-            } else {
-                made.resize(source.rgba.size() / 4);
-                std::memcpy(made.data(), source.rgba.data(), source.rgba.size());
-            }
-            texels.push_back({backend_, made});
-            return texels;
-        };
-        std::vector<std::array<bool, 2>> needed(model.images.size()); // without and with the weight of alpha
-        for (const material& m : model.materials)
-            if (m.texture != material::no_texture)
-                needed[model.textures[static_cast<std::size_t>(m.texture)].image]
-                      [alpha_of(m, request_.alpha) != alpha_mode::opaque ? 1 : 0] = true;
-        pictures_.resize(model.images.size());
-        for (std::size_t image = 0; image < model.images.size(); ++image) {
-            picture& source = model.images[image];
-            for (const bool by_alpha : {false, true})
-                if (needed[image][by_alpha ? 1 : 0])
-                    pictures_[image].texels[by_alpha ? 1 : 0] = texels_for(source, by_alpha);
-            if constexpr (memory_access<Backend>::on_host)
-                source.rgba = std::vector<std::uint8_t>(); // = {} would keep the memory
-        }
-    }
-
-    [[nodiscard]] sampled_texture texture_of(const material& m, const scene& model) {
-        sampled_texture result;
-        if (m.texture == material::no_texture) return result;
-        const texture& source = model.textures[static_cast<std::size_t>(m.texture)];
-        const std::size_t by_alpha = alpha_of(m, request_.alpha) != alpha_mode::opaque ? 1 : 0;
-        result.texels = pictures_[source.image].texels[by_alpha].front().data();
-        const picture& image = model.images[source.image];
-        if (shades()) result.levels = mip_level_count(image.width, image.height);
-        result.first_level = image.first_level;
-        result.width = static_cast<int>(image.width);
-        result.height = static_cast<int>(image.height);
-        result.wrap_s = source.wrap_s;
-        result.wrap_t = source.wrap_t;
-        result.filter = source.filter;
-        return result;
-    }
-
-    // Every primitive once, then a draw for each instance.
-    void upload_primitives(scene& model) {
-        std::vector<char> mirrored(model.primitives.size());
-        for (const instance& shown : model.instances)
-            if (shown.to_world.mirrors()) mirrored[shown.primitive] = 1;
-        for (std::size_t i = 0; i < model.primitives.size(); ++i) {
-            primitive& part = model.primitives[i];
-            const bool has_texcoords = !part.texcoords.empty();
-            const bool has_colors = !part.colors.empty();
-            std::vector<glm::uvec3> turned;
-            if (mirrored[i] != 0) {
-                turned = part.triangles;
-                for (glm::uvec3& corners : turned) std::swap(corners.y, corners.z);
-            }
-            uploaded_primitive& done =
-                primitives_.emplace_back(uploaded_primitive{{backend_, part.positions},
-                                                            {backend_, part.triangles},
-                                                            {backend_, part.lines},
-                                                            {},
-                                                            {backend_, part.texcoords},
-                                                            {backend_, part.colors},
-                                                            {},
-                                                            {},
-                                                            static_cast<std::int32_t>(part.material),
-                                                            model.materials[part.material].double_sided});
-            if (mirrored[i] != 0) done.mirrored_triangles.push_back({backend_, turned});
-            const material& m = model.materials[part.material];
-            if (has_texcoords) done.vertex_shader.texcoords = done.texcoords.data();
-            if (has_colors) done.vertex_shader.colors = done.colors.data();
-            done.fragment_shader = fragment_shader_of(m, model, has_texcoords);
-            any_mask_ = any_mask_ || done.fragment_shader.alpha == alpha_mode::mask;
-            if constexpr (memory_access<Backend>::on_host) part = {};
-        }
-        std::uint64_t first_triangle = 0;
-        for (const instance& shown : model.instances) {
-            const uploaded_primitive& part = primitives_[shown.primitive];
-            if (part.lines.size() != 0) continue;
-            const auto& triangles = shown.to_world.mirrors() ? part.mirrored_triangles.front() : part.triangles;
-            mesh_view mesh{part.positions.view(), triangles.view()};
-            // The scene's indices are in range.
-            mesh.checked = {mesh.triangles.data(), mesh.triangles.size(), mesh.positions.size()};
-            const placed_vertex_shader place{shown.to_world, reference_};
-            surface_vertex_shader vertex_shader = part.vertex_shader;
-            vertex_shader.place = place;
-            draws_.push_back({mesh, vertex_shader, part.fragment_shader});
-            bits_draws_.push_back({mesh, place, vp::constant(true, 1U)});
-            draw_is_double_sided_.push_back(part.double_sided ? 1 : 0);
-            numbered_draws_.push_back({first_triangle, part.material});
-            first_triangle += mesh.triangles.size();
-        }
-        for (const instance& shown : model.instances) {
-            const uploaded_primitive& part = primitives_[shown.primitive];
-            if (part.lines.size() == 0 || !draws_lines_) continue;
-            lines_view lines{.positions = part.positions.view()};
-            lines.indices = {reinterpret_cast<const std::uint32_t*>(part.lines.data()), 2 * part.lines.size()};
-            surface_vertex_shader vertex_shader = part.vertex_shader;
-            vertex_shader.place = {shown.to_world, reference_};
-            line_draws_.push_back(
-                {lines, vertex_shader, {part.fragment_shader, static_cast<std::uint32_t>(num_triangles_)}});
-            numbered_draws_.push_back({first_triangle, part.material});
-            first_triangle += part.lines.size();
-        }
-    }
-
-    [[nodiscard]] surface_fragment_shader fragment_shader_of(const material& m, const scene& model, bool textured) {
-        surface_fragment_shader shader;
-        if (textured) shader.texture = texture_of(m, model);
-        shader.tables = tables_.front().data();
-        shader.base_color = m.base_color;
-        shader.alpha = alpha_of(m, request_.alpha);
-        shader.alpha_cutoff = m.alpha == alpha_mode::blend ? 0.5F : m.alpha_cutoff;
-        shader.centers = {relative_grid_.origin, relative_grid_.voxel_size};
-        shader.depth_axis = request_.depth_axis;
-        shader.depth_reference = reference_[request_.depth_axis];
-        shader.wanted = {wants(target::color), wants(target::color_max) || wants(target::color_replace),
-                         wants(target::depth)};
-        return shader;
-    }
 
     // ---- slabs -----------------------------------------------------------------------------------------------------
 
@@ -421,7 +233,7 @@ protected: // sparse_pipeline draws the same into bricks
         for (int slab = 0; slab < slabs; ++slab) {
             const int begin = slab * depth;
             const glm::ivec3 size{extent.x, extent.y, std::min(depth, extent.z - begin)};
-            visit(relative_grid_.crop({0, 0, begin}, size), begin, slab, slabs);
+            visit(uploaded_->relative_grid().crop({0, 0, begin}, size), begin, slab, slabs);
         }
         return slabs;
     }
@@ -485,7 +297,7 @@ protected: // sparse_pipeline draws the same into bricks
         enabled[0] = keeps_bits_ || !counts_fragments();
         enabled[1] = counts_fragments();
         bits_framebuffer& framebuffer = framebuffer_for(bits_framebuffer_, part.extent, enabled);
-        draw_reporting(bits_draws_, part, framebuffer);
+        draw_reporting(uploaded_->bits_draws(), part, framebuffer);
         const stage_timer timer{*this, "resolve"};
         if (keeps_bits_) copy<0>(result, bits_name_, framebuffer, begin);
         if (counts_fragments()) copy<1>(result, target::count, framebuffer, begin);
@@ -496,15 +308,15 @@ protected: // sparse_pipeline draws the same into bricks
         const std::bitset<num_targets> enabled = enabled_targets();
         surface_framebuffer& framebuffer = framebuffer_for(surface_framebuffer_, part.extent, enabled);
         if (enabled[triangle]) vp::get<triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
-        draw_reporting(draws_, part, framebuffer);
-        draw_lines(line_draws_, part, framebuffer, enabled);
+        draw_reporting(uploaded_->draws(), part, framebuffer);
+        draw_lines(uploaded_->line_draws(), part, framebuffer, enabled);
         const stage_timer timer{*this, "resolve"};
         if (keeps_bits_) copy<occupancy>(result, bits_name_, framebuffer, begin);
         if (counts_fragments()) copy<count>(result, target::count, framebuffer, begin);
         if (wants(target::color))
-            resolve<glm::u8vec4>(result, target::color, part.extent, begin,
-                                 mean_color{elements_of<color_sum>(framebuffer), elements_of<count>(framebuffer),
-                                            tables_.front().data()});
+            resolve<glm::u8vec4>(
+                result, target::color, part.extent, begin,
+                mean_color{elements_of<color_sum>(framebuffer), elements_of<count>(framebuffer), uploaded_->tables()});
         if (wants(target::color_max)) copy<color_max>(result, target::color_max, framebuffer, begin);
         if (wants(target::color_replace)) copy<color_last>(result, target::color_replace, framebuffer, begin);
         if (wants(target::normal))
@@ -513,8 +325,8 @@ protected: // sparse_pipeline draws the same into bricks
         if (wants(target::triangle)) copy<triangle>(result, target::triangle, framebuffer, begin);
         if (wants(target::material))
             resolve<std::int32_t>(result, target::material, part.extent, begin,
-                                  material_of_triangle{elements_of<triangle>(framebuffer), draw_table_.front().data(),
-                                                       draw_table_.front().size()});
+                                  material_of_triangle{elements_of<triangle>(framebuffer), uploaded_->draw_table(),
+                                                       uploaded_->num_draws()});
         if (wants(target::depth)) copy<depth>(result, target::depth, framebuffer, begin);
     }
 
@@ -523,10 +335,11 @@ protected: // sparse_pipeline draws the same into bricks
 
     [[nodiscard]] std::vector<std::uint8_t> outer_sides(const volume& result) {
         const stage_timer timer{*this, "outside"};
-        for (std::size_t i = 0; i < draws_.size(); ++i)
+        const auto& draws = uploaded_->draws();
+        for (std::size_t i = 0; i < draws.size(); ++i)
             outer_draws_.push_back(
-                {draws_[i].mesh, draws_[i].vertex_shader, {draws_[i].fragment_shader, draw_is_double_sided_[i] != 0}});
-        for (const line_draw& d : line_draws_)
+                {draws[i].mesh, draws[i].vertex_shader, {draws[i].fragment_shader, uploaded_->double_sided()[i] != 0}});
+        for (const auto& d : uploaded_->line_draws())
             outer_line_draws_.push_back({d.mesh, d.vertex_shader, {{d.fragment_shader.of_triangles}}});
         return sides_that_see(result, *result.find(bits_name_), request_.threads);
     }
@@ -563,45 +376,6 @@ protected: // sparse_pipeline draws the same into bricks
         return wants(target::count) && request_.solid->rule == solid_rule::each_draw;
     }
 
-    [[nodiscard]] vp::solid_options solid_options() const {
-        vp::solid_options options;
-        switch (request_.solid->rule) {
-        case solid_rule::nonzero:
-            options.rule = vp::fill_rule::nonzero;
-            break;
-        case solid_rule::even_odd:
-            options.rule = vp::fill_rule::even_odd;
-            break;
-        case solid_rule::positive:
-            options.rule = vp::fill_rule::positive;
-            break;
-        case solid_rule::each_draw:
-            options = vp::each_draw;
-            break;
-        case solid_rule::exterior:
-            options.repair = vp::repair::exterior;
-            options.closing = request_.solid->closing;
-            break;
-        }
-        if (request_.solid->vote) options.repair = vp::repair::vote;
-        if (request_.solid->close_holes != 0) {
-            options.repair = vp::repair::close_holes;
-            options.max_hole_edges = request_.solid->close_holes;
-        }
-        switch (request_.solid->extent) {
-        case solid_extent::centre:
-            options.extent = vp::solid_extent::centre;
-            break;
-        case solid_extent::outer:
-            options.extent = vp::solid_extent::outer;
-            break;
-        case solid_extent::inner:
-            options.extent = vp::solid_extent::inner;
-            break;
-        }
-        return options;
-    }
-
     // The channel of a solid's bits: the occupancy, or one that stands for it.
     [[nodiscard]] std::string_view inside_name() const {
         return wants(target::occupancy) ? info_of(target::occupancy).name : std::string_view(inside_name_);
@@ -634,7 +408,8 @@ protected: // sparse_pipeline draws the same into bricks
         vp::status status;
         {
             const stage_timer timer{*this, "voxelize"};
-            status = vp::voxelize_solid(backend_, bits_draws_, part, framebuffer, solid_options());
+            status = vp::voxelize_solid(backend_, uploaded_->bits_draws(), part, framebuffer,
+                                        solid_options_of(*request_.solid));
         }
         add_solid_counts(status, part);
         report_(1.0);
@@ -754,8 +529,7 @@ protected: // sparse_pipeline draws the same into bricks
     Backend& backend_;
     const voxelize_request& request_;
     voxelize_stats& stats_;
-    std::bitset<target_table.size()> wanted_;
-    bool any_mask_ = false;
+    wanted_targets wanted_;
     bool only_bits_ = false;
     bool draws_surface_ = false; // else a solid's bits are all there is
     bool draws_lines_ = false;   // after the triangles
@@ -763,41 +537,13 @@ protected: // sparse_pipeline draws the same into bricks
     std::string bits_name_ = "occupancy";
     const std::string inside_name_ = "inside"; // the channel of a solid's bits where no occupancy is asked for
     std::function<void(double)> report_;
-    glm::dvec3 reference_{0.0};     // what positions are relative to; see reference_point
-    voxelpipe::grid relative_grid_; // the grid, its origin taken from there
-
-    // The scene in the backend's memory; draws point into it.
-    std::vector<buffer<color_tables>> tables_;
-    struct uploaded_picture {
-        std::vector<stored<glm::u8vec4>> texels[2]; // none or one: colours alike, colours by alpha
-    };
-    std::vector<uploaded_picture> pictures_;
-    struct uploaded_primitive {
-        stored<glm::vec3> positions;
-        stored<glm::uvec3> triangles;
-        stored<glm::uvec2> lines;
-        std::vector<stored<glm::uvec3>> mirrored_triangles; // one, where an instance mirrors
-        stored<glm::vec2> texcoords;
-        stored<glm::vec4> colors;
-        surface_vertex_shader vertex_shader; // all but its transform
-        surface_fragment_shader fragment_shader;
-        std::int32_t material;
-        bool double_sided;
-    };
-    std::vector<uploaded_primitive> primitives_;
-    std::vector<surface_draw> draws_;
-    std::vector<line_draw> line_draws_;
-    std::vector<bits_draw> bits_draws_;
+    std::unique_ptr<uploaded_scene<Backend>> uploaded_;
     std::unique_ptr<surface_framebuffer> surface_framebuffer_;
     std::unique_ptr<bits_framebuffer> bits_framebuffer_;
     std::unique_ptr<bits_framebuffer> solid_framebuffer_;
-    std::vector<char> draw_is_double_sided_;
     std::vector<outer_draw> outer_draws_;
     std::vector<outer_line_draw> outer_line_draws_;
     std::unique_ptr<outer_framebuffer> outer_framebuffer_;
-    std::vector<numbered_draw> numbered_draws_;
-    std::vector<buffer<numbered_draw>> draw_table_;
-    std::uint64_t num_triangles_ = 0;
 };
 
 } // namespace voxelize

@@ -217,14 +217,23 @@ struct placed_vertex_shader {
     VOXELPIPE_HD glm::vec3 operator()(const vp::vertex<>& v) const { return (*this)(v.position); }
 };
 
+// One of these for each copy of an instanced mesh, in memory of the backend.
+struct instanced_vertex_shader {
+    const placed_vertex_shader* places = nullptr;
+
+    [[nodiscard]] VOXELPIPE_HD glm::vec3 operator()(const vp::vertex<>& v) const {
+        return places[v.instance](v.position);
+    }
+};
+
 // Attributes by pointer, so that a primitive without them needs no array of ones.
 struct surface_vertex_shader {
-    placed_vertex_shader place;
+    instanced_vertex_shader place;
     const glm::vec2* texcoords = nullptr; // null: 0
     const glm::vec4* colors = nullptr;    // null: white
 
     VOXELPIPE_HD vp::vertex_output<surface_varyings> operator()(const vp::vertex<>& v) const {
-        const glm::vec3 position = place(v.position);
+        const glm::vec3 position = place(v);
         return {position,
                 {texcoords != nullptr ? texcoords[v.index] : glm::vec2(0.0f),
                  colors != nullptr ? colors[v.index] : glm::vec4(1.0f), position}};

@@ -81,31 +81,36 @@ private:
     }
     // How many voxels the surface has, more or less: its projections along the three axes, in voxels.
     [[nodiscard]] double likely_voxels() const {
-        const glm::dvec3 size = this->relative_grid_.voxel_size;
+        const glm::dvec3 size = this->uploaded_->relative_grid().voxel_size;
         double voxels = 0;
-        for (const auto& d : this->bits_draws_)
-            for (const glm::uvec3& t : d.mesh.triangles) {
-                const auto at = [&](unsigned i) { return glm::dvec3(d.vertex_shader(d.mesh.positions[i])) / size; };
-                const glm::dvec3 a = at(t.x), u = at(t.y) - a, v = at(t.z) - a;
-                const double all =
-                    std::abs(u.y * v.z - u.z * v.y) + std::abs(u.z * v.x - u.x * v.z) + std::abs(u.x * v.y - u.y * v.x);
-                if (std::isfinite(all)) voxels += all / 2;
-            }
-        for (const auto& d : this->line_draws_)
-            for (std::size_t i = 0; i + 1 < d.mesh.indices.size(); i += 2) {
-                const auto at = [&](std::size_t k) {
-                    return glm::dvec3(d.vertex_shader.place(d.mesh.positions[d.mesh.indices[i + k]])) / size;
-                };
-                const glm::dvec3 along = glm::abs(at(1) - at(0));
-                if (const double all = along.x + along.y + along.z; std::isfinite(all)) voxels += 1 + all;
-            }
+        for (const auto& d : this->uploaded_->bits_draws())
+            for (std::uint64_t copy = 0; copy < d.mesh.copies.count; ++copy)
+                for (const glm::uvec3& t : d.mesh.triangles) {
+                    const auto at = [&](unsigned i) {
+                        return glm::dvec3(d.vertex_shader.places[copy](d.mesh.positions[i])) / size;
+                    };
+                    const glm::dvec3 a = at(t.x), u = at(t.y) - a, v = at(t.z) - a;
+                    const double all = std::abs(u.y * v.z - u.z * v.y) + std::abs(u.z * v.x - u.x * v.z) +
+                                       std::abs(u.x * v.y - u.y * v.x);
+                    if (std::isfinite(all)) voxels += all / 2;
+                }
+        for (const auto& d : this->uploaded_->line_draws())
+            for (std::uint64_t copy = 0; copy < d.mesh.copies.count; ++copy)
+                for (std::size_t i = 0; i + 1 < d.mesh.indices.size(); i += 2) {
+                    const auto at = [&](std::size_t k) {
+                        return glm::dvec3(d.vertex_shader.place.places[copy](d.mesh.positions[d.mesh.indices[i + k]])) /
+                               size;
+                    };
+                    const glm::dvec3 along = glm::abs(at(1) - at(0));
+                    if (const double all = along.x + along.y + along.z; std::isfinite(all)) voxels += 1 + all;
+                }
         return voxels;
     }
     // As many slabs as keep within the working memory; one that would not is halved, down to a tile's height. Their
     // borders are borders of bricks.
     template <class Report>
     void draw_slabs(sparse_volume& result, const Report& report_from) {
-        const voxelpipe::grid& all = this->relative_grid_;
+        const voxelpipe::grid& all = this->uploaded_->relative_grid();
         constexpr double least_work = 64 << 20;
         const double work = this->request_.work_memory != 0
                                 ? static_cast<double>(this->request_.work_memory)
@@ -153,7 +158,7 @@ private:
         enabled[0] = !this->counts_fragments(); // one target there has to be
         enabled[1] = this->counts_fragments();
         bits framebuffer(this->backend_, slab.extent, enabled);
-        if (!draw_part(this->bits_draws_, slab, framebuffer, most)) return false;
+        if (!draw_part(this->uploaded_->bits_draws(), slab, framebuffer, most)) return false;
         const typename base::stage_timer timer{*this, "resolve"};
         take_bricks(result, framebuffer);
         for (const target wanted : this->request_.targets) {
@@ -169,8 +174,8 @@ private:
         if (enabled.count() > 1) enabled[base::occupancy] = false;
         surface framebuffer(this->backend_, slab.extent, enabled);
         if (enabled[base::triangle]) vp::get<base::triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
-        if (!draw_part(this->draws_, slab, framebuffer, most) ||
-            !this->draw_lines(this->line_draws_, slab, framebuffer, enabled))
+        if (!draw_part(this->uploaded_->draws(), slab, framebuffer, most) ||
+            !this->draw_lines(this->uploaded_->line_draws(), slab, framebuffer, enabled))
             return false;
         const typename base::stage_timer timer{*this, "resolve"};
         take_bricks(result, framebuffer);
@@ -186,7 +191,7 @@ private:
             case target::color:
                 resolve<glm::u8vec4>(result, wanted,
                                      mean_color{values_of<base::color_sum>(framebuffer),
-                                                values_of<base::count>(framebuffer), this->tables_.front().data()});
+                                                values_of<base::count>(framebuffer), this->uploaded_->tables()});
                 break;
             case target::color_max:
                 copy<base::color_max, glm::u8vec4>(result, wanted, framebuffer);
@@ -202,8 +207,8 @@ private:
             case target::material:
                 resolve<std::int32_t>(result, wanted,
                                       material_of_triangle{values_of<base::triangle>(framebuffer),
-                                                           this->draw_table_.front().data(),
-                                                           this->draw_table_.front().size()});
+                                                           this->uploaded_->draw_table(),
+                                                           this->uploaded_->num_draws()});
                 break;
             case target::triangle:
                 copy<base::triangle, std::uint32_t>(result, wanted, framebuffer);
@@ -220,7 +225,8 @@ private:
     [[nodiscard]] sparse_volume draw_solid(sparse_volume&& surface_of) {
         // What is outside follows from the whole grid: a flood is drawn there, with the padding.
         const bool is_flood = this->request_.solid->rule == solid_rule::exterior;
-        const voxelpipe::grid part = is_flood ? this->relative_grid_.uncropped() : this->relative_grid_;
+        const voxelpipe::grid part =
+            is_flood ? this->uploaded_->relative_grid().uncropped() : this->uploaded_->relative_grid();
         std::bitset<2> enabled;
         enabled[0] = !this->counts_bodies();
         enabled[1] = this->counts_bodies();
@@ -231,14 +237,16 @@ private:
             this->backend_.progress = [this](std::uint64_t done, std::uint64_t total) {
                 this->report_(total == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(total));
             };
-            status = vp::voxelize_solid(this->backend_, this->bits_draws_, part, framebuffer, this->solid_options());
+            status = vp::voxelize_solid(this->backend_, this->uploaded_->bits_draws(), part, framebuffer,
+                                        solid_options_of(*this->request_.solid));
         }
         this->add_solid_counts(status, part);
         const typename base::stage_timer timer{*this, "fill"};
         sparse_volume result;
         result.shape = surface_of.shape;
         take_bricks(result, framebuffer);
-        if (is_flood) keep_part(result, this->relative_grid_.offset, this->relative_grid_.extent);
+        if (is_flood)
+            keep_part(result, this->uploaded_->relative_grid().offset, this->uploaded_->relative_grid().extent);
         this->warn_of_solid(result.num_voxels(), surface_of.num_voxels());
         for (const target wanted : this->request_.targets) {
             if (wanted == target::occupancy)

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// Lines and points through the tool's pipeline: their voxels are those of the library, beside triangles, after them in
-// order and number.
+// Scenes through the tool's pipeline. Lines and points: their voxels are those of the library, beside triangles, after
+// them in order and number. Instances, which share a draw where they follow each other: nothing shows it.
 #include "tool_test.hpp"
 
 #include <cpu_ref/backend.hpp>
@@ -207,6 +207,58 @@ TEST(ToolLines, ThatCannotBeDrawnAreCounted) {
     EXPECT_EQ(4U, stats.voxels);
     EXPECT_EQ(2U, stats.lines_dropped);
     EXPECT_EQ(0U, stats.triangles_dropped);
+}
+
+// Five copies of a primitive, one of them mirrored, around one of another; then lines, twice.
+voxelize::scene copies() {
+    voxelize::scene scene;
+    scene.materials.resize(2);
+    scene.materials[1].base_color = {0, 0.5F, 1, 1};
+    voxelize::primitive corner, plate;
+    corner.positions = {{0.1F, 0.2F, 0.3F}, {4.7F, 0.4F, 0.9F}, {0.6F, 5.2F, 1.1F}, {0.8F, 0.7F, 4.9F}};
+    corner.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+    corner.colors = {glm::vec4(1, 0, 0, 1), glm::vec4(0, 1, 0, 1), glm::vec4(0, 0, 1, 1), glm::vec4(1)};
+    plate.positions = {{2, 2, 2.5F}, {9, 2, 2.5F}, {9, 9, 3.5F}};
+    plate.triangles = {{0, 1, 2}};
+    plate.material = 1;
+    scene.primitives = {std::move(corner), std::move(plate),
+                        lines_of({{0, 0, 0}, {7, 7, 7}, {3, 3, 3}}, {{0, 1}, {2, 2}})};
+    const auto at = [](double x, double y, double z, double turn = 1) {
+        voxelize::affine a;
+        a.m = {{{turn, 0.1, 0, x}, {0, 1, 0.2, y}, {0.05, 0, 1, z}}};
+        return a;
+    };
+    scene.instances = {{0, at(0, 0, 0)}, {0, at(3.2, 1, 0.5)}, {2, at(0, 1, 0)}, {0, at(9, 2, 1, -1)},
+                       {1, at(0, 0, 0)}, {0, at(5, 5, 5)},     {2, at(2, 0, 4)}, {0, at(6.5, 4, 3)}};
+    return scene;
+}
+
+TEST(ToolInstances, AreDrawnAsPrimitivesOfTheirOwnWouldBe) {
+    voxelize::scene apart = copies(); // whose every instance has a primitive of its own
+    apart.primitives.clear();
+    for (voxelize::instance& shown : apart.instances) {
+        apart.primitives.push_back(copies().primitives[shown.primitive]);
+        shown.primitive = static_cast<std::uint32_t>(apart.primitives.size() - 1);
+    }
+    const std::vector<target> all{target::occupancy,     target::count,       target::color,  target::color_max,
+                                  target::color_replace, target::color_outer, target::normal, target::material,
+                                  target::triangle,      target::depth};
+    for (const bool solid : {false, true})
+        for (const vp::coverage coverage : {vp::coverage::conservative, vp::coverage::thin}) {
+            voxelize::voxelize_request request = request_of({16, 14, 12}, all);
+            request.coverage = coverage;
+            if (solid) request.solid.emplace().rule = voxelize::solid_rule::each_draw;
+            voxelize::voxelize_stats stats, stats_apart;
+            const voxelize::volume v = voxelize::run_voxelizer(copies(), request, stats);
+            voxelize::scene copy = apart;
+            const voxelize::volume w = voxelize::run_voxelizer(std::move(copy), request, stats_apart);
+            EXPECT_EQ(stats_apart.fragments, stats.fragments);
+            EXPECT_EQ(stats_apart.voxels, stats.voxels);
+            EXPECT_LT(100U, stats.voxels);
+            ASSERT_EQ(w.channels.size(), v.channels.size());
+            for (std::size_t i = 0; i < v.channels.size(); ++i)
+                EXPECT_TRUE(w.channels[i].data == v.channels[i].data) << v.channels[i].name;
+        }
 }
 
 } // namespace
