@@ -17,7 +17,7 @@ foreach(folder IN ITEMS voxelpipe cpu_ref)
     REGEX "\\.(hpp|cuh)$")
 endforeach()
 
-install(TARGETS voxelpipe voxelpipe_cpu_ref voxelpipe_cuda EXPORT voxelpipe-targets)
+install(TARGETS voxelpipe voxelpipe_cpu_ref voxelpipe_cuda voxelpipe_io EXPORT voxelpipe-targets)
 install(EXPORT voxelpipe-targets NAMESPACE voxelpipe:: DESTINATION "${voxelpipe_config_dir}" COMPONENT voxelpipe)
 
 # The compiled kernels, for their architectures and this build's compiler: a component of its own.

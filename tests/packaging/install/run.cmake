@@ -78,3 +78,14 @@ endif()
 run(${environment} "${CMAKE_COMMAND}" --build "${build}")
 run("${build}/consumer")
 message(STATUS "${run_output}")
+run("${build}/consumer_io" "${WORK_DIR}/mask.nvdb")
+if(WAY STREQUAL "find_package")
+  # A component that nobody knows ends the configuration, and its name is said.
+  execute_process(
+    COMMAND ${configure} -S "${consumer}" -B "${build}" -DCONSUMER_USES=find_package -DCONSUMER_ASKS=teapot
+            "-DCMAKE_PREFIX_PATH=${prefix};${PREFIX_PATH}"
+    RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(result EQUAL 0 OR NOT output MATCHES "teapot")
+    message(FATAL_ERROR "a component that does not exist was found:\n${output}")
+  endif()
+endif()
