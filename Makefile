@@ -5,6 +5,8 @@
 #
 #   make demo [MODEL=file.glb] [RESOLUTION=256]   a model (glTF, OBJ, STL, PLY, ...) becomes voxels, files and a picture in demo/
 #   make test                                     builds everything and runs all tests
+#   make docs                                     the site, in build/docs/html
+#   make dist                                     the source archive, in build/dist
 #   make bench                                    the CPU table
 #   make bench-gpu                                the GPU table (needs nvcc and a GPU); make bench-scaling: its curves
 #   make clean                                    removes build/ and demo/
@@ -12,7 +14,7 @@
 MODEL ?=
 RESOLUTION ?= 256
 
-.PHONY: demo test bench bench-gpu bench-scaling bench-tune clean
+.PHONY: demo test docs dist bench bench-gpu bench-scaling bench-tune clean
 .DEFAULT_GOAL := demo
 
 demo:
@@ -20,6 +22,12 @@ demo:
 
 test:
 	@scripts/test.sh
+
+docs:
+	@scripts/docs.sh
+
+dist:
+	@scripts/dist.sh
 
 bench:
 	@scripts/bench.sh

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Checks README.md, CHANGELOG.md and the Markdown files of docs/, bench/, python/ and records/ against the repository.
+"""Checks the Markdown files of the root and of docs/, bench/, packaging/, python/, records/ and tests/ against the repository.
 
     check_documents.py [--update]
 
@@ -77,7 +77,7 @@ def main():
     update = parser.parse_args().update
     files = tracked()
     errors = []
-    for name in (f for f in files if re.fullmatch(r"(README|CHANGELOG)\.md|(docs|bench|python|records|tests)/.*\.md", f)):
+    for name in (f for f in files if re.fullmatch(r"[A-Z]+\.md|(docs|bench|packaging|python|records|tests)/.*\.md", f)):
         path = ROOT / name
         text = path.read_text(encoding="utf-8")
         try:

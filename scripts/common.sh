@@ -21,13 +21,15 @@ prefixes() {
     printf '%s\n' /usr/local /usr
 }
 
-has_header() {
+# The first header of this name, with its folder.
+find_header() {
     local prefix
     while read -r prefix; do
-        [[ -n $prefix && -e $prefix/include/$1 ]] && return 0
+        [[ -z $prefix || ! -e $prefix/include/$1 ]] || { printf '%s\n' "$prefix/include/$1"; return 0; }
     done < <(prefixes)
     return 1
 }
+has_header() { find_header "$1" >/dev/null; }
 
 # present PACKAGE: is what we need of this package (the names are the same on Debian 12 and Ubuntu 24.04) here already,
 # whoever installed it?
