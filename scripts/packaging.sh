@@ -23,7 +23,6 @@ packaging/fill.py --archive "$archive" --repository https://example.invalid/voxe
 if grep -rn 'ARCHIVE_URL\|ARCHIVE_SHA\|REPOSITORY_URL' "$folder/recipes"; then
     die "placeholders are left"
 fi
-# Unfilled, they fail rather than fetch something.
 launcher=$(command -v ccache || true)
 
 say "vcpkg"

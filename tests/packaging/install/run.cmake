@@ -6,6 +6,7 @@
 #   no_nvcc        the same, with no CUDA compiler to be found, and a configure of the project itself without one
 #   bare_compiler  the same prefix, one compiler call and no CMake
 #   fetch_content  FetchContent of the source tree as a subproject
+#   amalgamated    ../amalgamated/program.cpp with one header that scripts/amalgamate.py writes, and with the library: the same output
 # find_package builds with optimisation; the others, where finding, compiling and linking is all there is to see, without.
 cmake_minimum_required(VERSION 3.24)
 
@@ -23,6 +24,28 @@ file(MAKE_DIRECTORY "${WORK_DIR}")
 set(prefix "${WORK_DIR}/prefix")
 set(build "${WORK_DIR}/build")
 set(consumer "${CMAKE_CURRENT_LIST_DIR}/consumer")
+
+if(WAY STREQUAL "amalgamated")
+  string(REPLACE "|" ";" includes "${INCLUDES}")
+  list(TRANSFORM includes PREPEND "-I")
+  separate_arguments(flags UNIX_COMMAND "${CXX_FLAGS}")
+  set(compile "${CXX_COMPILER}" -std=c++20 ${flags} -Wall -Wextra -Werror)
+  run("${SOURCE_DIR}/scripts/amalgamate.py" --out "${WORK_DIR}/voxelpipe_cpu.hpp")
+  # Alone, and beside another unit of the same program.
+  file(WRITE "${WORK_DIR}/alone.cpp" "#include \"voxelpipe_cpu.hpp\"\n#include \"voxelpipe_cpu.hpp\"\n")
+  set(program "${CMAKE_CURRENT_LIST_DIR}/../amalgamated/program.cpp")
+  run(${compile} ${includes} "-I${WORK_DIR}" "-DVOXELPIPE_HEADER=<voxelpipe_cpu.hpp>" "${program}" "${WORK_DIR}/alone.cpp" -pthread -o
+      "${WORK_DIR}/amalgamated")
+  run(${compile} ${includes} "-I${SOURCE_DIR}" "-DVOXELPIPE_HEADER=<cpu_ref/backend.hpp>" "${program}" -pthread -o "${WORK_DIR}/library")
+  run("${WORK_DIR}/amalgamated")
+  set(amalgamated "${run_output}")
+  run("${WORK_DIR}/library")
+  if(NOT run_output STREQUAL amalgamated OR NOT run_output MATCHES "solid: ok")
+    message(FATAL_ERROR "the amalgamated header gives\n${amalgamated}and the library\n${run_output}")
+  endif()
+  message(STATUS "both give\n${run_output}")
+  return()
+endif()
 
 if(NOT WAY STREQUAL "fetch_content")
   run("${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${prefix}" --component voxelpipe)
