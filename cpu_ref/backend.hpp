@@ -51,7 +51,8 @@ public:
         [[nodiscard]] T* data() { return data_.get(); }
         [[nodiscard]] const T* data() const { return data_.get(); }
         [[nodiscard]] std::size_t size() const { return count_; }
-        [[nodiscard]] backend_view<const T> view() const { return {data_.get(), count_}; }
+        [[nodiscard]] backend_view<const T> view() const { return {data_.get(), count_}; } // Refers to the buffer.
+        // A copy of all elements.
         [[nodiscard]] std::vector<T> to_host(cpu_backend&) const { return {data_.get(), data_.get() + count_}; }
         // Copies a box of elements. `to` has room for box.count() of them.
         void read_box(cpu_backend&, const core::element_box& box, T* to) const {
@@ -77,7 +78,7 @@ public:
     };
 
     cpu_backend() = default;
-    explicit cpu_backend(unsigned num_threads) : threads(num_threads) {}
+    explicit cpu_backend(unsigned num_threads) : threads(num_threads) {} // num_threads as `threads`.
 
     unsigned threads = 0;         // 0: as many as the machine has
     stage_times* times = nullptr; // if not null, the time of each stage is added here
@@ -142,6 +143,7 @@ public:
             return cpu::run_solid(how, draws, aligned, g.offset - aligned.offset, options, finish);
         });
     }
+    // Implements voxelize of nothing into a sparse framebuffer.
     template <class... Targets>
     [[nodiscard]] status clear_sparse(const grid& g, sparse_framebuffer<cpu_backend, Targets...>& out) {
         return guarded(0, [&](const cpu::execution& how) {

@@ -103,6 +103,9 @@ test_packages=(libgtest-dev libnanovdb-dev libnanovdb-tools)
 # Ubuntu's package asks for a snap; without a browser the test of the page is left out there.
 grep -q '^ID=ubuntu' /etc/os-release 2>/dev/null || test_packages+=(chromium)
 
+# What the site is made with.
+docs_packages=(doxygen python3-sphinx python3-breathe python3-myst-parser furo python3-numpy python3-pil)
+
 # configure PRESET [cmake option...]: quiet unless it fails. Uses ccache where there is one, and the staged prefix.
 configure() {
     local preset=$1 log

@@ -17,6 +17,10 @@ if ! cmp -s packaging/requirements-test.txt "$folder/venv/requirements.txt"; the
     cp packaging/requirements-test.txt "$folder/venv/requirements.txt"
 fi
 
+say "files that a forge reads"
+"$folder/venv/bin/check-jsonschema" --builtin-schema vendor.github-workflows .github/workflows/ci.yml
+"$folder/venv/bin/cffconvert" --validate -i CITATION.cff
+
 say "filling in the recipes"
 rm -rf "$folder/recipes"
 packaging/fill.py --archive "$archive" --repository https://example.invalid/voxelpipe --url "file://$root/$archive" --out "$folder/recipes"

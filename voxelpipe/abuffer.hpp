@@ -21,8 +21,9 @@
 
 namespace voxelpipe {
 
-struct no_payload {};
+struct no_payload {}; // the payload of lists that hold primitives alone
 
+// What a fragment's payload is stored as: void has no_payload.
 template <class Payload>
 using payload_storage = std::conditional_t<std::is_void_v<Payload>, no_payload, Payload>;
 
@@ -33,23 +34,24 @@ using payload_storage = std::conditional_t<std::is_void_v<Payload>, no_payload, 
 template <class Payload>
 class host_abuffer {
 public:
-    std::vector<std::uint64_t> voxels;
-    std::vector<std::uint64_t> offsets;
-    std::vector<std::uint32_t> primitives;
-    std::vector<payload_storage<Payload>> payloads;
-    glm::ivec3 extent{0};
+    std::vector<std::uint64_t> voxels;              // linear ids of occupied voxels, ascending
+    std::vector<std::uint64_t> offsets;             // one more than voxels; empty if there are none
+    std::vector<std::uint32_t> primitives;          // one per fragment
+    std::vector<payload_storage<Payload>> payloads; // one per fragment
+    glm::ivec3 extent{0};                           // voxels of the computed part
 
     // A fragment unpacks as [primitive, value]; the value of a void payload is no_payload. Primitives are numbered
     // through all draws of the call; primitive_map gives the draw and the triangle.
     struct fragment_entry {
-        std::uint32_t primitive;
-        [[no_unique_address]] payload_storage<Payload> value;
+        std::uint32_t primitive;                              // number through all draws of the call
+        [[no_unique_address]] payload_storage<Payload> value; // what the fragment shader returned
     };
 
     // The fragments of a voxel. Refers to the host_abuffer.
     class fragment_range {
     public:
         fragment_range() = default;
+        // Fragments [first, last) of all.
         fragment_range(const host_abuffer& owner, std::size_t first, std::size_t last)
             : owner_(&owner), first_(first), last_(last) {}
         [[nodiscard]] fragment_entry operator[](std::size_t i) const {
@@ -72,8 +74,8 @@ public:
 
     // An occupied voxel unpacks as [voxel, fragments].
     struct voxel_entry {
-        glm::ivec3 voxel;
-        fragment_range fragments;
+        glm::ivec3 voxel;         // (x, y, z) in the computed part
+        fragment_range fragments; // ascending by primitive
     };
 
     // Occupied voxel i.
@@ -109,6 +111,7 @@ public:
         const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
         return (wide(voxel.z) * wide(extent.y) + wide(voxel.y)) * wide(extent.x) + wide(voxel.x);
     }
+    // (x, y, z) of a linear id.
     [[nodiscard]] glm::ivec3 position(std::uint64_t voxel) const {
         const auto nx = static_cast<std::uint64_t>(extent.x), ny = static_cast<std::uint64_t>(extent.y);
         return {static_cast<int>(voxel % nx), static_cast<int>(voxel / nx % ny), static_cast<int>(voxel / (nx * ny))};
@@ -134,9 +137,10 @@ class abuffer {
     using buffer = typename Backend::template buffer<T>;
 
 public:
-    using payload_type = payload_storage<Payload>;
-    static constexpr bool has_payload = !std::is_void_v<Payload>;
+    using payload_type = payload_storage<Payload>;                // the element of `payloads`
+    static constexpr bool has_payload = !std::is_void_v<Payload>; // false if Payload is void
 
+    // Empty. Calls allocate on the backend.
     explicit abuffer(Backend& backend)
         : voxels(backend, 0), offsets(backend, 0), primitives(backend, 0), payloads(backend, 0) {}
 
@@ -146,8 +150,8 @@ public:
     buffer<payload_type> payloads;    // one per fragment; empty if Payload is void
     glm::ivec3 extent{0};             // of the grid of the last voxelize
 
-    [[nodiscard]] std::size_t num_voxels() const { return voxels.size(); }
-    [[nodiscard]] std::size_t num_fragments() const { return primitives.size(); }
+    [[nodiscard]] std::size_t num_voxels() const { return voxels.size(); }        // Occupied voxels of the last call.
+    [[nodiscard]] std::size_t num_fragments() const { return primitives.size(); } // Fragments of the last call.
 
     // Copies to the host and waits.
     [[nodiscard]] host_abuffer<Payload> to_host(Backend& backend) const {

@@ -29,11 +29,11 @@ struct add {};           // integers wrap; floating types sum reproducibly; bit:
 struct add_saturate {};  // integers: the exact sum, then clamped to the type's range; bit: or
 struct add_unordered {}; // floating types: plain additions in any order; tested to a bound, not to the bit, on a GPU
 struct min {};           // floats by total order: -inf < ... < -0 < +0 < ... < inf < NaN
-struct max {};
-struct bit_and {};
-struct bit_or {};
-struct bit_xor {};
-struct count {}; // adds 1 per fragment, whatever the shader returns; wraps
+struct max {};           // floats by the same order
+struct bit_and {};       // integers and bit
+struct bit_or {};        // integers and bit
+struct bit_xor {};       // integers and bit
+struct count {};         // adds 1 per fragment, whatever the shader returns; wraps
 
 // add for float with a quantum of 2^Log2Quantum instead of 2^-32: terms from 2^(63 + Log2Quantum) on are infinite.
 template <int Log2Quantum>

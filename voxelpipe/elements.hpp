@@ -16,9 +16,9 @@ namespace voxelpipe {
 // Each vertex is a point. Members as in mesh_view.
 template <class... Attributes>
 struct points_view {
-    backend_view<const glm::vec3> positions;
-    core::pack<array_view<const Attributes>...> attributes = {};
-    instances copies = {};
+    backend_view<const glm::vec3> positions;                     // one per vertex, world or object space
+    core::pack<array_view<const Attributes>...> attributes = {}; // each as long as positions
+    instances copies = {};                                       // how often all points are drawn
 };
 
 // list: indices 2i and 2i + 1 are segment i. strip: i and i + 1. loop: a strip that ends where it began.
@@ -27,12 +27,13 @@ enum class line_topology : std::uint8_t { list, strip, loop };
 // Line segments between vertices.
 template <class... Attributes>
 struct lines_view {
-    backend_view<const glm::vec3> positions;
-    backend_view<const std::uint32_t> indices = {}; // of vertices; empty: the vertices in order
-    line_topology topology = line_topology::list;
-    core::pack<array_view<const Attributes>...> attributes = {};
-    instances copies = {};
+    backend_view<const glm::vec3> positions;                     // one per vertex, world or object space
+    backend_view<const std::uint32_t> indices = {};              // of vertices; empty: the vertices in order
+    line_topology topology = line_topology::list;                // which vertices make a segment
+    core::pack<array_view<const Attributes>...> attributes = {}; // each as long as positions
+    instances copies = {};                                       // how often all segments are drawn
 
+    // Indices of one instance, given or implied.
     [[nodiscard]] std::uint64_t num_indices() const { return indices.size() != 0 ? indices.size() : positions.size(); }
     // Segments of one instance. A last vertex without a partner, and a strip or loop of one vertex, give none.
     [[nodiscard]] std::uint64_t num_lines() const {

@@ -30,7 +30,9 @@
 
 namespace voxelpipe {
 
+// What a field is beyond its border: repeat starts again, mirror runs back, clamp keeps the last texel.
 enum class wrap_mode : std::uint8_t { repeat, mirror, clamp };
+// How texels become values: nearest takes one, linear mixes two along each axis.
 enum class filter_mode : std::uint8_t { nearest, linear };
 
 namespace core {
@@ -91,8 +93,8 @@ inline constexpr bool is_field_value<glm::vec<N, float, Q>> = true;
 // value.
 template <class T>
 struct as_stored {
-    using texel = T;
-    VOXELPIPE_HD const T& operator()(const T& t) const { return t; }
+    using texel = T;                                                 // what memory holds
+    VOXELPIPE_HD const T& operator()(const T& t) const { return t; } // The texel itself.
 };
 
 // A field over a plane. T: float, or a glm vector of floats. Does not own its texels: rows of `width`, `height` of
@@ -100,14 +102,14 @@ struct as_stored {
 template <class T, class Decode = as_stored<T>>
 struct field2d {
     static_assert(core::is_field_value<T>, "voxelpipe: a field holds float or a glm vector of floats");
-    using texel_type = typename Decode::texel;
+    using texel_type = typename Decode::texel; // what memory holds
 
-    const texel_type* texels = nullptr;
-    int width = 0, height = 0;
-    int levels = 1;
-    filter_mode filter = filter_mode::linear;
-    wrap_mode wrap_x = wrap_mode::repeat, wrap_y = wrap_mode::repeat;
-    Decode decode{};
+    const texel_type* texels = nullptr;       // all levels, in the memory of the backend that draws
+    int width = 0, height = 0;                // texels of level 0
+    int levels = 1;                           // 1: level 0 alone
+    filter_mode filter = filter_mode::linear; // between texels; levels are not mixed
+    wrap_mode wrap_x = wrap_mode::repeat, wrap_y = wrap_mode::repeat; // beyond the border
+    Decode decode{};                                                  // turns a texel into a value
 
     // The value at (0, 0) to (1, 1); the first row lies at y = 0.
     [[nodiscard]] VOXELPIPE_HD T operator()(const glm::vec2& at) const {
@@ -120,6 +122,7 @@ struct field2d {
     }
     // The same on a level, from 0 to levels - 1.
     [[nodiscard]] VOXELPIPE_HD T operator()(const glm::vec2& at, int level) const { return on_level(level)(at); }
+    // A texel of level 0: 0 <= x < width, 0 <= y < height.
     [[nodiscard]] VOXELPIPE_HD T fetch(int x, int y) const {
         return decode(
             texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)]);
@@ -141,15 +144,17 @@ struct field2d {
 template <class T, class Decode = as_stored<T>>
 struct field3d {
     static_assert(core::is_field_value<T>, "voxelpipe: a field holds float or a glm vector of floats");
-    using texel_type = typename Decode::texel;
+    using texel_type = typename Decode::texel; // what memory holds
 
-    const texel_type* texels = nullptr;
-    int width = 0, height = 0, depth = 0;
-    int levels = 1;
-    filter_mode filter = filter_mode::linear;
+    const texel_type* texels = nullptr;       // all levels, in the memory of the backend that draws
+    int width = 0, height = 0, depth = 0;     // texels of level 0
+    int levels = 1;                           // 1: level 0 alone
+    filter_mode filter = filter_mode::linear; // between texels; levels are not mixed
+    // Beyond the border.
     wrap_mode wrap_x = wrap_mode::repeat, wrap_y = wrap_mode::repeat, wrap_z = wrap_mode::repeat;
-    Decode decode{};
+    Decode decode{}; // turns a texel into a value
 
+    // The value at (0, 0, 0) to (1, 1, 1).
     [[nodiscard]] VOXELPIPE_HD T operator()(const glm::vec3& at) const {
         const core::axis_texels x = core::find_texels(wrap_x, filter, at.x, width),
                                 y = core::find_texels(wrap_y, filter, at.y, height),
@@ -165,10 +170,12 @@ struct field3d {
         return core::mix_texels(slice[0], slice[1], z.weight);
     }
     [[nodiscard]] VOXELPIPE_HD T operator()(const glm::vec3& at, int level) const { return on_level(level)(at); }
+    // A texel of level 0; x, y and z within it.
     [[nodiscard]] VOXELPIPE_HD T fetch(int x, int y, int z) const {
         const auto wide = [](int n) { return static_cast<std::size_t>(n); };
         return decode(texels[(wide(z) * wide(height) + wide(y)) * wide(width) + wide(x)]);
     }
+    // A level as a field of its own, 0 <= level < levels.
     [[nodiscard]] VOXELPIPE_HD field3d on_level(int level) const {
         field3d f = *this;
         for (; level > 0; --level) {

@@ -28,17 +28,18 @@ namespace voxelpipe {
 // blend::replace or a user-defined blend. The fragment shader has one output per target, of type T (bool for bit).
 template <class T, class Blend, class Layout = layout::linear>
 struct target {
-    using map = core::storage_map<T, Layout>;
+    using map = core::storage_map<T, Layout>; // where a voxel lies in memory
     using value_type = typename map::value;
+    // What memory holds: 32-bit words of bits, components of planar vectors.
     using element_type = typename map::element;
-    using blend_type = Blend;
-    using layout_type = Layout;
-    using traits = core::blend_traits<Blend, value_type>;
+    using blend_type = Blend;                             // how fragments meet
+    using layout_type = Layout;                           // the order of voxels in memory
+    using traits = core::blend_traits<Blend, value_type>; // identity and order of the blend
 
     static_assert(!std::is_same_v<T, bool>, "voxelpipe: a target of bits is written target<voxelpipe::bit, ...>");
     static_assert(std::is_trivially_copyable_v<value_type>,
                   "voxelpipe: a target's value type must be trivially copyable");
-    static constexpr bool is_own_blend = core::has_blend_member<Blend>;
+    static constexpr bool is_own_blend = core::has_blend_member<Blend>; // true for a struct with combine()
     static_assert(core::explain_user_blend<Blend, value_type>());
     static_assert(
         is_own_blend || traits::available,
@@ -46,46 +47,49 @@ struct target {
         "or bit, add_saturate integers, add_unordered floating types, a user struct its own blend)");
 };
 
-// The value of a voxel before its first fragment: a clear value, or what the memory holds. off: the target takes no
-// part; its memory is neither read nor written and may be absent, so one compiled pipeline serves any subset of
-// targets.
+// The value of a voxel before its first fragment. clear: a clear value. load: what the memory holds. off: the target
+// takes no part; its memory is neither read nor written and may be absent, so one compiled pipeline serves any subset
+// of targets.
 enum class load_operation : std::uint8_t { clear, load, off };
 
 // Memory of one target, not owned. `elements` has map::elements(extent) elements.
 template <class Target>
 struct target_view {
-    using map = typename Target::map;
+    using map = typename Target::map; // where a voxel lies in memory
     using value_type = typename Target::value_type;
-    using element_type = typename Target::element_type;
+    using element_type = typename Target::element_type; // what memory holds
 
-    element_type* elements = nullptr;
-    glm::ivec3 extent{0};
-    load_operation load = load_operation::clear;
-    value_type clear_value = Target::traits::identity();
+    element_type* elements = nullptr;                    // in the memory of the backend that draws
+    glm::ivec3 extent{0};                                // voxels, as the grid's
+    load_operation load = load_operation::clear;         // what a voxel starts from
+    value_type clear_value = Target::traits::identity(); // for load_operation::clear
 
     // (x, y, z) must be in the extent, and the caller must be able to access the memory.
     [[nodiscard]] VOXELPIPE_HD value_type operator()(int x, int y, int z) const {
         VOXELPIPE_EXPECTS(has(x, y, z));
         return map::load(elements, extent, x, y, z);
     }
+    // Writes a voxel. (x, y, z) must be in the extent, and the caller must be able to access the memory.
     VOXELPIPE_HD
     void store(int x, int y, int z, const value_type& v) const {
         VOXELPIPE_EXPECTS(has(x, y, z));
         map::store(elements, extent, x, y, z, v);
     }
+    // True if there is memory and (x, y, z) is in the extent.
     [[nodiscard]] VOXELPIPE_HD bool has(int x, int y, int z) const {
         return elements != nullptr && x >= 0 && y >= 0 && z >= 0 && x < extent.x && y < extent.y && z < extent.z;
     }
 };
 
+// One to eight render targets of one extent, in memory that somebody else owns: what calls draw into.
 template <class... Targets>
 struct framebuffer_view {
     static_assert(sizeof...(Targets) >= 1, "voxelpipe: a framebuffer needs at least one render target");
     static_assert(sizeof...(Targets) <= 8, "voxelpipe: a framebuffer takes at most 8 render targets in one pass");
-    static constexpr std::size_t num_targets = sizeof...(Targets);
+    static constexpr std::size_t num_targets = sizeof...(Targets); // render targets
 
-    glm::ivec3 extent{0};
-    core::pack<target_view<Targets>...> targets;
+    glm::ivec3 extent{0};                        // voxels, as the grid's
+    core::pack<target_view<Targets>...> targets; // get<I>(targets) is target I
     // A view of memory that the caller owns, one pointer per target. The next call clears all of them; a null pointer
     // turns its target off.
     [[nodiscard]] static framebuffer_view on(glm::ivec3 extent, typename Targets::element_type*... elements) {
@@ -118,7 +122,7 @@ template <class Target>
 template <class Backend, class... Targets>
 class framebuffer {
 public:
-    using view_type = framebuffer_view<Targets...>;
+    using view_type = framebuffer_view<Targets...>; // what calls take
 
     // Targets that are not `enabled` start as load_operation::off and get no memory.
     framebuffer(Backend& backend, glm::ivec3 extent,
@@ -132,8 +136,9 @@ public:
         });
     }
 
-    [[nodiscard]] glm::ivec3 extent() const { return view_.extent; }
-    [[nodiscard]] const view_type& view() const { return view_; }
+    [[nodiscard]] glm::ivec3 extent() const { return view_.extent; } // Voxels, as the grid's.
+    [[nodiscard]] const view_type& view() const { return view_; }    // Refers to the framebuffer.
+    // Refers to the framebuffer.
     operator const view_type&() const { return view_; } // NOLINT(*-explicit-*)
 
     // Repeated clears to the same value write only voxels near those drawn since the previous clear: for a surface in
@@ -154,9 +159,11 @@ public:
     template <std::size_t I>
     class const_reference {
     public:
-        using target_type = typename core::pack_element<I, Targets...>::type;
+        using target_type = typename core::pack_element<I, Targets...>::type; // the target's type
+        // Refers to the framebuffer.
         explicit const_reference(const framebuffer& owner) : owner_(owner) {}
 
+        // The target's memory, to be read.
         [[nodiscard]] const target_view<target_type>& view() const { return get<I>(owner_.view_.targets); }
         // Copies the raw elements, in the target's layout, and waits. Empty if the framebuffer was made without the
         // target.
@@ -190,7 +197,7 @@ public:
     template <std::size_t I>
     class reference : public const_reference<I> {
     public:
-        using target_type = typename core::pack_element<I, Targets...>::type;
+        using target_type = typename core::pack_element<I, Targets...>::type; // the target's type
         explicit reference(framebuffer& owner) : const_reference<I>(owner), owner_(owner) {}
 
         // The next voxelize starts every voxel with `value`, which blends like a first fragment's.

@@ -43,6 +43,7 @@ struct grid {
         return part;
     }
 
+    // Voxels of the whole grid, which determine the snapping.
     [[nodiscard]] glm::ivec3 whole_extent() const { return whole == glm::ivec3(0) ? extent : whole; }
 
     // The grid that this one was cropped from, or this one. Its voxels are numbered like fragment::voxel.
@@ -139,8 +140,8 @@ namespace core {
 
 // A box in world coordinates. Empty if a `low` is above its `high`, as by default.
 struct bounding_box {
-    glm::dvec3 low{std::numeric_limits<double>::infinity()};
-    glm::dvec3 high{-std::numeric_limits<double>::infinity()};
+    glm::dvec3 low{std::numeric_limits<double>::infinity()};   // least coordinates, world units
+    glm::dvec3 high{-std::numeric_limits<double>::infinity()}; // greatest coordinates, world units
 
     [[nodiscard]] bool empty() const { return !(low.x <= high.x && low.y <= high.y && low.z <= high.z); }
     friend bool operator==(const bounding_box&, const bounding_box&) = default;

@@ -76,13 +76,13 @@ void for_each_voxel_in(const brick_table& table, std::uint64_t brick, F&& f) {
 template <class... Targets>
 class host_sparse {
 public:
-    static constexpr std::size_t num_targets = sizeof...(Targets);
+    static constexpr std::size_t num_targets = sizeof...(Targets); // render targets
     template <std::size_t I>
-    using target_type = typename core::pack_element<I, Targets...>::type;
+    using target_type = typename core::pack_element<I, Targets...>::type; // the type of target I
 
-    std::vector<std::uint64_t> keys; // the arrays of brick_table
-    std::vector<brick_mask> masks;
-    std::vector<std::uint64_t> offsets;
+    std::vector<std::uint64_t> keys;    // the arrays of brick_table
+    std::vector<brick_mask> masks;      // voxels that exist, per brick
+    std::vector<std::uint64_t> offsets; // rank of each brick's first voxel, and the number of all
     core::pack<std::vector<typename core::rank_map<Targets>::element>...> values; // by rank; none of a disabled target
     core::pack<std::vector<core::kept_sum<Targets>>...> sums;                     // by rank, where they were kept
     core::pack<typename Targets::value_type...> clear_values{};                   // what absent voxels read as
@@ -92,16 +92,18 @@ public:
     [[nodiscard]] brick_table table() const {
         return {keys.data(), masks.data(), offsets.data(), keys.size(), where.extent, where.offset};
     }
-    [[nodiscard]] std::uint64_t num_bricks() const { return keys.size(); }
-    [[nodiscard]] std::uint64_t num_voxels() const { return table().num_voxels(); }
+    [[nodiscard]] std::uint64_t num_bricks() const { return keys.size(); }          // Bricks with a voxel.
+    [[nodiscard]] std::uint64_t num_voxels() const { return table().num_voxels(); } // Voxels that exist.
     // Whether a voxel exists, numbered from the corner of the part; false outside.
     [[nodiscard]] bool contains(const glm::ivec3& voxel) const { return table().find(voxel) != brick_table::none; }
 
+    // One brick: where it lies, and which voxels of it exist.
     struct brick_entry {
         glm::ivec3 origin;      // its first voxel, from the corner of the part; negative where a crop cuts the brick
         const brick_mask& mask; // which of its 512 voxels exist
         std::uint64_t first;    // rank of the first of them
     };
+    // Brick i in Morton order, 0 <= i < num_bricks().
     [[nodiscard]] brick_entry brick(std::uint64_t i) const {
         VOXELPIPE_EXPECTS(i < num_bricks());
         return {table().brick_origin(i), masks[i], offsets[i]};
@@ -109,6 +111,7 @@ public:
     // A random-access range of brick_entry, in Morton order. Refers to the arrays.
     class brick_range {
     public:
+        // Refers to the host_sparse.
         explicit brick_range(const host_sparse& owner) : owner_(&owner) {}
         [[nodiscard]] auto begin() const { return core::index_iterator(brick_at{owner_}, 0); }
         [[nodiscard]] auto end() const { return core::index_iterator(brick_at{owner_}, owner_->keys.size()); }
@@ -122,7 +125,7 @@ public:
         };
         const host_sparse* owner_;
     };
-    [[nodiscard]] brick_range bricks() const { return brick_range(*this); }
+    [[nodiscard]] brick_range bricks() const { return brick_range(*this); } // All bricks.
 
     // Calls f(glm::ivec3 voxel, std::uint64_t rank) for every voxel that exists, in Morton order.
     template <class F>
@@ -135,8 +138,9 @@ public:
     template <std::size_t I>
     class target_reference {
     public:
-        using target = typename core::pack_element<I, Targets...>::type;
+        using target = typename core::pack_element<I, Targets...>::type; // the target's type
         using value_type = typename target::value_type;
+        // Refers to the host_sparse.
         explicit target_reference(const host_sparse& owner) : owner_(owner) {}
 
         // The value of a voxel that exists. The target is not disabled.
@@ -149,6 +153,7 @@ public:
             const std::uint64_t rank = owner_.table().find({x, y, z});
             return rank == brick_table::none ? get<I>(owner_.clear_values) : (*this)[rank];
         }
+        // False if the framebuffer was made without the target.
         [[nodiscard]] bool enabled() const { return owner_.num_voxels() == 0 || !get<I>(owner_.values).empty(); }
 
         // The dense target: the same elements as a dense framebuffer's. Throws std::length_error where it cannot be

@@ -40,11 +40,11 @@ template <class Map>
 // A copy of a target in host memory. `elements` has the target's layout.
 template <class Target>
 struct host_target {
-    using target_type = Target;
+    using target_type = Target; // the target's type
     using value_type = typename Target::value_type;
-    using map = typename Target::map;
-    std::vector<typename Target::element_type> elements;
-    glm::ivec3 extent{0};
+    using map = typename Target::map;                    // where a voxel lies in `elements`
+    std::vector<typename Target::element_type> elements; // empty if the target was off
+    glm::ivec3 extent{0};                                // voxels
 
     // (x, y, z) must be in the extent, and the target must not have been off.
     [[nodiscard]] value_type operator()(int x, int y, int z) const {
@@ -54,6 +54,7 @@ struct host_target {
     }
     // The voxels [first(), last()).
     [[nodiscard]] glm::ivec3 first() const { return glm::ivec3(0); }
+    // The upper end of the box; 0 if the target was off.
     [[nodiscard]] glm::ivec3 last() const { return elements.empty() ? glm::ivec3(0) : extent; }
 };
 
@@ -61,9 +62,9 @@ struct host_target {
 template <class Target>
 class host_region {
 public:
-    using target_type = Target;
+    using target_type = Target; // the target's type
     using value_type = typename Target::value_type;
-    using map = typename Target::map;
+    using map = typename Target::map; // where a voxel lies in memory
 
     // Elements are zero until fill(). The box must lie in `extent`. For a target that is off, use the default
     // constructor.
@@ -84,8 +85,8 @@ public:
         return map::load(elements_.data(), copied_extent_, x - copied_first_.x, y - copied_first_.y,
                          z - copied_first_.z);
     }
-    [[nodiscard]] glm::ivec3 first() const { return first_; }
-    [[nodiscard]] glm::ivec3 last() const { return last_; }
+    [[nodiscard]] glm::ivec3 first() const { return first_; } // The lower corner of the box.
+    [[nodiscard]] glm::ivec3 last() const { return last_; }   // One above the upper corner.
 
     // (x, y, z) is in the box.
     void store(int x, int y, int z, const value_type& v) {

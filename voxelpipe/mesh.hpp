@@ -25,20 +25,21 @@ namespace voxelpipe {
 // them.
 struct checked_indices {
     const glm::uvec3* triangles = nullptr; // start of the `count` checked triangles; null: nothing is known
-    std::size_t count = 0;
-    std::uint64_t bound = 0; // greater than every index
+    std::size_t count = 0;                 // triangles
+    std::uint64_t bound = 0;               // greater than every index
 };
 
 // How often a mesh is drawn. The vertex shader gets the number of the copy, vertex::instance.
 struct instances {
-    std::uint64_t count = 1;
+    std::uint64_t count = 1; // 0 draws nothing; below 2^32
 };
 
+// A triangle mesh in memory that somebody else owns: the CPU backend reads host memory, cuda_backend device memory.
 template <class... Attributes>
 struct mesh_view {
     static_assert((std::is_trivially_copyable_v<Attributes> && ...),
                   "voxelpipe: vertex attributes must be trivially copyable");
-    static constexpr std::size_t num_attributes = sizeof...(Attributes);
+    static constexpr std::size_t num_attributes = sizeof...(Attributes); // arrays of attributes
 
     backend_view<const glm::vec3> positions;                     // one per vertex
     backend_view<const glm::uvec3> triangles;                    // vertex indices
@@ -50,6 +51,7 @@ struct mesh_view {
 
     // Of all instances.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_triangles() const { return triangles.size() * copies.count; }
+    // Of all instances.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_vertices() const { return positions.size() * copies.count; }
 
     // True if all indices are known to name vertices. Otherwise calls check each of them.
@@ -101,6 +103,7 @@ template <class... Attributes>
 template <class Backend, class... Attributes>
 class mesh {
 public:
+    // Copies its arguments.
     mesh(Backend& backend, const vertex_source<glm::vec3>& positions, triangle_source&& triangles,
          const vertex_source<Attributes>&... attributes)
         : positions_(backend, positions.view()),
@@ -120,6 +123,7 @@ public:
         }
         (std::index_sequence_for<Attributes...>{});
     }
+    // The mesh once.
     operator mesh_view<Attributes...>() const { return view(); } // NOLINT(*-explicit-*)
 
 private:

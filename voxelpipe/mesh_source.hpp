@@ -28,8 +28,8 @@ struct strided_view {
     using value_type = T;
     static_assert(std::is_trivially_copyable_v<T> && !std::is_const_v<T>);
 
-    const void* first = nullptr;
-    std::size_t count = 0;
+    const void* first = nullptr;    // address of the first value
+    std::size_t count = 0;          // number of values
     std::size_t stride = sizeof(T); // bytes; the values need no alignment
 
     [[nodiscard]] T operator[](std::size_t i) const {
@@ -99,6 +99,7 @@ public:
     vertex_source(const vertex_source&) = delete; // view_ may refer to copy_
     vertex_source& operator=(const vertex_source&) = delete;
 
+    // Refers to the source, or to its copy in here.
     [[nodiscard]] array_view<const T> view() const { return view_; }
 
 private:

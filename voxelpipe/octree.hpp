@@ -34,11 +34,13 @@ public:
     template <class... Targets>
     explicit octree(const host_sparse<Targets...>& h) : octree(h.table(), h.where.whole_extent()) {}
 
+    // Levels above the voxels; 0 if there are none.
     [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); }
     // A level, from 0 on.
     [[nodiscard]] std::uint64_t num_nodes(int level) const {
         return level == 0 ? num_voxels_ : levels_[static_cast<std::size_t>(level) - 1].masks.size();
     }
+    // Bytes that the nodes take.
     [[nodiscard]] std::uint64_t num_bytes() const {
         std::uint64_t count = 0;
         for (const auto& l : levels_) count += l.masks.size();
@@ -48,6 +50,7 @@ public:
     [[nodiscard]] std::span<const std::uint8_t> masks(int level) const {
         return levels_[static_cast<std::size_t>(level) - 1].masks;
     }
+    // For each node of a level, 1 to num_levels(), the number of its first child on the level below.
     [[nodiscard]] std::span<const std::uint64_t> first(int level) const {
         return levels_[static_cast<std::size_t>(level) - 1].first;
     }
@@ -147,9 +150,10 @@ private:
 template <class T>
 class octree_levels {
 public:
+    // Values of a level's nodes, 1 to num_levels().
     [[nodiscard]] std::span<const T> at(int level) const { return levels_[static_cast<std::size_t>(level) - 1]; }
-    [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); }
-    std::vector<T>& add() { return levels_.emplace_back(); }
+    [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); } // As the octree's.
+    std::vector<T>& add() { return levels_.emplace_back(); } // A level more, empty, to be filled.
 
 private:
     std::vector<std::vector<T>> levels_;

@@ -18,15 +18,17 @@
 
 namespace voxelpipe {
 
+// An octree whose equal parts are there once: a directed acyclic graph. On the host; owns its nodes.
 class octree_dag {
 public:
     octree_dag() = default;
+    // Merges equal nodes, from the voxels up.
     explicit octree_dag(const octree& tree) {
         std::vector<std::uint32_t> below; // what each node of the level below has become
         for (int l = 1; l <= tree.num_levels(); ++l) below = add_level(tree, l, below);
     }
 
-    [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); }
+    [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); } // As the octree's.
     // A level, from 1 on; the last one has the root.
     [[nodiscard]] std::uint64_t num_nodes(int level) const {
         return levels_[static_cast<std::size_t>(level) - 1].masks.size();

@@ -49,9 +49,11 @@ namespace core {
 template <class Varyings>
 class patch_point {
 public:
-    using vertex_type = vertex_output<Varyings>;
+    using vertex_type = vertex_output<Varyings>; // what the vertex shader returns
 
+    // Of the point, before the program displaces it.
     [[nodiscard]] VOXELPIPE_HD glm::vec3 position() const { return mix_of(a_.position, b_.position, c_.position); }
+    // All varyings, interpolated; flat ones from one vertex.
     [[nodiscard]] VOXELPIPE_HD Varyings varyings() const {
         return is_corner_ ? a_.varyings : core::mix(a_.varyings, b_.varyings, c_.varyings, t1_, t2_);
     }
@@ -79,7 +81,7 @@ private:
 // Divides triangles by a tessellation program.
 template <class Program>
 struct tessellate {
-    Program program;
+    Program program; // trivially copyable; edge_level(), and a call for each point
 };
 template <class Program>
 tessellate(Program) -> tessellate<Program>;
@@ -111,29 +113,32 @@ namespace exact {
 // What a geometry program gets: vertices after the vertex shader, or after the tessellation program.
 template <class Varyings = no_varyings>
 struct triangle {
-    vertex_output<Varyings> vertices[3];
+    vertex_output<Varyings> vertices[3];  // counter-clockwise from the front
     std::uint32_t number, instance, draw; // number: of the triangle in its mesh; of the patch after a tessellation
 };
+// The same for a segment of lines_view.
 template <class Varyings = no_varyings>
 struct line {
-    vertex_output<Varyings> vertices[2];
-    std::uint32_t number, instance, draw;
+    vertex_output<Varyings> vertices[2];  // in the order of the indices
+    std::uint32_t number, instance, draw; // number: of the segment in its view
 };
+// The same for a point of points_view.
 template <class Varyings = no_varyings>
 struct point {
-    vertex_output<Varyings> vertices[1];
-    std::uint32_t number, instance, draw;
+    vertex_output<Varyings> vertices[1];  // one
+    std::uint32_t number, instance, draw; // number: of the point in its view
 };
 
 // What it returns: up to N triangles, in order.
 template <int N, class Varyings = no_varyings>
 struct triangles {
-    using vertex_type = vertex_output<Varyings>;
-    static constexpr int capacity = N;
+    using vertex_type = vertex_output<Varyings>; // what the vertex shader returns
+    static constexpr int capacity = N;           // most triangles of one element
 
-    vertex_type vertices[3 * N];
-    int count = 0; // a call fails with bad_count unless this is 0 to N
+    vertex_type vertices[3 * N]; // three a triangle
+    int count = 0;               // a call fails with bad_count unless this is 0 to N
 
+    // Appends a triangle. Beyond N it only counts, and the call fails.
     VOXELPIPE_HD void add(const vertex_type& a, const vertex_type& b, const vertex_type& c) {
         if (count >= 0 && count < N) {
             vertices[3 * count] = a;
@@ -144,9 +149,10 @@ struct triangles {
     }
 };
 
+// Replaces triangles, lines or points by what a geometry program returns for each.
 template <class Program>
 struct geometry {
-    Program program;
+    Program program; // trivially copyable
 };
 template <class Program>
 geometry(Program) -> geometry<Program>;
@@ -154,9 +160,10 @@ geometry(Program) -> geometry<Program>;
 // A geometry program for the triangles of a tessellation.
 template <class Tessellation, class Geometry>
 struct tessellate_then_geometry {
-    tessellate<Tessellation> first;
-    geometry<Geometry> second;
+    tessellate<Tessellation> first; // divides triangles
+    geometry<Geometry> second;      // gets the parts
 };
+// Both programs, one after the other, as in vp::tessellate{a} | vp::geometry{b}.
 template <class Tessellation, class Geometry>
 [[nodiscard]] constexpr tessellate_then_geometry<Tessellation, Geometry> operator|(const tessellate<Tessellation>& t,
                                                                                    const geometry<Geometry>& g) {

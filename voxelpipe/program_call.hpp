@@ -33,6 +33,7 @@ struct program_options : voxelize_options {
     std::uint64_t chunk_triangles = std::uint64_t{1} << 24;
 
     program_options() = default;
+    // A coverage alone, or options of a call without programs, may be given in their place.
     program_options(const voxelize_options& o) : voxelize_options(o) {} // NOLINT(*-explicit-*)
     program_options(coverage rule_) : voxelize_options{rule_, true} {}  // NOLINT(*-explicit-*)
     program_options(coverage rule_, std::uint64_t chunk_triangles_)

@@ -33,9 +33,9 @@ struct mean {};
 struct mean_of_voxels {};
 // The sum over all voxels of the node, 8^level, existing or not: a coverage, for a target of ones.
 struct mean_of_volume {};
-struct min {}; // floats in the total order of blend::min
-struct max {};
-struct bit_or {};
+struct min {};      // floats in the total order of blend::min
+struct max {};      // in the same order
+struct bit_or {};   // integers and bit
 struct majority {}; // the value that most children have; of several the least, component by component
 
 } // namespace reduce

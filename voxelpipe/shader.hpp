@@ -31,17 +31,18 @@
 
 namespace voxelpipe {
 
-struct no_varyings {};
+struct no_varyings {}; // of shaders that need none
 
 // ---- vertex shader --------------------------------------------------------------------------------------------------
 
+// What a vertex shader gets.
 template <class... Attributes>
 struct vertex {
-    std::uint32_t index; // in its mesh
-    std::uint32_t draw;  // number of the draw in the call
-    glm::vec3 position;  // as in the mesh
-    core::pack<Attributes...> attributes;
-    std::uint32_t instance = 0; // number of the mesh's copy
+    std::uint32_t index;                  // in its mesh
+    std::uint32_t draw;                   // number of the draw in the call
+    glm::vec3 position;                   // as in the mesh
+    core::pack<Attributes...> attributes; // the mesh's, in order: get<I>(v)
+    std::uint32_t instance = 0;           // number of the mesh's copy
 };
 
 // Attribute I of the vertex.
@@ -50,16 +51,18 @@ template <std::size_t I, class... Attributes>
     return get<I>(v.attributes);
 }
 
+// What a vertex shader returns: a position, and what is interpolated over the triangle.
 template <class Varyings = no_varyings>
 struct vertex_output {
-    glm::vec3 position; // world space
-    Varyings varyings{};
+    glm::vec3 position;  // world space
+    Varyings varyings{}; // at most 12 floats, glm::vec2 to vec4, std::array<float, N> or flat<T>
 };
 template <class Varyings>
 vertex_output(glm::vec3, Varyings) -> vertex_output<Varyings>;
 
 // Returns positions unchanged; no varyings.
 struct passthrough {
+    // The position as it is.
     template <class Vertex>
     VOXELPIPE_HD glm::vec3 operator()(const Vertex& v) const {
         return v.position;
@@ -76,7 +79,8 @@ struct passthrough {
 
 // Transforms a mesh by an affine matrix (last row 0 0 0 1); no varyings.
 struct transform {
-    glm::mat4 matrix{1.0f};
+    glm::mat4 matrix{1.0f}; // columns as in glm
+    // The transformed position.
     template <class Vertex>
     VOXELPIPE_HD glm::vec3 operator()(const Vertex& v) const {
         return transform_point(matrix, v.position);
@@ -103,7 +107,9 @@ struct fragment {
 
     const Varyings* vertex_varyings[3]; // of the triangle's vertices
 
+    // The weights of the nearest point of the triangle.
     [[nodiscard]] VOXELPIPE_HD glm::vec3 clamped_barycentric() const { return core::clamp_barycentric(barycentric); }
+    // Varyings at the nearest point of the triangle.
     [[nodiscard]] VOXELPIPE_HD Varyings clamped_varyings() const {
         const glm::vec3 b = clamped_barycentric();
         return core::mix(*vertex_varyings[0], *vertex_varyings[1], *vertex_varyings[2], b.y, b.z);
@@ -113,8 +119,8 @@ struct fragment {
 // The result of a fragment shader: one value per render target, in order. The fragment is discarded unless `keep`.
 template <class... Ts>
 struct output {
-    core::pack<Ts...> values;
-    bool keep = true;
+    core::pack<Ts...> values; // one per render target
+    bool keep = true;         // false discards the fragment in all targets
 
     // The same values, discarded if `condition` holds.
     [[nodiscard]] VOXELPIPE_HD constexpr output discard_if(bool condition) const {
@@ -122,6 +128,7 @@ struct output {
     }
 };
 
+// Makes the result of a fragment shader, one value per render target. Types are the targets', without a conversion.
 template <class... Ts>
 [[nodiscard]] VOXELPIPE_HD constexpr output<Ts...> outputs(Ts... values) {
     return {core::make_pack(values...)};
@@ -130,12 +137,14 @@ template <class... Ts>
 // Fragment shader that returns the same values for every fragment: constant_output<bool>{true}, or constant(1.0f, 1u).
 template <class... Ts>
 struct constant_output {
-    core::pack<Ts...> values;
+    core::pack<Ts...> values; // one per render target
+    // The same values, whatever the fragment.
     template <class Fragment>
     VOXELPIPE_HD output<Ts...> operator()(const Fragment&) const {
         return {values};
     }
 };
+// Makes a constant_output. A shader that is known to be constant is drawn by faster strategies.
 template <class... Ts>
 [[nodiscard]] constexpr constant_output<Ts...> constant(Ts... values) {
     return {core::make_pack(values...)};
@@ -271,10 +280,10 @@ struct none {};
 // A mesh with its shaders; the functors carry the transform and the shader data. Does not own the mesh.
 template <class Mesh, class VertexShader, class FragmentShader, class Amplify = none>
 struct draw {
-    Mesh mesh;
-    VertexShader vertex_shader;
-    Amplify amplify; // vp::tessellate, vp::geometry, or one after the other
-    FragmentShader fragment_shader;
+    Mesh mesh;                      // a mesh_view, points_view or lines_view
+    VertexShader vertex_shader;     // trivially copyable
+    Amplify amplify;                // vp::tessellate, vp::geometry, or one after the other
+    FragmentShader fragment_shader; // trivially copyable
 };
 template <class Mesh, class VertexShader, class FragmentShader>
 struct draw<Mesh, VertexShader, FragmentShader, none> {
@@ -285,7 +294,7 @@ struct draw<Mesh, VertexShader, FragmentShader, none> {
 
 // The draw of a call and the triangle of its mesh.
 struct draw_triangle {
-    std::uint32_t draw = 0, triangle = 0;
+    std::uint32_t draw = 0, triangle = 0; // numbers in the call and in the draw's mesh
     friend bool operator==(const draw_triangle&, const draw_triangle&) = default;
 };
 
@@ -293,6 +302,7 @@ struct draw_triangle {
 // sizes at its construction, and refers to nothing.
 class primitive_map {
 public:
+    // Of the draws of a call.
     template <class Mesh, class VertexShader, class FragmentShader>
     explicit primitive_map(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws) {
         std::uint64_t end = 0;

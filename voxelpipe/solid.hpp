@@ -41,17 +41,17 @@ enum class repair : std::uint8_t {
 
 // Written {.rule = fill_rule::even_odd, .extent = solid_extent::outer}.
 struct solid_options {
-    fill_rule rule = fill_rule::nonzero;
-    voxelpipe::bodies bodies = voxelpipe::bodies::call;
-    solid_extent extent = solid_extent::centre;
-    voxelpipe::repair repair = voxelpipe::repair::none;
-    bool count_voxels = true; // fill counters::voxels
+    fill_rule rule = fill_rule::nonzero;                // what a winding number means
+    voxelpipe::bodies bodies = voxelpipe::bodies::call; // one body, or one for each draw
+    solid_extent extent = solid_extent::centre;         // which voxels belong to the inside
+    voxelpipe::repair repair = voxelpipe::repair::none; // of meshes that are not closed
+    bool count_voxels = true;                           // fill counters::voxels
 
     // close_holes: holes with more boundary edges than this stay open.
     std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max();
     // exterior: gaps of up to about twice as many voxels are closed, 0 to max_closing.
     int closing = 0;
-    static constexpr int max_closing = 64;
+    static constexpr int max_closing = 64; // the largest `closing`
 };
 
 // even_odd, each draw by itself: overlapping draws stay solid, cavities within one draw stay empty.

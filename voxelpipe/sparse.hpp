@@ -23,34 +23,36 @@ namespace voxelpipe {
 // The most that a call may make of a sparse framebuffer; a call that needs more changes nothing and returns
 // capacity_exceeded, with the numbers that it needs in status::required.
 struct sparse_limits {
-    std::uint64_t bricks = std::numeric_limits<std::uint64_t>::max();
-    std::uint64_t voxels = std::numeric_limits<std::uint64_t>::max();
+    std::uint64_t bricks = std::numeric_limits<std::uint64_t>::max(); // of 8 x 8 x 8 voxels
+    std::uint64_t voxels = std::numeric_limits<std::uint64_t>::max(); // that exist
 };
 
 // What calls are to do with one target.
 template <class Target>
 struct sparse_target {
-    load_operation load = load_operation::clear;
-    bool enabled = true;
-    bool keeps_sums = false;
-    typename Target::value_type clear_value = Target::traits::identity();
+    load_operation load = load_operation::clear; // what a voxel starts from
+    bool enabled = true;                         // false: no memory
+    bool keeps_sums = false;                     // keeps reproducible sums open for later calls
+    typename Target::value_type clear_value = Target::traits::identity(); // what absent voxels read as
 };
 
 // The arrays of a sparse framebuffer in the memory of a backend.
 template <class Backend, class... Targets>
 struct sparse_contents {
+    // The backend's memory.
     template <class T>
     using buffer = typename Backend::template buffer<T>;
 
+    // Empty.
     explicit sparse_contents(Backend& backend)
         : keys(backend, 0), masks(backend, 0), offsets(backend, 0),
           values(core::make_pack(buffer<typename core::rank_map<Targets>::element>(backend, 0)...)),
           sums(core::make_pack(buffer<core::kept_sum<Targets>>(backend, 0)...)) {}
 
-    buffer<std::uint64_t> keys;
-    buffer<brick_mask> masks;
+    buffer<std::uint64_t> keys;    // Morton keys of bricks, ascending
+    buffer<brick_mask> masks;      // one per brick
     buffer<std::uint64_t> offsets; // one more than bricks; empty where there are none
-    std::uint64_t num_voxels = 0;
+    std::uint64_t num_voxels = 0;  // that exist
     core::pack<buffer<typename core::rank_map<Targets>::element>...> values; // empty for disabled targets
     core::pack<buffer<core::kept_sum<Targets>>...> sums;                     // empty where they are not kept
 };
@@ -58,9 +60,9 @@ struct sparse_contents {
 // Reads a sparse framebuffer where it lies: in device code, or on the host for a backend that runs there.
 template <class... Targets>
 struct sparse_view {
-    brick_table table;
-    core::pack<const typename core::rank_map<Targets>::element*...> values;
-    core::pack<typename Targets::value_type...> clear_values;
+    brick_table table;                                                      // names the bricks
+    core::pack<const typename core::rank_map<Targets>::element*...> values; // by rank; null for disabled targets
+    core::pack<typename Targets::value_type...> clear_values;               // what absent voxels read as
 
     // Target I of a voxel of the part: the clear value, where it does not exist. The target is not disabled.
     template <std::size_t I>
@@ -81,8 +83,8 @@ class sparse_framebuffer {
     static_assert(sizeof...(Targets) <= 8, "voxelpipe: a framebuffer takes at most 8 render targets in one pass");
 
 public:
-    using contents_type = sparse_contents<Backend, Targets...>;
-    static constexpr std::size_t num_targets = sizeof...(Targets);
+    using contents_type = sparse_contents<Backend, Targets...>;    // its arrays
+    static constexpr std::size_t num_targets = sizeof...(Targets); // render targets
 
     // `enabled`: targets that are not start as load_operation::off and get no memory. Allocates nothing.
     sparse_framebuffer(Backend& backend, glm::ivec3 extent,
@@ -96,11 +98,11 @@ public:
         });
     }
 
-    [[nodiscard]] glm::ivec3 extent() const { return where_.extent; }
+    [[nodiscard]] glm::ivec3 extent() const { return where_.extent; } // Voxels, as the grid's.
     // The grid of the last call; only its extent means something before the first.
     [[nodiscard]] const grid& where() const { return where_; }
-    [[nodiscard]] std::uint64_t num_bricks() const { return contents_.keys.size(); }
-    [[nodiscard]] std::uint64_t num_voxels() const { return contents_.num_voxels; }
+    [[nodiscard]] std::uint64_t num_bricks() const { return contents_.keys.size(); } // Bricks with a voxel.
+    [[nodiscard]] std::uint64_t num_voxels() const { return contents_.num_voxels; }  // Voxels that exist.
     // Bytes that bricks, values and kept sums take.
     [[nodiscard]] std::uint64_t num_bytes() const {
         std::uint64_t bytes = num_bricks() * (sizeof(std::uint64_t) + sizeof(brick_mask)) +
@@ -112,8 +114,8 @@ public:
         });
         return bytes;
     }
-    void limit(const sparse_limits& limits) { limits_ = limits; }
-    [[nodiscard]] const sparse_limits& limits() const { return limits_; }
+    void limit(const sparse_limits& limits) { limits_ = limits; }         // Bounds later calls.
+    [[nodiscard]] const sparse_limits& limits() const { return limits_; } // As set; without bounds by default.
 
     // Whether the voxels' sums are kept in the format in which their blend adds, from the next call on; only targets
     // that sum floats (blend::add, add_quantum) or saturate signed integers have any. An octree rounds a parent's sum
@@ -148,6 +150,7 @@ public:
 
     // For backends.
     [[nodiscard]] const contents_type& contents() const { return contents_; }
+    // What the next call does with each target.
     [[nodiscard]] const core::pack<sparse_target<Targets>...>& targets() const { return targets_; }
     // What absent voxels read as after the next call.
     [[nodiscard]] core::pack<typename Targets::value_type...> next_background() const {
@@ -158,6 +161,7 @@ public:
         });
         return values;
     }
+    // For backends: replaces the contents by those of a finished call.
     void take(contents_type&& contents, const grid& where) {
         background_ = next_background();
         contents_ = std::move(contents);
@@ -168,7 +172,8 @@ public:
     template <std::size_t I>
     class const_reference {
     public:
-        using target_type = typename core::pack_element<I, Targets...>::type;
+        using target_type = typename core::pack_element<I, Targets...>::type; // the target's type
+        // Refers to the framebuffer.
         explicit const_reference(const sparse_framebuffer& owner) : owner_(owner) {}
 
         // The dense target, as a dense framebuffer gives it. Throws std::length_error where it cannot be addressed.
@@ -195,7 +200,7 @@ public:
     template <std::size_t I>
     class reference : public const_reference<I> {
     public:
-        using target_type = typename core::pack_element<I, Targets...>::type;
+        using target_type = typename core::pack_element<I, Targets...>::type; // the target's type
         explicit reference(sparse_framebuffer& owner) : const_reference<I>(owner), target_(get<I>(owner.targets_)) {}
 
         // Before the next voxelize: every voxel is `value`, which blends like a first fragment's.

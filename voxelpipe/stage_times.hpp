@@ -10,10 +10,10 @@
 
 namespace voxelpipe {
 
-// Milliseconds.
+// Milliseconds of each stage; 0 if the call has no such stage (docs/pipeline.md).
 struct stage_times {
-    double vertex_shade = 0, coarse_raster = 0, tile_sort = 0, tile_split = 0, clear = 0, fine_raster = 0,
-           tile_resolve = 0, abuffer_emit = 0;
+    double vertex_shade = 0, coarse_raster = 0, tile_sort = 0, tile_split = 0; // as far as lists of triangles
+    double clear = 0, fine_raster = 0, tile_resolve = 0, abuffer_emit = 0;     // from those to values
 
     friend bool operator==(const stage_times&, const stage_times&) = default;
 };
@@ -30,6 +30,7 @@ inline constexpr std::array<std::pair<const char*, double stage_times::*>, 8> st
     {"abuffer_emit", &stage_times::abuffer_emit},
 }};
 
+// All stages together, milliseconds.
 [[nodiscard]] constexpr double sum_of(const stage_times& times) {
     double sum = 0;
     for (const auto& [name, field] : stage_time_fields) sum += times.*field;

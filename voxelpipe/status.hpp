@@ -12,31 +12,34 @@
 
 namespace voxelpipe {
 
+// Why a call did nothing. A call that fails has written no target.
 enum class status_code : std::uint8_t {
-    ok,
-    null_view,          // a view with elements but without memory, or a target that is on but has none
-    index_out_of_range, // a triangle names a vertex that the mesh does not have
-    attribute_mismatch, // a vertex attribute array is not as long as the positions
-    not_affine,         // vp::transform with a matrix whose last row is not 0 0 0 1
-    bad_extent,         // an extent that is zero or negative
-    bad_crop,           // a crop that is not within the whole grid
-    extent_too_large,   // an extent above grid::max_extent
-    bad_origin,         // NaN or infinite
-    bad_voxel_size,     // zero, negative, NaN, infinite, or so small or large that the snapping scale is no number
-    extent_mismatch,    // framebuffer and grid differ in extent
-    size_overflow,      // a buffer would have more bytes than this machine can address
-    too_many_triangles, // more than 2^32 - 1 in all draws together
-    out_of_memory,
+    ok,                   // success
+    null_view,            // a view with elements but without memory, or a target that is on but has none
+    index_out_of_range,   // a triangle names a vertex that the mesh does not have
+    attribute_mismatch,   // a vertex attribute array is not as long as the positions
+    not_affine,           // vp::transform with a matrix whose last row is not 0 0 0 1
+    bad_extent,           // an extent that is zero or negative
+    bad_crop,             // a crop that is not within the whole grid
+    extent_too_large,     // an extent above grid::max_extent
+    bad_origin,           // NaN or infinite
+    bad_voxel_size,       // zero, negative, NaN, infinite, or so small or large that the snapping scale is no number
+    extent_mismatch,      // framebuffer and grid differ in extent
+    size_overflow,        // a buffer would have more bytes than this machine can address
+    too_many_triangles,   // more than 2^32 - 1 in all draws together
+    out_of_memory,        // of the host or the device
     capacity_exceeded,    // the caller's workspace is too small; `required` says what is needed
     strategy_unavailable, // the forced strategy cannot serve the call
     bad_solid_options,    // an option of voxelize_solid is out of its range
     bad_level,            // a tessellation program gave a level below 1 or above its max_level
     bad_count,            // a geometry program emitted more triangles than its type holds
     crop_without_whole,   // repair::exterior of a crop: what lies outside follows from the whole grid
-    no_device,
-    device_error, // `device_error` holds the CUDA error
+    no_device,            // cuda_backend without a usable device
+    device_error,         // `device_error` holds the CUDA error
 };
 
+// Stages of the pipeline, in their order; where a call failed: validate, vertex_shade, coarse_raster, tile_sort,
+// tile_split, fine_raster, tile_resolve or abuffer_emit.
 enum class stage : std::uint8_t {
     validate,
     vertex_shade,
@@ -51,17 +54,18 @@ enum class stage : std::uint8_t {
 // Counts of one call. A triangle is in exactly one of the fields from triangles_nonfinite to triangles_drawn, a
 // fragment in exactly one of fragments and fragments_discarded.
 struct counters {
-    std::uint64_t triangles_in = 0;
+    std::uint64_t triangles_in = 0;        // of all draws and instances
     std::uint64_t triangles_nonfinite = 0; // dropped: a position that is NaN or infinite
     std::uint64_t triangles_too_far = 0;   // dropped: a position beyond 2^40 sub-voxel units
     std::uint64_t triangles_zero_area =
         0; // thin and crosshair coverage only: zero area after snapping, gives no fragments
-    std::uint64_t triangles_outside = 0; // bounding box misses the grid
-    std::uint64_t triangles_drawn = 0;
+    std::uint64_t triangles_outside = 0;   // bounding box misses the grid
+    std::uint64_t triangles_drawn = 0;     // the others
     std::uint64_t fragments = 0;           // shaded and blended (or kept, in an A-buffer)
     std::uint64_t fragments_discarded = 0; // by the fragment shader
     std::uint64_t voxels = 0;              // with at least one fragment; 0 if counting was switched off
 
+    // Of either kind.
     [[nodiscard]] std::uint64_t triangles_dropped() const { return triangles_nonfinite + triangles_too_far; }
     friend bool operator==(const counters&, const counters&) = default;
 };
@@ -86,12 +90,13 @@ struct solid_counters {
 
 // Sizes that a caller's workspace or limits must have; set if `code` is capacity_exceeded.
 struct required_sizes {
-    std::uint64_t tile_pairs = 0;
-    std::uint64_t fragments = 0;
-    std::uint64_t bytes = 0;
+    std::uint64_t tile_pairs = 0;         // as workspace_limits
+    std::uint64_t fragments = 0;          // as workspace_limits
+    std::uint64_t bytes = 0;              // of the workspace
     std::uint64_t bricks = 0, voxels = 0; // of a sparse framebuffer with limits
 };
 
+// A description in English, without a final stop. Static memory.
 [[nodiscard]] inline const char* to_string(status_code code) {
     switch (code) {
     case status_code::ok:
@@ -166,21 +171,22 @@ struct required_sizes {
 
 struct checked_status;
 
+// What a call returns: success, or what failed, and counts. Must not be ignored; see or_throw().
 struct [[nodiscard]] status {
-    status_code code = status_code::ok;
-    stage where = stage::validate; // the stage that failed; meaningless when ok
-    int device_error = 0;          // cudaError_t, 0 on the CPU
-    counters counts{};
-    solid_counters solid{};
-    required_sizes required{};
-    static constexpr std::uint32_t unknown = ~std::uint32_t{0};
+    status_code code = status_code::ok;                         // why it failed
+    stage where = stage::validate;                              // the stage that failed; meaningless when ok
+    int device_error = 0;                                       // cudaError_t, 0 on the CPU
+    counters counts{};                                          // of this call
+    solid_counters solid{};                                     // of voxelize_solid
+    required_sizes required{};                                  // if the capacity did not suffice
+    static constexpr std::uint32_t unknown = ~std::uint32_t{0}; // no draw or triangle is named
     std::uint32_t draw = unknown; // of index_out_of_range: the first such triangle and its draw, if voxelize returns
     std::uint32_t triangle = unknown; // it; voxelize_async does not look for them
 
-    [[nodiscard]] bool ok() const { return code == status_code::ok; }
+    [[nodiscard]] bool ok() const { return code == status_code::ok; } // True for success.
     // A success that drew no triangle: there was none, all were outside the grid, or all were dropped (NaN).
     [[nodiscard]] bool nothing_drawn() const { return ok() && counts.triangles_drawn == 0; }
-    explicit operator bool() const { return ok(); }
+    explicit operator bool() const { return ok(); } // As ok().
 
     // One line: what failed and where.
     [[nodiscard]] std::string message() const {

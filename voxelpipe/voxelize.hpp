@@ -28,7 +28,7 @@ namespace voxelpipe {
 
 // Options of voxelize, as {.rule = coverage::thin, .count_voxels = false}. A coverage alone may be given instead.
 struct voxelize_options {
-    coverage rule = coverage::conservative;
+    coverage rule = coverage::conservative; // which voxels a triangle covers
     bool count_voxels = true; // fills counters::voxels; costs one bit per voxel of a tile, or reading a target once
 };
 

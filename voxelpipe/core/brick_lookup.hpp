@@ -16,15 +16,16 @@ namespace voxelpipe {
 
 // Refers to slots that someone else owns, made for the table that is passed.
 struct brick_lookup {
-    static constexpr std::uint32_t free_slot = ~std::uint32_t{0};
+    static constexpr std::uint32_t free_slot = ~std::uint32_t{0}; // marks a slot without a brick
 
-    const std::uint32_t* slots = nullptr;
-    int log2_slots = 0;
+    const std::uint32_t* slots = nullptr; // numbers of bricks, in the backend's memory
+    int log2_slots = 0;                   // there are 2^log2_slots of them
 
     // For fewer than 2^31 bricks.
     [[nodiscard]] static int log2_slots_for(std::uint64_t bricks) {
         return static_cast<int>(std::bit_width(bricks == 0 ? 1 : 2 * bricks - 1));
     }
+    // Where the search for a brick's key begins.
     [[nodiscard]] VOXELPIPE_HD static std::uint64_t first_slot(std::uint64_t key, int log2_slots) {
         return key * 0x9e3779b97f4a7c15u >> (64 - log2_slots);
     }
@@ -63,12 +64,14 @@ inline void insert_brick(std::uint32_t* slots, int log2_slots, std::uint64_t key
 template <class Backend>
 class brick_slots {
 public:
+    // Fills the slots on the backend.
     template <class Framebuffer>
     brick_slots(Backend& backend, const Framebuffer& fb)
         : log2_slots_(brick_lookup::log2_slots_for(checked(fb.num_bricks()))),
           slots_(backend, std::size_t{1} << log2_slots_) {
         backend.fill_brick_slots(fb.view().table, slots_.data(), log2_slots_);
     }
+    // Refers to the slots.
     [[nodiscard]] brick_lookup lookup() const { return {slots_.data(), log2_slots_}; }
 
 private:

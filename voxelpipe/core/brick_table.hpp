@@ -35,8 +35,9 @@ inline constexpr int sparse_brick_voxels = sparse_brick_size * sparse_brick_size
 // A bit for each voxel of a brick, in Morton order: voxel (x, y, z) of the brick is bit morton_key(x, y, z), and eight
 // voxels that share a parent are a byte.
 struct brick_mask {
-    std::uint64_t words[8]{};
+    std::uint64_t words[8]{}; // bit b is bit b % 64 of word b / 64
 
+    // Whether the voxel of this bit exists, 0 <= bit < 512.
     [[nodiscard]] VOXELPIPE_HD bool has(unsigned bit) const { return (words[bit >> 6] >> (bit & 63u) & 1u) != 0; }
     // The number of voxels that exist below a bit.
     [[nodiscard]] VOXELPIPE_HD unsigned before(unsigned bit) const {
@@ -44,6 +45,7 @@ struct brick_mask {
         for (unsigned w = 0; w < bit >> 6; ++w) n += core::count_ones(words[w]);
         return n;
     }
+    // Voxels that exist.
     [[nodiscard]] VOXELPIPE_HD unsigned count() const {
         unsigned n = 0;
         for (const std::uint64_t word : words) n += core::count_ones(word);
@@ -55,15 +57,16 @@ struct brick_mask {
 // Bricks are numbered in the whole grid, so that crops of it agree; voxels as framebuffers number them, from the corner
 // of the computed part.
 struct brick_table {
-    static constexpr std::uint64_t none = ~std::uint64_t{0};
+    static constexpr std::uint64_t none = ~std::uint64_t{0}; // no brick, or no voxel
 
     const std::uint64_t* keys = nullptr;    // core::morton_key of the brick's place, ascending
     const brick_mask* masks = nullptr;      // none is empty
     const std::uint64_t* offsets = nullptr; // rank of each brick's first voxel, and one more: the number of voxels
-    std::uint64_t count = 0;
-    glm::ivec3 extent{0}; // voxels of the part
-    glm::ivec3 offset{0}; // of the part in the whole grid
+    std::uint64_t count = 0;                // bricks
+    glm::ivec3 extent{0};                   // voxels of the part
+    glm::ivec3 offset{0};                   // of the part in the whole grid
 
+    // Voxels that exist in all bricks.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_voxels() const { return count == 0 ? 0 : offsets[count]; }
 
     // The number of the brick with this key, by bisection; `none` where it does not exist.
@@ -85,6 +88,7 @@ struct brick_table {
         const std::uint64_t key = core::morton_key(voxel + offset);
         return rank_of(find_brick(key / core::sparse_brick_voxels), key);
     }
+    // Whether (x, y, z) is a voxel of the part, whether it exists or not.
     [[nodiscard]] VOXELPIPE_HD bool is_in_part(const glm::ivec3& voxel) const {
         bool is_in = true;
         for (int a = 0; a < 3; ++a) is_in = is_in && voxel[a] >= 0 && voxel[a] < extent[a];

@@ -20,13 +20,16 @@
 
 namespace voxelpipe {
 
+// Integers of 128 bits, in which coverage of large triangles is decided.
 __extension__ typedef __int128 int128;
+// The same without a sign.
 __extension__ typedef unsigned __int128 uint128;
 
 namespace exact {
 
 // ---- float and double operations, one rounding each -----------------------------------------------------------------
 
+// a * b + c with one rounding.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float fma(float a, float b, float c) {
 #if defined(__CUDA_ARCH__)
     float r;
@@ -45,6 +48,7 @@ namespace exact {
 #endif
 }
 
+// a + b with one rounding.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float add(float a, float b) {
 #if defined(__CUDA_ARCH__)
     float r;
@@ -55,6 +59,7 @@ namespace exact {
 #endif
 }
 
+// a - b with one rounding.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float sub(float a, float b) {
 #if defined(__CUDA_ARCH__)
     float r;
@@ -76,6 +81,7 @@ namespace exact {
 #endif
 }
 
+// a / b with one rounding.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float div(float a, float b) {
 #if defined(__CUDA_ARCH__)
     float r;
@@ -190,6 +196,7 @@ namespace exact {
     return static_cast<float>(std::ceil(static_cast<double>(a) * b + c));
 #endif
 }
+// The same, rounded down.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float fma_down(float a, float b, float c) {
 #if defined(__CUDA_ARCH__)
     float sum;
@@ -199,6 +206,7 @@ namespace exact {
     return static_cast<float>(std::floor(static_cast<double>(a) * b + c));
 #endif
 }
+// The lesser; of +0 and -0 either.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float min(float a, float b) {
 #if defined(__CUDA_ARCH__)
     return fminf(a, b);
@@ -206,6 +214,7 @@ namespace exact {
     return b < a ? b : a;
 #endif
 }
+// The greater; of +0 and -0 either.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float max(float a, float b) {
 #if defined(__CUDA_ARCH__)
     return fmaxf(a, b);
@@ -213,6 +222,7 @@ namespace exact {
     return a < b ? b : a;
 #endif
 }
+// |a|.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float absolute(float a) {
 #if defined(__CUDA_ARCH__)
     return fabsf(a);
@@ -222,6 +232,7 @@ namespace exact {
 }
 // Converts a float that is an integer; |a| <= 2^21.
 inline constexpr std::int32_t integer_shift = 0x4b400000;
+// The integer; |a| <= 2^21.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t to_integer(float a) {
     return core::bit_cast<std::int32_t>(add(a, 12582912.0f)) - integer_shift;
 }
@@ -245,6 +256,7 @@ inline constexpr std::int32_t integer_shift = 0x4b400000;
 // offset, whose last mantissa bits are the integer: one addition, whereas conversions run at a fraction of that rate on
 // a GPU. An odd offset would turn ties to odd.
 [[nodiscard]] constexpr double rounding_shift(std::int64_t offset) { return 0x1.8p52 - static_cast<double>(offset); }
+// The integer; `shift` is rounding_shift(offset).
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::int32_t round_to_int32(double a, double shift) {
 #if defined(__CUDA_ARCH__)
     return __double2loint(__dadd_rn(a, shift));
@@ -301,6 +313,7 @@ template <class Int>
     return q + static_cast<Int>(a % b > 0);
 }
 
+// Bits that hold a: 0 for 0.
 [[nodiscard]] VOXELPIPE_HD inline int bit_width(std::uint64_t a) {
 #if defined(__CUDA_ARCH__)
     return 64 - __clzll(static_cast<long long>(a));
@@ -318,6 +331,7 @@ template <class Int>
 #endif
 }
 
+// Bits that are one.
 [[nodiscard]] VOXELPIPE_HD inline int count_ones(std::uint32_t a) {
 #if defined(__CUDA_ARCH__)
     return __popc(a);

@@ -12,17 +12,22 @@
 
 namespace voxelpipe {
 
+// An IEEE 754 number of 16 bits, for targets: conversions round to nearest, ties to even, the same everywhere.
+// Arithmetic is that of float.
 struct half {
-    std::uint16_t bits;
+    std::uint16_t bits; // sign, 5 of exponent, 10 of mantissa
 
     half() = default;
     VOXELPIPE_HD
     constexpr explicit half(std::uint16_t raw, int) : bits(raw) {}
+    // The nearest half.
     VOXELPIPE_HD
     explicit half(float value) : bits(from_float(value)) {}
 
+    // The number with these bits.
     [[nodiscard]] VOXELPIPE_HD static constexpr half from_bits(std::uint16_t raw) { return half(raw, 0); }
 
+    // Exact.
     VOXELPIPE_HD
     explicit operator float() const {
         const std::uint32_t sign = static_cast<std::uint32_t>(bits & 0x8000u) << 16;

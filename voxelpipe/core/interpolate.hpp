@@ -24,7 +24,7 @@ namespace voxelpipe {
 // A varying that is not interpolated: every fragment gets the value of its triangle's first vertex.
 template <class T>
 struct flat {
-    T value;
+    T value; // of the triangle's first vertex
 };
 
 namespace core {

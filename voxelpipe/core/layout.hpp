@@ -19,9 +19,9 @@
 namespace voxelpipe {
 
 namespace layout {
-struct linear {};
-struct planar {};
-struct tiled {};
+struct linear {}; // voxels in the order x, y, z; the components of a vector side by side
+struct planar {}; // the same order, each component of a vector in an array of its own
+struct tiled {};  // bricks of 8 x 8 x 8 voxels (bits: 32 x 8 x 8)
 } // namespace layout
 
 namespace core {

@@ -15,7 +15,7 @@ namespace voxelpipe {
 
 // The first voxel that a ray meets.
 struct voxel_hit {
-    bool found = false;
+    bool found = false;      // false: none within the limit
     double distance = 0;     // along the ray, in lengths of its direction
     glm::ivec3 voxel{0};     // in the numbers of the whole grid
     std::uint64_t rank = 0;  // of the voxel
@@ -23,8 +23,9 @@ struct voxel_hit {
     bool from_above = false; // through the upper side
 };
 
+// Reads an octree in host or device memory; does not own it.
 struct octree_view {
-    static constexpr int max_levels = 21;
+    static constexpr int max_levels = 21; // enough for 2^20 voxels an axis
 
     int num_levels = 0;                       // the root is level num_levels; there is none where no voxel exists
     const std::uint8_t* masks[max_levels]{};  // of level l at [l - 1]; bit c: the child with Morton number c exists

@@ -100,8 +100,8 @@ inline constexpr bool never = false; // for the static_assert of a function that
 // A non-owning array; T may be const. Unlike std::span it works in device code without flags.
 template <class T>
 struct array_view {
-    T* elements = nullptr;
-    std::size_t count = 0;
+    T* elements = nullptr; // address of the first; null if there are none
+    std::size_t count = 0; // number of elements
 
     constexpr array_view() = default;
     VOXELPIPE_HD
@@ -131,6 +131,7 @@ struct array_view {
 template <class T>
 struct backend_view : array_view<T> {
     using array_view<T>::array_view;
+    // The caller says that the backend can read it.
     constexpr backend_view() = default;
     VOXELPIPE_HD constexpr backend_view(const array_view<T>& a) : array_view<T>(a) {} // NOLINT(*-explicit-*)
 };

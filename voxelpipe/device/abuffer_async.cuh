@@ -17,14 +17,14 @@ using device::list_counts;
 // stay valid as long as that serves the same call, and may be read once the stream has passed the call.
 template <class Payload = void>
 struct abuffer_view {
-    using payload_type = payload_storage<Payload>;
+    using payload_type = payload_storage<Payload>; // the element of `payloads`
 
     const list_counts* counts = nullptr;       // numbers of voxels and fragments; both 0 if the call failed
     const std::uint64_t* voxels = nullptr;     // occupied voxels, ascending
     const std::uint64_t* offsets = nullptr;    // one more than voxels, if there are any
     const std::uint32_t* primitives = nullptr; // one per fragment
     const payload_type* payloads = nullptr;    // one per fragment; null if Payload is void
-    glm::ivec3 extent{0};
+    glm::ivec3 extent{0};                      // voxels of the computed part
 
     // Copies to the host and waits. Throws std::runtime_error with the CUDA error.
     [[nodiscard]] host_abuffer<Payload> to_host(cuda_backend& backend) const {

@@ -50,6 +50,7 @@ public:
     using buffer = device_buffer<T>;
 
     cuda_backend() = default;
+    // All work runs on stream_. Memory comes from resource_, by default from the current device's pool.
     explicit cuda_backend(cudaStream_t stream_, memory_resource resource_ = {}) : stream_memory{stream_, resource_} {}
 
     // If not null, voxelize adds the time of each stage to it, measured by events on the stream. They are read after
@@ -152,6 +153,7 @@ public:
     [[nodiscard]] status run_sparse_solid(std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
                                           sparse_framebuffer<cuda_backend, Targets...>& fb,
                                           const solid_options& options, std::uint64_t triangles_in);
+    // Implements voxelize of nothing into a sparse framebuffer.
     template <class... Targets>
     [[nodiscard]] status clear_sparse(const grid& g, sparse_framebuffer<cuda_backend, Targets...>& fb);
 

@@ -14,10 +14,10 @@ namespace voxelpipe {
 // Capacities of a call. tile_pairs: (tile, triangle) pairs. fragments: only for targets whose blend needs triangle
 // order, or with lists_fragments. The records are parts of large triangles, 512 columns of tiles or voxels each.
 struct workspace_limits {
-    std::uint64_t tile_pairs = 0;
-    std::uint64_t tile_records = 0;
-    std::uint64_t fragments = 0;
-    std::uint64_t fragment_records = 0;
+    std::uint64_t tile_pairs = 0;       // (tile, triangle) pairs, below 2^32
+    std::uint64_t tile_records = 0;     // parts of large triangles in tiles
+    std::uint64_t fragments = 0;        // listed fragments, below 2^32
+    std::uint64_t fragment_records = 0; // parts of large triangles in lists
     // Fragments of shaders that compute may be listed and sorted by voxel instead of drawn in tiles (strategies
     // sorted_reduce and sorted_fold). Then `fragments` must suffice, at most 2^28, instead of tile_pairs.
     bool lists_fragments = false;
@@ -44,9 +44,9 @@ struct workspace_limits {
 // until the stream has passed it. Calls on different streams or threads need different workspaces; calls that follow
 // each other on one stream may share one. Any thread may launch a captured graph, one at a time.
 struct workspace_view {
-    void* memory = nullptr;
-    std::size_t bytes = 0;
-    workspace_limits limits;
+    void* memory = nullptr;  // on the device, aligned to 256 bytes
+    std::size_t bytes = 0;   // at least workspace_bytes(...)
+    workspace_limits limits; // that `bytes` was computed for
 };
 
 namespace device {

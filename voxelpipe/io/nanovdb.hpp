@@ -98,6 +98,7 @@ public:
         else
             return V{};
     }
+    // The same as a type: rgba8, float, an integer of 32 bits or V.
     template <class V>
     using file_type = decltype(file_type_of<V>());
 

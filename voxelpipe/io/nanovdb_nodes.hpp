@@ -61,11 +61,11 @@ using stored_value = typename value_type<T>::stored;
 // A grid to write. value(rank) is asked for voxels that exist; a mask has no values.
 template <class T>
 struct source {
-    std::string name; // at most 255 bytes
-    brick_table table;
-    grid where;
-    stored_value<T> background{}; // what absent voxels read as
-    std::function<stored_value<T>(std::uint64_t rank)> value;
+    std::string name;                                         // at most 255 bytes
+    brick_table table;                                        // bricks; its arrays stay the caller's until write()
+    grid where;                                               // the map from indices to the world
+    stored_value<T> background{};                             // what absent voxels read as
+    std::function<stored_value<T>(std::uint64_t rank)> value; // of a voxel that exists
 };
 
 template <class T>

@@ -77,7 +77,7 @@ public:
     [[nodiscard]] T* data() { return static_cast<T*>(block_.data()); }
     [[nodiscard]] const T* data() const { return static_cast<const T*>(block_.data()); }
     [[nodiscard]] std::size_t size() const { return count_; }
-    [[nodiscard]] backend_view<const T> view() const { return {data(), count_}; }
+    [[nodiscard]] backend_view<const T> view() const { return {data(), count_}; } // Refers to the buffer.
 
     // Copies to the host, on the backend's stream, and waits.
     [[nodiscard]] std::vector<T> to_host(const stream_memory& backend) const {

@@ -61,8 +61,9 @@ inline void check(cudaError_t error, stage where = stage::validate) {
 // whose stream can be made from a cudaStream_t: cuda::mr resources of CCCL 2 and 3, and wrappers of other allocators.
 class memory_resource {
 public:
-    static constexpr std::size_t alignment = 256;
+    static constexpr std::size_t alignment = 256; // bytes, of every block
 
+    // The current device's pool, or an object as above, which must outlive this.
     memory_resource() = default;
     template <class Resource>
     requires(!std::is_same_v<std::remove_cvref_t<Resource>, memory_resource>)
@@ -95,6 +96,7 @@ public:
         device::check(error);
         return pointer;
     }
+    // In the order of the stream. A null pointer is nothing to do.
     void deallocate(void* pointer, std::size_t bytes, cudaStream_t stream) const noexcept {
         if (pointer == nullptr) return;
         if (deallocate_ != nullptr)
@@ -118,6 +120,7 @@ struct stream_memory {
 // Owns one block of device memory, freed in the order of its stream. Movable, not copyable.
 class device_block {
 public:
+    // Allocates; throws as memory_resource::allocate.
     device_block() = default;
     device_block(std::size_t bytes, const memory_resource& resource, cudaStream_t stream)
         : pointer_(resource.allocate(bytes, stream)), bytes_(bytes), resource_(resource), stream_(stream) {}

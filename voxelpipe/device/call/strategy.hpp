@@ -15,6 +15,7 @@
 
 namespace voxelpipe {
 
+// How cuda_backend draws. All strategies give the same bits.
 enum class strategy : std::uint32_t {
     automatic, // the first rule that applies
     // Sets a bit for each touched voxel in memory of the call, then fills all targets from these bits. Writes no target
@@ -52,8 +53,8 @@ enum class strategy : std::uint32_t {
 
 // The chosen strategy, and the rule that chose it in words.
 struct strategy_choice {
-    strategy value = strategy::automatic;
-    const char* why = "no call yet";
+    strategy value = strategy::automatic; // never automatic after a call
+    const char* why = "no call yet"; // static memory      // static memory
 };
 
 namespace device {

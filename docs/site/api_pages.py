@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+"""The pages of the API. Each header is a group of Doxygen's (doxygen_filter.py), which a page shows whole."""
+import re
+
+# Page: title, words, headers in the order in which a reader meets them.
+CPP = {
+    "calls": ("Calls and results", "The one entry point and what it returns. In the paper: the high-level API.",
+              ["voxelize.hpp", "status.hpp", "stage_times.hpp"]),
+    "backends": ("Backends", "Where the work runs. All backends give the same bits.",
+                 ["cpu_backend.hpp", "device/backend.cuh", "device/call/strategy.hpp", "device/base/memory.cuh",
+                  "device/base/device_buffer.cuh"]),
+    "grids": ("Grids and coverage", "Where voxels lie in space, and which of them a triangle covers. In the paper: conservative and thin rasterization.",
+              ["grid.hpp", "core/coverage.hpp"]),
+    "meshes": ("Meshes", "Triangles, points and lines, and the memory that they are made from.",
+               ["mesh.hpp", "mesh_source.hpp", "elements.hpp", "core/instances.hpp"]),
+    "shaders": ("Shaders", "Vertex and fragment shaders, varyings and draws. In the paper: vertex and fragment programs.",
+                ["shader.hpp", "core/interpolate.hpp", "field.hpp"]),
+    "programs": ("Programs", "Tessellation and geometry programs, between the vertex shader and the rasterizer.",
+                 ["program.hpp", "program_call.hpp", "element_call.hpp"]),
+    "framebuffers": ("Framebuffers and blends", "Render targets, how fragments meet in them, and their copies on the host. "
+                     "In the paper: frame-buffer types, multiple render targets, blending modes, programmable ROP.",
+                     ["framebuffer.hpp", "blend.hpp", "core/layout.hpp", "core/half.hpp", "host_target.hpp"]),
+    "abuffers": ("A-buffers", "Every fragment of every voxel. In the paper: A-buffer and bucketing.", ["abuffer.hpp"]),
+    "solids": ("Solids", "The inside of meshes.", ["solid.hpp"]),
+    "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
+               ["sparse.hpp", "host_sparse.hpp", "core/brick_table.hpp", "core/brick_lookup.hpp", "octree.hpp", "core/octree_view.hpp",
+                "reducers.hpp", "octree_dag.hpp", "io/nanovdb.hpp"]),
+    "streams": ("Streams and graphs", "Calls that never wait, with memory of the caller. For cuda_backend.",
+                ["device/voxelize_async.cuh", "device/abuffer_async.cuh", "device/optional/solid_async.cuh"]),
+    "arithmetic": ("Arithmetic for shaders", "Operations with the same bits on every compiler and device, and views of arrays.",
+                   ["core/exact.hpp", "core/pack.hpp"]),
+}
+PYTHON = ["Grid", "fit", "voxelize", "solid", "bake", "sparse", "fragments", "Fragments", "save", "render", "view", "View",
+          "DroppedTrianglesWarning", "OpenMeshWarning"]
+
+
+def heading(text, line="="):
+    return f"{text}\n{line * len(text)}\n\n"
+
+
+def python_grid(source):
+    """Grid as its binding documents it: the compiled module is not there when the site is made."""
+    text = re.search(r'nb::class_<grid>.*?;\n\n', source, flags=re.S)[0]
+    out = []
+    for piece in re.split(r"\.def(?=\w*\()|nb::class_", text)[1:]:
+        name, *strings = re.findall(r'"((?:[^"\\]|\\.)*)"', piece)
+        arguments = re.findall(r'nb::arg\("(\w+)"\)', piece)
+        words = "".join(s for s in strings if s not in arguments).replace("\\n", "\n")
+        words = re.sub(r"(?<!`)`(\w+)`(?!`)", r"``\1``", words).replace("\n", " ")
+        if name == "Grid":
+            out.append(f".. py:class:: Grid(origin, voxel_size, shape)\n\n   {words}\n")
+        elif name == "__init__":
+            out.append(f"   {words}\n")
+        elif not name.startswith("_"):
+            kind = f"py:method:: {name}({', '.join(arguments)})" if arguments else f"py:property:: {name}"
+            out.append(f"   .. {kind}\n\n      {words}\n")
+    return "\n".join(out) + "\n"
+
+
+def write_api(out, python_source):
+    folder = out / "api"
+    folder.mkdir()
+    toc = "".join(f"   {name}\n" for name in CPP)
+    (folder / "index.rst").write_text(
+        heading("C++ API") + "Everything is in namespace ``voxelpipe``, which programs shorten to ``vp``. ``<cpu_ref/backend.hpp>`` brings the CPU "
+        "backend, ``<voxelpipe/voxelpipe.hpp>`` the rest, with ``cuda_backend`` where nvcc compiles. Namespace ``voxelpipe::core`` is the "
+        "library's own.\n\n.. toctree::\n   :maxdepth: 2\n\n" + toc, encoding="utf-8")
+    for name, (title, words, headers) in CPP.items():
+        text = heading(title) + words + "\n\n"
+        for header in headers:
+            shown = {"cpu_backend.hpp": "cpu_ref/backend.hpp"}.get(header, f"voxelpipe/{header}")
+            text += heading(f"<{shown}>", "-")
+            text += f".. doxygengroup:: {re.sub('[^a-z0-9_]', '_', header)}\n   :content-only:\n   :members:\n\n"
+        (folder / f"{name}.rst").write_text(text, encoding="utf-8")
+    text = heading("Python API") + ".. py:module:: voxelpipe\n\n.. py:currentmodule:: voxelpipe\n\n"
+    for name in PYTHON:
+        if name == "Grid":
+            text += python_grid(python_source)
+        elif name[0].isupper():
+            text += f".. autoclass:: {name}\n   :members:\n\n"
+        else:
+            text += f".. autofunction:: {name}\n\n"
+    (folder / "python.rst").write_text(text, encoding="utf-8")
