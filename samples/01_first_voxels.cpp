@@ -1,8 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // The whole pipeline in one minute: a mesh, two fragment shaders, a framebuffer of two render targets, an A-buffer.
-// Prints what a 64^3 grid around an octahedron holds, checks it, and exits with 0 when all is right.
+// Prints what a 64^3 grid around an octahedron holds, checks it, and exits with 0 when all is right (first_voxels.ppm).
 // The backend is a template parameter: the same function serves a GPU.
+#include "picture.hpp"
+
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
@@ -51,6 +53,12 @@ bool bake(const std::vector<glm::vec3>& positions, const std::vector<glm::uvec3>
             ++thin;
         }
     }
+    picture::write("first_voxels.ppm", grid.extent,
+                   [&](int x, int y, int z) {
+                       const float shade = 0.5f + 0.5f * static_cast<float>(y) / 64.0f; // deeper below
+                       return count(x, y, z) == 0 ? glm::vec3(-1.0f) : shade * glm::vec3(0.96f, 0.60f, 0.32f);
+                   },
+                   {.zoom = 1.3f});
     const unsigned long long all = drawn.counts.fragments, voxels = drawn.counts.voxels;
     std::printf("%llu fragments in %llu voxels, %llu in the thin cover, brightest %.4f\n", all, voxels, thin, light);
     return good && 0 < thin && thin < all && light == static_cast<float>(1 / std::sqrt(3.0)); // how the faces lean

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A coloured torus knot at 4096 voxels a side, which no dense grid would fit: its bricks, a NanoVDB file of its colours
 // (knot.nvdb), and a picture of it by rays through the octree (knot.ppm). Another resolution: 04_sparse 512.
+#include "picture.hpp"
+
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/io/nanovdb.hpp>
 #include <voxelpipe/octree.hpp>
@@ -37,8 +39,8 @@ int main(int argc, char** argv) {
             const double a = 6.283185307179586 * s / sides;
             positions.emplace_back(knot(t) + 0.5 * (std::cos(a) * u + std::sin(a) * v));
             const unsigned j = (i + 1) % around, k = (s + 1) % sides, n = sides;
-            triangles.emplace_back(i * n + s, j * n + s, j * n + k);
-            triangles.emplace_back(i * n + s, j * n + k, i * n + k);
+            triangles.emplace_back(i * n + s, j * n + k, j * n + s);
+            triangles.emplace_back(i * n + s, i * n + k, j * n + k);
         }
     }
     const int n = argc > 1 ? std::atoi(argv[1]) : 4096;
@@ -60,19 +62,20 @@ int main(int argc, char** argv) {
     nvdb.write(file);
     // end snippet
 
+    // Rays from the front through the octree, and from what they meet to the sun.
     const vp::octree tree(voxels);
-    constexpr int width = 800, height = 800;
-    const glm::dvec3 centre = glm::dvec3(grid.extent) * 0.5, step(1.1 * n / width);
-    std::ofstream picture("knot.ppm", std::ios::binary);
-    picture << "P6\n" << width << ' ' << height << "\n255\n";
-    int hits = 0;
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x) {
-            const glm::dvec3 from = centre + glm::dvec3(x - width / 2, height / 2 - y, 0) * step + glm::dvec3(0, 0, n);
-            const vp::voxel_hit hit = tree.first_hit(from, {0, 0, -1});
-            const glm::u8vec4 c = hit.found ? vp::get<0>(voxels)[hit.rank] : glm::u8vec4(240);
-            picture.put(static_cast<char>(c.r)).put(static_cast<char>(c.g)).put(static_cast<char>(c.b));
-            hits += hit.found ? 1 : 0;
-        }
-    return hits > width * height / 8 && voxels.num_voxels() == drawn.counts.voxels && file && picture ? 0 : 1;
+    const glm::dvec3 centre = glm::dvec3(grid.extent) * 0.5, sun = glm::normalize(glm::dvec3(-0.4, 0.7, 0.8));
+    int hits = 0, rays = 0;
+    picture::write_pixels("knot.ppm", 1.1f, [&](float x, float y, const glm::vec2&) {
+        const glm::dvec3 from = centre + 1.12 * n * glm::dvec3(1.1 * (x - 0.5), 0.5 - y, 1.0);
+        const vp::voxel_hit hit = tree.first_hit(from, {0, 0, -1});
+        ++rays;
+        if (!hit.found) return glm::mix(glm::vec3(0.42f, 0.52f, 0.64f), glm::vec3(0.78f, 0.80f, 0.82f), y);
+        ++hits;
+        const glm::vec3 color = glm::vec3(vp::get<0>(voxels)[hit.rank]) / 255.0f, normal = 2.55f * color - 1.28f;
+        const glm::dvec3 above = from - glm::dvec3(0, 0, hit.distance) + 0.01 * n * glm::dvec3(normal);
+        const bool is_lit = !tree.first_hit(above, sun).found;
+        return color * color * (0.4f + (is_lit ? 0.9f * std::max(0.0f, glm::dot(normal, glm::vec3(sun))) : 0.0f));
+    });
+    return hits > rays / 8 && voxels.num_voxels() == drawn.counts.voxels && file ? 0 : 1;
 }

@@ -41,7 +41,7 @@ struct stones { // a tessellation program
 
 struct paint {
     VOXELPIPE_HD auto operator()(const vp::fragment<surface>& f) const {
-        const float light = 0.5f + 0.5f * glm::dot(f.normal, glm::normalize(glm::vec3(0.4f, 0.8f, 0.6f)));
+        const float light = 0.8f + 0.2f * glm::dot(f.normal, glm::normalize(glm::vec3(0.4f, 0.8f, 0.6f)));
         return vp::outputs(light * glm::vec3(0.86f, 0.78f, 0.66f));
     }
 };
@@ -92,7 +92,15 @@ int main() {
         vp::voxelize(backend, mesh, grid, unit_sphere{}, program, paint{}, colors, vp::coverage::conservative)
             .or_throw();
     const auto host = vp::get<0>(colors).to_host_target(backend);
-    picture::write("displaced.ppm", grid.extent, host);
+    // Moss grows in the joints, the more the higher they lie.
+    picture::write("displaced.ppm", grid.extent,
+                   [&](int x, int y, int z) {
+                       const glm::vec3 c = host(x, y, z), p = glm::vec3(x, y, z) + 0.5f - 64.0f;
+                       if (c.x < 0.0f) return c;
+                       const float deep = 1.0f - glm::smoothstep(46.0f, 51.5f, glm::length(p) - 0.06f * p.y);
+                       return glm::mix(c, glm::vec3(0.36f, 0.50f, 0.20f), deep);
+                   },
+                   {.zoom = 1.35f});
 
     vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, vp::blend::bit_or>> inside{backend, grid.extent};
     const vp::status t =

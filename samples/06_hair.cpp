@@ -49,28 +49,29 @@ struct tube { // a geometry program: a segment becomes a prism of six sides
 
 struct paint {
     VOXELPIPE_HD auto operator()(const vp::fragment<hair>& f) const {
-        const float light = 0.55f + 0.45f * glm::abs(f.normal.y);
+        const float light = 0.8f + 0.2f * glm::abs(f.normal.y);
         return vp::outputs(f.triangle + 1, light * f.clamped_varyings().color);
     }
 };
 
 int main() {
-    constexpr int curls = 900, points = 24;
+    constexpr int curls = 1600, points = 20;
+    const glm::vec3 center(80, 78, 80);
     std::vector<glm::vec3> positions, colors;
     std::vector<float> radii;
     std::vector<std::uint32_t> segments;
     for (int c = 0; c < curls; ++c) {
         const float y = 1.0f - 2.0f * (static_cast<float>(c) + 0.5f) / curls,
                     turn = 2.39996323f * static_cast<float>(c);
-        const float r = std::sqrt(1.0f - y * y);
+        const float r = std::sqrt(1.0f - y * y), shade = 0.75f + 0.25f * std::sin(5.1f * turn);
         const glm::vec3 out(r * std::cos(turn), y, r * std::sin(turn));
         const glm::vec3 side = glm::normalize(glm::cross(out, glm::vec3(0.3f, 1.0f, 0.2f))), up = glm::cross(out, side);
-        for (int p = 0; p < points; ++p) {
-            const float t = static_cast<float>(p) / (points - 1), w = 9.0f * t + turn;
-            const glm::vec3 curl = 4.5f * t * (std::cos(w) * side + std::sin(w) * up);
-            positions.push_back(glm::vec3(64, 68, 64) + (26.0f + 30.0f * t) * out + curl - glm::vec3(0, 14 * t * t, 0));
-            colors.push_back(glm::mix(glm::vec3(0.35f, 0.16f, 0.08f), glm::vec3(0.95f, 0.62f, 0.28f), t));
-            radii.push_back(0.9f - 0.5f * t);
+        for (int p = 0; p < points; ++p) { // it grows outward, then hangs
+            const float t = static_cast<float>(p) / (points - 1), w = 6.0f * t + 3.0f * turn;
+            const glm::vec3 curl = 2.6f * t * (std::cos(w) * side + std::sin(w) * up);
+            positions.push_back(center + (34.0f + 38.0f * t - 9.0f * t * t) * out + curl - glm::vec3(0, 30 * t * t, 0));
+            colors.push_back(shade * glm::mix(glm::vec3(0.26f, 0.20f, 0.52f), glm::vec3(0.98f, 0.66f, 0.55f), t * t));
+            radii.push_back(1.3f - 0.9f * t);
             const auto at = static_cast<std::uint32_t>(positions.size() - 1);
             if (p + 1 < points) segments.insert(segments.end(), {at, at + 1});
         }
@@ -82,14 +83,25 @@ int main() {
         .indices = segments,
         .attributes = vp::core::make_pack(vp::array_view<const glm::vec3>(colors), vp::array_view<const float>(radii))};
     vp::grid grid;
-    grid.extent = {128, 128, 128};
+    grid.extent = {160, 150, 160};
     vp::framebuffer<vp::cpu_backend, vp::target<std::uint32_t, vp::blend::max>, vp::target<glm::vec3, vp::blend::max>>
         fb{backend, grid.extent};
     vp::get<1>(fb).clear(glm::vec3(-1.0f));
     const vp::status tubes =
         vp::voxelize(backend, lines, grid, comb{}, vp::geometry{tube{}}, paint{}, fb, vp::coverage::conservative)
             .or_throw();
-    picture::write("hair.ppm", grid.extent, vp::get<1>(fb).to_host_target(backend));
+    const auto fur = vp::get<1>(fb).to_host_target(backend);
+    picture::write("hair.ppm", grid.extent,
+                   [&](int x, int y, int z) {
+                       const glm::vec3 at(x, y, z);
+                       for (const float eye : {-15.0f, 15.0f}) { // it looks at the camera
+                           const glm::vec3 ball = center + glm::vec3(20.0f + eye, 18.0f, 52.0f - 0.55f * eye);
+                           if (glm::length(at - ball - glm::vec3(4, 2, 9)) < 6.0f) return glm::vec3(0.05f);
+                           if (glm::length(at - ball) < 12.0f) return glm::vec3(0.97f);
+                       }
+                       return fur(x, y, z);
+                   },
+                   {.zoom = 1.3f});
 
     const vp::status bare =
         vp::voxelize(backend, lines, grid, comb{}, vp::constant(1u, glm::vec3(1.0f)), fb, vp::coverage::thin)

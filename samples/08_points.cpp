@@ -87,10 +87,12 @@ int main() {
     // end snippet
     const auto counts = vp::get<0>(fb).to_host_target(backend);
     const auto sums = vp::get<1>(fb).to_host_target(backend);
-    picture::write("scan.ppm", grid.extent, [&](int x, int y, int z) {
-        const std::uint32_t n = counts(x, y, z);
-        return n == 0 ? glm::vec3(-1.0f) : sums(x, y, z) / static_cast<float>(n);
-    });
+    picture::write("scan.ppm", grid.extent,
+                   [&](int x, int y, int z) {
+                       const std::uint32_t n = counts(x, y, z);
+                       return n == 0 ? glm::vec3(-1.0f) : sums(x, y, z) / static_cast<float>(n);
+                   },
+                   {.zoom = 1.35f});
     std::printf("%zu points, %llu of them in %llu voxels\n", positions.size(),
                 static_cast<unsigned long long>(s.counts.fragments), static_cast<unsigned long long>(s.counts.voxels));
     return s.counts.triangles_in == positions.size() && s.counts.voxels > 10000 ? 0 : 1;

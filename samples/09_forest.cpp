@@ -34,7 +34,9 @@ struct plant {
         const glm::vec3 p = v.position;
         return vp::vertex_output{glm::vec3(x + size * 0.45f * (c * p.x - s * p.z), ground(x, z) + size * p.y,
                                            z + size * 0.45f * (s * p.x + c * p.z)),
-                                 tree{(0.75f + 0.5f * random(n + 5)) * vp::get<0>(v)}};
+                                 tree{(0.75f + 0.5f * random(n + 5)) *
+                                      (random(n + 6) < 0.16f ? glm::vec3(3.4f, 1.25f, 0.55f) : glm::vec3(1.0f)) *
+                                      vp::get<0>(v)}};
     }
 };
 // end snippet
@@ -91,7 +93,8 @@ int main() {
     vp::get<0>(fb).load();
     constexpr std::uint64_t trees = 4000;
     const vp::status s = vp::voxelize(backend, one.view(vp::instances{trees}), grid, plant{}, paint{}, fb).or_throw();
-    picture::write("forest.ppm", grid.extent, vp::get<0>(fb).to_host_target(backend));
+    picture::write("forest.ppm", grid.extent, vp::get<0>(fb).to_host_target(backend),
+                   {.along = {-0.62f, -0.38f, -1.0f}, .zoom = 1.5f, .aspect = 1.6f});
     std::printf("%zu triangles, %llu instances of them in %llu voxels\n", triangles.size(),
                 static_cast<unsigned long long>(trees), static_cast<unsigned long long>(s.counts.voxels));
     return s.counts.triangles_in == trees * triangles.size() && s.counts.voxels > 100000 ? 0 : 1;
