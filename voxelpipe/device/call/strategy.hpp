@@ -54,7 +54,7 @@ enum class strategy : std::uint32_t {
 // The chosen strategy, and the rule that chose it in words.
 struct strategy_choice {
     strategy value = strategy::automatic; // never automatic after a call
-    const char* why = "no call yet"; // static memory      // static memory
+    const char* why = "no call yet";      // static memory
 };
 
 namespace device {
