@@ -56,8 +56,9 @@ int main() {
     std::vector<float> heights;
     std::vector<glm::vec3> colors;
     for (int i = 0; i < width * height; ++i) {
-        const float a = 6.2831853f * ((static_cast<float>(i % width) + 0.5f) / width - 0.5f),
-                    e = 3.1415927f * ((static_cast<float>(i / width) + 0.5f) / height - 0.5f);
+        const int column = i % width, row = i / width;
+        const float a = 6.2831853f * ((static_cast<float>(column) + 0.5f) / width - 0.5f),
+                    e = 3.1415927f * ((static_cast<float>(row) + 0.5f) / height - 0.5f);
         const glm::vec3 d(std::cos(e) * std::cos(a), std::sin(e), std::cos(e) * std::sin(a));
         const float h = noise(2.1f * d + 3.0f), ice = glm::smoothstep(0.82f, 0.9f, std::abs(d.y) + 0.3f * (h - 0.5f)),
                     dry = glm::smoothstep(0.35f, 0.6f, noise(3.0f * d + 40.0f) - 0.25f * std::abs(d.y));

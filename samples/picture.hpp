@@ -174,14 +174,14 @@ void write_pixels(const std::string& path, float aspect, const Look& look) {
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {
             glm::vec3 sum(0.0f);
-            for (int i = 0; i < 4; ++i)
-                sum += glm::pow(glm::clamp(look((static_cast<float>(x) + 0.25f + 0.5f * static_cast<float>(i % 2)) /
-                                                    static_cast<float>(width),
-                                                (static_cast<float>(y) + 0.25f + 0.5f * static_cast<float>(i / 2)) /
-                                                    static_cast<float>(height),
-                                                glm::vec2(noise(), noise())),
-                                           0.0f, 1.0f),
-                                glm::vec3(1.0f / 2.2f));
+            for (int i = 0; i < 4; ++i) {
+                const int right = i % 2, low = i / 2;
+                const float px = static_cast<float>(x) + 0.25f + 0.5f * static_cast<float>(right),
+                            py = static_cast<float>(y) + 0.25f + 0.5f * static_cast<float>(low);
+                const glm::vec3 c =
+                    look(px / static_cast<float>(width), py / static_cast<float>(height), glm::vec2(noise(), noise()));
+                sum += glm::pow(glm::clamp(c, 0.0f, 1.0f), glm::vec3(1.0f / 2.2f));
+            }
             for (int c = 0; c < 3; ++c) pixels.push_back(static_cast<char>(std::lround(255.0f * 0.25f * sum[c])));
         }
     std::ofstream out(path, std::ios::binary);
