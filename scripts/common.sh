@@ -103,6 +103,10 @@ test_packages=(libgtest-dev libnanovdb-dev libnanovdb-tools)
 # Ubuntu's package asks for a snap; without a browser the test of the page is left out there.
 grep -q '^ID=ubuntu' /etc/os-release 2>/dev/null || test_packages+=(chromium)
 
+# With which the Python package's tensors are tested; not in every distribution.
+torch_packages=()
+grep -q '^ID=debian' /etc/os-release 2>/dev/null && torch_packages=(python3-torch)
+
 # What the site is made with.
 docs_packages=(doxygen python3-sphinx python3-breathe python3-myst-parser furo python3-numpy python3-pil)
 

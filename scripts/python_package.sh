@@ -40,6 +40,16 @@ tag=$("$python" -c 'import sys; v = sys.version_info; print(f"cp3{v.minor}-cp3{v
 say "testing it"
 cd "$folder" # away from the folder that holds headers of the package's name
 "$python" -m pytest -q "$root/python/tests"
+# Tensors, where the distribution's Python has torch (Debian's python3-torch is a download of 47 MB; wheels of PyPI bring CUDA).
+system=/usr/bin/python3
+same_version='import sys; print(sys.version_info[:2])'
+if "$system" -c 'import torch' 2>/dev/null && [[ $("$system" -c "$same_version") == "$("$python" -c "$same_version")" ]]; then
+    "$system" -m venv --clear --system-site-packages "$folder/venv-torch"
+    "$folder/venv-torch/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps "$wheel" pytest iniconfig pluggy packaging
+    "$folder/venv-torch/bin/python" -m pytest -q "$root/python/tests/test_interoperation.py" -k torch
+else
+    printf 'not run: tests with torch (no torch for this version of Python)\n'
+fi
 for example in "$root"/python/examples/*.py; do
     "$python" "$example"
 done

@@ -3,10 +3,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Times voxelpipe for Python beside trimesh, Open3D and PyVista, with the errors of what they find, and beside C++.
 
-    bench/python/compare.py [--out FOLDER] [--resolutions 32 64 128 256] [--seconds 2] [--without-cpp]
+    bench/python/compare.py [--out FOLDER] [--resolutions 32 64 128 256] [--seconds 2] [--without-cpp] [--processor-time]
 
 The mesh is a sphere of 524,288 triangles. Each cell is the median of at least three calls, or of one that takes longer than --seconds;
 an entry that would take more than --most seconds at the next resolution is left out there. A peer that is not installed is left out.
+--processor-time measures that, of all cores together, for machines that do other work meanwhile; it hides what threads gain.
 Surfaces are compared with the voxels that the closed triangles touch, solids with those whose centre is inside; both exact.
 """
 import argparse
@@ -36,13 +37,16 @@ def version(package):
         return None
 
 
+clock = time.perf_counter
+
+
 def timed(call, seconds):
     """(median milliseconds, result)."""
     times, result = [], None
     while len(times) < 3 or sum(times) < seconds:
-        start = time.perf_counter()
+        start = clock()
         result = call()
-        times.append(time.perf_counter() - start)
+        times.append(clock() - start)
         if times[-1] > seconds:
             break
     return 1000 * statistics.median(times), result
@@ -95,16 +99,22 @@ def errors(voxels, exact):
     return int((exact & ~found).sum()), int((found & ~exact).sum() + (~inside).sum())
 
 
-def cpp_milliseconds(mesh, n, runs):
-    with tempfile.TemporaryDirectory() as folder:
-        program = os.path.join(folder, "call")
+class CppCall:
+    """The program call.cpp and its input, in a folder that goes when this does."""
+
+    def __init__(self, mesh):
+        self.folder = tempfile.TemporaryDirectory()
+        self.program, *self.files = (os.path.join(self.folder.name, name) for name in ("call", "vertices", "triangles"))
         subprocess.run([os.environ.get("CXX", "g++"), "-std=c++20", "-O3", "-DNDEBUG", "-pthread", f"-I{ROOT}",
-                        str(ROOT / "bench/python/call.cpp"), "-o", program], check=True)
-        for name, a in (("v", mesh[0]), ("t", mesh[1])):
-            a.tofile(os.path.join(folder, name))
-        out = subprocess.run([program, os.path.join(folder, "v"), os.path.join(folder, "t"), str(n), str(runs)], check=True,
-                             capture_output=True, text=True).stdout.split()
-    return float(out[0]), int(out[1])
+                        str(ROOT / "bench/python/call.cpp"), "-o", self.program], check=True)
+        for file, a in zip(self.files, mesh):
+            a.tofile(file)
+
+    def milliseconds(self, n, runs):
+        """(median milliseconds by the clock in use, voxels)."""
+        wall, processor, voxels = subprocess.run([self.program, *self.files, str(n), str(runs)], check=True, capture_output=True,
+                                                 text=True).stdout.split()
+        return float(processor if clock is time.process_time else wall), int(voxels)
 
 
 def plot(rows, path):
@@ -117,7 +127,7 @@ def plot(rows, path):
     for name in dict.fromkeys(r["program"] for r in rows):
         cells = [(r["resolution"], r["ms"]) for r in rows if r["program"] == name]
         axes.plot(*zip(*cells), marker="o", linewidth=2 if name.startswith("voxelpipe") else 1.2, label=name)
-    axes.set(xscale="log", yscale="log", xlabel="voxels a side", ylabel="milliseconds a call", title="A sphere of 524,288 triangles")
+    axes.set(xscale="log", yscale="log", xlabel="voxels a side", ylabel=f"milliseconds{' of processor time' if clock is time.process_time else ''} a call", title="A sphere of 524,288 triangles")
     axes.set_xticks(sorted({r["resolution"] for r in rows}), labels=[str(n) for n in sorted({r["resolution"] for r in rows})])
     axes.grid(True, which="major", alpha=0.3)
     axes.legend(frameon=False)
@@ -132,13 +142,18 @@ def main():
     parser.add_argument("--seconds", type=float, default=2)
     parser.add_argument("--most", type=float, default=60)
     parser.add_argument("--without-cpp", action="store_true")
+    parser.add_argument("--processor-time", action="store_true")
     args = parser.parse_args()
+    global clock
+    if args.processor_time:
+        clock = time.process_time
 
     mesh = sphere(levels=8)
     assert len(mesh[1]) == 524288
     versions = ", ".join(f"{p} {version(p)}" for p in ("voxelpipe", "numpy", "trimesh", "open3d", "pyvista") if version(p))
     print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, {versions}")
     rows, too_slow = [], set()
+    cpp = None if args.without_cpp else CppCall(mesh)
 
     def add(program, n, ms, voxels, missing, extra):
         rows.append({"program": program, "resolution": n, "ms": round(ms, 3), "voxels": voxels, "missing": missing, "extra": extra})
@@ -151,8 +166,8 @@ def main():
                                     ("voxelpipe solid", "solid", lambda: vp.solid(mesh, grid, extent="centre"))):
             ms, exact[what] = timed(call, args.seconds)
             add(program, n, ms, int(exact[what].sum()), 0, 0)
-        if not args.without_cpp:
-            ms, voxels = cpp_milliseconds(mesh, n, 15)
+        if cpp:
+            ms, voxels = cpp.milliseconds(n, 15)
             assert voxels == exact["surface"].sum()
             add("the same call from C++", n, ms, voxels, 0, 0)
         for program, package, what, prepare in PEERS:
