@@ -27,7 +27,7 @@ namespace {
 using writer = std::vector<std::filesystem::path> (*)(const volume&, const std::filesystem::path&,
                                                       const write_options&);
 
-constexpr std::array<format, 14> all_formats{{
+constexpr auto all_formats = std::to_array<format>({
     {".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", false, true, false, false},
     {".npz", "NumPy archive with one array for each channel", false, true, false, false},
     {".vox", "MagicaVoxel model, split above 256 voxels, 255 colours", true, false, true, true},
@@ -42,10 +42,30 @@ constexpr std::array<format, 14> all_formats{{
     {".png", "shaded picture of the voxels", true, false, true, false},
     {".html", "a page that shows the voxels in a browser: turn, cut, choose values", true, true, true, false},
     {".nvdb", "NanoVDB: a grid for each channel, of the occupied voxels alone", true, true, true, false, true},
-}};
-constexpr std::array<writer, 14> all_writers{write_npy, write_npz,  write_vox,  write_schem, write_binvox,
-                                             write_vti, write_nrrd, write_glb,  write_obj,   write_ply,
-                                             write_xyz, write_png,  write_page, write_nvdb};
+#ifdef VOXELIZE_HAS_OPENVDB
+    {".vdb", "the same for OpenVDB, colours in linear light", true, true, true, false, true},
+#endif
+});
+constexpr auto all_writers = std::to_array<writer>({
+    write_npy,
+    write_npz,
+    write_vox,
+    write_schem,
+    write_binvox,
+    write_vti,
+    write_nrrd,
+    write_glb,
+    write_obj,
+    write_ply,
+    write_xyz,
+    write_png,
+    write_page,
+    write_nvdb,
+#ifdef VOXELIZE_HAS_OPENVDB
+    write_vdb,
+#endif
+});
+static_assert(all_formats.size() == all_writers.size());
 
 std::string extension_of(const std::filesystem::path& path) {
     std::string extension = path.extension().string();

@@ -97,6 +97,9 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     bool needs_occupancy = false;
     for (const std::filesystem::path& output : options.outputs) {
         const format* found = find_format(output);
+        if (found == nullptr && lower(output.extension().string()) == ".vdb")
+            throw usage_error("\"" + output.string() +
+                              "\": this program was built without OpenVDB (libopenvdb-dev); .nvdb needs no library");
         if (found == nullptr) {
             throw usage_error("\"" + output.string() + "\": the extension of an output must be one of " +
                               names(formats(), &format::extension));

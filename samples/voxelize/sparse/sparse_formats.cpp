@@ -2,6 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sparse_formats.hpp"
 
+#ifdef VOXELIZE_HAS_OPENVDB
+#include "vdb.hpp"
+#endif
+
 #include "../formats/npy.hpp"
 #include "../formats/npz.hpp"
 #include "../formats/output_file.hpp"
@@ -210,11 +214,14 @@ std::vector<channel> channels_for(const sparse_volume& v, const std::filesystem:
 
 } // namespace
 
-bool is_sparse_format(const std::filesystem::path& path) { return extension_of(path) == ".nvdb"; }
+bool is_sparse_format(const std::filesystem::path& path) {
+    const format* const f = find_format(path);
+    return f != nullptr && f->only_sparse;
+}
 
 bool is_written_sparse(const std::filesystem::path& path) {
     const std::string extension = extension_of(path);
-    return extension == ".nvdb" || extension == ".npz" || extension == ".npy" || extension == ".png" ||
+    return is_sparse_format(path) || extension == ".npz" || extension == ".npy" || extension == ".png" ||
            extension == ".html" || is_streamed(extension);
 }
 
@@ -234,10 +241,20 @@ std::vector<std::filesystem::path> write_nvdb(const volume& v, const std::filesy
     return write_nvdb(make_sparse(v), path, options);
 }
 
+#ifdef VOXELIZE_HAS_OPENVDB
+std::vector<std::filesystem::path> write_vdb(const volume& v, const std::filesystem::path& path,
+                                             const write_options& options) {
+    return write_vdb(make_sparse(v), path, options);
+}
+#endif
+
 std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const std::filesystem::path& path,
                                                 const write_options& options) {
     const std::string extension = extension_of(path);
     if (extension == ".nvdb") return write_nvdb(v, path, options);
+#ifdef VOXELIZE_HAS_OPENVDB
+    if (extension == ".vdb") return write_vdb(v, path, options);
+#endif
     if (extension == ".npz") return write_sparse_npz(v, path, options);
     if (extension == ".npy") return write_sparse_npy(v, path, options);
     if (extension == ".png") return write_sparse_png(v, path, options);

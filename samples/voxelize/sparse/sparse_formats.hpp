@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Writers of sparse volumes. .nvdb holds a grid for each channel (occupancy as a mask). .npz holds coords, (n, 3) int32
-// with columns x, y and z, in the Morton order of the voxels, and an array for each channel but the occupancy; .npy
-// holds the coords, and each channel in a file of its own beside it. .png is drawn from the bricks. Other formats are
-// written from a dense volume, made of the channels that they take.
+// Writers of sparse volumes. .nvdb holds a grid for each channel (occupancy as a mask); .vdb see vdb.hpp. .npz holds
+// coords, (n, 3) int32 with columns x, y and z, in the Morton order of the voxels, and an array for each channel but
+// the occupancy; .npy holds the coords, and each channel in a file of its own beside it. .png is drawn from the bricks.
+// Other formats are written from a dense volume, made of the channels that they take.
 
 #include "../formats/formats.hpp"
 #include "sparse_volume.hpp"
@@ -27,7 +27,12 @@ namespace voxelize {
 std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const std::filesystem::path& path,
                                                 const write_options& options);
 
-// The occupied voxels of a dense volume as .nvdb.
+#ifdef VOXELIZE_HAS_OPENVDB
+// The occupied voxels of a dense volume as .vdb.
+std::vector<std::filesystem::path> write_vdb(const volume& v, const std::filesystem::path& path,
+                                             const write_options& options);
+#endif
+// The same as .nvdb.
 std::vector<std::filesystem::path> write_nvdb(const volume& v, const std::filesystem::path& path,
                                               const write_options& options);
 

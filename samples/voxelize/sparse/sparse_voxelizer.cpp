@@ -26,7 +26,8 @@ bool wants(const voxelize_request& request, target id) {
 storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
                                 std::span<const std::filesystem::path> outputs) {
     if (choice == storage_choice::dense) return {};
-    const bool needs_bricks = std::any_of(outputs.begin(), outputs.end(), is_sparse_format);
+    const auto bricks_alone = std::find_if(outputs.begin(), outputs.end(), is_sparse_format);
+    const bool needs_bricks = bricks_alone != outputs.end();
     const bool takes_bricks = std::all_of(outputs.begin(), outputs.end(), is_written_sparse);
     const double dense = volume_bytes(request);
     const bool fits = dense <= static_cast<double>(memory::room());
@@ -41,8 +42,8 @@ storage_decision choose_storage(storage_choice choice, const voxelize_request& r
         return {};
     }
     if (choice == storage_choice::sparse) return {true, ""};
-    return {true,
-            needs_bricks ? ".nvdb holds occupied voxels alone" : "a dense one would take " + memory::mebibytes(dense)};
+    return {true, needs_bricks ? std::string(find_format(*bricks_alone)->extension) + " holds occupied voxels alone"
+                               : "a dense one would take " + memory::mebibytes(dense)};
 }
 
 sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {

@@ -1,0 +1,130 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// .vdb files, read back by OpenVDB.
+
+#include "test_volumes.hpp"
+
+#include <formats/formats.hpp>
+#include <srgb.hpp>
+
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+
+#include <map>
+
+using namespace voxelize;
+using namespace voxelize::testing;
+
+namespace {
+
+class Vdb : public in_folder {};
+
+using grids = std::map<std::string, openvdb::GridBase::Ptr>;
+
+grids read(const std::filesystem::path& file) {
+    openvdb::initialize();
+    openvdb::io::File in(file.string());
+    in.open(false);
+    grids found;
+    for (const openvdb::GridBase::Ptr& grid : *in.getGrids()) found[grid->getName()] = grid;
+    return found;
+}
+
+// Counts of small numbers, but the last voxel's, which is `most`.
+volume with_all_types(std::uint32_t most) {
+    volume v = make_volume({21, 13, 18});
+    v.origin = {-3, 0.5, 10};
+    v.voxel_size = {0.5, 0.25, 2};
+    v.add("occupancy", scalar::bit);
+    v.add("color", scalar::u8, 4);
+    v.add("count", scalar::u32);
+    v.add("material", scalar::i32);
+    v.add("depth", scalar::f32);
+    v.add("normal", scalar::f32, 3);
+    for (std::size_t c = 0; c < v.channels.size(); ++c) fill(v, c);
+    channel& count = *v.find("count");
+    for (std::int64_t i = 0; i < v.num_voxels(); ++i)
+        store(count.data.data() + 4 * i, static_cast<std::uint32_t>(i % 100 + 1));
+    v.set_bit(*v.find("occupancy"), 20, 12, 17);
+    store(count.data.data() + 4 * v.index(20, 12, 17), most);
+    return v;
+}
+
+// VALUE(i) is what the grid holds at voxel i of the volume, where that is occupied; elsewhere nothing is active.
+template <class Grid, class Value>
+void expect_values(const grids& found, const std::string& name, const volume& v, const Value& value) {
+    ASSERT_TRUE(found.contains(name)) << name;
+    const auto grid = openvdb::gridPtrCast<Grid>(found.at(name));
+    ASSERT_TRUE(grid != nullptr) << name << " is a " << found.at(name)->type();
+    const auto accessor = grid->getConstAccessor();
+    for (int z = -1; z <= v.extent[2]; ++z)
+        for (int y = -1; y <= v.extent[1]; ++y)
+            for (int x = -1; x <= v.extent[0]; ++x) {
+                const bool inside = x >= 0 && y >= 0 && z >= 0 && x < v.extent[0] && y < v.extent[1] && z < v.extent[2];
+                const openvdb::Coord at(x, y, z);
+                const bool is_there = inside && v.occupied(x, y, z);
+                ASSERT_EQ(is_there, accessor.isValueOn(at)) << name << at;
+                if (!is_there) continue;
+                ASSERT_EQ(value(static_cast<std::size_t>(v.index(x, y, z))), accessor.getValue(at)) << name << at;
+            }
+    const openvdb::Vec3d centre = grid->transform().indexToWorld(openvdb::Vec3d(4, 5, 6));
+    EXPECT_EQ(openvdb::Vec3d(-3 + 4.5 * 0.5, 0.5 + 5.5 * 0.25, 10 + 6.5 * 2), centre);
+}
+
+template <class T>
+T value_at(const volume& v, const char* name, std::size_t i, std::size_t component = 0, std::size_t components = 1) {
+    T value;
+    std::memcpy(&value, v.find(name)->data.data() + (i * components + component) * sizeof(T), sizeof(T));
+    return value;
+}
+
+TEST_F(Vdb, HoldsEveryChannelWhereThereAreVoxels) {
+    const volume v = with_all_types(100);
+    ASSERT_EQ(std::vector<std::filesystem::path>{folder_ / "a.vdb"}, write(v, folder_ / "a.vdb"));
+    const grids found = read(folder_ / "a.vdb");
+    EXPECT_EQ(7U, found.size());
+    const color_tables tables = make_color_tables();
+    const auto byte = [&](std::size_t i, std::size_t c) { return value_at<std::uint8_t>(v, "color", i, c, 4); };
+    expect_values<openvdb::MaskGrid>(found, "occupancy", v, [](std::size_t) { return true; });
+    expect_values<openvdb::Vec3SGrid>(found, "color", v, [&](std::size_t i) {
+        return openvdb::Vec3s(tables.linear[byte(i, 0)], tables.linear[byte(i, 1)], tables.linear[byte(i, 2)]);
+    });
+    expect_values<openvdb::FloatGrid>(found, "color.alpha", v,
+                                      [&](std::size_t i) { return tables.fraction[byte(i, 3)]; });
+    expect_values<openvdb::Int32Grid>(found, "count", v, [&](std::size_t i) {
+        return static_cast<std::int32_t>(value_at<std::uint32_t>(v, "count", i));
+    });
+    expect_values<openvdb::Int32Grid>(found, "material", v,
+                                      [&](std::size_t i) { return value_at<std::int32_t>(v, "material", i); });
+    expect_values<openvdb::FloatGrid>(found, "depth", v, [&](std::size_t i) { return value_at<float>(v, "depth", i); });
+    expect_values<openvdb::Vec3SGrid>(found, "normal", v, [&](std::size_t i) {
+        return openvdb::Vec3s(value_at<float>(v, "normal", i, 0, 3), value_at<float>(v, "normal", i, 1, 3),
+                              value_at<float>(v, "normal", i, 2, 3));
+    });
+}
+
+TEST_F(Vdb, CountsBeyond31BitsTake64) {
+    const volume v = with_all_types(0x80000000U);
+    write(v, folder_ / "a.vdb");
+    expect_values<openvdb::Int64Grid>(read(folder_ / "a.vdb"), "count", v, [&](std::size_t i) {
+        return static_cast<std::int64_t>(value_at<std::uint32_t>(v, "count", i));
+    });
+}
+
+TEST_F(Vdb, TheSameVolumeIsTheSameBytes) {
+    write(with_all_types(100), folder_ / "a.vdb");
+    write(with_all_types(100), folder_ / "b.vdb");
+    write(with_all_types(101), folder_ / "c.vdb");
+    EXPECT_TRUE(read_file(folder_ / "a.vdb") == read_file(folder_ / "b.vdb"));
+    const auto id = [&](const char* name) {
+        openvdb::io::File in((folder_ / name).string());
+        in.open(false);
+        return in.getUniqueTag();
+    };
+    EXPECT_EQ(id("a.vdb"), id("b.vdb"));
+    EXPECT_NE(id("a.vdb"), id("c.vdb")); // by which OpenVDB tells files apart
+    EXPECT_EQ(36U, id("a.vdb").size());
+}
+
+} // namespace
