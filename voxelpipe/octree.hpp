@@ -161,13 +161,6 @@ private:
 
 namespace core {
 
-template <class Reducer>
-inline constexpr bool sums_terms =
-    std::is_same_v<Reducer, reduce::sum> || std::is_same_v<Reducer, reduce::mean_of_voxels> ||
-    std::is_same_v<Reducer, reduce::mean_of_volume>;
-template <std::size_t C>
-inline constexpr bool sums_terms<reduce::mean<C>> = true;
-
 // The number of fragments of each voxel, where a reducer asks for them.
 template <class Reducer>
 struct counted_target {

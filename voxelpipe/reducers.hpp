@@ -13,7 +13,6 @@
 #include <voxelpipe/core/reproducible_sum.hpp>
 #include <voxelpipe/core/value_traits.hpp>
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -42,6 +41,14 @@ struct majority {}; // the value that most children have; of several the least, 
 
 namespace core {
 
+// Reducers of all terms below a node.
+template <class Reducer>
+inline constexpr bool sums_terms =
+    std::is_same_v<Reducer, reduce::sum> || std::is_same_v<Reducer, reduce::mean_of_voxels> ||
+    std::is_same_v<Reducer, reduce::mean_of_volume>;
+template <std::size_t C>
+inline constexpr bool sums_terms<reduce::mean<C>> = true;
+
 // A sum that holds the sums of 2^63 voxels: as wide_sum, with 64 bits at the top.
 template <int Limbs>
 struct tree_sum {
@@ -49,7 +56,7 @@ struct tree_sum {
     std::int64_t top = 0;
     std::uint32_t marks = 0;
 
-    void add(const tree_sum& other) {
+    VOXELPIPE_HD void add(const tree_sum& other) {
         std::uint64_t carry = 0;
         for (int k = 0; k < Limbs; ++k) {
             const uint128 sum = static_cast<uint128>(limb[k]) + other.limb[k] + carry;
@@ -63,7 +70,7 @@ struct tree_sum {
 };
 
 template <int Limbs>
-[[nodiscard]] inline tree_sum<Limbs> widen(const wide_sum<Limbs>& s) {
+[[nodiscard]] VOXELPIPE_HD inline tree_sum<Limbs> widen(const wide_sum<Limbs>& s) {
     tree_sum<Limbs> r;
     for (int k = 0; k < Limbs; ++k) r.limb[k] = s.limb[k];
     r.top = s.top;
@@ -73,7 +80,7 @@ template <int Limbs>
 
 // |sum| as magnitude * 2^exponent, the last bit sticky where bits fall off.
 template <int Limbs>
-[[nodiscard]] inline sum_magnitude to_magnitude(const tree_sum<Limbs>& s) {
+[[nodiscard]] VOXELPIPE_HD inline sum_magnitude to_magnitude(const tree_sum<Limbs>& s) {
     std::uint64_t limb[Limbs + 1];
     for (int k = 0; k < Limbs; ++k) limb[k] = s.limb[k];
     limb[Limbs] = static_cast<std::uint64_t>(s.top);
@@ -97,8 +104,8 @@ template <int Limbs>
 
 // sum / divisor * 2^log2_quantum, rounded once; the divisor is not 0.
 template <int Limbs>
-[[nodiscard]] inline std::uint64_t round_quotient(const tree_sum<Limbs>& s, std::uint64_t divisor, int log2_quantum,
-                                                  int mantissa_bits, int exponent_bits) {
+[[nodiscard]] VOXELPIPE_HD inline std::uint64_t round_quotient(const tree_sum<Limbs>& s, std::uint64_t divisor,
+                                                               int log2_quantum, int mantissa_bits, int exponent_bits) {
     const std::uint64_t infinity = ((std::uint64_t{1} << exponent_bits) - 1) << mantissa_bits;
     const std::uint64_t sign = std::uint64_t{1} << (mantissa_bits + exponent_bits);
     if (sum_is_nan(s.marks)) return infinity | std::uint64_t{1} << (mantissa_bits - 1);
@@ -124,14 +131,14 @@ struct tree_sum_of { // integers
     using sum = tree_sum<1>;
     using total = std::conditional_t<std::is_signed_v<S>, std::int64_t, std::uint64_t>;
     using quotient = double;
-    static sum begin(S v) {
+    VOXELPIPE_HD static sum begin(S v) {
         sum s;
         s.limb[0] = static_cast<std::uint64_t>(static_cast<std::int64_t>(v));
         if constexpr (std::is_signed_v<S>) s.top = v < 0 ? -1 : 0;
         return s;
     }
-    static total end(const sum& s) { return static_cast<total>(s.limb[0]); }
-    static quotient divide(const sum& s, std::uint64_t by) {
+    VOXELPIPE_HD static total end(const sum& s) { return static_cast<total>(s.limb[0]); }
+    VOXELPIPE_HD static quotient divide(const sum& s, std::uint64_t by) {
         return core::bit_cast<double>(round_quotient(s, by, 0, 52, 11));
     }
 };
@@ -140,15 +147,15 @@ struct float_tree_sum {
     using sum = tree_sum<Limbs>;
     using total = S;
     using quotient = S;
-    static total end(const sum& s) { return divide(s, 1); }
-    static quotient divide(const sum& s, std::uint64_t by) {
+    VOXELPIPE_HD static total end(const sum& s) { return divide(s, 1); }
+    VOXELPIPE_HD static quotient divide(const sum& s, std::uint64_t by) {
         using bits = typename float_bits<S>::type;
         return core::bit_cast<S>(static_cast<bits>(round_quotient(s, by, Log2Quantum, Mantissa, Exponent)));
     }
 };
 template <>
 struct tree_sum_of<float> : float_tree_sum<float, 1, -32, 23, 8> {
-    static sum begin(float v) {
+    VOXELPIPE_HD static sum begin(float v) {
         wide_sum<1> s{};
         add_float<-32>(s, v);
         return widen(s);
@@ -156,7 +163,7 @@ struct tree_sum_of<float> : float_tree_sum<float, 1, -32, 23, 8> {
 };
 template <>
 struct tree_sum_of<half> : float_tree_sum<half, 1, -24, 10, 5> {
-    static sum begin(half v) {
+    VOXELPIPE_HD static sum begin(half v) {
         wide_sum<1> s{};
         add_half<-24>(s, v);
         return widen(s);
@@ -164,7 +171,7 @@ struct tree_sum_of<half> : float_tree_sum<half, 1, -24, 10, 5> {
 };
 template <>
 struct tree_sum_of<double> : float_tree_sum<double, 2, -64, 52, 11> {
-    static sum begin(double v) {
+    VOXELPIPE_HD static sum begin(double v) {
         wide_sum<2> s{};
         add_double<-64>(s, v);
         return widen(s);
@@ -176,7 +183,7 @@ template <class Blend, class S>
 struct blend_tree_sum : tree_sum_of<S> {};
 template <int Log2Quantum>
 struct blend_tree_sum<blend::add_quantum<Log2Quantum>, float> : float_tree_sum<float, 1, Log2Quantum, 23, 8> {
-    static tree_sum<1> begin(float v) {
+    VOXELPIPE_HD static tree_sum<1> begin(float v) {
         wide_sum<1> s{};
         add_float<Log2Quantum>(s, v);
         return widen(s);
@@ -191,7 +198,7 @@ struct components_of {
     template <class R>
     using with = R;
     template <class V>
-    static auto& at(V& v, int) {
+    VOXELPIPE_HD static auto& at(V& v, int) {
         return v;
     }
 };
@@ -202,7 +209,7 @@ struct components_of<glm::vec<N, S, Q>> {
     template <class R>
     using with = glm::vec<N, R, Q>;
     template <class V>
-    static auto& at(V& v, int c) {
+    VOXELPIPE_HD static auto& at(V& v, int c) {
         return v[c];
     }
 };
@@ -211,7 +218,7 @@ struct components_of<glm::vec<N, S, Q>> {
 // --------------------------------------------------------------------------------------
 
 template <class T>
-[[nodiscard]] bool least_first(const T& a, const T& b) {
+[[nodiscard]] VOXELPIPE_HD bool least_first(const T& a, const T& b) {
     using parts = components_of<T>;
     for (int c = 0; c < parts::count; ++c) {
         if (ordered_less(parts::at(a, c), parts::at(b, c))) return true;
@@ -222,40 +229,40 @@ template <class T>
 
 template <class Reducer, class T>
 struct fold_of {
-    static T fold(const Reducer& f, std::span<const T> children) {
+    VOXELPIPE_HD static T fold(const Reducer& f, std::span<const T> children) {
         static_assert(std::is_invocable_r_v<T, const Reducer&, std::span<const T>>,
                       "voxelpipe: a reducer of your own is called as T operator()(std::span<const T>) const");
         return f(children);
     }
 };
 template <class Blend, class T>
-[[nodiscard]] T fold_by_blend(std::span<const T> children) {
+[[nodiscard]] VOXELPIPE_HD T fold_by_blend(std::span<const T> children) {
     T value = children[0];
     for (const T& v : children.subspan(1)) blend_traits<Blend, T>::apply(value, v);
     return value;
 }
 template <class T>
 struct fold_of<reduce::min, T> {
-    static T fold(reduce::min, std::span<const T> children) { return fold_by_blend<blend::min>(children); }
+    VOXELPIPE_HD static T fold(reduce::min, std::span<const T> children) { return fold_by_blend<blend::min>(children); }
 };
 template <class T>
 struct fold_of<reduce::max, T> {
-    static T fold(reduce::max, std::span<const T> children) { return fold_by_blend<blend::max>(children); }
+    VOXELPIPE_HD static T fold(reduce::max, std::span<const T> children) { return fold_by_blend<blend::max>(children); }
 };
 template <class T>
 struct fold_of<reduce::bit_or, T> {
-    static T fold(reduce::bit_or, std::span<const T> children) { return fold_by_blend<blend::bit_or>(children); }
+    VOXELPIPE_HD static T fold(reduce::bit_or, std::span<const T> children) {
+        return fold_by_blend<blend::bit_or>(children);
+    }
 };
 template <class T>
 struct fold_of<reduce::majority, T> {
-    static T fold(reduce::majority, std::span<const T> children) {
+    VOXELPIPE_HD static T fold(reduce::majority, std::span<const T> children) {
         T best = children[0];
         std::size_t most = 0;
         for (const T& v : children) {
-            const auto n =
-                static_cast<std::size_t>(std::count_if(children.begin(), children.end(), [&](const T& other) {
-                    return !least_first(v, other) && !least_first(other, v);
-                }));
+            std::size_t n = 0;
+            for (const T& other : children) n += !least_first(v, other) && !least_first(other, v) ? 1 : 0;
             if (n > most || (n == most && least_first(v, best))) {
                 most = n;
                 best = v;

@@ -26,6 +26,8 @@ CPP = {
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
                ["sparse.hpp", "host_sparse.hpp", "core/brick_table.hpp", "core/brick_lookup.hpp", "octree.hpp", "core/octree_view.hpp",
                 "reducers.hpp", "octree_dag.hpp", "io/nanovdb.hpp"]),
+    "levels": ("Levels and rays of dense grids", "Coarser levels of targets, levels of light for cone tracing, rays through bits.",
+               ["dense_levels.hpp", "direction_mips.hpp", "dense_bits.hpp", "core/cell_walk.hpp"]),
     "streams": ("Streams and graphs", "Calls that never wait, with memory of the caller. For cuda_backend.",
                 ["device/voxelize_async.cuh", "device/abuffer_async.cuh", "device/optional/solid_async.cuh"]),
     "arithmetic": ("Arithmetic for shaders", "Operations with the same bits on every compiler and device, and views of arrays.",

@@ -2,11 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Instances, tessellation and geometry programs, points and lines on the device: the bytes of cpu_backend, for every
-// strategy, in lists and in solids, for any chunk capacity.
+// strategy, in lists and in solids, for any chunk capacity. Levels of dense grids and rays through bits too.
 
 #include "../programs/amplify_cases.hpp"
 #include "../programs/elements_cases.hpp"
 #include "../programs/field_cases.hpp"
+#include "../programs/levels_cases.hpp"
 #include "device_test.hpp"
 
 #include <gtest/gtest.h>
@@ -176,6 +177,20 @@ TEST(DeviceField, GivesItsGoldenValues) {
     vp::cuda_backend::buffer<glm::vec4> out(gpu, std::size_t{fields::num_samples});
     gpu.for_each(fields::num_samples, fields::make_sampler(there_plane.data(), there_box.data(), out.data()));
     EXPECT_EQ(fields::digest(out.to_host(gpu)), fields::golden);
+}
+
+TEST(DeviceLevels, AreTheCpus) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    EXPECT_EQ(levels::all_reduced(cpu), levels::all_reduced(gpu));
+    const std::vector<std::byte> light = levels::all_light(gpu);
+    EXPECT_EQ(levels::all_light(cpu), light);
+    EXPECT_EQ(levels::digest(light), levels::golden_light);
+}
+TEST(DeviceLevels, RaysThroughBitsAreTheCpus) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    expect_same_bytes(levels::all_rays(cpu), levels::all_rays(gpu), "rays");
 }
 
 } // namespace programs_tests

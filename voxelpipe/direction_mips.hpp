@@ -1,0 +1,294 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Levels of a dense grid of light, one value for each of six directions from level 1 on (anisotropic voxels, Crassin et
+// al. 2011), and their samples: what cone tracing reads. A value is a glm::vec4: colour multiplied by opacity, and
+// opacity. A voxel's value in a direction is what one sees who looks along it: in each of its four columns the nearer
+// child lies over the farther one, and the columns are averaged. So a wall that is lit on one side keeps its two sides
+// apart, and a layer that fills a voxel's cross-section is opaque on every level. Values have 11 significant bits, so
+// that their products with weights are exact and samples need few fused steps, which are slow on a plain x86-64.
+
+#include <voxelpipe/core/exact.hpp>
+#include <voxelpipe/framebuffer.hpp>
+
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+namespace voxelpipe {
+
+// Extent of a level: half of the one before, rounded up.
+[[nodiscard]] VOXELPIPE_HD inline glm::ivec3 mip_extent(const glm::ivec3& extent, int level) {
+    const auto half = [&](int n) {
+        return static_cast<int>((std::int64_t{n} + (std::int64_t{1} << level) - 1) >> level);
+    };
+    return {half(extent.x), half(extent.y), half(extent.z)};
+}
+// The last level, of one voxel.
+[[nodiscard]] VOXELPIPE_HD inline int last_mip_level(const glm::ivec3& extent) {
+    int level = 0;
+    for (glm::ivec3 e = extent; e.x > 1 || e.y > 1 || e.z > 1; e = mip_extent(extent, level)) ++level;
+    return level;
+}
+
+// Numbers of directions of view: 2 * axis for the look towards +axis, 2 * axis + 1 for the look towards -axis.
+inline constexpr int num_directions = 6;
+
+// `front` over `back`.
+[[nodiscard]] VOXELPIPE_HD inline glm::vec4 over(const glm::vec4& front, const glm::vec4& back) {
+    const float through = exact::sub(1.0f, front.w);
+    return {exact::fma(through, back.x, front.x), exact::fma(through, back.y, front.y),
+            exact::fma(through, back.z, front.z), exact::fma(through, back.w, front.w)};
+}
+
+// A parent's value in a direction from those of its 8 children, in Morton order.
+[[nodiscard]] VOXELPIPE_HD inline glm::vec4 fold_along(const glm::vec4 (&children)[8], int direction) {
+    const int axis = direction >> 1, step = 1 << axis, near = direction & 1 ? step : 0;
+    glm::vec4 sum(0.0f);
+    for (int c = 0; c < 8; ++c) {
+        if ((c & step) != 0) continue; // one child of each column
+        const glm::vec4 v = over(children[c + near], children[c + step - near]);
+        for (int k = 0; k < 4; ++k) sum[k] = exact::add(sum[k], v[k]);
+    }
+    for (int k = 0; k < 4; ++k) sum[k] = exact::mul(sum[k], 0.25f);
+    return sum;
+}
+
+namespace core {
+
+// The nearest value of 11 significant bits, as a half has, of float's range; ties to even.
+[[nodiscard]] VOXELPIPE_HD inline float to_11_bits(float v) {
+    const auto bits = bit_cast<std::uint32_t>(v);
+    return bit_cast<float>((bits + 0xfffu + (bits >> 13 & 1u)) & ~0x1fffu);
+}
+[[nodiscard]] VOXELPIPE_HD inline glm::vec4 to_11_bits(const glm::vec4& v) {
+    return {to_11_bits(v.x), to_11_bits(v.y), to_11_bits(v.z), to_11_bits(v.w)};
+}
+
+} // namespace core
+
+// The way that a voxel's surface faces, in 24 bits: a unit vector's parts as signed bytes, x lowest. 0 faces all ways.
+[[nodiscard]] VOXELPIPE_HD inline std::uint32_t pack_facing(const glm::vec3& normal) {
+    std::uint32_t packed = 0;
+    for (int a = 0; a < 3; ++a) {
+        const float scaled = exact::fma(normal[a], 127.0f, 128.5f); // positive, so that the conversion is a floor
+        packed |= (static_cast<std::uint32_t>(static_cast<int>(scaled) - 128) & 0xffu) << (8 * a);
+    }
+    return packed;
+}
+// The part of a voxel's light that leaves it against a look along the unit vector `along`: none on its back and across,
+// all from 20 degrees on.
+[[nodiscard]] VOXELPIPE_HD inline float facing_part(std::uint32_t packed, const glm::vec3& along) {
+    if (packed == 0) return 1.0f;
+    float towards = 0.0f;
+    for (int a = 0; a < 3; ++a) {
+        const auto part = static_cast<float>(static_cast<std::int8_t>(packed >> (8 * a) & 0xffu));
+        towards = exact::fma(-along[a], part, towards);
+    }
+    const float shown = exact::mul(towards, 3.0f / 127.0f);
+    return shown > 0.0f ? (shown < 1.0f ? shown : 1.0f) : 0.0f;
+}
+
+// Refers to the levels. finest: one value a voxel, level 0. coarse: the levels from 1 on, one after the other, each as
+// six arrays, one a direction. x fastest, then y, then z.
+struct direction_mips_view {
+    const glm::vec4* finest = nullptr;      // level 0
+    const glm::vec4* coarse = nullptr;      // levels 1 to last_level
+    const std::uint32_t* facings = nullptr; // of level 0; null: all voxels face all ways
+    glm::ivec3 extent{0};                   // of level 0
+    int last_level = 0;                     // the level of one voxel
+    std::uint64_t first[22] = {}; // number of values of `coarse` before a level; the last entry is that of them all
+
+    // Of a level.
+    [[nodiscard]] VOXELPIPE_HD std::size_t num_voxels(int level) const {
+        const glm::ivec3 e = mip_extent(extent, level);
+        return static_cast<std::size_t>(e.x) * static_cast<std::size_t>(e.y) * static_cast<std::size_t>(e.z);
+    }
+    // The array of a level and direction; level 0 has one for all directions.
+    [[nodiscard]] VOXELPIPE_HD const glm::vec4* values(int level, int direction) const {
+        if (level == 0) return finest;
+        return coarse + first[level] + static_cast<std::size_t>(direction) * num_voxels(level);
+    }
+    // A voxel of a level; zero outside.
+    [[nodiscard]] VOXELPIPE_HD glm::vec4 fetch(int level, int direction, const glm::ivec3& v) const {
+        const glm::ivec3 e = mip_extent(extent, level);
+        if (v.x < 0 || v.y < 0 || v.z < 0 || v.x >= e.x || v.y >= e.y || v.z >= e.z) return glm::vec4(0.0f);
+        const std::size_t i = index(e, v);
+        if (level != 0) return values(level, direction)[i];
+        glm::vec3 along(0.0f);
+        along[direction >> 1] = (direction & 1) != 0 ? -1.0f : 1.0f;
+        return seen(i, along);
+    }
+
+    // The value of a level around `position`, in voxels of level 0, for a look along the unit vector `along`: linear
+    // between the eight nearest voxels (zero outside), the three directions that `along` has a part in weighted by its
+    // squares.
+    [[nodiscard]] VOXELPIPE_HD glm::vec4 sample(int level, const glm::vec3& position, const glm::vec3& along) const {
+        const glm::ivec3 e = mip_extent(extent, level);
+        const float scale = core::bit_cast<float>(static_cast<std::uint32_t>(127 - level) << 23); // 2^-level
+        int low[3];
+        float high_part[3];
+        for (int a = 0; a < 3; ++a) {
+            const float p = exact::fma(position[a], scale, -0.5f);
+            // Far outside nothing is near; the bound keeps the conversion within an int.
+            if (!(p > -1.0f && p < static_cast<float>(e[a]))) return glm::vec4(0.0f);
+            low[a] = static_cast<int>(exact::add(p, 1.0f)) - 1; // floor
+            high_part[a] = exact::sub(p, static_cast<float>(low[a]));
+        }
+        const glm::vec4* from[3];
+        float weight[3];
+        const int sides = level == 0 ? 1 : 3;
+        if (level == 0) {
+            from[0] = finest;
+            weight[0] = 1.0f;
+        } else {
+            const std::size_t n = num_voxels(level);
+            const glm::vec4* const start = coarse + first[level];
+            for (int a = 0; a < 3; ++a) {
+                from[a] = start + static_cast<std::size_t>(2 * a + (along[a] < 0.0f ? 1 : 0)) * n;
+                weight[a] = exact::mul(along[a], along[a]);
+            }
+        }
+        // Weights in multiples of 2^-13, which add up to 1: the largest takes what the others' rounding left.
+        float part[8], left = 1.0f;
+        std::size_t slot[8];
+        int largest = 0;
+        for (int c = 0; c < 8; ++c) {
+            const auto along_axis = [&](int a) {
+                return (c >> a & 1) != 0 ? high_part[a] : exact::sub(1.0f, high_part[a]);
+            };
+            part[c] = exact::sub(exact::fma(exact::mul(along_axis(0), along_axis(1)), along_axis(2), 1024.0f), 1024.0f);
+            left = exact::sub(left, part[c]);
+            if (part[c] > part[largest]) largest = c;
+        }
+        part[largest] = exact::add(part[largest], left);
+        for (int c = 0; c < 8; ++c) {
+            const glm::ivec3 v(low[0] + (c & 1), low[1] + (c >> 1 & 1), low[2] + (c >> 2));
+            const bool inside = v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < e.x && v.y < e.y && v.z < e.z;
+            slot[c] = inside ? index(e, v) : 0;
+            if (!inside) part[c] = 0.0f;
+        }
+        glm::vec4 sum(0.0f);
+        for (int s = 0; s < sides; ++s) {
+            glm::vec4 mean(0.0f);
+            for (int c = 0; c < 8; ++c) {
+                // A weight of 13 bits times a value of 11 is exact: contracted or not, this rounds once.
+                const glm::vec4 value = level == 0 ? seen(slot[c], along) : from[s][slot[c]];
+                for (int k = 0; k < 4; ++k) mean[k] += part[c] * value[k];
+            }
+            for (int k = 0; k < 4; ++k) sum[k] = exact::fma(weight[s], mean[k], sum[k]);
+        }
+        return sum;
+    }
+    // The same between two levels: `level` is from 0 to last_level, and what lies beyond counts as its end.
+    [[nodiscard]] VOXELPIPE_HD glm::vec4 sample(float level, const glm::vec3& position, const glm::vec3& along) const {
+        if (!(level > 0.0f)) return sample(0, position, along);
+        if (level >= static_cast<float>(last_level)) return sample(last_level, position, along);
+        const int below = static_cast<int>(level);
+        const float above = exact::sub(level, static_cast<float>(below));
+        const glm::vec4 a = sample(below, position, along);
+        if (above == 0.0f) return a;
+        const glm::vec4 b = sample(below + 1, position, along);
+        glm::vec4 mixed;
+        for (int k = 0; k < 4; ++k) mixed[k] = exact::lerp(a[k], b[k], above);
+        return mixed;
+    }
+
+    // Voxel i of level 0 for a look along a unit vector.
+    [[nodiscard]] VOXELPIPE_HD glm::vec4 seen(std::size_t i, const glm::vec3& along) const {
+        glm::vec4 v = finest[i];
+        if (facings == nullptr) return v;
+        const float part = facing_part(facings[i], along);
+        for (int k = 0; k < 3; ++k) v[k] = core::to_11_bits(exact::mul(v[k], part));
+        return v;
+    }
+    // Where voxel v of an array of extent e stands.
+    [[nodiscard]] VOXELPIPE_HD static std::size_t index(const glm::ivec3& e, const glm::ivec3& v) {
+        const auto wide = [](int n) { return static_cast<std::size_t>(n); };
+        return (wide(v.z) * wide(e.y) + wide(v.y)) * wide(e.x) + wide(v.x);
+    }
+};
+
+namespace core {
+
+struct round_mip_voxel {
+    glm::vec4* finest;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const { finest[i] = to_11_bits(finest[i]); }
+};
+
+// Makes voxel i of a level, for all six directions.
+struct fold_mip_level {
+    direction_mips_view mips;
+    glm::vec4* out; // the level's first array
+    int level;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const glm::ivec3 e = mip_extent(mips.extent, level);
+        const auto nx = static_cast<std::uint64_t>(e.x), ny = static_cast<std::uint64_t>(e.y);
+        const glm::ivec3 corner(2 * static_cast<int>(i % nx), 2 * static_cast<int>(i / nx % ny),
+                                2 * static_cast<int>(i / (nx * ny)));
+        const std::size_t n = mips.num_voxels(level);
+        for (int d = 0; d < num_directions; ++d) {
+            glm::vec4 children[8];
+            for (int c = 0; c < 8; ++c)
+                children[c] = mips.fetch(level - 1, d, corner + glm::ivec3(c & 1, c >> 1 & 1, c >> 2));
+            out[static_cast<std::size_t>(d) * n + i] = to_11_bits(fold_along(children, d));
+        }
+    }
+};
+
+} // namespace core
+
+// Owns the levels, on Backend: 16 bytes a voxel for level 0, 6/7 of that for all others, and 4 bytes a voxel with
+// facings. The constructor allocates and does not initialise. Throws what Backend::buffer throws.
+template <class Backend>
+class direction_mips {
+public:
+    // For level 0 of that extent.
+    direction_mips(Backend& backend, const glm::ivec3& extent, bool with_facings = false)
+        : view_(sizes(extent)), finest_(backend, view_.num_voxels(0)),
+          coarse_(backend, view_.first[view_.last_level + 1]),
+          facings_(backend, with_facings ? view_.num_voxels(0) : 0) {
+        view_.finest = finest_.data();
+        view_.coarse = coarse_.data();
+        if (with_facings) view_.facings = facings_.data();
+    }
+    // Level 0, to be written by the caller on the backend: x fastest, then y, then z.
+    [[nodiscard]] glm::vec4* finest() { return finest_.data(); }
+    // Where each voxel of level 0 faces, to be written likewise: pack_facing. The two sides of a wall then keep apart
+    // on levels whose voxels are wider than it. Null without facings.
+    [[nodiscard]] std::uint32_t* facings() { return view_.facings != nullptr ? facings_.data() : nullptr; }
+    // For samples, on the backend. Valid as long as this object.
+    [[nodiscard]] const direction_mips_view& view() const { return view_; }
+
+    // Rounds level 0 to 11 significant bits, as all levels have them, and makes the others. In the order of the
+    // backend's stream.
+    void build(Backend& backend) {
+        backend.for_each(view_.num_voxels(0), core::round_mip_voxel{finest_.data()});
+        for (int level = 1; level <= view_.last_level; ++level)
+            backend.for_each(view_.num_voxels(level),
+                             core::fold_mip_level{view_, coarse_.data() + view_.first[level], level});
+    }
+    // A copy of the levels from 1 on.
+    [[nodiscard]] auto coarse_to_host(Backend& backend) const { return coarse_.to_host(backend); }
+
+private:
+    [[nodiscard]] static direction_mips_view sizes(const glm::ivec3& extent) {
+        direction_mips_view v;
+        v.extent = extent;
+        v.last_level = last_mip_level(extent);
+        for (int l = 1; l <= v.last_level; ++l) v.first[l + 1] = v.first[l] + num_directions * v.num_voxels(l);
+        return v;
+    }
+    template <class T>
+    using buffer = typename Backend::template buffer<T>;
+    direction_mips_view view_;
+    buffer<glm::vec4> finest_, coarse_;
+    buffer<std::uint32_t> facings_;
+};
+
+} // namespace voxelpipe
