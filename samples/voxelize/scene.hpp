@@ -59,6 +59,11 @@ struct material {
     std::int32_t texture = no_texture; // index into scene::textures
     alpha_mode alpha = alpha_mode::opaque;
     float alpha_cutoff = 0.5F;
+    // For programs that light the model. Factors only: where a texture says more, roughness and metallic keep these
+    // defaults.
+    glm::vec3 emission{0.0F};
+    float roughness = 0.6F;
+    float metallic = 0.0F;
     // As the file says; nothing here asks for it. A voxelization has no viewer: both sides of every face count,
     // double-sided or not. Normals are the front's, the side from which the corners run counter-clockwise.
     bool double_sided = false;

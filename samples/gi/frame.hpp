@@ -1,0 +1,248 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// One frame, from triangles to pixels, on a backend: the whole algorithm in the order in which it runs.
+
+#include "pixels.hpp"
+#include "renderer.hpp"
+#include "voxels.hpp"
+
+#include <voxelpipe/direction_mips.hpp>
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+#include <optional>
+
+namespace gi {
+
+// Vertices of this frame, in grid coordinates.
+struct place_vertices {
+    const glm::vec3* from;
+    glm::vec3* to;
+    glm::vec3 low, moved; // world; `moved` is added to the vertices that move
+    float scale;          // voxels a unit
+    std::uint64_t first_moving, end_moving;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const bool moves = i >= first_moving && i < end_moving;
+        to[i] = ((moves ? from[i] + moved : from[i]) - low) * scale;
+    }
+};
+
+template <class Backend>
+class frame_renderer : public renderer {
+    template <class T>
+    using buffer = typename Backend::template buffer<T>;
+
+public:
+    frame_renderer(Backend backend, scene s, const settings& how)
+        : backend_(std::move(backend)), scene_(std::move(s)), how_(how), fine_(fit(scene_, how.resolution, 2)),
+          coarse_(fit(scene_, how.resolution, 1)), rest_(upload(scene_.positions)),
+          placed_(backend_, scene_.positions.size()), normals_(upload(scene_.normals)), colors_(upload(scene_.colors)),
+          texcoords_(upload(scene_.texcoords)), triangles_(upload(scene_.triangles)),
+          triangle_materials_(upload(scene_.triangle_materials)), materials_(upload(scene_.materials)),
+          textures_(backend_, std::size_t{0}), tables_(upload(std::vector{voxelize::make_color_tables()})),
+          bits_(backend_, fine_.extent), voxels_(backend_, coarse_.extent), mips_(backend_, coarse_.extent, true),
+          last_(backend_, coarse_.extent, true), lists_(backend_), slots_(backend_, mips_.view().num_voxels(0)),
+          pixels_(backend_, static_cast<std::size_t>(how.width) * static_cast<std::size_t>(how.height)) {
+        upload_textures();
+        checked_ = vp::check_indices(backend_, triangles_.view());
+        how_.level = std::min(how_.level, mips_.view().last_level);
+    }
+
+    [[nodiscard]] frame render(double time) override {
+        frame made;
+        const auto timed = [&](const char* stage, auto&& work) {
+            const auto start = std::chrono::steady_clock::now();
+            work();
+            finish();
+            const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+            made.milliseconds.emplace_back(stage, took.count());
+        };
+        const world w = make_world(time);
+        timed("vertices", [&] {
+            backend_.for_each(placed_.size(),
+                              place_vertices{rest_.data(), placed_.data(), glm::vec3(origin_),
+                                             glm::vec3(scene_.motion(time)), static_cast<float>(per_unit_),
+                                             scene_.first_moving, scene_.end_moving});
+        });
+        timed("bits", [&] { draw_bits(); });
+        timed("voxels", [&] {
+            const light_fragments shader{w, vp::dense_bits(vp::get<0>(bits_).view())};
+            check(vp::voxelize<vp::coverage::conservative>(backend_, mesh(), coarse_, vp::passthrough{}, shader,
+                                                           voxels_));
+        });
+        timed("lists", [&] {
+            check(vp::voxelize<vp::coverage::conservative>(backend_, mesh(), coarse_, vp::passthrough{}, vp::constant(),
+                                                           lists_));
+            backend_.for_each(slots_.size(), clear_slots{slots_.data()});
+            backend_.for_each(lists_.num_voxels(), number_slots{lists_.voxels.data(), slots_.data()});
+        });
+        // The first frame has no last one: light bounces a few times within it.
+        const int rounds = has_last_ ? 1 : 4;
+        double lighting = 0, folding = 0;
+        for (int i = 0; i < rounds; ++i) {
+            timed("bounce", [&] {
+                std::swap(mips_, last_);
+                const voxel_views views = view_voxels();
+                const std::uint64_t n = mips_.view().num_voxels(0);
+                backend_.for_each(n,
+                                  light_surfaces{views, w, last_.view(), has_last_, mips_.finest(), mips_.facings()});
+                backend_.for_each(n, light_insides{views, mips_.finest(), mips_.facings()});
+            });
+            timed("mips", [&] { mips_.build(backend_); });
+            has_last_ = true;
+            folding += made.milliseconds.back().second;
+            made.milliseconds.pop_back();
+            lighting += made.milliseconds.back().second;
+            made.milliseconds.pop_back();
+        }
+        made.milliseconds.emplace_back("bounce", lighting);
+        made.milliseconds.emplace_back("mips", folding);
+        timed("pixels", [&] {
+            backend_.for_each(pixels_.size(),
+                              draw_pixels{w, mips_.view(), lists_view(), make_eye(time), how_.view, how_.level,
+                                          how_.width, how_.height, how_.samples, scene_.exposure, pixels_.data()});
+            made.pixels = pixels_.to_host(backend_);
+        });
+        return made;
+    }
+    [[nodiscard]] std::string device() const override;
+
+private:
+    // A grid of the scene with a layer of empty voxels around it; `finer` times as many voxels a side.
+    vp::grid fit(const scene& s, int resolution, int finer) {
+        const glm::dvec3 size = s.high - s.low;
+        per_unit_ = (resolution - 2) / std::max({size.x, size.y, size.z});
+        origin_ = s.low - 1.0 / per_unit_;
+        vp::grid g;
+        for (int a = 0; a < 3; ++a) {
+            g.extent[a] = finer * static_cast<int>(std::ceil(size[a] * per_unit_ - 1e-6) + 2);
+            g.voxel_size[a] = 1.0 / finer;
+        }
+        return g;
+    }
+    template <class T>
+    buffer<T> upload(const std::vector<T>& from) {
+        return buffer<T>(backend_, vp::array_view<const T>(from.data(), from.size()));
+    }
+    void upload_textures() {
+        std::vector<voxelize::sampled_texture> all;
+        std::vector<std::size_t> of_picture;
+        for (const voxelize::picture& p : scene_.pictures) {
+            std::vector<glm::u8vec4> texels(p.rgba.size() / 4);
+            if (!texels.empty()) std::memcpy(texels.data(), p.rgba.data(), p.rgba.size());
+            of_picture.push_back(texels_.size());
+            texels_.push_back(upload(texels));
+        }
+        for (const voxelize::texture& t : scene_.textures) {
+            const voxelize::picture& p = scene_.pictures[t.image];
+            voxelize::sampled_texture entry;
+            entry.texels = texels_[of_picture[t.image]].data();
+            entry.width = static_cast<int>(p.width);
+            entry.height = static_cast<int>(p.height);
+            entry.wrap_s = t.wrap_s;
+            entry.wrap_t = t.wrap_t;
+            entry.filter = t.filter;
+            all.push_back(entry);
+        }
+        textures_ = upload(all);
+        scene_.pictures.clear();
+    }
+
+    [[nodiscard]] vp::mesh_view<> mesh() const {
+        vp::mesh_view<> m{.positions = placed_.view(), .triangles = triangles_.view()};
+        m.checked = checked_;
+        return m;
+    }
+    // Insides of closed parts, and every voxel that a triangle touches.
+    void draw_bits() {
+        vp::mesh_view<> closed = mesh(), all = mesh();
+        closed.triangles = vp::backend_view<const glm::uvec3>{triangles_.data(), scene_.num_closed};
+        const vp::solid_options filled{
+            .rule = vp::fill_rule::nonzero, .extent = vp::solid_extent::centre, .count_voxels = false};
+        vp::get<0>(bits_).clear(false);
+        check(vp::voxelize_solid(backend_, closed, fine_, vp::passthrough{}, vp::constant(true), bits_, filled));
+        vp::get<0>(bits_).load();
+        check(vp::voxelize<vp::coverage::conservative>(backend_, all, fine_, vp::passthrough{}, vp::constant(true),
+                                                       bits_));
+    }
+    [[nodiscard]] voxel_views view_voxels() const {
+        return {vp::get<0>(voxels_).view(),
+                vp::get<1>(voxels_).view(),
+                vp::get<2>(voxels_).view(),
+                vp::get<3>(voxels_).view(),
+                vp::get<4>(voxels_).view(),
+                vp::get<5>(voxels_).view(),
+                vp::dense_bits(vp::get<0>(bits_).view()),
+                coarse_.extent};
+    }
+    [[nodiscard]] triangle_lists lists_view() const {
+        return {slots_.data(), lists_.offsets.data(), lists_.primitives.data(), coarse_.extent};
+    }
+    [[nodiscard]] world make_world(double) const {
+        world w;
+        w.positions = placed_.data();
+        w.normals = normals_.data();
+        w.colors = colors_.data();
+        w.texcoords = texcoords_.data();
+        w.triangles = triangles_.data();
+        w.triangle_materials = triangle_materials_.data();
+        w.materials = materials_.data();
+        w.textures = textures_.data();
+        w.tables = tables_.data();
+        w.light = scene_.light;
+        const auto scale = static_cast<float>(per_unit_);
+        if (w.light.position.w != 0.0f) {
+            w.light.position = glm::vec4((glm::vec3(w.light.position) - glm::vec3(origin_)) * scale, 1.0f);
+            w.light.side_u *= scale;
+            w.light.side_v *= scale;
+        }
+        w.widest = std::max(4.0f, static_cast<float>(1.4 * scene_.wall * per_unit_));
+        w.sky_above = scene_.sky_above;
+        w.sky_level = scene_.sky_level;
+        return w;
+    }
+    [[nodiscard]] eye_rays make_eye(double time) const {
+        const camera c = scene_.view(time);
+        const glm::dvec3 forward = glm::normalize(c.target - c.eye);
+        const glm::dvec3 right = glm::normalize(glm::cross(forward, glm::dvec3(0, 1, 0)));
+        const double tall = std::tan(c.field_of_view * std::numbers::pi / 360);
+        return {glm::vec3((c.eye - origin_) * per_unit_), glm::vec3(forward),
+                glm::vec3(right * (tall * how_.width / how_.height)), glm::vec3(glm::cross(right, forward) * tall)};
+    }
+    static void check(const vp::status& s) {
+        if (!s.ok()) throw std::runtime_error(s.message());
+    }
+    void finish() {} // a backend that runs behind waits here
+
+    double per_unit_ = 1;    // voxels a unit of the world
+    glm::dvec3 origin_{0.0}; // of the grid, world
+    bool has_last_ = false;
+    Backend backend_;
+    scene scene_;
+    settings how_;
+    vp::grid fine_, coarse_;
+    buffer<glm::vec3> rest_, placed_, normals_, colors_;
+    buffer<glm::vec2> texcoords_;
+    buffer<glm::uvec3> triangles_;
+    buffer<std::uint32_t> triangle_materials_;
+    buffer<material> materials_;
+    buffer<voxelize::sampled_texture> textures_;
+    buffer<voxelize::color_tables> tables_;
+    std::vector<buffer<glm::u8vec4>> texels_;
+    vp::checked_indices checked_;
+    vp::framebuffer<Backend, bits_target> bits_;
+    voxel_framebuffer<Backend> voxels_;
+    vp::direction_mips<Backend> mips_, last_;
+    vp::abuffer<Backend> lists_;
+    buffer<std::uint32_t> slots_;
+    buffer<glm::u8vec4> pixels_;
+};
+
+} // namespace gi

@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Renders frames of a scene; the work stands in frame.hpp, for either backend.
+
+#include "scene.hpp"
+#include "settings.hpp"
+
+#include <glm/gtc/type_precision.hpp>
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gi {
+
+struct frame {
+    std::vector<glm::u8vec4> pixels;                          // rows from the top, sRGB
+    std::vector<std::pair<std::string, double>> milliseconds; // of each stage, in order
+};
+
+class renderer {
+public:
+    virtual ~renderer() = default;
+    // The frame at a time of 0 to 1. Light bounces off what the call before rendered; the first call makes up for that.
+    // Throws std::bad_alloc, and std::runtime_error with the library's message.
+    [[nodiscard]] virtual frame render(double time) = 0;
+    // What it runs on, for people.
+    [[nodiscard]] virtual std::string device() const = 0;
+};
+
+// Takes what it needs of the scene by value.
+[[nodiscard]] std::unique_ptr<renderer> make_cpu_renderer(scene s, const settings& how);
+
+} // namespace gi

@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the user chose, and the command line that says it.
+
+#include <cstdint>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+namespace gi {
+
+enum class view_choice : std::uint8_t { final, direct, ao, indirect, level };
+
+struct settings {
+    std::string scene = "cornell"; // cornell, atrium or a file
+    std::filesystem::path output = "gi.mp4";
+    int width = 1280, height = 720; // pixels
+    int resolution = 128;           // voxels along the longest side of the scene
+    int frames = 240;
+    double start = 0;   // time of the first frame; a whole round is 1
+    double round = 240; // frames of a whole round
+    view_choice view = view_choice::final;
+    int level = 0;        // of view_choice::level
+    int samples = 1;      // a side of a pixel
+    bool still = false;   // nothing moves
+    unsigned threads = 0; // 0: one for each core
+    bool stats = false, quiet = false, window = false;
+};
+
+// Text that --help and the like ask for; not an error.
+struct early_exit {
+    std::string text;
+};
+// The command line makes no sense: one line.
+struct usage_error : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+// Throws early_exit and usage_error.
+[[nodiscard]] settings parse_command_line(int argc, const char* const* argv);
+
+} // namespace gi

@@ -1,0 +1,164 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Pictures of samples/gi: the same bytes for any number of threads and in every run, no light through walls, no jumps
+// where something moves, no flicker where nothing does.
+
+#include "parts.hpp"
+#include "renderer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+
+namespace {
+
+using gi::frame;
+using gi::scene;
+using gi::settings;
+using pixels = std::vector<glm::u8vec4>;
+
+settings small(int width, int height, int resolution, unsigned threads = 2) {
+    settings s;
+    s.width = width;
+    s.height = height;
+    s.resolution = resolution;
+    s.threads = threads;
+    return s;
+}
+
+std::uint64_t digest(const pixels& p) {
+    std::uint64_t h = 0xcbf29ce484222325u;
+    for (const glm::u8vec4& c : p)
+        for (int k = 0; k < 4; ++k) h = (h ^ c[k]) * 0x100000001b3u;
+    return h;
+}
+
+// Mean of all channels, and the largest channel.
+double mean_of(const pixels& p) {
+    double sum = 0;
+    for (const glm::u8vec4& c : p) sum += c.r + c.g + c.b;
+    return sum / (3.0 * static_cast<double>(p.size()));
+}
+int largest_of(const pixels& p) {
+    int most = 0;
+    for (const glm::u8vec4& c : p) most = std::max({most, int{c.r}, int{c.g}, int{c.b}});
+    return most;
+}
+double difference(const pixels& a, const pixels& b) {
+    double sum = 0;
+    for (std::size_t i = 0; i < a.size(); ++i)
+        for (int k = 0; k < 3; ++k) sum += std::abs(int{a[i][k]} - int{b[i][k]});
+    return sum / (3.0 * static_cast<double>(a.size()));
+}
+
+TEST(Gi, PicturesAreGolden) {
+    struct golden {
+        scene (*make)();
+        settings how;
+        std::uint64_t digest;
+    };
+    const golden pictures[] = {{gi::make_cornell, small(96, 54, 32), 16071036628088936356u},
+                               {gi::make_atrium, small(96, 54, 48), 17322237679438269536u}};
+    for (const golden& g : pictures) {
+        const std::unique_ptr<gi::renderer> two = gi::make_cpu_renderer(g.make(), g.how);
+        settings one_thread = g.how;
+        one_thread.threads = 1;
+        const std::unique_ptr<gi::renderer> one = gi::make_cpu_renderer(g.make(), one_thread);
+        for (const double time : {0.0, 0.01}) // the second frame has the first one's light
+            EXPECT_EQ(two->render(time).pixels, one->render(time).pixels) << time;
+        const pixels shown = gi::make_cpu_renderer(g.make(), g.how)->render(0.0).pixels;
+        EXPECT_EQ(digest(shown), g.digest);
+        EXPECT_GT(mean_of(shown), 40.0);
+        EXPECT_LT(mean_of(shown), 200.0);
+    }
+}
+
+// A hollow cube in the sun, seen from inside.
+scene closed_box(double thickness, bool roof) {
+    gi::scene_builder b;
+    const double t = thickness, o = 1 + t;
+    const auto box = [&](gi::vec3 low, gi::vec3 high) {
+        gi::mesh m;
+        m.add_box(low, high);
+        b.add(std::move(m), {.color = glm::vec3(0.8f)});
+    };
+    box({-o, -o, -o}, {o, -1, o});
+    if (roof) box({-o, 1, -o}, {o, o, o});
+    box({-o, -1, -o}, {-1, 1, o});
+    box({1, -1, -o}, {o, 1, o});
+    box({-1, -1, -o}, {1, 1, -1});
+    box({-1, -1, 1}, {1, 1, o});
+    scene s = b.finish();
+    s.light.position = glm::vec4(glm::normalize(glm::vec3(0.3f, 1.0f, 0.2f)), 0.0f);
+    s.light.color = glm::vec3(20.0f);
+    s.sky_above = s.sky_level = glm::vec3(2.0f);
+    s.exposure = 0.1f;
+    s.wall = thickness;
+    s.view = [](double time) { return gi::camera{{0, 0, 0}, {std::sin(7 * time), 0.3, std::cos(7 * time)}, 90}; };
+    return s;
+}
+
+TEST(Gi, AClosedRoomStaysDark) {
+    // Without its roof the room is bright, so the light is there.
+    EXPECT_GT(mean_of(gi::make_cpu_renderer(closed_box(0.14, false), small(48, 48, 48))->render(0.0).pixels), 75.0);
+    for (const double voxels : {2.0, 3.0}) { // thickness of the walls
+        const auto room = gi::make_cpu_renderer(closed_box(voxels * 2 / (46 - 2 * voxels), true), small(48, 48, 48));
+        for (const double time : {0.0, 0.3, 0.7}) {
+            const pixels seen = room->render(time).pixels;
+            EXPECT_LE(largest_of(seen), voxels < 2.5 ? 12 : 20); // without the roof the mean is more than 75
+            std::printf("walls of %.0f voxels: at most %d of 255, mean %.3f\n", voxels, largest_of(seen),
+                        mean_of(seen));
+        }
+    }
+}
+
+TEST(Gi, FramesOfASceneThatStandsStillAreTheSame) {
+    const auto r = gi::make_cpu_renderer(gi::make_cornell(), small(96, 54, 32));
+    pixels last;
+    for (int i = 0; i < 12; ++i) last = r->render(0.3).pixels;
+    EXPECT_EQ(r->render(0.3).pixels, last);
+}
+
+// The glowing ball slides by a twentieth of a voxel a frame; the picture is the indirect light alone.
+struct changes {
+    double largest = 0, sum = 0, whole = 0; // mean change of a channel: of one step, of all steps, from first to last
+};
+changes slide(float density) {
+    scene s = gi::make_cornell();
+    for (gi::material& m : s.materials)
+        if (m.emission.b > 11.0f && !m.is_light) m.density = density;
+    settings how = small(80, 60, 32);
+    how.view = gi::view_choice::indirect;
+    const auto camera = s.view(0.0);
+    s.view = [camera](double) { return camera; };
+    const double voxel = (s.high.x - s.low.x) / 30;
+    s.motion = [voxel](double t) { return glm::dvec3(-0.4 + t * voxel, 1.2, 0.3); };
+    const auto r = gi::make_cpu_renderer(std::move(s), how);
+    for (int i = 0; i < 5; ++i) static_cast<void>(r->render(0.0));
+    const pixels first = r->render(0.0).pixels;
+    pixels last = first;
+    changes c;
+    constexpr int steps = 20;
+    for (int i = 1; i <= steps; ++i) {
+        const pixels next = r->render(static_cast<double>(i) / steps).pixels;
+        const double d = difference(last, next);
+        c.largest = std::max(c.largest, d);
+        c.sum += d;
+        last = next;
+    }
+    c.whole = difference(first, last);
+    return c;
+}
+TEST(Gi, NothingJumpsWhereSomethingMoves) {
+    const changes smooth = slide(1.0f), abrupt = slide(8.0f); // an eighth that is filled makes a voxel opaque
+    std::printf("change of a step: at most %.3f of 255, mean %.3f; with opaque voxels at most %.3f, mean %.3f\n",
+                smooth.largest, smooth.sum / 20, abrupt.largest, abrupt.sum / 20);
+    EXPECT_LT(smooth.largest, 0.7);
+    EXPECT_GT(abrupt.largest, 1.5 * smooth.largest);
+}
+
+} // namespace
