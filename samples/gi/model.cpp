@@ -82,13 +82,15 @@ scene load_scene(const std::filesystem::path& file) {
     for (const glm::uvec3& t : loaded.triangles) s.triangles.push_back(t + vertices);
     for (const std::uint32_t m : loaded.triangle_materials) s.triangle_materials.push_back(looks + m);
     for (const voxelize::material& m : model.materials)
-        s.materials.push_back({.color = glm::vec3(m.base_color),
-                               .emission = m.emission,
-                               .roughness = m.roughness,
-                               .metallic = m.metallic,
-                               .texture = m.texture,
-                               .cutoff = m.alpha == voxelize::alpha_mode::mask ? m.alpha_cutoff : -1.0f,
-                               .density = 2.0f});
+        s.materials.push_back(
+            {.color = glm::vec3(m.base_color),
+             .emission = m.emission,
+             .roughness = m.roughness,
+             // The reader leaves out textures but the base colour's; a textured metal is mostly paint.
+             .metallic = m.texture < 0 ? m.metallic : 0.0f,
+             .texture = m.texture,
+             .cutoff = m.alpha == voxelize::alpha_mode::mask ? m.alpha_cutoff : -1.0f,
+             .density = 2.0f});
     s.textures = std::move(model.textures);
     s.pictures = std::move(model.images);
     s.warnings = std::move(model.warnings);

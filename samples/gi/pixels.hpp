@@ -85,7 +85,7 @@ private:
                                          static_cast<float>(sample) / static_cast<float>(samples * samples));
         if (view == view_choice::ao) return glm::vec3(3.0f * (1.0f - around.occlusion) / exposure);
         light = light + diffuse * around.light;
-        if (s.roughness < 0.99f) light = light + reflection(s, direction);
+        if (s.roughness < 0.99f || s.metallic > 0.0f) light = light + reflection(s, direction);
         return light;
     }
 
