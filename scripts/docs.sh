@@ -33,7 +33,7 @@ say "reading the headers"
 "$python" docs/site/check_documented.py "$folder/doxygen/xml"
 
 say "writing the pages"
-"$python" docs/site/prepare.py "$folder/source" "${repository[@]}"
+"$python" docs/site/prepare.py "$folder/source" --xml "$folder/doxygen/xml" "${repository[@]}"
 VOXELPIPE_VERSION=$version VOXELPIPE_DOXYGEN_XML=$folder/doxygen/xml VOXELPIPE_PYTHON_SOURCE=$root/python PYTHONDONTWRITEBYTECODE=1 \
     "$python" -m sphinx -q -W --keep-going -j auto -b html "$folder/source" "$folder/html"
 printf '%s: %s pages\n' "$folder/html/index.html" "$(find "$folder/html" -name '*.html' | wc -l)"

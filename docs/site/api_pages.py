@@ -11,7 +11,7 @@ CPP = {
                  ["cpu_backend.hpp", "device/backend.cuh", "device/call/strategy.hpp", "device/base/memory.cuh",
                   "device/base/device_buffer.cuh"]),
     "grids": ("Grids and coverage", "Where voxels lie in space, and which of them a triangle covers. In the paper: conservative and thin rasterization.",
-              ["grid.hpp", "core/coverage.hpp"]),
+              ["grid.hpp", "core/triangle_setup.hpp", "core/coverage.hpp"]),
     "meshes": ("Meshes", "Triangles, points and lines, and the memory that they are made from.",
                ["mesh.hpp", "mesh_source.hpp", "elements.hpp", "core/instances.hpp"]),
     "shaders": ("Shaders", "Vertex and fragment shaders, varyings and draws. In the paper: vertex and fragment programs.",
@@ -20,9 +20,9 @@ CPP = {
                  ["program.hpp", "program_call.hpp", "element_call.hpp"]),
     "framebuffers": ("Framebuffers and blends", "Render targets, how fragments meet in them, and their copies on the host. "
                      "In the paper: frame-buffer types, multiple render targets, blending modes, programmable ROP.",
-                     ["framebuffer.hpp", "blend.hpp", "core/layout.hpp", "core/half.hpp", "host_target.hpp"]),
+                     ["framebuffer.hpp", "blend.hpp", "core/layout.hpp", "core/value_traits.hpp", "core/half.hpp", "host_target.hpp"]),
     "abuffers": ("A-buffers", "Every fragment of every voxel. In the paper: A-buffer and bucketing.", ["abuffer.hpp"]),
-    "solids": ("Solids", "The inside of meshes.", ["solid.hpp"]),
+    "solids": ("Solids", "The inside of meshes.", ["solid.hpp", "core/crossing.hpp"]),
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
                ["sparse.hpp", "host_sparse.hpp", "core/brick_table.hpp", "core/brick_lookup.hpp", "octree.hpp", "core/octree_view.hpp",
                 "reducers.hpp", "octree_dag.hpp", "io/nanovdb.hpp"]),
@@ -33,6 +33,8 @@ CPP = {
     "arithmetic": ("Arithmetic for shaders", "Operations with the same bits on every compiler and device, and views of arrays.",
                    ["core/exact.hpp", "core/pack.hpp"]),
 }
+# Shown nowhere: what the library uses to write NanoVDB files.
+HIDDEN = ["io/nanovdb_nodes.hpp"]
 PYTHON = ["Grid", "fit", "voxelize", "solid", "bake", "sparse", "fragments", "Fragments", "save", "render", "view", "View",
           "DroppedTrianglesWarning", "OpenMeshWarning"]
 
@@ -60,9 +62,26 @@ def python_grid(source):
     return "\n".join(out) + "\n"
 
 
-def write_api(out, python_source):
+def group_of(header):
+    return re.sub("[^a-z0-9_]", "_", header)
+
+
+def unlisted(xml):
+    """Headers with public names that CPP does not list: no name is missing on the site."""
+    listed = {group_of(h) for _, _, headers in CPP.values() for h in headers} | {group_of(h) for h in HIDDEN}
+    for file in sorted(xml.glob("group__*.xml")):
+        text = file.read_text(encoding="utf-8")
+        name, header = re.search(r"<compoundname>(.*?)</compoundname>\s*<title>(.*?)</title>", text).groups()
+        if name not in listed and ("<memberdef" in text or "<innerclass" in text):
+            yield header
+
+
+def write_api(out, xml, python_source):
     folder = out / "api"
     folder.mkdir()
+    more = list(unlisted(xml))
+    if more:
+        CPP["more"] = ("Further headers", "What the other pages do not show.", more)
     toc = "".join(f"   {name}\n" for name in CPP)
     (folder / "index.rst").write_text(
         heading("C++ API") + "Everything is in namespace ``voxelpipe``, which programs shorten to ``vp``. ``<cpu_ref/backend.hpp>`` brings the CPU "
@@ -73,7 +92,7 @@ def write_api(out, python_source):
         for header in headers:
             shown = {"cpu_backend.hpp": "cpu_ref/backend.hpp"}.get(header, f"voxelpipe/{header}")
             text += heading(f"<{shown}>", "-")
-            text += f".. doxygengroup:: {re.sub('[^a-z0-9_]', '_', header)}\n   :content-only:\n   :members:\n\n"
+            text += f".. doxygengroup:: {group_of(header)}\n   :content-only:\n   :members:\n\n"
         (folder / f"{name}.rst").write_text(text, encoding="utf-8")
     text = heading("Python API") + ".. py:module:: voxelpipe\n\n.. py:currentmodule:: voxelpipe\n\n"
     for name in PYTHON:

@@ -4,7 +4,7 @@
 """Makes the folder that Sphinx reads: the Markdown documents of the repository with links that hold on the site, a page for each part of the
 API, and a plot of records/history.csv.
 
-    prepare.py OUT [--repository https://HOST/OWNER/voxelpipe]
+    prepare.py OUT --xml DOXYGEN_XML [--repository https://HOST/OWNER/voxelpipe]
 
 A link to a document leads to its page. A link to another file leads to the repository if its address is given, else only its text is left.
 """
@@ -67,6 +67,7 @@ class Converter:
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("--xml", type=pathlib.Path, required=True)
     parser.add_argument("--repository", default="")
     args = parser.parse_args()
     shutil.rmtree(args.out, ignore_errors=True)
@@ -82,7 +83,7 @@ def main():
         shutil.copy(SITE / name, args.out / name)
     shutil.copy(SITE / "site.css", args.out / "_static" / "site.css")
     converter.picture("docs/lighthouse.png")
-    write_api(args.out, (ROOT / "python" / "src" / "grid.cpp").read_text(encoding="utf-8"))
+    write_api(args.out, args.xml, (ROOT / "python" / "src" / "grid.cpp").read_text(encoding="utf-8"))
 
 
 main()
