@@ -63,6 +63,7 @@ void bucket_tile(const Scene& s, const core::tile_grid& tiles, std::uint64_t til
     for (std::size_t i = 0; i < count; ++i) {
         const std::uint32_t id =
             *reinterpret_cast<const std::uint32_t*>(reinterpret_cast<const std::byte*>(primitives) + i * stride);
+        const std::uint32_t number = s.numberings.empty() ? id : s.numbers_of(s.find(id), id).primitive;
         shade_in_tile<Rule>(s, id, box, [&](int x, int y, int z, const auto& out) VOXELPIPE_INLINE_LAMBDA {
             if (!out.keep) {
                 ++scratch.counts.fragments_discarded;
@@ -73,9 +74,9 @@ void bucket_tile(const Scene& s, const core::tile_grid& tiles, std::uint64_t til
             ++scratch.count[voxel];
             scratch.touched[static_cast<std::size_t>(row)] |= 1u << x;
             if constexpr (has_payload)
-                scratch.fragments.push_back({id, static_cast<std::uint16_t>(voxel), get<0>(out.values)});
+                scratch.fragments.push_back({number, static_cast<std::uint16_t>(voxel), get<0>(out.values)});
             else
-                scratch.fragments.push_back({id, static_cast<std::uint16_t>(voxel), {}});
+                scratch.fragments.push_back({number, static_cast<std::uint16_t>(voxel), {}});
         });
     }
     scratch.counts.fragments += scratch.fragments.size();

@@ -95,10 +95,13 @@ public:
         return core::max_index(triangles);
     }
 
+    static constexpr bool takes_subsets = true; // mesh_view::part
+
     // Used by voxelize, with validated arguments. Exceptions of a user's shader or progress function pass through.
     template <class Draws, class Output, class Coverage = core::known_coverage<>>
     [[nodiscard]] status run(const Draws& draws, const grid& g, Output& out, const voxelize_options& options,
                              std::uint64_t triangles_in, Coverage = {}) {
+        if (!cpu::are_numbered(draws)) return core::failure(status_code::bad_subset);
         return guarded(triangles_in, [&](const cpu::execution& how) {
             auto s = cpu::make_scene(how, draws, g);
             s.is_crosshair = options.rule == coverage::crosshair;
@@ -121,6 +124,7 @@ public:
     template <class Draws, class Coverage = core::known_coverage<>, class... Targets>
     [[nodiscard]] status run_sparse(const Draws& draws, const grid& g, sparse_framebuffer<cpu_backend, Targets...>& out,
                                     const voxelize_options& options, std::uint64_t triangles_in, Coverage = {}) {
+        if (!cpu::are_numbered(draws)) return core::failure(status_code::bad_subset);
         return guarded(triangles_in, [&](const cpu::execution& how) {
             auto s = cpu::make_scene(how, draws, cpu::tile_aligned(g));
             s.lead = g.offset - s.where.offset;

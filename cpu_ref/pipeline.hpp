@@ -18,6 +18,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <memory>
 #include <span>
 #include <type_traits>
@@ -109,6 +110,13 @@ struct geometry {
     glm::ivec3 lead{0};        // lowest voxel of `where` that is drawn
     bool is_crosshair = false; // the voxels of coverage::crosshair among the conservative ones
 
+    // What the primitives of a draw are called where some draw is a subset (mesh_view::part).
+    struct numbering {
+        const std::uint32_t* numbers; // of the triangles in the whole mesh; null: the draw is no subset
+        std::uint32_t whole, first;   // triangles of the whole mesh; its first primitive
+    };
+    std::vector<numbering> numberings; // by draw; empty if no draw is a subset
+
     struct primitive {
         std::uint32_t draw, triangle, instance;
         glm::uvec3 index;
@@ -122,6 +130,16 @@ struct geometry {
         const std::uint32_t t = id - first_primitive[d];
         const auto at = parts[d].triangles.find(t);
         return {d, at.triangle, at.instance, parts[d].triangles[t]};
+    }
+    // The numbers of a primitive that shaders and lists see. `id` counts what is drawn, in the same order.
+    struct visible_numbers {
+        std::uint32_t triangle, primitive;
+    };
+    [[nodiscard]] visible_numbers numbers_of(const primitive& p, std::uint32_t id) const {
+        if (numberings.empty()) return {p.triangle, id};
+        const numbering& n = numberings[p.draw];
+        const std::uint32_t triangle = n.numbers != nullptr ? n.numbers[p.triangle] : p.triangle;
+        return {triangle, n.first + p.instance * n.whole + triangle};
     }
     [[nodiscard]] core::voxel_box whole_box() const {
         return {{{lead.x, lead.y, lead.z}}, {{where.extent.x - 1, where.extent.y - 1, where.extent.z - 1}}};
@@ -163,7 +181,27 @@ make_scene(const execution& how, std::span<const draw<Mesh, VertexShader, Fragme
         first += s.parts.back().num_triangles;
     }
     s.first_primitive.push_back(first);
+    if (core::has_subset(draws)) {
+        std::uint32_t number = 0;
+        for (const auto& d : draws) {
+            const std::uint64_t whole = d.mesh.part.whole != 0 ? d.mesh.part.whole : d.mesh.triangles.size();
+            s.numberings.push_back({d.mesh.part.whole != 0 ? d.mesh.part.numbers.data() : nullptr,
+                                    static_cast<std::uint32_t>(whole), number});
+            number += static_cast<std::uint32_t>(d.mesh.num_primitives());
+        }
+    }
     return s;
+}
+
+// Whether the numbers of every subset ascend and are below the number of its whole mesh.
+template <class Draw>
+[[nodiscard]] bool are_numbered(std::span<const Draw> draws) {
+    return std::all_of(draws.begin(), draws.end(), [](const Draw& d) {
+        const auto& part = d.mesh.part;
+        if (part.whole == 0 || part.numbers.size() == 0) return true;
+        return std::is_sorted(part.numbers.begin(), part.numbers.end(), std::less_equal<>{}) &&
+               part.numbers[part.numbers.size() - 1] < part.whole;
+    });
 }
 
 // ---- coarse raster --------------------------------------------------------------------------------------------------
@@ -328,10 +366,11 @@ VOXELPIPE_INLINE void shade_fragments(const Scene& s, std::uint32_t id, const co
                                  &c = vertices.positions[tri.index.z];
     static constexpr varyings none{};
     fragment<varyings> f{};
-    f.triangle = tri.triangle;
+    const auto visible = s.numbers_of(tri, id);
+    f.triangle = visible.triangle;
     f.draw = tri.draw;
     f.instance = tri.instance;
-    f.primitive = id;
+    f.primitive = visible.primitive;
     for (int i = 0; i < 3; ++i) {
         if constexpr (std::is_empty_v<varyings>)
             f.vertex_varyings[i] = &none;

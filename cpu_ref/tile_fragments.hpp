@@ -124,10 +124,11 @@ VOXELPIPE_INLINE void shade_in_tile(const Scene& s, std::uint32_t id, const core
         using varyings = typename Scene::varyings;
         static constexpr varyings none{};
         fragment<varyings> f{};
-        f.triangle = tri.where.triangle;
+        const auto visible = s.numbers_of(tri.where, id);
+        f.triangle = visible.triangle;
         f.draw = tri.where.draw;
         f.instance = tri.where.instance;
-        f.primitive = id;
+        f.primitive = visible.primitive;
         for (int i = 0; i < 3; ++i) {
             if constexpr (std::is_empty_v<varyings>)
                 f.vertex_varyings[i] = &none;

@@ -34,6 +34,14 @@ struct instances {
     std::uint64_t count = 1; // 0 draws nothing; below 2^32
 };
 
+// Which triangles of a larger mesh a mesh_view has. Shaders, A-buffers and blends that need an order then see the
+// numbers of the whole: fragment::triangle is numbers[i], and fragment::primitive counts all triangles of each whole
+// mesh. Solids have no primitive numbers and ignore it. cpu_backend takes subsets; others return bad_subset.
+struct subset {
+    backend_view<const std::uint32_t> numbers = {}; // one per triangle: its number in the whole mesh; ascending
+    std::uint64_t whole = 0;                        // triangles of the whole mesh; 0: the mesh_view is the whole
+};
+
 // A triangle mesh in memory that somebody else owns: the CPU backend reads host memory, cuda_backend device memory.
 template <class... Attributes>
 struct mesh_view {
@@ -48,11 +56,17 @@ struct mesh_view {
     checked_indices checked = {};
     // Primitives are numbered by instance, then by triangle. 0 draws nothing.
     instances copies = {};
+    // Set if these triangles are some of a larger mesh's, such as those that reach a slab.
+    subset part = {};
 
     // Of all instances.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_triangles() const { return triangles.size() * copies.count; }
     // Of all instances.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_vertices() const { return positions.size() * copies.count; }
+    // Numbers that primitives of this draw take, of all instances: more than num_triangles() of a subset.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_primitives() const {
+        return (part.whole != 0 ? part.whole : triangles.size()) * copies.count;
+    }
 
     // True if all indices are known to name vertices. Otherwise calls check each of them.
     [[nodiscard]] bool has_checked_indices() const {

@@ -263,6 +263,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class Amplify>
         const plain vertices{elements::vertices(d.mesh), d.vertex_shader, {}};
         if (const status s = validate_draws(std::span<const plain>(&vertices, 1)); !s.ok()) return s;
         if (!elements::has_memory(d.mesh)) return failure(status_code::null_view);
+        if (vertices.mesh.part.whole != 0) return failure(status_code::bad_subset);
         const std::uint64_t each = elements::count(d.mesh);
         if (each > most || (each != 0 && d.mesh.copies.count > (most - inputs) / each)) {
             status s = failure(status_code::too_many_triangles);

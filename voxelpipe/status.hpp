@@ -33,6 +33,7 @@ enum class status_code : std::uint8_t {
     bad_solid_options,    // an option of voxelize_solid is out of its range
     bad_level,            // a tessellation program gave a level below 1 or above its max_level
     bad_count,            // a geometry program emitted more triangles than its type holds
+    bad_subset,           // mesh_view::part: not one number a triangle, or not below `whole`, or not on this backend
     crop_without_whole,   // repair::exterior of a crop: what lies outside follows from the whole grid
     no_device,            // cuda_backend without a usable device
     device_error,         // `device_error` holds the CUDA error
@@ -137,6 +138,8 @@ struct required_sizes {
         return "bad level: a tessellation program's edge_level must be 1 to its max_level";
     case status_code::bad_count:
         return "bad count: a geometry program emitted more triangles than vp::triangles<N> holds";
+    case status_code::bad_subset:
+        return "bad subset: a mesh's part needs one number a triangle, ascending, and a backend that takes them";
     case status_code::crop_without_whole:
         return "crop without whole: the exterior of a crop follows from the whole grid, draw that";
     case status_code::no_device:

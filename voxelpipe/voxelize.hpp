@@ -12,6 +12,7 @@
 #include <voxelpipe/shader.hpp>
 #include <voxelpipe/status.hpp>
 
+#include <algorithm>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
@@ -118,7 +119,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
 // Checks everything about the draws that needs no access to their arrays. Fills counts.triangles_in.
 template <class Mesh, class VertexShader, class FragmentShader>
 [[nodiscard]] status validate_draws(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws) {
-    std::uint64_t triangles = 0;
+    std::uint64_t triangles = 0, primitives = 0;
     for (const auto& d : draws) {
         const Mesh& m = d.mesh;
         if ((m.positions.data() == nullptr && m.positions.size() != 0) ||
@@ -135,11 +136,13 @@ template <class Mesh, class VertexShader, class FragmentShader>
                 attributes = status_code::null_view;
         });
         if (attributes != status_code::ok) return failure(attributes);
+        if (m.part.whole != 0 && (m.part.numbers.size() != m.triangles.size() || m.part.whole < m.triangles.size()))
+            return failure(status_code::bad_subset);
         // Triangles and vertices of all instances are numbered with 32 bits.
-        const std::uint64_t each = m.triangles.size();
-        if (each > most || (each != 0 && m.copies.count > (most - triangles) / each)) {
+        const std::uint64_t each = m.part.whole != 0 ? m.part.whole : m.triangles.size();
+        if (each > most || (each != 0 && m.copies.count > (most - primitives) / each)) {
             status s = failure(status_code::too_many_triangles);
-            const auto all = static_cast<uint128>(each) * m.copies.count + triangles;
+            const auto all = static_cast<uint128>(each) * m.copies.count + primitives;
             s.counts.triangles_in = all > ~std::uint64_t{0} ? ~std::uint64_t{0} : static_cast<std::uint64_t>(all);
             return s;
         }
@@ -151,10 +154,23 @@ template <class Mesh, class VertexShader, class FragmentShader>
                 return failure(status_code::not_affine);
         }
         triangles += m.num_triangles();
+        primitives += m.num_primitives();
     }
     status s;
     s.counts.triangles_in = triangles;
     return s;
+}
+
+template <class Draw>
+[[nodiscard]] bool has_subset(std::span<const Draw> draws) {
+    return std::any_of(draws.begin(), draws.end(), [](const Draw& d) { return d.mesh.part.whole != 0; });
+}
+// The same for draws that become fragments on this backend, whose shaders may ask for numbers of the whole mesh.
+template <class Backend, class Mesh, class VertexShader, class FragmentShader>
+[[nodiscard]] status validate_draws_on(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws) {
+    if constexpr (!requires { requires Backend::takes_subsets; })
+        if (has_subset(draws)) return failure(status_code::bad_subset);
+    return validate_draws(draws);
 }
 
 template <class... Targets>
@@ -241,7 +257,7 @@ template <coverage... Known, class Backend, core::triangle_mesh Mesh, class Vert
     if constexpr (core::shaders_fit_targets<Mesh, VertexShader, FragmentShader, Targets...>()) {
         if (const status s = validate(g); !s.ok()) return s;
         if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
-        const status s = core::validate_draws(draws);
+        const status s = core::validate_draws_on<Backend>(draws);
         if (!s.ok()) return s;
         if (s.counts.triangles_in == 0) return backend.clear(fb);
         core::known_coverage<Known...>::set(options);
@@ -267,7 +283,7 @@ template <coverage... Known, class Backend, core::triangle_mesh Mesh, class Vert
                               const grid& g, abuffer<Backend, Payload>& lists, voxelize_options options = {}) {
     if constexpr (core::shaders_fit_payload<Mesh, VertexShader, FragmentShader, Payload>()) {
         if (const status s = validate(g); !s.ok()) return s;
-        const status s = core::validate_draws(draws);
+        const status s = core::validate_draws_on<Backend>(draws);
         if (!s.ok()) return s;
         if (s.counts.triangles_in == 0) {
             lists = abuffer<Backend, Payload>(backend);

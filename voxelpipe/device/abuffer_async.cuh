@@ -133,7 +133,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                           const grid& g, const abuffer_view<Payload>& lists,
                                           const voxelize_options& options, const workspace_limits& limits) {
-    const status s = core::validate_draws(draws);
+    const status s = core::validate_draws_on<cuda_backend>(draws);
     if (!s.ok() || !validate(g).ok() || limits.fragments > core::max_numbered) return 0;
     if (s.counts.triangles_in == 0) return sizeof(device::empty_lists);
     try {
@@ -156,7 +156,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         core::known_coverage<Known...>::set(options);
         lists = {};
         if (const status s = validate(g); !s.ok()) return s;
-        status s = core::validate_draws(draws);
+        status s = core::validate_draws_on<cuda_backend>(draws);
         if (!s.ok()) return s;
         if (workspace.limits.fragments > core::max_numbered) return core::failure(status_code::size_overflow);
         try {

@@ -97,7 +97,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                           const grid& g, const framebuffer_view<Targets...>& fb,
                                           const voxelize_options& options, const workspace_limits& limits) {
-    const status s = core::validate_draws(draws);
+    const status s = core::validate_draws_on<cuda_backend>(draws);
     if (!s.ok() || !validate(g).ok() || !device::are_numbered(limits)) return 0;
     if (s.counts.triangles_in == 0) return sizeof(device::pipeline_state);
     try {
@@ -119,7 +119,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         core::known_coverage<Known...>::set(options);
         if (const status s = validate(g); !s.ok()) return s;
         if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
-        status s = core::validate_draws(draws);
+        status s = core::validate_draws_on<cuda_backend>(draws);
         if (!s.ok()) return s;
         if (!device::are_numbered(workspace.limits)) return core::failure(status_code::size_overflow);
         try {
