@@ -98,8 +98,9 @@ Install them and run the same command again; on Debian or Ubuntu:
 build_packages=(g++ cmake ninja-build libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev zlib1g-dev
     libminizip-dev libdeflate-dev libwebp-dev libassimp-dev libdraco-dev libmeshoptimizer-dev)
 
-# What the tests need beside them: readers of NanoVDB files that are not ours, and a browser.
-test_packages=(libgtest-dev libnanovdb-dev libnanovdb-tools)
+# What the tests need beside them: readers of NanoVDB files that are not ours, MPI for the slabs of several machines, and a
+# browser.
+test_packages=(libgtest-dev libnanovdb-dev libnanovdb-tools libmpich-dev mpich)
 # Ubuntu's package asks for a snap; without a browser the test of the page is left out there.
 grep -q '^ID=ubuntu' /etc/os-release 2>/dev/null || test_packages+=(chromium)
 

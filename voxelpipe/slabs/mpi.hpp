@@ -1,0 +1,304 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Voxelizes over the ranks of an MPI communicator (CMake component mpi, target voxelpipe::mpi). Each rank adds the
+// triangles that it has read, whichever they are. Then the ranks agree on slabs of about equal work, send each triangle
+// to the ranks whose slabs it reaches, and each draws its slab, as a stream does. All slabs together are the result of
+// one call, bit for bit; results stay where they are, only counters travel.
+//
+//   slabs::mpi_stream stream(MPI_COMM_WORLD, backend, grid, vertex_shader, options);
+//   stream.add(my_part_of_the_mesh).or_throw();
+//   stream.draw(fragment_shader, make_framebuffer, sink).or_throw();   // every rank
+//
+// The program calls MPI_Init before and MPI_Finalize after. An MPI error ends the program, as MPI does by default.
+
+#include <voxelpipe/slabs/stream.hpp>
+
+#ifndef MPICH_SKIP_MPICXX
+#define MPICH_SKIP_MPICXX 1
+#endif
+#ifndef OMPI_SKIP_MPICXX
+#define OMPI_SKIP_MPICXX 1
+#endif
+#include <mpi.h>
+
+#include <array>
+#include <cstdint>
+#include <exception>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe::slabs {
+
+// The items [first, second) of `count` that a rank reads: contiguous, ascending with the rank, of about equal number.
+[[nodiscard]] inline std::pair<std::uint64_t, std::uint64_t> share_of(std::uint64_t count, int rank, int num_ranks) {
+    const auto at = [&](int r) {
+        const auto n = static_cast<std::uint64_t>(num_ranks), i = static_cast<std::uint64_t>(r);
+        return count / n * i + std::min(i, count % n);
+    };
+    return {at(rank), at(rank + 1)};
+}
+
+// Members marked "every rank" are collective: all ranks of the communicator call them in the same order. Options and
+// grid are the same on all of them.
+template <class Backend, class VertexShader, class Mesh = mesh_view<>>
+class mpi_stream {
+    using varyings = detail::varyings_of<Mesh, VertexShader>;
+    using record_type = record<varyings>;
+
+public:
+    // Refers to the communicator and the backend. stream_options::num_slabs is ignored; align holds for the borders
+    // between ranks too. Throws std::invalid_argument for a grid that is not valid.
+    mpi_stream(MPI_Comm comm, Backend& backend, const grid& g, const VertexShader& shader, stream_options options = {})
+        : comm_(comm), backend_(backend), grid_(g), shader_(shader), options_(std::move(options)),
+          memory_(options_.memory / 4, 1, options_.folder), mine_(1) {
+        if (const status s = validate(g); !s.ok()) throw std::invalid_argument("voxelpipe::slabs: " + s.message());
+        options_.num_slabs = 1;
+        counts_of_layers_ = histogram(g.extent);
+        MPI_Comm_rank(comm_, &rank_);
+        MPI_Comm_size(comm_, &num_ranks_);
+    }
+
+    // Adds triangles of host memory. In the whole mesh, those of a lower rank come first, and each rank's in the order
+    // in which it adds them. As stream::add; draw() fails on every rank if it failed on one.
+    [[nodiscard]] status add(const Mesh& chunk) {
+        counters added;
+        status s = for_each_record<varyings>(chunk, shader_, grid_, options_.voxelize.rule, options_.is_solid,
+                                             num_triangles_, added, [&](const record_type& r, const auto& reach) {
+                                                 counts_of_layers_.add(reach);
+                                                 memory_.push(mine_, 0, r);
+                                             });
+        sum(counts_, added);
+        if (s.ok())
+            num_triangles_ += chunk.part.whole != 0 ? chunk.part.whole : chunk.triangles.size();
+        else if (failed_.ok())
+            failed_ = s;
+        return s;
+    }
+
+    // Every rank. As stream::draw, for the slab of this rank; a rank that has no layer calls neither make nor sink.
+    // slab::voxels_before and fragments_before count from this rank's first slab; lists_before() has those of the ranks
+    // below. Returns the counts of the whole grid on every rank, or a failure on every rank: its own, or
+    // other_rank_failed.
+    template <class FragmentShader, class Make, class Sink>
+    [[nodiscard]] status draw(const FragmentShader& shader, const Make& make, const Sink& sink) {
+        constexpr bool lists = detail::is_abuffer<std::remove_cvref_t<decltype(make(grid_.extent))>>;
+        return draw_with(!lists, [&](auto& stream) { return stream.draw(shader, make, sink); });
+    }
+    // Every rank. As stream::draw_solid.
+    template <class SolidShader, class Make, class Sink>
+    [[nodiscard]] status draw_solid(const SolidShader& shader, const Make& make, const Sink& sink,
+                                    const solid_options& how = {}) {
+        return draw_with(false, [&](auto& stream) { return stream.draw_solid(shader, make, sink, how); });
+    }
+
+    // After draw(), on every rank: the slabs, by rank, and the voxels and fragments of the ranks below this one.
+    [[nodiscard]] const plan& slabs() const { return plan_; }
+    struct list_offset {
+        std::uint64_t voxels = 0, fragments = 0;
+    };
+    [[nodiscard]] list_offset lists_before() const { return before_; }
+
+private:
+    template <class Draw>
+    [[nodiscard]] status draw_with(bool may_turn, const Draw& draw) {
+        status own = failed_;
+        std::exception_ptr thrown;
+        // Runs work() on this rank; whatever goes wrong is kept until all ranks know.
+        const auto attempt = [&](const auto& work) {
+            if (!own.ok() || thrown) return;
+            try {
+                work();
+            } catch (const std::bad_alloc&) {
+                own = core::failure(status_code::out_of_memory);
+            } catch (...) {
+                thrown = std::current_exception();
+            }
+        };
+        const auto all_ok = [&] { return agree(own, thrown); };
+
+        std::uint64_t base = 0, total = 0;
+        MPI_Exscan(&num_triangles_, &base, 1, MPI_UINT64_T, MPI_SUM, comm_);
+        if (rank_ == 0) base = 0; // MPI leaves it undefined
+        MPI_Allreduce(&num_triangles_, &total, 1, MPI_UINT64_T, MPI_SUM, comm_);
+        if (own.ok() && total > std::numeric_limits<std::uint32_t>::max())
+            own = core::failure(status_code::too_many_triangles);
+        if (!all_ok()) return finish(own, thrown);
+
+        MPI_Allreduce(MPI_IN_PLACE, counts_of_layers_.words().data(),
+                      static_cast<int>(counts_of_layers_.words().size()), MPI_UINT64_T, MPI_SUM, comm_);
+        plan_options how;
+        how.align = options_.align;
+        how.may_turn = may_turn;
+        plan_ = split(counts_of_layers_, num_ranks_, how);
+
+        // One bin for each rank that sends, so that numbers ascend when they are joined.
+        std::vector<bin<record_type>> received(static_cast<std::size_t>(num_ranks_));
+        exchange(static_cast<std::uint32_t>(base), received, attempt);
+        if (!all_ok()) return finish(own, thrown);
+
+        status drawn;
+        attempt([&] {
+            if (plan_.slabs[static_cast<std::size_t>(rank_)].size() == 0) return;
+            record_stream<Backend, varyings> stream(backend_, plan_.crop(grid_, static_cast<std::size_t>(rank_)),
+                                                    options_);
+            if (plan_.axis != 2) stream.cut_into(equal_layers(stream.where(), plan_.axis, 1));
+            feed(stream, received);
+            stream.set_num_triangles(total);
+            drawn = draw(stream);
+            if (!drawn.ok()) own = drawn;
+        });
+        if (!all_ok()) return finish(own, thrown);
+        return add_up(drawn);
+    }
+
+    // Sends each record to the ranks whose slabs it reaches, a block at a time.
+    template <class Attempt>
+    void exchange(std::uint32_t base, std::vector<bin<record_type>>& received, const Attempt& attempt) {
+        const auto n = static_cast<std::size_t>(num_ranks_);
+        std::vector<std::uint32_t> rank_of(static_cast<std::size_t>(grid_.extent[plan_.axis]));
+        for (std::size_t r = 0; r < n; ++r)
+            std::fill_n(rank_of.begin() + plan_.slabs[r].begin, plan_.slabs[r].size(), static_cast<std::uint32_t>(r));
+        bin_memory<record_type> memory(options_.memory / 4, n, options_.folder);
+        MPI_Datatype type;
+        MPI_Type_contiguous(static_cast<int>(sizeof(record_type)), MPI_BYTE, &type);
+        MPI_Type_commit(&type);
+        std::vector<std::vector<record_type>> outgoing(n);
+        std::uint64_t waiting = 0;
+        const std::uint64_t most = std::clamp<std::uint64_t>(options_.memory / 8 / sizeof(record_type), 64, 1u << 22);
+
+        // A round sends what waits. It goes on until no rank has anything left.
+        const auto round = [&](bool last) {
+            std::vector<record_type> out, in;
+            std::vector<int> sent(n), coming(n), out_at(n), in_at(n);
+            for (std::size_t r = 0; r < n; ++r) {
+                out_at[r] = static_cast<int>(out.size());
+                sent[r] = static_cast<int>(outgoing[r].size());
+                out.insert(out.end(), outgoing[r].begin(), outgoing[r].end());
+                outgoing[r].clear();
+            }
+            waiting = 0;
+            MPI_Alltoall(sent.data(), 1, MPI_INT, coming.data(), 1, MPI_INT, comm_);
+            std::size_t arrive = 0;
+            for (std::size_t r = 0; r < n; ++r) {
+                in_at[r] = static_cast<int>(arrive);
+                arrive += static_cast<std::size_t>(coming[r]);
+            }
+            // No rank sends unless all have room.
+            attempt([&] { in.resize(arrive); });
+            int has_room = in.size() == arrive ? 1 : 0;
+            MPI_Allreduce(MPI_IN_PLACE, &has_room, 1, MPI_INT, MPI_MIN, comm_);
+            if (has_room == 0) return false;
+            MPI_Alltoallv(out.data(), sent.data(), out_at.data(), type, in.data(), coming.data(), in_at.data(), type,
+                          comm_);
+            attempt([&] {
+                for (std::size_t r = 0; r < n; ++r)
+                    for (int i = 0; i < coming[r]; ++i)
+                        memory.push(received, r, in[static_cast<std::size_t>(in_at[r] + i)]);
+            });
+            int left = last ? 0 : 1;
+            MPI_Allreduce(MPI_IN_PLACE, &left, 1, MPI_INT, MPI_MAX, comm_);
+            return left != 0;
+        };
+        const core::snap_transform snap = core::make_snap_transform(grid_);
+        bool goes_on = true;
+        attempt([&] {
+            mine_[0].for_each_block([&](std::span<const record_type> block) {
+                for (record_type r : block) {
+                    if (!goes_on) return;
+                    const core::voxel_box reach = reach_of(snap, grid_.extent, r);
+                    const std::uint32_t first = rank_of[static_cast<std::size_t>(reach.lo[plan_.axis])],
+                                        last = rank_of[static_cast<std::size_t>(reach.hi[plan_.axis])];
+                    r.number += base;
+                    for (std::uint32_t to = first; to <= last; ++to) outgoing[to].push_back(r);
+                    waiting += last - first + 1;
+                    if (waiting >= most) goes_on = round(false);
+                }
+            });
+        });
+        while (goes_on) goes_on = round(true);
+        mine_[0] = {};
+        MPI_Type_free(&type);
+    }
+
+    template <class Stream>
+    void feed(Stream& stream, std::vector<bin<record_type>>& received) const {
+        const core::snap_transform snap = core::make_snap_transform(stream.where());
+        for (bin<record_type>& from : received) {
+            from.for_each_block([&](std::span<const record_type> block) {
+                for (const record_type& r : block)
+                    if (const auto reach = reach_of(snap, stream.where().extent, r); !reach.empty())
+                        stream.push(r, reach);
+            });
+            from = {};
+        }
+    }
+
+    [[nodiscard]] core::voxel_box reach_of(const core::snap_transform& snap, const glm::ivec3& extent,
+                                           const record_type& r) const {
+        return classify(snap, extent, options_.voxelize.rule, r.positions[0], r.positions[1], r.positions[2],
+                        options_.is_solid)
+            .reach;
+    }
+
+    // Whether no rank has failed. Every rank.
+    [[nodiscard]] bool agree(const status& own, const std::exception_ptr& thrown) const {
+        int failed = !own.ok() || thrown ? 1 : 0;
+        MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, comm_);
+        return failed == 0;
+    }
+    [[nodiscard]] static status finish(const status& own, const std::exception_ptr& thrown) {
+        if (thrown) std::rethrow_exception(thrown);
+        return own.ok() ? core::failure(status_code::other_rank_failed) : own;
+    }
+
+    // The counts of all ranks, and those of the ranks below. Every rank.
+    [[nodiscard]] status add_up(const status& drawn) {
+        const std::array<std::uint64_t, 2> own{drawn.counts.voxels, drawn.counts.fragments};
+        std::array<std::uint64_t, 2> below{};
+        MPI_Exscan(own.data(), below.data(), 2, MPI_UINT64_T, MPI_SUM, comm_);
+        if (rank_ == 0) below = {};
+        before_ = {below[0], below[1]};
+        std::array<std::uint64_t, 11> sums{counts_.triangles_in,      counts_.triangles_nonfinite,
+                                           counts_.triangles_too_far, counts_.triangles_zero_area,
+                                           counts_.triangles_outside, counts_.triangles_drawn,
+                                           drawn.counts.fragments,    drawn.counts.fragments_discarded,
+                                           drawn.counts.voxels,       drawn.solid.open_rows,
+                                           drawn.solid.crossings};
+        MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_UINT64_T, MPI_SUM, comm_);
+        status all;
+        all.counts = {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8]};
+        all.solid.open_rows = sums[9];
+        all.solid.crossings = sums[10];
+        all.solid.max_winding = drawn.solid.max_winding;
+        MPI_Allreduce(MPI_IN_PLACE, &all.solid.max_winding, 1, MPI_UINT64_T, MPI_MAX, comm_);
+        return all;
+    }
+    static void sum(counters& all, const counters& one) {
+        all.triangles_in += one.triangles_in;
+        all.triangles_nonfinite += one.triangles_nonfinite;
+        all.triangles_too_far += one.triangles_too_far;
+        all.triangles_zero_area += one.triangles_zero_area;
+        all.triangles_outside += one.triangles_outside;
+        all.triangles_drawn += one.triangles_drawn;
+    }
+
+    MPI_Comm comm_;
+    Backend& backend_;
+    grid grid_;
+    VertexShader shader_;
+    stream_options options_;
+    bin_memory<record_type> memory_;
+    std::vector<bin<record_type>> mine_; // one
+    histogram counts_of_layers_;
+    counters counts_;
+    status failed_;
+    std::uint64_t num_triangles_ = 0;
+    int rank_ = 0, num_ranks_ = 1;
+    plan plan_;
+    list_offset before_;
+};
+
+} // namespace voxelpipe::slabs
