@@ -146,7 +146,6 @@ private:
                                                     options_);
             if (plan_.axis != 2) stream.cut_into(equal_layers(stream.where(), plan_.axis, 1));
             feed(stream, received);
-            stream.set_num_triangles(total);
             drawn = draw(stream);
             if (!drawn.ok()) own = drawn;
         });

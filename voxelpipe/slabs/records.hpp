@@ -43,6 +43,28 @@ struct stored_vertices {
         return {v.position, voxelpipe::get<0>(v)};
     }
 };
+
+// The fragment shader of a slab: the user's, with the numbers of the whole mesh. Constants need none.
+template <class Shader>
+struct numbered_shader {
+    Shader shader;
+    const std::uint32_t* numbers; // by triangle of the slab, in the backend's memory
+
+    VOXELPIPE_ANY_CALLABLE
+    template <class V>
+    VOXELPIPE_HD auto operator()(const fragment<V>& drawn) const {
+        fragment<V> f = drawn;
+        f.triangle = f.primitive = numbers[drawn.triangle];
+        return shader(f);
+    }
+};
+// The same for the lists that a slab gave. Triangles keep their order, so that lists stay sorted.
+struct renumber_list {
+    std::uint32_t* primitives;
+    const std::uint32_t* numbers;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const { primitives[i] = numbers[primitives[i]]; }
+};
+
 template <class Varyings>
 struct slab_mesh {
     using view = mesh_view<Varyings>;

@@ -112,10 +112,6 @@ public:
     // Of the triangles so far, in the whole grid: each is counted once.
     [[nodiscard]] const counters& counts() const { return counts_; }
     [[nodiscard]] counters& counts() { return counts_; }
-    // Of the whole mesh: more than any record's.
-    void set_num_triangles(std::uint64_t n) { num_triangles_ = n; }
-    [[nodiscard]] std::uint64_t num_triangles() const { return num_triangles_; }
-
     // Records come by ascending number. reach: see classify(). Throws std::bad_alloc, and std::system_error of files.
     void push(const record_type& r, const core::voxel_box& reach) {
         const auto first = slab_of_[static_cast<std::size_t>(reach.lo[axis_])],
@@ -130,7 +126,7 @@ public:
     // gave has reached the sink by then. Throws what make and sink throw, and std::system_error of files.
     template <class FragmentShader, class Make, class Sink>
     [[nodiscard]] status draw(const FragmentShader& shader, const Make& make, const Sink& sink) {
-        return draw_slabs<FragmentShader>(shader, make, sink, [&](const auto& draws, const grid& g, auto& out) {
+        return draw_slabs<false>(shader, make, sink, [&](const auto& draws, const grid& g, auto& out) {
             return voxelize(backend_, draws, g, out, options_.voxelize);
         });
     }
@@ -140,7 +136,7 @@ public:
                                     const solid_options& how = {}) {
         if (how.repair != repair::none || !options_.is_solid || axis_ == 0)
             return core::failure(status_code::bad_solid_options);
-        return draw_slabs<SolidShader>(shader, make, sink, [&](const auto& draws, const grid& g, auto& out) {
+        return draw_slabs<true>(shader, make, sink, [&](const auto& draws, const grid& g, auto& out) {
             return voxelize_solid(backend_, draws, g, out, how);
         });
     }
@@ -153,7 +149,7 @@ private:
     };
     using mesh_types = detail::slab_mesh<Varyings>;
 
-    template <class Shader, class Make, class Sink, class Call>
+    template <bool IsSolid, class Shader, class Make, class Sink, class Call>
     [[nodiscard]] status draw_slabs(const Shader& shader, const Make& make, const Sink& sink, const Call& call) {
         using output = std::remove_cvref_t<decltype(make(grid_.extent))>;
         if (detail::is_abuffer<output> && axis_ != 2) return core::failure(status_code::bad_crop);
@@ -173,7 +169,7 @@ private:
                 const std::vector<record_type> records = next.loading.valid() ? next.loading.get() : load(next);
                 begin_loading(cost);
                 output out = make(s.where.extent);
-                s.drawn = draw_one<Shader>(records, shader, s.where, out, call);
+                s.drawn = draw_one<IsSolid>(records, shader, s.where, out, call);
                 if (s.drawn.ok()) {
                     add(all, s.drawn);
                     sink(std::as_const(s), out);
@@ -193,7 +189,7 @@ private:
         return all;
     }
 
-    template <class Shader, class Output, class Call>
+    template <bool IsSolid, class Shader, class Output, class Call>
     [[nodiscard]] status draw_one(const std::vector<record_type>& records, const Shader& shader, const grid& g,
                                   Output& out, const Call& call) {
         const std::size_t n = records.size();
@@ -210,11 +206,22 @@ private:
             using view = typename mesh_types::view;
             const typename Backend::template buffer<std::uint32_t> in_backend(backend_,
                                                                               array_view<const std::uint32_t>(numbers));
-            view v = mesh.view();
-            v.part = {in_backend.view(), num_triangles_};
-            using draw_type = voxelpipe::draw<view, typename mesh_types::vertex_shader, Shader>;
-            const draw_type d{v, {}, shader};
-            return call(std::span<const draw_type>(&d, 1), g, out);
+            const auto one_draw = [&](const auto& numbered) {
+                using draw_type =
+                    voxelpipe::draw<view, typename mesh_types::vertex_shader, std::remove_cvref_t<decltype(numbered)>>;
+                const draw_type d{mesh.view(), {}, numbered};
+                return call(std::span<const draw_type>(&d, 1), g, out);
+            };
+            status s;
+            if constexpr (core::is_constant<Shader> || IsSolid)
+                s = one_draw(shader);
+            else
+                s = one_draw(detail::numbered_shader<Shader>{shader, in_backend.data()});
+            if constexpr (detail::is_abuffer<Output> && !IsSolid)
+                if (s.ok())
+                    backend_.for_each(out.primitives.size(),
+                                      detail::renumber_list{out.primitives.data(), in_backend.data()});
+            return s;
         };
         if constexpr (std::is_empty_v<Varyings>) {
             return run(mesh<Backend>{backend_, positions, triangles});
@@ -327,7 +334,6 @@ private:
     stream_options options_;
     int axis_ = 2;
     bool lists_ = false;
-    std::uint64_t num_triangles_ = 0;
     counters counts_;
     std::deque<pending_slab> pending_;
     std::vector<bin<record_type>> bins_; // of the pending slabs, until they are drawn
@@ -353,19 +359,20 @@ public:
     // Adds triangles of host memory; they are numbered on from those before. Fails for an index that names no vertex,
     // for more than 2^32 - 1 triangles, and for instances. What was added before a failure stays.
     [[nodiscard]] status add(const Mesh& chunk) {
-        const std::uint64_t first = this->num_triangles();
         const status s =
-            for_each_record<varyings>(chunk, shader_, this->where(), rule_, is_solid_, first, this->counts(),
+            for_each_record<varyings>(chunk, shader_, this->where(), rule_, is_solid_, num_triangles_, this->counts(),
                                       [&](const auto& r, const core::voxel_box& reach) { this->push(r, reach); });
-        if (s.ok())
-            this->set_num_triangles(first + (chunk.part.whole != 0 ? chunk.part.whole : chunk.triangles.size()));
+        if (s.ok()) num_triangles_ += chunk.part.whole != 0 ? chunk.part.whole : chunk.triangles.size();
         return s;
     }
+    // Of the chunks so far.
+    [[nodiscard]] std::uint64_t num_triangles() const { return num_triangles_; }
 
 private:
     VertexShader shader_;
     coverage rule_;
     bool is_solid_;
+    std::uint64_t num_triangles_ = 0;
 };
 
 // Appends the lists of a slab along z to those of the slabs before it, as one call with the whole grid orders them.
