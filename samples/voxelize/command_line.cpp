@@ -20,7 +20,8 @@ namespace {
 
 struct help_formatter : CLI::Formatter {
     std::string make_usage(const CLI::App*, std::string) const override {
-        return "\nUsage: voxelize INPUT -o FILE [-o FILE...] [OPTIONS]\n";
+        return "\nUsage: voxelize INPUT -o FILE [-o FILE...] [OPTIONS]\n"
+               "       voxelize --list FILE -o \"out/{name}.npy\" [--rank R --world-size W] [--jobs J] [OPTIONS]\n";
     }
 };
 
@@ -89,6 +90,15 @@ command_line parse_command_line(int argc, const char* const* argv) {
     // Ranges let NaN through.
     if (!std::isfinite(options.load.scale)) throw usage_error("--scale is a number");
     if (!std::isfinite(options.load.gltf.seconds)) throw usage_error("--time is a number of seconds");
+    for (const CLI::Option* const option : app.get_options()) {
+        const std::string group = option->get_group();
+        if (option->count() == 0 || group == "Many models" || group == "Machine" || group == "Messages") continue;
+        options.arguments.push_back(option->get_name());
+        for (const std::string& value : option->results()) options.arguments.push_back(value);
+    }
+    if (options.storage != storage_choice::automatic)
+        options.arguments.emplace_back(options.storage == storage_choice::sparse ? "--sparse" : "--dense");
+    understand_batch(options, app.count("--world-size") != 0);
     understand_solid(options, raw);
     understand_grid(options, raw);
     understand_outputs(options, raw);

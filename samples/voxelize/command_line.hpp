@@ -19,8 +19,18 @@ namespace voxelize {
 
 enum class stats_format : std::uint8_t { none, text, json };
 
+// Many models in one run (batch.hpp).
+struct batch_request {
+    std::filesystem::path list; // a file with a model a line, "-" for standard input; empty: there is one model
+    int rank = 0;               // this process takes the models whose number is RANK modulo WORLD_SIZE
+    int world_size = 1;
+    int jobs = 1; // models at a time
+};
+
 struct command_line {
-    std::filesystem::path input;
+    std::filesystem::path input; // empty with batch.list
+    batch_request batch;
+    std::vector<std::string> arguments; // as given, without those of --list and of the machine that change no output
     std::vector<std::filesystem::path> outputs;
     load_options load;
     grid_request grid;

@@ -1,21 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // voxelize INPUT.glb -o OUT... [options]: turns a glTF model into voxels. See --help.
-#include "backend_estimate.hpp"
+#include "batch.hpp"
 #include "command_line.hpp"
-#include "cuda_device.hpp"
 #include "exit_code.hpp"
-#include "model_file.hpp"
-#include "picture_levels.hpp"
-#include "report.hpp"
-#include "sparse/sparse_formats.hpp"
-#include "sparse/sparse_voxelizer.hpp"
+#include "memory.hpp"
+#include "run_model.hpp"
 
 #include <chrono>
-#include <cstdio>
 #include <iostream>
-#include <memory>
-#include <system_error>
 
 namespace voxelize {
 namespace {
@@ -25,153 +18,29 @@ int fail(exit_code code, const std::string& why) {
     return code;
 }
 
-// Writes one output. Formats that hold every channel get those that were asked for, which come first in the volume.
-std::vector<std::filesystem::path> write_output(volume& voxels, const command_line& options,
-                                                const std::filesystem::path& output, const write_options& how) {
-    std::vector<channel> aside;
-    if (const format* const f = find_format(output); f->all_channels && !f->only_sparse)
-        while (aside.size() < options.implied.size()) {
-            aside.push_back(std::move(voxels.channels.back()));
-            voxels.channels.pop_back();
-        }
-    std::vector<std::filesystem::path> files = write(voxels, output, how);
-    for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
-    return files;
-}
-
-// The same of a sparse volume; .nvdb takes the colours that --help promises too.
-std::vector<std::filesystem::path> write_output(sparse_volume& voxels, const command_line& options,
-                                                const std::filesystem::path& output, const write_options& how) {
-    memory::require(dense_bytes(voxels, output), "a dense grid for " + output.filename().string());
-    std::vector<channel> aside;
-    if (const format* const f = find_format(output); f->all_channels && !f->only_sparse)
-        while (aside.size() < options.implied.size()) {
-            aside.push_back(std::move(voxels.channels.back()));
-            voxels.channels.pop_back();
-        }
-    std::vector<std::filesystem::path> files = write_sparse(voxels, output, how);
-    for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
-    return files;
-}
-
 void print_warnings(const std::vector<std::string>& warnings) {
     for (const std::string& warning : warnings) std::cerr << "voxelize: warning: " << warning << '\n';
 }
 
-using clock = std::chrono::steady_clock;
-
-double milliseconds_since(clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(clock::now() - start).count();
-}
-
-// CUDA, starting already where it will be used or may be.
-std::shared_ptr<cuda_start> start_cuda(const command_line& options) {
-    if (!built_with_cuda() || options.voxelize.backend == backend_choice::cpu) return nullptr;
-    std::error_code error;
-    const std::uintmax_t bytes = std::filesystem::file_size(options.input, error);
-    if (error) return nullptr; // the model cannot be read either
-    if (options.voxelize.backend == backend_choice::automatic &&
-        !cuda_may_pay(options.grid, options.voxelize, static_cast<double>(bytes)))
-        return nullptr;
-    return std::make_shared<cuda_start>();
-}
-
-// Does the work, once the command line is read; every failure is an exception. The program began at BEGIN.
-void run(const command_line& options, clock::time_point begin) {
-    run_report report;
-    report.input = options.input;
-    report.request = options.voxelize;
-    progress_bar bar{!options.quiet};
-    report.stats.milliseconds.emplace_back("options", milliseconds_since(begin));
-
-    auto start = clock::now();
-    report.request.cuda = start_cuda(options);
-    load_options load = options.load;
-    load.picture_hook = picture_reducer{options.grid, options.voxelize};
-    scene model = load_model(options.input, load);
-    report.warnings = options.warnings;
-    report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
-    report.vertices = model.vertex_count();
-    for (const material& m : model.materials) report.materials.push_back(m.name);
-    report.stats.milliseconds.emplace_back("read", milliseconds_since(start));
-    start = clock::now();
-    const auto refuse = [&report](const std::string& why) {
-        model_error error(why);
-        error.warnings = report.warnings;
-        throw error;
-    };
-    const std::uint64_t elements = model.triangle_count() + model.line_count();
-    if (elements == 0) refuse("there are no triangles, lines or points to voxelize");
-    if (model.triangle_count() == 0 && options.voxelize.solid)
-        refuse("there are only lines and points, which enclose nothing: --solid needs triangles");
-    if (elements > UINT32_MAX)
-        refuse("there are " + std::to_string(elements) + " triangles, lines and points, more than the " +
-               std::to_string(UINT32_MAX) + " that can be numbered");
-    const bounding_box bounds = bounds_of(model, options.voxelize.threads);
-    if (bounds.empty) refuse("nothing to voxelize has a corner at a finite position");
-    report.request.grid = place_grid(options.grid, bounds);
-    report.request.padding = options.grid.padding;
-    if (std::string warning = precision_warning(model, report.request.grid); !warning.empty())
-        report.warnings.push_back(std::move(warning));
-    report.stats.milliseconds.emplace_back("place", milliseconds_since(start));
-
-    const storage_decision storage = choose_storage(options.storage, report.request, options.outputs);
-    const glm::ivec3 extent = report.request.grid.extent;
-    if (!options.quiet && !storage.reason.empty())
-        std::cerr << "voxelize: a sparse grid of " << extent.x << " x " << extent.y << " x " << extent.z
-                  << " voxels: " << storage.reason << '\n';
-    bar.start(storage.sparse ? "voxelizing into bricks" : "voxelizing");
-    report.request.progress = [&bar](double done) { bar.show(done); };
-    volume voxels;
-    sparse_volume bricks;
-    if (storage.sparse)
-        bricks = run_sparse_voxelizer(std::move(model), report.request, report.stats);
-    else
-        voxels = run_voxelizer(std::move(model), report.request, report.stats);
-    const std::uint64_t num_bricks = bricks.keys.size(), brick_bytes = bricks.num_bytes();
-    for (const std::string& warning : report.stats.warnings) report.warnings.push_back(warning);
-    if (report.stats.triangles_dropped != 0)
-        report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
-                                  " triangles are dropped: a position is not finite, or too far from the grid");
-    if (report.stats.voxels == 0) report.warnings.push_back(why_empty(report.stats, report.request.coverage));
-
-    start = clock::now();
-    for (const std::filesystem::path& output : options.outputs) {
-        write_options how = options.write;
-        bar.start("writing " + output.filename().string());
-        how.progress = [&bar](double done) { bar.show(done); };
-        for (std::filesystem::path& file :
-             storage.sparse ? write_output(bricks, options, output, how) : write_output(voxels, options, output, how))
-            report.files.push_back(std::move(file));
-    }
-    bar.clear();
-    report.stats.milliseconds.emplace_back("write", milliseconds_since(start));
-    start = clock::now();
-    model = {};
-    voxels = {};
-    bricks = {};
-    report.request.cuda.reset();
-    report.stats.milliseconds.emplace_back("release", milliseconds_since(start));
-    report.peak_memory = memory::peak();
-
+void print(const command_line& options, const run_report& report) {
     if (!options.quiet) {
         print_warnings(report.warnings);
         // Standard output belongs to the object where one is asked for.
         std::ostream& stream = options.stats == stats_format::json ? std::cerr : std::cout;
+        const glm::ivec3 extent = report.request.grid.extent;
         for (const std::filesystem::path& file : report.files) stream << "wrote " << file.string() << '\n';
         stream << report.stats.voxels << " of " << extent.x << " x " << extent.y << " x " << extent.z
                << " voxels are covered\n";
-        if (storage.sparse)
-            stream << "they lie in " << num_bricks << " bricks of 8 x 8 x 8, "
-                   << memory::mebibytes(static_cast<double>(brick_bytes)) << " with their values\n";
+        if (report.is_sparse)
+            stream << "they lie in " << report.bricks << " bricks of 8 x 8 x 8, "
+                   << memory::mebibytes(static_cast<double>(report.brick_bytes)) << " with their values\n";
     }
-    add_rest(report, milliseconds_since(begin));
     if (options.stats == stats_format::text) print_text(std::cout, report);
     if (options.stats == stats_format::json) print_json(std::cout, report);
 }
 
 int run_main(int argc, char** argv) {
-    const clock::time_point begin = clock::now();
+    const auto begin = std::chrono::steady_clock::now();
     command_line options;
     try {
         options = parse_command_line(argc, argv);
@@ -181,27 +50,21 @@ int run_main(int argc, char** argv) {
     } catch (const usage_error& error) {
         return fail(exit_usage, std::string(error.what()) + "\nTry: voxelize --help");
     }
-    memory::set_limit(options.max_memory, options.max_memory != 0);
-    try {
-        run(options, begin);
-    } catch (const model_error& error) {
-        if (!options.quiet) print_warnings(error.warnings);
-        return fail(exit_input, options.input.string() + ": " + error.what() +
-                                    (error.lenient_helps ? " (--lenient goes on all the same)" : ""));
-    } catch (const grid_error& error) {
-        return fail(exit_usage, error.what());
-    } catch (const memory_error& error) {
-        return fail(exit_too_large, error.what());
-    } catch (const std::bad_alloc&) {
-        return fail(exit_too_large, memory::shortage());
-    } catch (const write_error& error) {
-        return fail(exit_output, error.what());
-    } catch (const backend_error& error) {
-        return fail(exit_backend, error.what());
-    } catch (const std::exception& error) {
-        return fail(exit_internal, std::string("unexpected error, please report it: ") + error.what());
+    if (!options.batch.list.empty()) {
+        try {
+            return run_batch(options);
+        } catch (const std::exception& error) {
+            return fail(exit_output, error.what());
+        }
     }
-    return exit_ok;
+    memory::set_limit(options.max_memory, options.max_memory != 0);
+    const run_outcome result = run_model(options, begin);
+    if (result.code == exit_ok) {
+        print(options, result.report);
+        return exit_ok;
+    }
+    if (!options.quiet && result.code == exit_input) print_warnings(result.report.warnings);
+    return fail(result.code, result.error);
 }
 
 } // namespace

@@ -46,6 +46,8 @@ struct run_report {
     std::vector<std::filesystem::path> files;
     std::vector<std::string> warnings;
     std::uint64_t peak_memory = 0; // bytes
+    bool is_sparse = false;        // the voxels were kept in bricks:
+    std::uint64_t bricks = 0, brick_bytes = 0;
 };
 
 // Adds the stage "other": what is left of the program's wall time, so that the stages add up to it.

@@ -44,7 +44,6 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
 void describe_files(CLI::App& app, command_line& options, raw_options& raw) {
     app.add_option("INPUT", options.input,
                    "Model: glTF 2.0 (.glb, .gltf), or .obj, .stl, .ply, .off and others that assimp reads")
-        ->required()
         ->option_text(" ");
     app.add_option("-o,--output", options.outputs, "Write the voxels to FILE (required); one -o for each file")
         ->required()
@@ -58,6 +57,33 @@ void describe_files(CLI::App& app, command_line& options, raw_options& raw) {
         ->delimiter(',')
         ->option_text("NAME")
         ->group("Output");
+}
+
+void describe_batch(CLI::App& app, command_line& options) {
+    auto* const list = app.add_option("--list", options.batch.list,
+                                      "In place of INPUT: a file with the path of a model in each line, - for standard "
+                                      "input. {name} in each -o is the model's name, see MANY MODELS")
+                           ->option_text("FILE")
+                           ->group("Many models");
+    auto* const size = app.add_option("--world-size", options.batch.world_size,
+                                      "How many processes share the list. Default: 1, or as mpiexec and srun say")
+                           ->check(CLI::Range(1, 1 << 30).description(""))
+                           ->needs(list)
+                           ->option_text("W")
+                           ->group("Many models");
+    app.add_option("--rank", options.batch.rank,
+                   "The number of this one, from 0: it takes the models RANK, RANK + W, RANK + 2 W, ...")
+        ->check(CLI::Range(0, 1 << 30).description(""))
+        ->needs(list)
+        ->needs(size)
+        ->option_text("R")
+        ->group("Many models");
+    app.add_option("--jobs", options.batch.jobs,
+                   "Models at a time, which share --max-memory and the machine's cores. Default: 1")
+        ->check(CLI::Range(1, 1024).description(""))
+        ->needs(list)
+        ->option_text("J")
+        ->group("Many models");
 }
 
 void describe_grid(CLI::App& app, command_line& options, raw_options& raw) {
@@ -299,6 +325,7 @@ void describe_messages(CLI::App& app, command_line& options) {
 
 void describe(CLI::App& app, command_line& options, raw_options& raw) {
     describe_files(app, options, raw);
+    describe_batch(app, options);
     describe_grid(app, options, raw);
     describe_model(app, options);
     describe_values(app, options, raw);

@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <initializer_list>
 #include <optional>
 
 namespace voxelize {
@@ -17,7 +20,40 @@ glm::dvec3 parse_point(const std::string& option, const std::string& text, std::
     return n.size() == 3 ? glm::dvec3(n[0], n[1], n[2]) : glm::dvec3(n[0]);
 }
 
+// A number that a launcher puts into the environment, under one of these names.
+std::optional<int> from_environment(std::initializer_list<const char*> names) {
+    for (const char* const name : names) {
+        const char* const text = std::getenv(name);
+        if (text == nullptr) continue;
+        int number = 0;
+        const char* const end = text + std::strlen(text);
+        if (std::from_chars(text, end, number).ptr == end && number >= 0) return number;
+    }
+    return std::nullopt;
+}
+
 } // namespace
+
+void understand_batch(command_line& options, bool has_world) {
+    batch_request& batch = options.batch;
+    if (batch.list.empty()) {
+        if (options.input.empty()) throw usage_error("INPUT is required");
+        return;
+    }
+    if (!options.input.empty()) throw usage_error("INPUT and --list do not go together");
+    for (const std::filesystem::path& output : options.outputs)
+        if (output.string().find("{name}") == std::string::npos)
+            throw usage_error("with --list every -o needs {name}, so that each model has files of its own: \"" +
+                              output.string() + '"');
+    if (options.stats != stats_format::none) throw usage_error("--stats does not go with --list: see the manifest");
+    if (!has_world) {
+        batch.world_size = from_environment({"PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "SLURM_NTASKS"}).value_or(1);
+        batch.rank = from_environment({"PMI_RANK", "OMPI_COMM_WORLD_RANK", "SLURM_PROCID"}).value_or(0);
+    }
+    if (batch.rank >= batch.world_size)
+        throw usage_error("--rank is below --world-size: " + std::to_string(batch.rank) + " of " +
+                          std::to_string(batch.world_size));
+}
 
 void understand_solid(command_line& options, const raw_options& raw) {
     if (raw.coverage) options.voxelize.coverage = *raw.coverage;

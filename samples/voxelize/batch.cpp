@@ -1,0 +1,389 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "batch.hpp"
+
+#include "exit_code.hpp"
+#include "memory.hpp"
+#include "run_model.hpp"
+
+#include <nlohmann/json.hpp>
+#include <zlib.h>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <system_error>
+#include <thread>
+#include <unordered_map>
+#include <unordered_set>
+
+namespace voxelize {
+namespace {
+
+namespace fs = std::filesystem;
+using json = nlohmann::ordered_json;
+using clock = std::chrono::steady_clock;
+
+// Bytes and CRC-32, as of cksum -a crc32b, of a file; of a folder's files by name, with their names.
+struct content {
+    std::uint64_t bytes = 0;
+    std::uint32_t crc = 0;
+
+    void add(const void* data, std::size_t size) {
+        crc = static_cast<std::uint32_t>(crc32_z(crc, static_cast<const Bytef*>(data), size));
+        bytes += size;
+    }
+    void add_file(const fs::path& path) {
+        std::ifstream file(path, std::ios::binary);
+        std::vector<char> block(std::size_t{1} << 20);
+        while (file.read(block.data(), static_cast<std::streamsize>(block.size())) || file.gcount() > 0)
+            add(block.data(), static_cast<std::size_t>(file.gcount()));
+    }
+};
+content content_of(const fs::path& path) {
+    content all;
+    if (!fs::is_directory(path)) {
+        all.add_file(path);
+        return all;
+    }
+    std::set<fs::path> files;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(path))
+        if (entry.is_regular_file()) files.insert(entry.path());
+    for (const fs::path& file : files) {
+        const std::string name = file.lexically_relative(path).generic_string();
+        all.add(name.data(), name.size());
+        all.add_file(file);
+    }
+    return all;
+}
+
+const char* name_of(exit_code code) {
+    switch (code) {
+    case exit_ok:
+        return "ok";
+    case exit_usage:
+        return "bad_grid";
+    case exit_input:
+        return "bad_model";
+    case exit_too_large:
+        return "out_of_memory";
+    case exit_output:
+        return "not_written";
+    case exit_backend:
+        return "no_backend";
+    case exit_internal:
+        break;
+    }
+    return "internal_error";
+}
+
+// What makes two runs the same work on a model: every option that can change a byte, and the model's size and time.
+std::string work_of(const command_line& options, const listed_model& model) {
+    content arguments;
+    for (const std::string& argument : options.arguments) arguments.add(argument.c_str(), argument.size() + 1);
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(model.input, error);
+    const auto time = fs::last_write_time(model.input, error).time_since_epoch().count();
+    std::array<char, 64> text{};
+    std::snprintf(text.data(), text.size(), "%08x-%jx-%llx", arguments.crc, size,
+                  static_cast<unsigned long long>(time));
+    return text.data();
+}
+
+json record_of(const listed_model& model, const std::string& work) {
+    return {{"input", model.input.string()}, {"name", model.name}, {"work", work}};
+}
+
+// In the process of a model: does the work, sends the record through OUT.
+[[noreturn]] void run_child(const command_line& all, const listed_model& model, const std::string& work, int out) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    const auto begin = clock::now();
+    command_line options = all;
+    options.input = model.input;
+    options.quiet = true;
+    run_outcome result;
+    json record = record_of(model, work);
+    try {
+        for (fs::path& output : options.outputs) {
+            output = with_name(output, model.name);
+            if (output.has_parent_path()) fs::create_directories(output.parent_path());
+        }
+        const auto jobs = static_cast<std::uint64_t>(all.batch.jobs);
+        const std::uint64_t limit = all.max_memory != 0 ? all.max_memory : memory::machine_limit();
+        memory::set_limit(limit / jobs, all.max_memory != 0);
+        if (options.voxelize.threads == 0)
+            options.voxelize.threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency() / jobs));
+        options.write.threads = options.voxelize.threads;
+        result = run_model(options, begin);
+        record["outputs"] = json::array();
+        for (const fs::path& file : result.report.files) {
+            const content c = content_of(file);
+            std::array<char, 32> hash{};
+            std::snprintf(hash.data(), hash.size(), "crc32:%08x", c.crc);
+            record["outputs"].push_back({{"file", file.string()}, {"bytes", c.bytes}, {"hash", hash.data()}});
+        }
+    } catch (const std::exception& error) {
+        result.code = exit_output;
+        result.error = error.what();
+    }
+    record["status"] = name_of(result.code);
+    if (result.code != exit_ok) {
+        record.erase("outputs");
+        record["error"] = result.error;
+    } else {
+        const voxelize_stats& stats = result.report.stats;
+        record["counts"] = {{"triangles", stats.triangles},
+                            {"triangles_dropped", stats.triangles_dropped},
+                            {"fragments", stats.fragments},
+                            {"voxels", stats.voxels}};
+        record["peak_memory_bytes"] = result.report.peak_memory;
+    }
+    if (!result.report.warnings.empty()) record["warnings"] = result.report.warnings;
+    record["ms"] = std::chrono::duration<double, std::milli>(clock::now() - begin).count();
+    const std::string text = record.dump(-1, ' ', false, json::error_handler_t::replace);
+    for (std::size_t at = 0; at < text.size();) {
+        const ssize_t n = ::write(out, text.data() + at, text.size() - at);
+        if (n < 0 && errno != EINTR) break;
+        at += n > 0 ? static_cast<std::size_t>(n) : 0;
+    }
+    _exit(result.code);
+}
+
+// Lines are appended whole, each with one write: a run that is killed leaves at most one unfinished line.
+class manifest {
+public:
+    explicit manifest(const fs::path& path) : path_(path) {
+        if (path.has_parent_path()) fs::create_directories(path.parent_path());
+        file_ = open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+        if (file_ < 0) fail("open");
+        char last = '\n';
+        const off_t size = lseek(file_, 0, SEEK_END);
+        if (size > 0 && pread(file_, &last, 1, size - 1) == 1 && last != '\n') add_text("\n");
+    }
+    manifest(const manifest&) = delete;
+    manifest& operator=(const manifest&) = delete;
+    ~manifest() { close(file_); }
+    void add(const std::string& line) const { add_text(line + '\n'); }
+
+private:
+    void add_text(const std::string& text) const {
+        if (::write(file_, text.data(), text.size()) != static_cast<ssize_t>(text.size())) fail("write");
+    }
+    [[noreturn]] void fail(const char* action) const {
+        throw std::runtime_error("cannot " + std::string(action) + " '" + path_.string() +
+                                 "': " + std::strerror(errno));
+    }
+    fs::path path_;
+    int file_ = -1;
+};
+
+// The latest record of each name in the manifests of all ranks, if it says ok and its files are there.
+class finished_models {
+public:
+    explicit finished_models(const fs::path& folder) {
+        std::error_code error;
+        for (const fs::directory_entry& entry :
+             fs::directory_iterator(folder.empty() ? fs::path(".") : folder, error)) {
+            const std::string name = entry.path().filename().string();
+            if (!name.starts_with("manifest.") || !name.ends_with(".jsonl")) continue;
+            std::ifstream file(entry.path());
+            for (std::string line; std::getline(file, line);) {
+                const json record = json::parse(line, nullptr, false);
+                if (!record.is_object() || !record.contains("name") || !record.contains("work")) continue;
+                const bool ok = record.value("status", "") == "ok";
+                auto& known = works_[record["name"].get<std::string>()];
+                known = {};
+                if (!ok || !record.contains("outputs")) continue;
+                known.work = record["work"].get<std::string>();
+                for (const json& output : record["outputs"])
+                    known.files.emplace_back(output.value("file", ""), output.value("bytes", std::uint64_t{0}));
+            }
+        }
+    }
+    [[nodiscard]] bool has(const std::string& name, const std::string& work) const {
+        const auto found = works_.find(name);
+        if (found == works_.end() || found->second.work != work || found->second.files.empty()) return false;
+        return std::all_of(found->second.files.begin(), found->second.files.end(), [](const auto& file) {
+            std::error_code error;
+            if (fs::is_directory(file.first, error)) return true;
+            return fs::file_size(file.first, error) == file.second && !error;
+        });
+    }
+
+private:
+    struct known_model {
+        std::string work;
+        std::vector<std::pair<std::string, std::uint64_t>> files;
+    };
+    std::unordered_map<std::string, known_model> works_;
+};
+
+// The processes of models.
+class workers {
+public:
+    struct job {
+        listed_model model;
+        std::string work;
+        pid_t process;
+        int from;
+        std::string text;
+    };
+    void start(const command_line& options, listed_model model, std::string work) {
+        int ends[2];
+        if (pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error(std::string("no pipe: ") + std::strerror(errno));
+        std::cout.flush();
+        const pid_t process = fork();
+        if (process < 0) throw std::runtime_error(std::string("no further process: ") + std::strerror(errno));
+        if (process == 0) {
+            close(ends[0]);
+            run_child(options, model, work, ends[1]);
+        }
+        close(ends[1]);
+        jobs_.push_back({std::move(model), std::move(work), process, ends[0], {}});
+    }
+    [[nodiscard]] std::size_t size() const { return jobs_.size(); }
+
+    // Waits until a process ends, and calls done(job, its record).
+    template <class Done>
+    void wait(const Done& done) {
+        std::vector<pollfd> files;
+        for (const job& j : jobs_) files.push_back({j.from, POLLIN, 0});
+        if (poll(files.data(), files.size(), -1) < 0 && errno != EINTR)
+            throw std::runtime_error(std::string("poll: ") + std::strerror(errno));
+        for (std::size_t i = files.size(); i-- > 0;) {
+            if (files[i].revents == 0) continue;
+            std::array<char, 65536> block;
+            const ssize_t n = read(files[i].fd, block.data(), block.size());
+            if (n > 0) jobs_[i].text.append(block.data(), static_cast<std::size_t>(n));
+            if (n > 0 || (n < 0 && errno == EINTR)) continue;
+            job ended = std::move(jobs_[i]);
+            jobs_.erase(jobs_.begin() + static_cast<std::ptrdiff_t>(i));
+            close(ended.from);
+            int status = 0;
+            while (waitpid(ended.process, &status, 0) < 0 && errno == EINTR) {
+            }
+            json record = json::parse(ended.text, nullptr, false);
+            if (!record.is_object()) {
+                record = record_of(ended.model, ended.work);
+                record["status"] = "crashed";
+                record["error"] = WIFSIGNALED(status)
+                                      ? "ended by signal " + std::to_string(WTERMSIG(status))
+                                      : "ended without a word, code " + std::to_string(WEXITSTATUS(status));
+            }
+            done(ended, record);
+        }
+    }
+
+private:
+    std::vector<job> jobs_;
+};
+
+} // namespace
+
+std::vector<listed_model> read_list(std::istream& list) {
+    std::vector<listed_model> models;
+    std::unordered_set<std::string> stems;
+    for (std::string line; std::getline(list, line);) {
+        if (!line.empty() && line.back() == '\r') line.pop_back();
+        if (line.empty() || line[0] == '#') continue;
+        models.push_back({line, fs::path(line).stem().string()});
+        stems.insert(models.back().name);
+    }
+    std::unordered_map<std::string, std::uint64_t> times;
+    std::unordered_set<std::string> numbered;
+    for (listed_model& model : models) {
+        std::uint64_t& n = times[model.name];
+        if (++n == 1) continue;
+        std::string name;
+        for (;; ++n) {
+            name = model.name + '-' + std::to_string(n);
+            if (!stems.contains(name) && numbered.insert(name).second) break;
+        }
+        model.name = name;
+    }
+    return models;
+}
+
+fs::path with_name(const fs::path& path, const std::string& name) {
+    constexpr std::string_view place = "{name}";
+    std::string text = path.string();
+    for (std::size_t at = text.find(place); at != std::string::npos; at = text.find(place, at + name.size()))
+        text.replace(at, place.size(), name);
+    return text;
+}
+
+fs::path manifest_folder(const fs::path& output) {
+    fs::path folder;
+    for (const fs::path& part : output.parent_path()) {
+        if (part.string().find("{name}") != std::string::npos) break;
+        folder /= part;
+    }
+    return folder;
+}
+
+int run_batch(const command_line& options) {
+    std::vector<listed_model> models;
+    if (options.batch.list == "-") {
+        models = read_list(std::cin);
+    } else {
+        std::ifstream list(options.batch.list);
+        models = read_list(list);
+        if (list.bad() || (!list.is_open()))
+            throw std::runtime_error("cannot read the list '" + options.batch.list.string() + "'");
+    }
+    const fs::path folder = manifest_folder(options.outputs.front());
+    const manifest records(folder / ("manifest." + std::to_string(options.batch.rank) + ".jsonl"));
+    const finished_models finished(folder);
+
+    std::size_t mine = 0, skipped = 0, done = 0, failed = 0;
+    workers running;
+    const auto wait = [&] {
+        running.wait([&](const workers::job& job, const json& record) {
+            records.add(record.dump(-1, ' ', false, json::error_handler_t::replace));
+            const std::string status = record.value("status", "");
+            ++done;
+            if (status != "ok") {
+                ++failed;
+                std::cerr << "voxelize: " << job.model.input.string() << ": " << status << ": "
+                          << record.value("error", "") << '\n';
+            } else if (!options.quiet) {
+                std::cout << job.model.name << ": " << record["counts"]["voxels"] << " voxels, "
+                          << static_cast<long long>(record["ms"].get<double>()) << " ms\n";
+            }
+        });
+    };
+    for (std::size_t i = 0; i < models.size(); ++i) {
+        if (i % static_cast<std::size_t>(options.batch.world_size) != static_cast<std::size_t>(options.batch.rank))
+            continue;
+        ++mine;
+        std::string work = work_of(options, models[i]);
+        if (finished.has(models[i].name, work)) {
+            ++skipped;
+            continue;
+        }
+        while (running.size() >= static_cast<std::size_t>(options.batch.jobs)) wait();
+        running.start(options, models[i], std::move(work));
+    }
+    while (running.size() != 0) wait();
+    if (!options.quiet)
+        std::cout << mine << " models: " << done - failed << " done, " << skipped << " were finished, " << failed
+                  << " failed\n";
+    return failed != 0 ? exit_input : exit_ok;
+}
+
+} // namespace voxelize

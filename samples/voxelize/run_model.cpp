@@ -1,0 +1,180 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "run_model.hpp"
+
+#include "backend_estimate.hpp"
+#include "cuda_device.hpp"
+#include "model_file.hpp"
+#include "picture_levels.hpp"
+#include "sparse/sparse_formats.hpp"
+#include "sparse/sparse_voxelizer.hpp"
+
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <system_error>
+
+namespace voxelize {
+namespace {
+
+using clock = std::chrono::steady_clock;
+
+double milliseconds_since(clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(clock::now() - start).count();
+}
+
+// CUDA, starting already where it will be used or may be.
+std::shared_ptr<cuda_start> start_cuda(const command_line& options) {
+    if (!built_with_cuda() || options.voxelize.backend == backend_choice::cpu) return nullptr;
+    std::error_code error;
+    const std::uintmax_t bytes = std::filesystem::file_size(options.input, error);
+    if (error) return nullptr; // the model cannot be read either
+    if (options.voxelize.backend == backend_choice::automatic &&
+        !cuda_may_pay(options.grid, options.voxelize, static_cast<double>(bytes)))
+        return nullptr;
+    return std::make_shared<cuda_start>();
+}
+
+// Writes one output. Formats that hold every channel get those that were asked for, which come first in the volume.
+std::vector<std::filesystem::path> write_output(volume& voxels, const command_line& options,
+                                                const std::filesystem::path& output, const write_options& how) {
+    std::vector<channel> aside;
+    if (const format* const f = find_format(output); f->all_channels && !f->only_sparse)
+        while (aside.size() < options.implied.size()) {
+            aside.push_back(std::move(voxels.channels.back()));
+            voxels.channels.pop_back();
+        }
+    std::vector<std::filesystem::path> files = write(voxels, output, how);
+    for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
+    return files;
+}
+
+// The same of a sparse volume; .nvdb takes the colours that --help promises too.
+std::vector<std::filesystem::path> write_output(sparse_volume& voxels, const command_line& options,
+                                                const std::filesystem::path& output, const write_options& how) {
+    memory::require(dense_bytes(voxels, output), "a dense grid for " + output.filename().string());
+    std::vector<channel> aside;
+    if (const format* const f = find_format(output); f->all_channels && !f->only_sparse)
+        while (aside.size() < options.implied.size()) {
+            aside.push_back(std::move(voxels.channels.back()));
+            voxels.channels.pop_back();
+        }
+    std::vector<std::filesystem::path> files = write_sparse(voxels, output, how);
+    for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
+    return files;
+}
+
+// Does the work; every failure is an exception.
+void run(const command_line& options, clock::time_point begin, run_report& report) {
+    report.input = options.input;
+    report.request = options.voxelize;
+    progress_bar bar{!options.quiet};
+    report.stats.milliseconds.emplace_back("options", milliseconds_since(begin));
+
+    auto start = clock::now();
+    report.request.cuda = start_cuda(options);
+    load_options load = options.load;
+    load.picture_hook = picture_reducer{options.grid, options.voxelize};
+    scene model = load_model(options.input, load);
+    report.warnings = options.warnings;
+    report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
+    report.vertices = model.vertex_count();
+    for (const material& m : model.materials) report.materials.push_back(m.name);
+    report.stats.milliseconds.emplace_back("read", milliseconds_since(start));
+    start = clock::now();
+    const auto refuse = [&report](const std::string& why) {
+        model_error error(why);
+        error.warnings = report.warnings;
+        throw error;
+    };
+    const std::uint64_t elements = model.triangle_count() + model.line_count();
+    if (elements == 0) refuse("there are no triangles, lines or points to voxelize");
+    if (model.triangle_count() == 0 && options.voxelize.solid)
+        refuse("there are only lines and points, which enclose nothing: --solid needs triangles");
+    if (elements > UINT32_MAX)
+        refuse("there are " + std::to_string(elements) + " triangles, lines and points, more than the " +
+               std::to_string(UINT32_MAX) + " that can be numbered");
+    const bounding_box bounds = bounds_of(model, options.voxelize.threads);
+    if (bounds.empty) refuse("nothing to voxelize has a corner at a finite position");
+    report.request.grid = place_grid(options.grid, bounds);
+    report.request.padding = options.grid.padding;
+    if (std::string warning = precision_warning(model, report.request.grid); !warning.empty())
+        report.warnings.push_back(std::move(warning));
+    report.stats.milliseconds.emplace_back("place", milliseconds_since(start));
+
+    const storage_decision storage = choose_storage(options.storage, report.request, options.outputs);
+    const glm::ivec3 extent = report.request.grid.extent;
+    if (!options.quiet && !storage.reason.empty())
+        std::cerr << "voxelize: a sparse grid of " << extent.x << " x " << extent.y << " x " << extent.z
+                  << " voxels: " << storage.reason << '\n';
+    bar.start(storage.sparse ? "voxelizing into bricks" : "voxelizing");
+    report.request.progress = [&bar](double done) { bar.show(done); };
+    volume voxels;
+    sparse_volume bricks;
+    if (storage.sparse)
+        bricks = run_sparse_voxelizer(std::move(model), report.request, report.stats);
+    else
+        voxels = run_voxelizer(std::move(model), report.request, report.stats);
+    const std::uint64_t num_bricks = bricks.keys.size(), brick_bytes = bricks.num_bytes();
+    for (const std::string& warning : report.stats.warnings) report.warnings.push_back(warning);
+    if (report.stats.triangles_dropped != 0)
+        report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
+                                  " triangles are dropped: a position is not finite, or too far from the grid");
+    if (report.stats.voxels == 0) report.warnings.push_back(why_empty(report.stats, report.request.coverage));
+
+    start = clock::now();
+    for (const std::filesystem::path& output : options.outputs) {
+        write_options how = options.write;
+        bar.start("writing " + output.filename().string());
+        how.progress = [&bar](double done) { bar.show(done); };
+        for (std::filesystem::path& file :
+             storage.sparse ? write_output(bricks, options, output, how) : write_output(voxels, options, output, how))
+            report.files.push_back(std::move(file));
+    }
+    bar.clear();
+    report.stats.milliseconds.emplace_back("write", milliseconds_since(start));
+    start = clock::now();
+    model = {};
+    voxels = {};
+    bricks = {};
+    report.request.cuda.reset();
+    report.stats.milliseconds.emplace_back("release", milliseconds_since(start));
+    report.peak_memory = memory::peak();
+
+    report.bricks = num_bricks;
+    report.brick_bytes = brick_bytes;
+    report.is_sparse = storage.sparse;
+    add_rest(report, milliseconds_since(begin));
+}
+
+} // namespace
+
+run_outcome run_model(const command_line& options, clock::time_point begin) {
+    run_outcome result;
+    const auto fail = [&result](exit_code code, const std::string& why) {
+        result.code = code;
+        result.error = why;
+    };
+    try {
+        run(options, begin, result.report);
+    } catch (const model_error& error) {
+        result.report.warnings = error.warnings;
+        fail(exit_input, options.input.string() + ": " + error.what() +
+                             (error.lenient_helps ? " (--lenient goes on all the same)" : ""));
+    } catch (const grid_error& error) {
+        fail(exit_usage, error.what());
+    } catch (const memory_error& error) {
+        fail(exit_too_large, error.what());
+    } catch (const std::bad_alloc&) {
+        fail(exit_too_large, memory::shortage());
+    } catch (const write_error& error) {
+        fail(exit_output, error.what());
+    } catch (const backend_error& error) {
+        fail(exit_backend, error.what());
+    } catch (const std::exception& error) {
+        fail(exit_internal, std::string("unexpected error, please report it: ") + error.what());
+    }
+    return result;
+}
+
+} // namespace voxelize

@@ -1,0 +1,24 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// One model, from its file to the outputs.
+
+#include "command_line.hpp"
+#include "exit_code.hpp"
+#include "report.hpp"
+
+#include <chrono>
+#include <string>
+
+namespace voxelize {
+
+struct run_outcome {
+    exit_code code = exit_ok;
+    std::string error; // one line, if the code is not exit_ok
+    run_report report; // of a failure, the warnings alone
+};
+
+// Does the work of a command line. The program, or this model, began at BEGIN. Throws nothing.
+[[nodiscard]] run_outcome run_model(const command_line& options, std::chrono::steady_clock::time_point begin);
+
+} // namespace voxelize

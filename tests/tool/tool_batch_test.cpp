@@ -1,0 +1,208 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// Many models in one run: shares of ranks, jobs, names, the manifest, and what a later run does after one that was
+// killed.
+#include "tool_test.hpp"
+
+#include "batch.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <set>
+#include <sstream>
+#include <thread>
+
+namespace {
+
+using namespace tool_test;
+
+// COUNT models of one triangle each, of different sizes, listed in models.txt; NAME(i) is a path in the folder.
+struct models {
+    scratch_folder folder;
+    std::vector<std::string> inputs;
+
+    void add(const std::string& name, float size = 1) {
+        const std::string path = folder / name;
+        fs::create_directories(fs::path(path).parent_path());
+        std::ofstream(path) << "v 0 0 0\nv " << size << " 0 0\nv 0 " << size / 2 << " 0\nv 0 0 0.5\nf 1 2 3\nf 1 2 4\n";
+        inputs.push_back(path);
+    }
+    void write_list() const {
+        std::ofstream list(folder / "models.txt");
+        list << "# models\n\n";
+        for (const std::string& input : inputs) list << input << '\n';
+    }
+    outcome run_list(std::vector<std::string> more = {}) const {
+        std::vector<std::string> arguments{"--list", folder / "models.txt", "-o", folder / "out/{name}.npy", "-r",
+                                           "16"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run(folder, arguments);
+    }
+    [[nodiscard]] std::vector<json> manifest(int rank = 0) const {
+        std::vector<json> records;
+        std::istringstream lines(read_file(folder / ("out/manifest." + std::to_string(rank) + ".jsonl")));
+        for (std::string line; std::getline(lines, line);) records.push_back(json::parse(line));
+        return records;
+    }
+};
+
+TEST(ToolBatch, NamesAreStemsAndEqualOnesAreNumbered) {
+    std::istringstream list("a/x.obj\n\n# no model\nb/x.glb\r\nx-2.obj\nc/x.stl\ny.tar.gz\nd/x-2.ply\n");
+    const auto models = voxelize::read_list(list);
+    std::vector<std::string> names;
+    for (const auto& m : models) names.push_back(m.name);
+    EXPECT_EQ(names, (std::vector<std::string>{"x", "x-3", "x-2", "x-4", "y.tar", "x-2-2"}));
+    EXPECT_EQ(models[1].input, "b/x.glb");
+    EXPECT_EQ(voxelize::with_name("o/{name}/{name}.npy", "m{name}").string(), "o/m{name}/m{name}.npy");
+    EXPECT_EQ(voxelize::manifest_folder("o/p/{name}.npy"), "o/p");
+    EXPECT_EQ(voxelize::manifest_folder("o/{name}/p/x.npy"), "o");
+    EXPECT_EQ(voxelize::manifest_folder("{name}.npy"), "");
+}
+
+TEST(ToolBatch, EachModelIsWhatARunByItselfGives) {
+    models all;
+    for (int i = 0; i < 7; ++i) all.add("m/part" + std::to_string(i) + ".obj", 1.0f + static_cast<float>(i));
+    all.write_list();
+    const outcome result = all.run_list({"--jobs", "2"});
+    ASSERT_EQ(result.code, 0) << result.err;
+    EXPECT_NE(result.out.find("7 models: 7 done, 0 were finished, 0 failed"), std::string::npos) << result.out;
+    const auto records = all.manifest();
+    ASSERT_EQ(records.size(), 7u);
+    std::set<std::string> inputs;
+    for (const json& record : records) {
+        EXPECT_EQ(record["status"], "ok");
+        inputs.insert(record["input"].get<std::string>());
+        ASSERT_EQ(record["outputs"].size(), 1u);
+        const std::string file = record["outputs"][0]["file"];
+        const std::string alone = all.folder / "alone.npy";
+        ASSERT_EQ(run(all.folder, {record["input"], "-o", alone, "-r", "16"}).code, 0);
+        EXPECT_EQ(read_file(file), read_file(alone));
+        EXPECT_EQ(record["outputs"][0]["bytes"], fs::file_size(file));
+        EXPECT_EQ(record["outputs"][0]["hash"].get<std::string>().substr(0, 6), "crc32:");
+        EXPECT_EQ(record["counts"]["triangles"], 2);
+        EXPECT_GT(record["counts"]["voxels"], 10);
+        EXPECT_GT(record["ms"], 0);
+    }
+    EXPECT_EQ(inputs.size(), 7u);
+
+    // What is finished is left out; a file that is gone, or other options, are not.
+    EXPECT_NE(all.run_list().out.find("0 done, 7 were finished"), std::string::npos);
+    fs::remove(all.folder / "out/part3.npy");
+    EXPECT_NE(all.run_list().out.find("1 done, 6 were finished"), std::string::npos);
+    EXPECT_NE(all.run_list({"--coverage", "thin"}).out.find("7 done, 0 were finished"), std::string::npos);
+    EXPECT_NE(all.run_list({"--coverage", "thin", "-j", "1"}).out.find("0 done, 7 were finished"), std::string::npos);
+    // So is a model that has changed.
+    all.inputs.clear();
+    all.add("m/part5.obj", 3.25f);
+    EXPECT_NE(all.run_list({"--coverage", "thin"}).out.find("1 done, 6 were finished"), std::string::npos);
+}
+
+TEST(ToolBatch, RanksShareTheList) {
+    models all;
+    for (int i = 0; i < 5; ++i) all.add("p" + std::to_string(i) + ".obj");
+    all.add("other/p1.obj", 2);
+    all.write_list();
+    ASSERT_EQ(all.run_list({"--rank", "1", "--world-size", "2"}).code, 0);
+    EXPECT_EQ(all.manifest(1).size(), 3u);
+    EXPECT_FALSE(fs::exists(all.folder / "out/p0.npy"));
+    EXPECT_TRUE(fs::exists(all.folder / "out/p1-2.npy")); // its name does not depend on who makes it
+    ASSERT_EQ(all.run_list({"--rank", "0", "--world-size", "2"}).code, 0);
+    EXPECT_EQ(all.manifest(0).size(), 3u);
+    std::set<std::string> names;
+    for (int rank = 0; rank < 2; ++rank)
+        for (const json& record : all.manifest(rank)) names.insert(record["name"].get<std::string>());
+    EXPECT_EQ(names, (std::set<std::string>{"p0", "p1", "p2", "p3", "p4", "p1-2"}));
+    // Another number of ranks knows what these have done.
+    EXPECT_NE(all.run_list().out.find("0 done, 6 were finished"), std::string::npos);
+}
+
+TEST(ToolBatch, ABadModelStopsNothing) {
+    models all;
+    all.add("good1.obj");
+    all.inputs.push_back(all.folder / "missing.obj");
+    std::ofstream(all.folder / "broken.glb") << "glTF, but not really";
+    all.inputs.push_back(all.folder / "broken.glb");
+    all.add("good2.obj");
+    all.write_list();
+    const outcome result = all.run_list();
+    EXPECT_EQ(result.code, 2);
+    EXPECT_NE(result.err.find("missing.obj: bad_model: "), std::string::npos) << result.err;
+    EXPECT_NE(result.out.find("2 done, 0 were finished, 2 failed"), std::string::npos) << result.out;
+    int bad = 0;
+    for (const json& record : all.manifest()) {
+        if (record["status"] == "ok") continue;
+        ++bad;
+        EXPECT_EQ(record["status"], "bad_model");
+        EXPECT_FALSE(record["error"].get<std::string>().empty());
+        EXPECT_FALSE(record.contains("outputs"));
+    }
+    EXPECT_EQ(bad, 2);
+    // Failures are tried again.
+    std::ofstream(all.folder / "missing.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    EXPECT_NE(all.run_list().out.find("1 done, 2 were finished, 1 failed"), std::string::npos);
+    // A model that needs more than its share of the memory fails by itself.
+    models large;
+    large.add("cube.obj");
+    large.write_list();
+    const outcome over =
+        run(large.folder, {"--list", large.folder / "models.txt", "-o", large.folder / "{name}.npy", "-r",
+                           "1600x1600x1600", "-t", "count", "--max-memory", "200", "--jobs", "4"});
+    EXPECT_EQ(over.code, 2);
+    EXPECT_NE(over.err.find("out_of_memory"), std::string::npos) << over.err;
+    EXPECT_NE(over.err.find("50 MiB"), std::string::npos) << over.err; // a quarter of the budget
+}
+
+TEST(ToolBatch, ARunThatIsKilledGoesOnWhereItStopped) {
+    models all;
+    for (int i = 0; i < 12; ++i) all.add("k" + std::to_string(i) + ".obj", 1.0f + static_cast<float>(i));
+    all.write_list();
+    const pid_t child = fork();
+    if (child == 0) {
+        const char* const elsewhere = std::getenv("VOXELPIPE_VOXELIZE");
+        const std::string tool = elsewhere != nullptr ? elsewhere : VOXELPIPE_VOXELIZE;
+        dup2(open("/dev/null", O_WRONLY), STDOUT_FILENO);
+        execl(tool.c_str(), tool.c_str(), "--list", (all.folder / "models.txt").c_str(), "-o",
+              (all.folder / "out/{name}.npy").c_str(), "-r", "160", static_cast<char*>(nullptr));
+        _exit(127);
+    }
+    const std::string first = all.folder / "out/manifest.0.jsonl";
+    const auto lines = [&] {
+        const std::string text = read_file(first);
+        return std::count(text.begin(), text.end(), '\n');
+    };
+    for (int i = 0; i < 3000 && lines() < 3; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+    const auto before = lines();
+    ASSERT_GE(before, 3);
+    // As if the kill had met a line half written.
+    std::ofstream(first, std::ios::app) << "{\"input\": \"half";
+    const outcome again =
+        run(all.folder, {"--list", all.folder / "models.txt", "-o", all.folder / "out/{name}.npy", "-r", "160"});
+    EXPECT_EQ(again.code, 0) << again.err;
+    EXPECT_NE(again.out.find(std::to_string(12 - before) + " done, " + std::to_string(before) + " were finished"),
+              std::string::npos)
+        << again.out;
+    for (int i = 0; i < 12; ++i)
+        EXPECT_EQ(fs::file_size(all.folder / ("out/k" + std::to_string(i) + ".npy")) > 1000, true);
+}
+
+TEST(ToolBatch, ChecksItsOptions) {
+    const scratch_folder folder;
+    const auto error = [&](const std::vector<std::string>& arguments) {
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(result.code, 1);
+        return result.err;
+    };
+    EXPECT_NE(error({"-o", "x.npy"}).find("INPUT is required"), std::string::npos);
+    EXPECT_NE(error({"m.obj", "--list", "l", "-o", "{name}.npy"}).find("do not go together"), std::string::npos);
+    EXPECT_NE(error({"--list", "l", "-o", "x.npy"}).find("needs {name}"), std::string::npos);
+    EXPECT_NE(error({"--list", "l", "-o", "{name}.npy", "--rank", "2", "--world-size", "2"}).find("below --world-size"),
+              std::string::npos);
+    EXPECT_NE(error({"m.obj", "-o", "x.npy", "--jobs", "2"}).find("--list"), std::string::npos);
+    const outcome missing = run(folder, {"--list", folder / "none.txt", "-o", folder / "{name}.npy"});
+    EXPECT_EQ(missing.code, 4);
+    EXPECT_NE(missing.err.find("cannot read the list"), std::string::npos);
+}
+
+} // namespace
