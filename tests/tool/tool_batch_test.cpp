@@ -146,7 +146,7 @@ TEST(ToolBatch, ABadModelStopsNothing) {
     large.write_list();
     const outcome over =
         run(large.folder, {"--list", large.folder / "models.txt", "-o", large.folder / "{name}.npy", "-r",
-                           "1600x1600x1600", "-t", "count", "--max-memory", "200", "--jobs", "4"});
+                           "1600x1600x1600", "-t", "count", "--dense", "--max-memory", "200", "--jobs", "4"});
     EXPECT_EQ(over.code, 2);
     EXPECT_NE(over.err.find("out_of_memory"), std::string::npos) << over.err;
     EXPECT_NE(over.err.find("50 MiB"), std::string::npos) << over.err; // a quarter of the budget

@@ -13,6 +13,7 @@
 #include "text.hpp"
 #include "vox.hpp"
 #include "vti.hpp"
+#include "zarr.hpp"
 
 #include "../page/page.hpp"
 #include "../sparse/sparse_formats.hpp"
@@ -35,6 +36,7 @@ constexpr auto all_formats = std::to_array<format>({
     {".binvox", "binvox occupancy, padded to a cube", true, false, false, true},
     {".vti", "VTK image data for ParaView, all channels as cell data", false, true, false, false},
     {".nrrd", "NRRD for 3D Slicer and teem; OUT.CHANNEL.nrrd for several", false, true, false, false},
+    {".zarr", "Zarr 3 group with a compressed array for each channel, in shards of 256^3", false, true, false, false},
     {".glb", "glTF mesh of the voxels' outer sides, with colours; see --merge", true, false, true, false},
     {".obj", "the same as a Wavefront OBJ of quads, colours at the vertices", true, false, true, false},
     {".ply", "the same as a PLY of quads; with --points the centres of the voxels", true, false, true, false},
@@ -54,6 +56,7 @@ constexpr auto all_writers = std::to_array<writer>({
     write_binvox,
     write_vti,
     write_nrrd,
+    write_zarr,
     write_glb,
     write_obj,
     write_ply,

@@ -20,13 +20,13 @@
 namespace voxelize {
 
 struct write_options {
-    int compression = 1;              // zlib level of .npz, .vti, .nrrd, .schem: 0 stores (.schem: 1), 9 is smallest
-    up_axis up = up_axis::y;          // which world axis stands upright in .vox and .schem; glTF's is y
-    int threads = 0;                  // 0 takes all cores. No output depends on it
-    bool merge_faces = false;         // .ply, .obj, .glb: coplanar faces of equal colour become one rectangle
-    bool points = false;              // .ply holds the voxels' centres, not their outer sides
-    std::uint64_t faces_per_file = 0; // .ply, .obj, .glb: most faces in a file; 0: what the format can number
-    preview_options preview;          // camera and light of .png
+    int compression = 1;      // zlib level of .npz, .vti, .nrrd, .zarr, .schem: 0 stores (.schem: 1), 9 is smallest
+    up_axis up = up_axis::y;  // which world axis stands upright in .vox and .schem; glTF's is y
+    int threads = 0;          // 0 takes all cores. No output depends on it
+    bool merge_faces = false; // .ply, .obj, .glb: coplanar faces of equal colour become one rectangle
+    bool points = false;      // .ply holds the voxels' centres, not their outer sides
+    std::uint64_t faces_per_file = 0;     // .ply, .obj, .glb: most faces in a file; 0: what the format can number
+    preview_options preview;              // camera and light of .png
     std::function<void(double)> progress; // called with 0..1 now and then, from the calling thread; may be empty
 };
 

@@ -301,7 +301,7 @@ void describe_output(CLI::App& app, command_line& options) {
     app.add_flag("--points", options.write.points, "Write the centres of the voxels into .ply, not their outer sides")
         ->group("Files");
     app.add_option("--compression", options.write.compression,
-                   "Level of .npz, .vti, .nrrd and .schem, 0 to 9. Default: 1")
+                   "Level of .npz, .vti, .nrrd, .zarr and .schem, 0 to 9. Default: 1")
         ->check(CLI::Range(0, 9).description(""))
         ->option_text("N")
         ->group("Files");

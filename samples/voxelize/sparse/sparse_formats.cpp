@@ -199,7 +199,9 @@ std::vector<std::filesystem::path> write_sparse_png(const sparse_volume& v, cons
 // ------------------------------------------------------------------------------------
 
 // Formats whose writers take the channels piece by piece, so that no dense one is ever there.
-bool is_streamed(const std::string& extension) { return extension == ".vti" || extension == ".nrrd"; }
+bool is_streamed(const std::string& extension) {
+    return extension == ".vti" || extension == ".nrrd" || extension == ".zarr";
+}
 
 // Formats that hold all channels take them all, others the occupancy and colours.
 std::vector<channel> channels_for(const sparse_volume& v, const std::filesystem::path& path) {

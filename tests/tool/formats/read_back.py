@@ -13,7 +13,8 @@ import json
 import pathlib
 import sys
 
-MODULES = ["numpy", "vtkmodules", "nrrd", "trimesh", "PIL", "pyvox", "midvoxio", "pygltflib", "mcschematic"]
+MODULES = ["numpy", "vtkmodules", "nrrd", "trimesh", "PIL", "pyvox", "midvoxio", "pygltflib", "mcschematic", "zarr",
+           "tensorstore"]
 
 
 def have_modules():
@@ -188,6 +189,29 @@ def check_nrrd(case, files):
         close(header["space origin"], np.array(case["origin"]) + size / 2, "space origin")
         close(header["space directions"][-3:], np.diag(size), "space directions")
         assert header["kinds"][-3:] == ["domain"] * 3 and len(header["kinds"]) == (3 if components == 1 else 4)
+
+
+def check_zarr(case, files):
+    import numpy as np
+    import tensorstore
+    import zarr
+
+    group = zarr.open_group(files[0], mode="r")
+    assert sorted(group.array_keys()) == sorted(c[0] for c in case["channels"]), list(group.array_keys())
+    close(group.attrs["voxelpipe"]["origin"], case["origin"], "origin")
+    close(group.attrs["voxelpipe"]["voxel_size"], case["voxel_size"], "voxel size")
+    for n, (name, kind, components) in enumerate(case["channels"]):
+        want = expected(case, n)
+        if kind == "bit":
+            want = want.astype(bool)
+        array = group[name]
+        same(array[...], want, f"{files[0].name}: {name}")
+        assert array.metadata.dimension_names == ("z", "y", "x", "c")[: want.ndim], array.metadata.dimension_names
+        spec = {"driver": "zarr3", "kvstore": {"driver": "file", "path": str(files[0] / name)}}
+        same(np.asarray(tensorstore.open(spec).result().read().result()), want, f"{files[0].name}: {name} by tensorstore")
+        # An array without a value other than 0 has no files beside its description.
+        shards = [f for f in (files[0] / name).rglob("*") if f.is_file() and f.name != "zarr.json"]
+        assert bool(shards) == bool(want.any()), shards
 
 
 def check_binvox(case, files):

@@ -39,9 +39,9 @@ volume with_channels(std::array<std::int64_t, 3> extent, std::uint32_t density, 
 }
 
 std::vector<sample_case> make_cases() {
-    const std::vector<std::string> any{".npy", ".npz", ".vti", ".nrrd"};
-    const std::vector<std::string> solid{".npy", ".npz", ".vti", ".nrrd", ".vox", ".schem", ".binvox",
-                                         ".glb", ".obj", ".ply", ".xyz",  ".png", ".html"};
+    const std::vector<std::string> any{".npy", ".npz", ".vti", ".nrrd", ".zarr"};
+    const std::vector<std::string> solid{".npy",    ".npz", ".vti", ".nrrd", ".zarr", ".vox", ".schem",
+                                         ".binvox", ".glb", ".obj", ".ply",  ".xyz",  ".png", ".html"};
     const std::vector<std::string> meshes{".glb", ".obj", ".ply"};
     std::vector<sample_case> cases;
     const auto add = [&](const char* name, std::array<std::int64_t, 3> extent, std::uint32_t density, bool color,
@@ -60,7 +60,8 @@ std::vector<sample_case> make_cases() {
     add("split", {260, 40, 513}, 997, true, false, {".vox", ".schem", ".binvox"}).options.up = up_axis::z;
     add("split_y", {270, 513, 33}, 997, true, false, {".vox"});
     add("empty", {9, 8, 7}, 0, false, false,
-        {".npy", ".npz", ".vti", ".nrrd", ".schem", ".binvox", ".glb", ".obj", ".ply", ".xyz", ".png", ".html"});
+        {".npy", ".npz", ".vti", ".nrrd", ".zarr", ".schem", ".binvox", ".glb", ".obj", ".ply", ".xyz", ".png",
+         ".html"});
     add("merged", {40, 33, 21}, 2, false, false, meshes).options.merge_faces = true;
     add("merged_colors", {40, 33, 21}, 1, true, false, meshes).options.merge_faces = true;
     add("pieces", {37, 23, 11}, 5, true, false, meshes).options.faces_per_file = 1000;

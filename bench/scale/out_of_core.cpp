@@ -1,0 +1,125 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// Out of core: a generated mesh that is never there as a whole, voxelized within a budget of memory.
+//
+//   bench_out_of_core [TRIANGLES [RESOLUTION [BUDGET_MIB [FOLDER]]]]
+//   bench_out_of_core 1000000000 16384 4096 /scratch       # 10^9 triangles into 16,384^3
+//
+// The mesh is a relief over a unit square, of two triangles for each of its cells, strip by strip. Voxels go into a
+// sparse framebuffer of one bit, whose bricks are counted and dropped. Prints seconds of making the mesh, of binning
+// and of drawing, bytes that went through the disk, and peak memory. The medium's own rate is measured first: a file of
+// 1 GiB, or of as much as the bins take if that is less, written and read in the same folder.
+#include <cpu_ref/backend.hpp>
+#include <voxelpipe/slabs/stream.hpp>
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace vp = voxelpipe;
+namespace slabs = voxelpipe::slabs;
+
+double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+// Row `row` of a relief of n x n cells: 2 n triangles.
+void make_strip(std::uint64_t n, std::uint64_t row, std::vector<glm::vec3>& positions,
+                std::vector<glm::uvec3>& triangles) {
+    positions.clear();
+    triangles.clear();
+    for (std::uint64_t j = row; j <= row + 1; ++j)
+        for (std::uint64_t i = 0; i <= n; ++i) {
+            const double x = static_cast<double>(i) / static_cast<double>(n),
+                         y = static_cast<double>(j) / static_cast<double>(n);
+            const double waves = 0.5 + 0.25 * std::sin(9 * x + 4 * y) + 0.12 * std::sin(31 * y - 17 * x);
+            positions.emplace_back(x, y, waves + 0.02 * std::sin(240 * x) * std::cos(220 * y));
+        }
+    const auto up = static_cast<unsigned>(n + 1);
+    for (unsigned i = 0; i + 1 < up; ++i) {
+        triangles.emplace_back(i, i + 1, i + up);
+        triangles.emplace_back(i + 1, i + up + 1, i + up);
+    }
+}
+
+struct disk_rate {
+    double write = 0, read = 0; // bytes a second
+};
+disk_rate measure_disk(const std::string& folder, std::uint64_t bytes) {
+    slabs::scratch_file file(folder);
+    std::vector<std::byte> block(std::size_t{4} << 20);
+    for (std::size_t i = 0; i < block.size(); ++i) block[i] = static_cast<std::byte>(i * 2654435761u >> 13);
+    const double start = seconds();
+    for (std::uint64_t at = 0; at < bytes; at += block.size()) file.append(block);
+    const double written = seconds();
+    for (std::uint64_t at = 0; at < file.size(); at += block.size()) file.read(at, block);
+    return {static_cast<double>(file.size()) / (written - start),
+            static_cast<double>(file.size()) / (seconds() - written)};
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+    const auto number = [&](int i, double otherwise) { return argc > i ? std::atof(argv[i]) : otherwise; };
+    const auto side = static_cast<std::uint64_t>(std::sqrt(number(1, 1e6) / 2));
+    const int resolution = static_cast<int>(number(2, 1024));
+    slabs::stream_options options;
+    options.memory = static_cast<std::uint64_t>(number(3, 64)) << 20;
+    options.folder = argc > 4 ? argv[4] : "/tmp";
+    options.align = 8;
+    options.num_slabs = 64;
+    options.voxel_bytes = 0.02; // of a relief's bricks, a voxel of the grid
+    const double bin_bytes = 2.0 * static_cast<double>(side * side) * sizeof(slabs::record<vp::no_varyings>);
+    const disk_rate disk =
+        measure_disk(options.folder, static_cast<std::uint64_t>(std::min(bin_bytes, double{1 << 30})) + 1);
+
+    vp::cpu_backend backend;
+    const vp::grid grid = vp::fit(vp::bounding_box{{0, 0, 0}, {1, 1, 1}}, {resolution, resolution, resolution});
+    slabs::stream stream(backend, grid, vp::passthrough{}, options);
+    double making = 0, binning = 0, sinking = 0;
+    std::vector<glm::vec3> positions;
+    std::vector<glm::uvec3> triangles;
+    for (std::uint64_t row = 0; row < side; ++row) {
+        const double start = seconds();
+        make_strip(side, row, positions, triangles);
+        const double made = seconds();
+        stream.add({positions, triangles}).or_throw();
+        making += made - start;
+        binning += seconds() - made;
+    }
+    using bits = vp::sparse_framebuffer<vp::cpu_backend, vp::target<vp::bit, vp::blend::bit_or>>;
+    std::uint64_t bricks = 0, voxels = 0, parts = 0;
+    const double start = seconds();
+    const vp::status s = stream.draw(
+        vp::constant(true),
+        [&](glm::ivec3 extent) {
+            return bits{backend, extent};
+        },
+        [&](const slabs::slab&, const bits& part) {
+            const double begin = seconds();
+            ++parts;
+            bricks += part.num_bricks();
+            voxels += part.num_voxels();
+            sinking += seconds() - begin;
+        });
+    const double drawing = seconds() - start - sinking;
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    const double n = static_cast<double>(s.counts.triangles_in);
+    std::printf("%s\n%.0f triangles, %d^3, budget %.0f MiB\n", s.message().c_str(), n, resolution,
+                static_cast<double>(options.memory >> 20));
+    std::printf(
+        "making   %9.2f s\nbinning  %9.2f s, %.1f ns a triangle\ndrawing  %9.2f s, %.1f ns a triangle, %llu slabs\n",
+        making, binning, 1e9 * binning / n, drawing, 1e9 * drawing / n, static_cast<unsigned long long>(parts));
+    std::printf("bins     %9.2f GB, medium %.0f MB/s written, %.0f MB/s read\n", n * 40 / 1e9, disk.write / 1e6,
+                disk.read / 1e6);
+    std::printf("voxels   %llu in %llu bricks\npeak     %.0f MiB\n", static_cast<unsigned long long>(voxels),
+                static_cast<unsigned long long>(bricks), static_cast<double>(usage.ru_maxrss) / 1024);
+    return s.ok() && voxels == s.counts.voxels && s.counts.triangles_drawn == s.counts.triangles_in ? 0 : 1;
+}
