@@ -23,6 +23,10 @@ namespace {
 std::set<std::string> all_options() {
     return {"-o,--output FILE",
             "-t,--target NAME",
+            "--list FILE",
+            "--world-size W",
+            "--rank R",
+            "--jobs J",
             "-r,--resolution N|NXxNYxNZ",
             "--padding N",
             "-s,--voxel-size S[,SY,SZ]",

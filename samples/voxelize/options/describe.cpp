@@ -46,7 +46,6 @@ void describe_files(CLI::App& app, command_line& options, raw_options& raw) {
                    "Model: glTF 2.0 (.glb, .gltf), or .obj, .stl, .ply, .off and others that assimp reads")
         ->option_text(" ");
     app.add_option("-o,--output", options.outputs, "Write the voxels to FILE (required); one -o for each file")
-        ->required()
         ->allow_extra_args(false)
         ->option_text("FILE")
         ->group("Output");

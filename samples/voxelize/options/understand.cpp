@@ -36,10 +36,9 @@ std::optional<int> from_environment(std::initializer_list<const char*> names) {
 
 void understand_batch(command_line& options, bool has_world) {
     batch_request& batch = options.batch;
-    if (batch.list.empty()) {
-        if (options.input.empty()) throw usage_error("INPUT is required");
-        return;
-    }
+    if (batch.list.empty() && options.input.empty()) throw usage_error("INPUT is required");
+    if (options.outputs.empty()) throw usage_error("--output is required");
+    if (batch.list.empty()) return;
     if (!options.input.empty()) throw usage_error("INPUT and --list do not go together");
     for (const std::filesystem::path& output : options.outputs)
         if (output.string().find("{name}") == std::string::npos)
