@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 SITE = ROOT / "docs" / "site"
 # Document of the repository: page of the site.
 PAGES = {
-    "docs/guide.md": "guide", "docs/tool.md": "tool", "python/README.md": "python", "docs/gallery/README.md": "gallery/index",
+    "docs/guide.md": "guide", "docs/tool.md": "tool", "docs/scale.md": "scale", "python/README.md": "python", "docs/gallery/README.md": "gallery/index",
     "docs/design.md": "design", "docs/pipeline.md": "pipeline", "docs/performance.md": "performance", "docs/optimizations.md": "optimizations",
     "docs/rejected.md": "rejected", "docs/contributing.md": "contributing", "docs/release.md": "release", "packaging/README.md": "packaging",
     "CHANGELOG.md": "changelog", "README.md": "index",

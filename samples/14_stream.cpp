@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A landscape in a grid that does not fit into the memory that the program allows itself: the mesh is made strip by
 // strip and never there as a whole, slabs of the grid are drawn one at a time, and terrain.raw gets one byte a voxel,
-// the number of triangles in it, x fastest. Another resolution, and another budget in MiB: 10_stream 512 64.
+// the number of triangles in it, x fastest. Another resolution, and another budget in MiB: 14_stream 512 64.
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/slabs/stream.hpp>
 

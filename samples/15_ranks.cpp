@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// One voxelization over several machines, by MPI: mpiexec -n 4 12_ranks. Each rank makes a part of a ring of spheres,
+// One voxelization over several machines, by MPI: mpiexec -n 4 15_ranks. Each rank makes a part of a ring of spheres,
 // the ranks agree on slabs, and each writes its own layers into one file, spheres.raw: the mean brightness of each
-// voxel as a float, x fastest. Another resolution: 12_ranks 512.
+// voxel as a float, x fastest. Another resolution: 15_ranks 512.
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/slabs/mpi.hpp>
 
