@@ -28,6 +28,8 @@ CPP = {
                 "reducers.hpp", "octree_dag.hpp", "io/nanovdb.hpp"]),
     "levels": ("Levels and rays of dense grids", "Coarser levels of targets, levels of light for cone tracing, rays through bits.",
                ["dense_levels.hpp", "direction_mips.hpp", "dense_bits.hpp", "core/cell_walk.hpp"]),
+    "slabs": ("Slabs", "Meshes and grids beyond one memory or one machine: plans, out-of-core streams, MPI.",
+              ["slabs/stream.hpp", "slabs/mpi.hpp", "slabs/plan.hpp", "slabs/records.hpp", "slabs/bins.hpp"]),
     "streams": ("Streams and graphs", "Calls that never wait, with memory of the caller. For cuda_backend.",
                 ["device/voxelize_async.cuh", "device/abuffer_async.cuh", "device/optional/solid_async.cuh"]),
     "arithmetic": ("Arithmetic for shaders", "Operations with the same bits on every compiler and device, and views of arrays.",

@@ -31,6 +31,7 @@ namespace voxelpipe::slabs {
 // throw std::system_error, such as for a full disk.
 class scratch_file {
 public:
+    // A new, empty file in a folder that is there.
     explicit scratch_file(const std::string& folder) {
         std::string name = folder + "/voxelpipe-XXXXXX";
         file_ = ::mkstemp(name.data());
@@ -48,7 +49,8 @@ public:
         if (file_ >= 0) ::close(file_);
     }
 
-    [[nodiscard]] std::uint64_t size() const { return size_; }
+    [[nodiscard]] std::uint64_t size() const { return size_; } // bytes
+    // Writes bytes at the end.
     void append(std::span<const std::byte> bytes) {
         while (!bytes.empty()) {
             const ssize_t n = ::pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(size_));
@@ -58,6 +60,7 @@ public:
             bytes = bytes.subspan(static_cast<std::size_t>(n));
         }
     }
+    // Fills `bytes` from the file's bytes at `offset` on; all of them have been written.
     void read(std::uint64_t offset, std::span<std::byte> bytes) const {
         while (!bytes.empty()) {
             const ssize_t n = ::pread(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
@@ -83,7 +86,9 @@ class bin {
 
 public:
     [[nodiscard]] std::uint64_t size() const { return in_file() + in_memory_; }
+    // Records in the file, and in memory.
     [[nodiscard]] std::uint64_t in_file() const { return file_.empty() ? 0 : file_[0].size() / sizeof(Record); }
+    // Records in memory.
     [[nodiscard]] std::uint64_t in_memory() const { return in_memory_; }
 
     // block: records that memory is taken for at a time. Returns whether it was taken.
@@ -97,6 +102,7 @@ public:
         ++in_memory_;
         return grows;
     }
+    // Bytes that records in memory take, with those that are reserved.
     [[nodiscard]] std::uint64_t memory_bytes() const {
         std::uint64_t bytes = 0;
         for (const auto& b : blocks_) bytes += b.capacity() * sizeof(Record);
@@ -134,11 +140,13 @@ private:
 template <class Record>
 class bin_memory {
 public:
+    // budget: bytes of all bins' memory. folder: for files.
     bin_memory(std::uint64_t budget, std::size_t num_bins, std::string folder)
         : budget_(budget), folder_(std::move(folder)),
           block_(static_cast<std::size_t>(std::clamp<std::uint64_t>(
               budget / sizeof(Record) / (4 * std::max<std::size_t>(1, num_bins)), 16, 65536))) {}
 
+    // Appends to bin i of the bins that share this budget.
     void push(std::vector<bin<Record>>& bins, std::size_t i, const Record& r) {
         if (!bins[i].push(r, block_)) return;
         used_ += block_ * sizeof(Record);

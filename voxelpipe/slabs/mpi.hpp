@@ -94,11 +94,13 @@ public:
         return draw_with(false, [&](auto& stream) { return stream.draw_solid(shader, make, sink, how); });
     }
 
-    // After draw(), on every rank: the slabs, by rank, and the voxels and fragments of the ranks below this one.
+    // After draw(): the slabs, by rank.
     [[nodiscard]] const plan& slabs() const { return plan_; }
+    // Where the lists of a rank begin among those of all.
     struct list_offset {
-        std::uint64_t voxels = 0, fragments = 0;
+        std::uint64_t voxels = 0, fragments = 0; // of the ranks below
     };
+    // After draw(): of this rank.
     [[nodiscard]] list_offset lists_before() const { return before_; }
 
 private:

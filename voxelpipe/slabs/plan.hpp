@@ -43,6 +43,7 @@ public:
         words_.resize(words);
     }
 
+    // As given.
     [[nodiscard]] glm::ivec3 extent() const { return extent_; }
 
     // reach: the voxels that a triangle may touch, not empty and within the extent.
@@ -56,8 +57,9 @@ public:
     [[nodiscard]] std::span<std::uint64_t> words() { return words_; }
     [[nodiscard]] std::span<const std::uint64_t> words() const { return words_; }
 
-    // Triangles whose first layer along an axis is this one, and whose last.
+    // Triangles by their first layer along an axis.
     [[nodiscard]] std::span<std::uint64_t> begins(int axis) { return words(axis).first(layers(axis)); }
+    // Triangles by their last layer.
     [[nodiscard]] std::span<std::uint64_t> ends(int axis) { return words(axis).last(layers(axis)); }
     [[nodiscard]] std::span<const std::uint64_t> begins(int axis) const { return words(axis).first(layers(axis)); }
     [[nodiscard]] std::span<const std::uint64_t> ends(int axis) const { return words(axis).last(layers(axis)); }
@@ -89,8 +91,9 @@ struct plan_options {
     double turn_gain = 1.05;         // another axis than z must be better by more than this factor
 };
 
+// Slabs of a grid's computed part, and what they cost.
 struct plan {
-    int axis = 2;
+    int axis = 2;                    // that the slabs follow each other along: 0 x, 1 y, 2 z
     std::vector<layer_range> slabs;  // in order, without gaps; the last ones may be empty
     std::uint64_t bottleneck = 0;    // cost of the most expensive slab
     std::uint64_t triangles = 0;     // that reach the grid
@@ -227,8 +230,8 @@ private:
 // Why a triangle is not drawn, or which voxels of the computed part it may touch. Positions are those that the vertex
 // shader gives.
 struct classified {
-    core::triangle_class kind = core::triangle_class::outside;
-    core::voxel_box reach{};
+    core::triangle_class kind = core::triangle_class::outside; // drawn, or why not
+    core::voxel_box reach{};                                   // within the extent, of a triangle that is drawn
 };
 // is_solid: as voxelize_solid needs them. Triangles beside the grid along x cross its rows too, and their reach is the
 // nearest layer; those of no area are kept.

@@ -23,9 +23,9 @@ namespace voxelpipe::slabs {
 // 40 bytes, and the varyings.
 template <class Varyings>
 struct record {
-    glm::vec3 positions[3];
-    std::uint32_t number;
-    Varyings varyings[3];
+    glm::vec3 positions[3]; // world space
+    std::uint32_t number;   // of the triangle in the whole mesh
+    Varyings varyings[3];   // of its vertices
 };
 template <class Varyings>
 requires(std::is_empty_v<Varyings>) struct record<Varyings> {

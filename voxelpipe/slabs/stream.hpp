@@ -33,8 +33,9 @@
 
 namespace voxelpipe::slabs {
 
+// How a stream works.
 struct stream_options {
-    voxelize_options voxelize = {};
+    voxelize_options voxelize = {}; // of each slab's call
     // Bytes for binned triangles, a slab's mesh and its targets, together. Lists and sparse results, whose size only
     // the call finds out, come on top, and so does what source and sink hold.
     std::uint64_t memory = std::uint64_t{1} << 30;
@@ -81,7 +82,7 @@ inline constexpr bool is_abuffer<abuffer<Backend, Payload>> = true;
 template <class Backend, class Varyings>
 class record_stream {
 public:
-    using record_type = record<Varyings>;
+    using record_type = record<Varyings>; // what it is fed with
 
     // The grid may be a crop. Throws std::invalid_argument for one that is not valid.
     record_stream(Backend& backend, const grid& g, stream_options options)
@@ -108,6 +109,7 @@ public:
         }
     }
 
+    // The grid that all slabs together are.
     [[nodiscard]] const grid& where() const { return grid_; }
     // Of the triangles so far, in the whole grid: each is counted once.
     [[nodiscard]] const counters& counts() const { return counts_; }
@@ -353,6 +355,7 @@ class stream : public record_stream<Backend, detail::varyings_of<Mesh, VertexSha
     using base = record_stream<Backend, varyings>;
 
 public:
+    // Throws std::invalid_argument for a grid that is not valid.
     stream(Backend& backend, const grid& g, const VertexShader& shader, const stream_options& options = {})
         : base(backend, g, options), shader_(shader), rule_(options.voxelize.rule), is_solid_(options.is_solid) {}
 
