@@ -264,6 +264,8 @@ std::string group_description(const volume& v) {
 std::vector<fs::path> write_zarr(const volume& v, const fs::path& path, const write_options& options) {
     fs::path target = path;
     if (target.filename().empty()) target = target.parent_path(); // "out.zarr/"
+    std::error_code ignored;
+    if (fs::is_symlink(target, ignored)) target = fs::weakly_canonical(target, ignored); // kept, as by other writers
     output_folder folder(target);
     try {
         std::vector<std::unique_ptr<array_writer>> arrays;

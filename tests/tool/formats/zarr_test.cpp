@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Zarr groups as folders: which files there are, and what a failed run leaves. Values are read back by other people's
+// readers (read_back.py).
+
+#include "formats/formats.hpp"
+#include "test_volumes.hpp"
+
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+
+using namespace voxelize;
+using namespace voxelize::testing;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+class Zarr : public in_folder {
+protected:
+    // Files below the folder, by their names relative to it.
+    [[nodiscard]] std::vector<std::string> files(const fs::path& in) const {
+        std::vector<std::string> all;
+        for (const auto& entry : fs::recursive_directory_iterator(in))
+            if (entry.is_regular_file()) all.push_back(entry.path().lexically_relative(in).generic_string());
+        std::sort(all.begin(), all.end());
+        return all;
+    }
+};
+
+} // namespace
+
+TEST_F(Zarr, EmptyChunksHaveNoFileAndNoBytes) {
+    volume v = make_volume({300, 70, 270}); // 2 x 1 x 2 shards
+    v.add("count", scalar::u32);
+    v.add("material", scalar::i32);
+    channel& empty = *v.find("material");
+    for (std::size_t at = 0; at < empty.data.size(); ++at) empty.data[at] = std::byte{0xff}; // -1: an empty voxel
+    // One voxel in the first shard, one in the last.
+    const std::uint32_t one = 1;
+    channel& count = *v.find("count");
+    for (const auto& [i, j, k] : {std::array{3, 65, 2}, std::array{299, 0, 269}})
+        std::memcpy(count.data.data() + 4 * v.index(i, j, k), &one, 4);
+    write_options options;
+    options.compression = 0;
+    const auto written = write(v, folder_ / "a.zarr", options);
+    EXPECT_EQ(written, std::vector<fs::path>{folder_ / "a.zarr"});
+    EXPECT_EQ(files(folder_ / "a.zarr"), (std::vector<std::string>{"count/c/0/0/0", "count/c/1/0/1", "count/zarr.json",
+                                                                   "material/zarr.json", "zarr.json"}));
+    // One chunk of 64^3, and the index of all chunks of the shard: 4 x 2 x 4 of 16 bytes, and a checksum.
+    EXPECT_EQ(fs::file_size(folder_ / "a.zarr/count/c/0/0/0"), 64u * 64 * 64 * 4 + 32 * 16 + 4);
+    EXPECT_NE(read_file(folder_ / "a.zarr/material/zarr.json").find("\"fill_value\": -1"), std::string::npos);
+    options.compression = 9;
+    write(v, folder_ / "a.zarr", options); // in place of the other
+    EXPECT_LT(fs::file_size(folder_ / "a.zarr/count/c/0/0/0"), 3000u);
+    EXPECT_EQ(names(), std::vector<std::string>{"a.zarr"});
+}
+
+TEST_F(Zarr, FilesDoNotDependOnThreads) {
+    const volume v = make_colored({130, 70, 90});
+    write_options options;
+    options.threads = 1;
+    write(v, folder_ / "one.zarr", options);
+    options.threads = 3;
+    write(v, folder_ / "three.zarr", options);
+    const auto all = files(folder_ / "one.zarr");
+    EXPECT_EQ(all, files(folder_ / "three.zarr"));
+    for (const std::string& file : all)
+        EXPECT_EQ(read_file(folder_ / "one.zarr" / file), read_file(folder_ / "three.zarr" / file)) << file;
+}
+
+TEST_F(Zarr, ReplacesOnlyAGroup) {
+    const volume v = make_occupancy({9, 8, 7});
+    const auto message = [&](const fs::path& path) {
+        try {
+            write(v, path);
+        } catch (const write_error& e) {
+            return std::string(e.what());
+        }
+        return std::string("no error");
+    };
+    std::ofstream(folder_ / "file.zarr") << "mine";
+    fs::create_directory(folder_ / "folder.zarr");
+    std::ofstream(folder_ / "folder.zarr/mine.txt") << "mine";
+    EXPECT_NE(message(folder_ / "file.zarr").find("no Zarr group"), std::string::npos);
+    EXPECT_NE(message(folder_ / "folder.zarr").find("no Zarr group"), std::string::npos);
+    EXPECT_NE(message(folder_ / "nowhere/a.zarr").find("No such file"), std::string::npos);
+    EXPECT_EQ(read_file(folder_ / "folder.zarr/mine.txt"), "mine");
+    EXPECT_EQ(names(), (std::vector<std::string>{"file.zarr", "folder.zarr"}));
+    // A link is followed and kept.
+    fs::create_directory(folder_ / "elsewhere");
+    EXPECT_EQ(message(folder_ / "elsewhere/b.zarr"), "no error");
+    fs::create_directory_symlink(folder_ / "elsewhere/b.zarr", folder_ / "link.zarr");
+    EXPECT_EQ(message(folder_ / "link.zarr"), "no error");
+    EXPECT_TRUE(fs::is_symlink(folder_ / "link.zarr"));
+}
+
+TEST_F(Zarr, AFullDiskLeavesTheOldGroupAndNothingElse) {
+    const volume small = make_occupancy({9, 8, 7}), large = make_colored({200, 200, 100});
+    write(small, folder_ / "a.zarr");
+    const auto before = files(folder_ / "a.zarr");
+    // No file of this process may have more bytes than that: what a disk without room says comes from write() too.
+    const pid_t child = fork();
+    if (child == 0) {
+        std::signal(SIGXFSZ, SIG_IGN);
+        const rlimit bound{100000, 100000};
+        setrlimit(RLIMIT_FSIZE, &bound);
+        int code = 1;
+        try {
+            write(large, folder_ / "a.zarr");
+        } catch (const write_error& e) {
+            code = std::string(e.what()).find("File too large") != std::string::npos ? 0 : 2;
+        } catch (...) {
+            code = 3;
+        }
+        _exit(code);
+    }
+    int status = -1;
+    waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), 0);
+    EXPECT_EQ(names(), std::vector<std::string>{"a.zarr"});
+    EXPECT_EQ(files(folder_ / "a.zarr"), before);
+}
