@@ -65,7 +65,7 @@ TEST(SlabPlan, BottleneckIsTheLeastOfAllCuts) {
     for (std::uint64_t seed = 0; seed < 12; ++seed) {
         const some_reaches r = make_reaches(seed, {9, 13, 17}, 60);
         for (const int align : {1, 4})
-            for (const std::uint64_t layer_cost : {0, 5})
+            for (const std::uint64_t layer_cost : {0u, 5u})
                 for (int n = 1; n <= 4; ++n) {
                     slabs::plan_options how;
                     how.align = align;
