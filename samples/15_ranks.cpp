@@ -92,5 +92,5 @@ int main(int argc, char** argv) {
                     static_cast<unsigned long long>(s.counts.triangles_in),
                     static_cast<unsigned long long>(s.counts.voxels));
     MPI_Finalize();
-    return s.ok() && s.counts.triangles_in == 40 * 40000 && s.counts.voxels != 0 ? 0 : 1;
+    return s.ok() && s.counts.triangles_in == 1'600'000 && s.counts.voxels != 0 ? 0 : 1;
 }

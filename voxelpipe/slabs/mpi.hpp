@@ -197,7 +197,7 @@ private:
             attempt([&] {
                 for (std::size_t r = 0; r < n; ++r)
                     for (int i = 0; i < coming[r]; ++i)
-                        memory.push(received, r, in[static_cast<std::size_t>(in_at[r] + i)]);
+                        memory.push(received, r, in[static_cast<std::size_t>(in_at[r]) + static_cast<std::size_t>(i)]);
             });
             int left = last ? 0 : 1;
             MPI_Allreduce(MPI_IN_PLACE, &left, 1, MPI_INT, MPI_MAX, comm_);
