@@ -43,8 +43,9 @@ struct draw_pixels {
         glm::vec3 sum(0.0f);
         const auto side = static_cast<float>(samples);
         for (int s = 0; s < samples * samples; ++s) {
-            const float across = (static_cast<float>(s % samples) + 0.5f) / side,
-                        down = (static_cast<float>(s / samples) + 0.5f) / side;
+            const int column = s % samples, row = s / samples;
+            const float across = (static_cast<float>(column) + 0.5f) / side,
+                        down = (static_cast<float>(row) + 0.5f) / side;
             const float u = 2.0f * (static_cast<float>(x) + across) / static_cast<float>(width) - 1.0f,
                         v = 1.0f - 2.0f * (static_cast<float>(y) + down) / static_cast<float>(height);
             const glm::vec3 d = eye.forward + eye.right * u + eye.up * v;

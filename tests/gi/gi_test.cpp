@@ -16,7 +16,6 @@
 
 namespace {
 
-using gi::frame;
 using gi::scene;
 using gi::settings;
 using pixels = std::vector<glm::u8vec4>;
