@@ -63,7 +63,7 @@ struct voxel_views {
         const auto nx = static_cast<std::uint64_t>(extent.x), ny = static_cast<std::uint64_t>(extent.y);
         return {static_cast<int>(i % nx), static_cast<int>(i / nx % ny), static_cast<int>(i / (nx * ny))};
     }
-    // Of the eighths that are filled; nothing jumps when a surface moves.
+    // The density times the share of the voxel's eighths that are filled, so that nothing jumps when a surface moves.
     [[nodiscard]] VOXELPIPE_HD float opacity(const glm::ivec3& v, float density_of_voxel) const {
         const float a = density_of_voxel * static_cast<float>(vp::exact::count_ones(bits.children(v))) * 0.125f;
         return a < 1.0f ? a : 1.0f;

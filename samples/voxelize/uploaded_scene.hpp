@@ -59,7 +59,7 @@ public:
     [[nodiscard]] const std::vector<surface_draw>& draws() const { return draws_; }
     // The same triangles without their attributes.
     [[nodiscard]] const std::vector<bits_draw>& bits_draws() const { return bits_draws_; }
-    // Of draws().
+    // For each of draws(): whether its material is double-sided.
     [[nodiscard]] const std::vector<char>& double_sided() const { return double_sided_; }
     // Primitives are numbered from 0 here, too: the shader adds the number of triangles.
     [[nodiscard]] const std::vector<line_draw>& line_draws() const { return line_draws_; }

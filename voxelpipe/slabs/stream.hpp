@@ -52,7 +52,8 @@ struct stream_options {
 struct slab {
     grid where;   // a crop of the stream's grid
     status drawn; // of the slab's call: its fragments and voxels
-    // Of the slabs before it. A-buffers of slabs along z follow each other: these are the offsets of its lists.
+    // Voxels and fragments in the slabs before this one. A-buffers of slabs along z follow each other: these are the
+    // offsets at which this one's lists begin.
     std::uint64_t voxels_before = 0, fragments_before = 0;
 };
 
@@ -111,7 +112,7 @@ public:
 
     // The grid that all slabs together are.
     [[nodiscard]] const grid& where() const { return grid_; }
-    // Of the triangles so far, in the whole grid: each is counted once.
+    // Counts of the triangles so far in the whole grid. Each is counted once, however many slabs it reaches.
     [[nodiscard]] const counters& counts() const { return counts_; }
     [[nodiscard]] counters& counts() { return counts_; }
     // Records come by ascending number. reach: see classify(). Throws std::bad_alloc, and std::system_error of files.
@@ -368,7 +369,7 @@ public:
         if (s.ok()) num_triangles_ += chunk.part.whole != 0 ? chunk.part.whole : chunk.triangles.size();
         return s;
     }
-    // Of the chunks so far.
+    // Triangles in the chunks so far.
     [[nodiscard]] std::uint64_t num_triangles() const { return num_triangles_; }
 
 private:
