@@ -104,7 +104,7 @@ public:
         if (!cpu::are_numbered(draws)) return core::failure(status_code::bad_subset);
         return guarded(triangles_in, [&](const cpu::execution& how) {
             auto s = cpu::make_scene(how, draws, g);
-            s.is_crosshair = options.rule == coverage::crosshair;
+            s.arms = core::arms_of(options.rule);
             return Coverage::dispatch(options.rule, [&]<coverage Rule>() { return pass<Rule>(how, s, out, options); });
         });
     }
@@ -128,7 +128,7 @@ public:
         return guarded(triangles_in, [&](const cpu::execution& how) {
             auto s = cpu::make_scene(how, draws, cpu::tile_aligned(g));
             s.lead = g.offset - s.where.offset;
-            s.is_crosshair = options.rule == coverage::crosshair;
+            s.arms = core::arms_of(options.rule);
             return Coverage::dispatch(options.rule, [&]<coverage Rule>() {
                 return cpu::draw_sparse_surface<Rule>(how, *this, g, s, options.count_voxels, out);
             });

@@ -87,7 +87,7 @@ void cover_tile(const geometry& s, const core::voxel_box& tile, const std::uint3
     for (std::size_t i = 0; i < count; ++i) {
         const std::uint32_t id =
             *reinterpret_cast<const std::uint32_t*>(reinterpret_cast<const std::byte*>(primitives) + i * stride);
-        cover_in_tile<Rule>(gathered_triangle(s, id), s.snap.fraction, s.is_crosshair, tile, along_x, across);
+        cover_in_tile<Rule>(gathered_triangle(s, id), s.snap.fraction, s.arms, tile, along_x, across);
     }
     scratch.counts.fragments += fragments;
 }

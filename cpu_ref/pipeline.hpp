@@ -107,8 +107,8 @@ struct geometry {
     std::vector<std::uint32_t> first_primitive; // by draw, then the total
     core::snap_transform snap{};
     grid where{};
-    glm::ivec3 lead{0};        // lowest voxel of `where` that is drawn
-    bool is_crosshair = false; // the voxels of coverage::crosshair among the conservative ones
+    glm::ivec3 lead{0};                       // lowest voxel of `where` that is drawn
+    core::arm_set arms = core::arm_set::none; // leave out the conservative voxels whose arms a triangle does not meet
 
     // What the primitives of a draw are called where some draw is a subset (mesh_view::part).
     struct numbering {
@@ -277,7 +277,7 @@ template <coverage Rule, class Key>
             const auto &a = p[tri.index.x], &b_ = p[tri.index.y], &c = p[tri.index.z];
             core::voxel_box reach{};
             core::triangle_class kind = core::classify<Rule>(a, b_, c, s.snap.fraction, whole, reach);
-            if ((Rule == coverage::thin || s.is_crosshair) && kind == core::triangle_class::drawn &&
+            if ((Rule == coverage::thin || s.arms != core::arm_set::none) && kind == core::triangle_class::drawn &&
                 core::has_zero_area(a, b_, c))
                 kind = core::triangle_class::zero_area;
             switch (kind) {

@@ -8,8 +8,8 @@
 
 #include <cpu_ref/pipeline.hpp>
 #include <cpu_ref/small_box.hpp>
+#include <cpu_ref/tile_arms.hpp>
 #include <cpu_ref/tile_columns.hpp>
-#include <cpu_ref/tile_crosshair.hpp>
 
 namespace voxelpipe::cpu {
 
@@ -32,9 +32,9 @@ private:
 
 // Visits the voxels of one triangle in the tile, each once: calls along_x(row, bits) with an interval of bits, or
 // across(row, stride, x, bits), which means bit x of the rows row + i * stride for the ones i of an interval of bits.
-// An interval may be empty. is_crosshair: see geometry.
+// An interval may be empty. arms: see geometry.
 template <coverage Rule, class AlongX, class Across>
-VOXELPIPE_INLINE void cover_in_tile(const gathered_triangle& tri, int fraction, bool is_crosshair,
+VOXELPIPE_INLINE void cover_in_tile(const gathered_triangle& tri, int fraction, core::arm_set arms,
                                     const core::voxel_box& tile, AlongX&& along_x, Across&& across) {
     constexpr auto rule = core::to_rule(Rule);
     const auto column = [&](int axis, int u, int v, std::uint32_t bits) VOXELPIPE_INLINE_LAMBDA {
@@ -46,9 +46,9 @@ VOXELPIPE_INLINE void cover_in_tile(const gathered_triangle& tri, int fraction, 
             across(v, tile_size, u, bits);
     };
     if constexpr (Rule == coverage::conservative) {
-        if (is_crosshair) {
+        if (arms != core::arm_set::none) {
             tile_columns columns;
-            find_crosshair(tri.a, tri.b, tri.c, fraction, tile, columns);
+            find_arm_columns(tri.a, tri.b, tri.c, fraction, arms, tile, columns);
             for (const auto& c : columns) column(columns.axis, c.u, c.v, c.bits);
             return;
         }
@@ -109,7 +109,7 @@ VOXELPIPE_INLINE void shade_in_tile(const Scene& s, std::uint32_t id, const core
     if constexpr (core::is_constant<typename Scene::fragment_shader>) {
         const auto out = d.fragment_shader(tri); // a constant shader ignores its argument
         cover_in_tile<Rule>(
-            tri, s.snap.fraction, s.is_crosshair, tile,
+            tri, s.snap.fraction, s.arms, tile,
             [&](int row, std::uint32_t bits) VOXELPIPE_INLINE_LAMBDA {
                 for (; bits != 0; bits &= bits - 1)
                     visit(std::countr_zero(bits), row % tile_size, row / tile_size, out);
@@ -155,9 +155,9 @@ VOXELPIPE_INLINE void shade_in_tile(const Scene& s, std::uint32_t id, const core
                 }
             };
             if constexpr (Rule == coverage::conservative) {
-                if (s.is_crosshair) {
+                if (s.arms != core::arm_set::none) {
                     tile_columns columns;
-                    find_crosshair(tri.a, tri.b, tri.c, s.snap.fraction, tile, columns);
+                    find_arm_columns(tri.a, tri.b, tri.c, s.snap.fraction, s.arms, tile, columns);
                     for (const auto& c : columns) column(c.u, c.v, c.bits);
                     return;
                 }

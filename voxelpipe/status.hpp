@@ -60,10 +60,10 @@ struct counters {
     std::uint64_t triangles_nonfinite = 0; // dropped: a position that is NaN or infinite
     std::uint64_t triangles_too_far = 0;   // dropped: a position beyond 2^40 sub-voxel units
     std::uint64_t triangles_zero_area =
-        0; // thin and crosshair coverage only: zero area after snapping, gives no fragments
-    std::uint64_t triangles_outside = 0;   // bounding box misses the grid
-    std::uint64_t triangles_drawn = 0;     // the others
-    std::uint64_t fragments = 0;           // shaded and blended (or kept, in an A-buffer)
+        0;                               // not with conservative coverage: zero area after snapping, gives no fragments
+    std::uint64_t triangles_outside = 0; // bounding box misses the grid
+    std::uint64_t triangles_drawn = 0;   // the others
+    std::uint64_t fragments = 0;         // shaded and blended (or kept, in an A-buffer)
     std::uint64_t fragments_discarded = 0; // by the fragment shader
     std::uint64_t voxels = 0;              // with at least one fragment; 0 if counting was switched off
 

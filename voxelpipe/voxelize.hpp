@@ -36,7 +36,8 @@ struct voxelize_options {
 namespace core {
 
 // Coverage known at compile time, as in voxelize<coverage::thin>(...). Empty: the call's options decide, and thin and
-// conservative are compiled. A crosshair takes the code of conservative coverage, which leaves voxels out then.
+// conservative are compiled. Crosshair and diagonal take the code of conservative coverage, which leaves voxels out
+// then.
 template <coverage... Known>
 struct known_coverage {
     static_assert(sizeof...(Known) <= 1, "voxelpipe: a call has one coverage");

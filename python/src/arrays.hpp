@@ -42,13 +42,14 @@ using triangle_array = nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_
             array_view<const glm::uvec3>(reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0))};
 }
 
-// "conservative", "thin" or "crosshair". Throws ValueError.
+// "conservative", "thin", "crosshair" or "diagonal". Throws ValueError.
 [[nodiscard]] inline coverage coverage_named(std::string_view name) {
     if (name == "conservative") return coverage::conservative;
     if (name == "thin") return coverage::thin;
     if (name == "crosshair") return coverage::crosshair;
+    if (name == "diagonal") return coverage::diagonal;
     throw nb::value_error(
-        ("coverage is 'conservative', 'thin' or 'crosshair', not '" + std::string(name) + "'").c_str());
+        ("coverage is 'conservative', 'thin', 'crosshair' or 'diagonal', not '" + std::string(name) + "'").c_str());
 }
 
 // Whether a (nz, ny, nx, ...) array has the grid's shape, and rows of `columns` values. Throws ValueError.

@@ -25,13 +25,15 @@ def test_packed_bits_are_the_same_voxels():
         assert np.array_equal(bits, dense)
 
 
-def test_thin_and_crosshair_are_part_of_conservative_and_less():
+def test_thin_crosshair_and_diagonal_are_part_of_conservative_and_less():
     mesh = sphere(levels=3)
     grid = vp.fit(mesh, 64)
     thin, conservative = vp.voxelize(mesh, grid, "thin"), vp.voxelize(mesh, grid)
     crosshair = vp.voxelize(mesh, grid, "crosshair")
     assert not (thin & ~conservative).any() and not (crosshair & ~conservative).any()
     assert 0.8 < crosshair.sum() / thin.sum() < 1
+    diagonal = vp.voxelize(mesh, grid, "diagonal")
+    assert not (diagonal & ~conservative).any() and 0.95 < diagonal.sum() / conservative.sum() <= 1
     assert 0.3 < thin.sum() / conservative.sum() < 0.8
 
 

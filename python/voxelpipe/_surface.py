@@ -43,7 +43,8 @@ def voxelize(
 
     coverage: "conservative", every voxel whose closed box a triangle touches; "thin", one voxel in each column along a
         triangle's main axis, which leaves no hole between face neighbours; "crosshair", those of which a triangle meets a
-        segment through the centre along an axis: still fewer, without a hole, and the same however a face is cut.
+        segment through the centre along an axis: still fewer, without a hole, and the same however a face is cut;
+        "diagonal", those of which one meets a segment from corner to corner: a little less than conservative.
     packed: uint32 (nz, ny, ceil(nx / 32)) in place of bool, a bit for each voxel, lowest bit first. An eighth of the
         memory.
     threads: 0 takes all cores. The result is the same for any number.

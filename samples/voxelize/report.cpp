@@ -119,6 +119,7 @@ void print_json(std::ostream& stream, const run_report& report) {
                     {"voxel_size", {grid.voxel_size.x, grid.voxel_size.y, grid.voxel_size.z}}};
     root["coverage"] = report.request.coverage == voxelpipe::coverage::thin        ? "thin"
                        : report.request.coverage == voxelpipe::coverage::crosshair ? "crosshair"
+                       : report.request.coverage == voxelpipe::coverage::diagonal  ? "diagonal"
                                                                                    : "conservative";
     if (report.stats.solid && report.request.solid) {
         root.erase("coverage");

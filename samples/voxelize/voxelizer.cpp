@@ -159,10 +159,11 @@ std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage)
                       "surface touches, --solid nonzero also what is wound inside out)";
     if (stats.triangles_drawn != 0 && coverage == voxelpipe::coverage::crosshair)
         return text + "no triangle meets an axis through a voxel's centre (--coverage conservative draws all)";
+    if (stats.triangles_drawn != 0 && coverage == voxelpipe::coverage::diagonal)
+        return text + "no triangle meets a diagonal of a voxel (--coverage conservative draws all)";
     if (stats.triangles_drawn != 0) return text + "what the triangles cover lies outside the grid";
     if (stats.triangles_flat != 0)
-        return text + "the triangles have no area, and thin and crosshair coverage draw areas only (--coverage "
-                      "conservative draws all)";
+        return text + "the triangles have no area, and only --coverage conservative draws such";
     if (stats.lines != 0 && stats.triangles_dropped + stats.lines_dropped == stats.triangles + stats.lines)
         return text + "no triangle, line or point has positions that can be drawn";
     if (stats.triangles != 0 && stats.triangles_dropped == stats.triangles)

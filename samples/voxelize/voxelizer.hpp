@@ -72,7 +72,7 @@ struct voxelize_stats {
     std::uint64_t triangles_dropped = 0;   // a position that is not finite, or too far from the grid to be snapped
     std::uint64_t lines_dropped = 0;       // for the same reasons
     std::uint64_t triangles_drawn = 0;     // that reach into the grid, summed over slabs; lines too
-    std::uint64_t triangles_flat = 0;      // without area, which thin and crosshair leave out; summed over slabs
+    std::uint64_t triangles_flat = 0;      // without area, which conservative coverage alone draws; summed over slabs
     std::uint64_t fragments = 0;           // kept, over all voxels; of a solid's surface where that is drawn
     std::uint64_t fragments_discarded = 0; // by an alpha mask
     std::uint64_t voxels = 0;              // with at least one fragment; of a solid where that is asked for

@@ -27,7 +27,10 @@
 namespace voxelpipe {
 
 inline const char* name(coverage rule) {
-    return rule == coverage::thin ? "thin" : rule == coverage::crosshair ? "crosshair" : "conservative";
+    return rule == coverage::thin        ? "thin"
+           : rule == coverage::crosshair ? "crosshair"
+           : rule == coverage::diagonal  ? "diagonal"
+                                         : "conservative";
 }
 inline void PrintTo(coverage rule, std::ostream* os) { *os << name(rule); }
 
@@ -96,6 +99,7 @@ inline vp::grid as_library(const grid& g, const part& p) {
 inline std::vector<voxel> expected_voxels(const grid& g, const snapped_triangle& t, vp::coverage rule, const part& p) {
     return rule == vp::coverage::thin        ? thin(g, t, p.as_region())
            : rule == vp::coverage::crosshair ? crosshair(g, t, p.as_region())
+           : rule == vp::coverage::diagonal  ? diagonal(g, t, p.as_region())
                                              : conservative(g, t, p.as_region());
 }
 

@@ -137,7 +137,7 @@ TEST_P(LibraryCoverage, IsTheOraclesToTheVoxel) {
     const triangle_class kind = GetParam();
     const auto wanted = static_cast<std::uint64_t>(static_cast<double>(triangle_budget(1200000)) * share(kind)) + 1;
     splitmix64 random(seed(1000 + static_cast<std::uint64_t>(kind)));
-    totals sums, of_crosshair;
+    totals sums, of_arms[2];
     std::set<std::string_view> grids_seen;
     for (std::uint64_t round = 0; sums.triangles < 2 * wanted; ++round) {
         test_grid where = test_grids()[round % test_grids().size()];
@@ -156,7 +156,8 @@ TEST_P(LibraryCoverage, IsTheOraclesToTheVoxel) {
             compare(where, triangles, rule, p, threads, sums);
             if (HasFailure()) return;
         }
-        if (round % 3 == 0) compare(where, triangles, vp::coverage::crosshair, p, threads, of_crosshair);
+        if (round % 3 == 0) compare(where, triangles, vp::coverage::crosshair, p, threads, of_arms[0]);
+        if (round % 3 == 1) compare(where, triangles, vp::coverage::diagonal, p, threads, of_arms[1]);
         if (HasFailure()) return;
         grids_seen.insert(where.name);
     }
@@ -168,7 +169,7 @@ TEST_P(LibraryCoverage, IsTheOraclesToTheVoxel) {
         EXPECT_GT(sums.fragments, 0u);
         const bool meets_arms = kind == triangle_class::small || kind == triangle_class::large ||
                                 kind == triangle_class::half_lattice || kind == triangle_class::diagonal_plane;
-        EXPECT_TRUE(of_crosshair.fragments > 0 || !meets_arms);
+        for (const totals& by_arms : of_arms) EXPECT_TRUE(by_arms.fragments > 0 || !meets_arms);
     }
     EXPECT_EQ(grids_seen.size(), test_grids().size());
 }
@@ -189,7 +190,8 @@ TEST(LibraryCoverage, HoldsForAllClassesInOneMesh) {
             for (int n = 0; n < (big ? 4 : 40); ++n) triangles.push_back(make_triangle(random, where, kind));
         }
         for (std::size_t n = triangles.size(); n > 1; --n) std::swap(triangles[n - 1], triangles[random.below(n)]);
-        for (const vp::coverage rule : {vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair})
+        for (const vp::coverage rule :
+             {vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair, vp::coverage::diagonal})
             compare(where, triangles, rule, whole_of(where.g), 2, sums);
     }
     EXPECT_GT(sums.fragments, 100000u);

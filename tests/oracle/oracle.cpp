@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <stdexcept>
 
 namespace oracle {
@@ -413,32 +414,32 @@ namespace {
 // A segment meets a triangle that is not parallel to it iff its ends lie on different sides of the plane, or on it, and
 // its line passes all edges on the same side. Everything doubled, so that centres are integers.
 template <class Integer>
-bool meets_an_arm(const snapped_triangle& t, int fraction, const voxel& at) {
+bool meets_an_arm(const snapped_triangle& t, int fraction, const voxel& at, std::span<const std::array<int, 3>> arms) {
     const Integer two(2), zero(0);
     const point<Integer> v0 = vertex<Integer>(t, 0);
     const point<Integer> n = cross(vertex<Integer>(t, 1) - v0, vertex<Integer>(t, 2) - v0);
-    const Integer normal[3] = {n.x, n.y, n.z};
-    const std::int64_t centre[3] = {(2 * std::int64_t{at.i} + 1) << fraction, (2 * std::int64_t{at.j} + 1) << fraction,
-                                    (2 * std::int64_t{at.k} + 1) << fraction};
-    for (int axis = 0; axis < 3; ++axis) {
-        if (normal[axis] == zero) continue;
+    const point<Integer> centre{Integer((2 * std::int64_t{at.i} + 1) << fraction),
+                                Integer((2 * std::int64_t{at.j} + 1) << fraction),
+                                Integer((2 * std::int64_t{at.k} + 1) << fraction)};
+    const auto doubled = [&](int k) {
+        const point<Integer> p = vertex<Integer>(t, k % 3);
+        return point<Integer>{two * p.x, two * p.y, two * p.z} - centre;
+    };
+    const auto dot = [](const point<Integer>& a, const point<Integer>& b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
+    for (const auto& direction : arms) {
+        const point<Integer> s{Integer(direction[0]), Integer(direction[1]), Integer(direction[2])};
+        const Integer slope = dot(n, s), height = dot(n, doubled(0)), size(std::int64_t{1} << fraction);
+        if (slope == zero) continue;
         int above = 0, below = 0;
-        for (const int end : {-1, 1}) {
-            Integer side = zero;
-            for (int k = 0; k < 3; ++k) {
-                const std::int64_t q = centre[k] + (k == axis ? end * (std::int64_t{1} << fraction) : 0);
-                side = side + normal[k] * (Integer(q) - two * Integer(t.v[0][k]));
-            }
+        for (const Integer& end : {zero - size, size}) {
+            const Integer side = end * slope - height;
             above += zero < side ? 1 : 0;
             below += side < zero ? 1 : 0;
         }
         if (above == 2 || below == 2) continue;
-        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
         bool left = false, right = false;
         for (int k = 0; k < 3; ++k) {
-            const std::int64_t *from = t.v[k], *to = t.v[(k + 1) % 3];
-            const Integer side = (two * Integer(from[u]) - Integer(centre[u])) * (Integer(to[v]) - Integer(from[v])) -
-                                 (two * Integer(from[v]) - Integer(centre[v])) * (Integer(to[u]) - Integer(from[u]));
+            const Integer side = dot(s, cross(doubled(k), doubled(k + 1)));
             left = left || zero < side;
             right = right || side < zero;
         }
@@ -447,15 +448,26 @@ bool meets_an_arm(const snapped_triangle& t, int fraction, const voxel& at) {
     return false;
 }
 
-} // namespace
-
-std::vector<voxel> crosshair(const grid& g, const snapped_triangle& t, const region& part, arithmetic with) {
+std::vector<voxel> by_arms(const grid& g, const snapped_triangle& t, const region& part, arithmetic with,
+                           std::span<const std::array<int, 3>> arms) {
     std::vector<voxel> result;
     for (const voxel& at : conservative(g, t, part, with)) // which holds every point of an arm
         if (with_integers(t, with,
-                          [&]<class Integer>(Integer) { return meets_an_arm<Integer>(t, fraction_bits(g), at); }))
+                          [&]<class Integer>(Integer) { return meets_an_arm<Integer>(t, fraction_bits(g), at, arms); }))
             result.push_back(at);
     return result;
+}
+
+} // namespace
+
+std::vector<voxel> crosshair(const grid& g, const snapped_triangle& t, const region& part, arithmetic with) {
+    static constexpr std::array<int, 3> arms[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    return by_arms(g, t, part, with, arms);
+}
+
+std::vector<voxel> diagonal(const grid& g, const snapped_triangle& t, const region& part, arithmetic with) {
+    static constexpr std::array<int, 3> arms[] = {{1, 1, 1}, {-1, 1, 1}, {1, -1, 1}, {1, 1, -1}};
+    return by_arms(g, t, part, with, arms);
 }
 
 std::array<ratio, 3> barycentrics(const grid& g, const snapped_triangle& t, const voxel& at) {

@@ -92,6 +92,10 @@ std::vector<voxel> thin(const grid& g, const snapped_triangle& t, const region& 
 std::vector<voxel> crosshair(const grid& g, const snapped_triangle& t, const region& part,
                              arithmetic with = arithmetic::automatic);
 
+// The same with closed segments from corner to corner.
+std::vector<voxel> diagonal(const grid& g, const snapped_triangle& t, const region& part,
+                            arithmetic with = arithmetic::automatic);
+
 // A rational number; the denominator is not zero but may be negative.
 struct ratio {
     wide numerator;

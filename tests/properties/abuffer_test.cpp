@@ -281,7 +281,8 @@ TEST_P(ABuffer, TwoDrawsAndTwoCallsAreOne) {
 }
 
 INSTANTIATE_TEST_SUITE_P(AllRules, ABuffer,
-                         ::testing::Values(vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair),
+                         ::testing::Values(vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair,
+                                           vp::coverage::diagonal),
                          rule_of);
 
 } // namespace

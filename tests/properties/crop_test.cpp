@@ -130,7 +130,8 @@ TEST_P(Crop, PartsOfAHugeGridAgreeWhereTheyOverlap) {
 }
 
 INSTANTIATE_TEST_SUITE_P(AllRules, Crop,
-                         ::testing::Values(vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair),
+                         ::testing::Values(vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair,
+                                           vp::coverage::diagonal),
                          rule_of);
 
 } // namespace

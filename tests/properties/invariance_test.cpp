@@ -319,7 +319,8 @@ TEST_P(Invariance, MirroringMirrorsTheVoxels) {
 }
 
 INSTANTIATE_TEST_SUITE_P(AllRules, Invariance,
-                         ::testing::Values(vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair),
+                         ::testing::Values(vp::coverage::conservative, vp::coverage::thin, vp::coverage::crosshair,
+                                           vp::coverage::diagonal),
                          rule_of);
 
 } // namespace

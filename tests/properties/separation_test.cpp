@@ -128,10 +128,15 @@ std::vector<closed_mesh> meshes() {
     return list;
 }
 
+// Coverages that stop paths across edges and corners of voxels too.
+bool is_26_separating(vp::coverage rule) {
+    return rule == vp::coverage::conservative || rule == vp::coverage::diagonal;
+}
+
 class Separation : public ::testing::TestWithParam<vp::coverage> {};
 
 TEST_P(Separation, NoPathOfEmptyVoxelsCrossesAClosedSurface) {
-    const bool corners = GetParam() == vp::coverage::conservative;
+    const bool corners = is_26_separating(GetParam());
     std::size_t bodies = 0;
     for (const closed_mesh& m : meshes()) {
         ASSERT_TRUE(is_closed(m)) << m.name;
@@ -162,8 +167,8 @@ TEST_P(Separation, HoldsWhereTheGridCutsTheSurface) {
         const grid& g = grids()[static_cast<std::size_t>(n) % grids().size()];
         const auto placed = place(m, g);
         // inside_of counts crossings in whole columns, also below the grid.
-        const flood_result r = flood(g, occupancy(placed, g, GetParam()), inside_of(m, g, placed),
-                                     GetParam() == vp::coverage::conservative);
+        const flood_result r =
+            flood(g, occupancy(placed, g, GetParam()), inside_of(m, g, placed), is_26_separating(GetParam()));
         ASSERT_EQ(r.leaks, 0u);
         bodies += r.inside > 0 && r.outside > r.inside;
     }
@@ -171,7 +176,8 @@ TEST_P(Separation, HoldsWhereTheGridCutsTheSurface) {
 }
 
 INSTANTIATE_TEST_SUITE_P(AllRules, Separation,
-                         ::testing::Values(vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair),
+                         ::testing::Values(vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair,
+                                           vp::coverage::diagonal),
                          rule_of);
 
 // Controls: the flood fill finds leaks through a hole in the mesh, and through the corners of thin surfaces.
@@ -181,15 +187,17 @@ TEST(SeparationControl, AHoleLeaks) {
     auto placed = place(m, g);
     const auto side = inside_of(m, g, placed);
     placed.erase(placed.begin() + 17);
-    for (const vp::coverage rule : {vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair})
-        EXPECT_GT(flood(g, occupancy(placed, g, rule), side, rule == vp::coverage::conservative).leaks, 0u);
+    for (const vp::coverage rule :
+         {vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair, vp::coverage::diagonal})
+        EXPECT_GT(flood(g, occupancy(placed, g, rule), side, is_26_separating(rule)).leaks, 0u);
 }
 
-TEST(SeparationControl, ThinIsNot26Separating) {
+TEST(SeparationControl, ThinAndCrosshairAreNot26Separating) {
     const grid& g = grids()[0];
     const closed_mesh m = sphere(10, 2);
     const auto placed = place(m, g);
-    EXPECT_GT(flood(g, occupancy(placed, g, vp::coverage::thin), inside_of(m, g, placed), true).leaks, 0u);
+    for (const vp::coverage rule : {vp::coverage::thin, vp::coverage::crosshair})
+        EXPECT_GT(flood(g, occupancy(placed, g, rule), inside_of(m, g, placed), true).leaks, 0u);
 }
 
 TEST(SeparationControl, InsideOfABallIsWithinItsRadius) {

@@ -50,7 +50,8 @@ struct whole_call {
 
 class Stream : public ::testing::TestWithParam<vp::coverage> {};
 INSTANTIATE_TEST_SUITE_P(Coverages, Stream,
-                         ::testing::Values(vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair));
+                         ::testing::Values(vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair,
+                                           vp::coverage::diagonal));
 
 // Every way to cut: 1, 2, 3 and 7 slabs along z; along the other axes; by triangles; with so little memory that bins go
 // to disk and slabs are cut again and again.

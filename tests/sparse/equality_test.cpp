@@ -107,7 +107,8 @@ constexpr auto as_made = [](auto&) {};
 
 class Sparse : public ::testing::TestWithParam<vp::coverage> {};
 INSTANTIATE_TEST_SUITE_P(Coverages, Sparse,
-                         ::testing::Values(vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair));
+                         ::testing::Values(vp::coverage::thin, vp::coverage::conservative, vp::coverage::crosshair,
+                                           vp::coverage::diagonal));
 
 template <class Dense, class Shader>
 void check_targets(const Shader& shader, vp::coverage rule) {

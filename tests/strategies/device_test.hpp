@@ -370,6 +370,6 @@ vp::stage_times time_stages(vp::cuda_backend& be, const Call& call) {
 
 inline constexpr vp::coverage both_rules[] = {vp::coverage::thin, vp::coverage::conservative};
 inline constexpr vp::coverage every_coverage[] = {vp::coverage::thin, vp::coverage::conservative,
-                                                  vp::coverage::crosshair};
+                                                  vp::coverage::crosshair, vp::coverage::diagonal};
 
 } // namespace device_test

@@ -84,7 +84,10 @@ configuration make(int i, std::mt19937& random) {
     g.origin = glm::dvec3(below(3), 0.25, -below(2));
     g.voxel_size = glm::dvec3(1.0 + 0.1 * below(3), 1.0, 0.9);
     if (i % 3 == 0 && g.extent.x > 4) g = g.crop({g.extent.x / 3, 0, 0}, {g.extent.x / 2, g.extent.y, g.extent.z});
-    return {m, g, {every_coverage[random() % 3], i % 5 != 0}, i % 2 == 0 ? start::clear : start::load};
+    return {m,
+            g,
+            {every_coverage[random() % std::size(every_coverage)], i % 5 != 0},
+            i % 2 == 0 ? start::clear : start::load};
 }
 
 TEST(Random, ConfigurationsGiveTheCpusBytes) {

@@ -95,7 +95,7 @@ TEST(GpuFiles, OfAModelWithEverythingInIt) {
     const scratch_folder folder;
     const std::string model = folder / "m.glb";
     gltf_test::small_world().write_glb(model);
-    for (const char* coverage : {"conservative", "thin", "crosshair"}) {
+    for (const char* coverage : {"conservative", "thin", "crosshair", "diagonal"}) {
         expect_same_files(folder, model, {"-r", "64", "--coverage", coverage, "-t", all_targets},
                           {"a.npz", "a.vti", "a.nrrd"});
         expect_same_files(folder, model, {"-r", "100", "--coverage", coverage}, {"a.npy", "a.binvox"});

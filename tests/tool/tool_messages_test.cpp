@@ -31,7 +31,7 @@ TEST(Messages, ChoicesAreListedInWords) {
         return result.err.substr(0, result.err.find('\n'));
     };
     EXPECT_EQ("voxelize: --up takes y or z, not \"x\"", error({"--up", "x"}));
-    EXPECT_EQ("voxelize: --coverage takes conservative, thin or crosshair, not \"thick\"",
+    EXPECT_EQ("voxelize: --coverage takes conservative, thin, crosshair or diagonal, not \"thick\"",
               error({"--coverage", "thick"}));
     EXPECT_EQ("voxelize: --depth-axis takes x, y or z, not \"w\"", error({"--depth-axis", "w"}));
     EXPECT_EQ("voxelize: --alpha takes weight, cutoff or ignore, not \"0.5\"", error({"--alpha", "0.5"}));

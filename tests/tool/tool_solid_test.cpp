@@ -97,19 +97,26 @@ TEST(Solid, ExtentsDifferByTheSurface) {
 }
 
 // Beside the surface's other coverages: through voxels before their centres, the corners and edges of a box meet no
-// axis.
-TEST(Solid, CrosshairsOfASurface) {
+// axis, but diagonals.
+TEST(Solid, CrosshairsAndDiagonalsOfASurface) {
     const scratch_folder folder;
     builder file;
     add_box(file, {0.75F, 0.75F, 0.75F}, {9.25F, 9.25F, 9.25F});
     EXPECT_EQ(1000U - 512U, covered(folder, file, {"--coverage", "conservative"}));
     EXPECT_EQ(6U * 64U, covered(folder, file, {"--coverage", "crosshair"}));
+    EXPECT_EQ(1000U - 512U, covered(folder, file, {"--coverage", "diagonal"}));
     builder speck; // between all axes
     add_box(speck, {0.6F, 0.6F, 0.6F}, {0.9F, 0.9F, 0.9F});
     speck.write_glb(folder / "speck.glb");
     const outcome none =
         run(folder, {folder / "speck.glb", "-s", "1", "-o", folder / "o.npy", "--coverage", "crosshair"});
     EXPECT_NE(std::string::npos, none.err.find("no triangle meets an axis")) << none.err;
+    builder grain; // between the diagonals of one voxel
+    add_box(grain, {0.45F, 0.45F, 0.05F}, {0.55F, 0.55F, 0.15F});
+    grain.write_glb(folder / "grain.glb");
+    const outcome nothing =
+        run(folder, {folder / "grain.glb", "-s", "1", "-o", folder / "o.npy", "--coverage", "diagonal"});
+    EXPECT_NE(std::string::npos, nothing.err.find("no triangle meets a diagonal")) << nothing.err;
 }
 
 // The mean of the outermost voxels of the halves of a 16 x 8 x 8 grid, in linear light.

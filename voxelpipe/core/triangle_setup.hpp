@@ -20,10 +20,20 @@ namespace voxelpipe {
 // Which voxels a triangle covers. thin: one voxel per touched column of the dominant axis, 6-separating.
 // conservative: every voxel whose closed box meets the closed triangle, 26-separating. crosshair: every voxel of which
 // the triangle meets an arm, a segment through the centre from face to face along an axis, that is not parallel to it;
-// 6-separating (core/crosshair.hpp). Points and lines have no crosshair: it is conservative coverage there.
-enum class coverage : std::uint8_t { thin, conservative, crosshair };
+// 6-separating. diagonal: the same with four arms, from corner to corner; 26-separating (core/arms.hpp). Points and
+// lines have no arms to meet: both are conservative coverage there.
+enum class coverage : std::uint8_t { thin, conservative, crosshair, diagonal };
 
 namespace core {
+
+// The arms of a voxel that a coverage asks for. Code of conservative coverage leaves out the voxels whose arms the
+// triangle does not meet, so programs compile nothing for them.
+enum class arm_set : std::uint8_t { none, axes, diagonals };
+[[nodiscard]] VOXELPIPE_HD constexpr arm_set arms_of(coverage rule) {
+    return rule == coverage::crosshair  ? arm_set::axes
+           : rule == coverage::diagonal ? arm_set::diagonals
+                                        : arm_set::none;
+}
 
 // The spans that for_each_span enumerates. columns: for each touched column all voxels that the plane may pass at any
 // point of the column's square. These include the thin voxels of every finer grid, so coarse raster uses them for thin

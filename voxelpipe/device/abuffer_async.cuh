@@ -122,7 +122,7 @@ template <class Draw, class Payload>
             limits.lists_fragments,
             true,
             limits.fragments > 2 * triangles,
-            rule == coverage::crosshair};
+            core::arms_of(rule)};
 }
 
 } // namespace device

@@ -316,7 +316,7 @@ status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader
             call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
             limits.skips_deferred_pass = call.limits.skips_deferred_pass =
                 call.can_skip_deferred_pass(guess.num_deferred) ? 1 : 0;
-            call.is_crosshair = options.rule == coverage::crosshair;
+            call.arms = core::arms_of(options.rule);
             call.has_few_a_voxel = limits.fragments < tuning::min_counted * guess.expected_voxels;
             device::list_filler filler(call, *this, workspace_, use_pinned_memory, use_graphs, made, state);
             if (device::num_voxels(g) >= std::numeric_limits<std::uint32_t>::max()) {

@@ -138,10 +138,14 @@ void describe_model(CLI::App& app, command_line& options) {
 void describe_values(CLI::App& app, command_line& options, raw_options& raw) {
     using voxelpipe::coverage;
     add_choice(app, "--coverage", raw.coverage,
-               {{"conservative", coverage::conservative}, {"thin", coverage::thin}, {"crosshair", coverage::crosshair}},
+               {{"conservative", coverage::conservative},
+                {"thin", coverage::thin},
+                {"crosshair", coverage::crosshair},
+                {"diagonal", coverage::diagonal}},
                "conservative: every voxel that a triangle touches. thin: one voxel in each column along a triangle's "
                "dominant axis, without a hole (6-separating). crosshair: voxels whose axes through the centre meet a "
-               "triangle (6-separating, fewer than thin, whatever the triangles). Default: conservative")
+               "triangle (6-separating, fewer than thin, whatever the triangles). diagonal: the same with the "
+               "diagonals of a voxel (26-separating). Default: conservative")
         ->option_text("RULE")
         ->group("Coverage and values");
 

@@ -34,8 +34,8 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     // may_shade_late: fragments may be shaded in the finished lists; if any is discarded then, the lists are not the
     // result. filters: they are also shaded before the sort, to remove discarded ones.
     bool may_shade_late = false, filters = false;
-    bool has_few_a_voxel = false; // fragments; see min_counted
-    bool is_crosshair = false;    // launched as conservative coverage
+    bool has_few_a_voxel = false;             // fragments; see min_counted
+    core::arm_set arms = core::arm_set::none; // if any, launched as conservative coverage
 
     // Everything that this call's launches depend on, if it is trivially copyable.
     static constexpr bool has_bytes = std::is_trivially_copyable_v<draw_type>;
@@ -50,13 +50,13 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
         b.add(may_shade_late);
         b.add(filters);
         b.add(has_few_a_voxel);
-        b.add(is_crosshair);
+        b.add(arms);
         return b;
     }
     // True if the raster lists the fragments, and a shader that is not constant runs afterwards.
     template <class Key>
     [[nodiscard]] bool is_listed_call() const {
-        return sizeof(Key) == sizeof(std::uint32_t) && !is_crosshair &&
+        return sizeof(Key) == sizeof(std::uint32_t) && arms == core::arm_set::none &&
                (core::is_constant<FragmentShader> || may_shade_late) && draws.size() == 1 &&
                is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
     }
@@ -108,7 +108,7 @@ private:
         template <coverage Rule>
         [[nodiscard]] fragment_lists<Key, Payload> launch(pipeline_state* state, cudaStream_t stream,
                                                           const output_pointers& outputs) const {
-            const scene_type s = buffers.shade(call.draws, call.g, stream, call.is_crosshair);
+            const scene_type s = buffers.shade(call.draws, call.g, stream, call.arms);
             end_stage(call.clock, &stage_times::vertex_shade);
             return build_lists<Rule, first_value>(s, lists, list_scratch.with(state), state, call.limits, true, stream,
                                                   call.clock, outputs);

@@ -208,7 +208,7 @@ private:
         f.num_voxels = num_voxels(plan.g);
         f.mask_bytes = mask_target::map::elements(plan.g.extent) * sizeof(word);
         f.fragment_capacity = plan.limits.fragments;
-        f.fits_int32 = plan.options.rule != coverage::crosshair &&
+        f.fits_int32 = core::arms_of(plan.options.rule) == core::arm_set::none &&
                        is_listable(plan.num_primitives, core::make_snap_transform(plan.g).fraction, plan.g.extent);
         if constexpr (core::is_constant<FragmentShader>)
             f.all_draws_equal = std::all_of(draws.begin(), draws.end(), [&](const draw_type& d) {

@@ -50,8 +50,7 @@ struct tiled_strategy {
     void launch(pipeline_state* state, cudaStream_t stream) {
         const capacities& limits = call.plan.limits;
         const voxelize_options& options = call.plan.options;
-        const typename Call::scene_type s =
-            buffers.shade(call.draws, call.plan.g, stream, options.rule == coverage::crosshair);
+        const typename Call::scene_type s = buffers.shade(call.draws, call.plan.g, stream, core::arms_of(options.rule));
         end_stage(call.clock, &stage_times::vertex_shade);
         tile_work work;
         if constexpr (has_tiles) work = coarse_pass<Rule>(s.geo, *tiles, state, limits, stream, call.clock);

@@ -109,7 +109,7 @@ __global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) v
         if (!bad) {
             core::voxel_box reach{};
             kind = core::classify<Op::rule>(t.a, t.b, t.c, geo.snap.fraction, geo.whole_box(), reach);
-            if ((Op::rule == coverage::thin || geo.is_crosshair) && kind == triangle_class::drawn &&
+            if ((Op::rule == coverage::thin || geo.arms != core::arm_set::none) && kind == triangle_class::drawn &&
                 core::has_zero_area(t.a, t.b, t.c))
                 kind = triangle_class::zero_area;
             if (kind == triangle_class::drawn) {

@@ -74,10 +74,10 @@ __device__ VOXELPIPE_INLINE void shade_fragments(const Scene& s, const loaded_tr
         }
     };
     if constexpr (Rule == coverage::conservative) {
-        if (s.geo.is_crosshair) {
-            const wide_triangle t = set_up_crosshair(tri.a, tri.b, tri.c, fraction, s.normal_factors);
+        if (s.geo.arms != core::arm_set::none) {
+            const wide_triangle t = set_up_either_width(tri.a, tri.b, tri.c, fraction, s.normal_factors);
             source.begin_triangle(t);
-            for_each_crosshair(tri.a, tri.b, tri.c, fraction, box, [&](const wide_span& span) {
+            for_each_arm_span(tri.a, tri.b, tri.c, fraction, s.geo.arms, box, [&](const wide_span& span) {
                 source.begin_column(span.barycentric);
                 column(t.axis, span.u, span.v, span.w_first, span.w_last);
             });

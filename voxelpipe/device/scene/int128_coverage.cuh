@@ -3,9 +3,9 @@
 #pragma once
 
 // Coverage out of line, so that other triangles pay neither its registers nor its code: in 128 bits, for the few
-// triangles that are too large for 64, and crosshairs in either width. Spans come in batches.
+// triangles that are too large for 64, and crosshairs and diagonals in either width. Spans come in batches.
 
-#include <voxelpipe/core/crosshair.hpp>
+#include <voxelpipe/core/arms.hpp>
 #include <voxelpipe/core/interpolate.hpp>
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/tuning/tuning_raster.hpp>
@@ -51,38 +51,37 @@ __device__ __noinline__ glm::vec3 wide_barycentric(Position a, Position b, Posit
     return core::barycentric(core::make_frame<int128>(a, b, c, fraction), u, v);
 }
 
-// As wide_spans and set_up_wide, for coverage::crosshair and triangles of any size.
+// As wide_spans and set_up_wide, for coverage by arms and triangles of any size.
 template <class Position>
-__device__ __noinline__ int crosshair_spans(Position a, Position b, Position c, int fraction,
-                                            const core::voxel_box& box, int skip,
-                                            wide_span (&out)[tuning::wide_batch]) {
+__device__ __noinline__ int arm_spans(Position a, Position b, Position c, int fraction, core::arm_set arms,
+                                      const core::voxel_box& box, int skip, wide_span (&out)[tuning::wide_batch]) {
     int i = 0, n = 0;
     const auto run = [&](const auto& t) {
-        core::for_each_crosshair_span(t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
+        core::for_each_arm_span(t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
             if (i++ < skip || n == tuning::wide_batch) return;
             out[n++] = {static_cast<int>(u), static_cast<int>(v), static_cast<int>(w0), static_cast<int>(w1),
                         core::barycentric(t, u, v)};
         });
     };
     if (core::fits_narrow(a, b, c, fraction))
-        run(core::setup_crosshair<std::int64_t>(a, b, c, fraction));
+        run(core::setup_arms<std::int64_t>(a, b, c, fraction, arms));
     else
-        run(core::setup_crosshair<int128>(a, b, c, fraction));
+        run(core::setup_arms<int128>(a, b, c, fraction, arms));
     return n;
 }
 template <class Factors>
-__device__ __noinline__ wide_triangle set_up_crosshair(core::snapped_position a, core::snapped_position b,
-                                                       core::snapped_position c, int fraction, Factors factors) {
+__device__ __noinline__ wide_triangle set_up_either_width(core::snapped_position a, core::snapped_position b,
+                                                          core::snapped_position c, int fraction, Factors factors) {
     if (!core::fits_narrow(a, b, c, fraction)) return set_up_wide(a, b, c, fraction, factors);
     const auto t = core::make_frame<std::int64_t>(a, b, c, fraction);
     return {t.axis, t.zero_area, t.normal[2] >= 0, core::unit_normal(t, factors)};
 }
 template <class Visit>
-__device__ void for_each_crosshair(core::snapped_position a, core::snapped_position b, core::snapped_position c,
-                                   int fraction, const core::voxel_box& box, Visit&& visit) {
+__device__ void for_each_arm_span(core::snapped_position a, core::snapped_position b, core::snapped_position c,
+                                  int fraction, core::arm_set arms, const core::voxel_box& box, Visit&& visit) {
     wide_span spans[tuning::wide_batch];
     for (int skip = 0;; skip += tuning::wide_batch) {
-        const int n = crosshair_spans(a, b, c, fraction, box, skip, spans);
+        const int n = arm_spans(a, b, c, fraction, arms, box, skip, spans);
         for (int i = 0; i < n; ++i) visit(spans[i]);
         if (n < tuning::wide_batch) break;
     }

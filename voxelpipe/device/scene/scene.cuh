@@ -74,7 +74,7 @@ struct geometry {
     std::uint32_t num_draws, num_primitives;
     core::snap_transform snap;
     glm::ivec3 extent;
-    bool is_crosshair; // the voxels of coverage::crosshair among the conservative ones
+    core::arm_set arms; // leave out the conservative voxels whose arms a triangle does not meet
 
     [[nodiscard]] VOXELPIPE_HD const draw_geometry& draw(std::uint32_t d) const {
         return many != nullptr ? many[d] : one;

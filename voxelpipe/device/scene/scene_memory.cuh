@@ -38,12 +38,12 @@ struct scene_memory {
         shadings = memory.take<typename scene_type::shading>(draws.size() > 1 ? draws.size() : 0);
     }
 
-    // Runs the vertex shaders and returns the scene that the other stages read. is_crosshair: see geometry; only for
+    // Runs the vertex shaders and returns the scene that the other stages read. arms: see geometry; only for
     // the tiled strategy and fragments that are counted first.
     [[nodiscard]] scene_type shade(std::span<const draw_type> draws, const grid& g, cudaStream_t stream,
-                                   bool is_crosshair = false) const {
+                                   core::arm_set arms = core::arm_set::none) const {
         scene_type s{};
-        s.geo.is_crosshair = is_crosshair;
+        s.geo.arms = arms;
         s.geo.num_draws = static_cast<std::uint32_t>(draws.size());
         s.geo.snap = core::make_snap_transform(g);
         s.geo.extent = g.extent;

@@ -39,7 +39,7 @@ template <class Draw, class Backend, class... Targets>
 [[nodiscard]] bool follows_from_masks(std::span<const Draw> draws, const grid& g, coverage rule,
                                       std::uint64_t triangles_in, const sparse_framebuffer<Backend, Targets...>& fb) {
     const glm::ivec3 whole = g.whole_extent();
-    if (rule == coverage::crosshair || core::keeps_voxels(fb) ||
+    if (core::arms_of(rule) != core::arm_set::none || core::keeps_voxels(fb) ||
         std::max({whole.x, whole.y, whole.z}) > brick_index<>::max_extent || draws.size() > tuning::max_raster_draws ||
         !is_rastered(triangles_in, core::make_snap_transform(g).fraction, g.extent,
                      rule == coverage::thin ? split_pieces<coverage::thin>::max_work_items(g.extent)

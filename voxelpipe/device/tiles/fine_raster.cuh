@@ -92,7 +92,8 @@ struct small_part {
         : in{{geo.draw(geo.find_draw(id))}, 0, geo.snap.fraction, geo.extent} {
         const draw_geometry& d = in.source.geometry;
         t = load_int32(in, d.triangles[id - d.first_primitive]);
-        is_small = t.fits_int32 && !geo.is_crosshair && t.longest_side() <= core::small_voxels(in.fraction);
+        is_small =
+            t.fits_int32 && geo.arms == core::arm_set::none && t.longest_side() <= core::small_voxels(in.fraction);
         box = t.part(geo.extent);
         int cells = 1;
         for (int k = 0; k < 3; ++k) {
