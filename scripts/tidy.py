@@ -4,9 +4,9 @@
 """tidy.py BUILD JOBS REGEX...: clang-tidy over the sources in BUILD/compile_commands.json that a REGEX matches.
 
 Most of a run goes into the headers that sources share: all sources with the same flags are checked as one file, their
-texts one behind the other, so that checks that look at a main file see each of them. Where that file does not come out
-clean, be it that two sources have the same name for two things, its sources are checked apart, and that counts: the
-messages then name the source and its line.
+texts one behind the other, so that checks that look at a main file see each of them. Where two sources have the same name
+for two things, each stands in a namespace; where that does not compile either, the sources are halved. A file that does
+not come out clean is checked again, each source apart, and that counts: the messages then name the source and its line.
 """
 
 import concurrent.futures
@@ -36,6 +36,27 @@ def check(folder, source):
     return done.returncode == 0, done.stdout
 
 
+def text_of(source):
+    return pathlib.Path(source).read_text(encoding="utf-8") + "\n"
+
+
+def one_behind_the_other(sources):
+    return "".join(map(text_of, sources))
+
+
+def each_in_a_namespace(sources):
+    """For programs, which all have a main() and names of their own: what stands behind a source's last #include is put into
+    a namespace, so that equal names do not meet."""
+    heads = []
+    bodies = []
+    for number, source in enumerate(sources):
+        lines = text_of(source).splitlines(keepends=True)
+        begin = max((n + 1 for n, line in enumerate(lines) if line.startswith("#include")), default=0)
+        heads += lines[:begin]
+        bodies += [f"namespace source_{number} {{\n", *lines[begin:], "}\n"]
+    return "".join(heads + bodies)
+
+
 def main():
     build = pathlib.Path(sys.argv[1]).resolve()
     jobs = int(sys.argv[2])
@@ -50,14 +71,29 @@ def main():
 
     joined = build / "tidy"
     joined.mkdir(exist_ok=True)
+
+    def compiles(arguments):
+        return subprocess.run([*arguments, "-fsyntax-only", "-w"], cwd=build, stderr=subprocess.DEVNULL, check=False).returncode == 0
+
+    # The database's entries and their sources; a group that does not go into one file is halved until it does.
     database = []
-    for flags, sources in groups.items():
+    def join(flags, sources):
         text = joined / f"joined_{len(database)}.cpp"
-        text.write_text("".join(pathlib.Path(s).read_text(encoding="utf-8") + "\n" for s in sources), encoding="utf-8")
         folders = sorted({f"-iquote{pathlib.Path(s).parent}" for s in sources})
         arguments = [flags[0], *folders, *flags[1:], "-c", str(text)]
-        database.append({"directory": str(build), "file": str(text), "arguments": arguments})
-    (joined / "compile_commands.json").write_text(json.dumps(database, indent=1))
+        for layout in (one_behind_the_other, each_in_a_namespace):
+            text.write_text(layout(sources), encoding="utf-8")
+            if len(sources) == 1 or compiles(arguments):
+                database.append(({"directory": str(build), "file": str(text), "arguments": arguments}, sources))
+                return
+        middle = len(sources) // 2
+        print("note: not in one file:", *(pathlib.Path(s).name for s in sources[:middle]), "|", *(pathlib.Path(s).name for s in sources[middle:]))
+        join(flags, sources[:middle])
+        join(flags, sources[middle:])
+
+    for flags, sources in groups.items():
+        join(flags, sources)
+    (joined / "compile_commands.json").write_text(json.dumps([entry for entry, _ in database], indent=1))
 
     def check_group(text, sources):
         names = ", ".join(pathlib.Path(s).name for s in sources)
@@ -65,11 +101,11 @@ def main():
             return True, f"clean: {names}\n"
         results = [check(build, s) for s in sources]
         if all(clean for clean, _ in results):
-            return True, f"note: clean, but only apart, for they do not go into one file: {names}\n"
+            return True, f"note: clean, but only apart: {names}\n"
         return False, "".join(output for clean, output in results if not clean)
 
-    texts = [pathlib.Path(entry["file"]) for entry in database]
-    largest_first = sorted(zip(texts, groups.values()), key=lambda pair: -pair[0].stat().st_size)
+    texts = [(pathlib.Path(entry["file"]), sources) for entry, sources in database]
+    largest_first = sorted(texts, key=lambda pair: -pair[0].stat().st_size)
     failed = False
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         for clean, text in pool.map(lambda pair: check_group(*pair), largest_first):

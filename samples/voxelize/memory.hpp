@@ -53,6 +53,9 @@ void require(double bytes, const std::string& what, const std::string& hint = ""
 // HINT follows the figures.
 [[nodiscard]] std::string shortage(const std::string& hint = "", double likely = 0);
 
+// The hint for calls that voxelize: what a person can do about it.
+inline constexpr const char* fewer_voxels_hint = "take fewer targets or voxels";
+
 // BYTES in MiB for a message, rounded up.
 [[nodiscard]] std::string mebibytes(double bytes);
 

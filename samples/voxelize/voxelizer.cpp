@@ -28,8 +28,6 @@ double volume_bytes(const voxelize_request& request) {
 
 namespace {
 
-constexpr const char* memory_hint = "take fewer targets or voxels";
-
 // The result, and while a ring is put around it its largest channel once more.
 void require_volume(const voxelize_request& request) {
     double bytes = volume_bytes(request);
@@ -47,7 +45,7 @@ void require_volume(const voxelize_request& request) {
     memory::require(bytes,
                     "a result of " + std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
                         std::to_string(extent.z) + " voxels",
-                    memory_hint);
+                    memory::fewer_voxels_hint);
 }
 
 // Bytes for each vertex and triangle of every instance, while a slab is drawn.
@@ -75,7 +73,7 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
     memory::require(least,
                     "a scene of " + std::to_string(model.vertex_count()) + " vertices and " +
                         std::to_string(model.triangle_count()) + " triangles",
-                    memory_hint, likely);
+                    memory::fewer_voxels_hint, likely);
     const auto room = static_cast<double>(memory::room());
     const double likely_in_all = static_cast<double>(memory::limit()) - room + likely;
     if (request.work_memory == 0) {
@@ -91,7 +89,8 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
     try {
         result = pipeline<vp::cpu_backend>{backend, model, request, stats}.run();
     } catch (const std::bad_alloc&) {
-        throw memory_error(memory::shortage(memory_hint, likely_in_all + static_cast<double>(request.work_memory)));
+        throw memory_error(
+            memory::shortage(memory::fewer_voxels_hint, likely_in_all + static_cast<double>(request.work_memory)));
     }
 
     constexpr std::string_view absent[] = {"tile_split", "tile_resolve", "abuffer_emit"};
@@ -181,7 +180,7 @@ volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_st
                 return with_ring(std::move(*result), request);
         return with_ring(run_on_cpu(model, inside, stats), request);
     } catch (const std::bad_alloc&) {
-        throw memory_error(memory::shortage(memory_hint));
+        throw memory_error(memory::shortage(memory::fewer_voxels_hint));
     }
 }
 

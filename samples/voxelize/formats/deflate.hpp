@@ -62,6 +62,9 @@ struct running_crc {
     void add(const compressed_piece& piece);
 };
 
+// What a thread compresses at once in streams whose readers never see the pieces (.npz, .nrrd).
+inline constexpr std::size_t compressed_piece_bytes = std::size_t{256} << 10;
+
 // Compresses a channel's stream, after `head`, on `threads` threads and hands the pieces over in order, from the
 // calling thread. Without `head` all pieces but the last come from `piece_bytes` bytes.
 void compress_channel(const volume& v, const channel& c, half_floats halves, std::span<const std::byte> head,

@@ -12,7 +12,7 @@
 namespace voxelize {
 namespace {
 
-constexpr std::size_t piece_bytes = std::size_t{1} << 20;
+constexpr std::size_t stream_piece_bytes = std::size_t{1} << 20;
 
 // For each byte of packed bits the eight bytes 0 or 1, first voxel first.
 constexpr std::array<std::array<std::uint8_t, 8>, 256> make_expansion() {
@@ -102,9 +102,10 @@ std::span<const std::byte> streamed_piece(const volume& v, const channel& c, hal
 void stream_values(const volume& v, const channel& c, half_floats halves, const byte_sink& sink) {
     const std::uint64_t total = streamed_bytes(v, c, halves);
     std::vector<std::byte> room;
-    for (std::uint64_t begin = 0; begin < total; begin += piece_bytes)
+    for (std::uint64_t begin = 0; begin < total; begin += stream_piece_bytes)
         sink(streamed_piece(v, c, halves, begin,
-                            static_cast<std::size_t>(std::min<std::uint64_t>(piece_bytes, total - begin)), room));
+                            static_cast<std::size_t>(std::min<std::uint64_t>(stream_piece_bytes, total - begin)),
+                            room));
 }
 
 } // namespace voxelize

@@ -70,13 +70,6 @@ constexpr auto all_writers = std::to_array<writer>({
 });
 static_assert(all_formats.size() == all_writers.size());
 
-std::string extension_of(const std::filesystem::path& path) {
-    std::string extension = path.extension().string();
-    for (char& c : extension)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    return extension;
-}
-
 } // namespace
 
 bool are_cubic(const std::array<double, 3>& voxel_size) {
@@ -88,7 +81,7 @@ bool are_cubic(const std::array<double, 3>& voxel_size) {
 std::span<const format> formats() { return all_formats; }
 
 const format* find_format(const std::filesystem::path& path) {
-    const std::string extension = extension_of(path);
+    const std::string extension = lower_extension(path);
     for (const format& f : all_formats)
         if (f.extension == extension) return &f;
     return nullptr;

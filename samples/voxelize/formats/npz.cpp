@@ -16,9 +16,6 @@
 namespace voxelize {
 namespace {
 
-// Bytes that a thread compresses at once; numpy never sees the pieces.
-constexpr std::size_t piece_bytes = std::size_t{256} << 10;
-
 // minizip writes through these callbacks into our output_file. A C library must not see an exception, so the first one
 // is kept here and thrown again once minizip has returned its error code.
 struct zip_sink {
@@ -137,7 +134,7 @@ std::vector<std::filesystem::path> write_npz(const volume& v, const std::filesys
             archive.add_compressed(c.name, [&](const array_sink& add) {
                 piece_compressor compressor(piece_compressor::form::stream_part, options.compression);
                 running_crc whole;
-                compress_channel(v, c, half_floats::keep, std::as_bytes(std::span{header}), piece_bytes,
+                compress_channel(v, c, half_floats::keep, std::as_bytes(std::span{header}), compressed_piece_bytes,
                                  options.threads, compressor, [&](const compressed_piece& piece) {
                                      add(piece.bytes);
                                      whole.add(piece);

@@ -56,8 +56,6 @@ std::string header_of(const volume& v, const channel& c, bool compress) {
     return text;
 }
 
-constexpr std::size_t piece_bytes = std::size_t{256} << 10; // what a thread compresses at once
-
 // A gzip stream with an empty name and no time, so that equal input gives equal bytes.
 void write_gzip(output_file& out, const volume& v, const channel& c, const write_options& options,
                 progress_meter& meter) {
@@ -65,7 +63,7 @@ void write_gzip(output_file& out, const volume& v, const channel& c, const write
     out.write(std::as_bytes(std::span{head}));
     piece_compressor compressor(piece_compressor::form::stream_part, options.compression);
     running_crc whole;
-    compress_channel(v, c, half_floats::widen, {}, piece_bytes, options.threads, compressor,
+    compress_channel(v, c, half_floats::widen, {}, compressed_piece_bytes, options.threads, compressor,
                      [&](const compressed_piece& piece) {
                          out.write(piece.bytes);
                          whole.add(piece);

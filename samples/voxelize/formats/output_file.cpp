@@ -94,4 +94,11 @@ std::vector<fs::path> commit_all(std::span<const std::unique_ptr<output_file>> f
     return paths;
 }
 
+std::string lower_extension(const std::filesystem::path& path) {
+    std::string extension = path.extension().string();
+    for (char& c : extension)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return extension;
+}
+
 } // namespace voxelize

@@ -28,6 +28,9 @@ public:
     write_error(const std::filesystem::path& path, std::string_view reason);
 };
 
+// The path's extension with its dot and in lower case ("A.NPZ": ".npz"), as formats are found by it.
+[[nodiscard]] std::string lower_extension(const std::filesystem::path& path);
+
 class output_file {
 public:
     // Opens a temporary in the folder of `target`. A target that exists and is no regular file (a device, a pipe) is

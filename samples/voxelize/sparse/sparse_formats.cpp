@@ -27,13 +27,6 @@ namespace {
 using voxelpipe::io::nanovdb_file;
 namespace nanovdb = voxelpipe::io::nanovdb;
 
-std::string extension_of(const std::filesystem::path& path) {
-    std::string extension = path.extension().string();
-    for (char& c : extension)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    return extension;
-}
-
 // ---- .nvdb
 // ------------------------------------------------------------------------------------------------------------
 
@@ -222,7 +215,7 @@ bool is_sparse_format(const std::filesystem::path& path) {
 }
 
 bool is_written_sparse(const std::filesystem::path& path) {
-    const std::string extension = extension_of(path);
+    const std::string extension = lower_extension(path);
     return is_sparse_format(path) || extension == ".npz" || extension == ".npy" || extension == ".png" ||
            extension == ".html" || is_streamed(extension);
 }
@@ -252,7 +245,7 @@ std::vector<std::filesystem::path> write_vdb(const volume& v, const std::filesys
 
 std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const std::filesystem::path& path,
                                                 const write_options& options) {
-    const std::string extension = extension_of(path);
+    const std::string extension = lower_extension(path);
     if (extension == ".nvdb") return write_nvdb(v, path, options);
 #ifdef VOXELIZE_HAS_OPENVDB
     if (extension == ".vdb") return write_vdb(v, path, options);

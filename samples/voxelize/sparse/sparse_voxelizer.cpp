@@ -15,8 +15,6 @@ namespace voxelize {
 
 namespace {
 
-constexpr const char* memory_hint = "take fewer targets or voxels";
-
 bool wants(const voxelize_request& request, target id) {
     return std::find(request.targets.begin(), request.targets.end(), id) != request.targets.end();
 }
@@ -58,7 +56,7 @@ sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& reques
     try {
         result = sparse_pipeline<vp::cpu_backend>{backend, model, inside, stats}.run(request.grid);
     } catch (const std::bad_alloc&) {
-        throw memory_error(memory::shortage(memory_hint));
+        throw memory_error(memory::shortage(memory::fewer_voxels_hint));
     }
     constexpr std::string_view absent[] = {"tile_split", "abuffer_emit", "clear"};
     show_stages(stats, times, absent, "");
