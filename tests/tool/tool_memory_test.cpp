@@ -96,7 +96,7 @@ TEST(Memory, TheNeedThatIsNamedSuffices) {
     file.write_glb(folder / "m.glb");
     const auto voxelize = [&](const std::string& out, const std::vector<std::string>& how) {
         std::vector<std::string> arguments{
-            folder / "m.glb", "-o",        folder / out, "-r", "300", "-t", "occupancy,normal,color,triangle",
+            folder / "m.glb", "-o",        folder / out, "-r", sanitized ? "40" : "300", "-t", "occupancy,normal,color,triangle",
             "--stats=json",   "--backend", "cpu",        "-j", "2",   "-q"};
         arguments.insert(arguments.end(), how.begin(), how.end());
         return run(folder, arguments);
