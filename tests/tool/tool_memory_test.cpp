@@ -95,9 +95,19 @@ TEST(Memory, TheNeedThatIsNamedSuffices) {
     for (int i = 0; i < 150; ++i) file.append("nodes", {{"mesh", 0}, {"translation", {i % 12, i / 12, 0}}});
     file.write_glb(folder / "m.glb");
     const auto voxelize = [&](const std::string& out, const std::vector<std::string>& how) {
-        std::vector<std::string> arguments{
-            folder / "m.glb", "-o",        folder / out, "-r", sanitized ? "40" : "300", "-t", "occupancy,normal,color,triangle",
-            "--stats=json",   "--backend", "cpu",        "-j", "2",   "-q"};
+        std::vector<std::string> arguments{folder / "m.glb",
+                                           "-o",
+                                           folder / out,
+                                           "-r",
+                                           sanitized ? "40" : "300",
+                                           "-t",
+                                           "occupancy,normal,color,triangle",
+                                           "--stats=json",
+                                           "--backend",
+                                           "cpu",
+                                           "-j",
+                                           "2",
+                                           "-q"};
         arguments.insert(arguments.end(), how.begin(), how.end());
         return run(folder, arguments);
     };
