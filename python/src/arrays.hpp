@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the module's functions have in common: arrays of NumPy as the library's views, names of options, a failed status
-// as a Python exception, and results that NumPy owns.
+// What the module's functions have in common: arrays of NumPy as the library's views, and results that NumPy owns.
+
+#include "report.hpp"
 
 #include <cpu_ref/backend.hpp>
 
-#include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -25,8 +25,6 @@
 
 namespace voxelpipe::python {
 
-namespace nb = nanobind;
-
 // Arrays in host memory, C order.
 template <class T, std::size_t Dimensions>
 using array = nb::ndarray<T, nb::ndim<Dimensions>, nb::c_contig, nb::device::cpu>;
@@ -42,16 +40,6 @@ using triangle_array = nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_
             array_view<const glm::uvec3>(reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0))};
 }
 
-// "conservative", "thin", "crosshair" or "diagonal". Throws ValueError.
-[[nodiscard]] inline coverage coverage_named(std::string_view name) {
-    if (name == "conservative") return coverage::conservative;
-    if (name == "thin") return coverage::thin;
-    if (name == "crosshair") return coverage::crosshair;
-    if (name == "diagonal") return coverage::diagonal;
-    throw nb::value_error(
-        ("coverage is 'conservative', 'thin', 'crosshair' or 'diagonal', not '" + std::string(name) + "'").c_str());
-}
-
 // Whether a (nz, ny, nx, ...) array has the grid's shape, and rows of `columns` values. Throws ValueError.
 template <class Array>
 void expect_shape(const Array& out, const grid& g, std::initializer_list<std::size_t> tail = {},
@@ -62,25 +50,6 @@ void expect_shape(const Array& out, const grid& g, std::initializer_list<std::si
     std::size_t axis = 3;
     for (const std::size_t n : tail) fits = fits && out.shape(axis++) == n;
     if (!fits) throw nb::value_error("the array to draw into does not have the grid's shape (nz, ny, nx)");
-}
-
-// The counters of a call as a dict; raises what a failed call means in Python: IndexError with the triangle of an index
-// out of range, MemoryError, ValueError.
-[[nodiscard]] inline nb::dict report(const status& s) {
-    if (!s.ok()) {
-        if (s.code == status_code::index_out_of_range) throw nb::index_error(s.message().c_str());
-        if (s.code == status_code::out_of_memory) throw std::bad_alloc();
-        throw nb::value_error(s.message().c_str());
-    }
-    nb::dict d;
-    d["triangles"] = s.counts.triangles_in;
-    d["triangles_dropped"] = s.counts.triangles_dropped();
-    d["triangles_zero_area"] = s.counts.triangles_zero_area;
-    d["triangles_outside"] = s.counts.triangles_outside;
-    d["triangles_drawn"] = s.counts.triangles_drawn;
-    d["fragments"] = s.counts.fragments;
-    d["voxels"] = s.counts.voxels;
-    return d;
 }
 
 // An array of NumPy that owns `values`.

@@ -1,13 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #include "arrays.hpp"
+#include "grid_state.hpp"
 
 #include <nanobind/operators.h>
-#include <nanobind/stl/array.h>
-#include <nanobind/stl/tuple.h>
 
 #include <algorithm>
-#include <array>
 #include <new>
 #include <sstream>
 #include <tuple>
@@ -15,33 +13,9 @@
 namespace voxelpipe::python {
 namespace {
 
-using triple_of_double = std::array<double, 3>;
-using triple_of_int = std::array<std::int64_t, 3>;
-
-glm::dvec3 to_vector(const triple_of_double& t) { return {t[0], t[1], t[2]}; }
 std::tuple<double, double, double> to_tuple(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 
-// An extent from a shape (nz, ny, nx). A number that no grid can have becomes one that validate() refuses.
-glm::ivec3 extent_of(const triple_of_int& shape) {
-    glm::ivec3 extent;
-    for (std::size_t a = 0; a < 3; ++a)
-        extent[static_cast<int>(a)] = static_cast<int>(std::clamp<std::int64_t>(shape[2 - a], -1, 1 << 30));
-    return extent;
-}
 std::tuple<int, int, int> shape_of(const glm::ivec3& extent) { return {extent.z, extent.y, extent.x}; }
-
-const grid& checked(const grid& g) {
-    if (const status s = validate(g); !s.ok()) throw nb::value_error(s.message().c_str());
-    return g;
-}
-
-grid make_grid(const triple_of_double& origin, const triple_of_double& voxel_size, const triple_of_int& shape) {
-    grid g;
-    g.origin = to_vector(origin);
-    g.voxel_size = to_vector(voxel_size);
-    g.extent = extent_of(shape);
-    return checked(g);
-}
 
 bounding_box box_of(const triple_of_double& low, const triple_of_double& high) {
     return {to_vector(low), to_vector(high)};
@@ -124,13 +98,7 @@ void bind_grid(nb::module_& m) {
                  return std::make_tuple(to_tuple(g.origin), to_tuple(g.voxel_size), shape_of(all.extent),
                                         shape_of(g.offset), shape_of(g.extent));
              })
-        .def("__setstate__",
-             [](grid& g, const std::tuple<triple_of_double, triple_of_double, triple_of_int, triple_of_int,
-                                          triple_of_int>& state) {
-                 const auto& [origin, voxel_size, whole, offset, shape] = state;
-                 const grid all = make_grid(origin, voxel_size, whole);
-                 new (&g) grid(shape == whole ? all : checked(all.crop(extent_of(offset), extent_of(shape))));
-             })
+        .def("__setstate__", [](grid& g, const grid_state& state) { new (&g) grid(grid_of(state)); })
         .def("__repr__", &describe);
 
     m.def(

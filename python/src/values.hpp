@@ -2,66 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Attributes that are baked into voxels: rows of values, one for each vertex or one for each triangle. The shaders read
-// them by pointer, so that one pipeline serves both.
+// Attributes that are baked into voxels by the CPU.
 
 #include "arrays.hpp"
+#include "value_rows.hpp"
 
 #include <cpu_ref/parallel.hpp>
 
 #include <algorithm>
 #include <thread>
-#include <type_traits>
 
 namespace voxelpipe::python {
-
-// A scalar where there is one component.
-template <class T, int Components>
-using value_of = std::conditional_t<Components == 1, T, glm::vec<Components, T>>;
-
-// Components [first, first + n) of each row of `values`. Values of vertices are interpolated at the fragment's point on
-// its triangle, as varyings are; integers are taken from the triangle's first vertex.
-template <class T>
-struct value_rows {
-    const T* values = nullptr;
-    std::size_t columns = 0;
-    const glm::uvec3* triangles = nullptr; // null: one row for each triangle
-
-    template <int Components>
-    [[nodiscard]] value_of<T, Components> at(const fragment<>& f) const {
-        value_of<T, Components> result{};
-        const auto set = [&](int c, T v) {
-            if constexpr (Components == 1)
-                result = v;
-            else
-                result[c] = v;
-        };
-        if (triangles == nullptr) {
-            for (int c = 0; c < Components; ++c) set(c, row(f.triangle)[c]);
-            return result;
-        }
-        const glm::uvec3 t = triangles[f.triangle];
-        if constexpr (std::is_integral_v<T>) {
-            for (int c = 0; c < Components; ++c) set(c, row(t.x)[c]);
-        } else {
-            const glm::vec3 b = f.clamped_barycentric();
-            for (int c = 0; c < Components; ++c)
-                set(c, core::member_traits<float>::mix(row(t.x)[c], row(t.y)[c], row(t.z)[c], b.y, b.z));
-        }
-        return result;
-    }
-
-private:
-    [[nodiscard]] const T* row(std::uint32_t i) const { return values + i * columns; }
-};
-
-template <class T, int Components>
-struct counted_value_shader {
-    value_rows<T> rows;
-    auto operator()(const fragment<>& f) const { return outputs(rows.template at<Components>(f), 1U); }
-};
-
-using number_of_fragments = target<std::uint32_t, blend::add>;
 
 // A call's mesh, grid and values. The arrays are the caller's.
 template <class T>
@@ -87,7 +38,8 @@ template <class T>
     if (values.shape(0) != rows) throw nb::value_error("values need one row for each vertex, or for each triangle");
     if (columns.first > values.shape(1) || columns.count > values.shape(1) - columns.first)
         throw nb::value_error("values have no such columns");
-    call.rows = {values.data() + columns.first, values.shape(1), per_triangle ? nullptr : call.mesh.triangles.data()};
+    call.rows = {values.data() + columns.first, values.shape(1), static_cast<int>(columns.count),
+                 per_triangle ? nullptr : call.mesh.triangles.data()};
     return call;
 }
 

@@ -9,30 +9,31 @@ from typing import Any, Mapping
 
 import numpy as np
 
-from . import _core
+from . import _core, _device
 from ._core import Grid
-from ._mesh import Mesh, MeshLike, as_mesh, to_numpy
+from ._device import DeviceMesh
+from ._mesh import Mesh, MeshLike, as_mesh
 from ._surface import take_counts
 
 
 @dataclass(frozen=True)
 class _Attribute:
     name: str
-    values: np.ndarray  # (rows, columns): float32, or int64 where exact integers are asked for
+    values: Any  # (rows, columns): float32, or int64 where exact integers are asked for
     per_triangle: bool
     blend: str
     is_flat: bool  # given without columns
     dtype: np.dtype  # of the result
+    is_integer: bool
 
-    @property
-    def is_integer(self) -> bool:
-        return self.values.dtype == np.int64
 
-    def result(self, values: np.ndarray) -> np.ndarray:
+    def result(self, mesh: Mesh | DeviceMesh, values: Any) -> Any:
         """From (..., columns) as drawn to what the caller gets."""
-        if values.dtype != self.dtype:
-            values = (np.rint(values) if self.dtype.kind in "iu" and values.dtype.kind == "f" else values).astype(self.dtype)
-        return values[..., 0] if self.is_flat else values
+        drawn = mesh.dtype_of(values)
+        if drawn != self.dtype:
+            is_rounded = self.dtype.kind in "iu" and drawn.kind == "f"
+            values = mesh.rounded(values, self.dtype) if is_rounded else mesh.convert(values, self.dtype)
+        return mesh.to_caller(values[..., 0] if self.is_flat else values)
 
 
 def _blend_of(name: str, dtype: np.dtype, blend: Any) -> str:
@@ -44,7 +45,7 @@ def _blend_of(name: str, dtype: np.dtype, blend: Any) -> str:
     return chosen
 
 
-def _per_triangle(name: str, rows: int, mesh: Mesh, per: Mapping[str, str] | None) -> bool:
+def _per_triangle(name: str, rows: int, mesh: Mesh | DeviceMesh, per: Mapping[str, str] | None) -> bool:
     vertices, triangles = len(mesh.vertices), len(mesh.triangles)
     said = (per or {}).get(name)
     if said not in (None, "vertex", "triangle"):
@@ -57,24 +58,27 @@ def _per_triangle(name: str, rows: int, mesh: Mesh, per: Mapping[str, str] | Non
     return said == "triangle" or (said is None and rows == triangles)
 
 
-def _attribute(name: str, given: Any, mesh: Mesh, blend: Any, per: Mapping[str, str] | None) -> _Attribute:
-    values = to_numpy(given, name)
-    if values.ndim not in (1, 2) or values.dtype.kind not in "fiub":
-        raise ValueError(f"{name}: an array (rows,) or (rows, columns) of numbers, not {values.shape} of {values.dtype}")
+def _attribute(name: str, given: Any, mesh: Mesh | DeviceMesh, blend: Any, per: Mapping[str, str] | None) -> _Attribute:
+    values = mesh.take(given, name)
+    given_type = mesh.dtype_of(values)
+    if values.ndim not in (1, 2) or given_type.kind not in "fiub":
+        raise ValueError(
+            f"{name}: an array (rows,) or (rows, columns) of numbers, not {tuple(values.shape)} of {given_type}"
+        )
     is_flat = values.ndim == 1
-    rows = values[:, np.newaxis] if is_flat else values
+    rows = values[:, None] if is_flat else values
     if rows.shape[1] == 0:
         raise ValueError(f"{name}: no columns")
     per_triangle = _per_triangle(name, len(rows), mesh, per)
-    chosen = _blend_of(name, values.dtype, blend)
-    if values.dtype.kind == "f" or chosen == "mean":
-        keeps_type = values.dtype == np.uint8  # colours
+    chosen = _blend_of(name, given_type, blend)
+    if given_type.kind == "f" or chosen == "mean":
+        keeps_type = given_type == np.uint8  # colours
         dtype = np.dtype(np.uint8 if keeps_type else np.float32)
-        return _Attribute(name, np.ascontiguousarray(rows, np.float32), per_triangle, chosen, is_flat, dtype)
-    if values.dtype.kind == "u" and rows.size and int(rows.max()) > np.iinfo(np.int64).max:
+        return _Attribute(name, mesh.convert(rows, np.float32), per_triangle, chosen, is_flat, dtype, False)
+    if given_type == np.uint64 and len(rows) and int(rows.max()) > np.iinfo(np.int64).max:
         raise ValueError(f"{name}: integers above 2^63 - 1")
-    dtype = np.dtype(np.int64) if chosen == "sum" else values.dtype
-    return _Attribute(name, np.ascontiguousarray(rows, np.int64), per_triangle, chosen, is_flat, dtype)
+    dtype = np.dtype(np.int64) if chosen == "sum" else given_type
+    return _Attribute(name, mesh.convert(rows, np.int64), per_triangle, chosen, is_flat, dtype, True)
 
 
 def _passes(a: _Attribute) -> list[tuple[int, int]]:
@@ -109,8 +113,15 @@ def bake(
     Floats give float32; integers keep their type, but for sums (int64) and means (float32; uint8 stays uint8, rounded).
     """
     m = as_mesh(mesh)
-    positions, where = m.positions(grid)
     attributes = [_attribute(name, given, m, blend, per) for name, given in values.items()]
+    if isinstance(m, DeviceMesh):
+        on_device = {}
+        for a in attributes:
+            drawn, report = _device.bake(m, grid, coverage, a, fill)
+            take_counts(report, status)
+            on_device[a.name] = a.result(m, drawn)
+        return on_device
+    positions, where = m.positions(grid)
     counts = np.empty(grid.shape, np.uint32)
     result = {}
     for a in attributes:
@@ -126,7 +137,7 @@ def bake(
             if n != columns:
                 out[..., first : first + n] = part
         take_counts(report, status)
-        result[a.name] = m.to_caller(a.result(out))
+        result[a.name] = a.result(m, out)
     return result
 
 
@@ -148,8 +159,12 @@ def sparse(
     (n, columns), as bake() has them in these voxels. The other parameters are those of bake().
     """
     m = as_mesh(mesh)
-    positions, where = m.positions(grid)
     attributes = [_attribute(name, given, m, blend, per) for name, given in (values or {}).items()]
+    if isinstance(m, DeviceMesh):
+        on_device, report = _device.sparse_voxels(m, grid, coverage)
+        take_counts(report, status)
+        return on_device, {a.name: a.result(m, _device.sparse(m, grid, coverage, a)) for a in attributes}
+    positions, where = m.positions(grid)
     voxels, report = _core.sparse_voxels(positions, m.triangles, where, coverage, threads)
     take_counts(report, status)
     result = {}
@@ -163,5 +178,5 @@ def sparse(
             else:
                 part, _ = _core.sparse_float(*what, n, a.per_triangle, a.blend, threads)
             parts.append(part)
-        result[a.name] = m.to_caller(a.result(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)))
+        result[a.name] = a.result(m, parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
     return m.to_caller(voxels), result

@@ -30,12 +30,7 @@ def fit(
     """
     if (resolution is None) == (voxel_size is None):
         raise ValueError("give a resolution or a voxel_size")
-    vertices = as_mesh(mesh).vertices
-    finite = np.isfinite(vertices).all(axis=1)
-    if not finite.all():
-        vertices = vertices[finite]
-    low = tuple(vertices.min(axis=0).astype(np.float64).tolist()) if len(vertices) else (0.0, 0.0, 0.0)
-    high = tuple(vertices.max(axis=0).astype(np.float64).tolist()) if len(vertices) else (0.0, 0.0, 0.0)
+    low, high = as_mesh(mesh).bounds() or ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     if voxel_size is not None:
         size = (float(voxel_size),) * 3 if np.ndim(voxel_size) == 0 else tuple(float(s) for s in voxel_size)
         return _core.fit_voxel_size(low, high, size, padding)

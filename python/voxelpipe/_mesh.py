@@ -11,6 +11,7 @@ from typing import Any, Callable, Sequence
 import numpy as np
 
 from ._core import Grid
+from ._device import DeviceMesh, as_device_mesh, is_on_device
 
 # What functions take as a mesh; see as_mesh.
 MeshLike = Any
@@ -24,6 +25,27 @@ class Mesh:
     triangles: np.ndarray  # (f, 3) uint32, C order
     first_triangles: tuple[int, ...]  # of each part
     to_caller: Callable[[np.ndarray], Any]  # a result as the caller's kind of array
+
+    # The same four for arrays on a GPU: _device.DeviceMesh.
+    def take(self, a: Any, what: str) -> np.ndarray:
+        return to_numpy(a, what)
+
+    def dtype_of(self, a: np.ndarray) -> np.dtype:
+        return a.dtype
+
+    def convert(self, a: np.ndarray, dtype: Any) -> np.ndarray:
+        return np.ascontiguousarray(a, dtype)
+
+    def rounded(self, a: np.ndarray, dtype: Any) -> np.ndarray:
+        return np.rint(a).astype(dtype)
+
+    def bounds(self) -> tuple[list[float], list[float]] | None:
+        """The lowest and highest corner of the vertices that are finite, if there are any."""
+        finite = np.isfinite(self.vertices).all(axis=1)
+        vertices = self.vertices if finite.all() else self.vertices[finite]
+        if not len(vertices):
+            return None
+        return vertices.min(axis=0).astype(np.float64).tolist(), vertices.max(axis=0).astype(np.float64).tolist()
 
     def positions(self, grid: Grid) -> tuple[np.ndarray, Grid]:
         """Positions in float32, and the grid in which they are to be drawn.
@@ -41,8 +63,8 @@ def to_numpy(a: Any, what: str) -> np.ndarray:
     """An array of any library in host memory; shares its memory where it can."""
     if isinstance(a, np.ndarray):
         return a
-    if hasattr(a, "__cuda_array_interface__") or getattr(getattr(a, "device", None), "type", "cpu") == "cuda":
-        raise TypeError(f"{what} is in a GPU's memory: copy it to the host, as with .cpu() or .get()")
+    if is_on_device(a):
+        raise TypeError(f"{what} is in a GPU's memory, the mesh is not: copy it to the host, as with .cpu() or .get()")
     if hasattr(a, "detach"):  # a tensor of torch that records gradients
         a = a.detach()
     if hasattr(a, "__dlpack__") and not hasattr(a, "__array__"):
@@ -128,10 +150,13 @@ def _parts_of(mesh: MeshLike) -> tuple[Any, Any]:
     )
 
 
-def as_mesh(mesh: MeshLike) -> Mesh:
-    """Converts what the caller has. The parts of a list stay apart as bodies of solids, and are one mesh otherwise."""
+def as_mesh(mesh: MeshLike) -> Mesh | DeviceMesh:
+    """Converts what the caller has. The parts of a list stay apart as bodies of solids, and are one mesh otherwise. Arrays
+    in a GPU's memory stay there."""
     parts: Sequence[MeshLike] = mesh if isinstance(mesh, list) else [mesh]
     pairs = [_parts_of(part) for part in parts]
+    if any(is_on_device(a) for pair in pairs for a in pair):
+        return as_device_mesh(pairs)
     vertices = [_vertices(v) for v, _ in pairs]
     triangles = [_triangles(t) for _, t in pairs]
     to_caller = _converter(pairs[0][0]) if pairs else lambda array: array

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from . import _core
+from . import _core, _device
 from ._core import Grid
+from ._device import DeviceMesh
 from ._mesh import MeshLike, as_mesh
 from ._surface import take_counts
 
@@ -47,12 +48,16 @@ def solid(
     Warns with OpenMeshWarning where rows of voxels prove that the mesh is not closed.
     """
     m = as_mesh(mesh)
-    positions, where = m.positions(grid)
-    out = np.empty(grid.shape, np.uint8)
-    counts = _core.solid_mask(
-        positions, m.triangles, list(m.first_triangles), where, fill, extent, repair, bodies, max_hole_edges, closing,
-        out, threads,
-    )  # fmt: skip
+    options = (fill, extent, repair, bodies, max_hole_edges, closing)
+    if isinstance(m, DeviceMesh):
+        result, counts = _device.solid(m, grid, options)
+    else:
+        positions, where = m.positions(grid)
+        out = np.empty(grid.shape, np.uint8)
+        counts = _core.solid_mask(
+            positions, m.triangles, list(m.first_triangles), where, *options, out, threads
+        )
+        result = m.to_caller(out.view(np.bool_))
     take_counts(counts, status)
     if counts["open_rows"] and repair in ("none", "close_holes"):
         rows = grid.shape[0] * grid.shape[1]
@@ -62,4 +67,4 @@ def solid(
             OpenMeshWarning,
             stacklevel=2,
         )
-    return m.to_caller(out.view(np.bool_))
+    return result

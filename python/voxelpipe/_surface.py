@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import _core
+from . import _core, _device
 from ._core import Grid
+from ._device import DeviceMesh
 from ._mesh import MeshLike, as_mesh
 
 
@@ -50,9 +51,14 @@ def voxelize(
     threads: 0 takes all cores. The result is the same for any number.
     status: a dict that is filled with the call's counters.
 
-    A mesh of torch's tensors gives a tensor. Raises IndexError for a triangle that names a vertex that does not exist.
+    A mesh of torch's tensors gives a tensor. A mesh in a GPU's memory (torch, CuPy) is drawn there, with the same bits,
+    and threads has no meaning; this needs the package voxelpipe-cuda13. Raises IndexError for a triangle that names a vertex that does not exist.
     """
     m = as_mesh(mesh)
+    if isinstance(m, DeviceMesh):
+        result, counts = _device.voxelize(m, grid, coverage, packed)
+        take_counts(counts, status)
+        return result
     positions, where = m.positions(grid)
     nz, ny, nx = grid.shape
     if packed:
@@ -89,6 +95,10 @@ def fragments(
 ) -> Fragments:
     """Every triangle of every voxel: the lists of a ray-tracing grid, or the input of any shading of one's own."""
     m = as_mesh(mesh)
+    if isinstance(m, DeviceMesh):
+        on_device, counts = _device.fragments(m, grid, coverage)
+        take_counts(counts, status)
+        return Fragments(*on_device)
     positions, where = m.positions(grid)
     *arrays, counts = _core.fragments(positions, m.triangles, where, coverage, threads)
     take_counts(counts, status)

@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The backend of a call, and kernels that copy results into the caller's arrays.
+
+#include "device_calls.hpp"
+
+#include <cuda_runtime.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace voxelpipe::python {
+
+inline void check(cudaError_t error) {
+    if (error != cudaSuccess) throw std::runtime_error(std::string("CUDA: ") + cudaGetErrorString(error));
+}
+
+// Makes the call's device the current one, and gives the old one back.
+class current_device {
+public:
+    explicit current_device(const device_stream& on) {
+        check(cudaGetDevice(&before_));
+        check(cudaSetDevice(on.device));
+    }
+    ~current_device() { (void)cudaSetDevice(before_); }
+    current_device(const current_device&) = delete;
+    current_device& operator=(const current_device&) = delete;
+
+private:
+    int before_ = 0;
+};
+
+// A backend for one call: it keeps neither graphs nor locked memory for later ones.
+class call_backend : public cuda_backend {
+public:
+    explicit call_backend(const device_stream& on) : cuda_backend(reinterpret_cast<cudaStream_t>(on.stream)) {
+        use_graphs = false;
+        use_pinned_memory = false;
+    }
+};
+
+// A thread for each of `n` elements.
+template <class F>
+__global__ void each_kernel(std::size_t n, F f) {
+    const std::size_t i = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    if (i < n) f(i);
+}
+template <class F>
+void for_each(const device_stream& on, std::size_t n, const F& f) {
+    if (n == 0) return;
+    each_kernel<<<static_cast<unsigned>((n + 255) / 256), 256, 0, reinterpret_cast<cudaStream_t>(on.stream)>>>(n, f);
+    check(cudaGetLastError());
+}
+
+inline void wait(const device_stream& on) { check(cudaStreamSynchronize(reinterpret_cast<cudaStream_t>(on.stream))); }
+
+// Components of a value, a scalar's or a vector's.
+template <class T>
+[[nodiscard]] VOXELPIPE_HD T component_of(const T& value, int) {
+    return value;
+}
+template <int N, class T>
+[[nodiscard]] VOXELPIPE_HD T component_of(const glm::vec<N, T>& value, int c) {
+    return value[c];
+}
+
+// Writes a pass's values into its columns: `fill` where there is no fragment, quotients of a mean, each rounded once.
+template <class T, class Value>
+struct finish {
+    const Value* values;
+    const std::uint32_t* counts;
+    T* out; // begins at the pass's first column
+    std::size_t columns;
+    int count;
+    bool is_mean;
+    T fill;
+    VOXELPIPE_HD void operator()(std::size_t i) const {
+        for (int c = 0; c < count; ++c) {
+            T v = component_of(values[i], c);
+            if (counts[i] == 0)
+                v = fill;
+            else if (is_mean)
+                v = v / static_cast<T>(counts[i]);
+            out[i * columns + static_cast<std::size_t>(c)] = v;
+        }
+    }
+};
+
+// Calls f.template operator()<Blend>().
+template <class F>
+auto with_blend(combine how, F&& f) {
+    switch (how) {
+    case combine::mean:
+    case combine::sum:
+        return f.template operator()<blend::add>();
+    case combine::min:
+        return f.template operator()<blend::min>();
+    case combine::max:
+        return f.template operator()<blend::max>();
+    case combine::last:
+        break;
+    }
+    return f.template operator()<blend::replace>();
+}
+
+} // namespace voxelpipe::python

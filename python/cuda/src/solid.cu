@@ -1,0 +1,19 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "../../src/parts.hpp"
+#include "on_device.cuh"
+
+namespace voxelpipe::python {
+
+status draw_solid(const device_stream& on, const mesh_view<>& mesh, const std::vector<std::uint64_t>& first_triangles,
+                  const grid& g, const solid_options& options, std::uint8_t* out) {
+    using mask = target<std::uint8_t, blend::replace>;
+    using shader = decltype(constant(std::uint8_t{1}));
+    const current_device current(on);
+    call_backend backend(on);
+    const auto draws =
+        draws_of_parts<draw<mesh_view<>, passthrough, shader>>(mesh, first_triangles, constant(std::uint8_t{1}));
+    return voxelize_solid(backend, draws, g, framebuffer_view<mask>::on(g.extent, out), options);
+}
+
+} // namespace voxelpipe::python

@@ -1,0 +1,102 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What the modules for CPU and GPU have in common: names of options, and a failed status as a Python exception.
+
+#include <voxelpipe/solid.hpp>
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <nanobind/nanobind.h>
+
+#include <cstdint>
+#include <initializer_list>
+#include <new>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace voxelpipe::python {
+
+namespace nb = nanobind;
+
+// "conservative", "thin", "crosshair" or "diagonal". Throws ValueError.
+[[nodiscard]] inline coverage coverage_named(std::string_view name) {
+    if (name == "conservative") return coverage::conservative;
+    if (name == "thin") return coverage::thin;
+    if (name == "crosshair") return coverage::crosshair;
+    if (name == "diagonal") return coverage::diagonal;
+    throw nb::value_error(
+        ("coverage is 'conservative', 'thin', 'crosshair' or 'diagonal', not '" + std::string(name) + "'").c_str());
+}
+
+// The counters of a call as a dict; raises what a failed call means in Python: IndexError with the triangle of an index
+// out of range, MemoryError, ValueError; RuntimeError for what a device says.
+[[nodiscard]] inline nb::dict report(const status& s) {
+    if (!s.ok()) {
+        if (s.code == status_code::index_out_of_range) throw nb::index_error(s.message().c_str());
+        if (s.code == status_code::out_of_memory) throw std::bad_alloc();
+        if (s.code == status_code::no_device || s.code == status_code::device_error)
+            throw std::runtime_error(s.message());
+        throw nb::value_error(s.message().c_str());
+    }
+    nb::dict d;
+    d["triangles"] = s.counts.triangles_in;
+    d["triangles_dropped"] = s.counts.triangles_dropped();
+    d["triangles_zero_area"] = s.counts.triangles_zero_area;
+    d["triangles_outside"] = s.counts.triangles_outside;
+    d["triangles_drawn"] = s.counts.triangles_drawn;
+    d["fragments"] = s.counts.fragments;
+    d["voxels"] = s.counts.voxels;
+    return d;
+}
+
+// The value that stands beside the name. Throws ValueError that lists the names.
+template <class T>
+[[nodiscard]] T named(std::string_view what, std::string_view name,
+                      std::initializer_list<std::pair<std::string_view, T>> choices) {
+    std::string text;
+    for (const auto& [choice, value] : choices) {
+        if (choice == name) return value;
+        text += (text.empty() ? "'" : ", '") + std::string(choice) + "'";
+    }
+    throw nb::value_error((std::string(what) + " is one of " + text + ", not '" + std::string(name) + "'").c_str());
+}
+
+// The options of a solid from their names, as voxelpipe/_solid.py has them. Throws ValueError.
+[[nodiscard]] inline solid_options solid_options_named(const std::string& fill, const std::string& extent,
+                                                       const std::string& repair_name, const std::string& bodies_name,
+                                                       std::optional<std::uint64_t> max_hole_edges, int closing) {
+    solid_options options;
+    options.rule = named<fill_rule>(
+        "fill", fill,
+        {{"nonzero", fill_rule::nonzero}, {"even_odd", fill_rule::even_odd}, {"positive", fill_rule::positive}});
+    options.extent = named<solid_extent>(
+        "extent", extent,
+        {{"outer", solid_extent::outer}, {"centre", solid_extent::centre}, {"inner", solid_extent::inner}});
+    options.repair = named<repair>("repair", repair_name,
+                                   {{"none", repair::none},
+                                    {"close_holes", repair::close_holes},
+                                    {"exterior", repair::exterior},
+                                    {"vote", repair::vote}});
+    options.bodies = named<bodies>("bodies", bodies_name, {{"all", bodies::call}, {"each", bodies::draw}});
+    if (max_hole_edges) options.max_hole_edges = *max_hole_edges;
+    options.closing = closing;
+    return options;
+}
+
+// report(), and the counters of solids.
+[[nodiscard]] inline nb::dict report_solid(const status& s) {
+    nb::dict d = report(s);
+    d["open_rows"] = s.solid.open_rows;
+    d["crossings"] = s.solid.crossings;
+    d["max_winding"] = s.solid.max_winding;
+    d["hole_edges"] = s.solid.hole_edges;
+    d["holes"] = s.solid.holes;
+    d["cones"] = s.solid.cones;
+    return d;
+}
+
+} // namespace voxelpipe::python
