@@ -19,7 +19,8 @@ template <class T, int Components>
 [[nodiscard]] status bake_columns(const device_stream& on, const mesh_view<>& mesh, const grid& g, coverage rule,
                                   const device_values<T>& values, T fill, T* out) {
     const current_device current(on);
-    call_backend backend(on);
+    call_backend own(on);
+    cuda_backend& backend = own.backend;
     return with_blend(values.how, [&]<class Blend>() {
         framebuffer<cuda_backend, target<value_of<T, Components>, Blend>, number_of_fragments> fb{backend, g.extent};
         const status s = voxelize(backend, mesh, g, passthrough{}, shader_of<T, Components>(mesh, values), fb,
@@ -57,9 +58,9 @@ struct coordinates_of_bricks {
 // What is drawn, kept with its backend.
 template <class... Targets>
 struct kept_bricks {
-    call_backend backend;
+    call_backend own;
     sparse_framebuffer<cuda_backend, Targets...> fb;
-    kept_bricks(const device_stream& on, glm::ivec3 extent) : backend(on), fb(backend, extent) {}
+    kept_bricks(const device_stream& on, glm::ivec3 extent) : own(on), fb(own.backend, extent) {}
 };
 
 template <class T, class Kept>
@@ -80,8 +81,8 @@ template <class T, int Components>
         using kept = kept_bricks<target<value_of<T, Components>, Blend>, number_of_fragments>;
         const auto all = std::make_shared<kept>(on, g.extent);
         sparse_result<T> made;
-        made.result = voxelize(all->backend, mesh, g, passthrough{}, shader_of<T, Components>(mesh, values), all->fb,
-                               voxelize_options{rule});
+        made.result = voxelize(all->own.backend, mesh, g, passthrough{}, shader_of<T, Components>(mesh, values),
+                               all->fb, voxelize_options{rule});
         if (!made.result.ok()) return made;
         give_voxels(on, all, made);
         made.copy_values = [all, on, values](T* out) {

@@ -32,12 +32,12 @@ private:
     int before_ = 0;
 };
 
-// A backend for one call: it keeps neither graphs nor locked memory for later ones.
-class call_backend : public cuda_backend {
-public:
-    explicit call_backend(const device_stream& on) : cuda_backend(reinterpret_cast<cudaStream_t>(on.stream)) {
-        use_graphs = false;
-        use_pinned_memory = false;
+// The backend of one call, which keeps neither graphs nor locked memory for later ones.
+struct call_backend {
+    cuda_backend backend;
+    explicit call_backend(const device_stream& on) : backend(reinterpret_cast<cudaStream_t>(on.stream)) {
+        backend.use_graphs = false;
+        backend.use_pinned_memory = false;
     }
 };
 

@@ -10,7 +10,8 @@ status draw_solid(const device_stream& on, const mesh_view<>& mesh, const std::v
     using mask = target<std::uint8_t, blend::replace>;
     using shader = decltype(constant(std::uint8_t{1}));
     const current_device current(on);
-    call_backend backend(on);
+    call_backend own(on);
+    cuda_backend& backend = own.backend;
     const auto draws =
         draws_of_parts<draw<mesh_view<>, passthrough, shader>>(mesh, first_triangles, constant(std::uint8_t{1}));
     return voxelize_solid(backend, draws, g, framebuffer_view<mask>::on(g.extent, out), options);

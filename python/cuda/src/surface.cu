@@ -41,7 +41,8 @@ struct coordinates_of_ids {
 
 status draw_bits(const device_stream& on, const mesh_view<>& mesh, const grid& g, coverage rule, std::uint32_t* out) {
     const current_device current(on);
-    call_backend backend(on);
+    call_backend own(on);
+    cuda_backend& backend = own.backend;
     return voxelize(backend, mesh, g, passthrough{}, constant(true), framebuffer_view<bits>::on(g.extent, out),
                     voxelize_options{rule});
 }
@@ -49,7 +50,8 @@ status draw_bits(const device_stream& on, const mesh_view<>& mesh, const grid& g
 // By way of bits, whose kernels the program has anyway.
 status draw_mask(const device_stream& on, const mesh_view<>& mesh, const grid& g, coverage rule, std::uint8_t* out) {
     const current_device current(on);
-    call_backend backend(on);
+    call_backend own(on);
+    cuda_backend& backend = own.backend;
     framebuffer<cuda_backend, bits> fb{backend, g.extent};
     const status s = voxelize(backend, mesh, g, passthrough{}, constant(true), fb, voxelize_options{rule});
     if (!s.ok()) return s;
@@ -64,13 +66,13 @@ fragment_lists list_fragments(const device_stream& on, const mesh_view<>& mesh, 
     const current_device current(on);
     using lists = abuffer<cuda_backend, glm::vec3>;
     struct kept {
-        call_backend backend;
+        call_backend own;
         lists on_device;
-        explicit kept(const device_stream& where) : backend(where), on_device(backend) {}
+        explicit kept(const device_stream& where) : own(where), on_device(own.backend) {}
     };
     const auto all = std::make_shared<kept>(on);
     fragment_lists made;
-    made.result = voxelize(all->backend, mesh, g, passthrough{}, weights{}, all->on_device, voxelize_options{rule});
+    made.result = voxelize(all->own.backend, mesh, g, passthrough{}, weights{}, all->on_device, voxelize_options{rule});
     if (!made.result.ok()) return made;
     made.num_voxels = all->on_device.num_voxels();
     made.num_fragments = all->on_device.num_fragments();
