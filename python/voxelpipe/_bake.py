@@ -106,7 +106,7 @@ def bake(
         triangle's first vertex), or for each triangle.
     blend: what becomes of the fragments of one voxel, for all names or by name: "mean", "sum", "min", "max", or "last",
         that of the highest triangle number. By default floats and uint8 are averaged, other integers "last". Sums of
-        floats do not depend on any order.
+        floats do not depend on any order: terms are multiples of 2^-32, and one of 2^31 or more is infinite.
     per: by name, "vertex" or "triangle", for a mesh that has as many vertices as triangles.
     fill: the value of voxels without a fragment.
 

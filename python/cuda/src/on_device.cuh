@@ -81,7 +81,7 @@ struct finish {
             T v = component_of(values[i], c);
             if (counts[i] == 0)
                 v = fill;
-            else if (is_mean)
+            else if (is_mean && v == v) // a GPU's quotient of NaN has bits of its own
                 v = v / static_cast<T>(counts[i]);
             out[i * columns + static_cast<std::size_t>(c)] = v;
         }
