@@ -95,8 +95,6 @@ public:
         return core::max_index(triangles);
     }
 
-    static constexpr bool takes_subsets = true; // mesh_view::part
-
     // Used by voxelize, with validated arguments. Exceptions of a user's shader or progress function pass through.
     template <class Draws, class Output, class Coverage = core::known_coverage<>>
     [[nodiscard]] status run(const Draws& draws, const grid& g, Output& out, const voxelize_options& options,

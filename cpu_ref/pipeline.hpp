@@ -10,6 +10,7 @@
 #include <cpu_ref/parallel.hpp>
 #include <voxelpipe/core/coverage.hpp>
 #include <voxelpipe/core/interpolate.hpp>
+#include <voxelpipe/core/numbering.hpp>
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/voxelize.hpp>
 
@@ -110,12 +111,8 @@ struct geometry {
     glm::ivec3 lead{0};                       // lowest voxel of `where` that is drawn
     core::arm_set arms = core::arm_set::none; // leave out the conservative voxels whose arms a triangle does not meet
 
-    // What the primitives of a draw are called where some draw is a subset (mesh_view::part).
-    struct numbering {
-        const std::uint32_t* numbers; // of the triangles in the whole mesh; null: the draw is no subset
-        std::uint32_t whole, first;   // triangles of the whole mesh; its first primitive
-    };
-    std::vector<numbering> numberings; // by draw; empty if no draw is a subset
+    // What the primitives of each draw are called where some draw is a subset (mesh_view::part); otherwise empty.
+    std::vector<core::numbering> numberings;
 
     struct primitive {
         std::uint32_t draw, triangle, instance;
@@ -132,14 +129,9 @@ struct geometry {
         return {d, at.triangle, at.instance, parts[d].triangles[t]};
     }
     // The numbers of a primitive that shaders and lists see. `id` counts what is drawn, in the same order.
-    struct visible_numbers {
-        std::uint32_t triangle, primitive;
-    };
-    [[nodiscard]] visible_numbers numbers_of(const primitive& p, std::uint32_t id) const {
+    [[nodiscard]] core::visible_numbers numbers_of(const primitive& p, std::uint32_t id) const {
         if (numberings.empty()) return {p.triangle, id};
-        const numbering& n = numberings[p.draw];
-        const std::uint32_t triangle = n.numbers != nullptr ? n.numbers[p.triangle] : p.triangle;
-        return {triangle, n.first + p.instance * n.whole + triangle};
+        return numberings[p.draw].of(p.triangle, p.instance);
     }
     [[nodiscard]] core::voxel_box whole_box() const {
         return {{{lead.x, lead.y, lead.z}}, {{where.extent.x - 1, where.extent.y - 1, where.extent.z - 1}}};
@@ -181,15 +173,7 @@ make_scene(const execution& how, std::span<const draw<Mesh, VertexShader, Fragme
         first += s.parts.back().num_triangles;
     }
     s.first_primitive.push_back(first);
-    if (core::has_subset(draws)) {
-        std::uint32_t number = 0;
-        for (const auto& d : draws) {
-            const std::uint64_t whole = d.mesh.part.whole != 0 ? d.mesh.part.whole : d.mesh.triangles.size();
-            s.numberings.push_back({d.mesh.part.whole != 0 ? d.mesh.part.numbers.data() : nullptr,
-                                    static_cast<std::uint32_t>(whole), number});
-            number += static_cast<std::uint32_t>(d.mesh.num_primitives());
-        }
-    }
+    s.numberings = core::make_numberings(draws);
     return s;
 }
 

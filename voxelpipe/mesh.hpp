@@ -36,7 +36,7 @@ struct instances {
 
 // Which triangles of a larger mesh a mesh_view has. Shaders, A-buffers and blends that need an order then see the
 // numbers of the whole: fragment::triangle is numbers[i], and fragment::primitive counts all triangles of each whole
-// mesh. Solids have no primitive numbers and ignore it. cpu_backend takes subsets; others return bad_subset.
+// mesh. Solids have no primitive numbers and ignore it.
 struct subset {
     backend_view<const std::uint32_t> numbers = {}; // one per triangle: its number in the whole mesh; ascending
     std::uint64_t whole = 0;                        // triangles of the whole mesh; 0: the mesh_view is the whole

@@ -304,7 +304,7 @@ template <coverage... Known, class Backend, core::triangle_mesh Mesh, class Vert
     if constexpr (core::shaders_fit_targets<Mesh, VertexShader, FragmentShader, Targets...>()) {
         if (const status s = validate(g); !s.ok()) return s;
         if (const status s = core::validate_sparse(fb, g); !s.ok()) return s;
-        const status s = core::validate_draws_on<Backend>(draws);
+        const status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (s.counts.triangles_in == 0) return backend.clear_sparse(g, fb);
         core::known_coverage<Known...>::set(options);

@@ -33,7 +33,7 @@ enum class status_code : std::uint8_t {
     bad_solid_options,    // an option of voxelize_solid is out of its range
     bad_level,            // a tessellation program gave a level below 1 or above its max_level
     bad_count,            // a geometry program emitted more triangles than its type holds
-    bad_subset,           // mesh_view::part: not one number a triangle, or not below `whole`, or not on this backend
+    bad_subset,           // mesh_view::part: not one number a triangle, or not ascending below `whole`
     other_rank_failed,    // slabs/mpi.hpp: this rank has not failed, another one has
     crop_without_whole,   // repair::exterior of a crop: what lies outside follows from the whole grid
     no_device,            // cuda_backend without a usable device
@@ -140,7 +140,7 @@ struct required_sizes {
     case status_code::bad_count:
         return "bad count: a geometry program emitted more triangles than vp::triangles<N> holds";
     case status_code::bad_subset:
-        return "bad subset: a mesh's part needs one number a triangle, ascending, and a backend that takes them";
+        return "bad subset: a mesh's part needs one number a triangle, ascending and below the whole";
     case status_code::other_rank_failed:
         return "other rank failed: no slab of this rank is to be used";
     case status_code::crop_without_whole:

@@ -162,18 +162,6 @@ template <class Mesh, class VertexShader, class FragmentShader>
     return s;
 }
 
-template <class Draw>
-[[nodiscard]] bool has_subset(std::span<const Draw> draws) {
-    return std::any_of(draws.begin(), draws.end(), [](const Draw& d) { return d.mesh.part.whole != 0; });
-}
-// The same for draws that become fragments on this backend, whose shaders may ask for numbers of the whole mesh.
-template <class Backend, class Mesh, class VertexShader, class FragmentShader>
-[[nodiscard]] status validate_draws_on(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws) {
-    if constexpr (!requires { requires Backend::takes_subsets; })
-        if (has_subset(draws)) return failure(status_code::bad_subset);
-    return validate_draws(draws);
-}
-
 template <class... Targets>
 [[nodiscard]] status validate_framebuffer(const framebuffer_view<Targets...>& fb, const grid& g) {
     if (fb.extent != g.extent) return failure(status_code::extent_mismatch);
@@ -258,7 +246,7 @@ template <coverage... Known, class Backend, core::triangle_mesh Mesh, class Vert
     if constexpr (core::shaders_fit_targets<Mesh, VertexShader, FragmentShader, Targets...>()) {
         if (const status s = validate(g); !s.ok()) return s;
         if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
-        const status s = core::validate_draws_on<Backend>(draws);
+        const status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (s.counts.triangles_in == 0) return backend.clear(fb);
         core::known_coverage<Known...>::set(options);
@@ -284,7 +272,7 @@ template <coverage... Known, class Backend, core::triangle_mesh Mesh, class Vert
                               const grid& g, abuffer<Backend, Payload>& lists, voxelize_options options = {}) {
     if constexpr (core::shaders_fit_payload<Mesh, VertexShader, FragmentShader, Payload>()) {
         if (const status s = validate(g); !s.ok()) return s;
-        const status s = core::validate_draws_on<Backend>(draws);
+        const status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (s.counts.triangles_in == 0) {
             lists = abuffer<Backend, Payload>(backend);

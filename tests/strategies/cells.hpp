@@ -167,6 +167,12 @@ inline mesh_data triangles_in_voxel(int count, glm::vec3 corner, std::uint32_t s
     return m;
 }
 
+// Targets that are drawn in tiles, and one that is folded in order.
+template <template <class...> class Pipeline, class... First>
+using small_kinds = Pipeline<First..., vp::target<vp::bit, vp::blend::bit_or>, vp::target<float, vp::blend::add>,
+                             vp::target<double, vp::blend::max>, vp::target<std::uint32_t, vp::blend::replace>,
+                             vp::target<std::uint32_t, chain>>;
+
 // A payload for fragment lists.
 using any_double = any_values<vp::target<double, vp::blend::replace>>;
 

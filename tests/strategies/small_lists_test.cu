@@ -5,7 +5,9 @@
 
 #include "async_lists.hpp"
 #include "cells.hpp"
+#include "subset_meshes.hpp"
 
+#include <algorithm>
 #include <span>
 
 using namespace device_test;
@@ -94,6 +96,66 @@ TEST(SmallLists, OfAsynchronousCallsAreTheCpus) {
         compare_without_a_wait<double>({mixed_triangles(300, 30.0f, 74)}, g, any_double{}, rule);
         compare_without_a_wait<double>({far_triangles(73)}, large_grid, any_double{}, rule);
     }
+}
+
+// A mesh, two instances of a third of another, and the first again; or the middle one alone, once, which goes through
+// other kernels.
+template <class Backend, class FragmentShader>
+struct subset_draws {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, FragmentShader>;
+    mesh_data a = mixed_triangles(150, 30.0f, 75), b = mixed_triangles(300, 30.0f, 76);
+    vp::mesh<Backend> first, second;
+    some_triangles<Backend> some;
+    std::vector<draw_type> draws;
+    subset_draws(Backend& backend, const FragmentShader& fs, bool alone)
+        : first(backend, a.positions, a.triangles), second(backend, b.positions, b.triangles),
+          some(backend, b.triangles) {
+        if (!alone) draws.push_back({first.view(), {}, fs});
+        draws.push_back({some.of(second.view(), alone ? 1 : 2), {}, fs});
+        if (!alone) draws.push_back({first.view(), {}, fs});
+    }
+};
+template <class Payload, class FragmentShader>
+void list_subsets(const FragmentShader& fs, bool is_async) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    const vp::grid g = box_grid({30, 21, 33});
+    for (const bool alone : {false, true}) {
+        SCOPED_TRACE(alone ? "alone" : "among others");
+        const subset_draws<vp::cpu_backend, FragmentShader> here(cpu, fs, alone);
+        const subset_draws<vp::cuda_backend, FragmentShader> there(gpu, fs, alone);
+        const std::span draws(there.draws);
+        vp::abuffer<vp::cpu_backend, Payload> expected{cpu};
+        ASSERT_TRUE(vp::voxelize(cpu, std::span(here.draws), g, expected).ok());
+        const auto lists_of_cpu = expected.to_host(cpu);
+        // More than are drawn.
+        EXPECT_GT(*std::max_element(lists_of_cpu.primitives.begin(), lists_of_cpu.primitives.end()),
+                  there.draws.size() * 200);
+        if (!is_async) {
+            vp::abuffer<vp::cuda_backend, Payload> lists{gpu};
+            const vp::status s = vp::voxelize(gpu, draws, g, lists);
+            ASSERT_TRUE(s.ok()) << s.message();
+            expect_same_on_host(lists_of_cpu, lists.to_host(gpu));
+            continue;
+        }
+        const vp::workspace_limits limits{0, 0, 1 << 17, 1 << 16, alone};
+        vp::abuffer_view<Payload> lists;
+        const guarded_memory memory(gpu, vp::workspace_bytes(draws, g, lists, {}, limits));
+        const vp::workspace_view workspace{const_cast<unsigned char*>(memory.memory.data()), memory.bytes, limits};
+        ASSERT_TRUE(vp::voxelize_async(gpu, draws, g, lists, {}, workspace).ok());
+        const vp::status s = vp::read_status(gpu, workspace);
+        ASSERT_TRUE(s.ok()) << s.message();
+        expect_same_on_host(lists_of_cpu, lists.to_host(gpu));
+        memory.expect_untouched_behind(gpu);
+    }
+}
+
+TEST(SmallLists, OfSubsetsAreTheCpus) {
+    list_subsets<void>(vp::constant(true), false);
+    list_subsets<float>(shaded_late{}, false);
+    list_subsets<float>(shaded_late{3}, false);
+    list_subsets<void>(vp::constant(true), true);
+    list_subsets<double>(any_double{}, true);
 }
 
 // One draw of a constant shader is listed by the raster; for several draws, vertices are shaded first.

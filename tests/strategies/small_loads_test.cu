@@ -10,11 +10,6 @@ namespace blend = voxelpipe::blend;
 
 namespace {
 
-// Targets that are drawn in tiles, and one that is folded in order.
-template <template <class...> class Pipeline, class... First>
-using with_every_kind = Pipeline<First..., vp::target<vp::bit, blend::bit_or>, vp::target<float, blend::add>,
-                                 vp::target<double, blend::max>, vp::target<std::uint32_t, blend::replace>,
-                                 vp::target<std::uint32_t, chain>>;
 template <class... Targets>
 struct on_both {
     static void compare(const mesh_data& m, const vp::grid& g, vp::coverage rule) {
@@ -24,9 +19,9 @@ struct on_both {
 
 TEST(SmallLoads, EveryKindOfTargetHoldsTheCpusBytes) {
     for (const vp::coverage rule : both_rules) {
-        with_every_kind<on_both>::compare(mixed_triangles(300, 30.0f, 60), box_grid({30, 21, 33}), rule);
+        small_kinds<on_both>::compare(mixed_triangles(300, 30.0f, 60), box_grid({30, 21, 33}), rule);
         // More triangles in a tile than a work item holds.
-        with_every_kind<on_both>::compare(mixed_triangles(1200, 4.0f, 66), box_grid({5, 4, 6}), rule);
+        small_kinds<on_both>::compare(mixed_triangles(1200, 4.0f, 66), box_grid({5, 4, 6}), rule);
     }
 }
 
@@ -110,8 +105,8 @@ TEST(SmallLoads, ListedFragmentsGiveTheCpusBytes) {
 }
 
 TEST(SmallLoads, StageTimesOfTilesAndOrderedTargetsAddUpToTheCall) {
-    using fb_type = with_every_kind<vp::framebuffer, vp::cuda_backend>;
-    const with_every_kind<any_values> shader;
+    using fb_type = small_kinds<vp::framebuffer, vp::cuda_backend>;
+    const small_kinds<any_values> shader;
     const mesh_data m = mixed_triangles(300, 30.0f, 63);
     const vp::grid g = box_grid({30, 21, 33});
     vp::cuda_backend be;

@@ -6,6 +6,9 @@
 
 #include "api_model.hpp"
 #include "device_test.hpp"
+#include "subset_meshes.hpp"
+
+#include <voxelpipe/slabs/devices.cuh>
 
 #include <gtest/gtest.h>
 
@@ -19,6 +22,7 @@ namespace sparse_values { // named: nvcc warns of members of unnamed ones that t
 struct record {
     std::uint64_t chain;
     std::uint32_t fragments, last;
+    bool operator==(const record&) const = default;
 };
 struct chain {
     static constexpr bool order_free = false;
@@ -75,6 +79,7 @@ struct any_pair {
     vp::cpu_backend host{2};
     Framebuffer<vp::cuda_backend> on_device;
     Framebuffer<vp::cpu_backend> on_host;
+    bool draws_some = false; // a third of each mesh, as a subset that knows its numbers
     explicit any_pair(const glm::ivec3& extent) : on_device(device, extent), on_host(host, extent) {}
 
     template <class F>
@@ -87,11 +92,18 @@ struct any_pair {
               const Shader& shade = {}) {
         std::vector<vp::mesh<vp::cuda_backend>> owners;
         std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, Shader>> there, here;
+        std::vector<device_test::some_triangles<vp::cuda_backend>> some_there;
+        std::vector<device_test::some_triangles<vp::cpu_backend>> some_here;
         owners.reserve(meshes.size());
         for (const auto& m : meshes) {
             owners.emplace_back(device, m.positions, m.triangles);
             there.push_back({owners.back().view(), {}, shade});
             here.push_back({m.view(), {}, shade});
+            if (!draws_some) continue;
+            some_there.emplace_back(device, m.triangles);
+            some_here.emplace_back(host, m.triangles);
+            there.back().mesh = some_there.back().of(there.back().mesh);
+            here.back().mesh = some_here.back().of(here.back().mesh);
         }
         const vp::status a = vp::voxelize(device, there, grid, on_device, rule);
         const vp::status b = vp::voxelize(host, here, grid, on_host, rule);
@@ -164,6 +176,26 @@ TEST(DeviceSparse, GivesTheBytesOfTheCpu) {
         p.compare("nothing");
         EXPECT_EQ(p.on_device.num_voxels(), 0u);
     }
+}
+
+// mesh_view::part: shaders see the numbers of the whole; masks have none.
+TEST(DeviceSparse, SubsetsGiveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{45, 34, 37};
+    const vp::grid grid = unit::unit_grid(extent);
+    const std::vector<unit::small_mesh> meshes{unit::make_mesh(1, 75, extent), unit::make_mesh(2, 45, extent)};
+    pair p(extent);
+    constant_pair constants(extent);
+    p.draws_some = constants.draws_some = true;
+    p.draw(meshes, grid, vp::coverage::conservative, "computed");
+    constants.draw(meshes, grid, vp::coverage::thin, "constant", constant_shader);
+    EXPECT_GT(p.on_host.num_voxels(), 500u);
+    const device_test::some_triangles some(constants.device, meshes[0].triangles, {7, 7});
+    const vp::mesh<vp::cuda_backend> mesh(constants.device, meshes[0].positions, meshes[0].triangles);
+    EXPECT_EQ(vp::voxelize(constants.device, some.of(mesh.view()), grid, vp::passthrough{}, constant_shader,
+                           constants.on_device, vp::coverage::thin)
+                  .code,
+              vp::status_code::bad_subset);
+    constants.compare("a call that was refused");
 }
 
 TEST(DeviceSparse, GivesTheBytesOfTheCpuInPartsOfLargeGrids) {
@@ -282,4 +314,39 @@ TEST(DeviceSparse, SolidsGiveTheBytesOfTheCpu) {
     const vp::grid part = grid.crop({19, 5, 3}, {21, 27, 33});
     pair p(part.extent);
     p.draw_solid(meshes, part, {.extent = vp::solid_extent::outer}, "a crop");
+}
+
+// Slabs of several GPUs (slabs/devices.cuh), joined: of surfaces and of solids.
+TEST(DeviceSparse, SlabsOfSeveralGpusAreTheCpus) {
+    const glm::ivec3 extent{45, 34, 37};
+    const vp::grid grid = unit::unit_grid(extent);
+    const unit::small_mesh mesh = unit::make_mesh(14, 25, extent);
+    for (const bool is_solid : {false, true}) {
+        SCOPED_TRACE(is_solid ? "solid" : "surface");
+        vp::slabs::devices gpus({0, 0, 0}, false);
+        vp::slabs::device_options options;
+        options.is_solid = is_solid;
+        vp::slabs::device_slabs slabs(gpus, grid, mesh.view(), vp::passthrough{}, options);
+        auto parts = slabs.make([](vp::cuda_backend& gpu, glm::ivec3 part) {
+            return framebuffer<vp::cuda_backend>{gpu, part};
+        });
+        vp::cpu_backend host{2};
+        const vp::mesh<vp::cpu_backend> on_host{host, mesh.positions, mesh.triangles};
+        framebuffer<vp::cpu_backend> expected{host, extent};
+        const vp::status a = is_solid ? slabs.draw_solid(solid_shader{}, parts) : slabs.draw(shader{}, parts);
+        const vp::status b = is_solid
+                                 ? vp::voxelize_solid(host, on_host, grid, vp::passthrough{}, solid_shader{}, expected)
+                                 : vp::voxelize(host, on_host, grid, vp::passthrough{}, shader{}, expected);
+        ASSERT_TRUE(a.ok() && b.ok()) << a.message() << "; " << b.message();
+        EXPECT_EQ(a.counts, b.counts);
+        std::vector<decltype(expected.to_host(host))> on_gpus;
+        for (std::size_t i = 0; i < parts.size(); ++i) on_gpus.push_back(parts[i].to_host(gpus.backend(i)));
+        EXPECT_TRUE(vp::same_contents(vp::merge(std::span<const decltype(expected.to_host(host))>(on_gpus)),
+                                      expected.to_host(host)));
+        EXPECT_GT(expected.num_voxels(), 500u);
+    }
+    vp::slabs::devices gpus({0}, false);
+    vp::slabs::device_slabs surfaces(gpus, grid, mesh.view(), vp::passthrough{});
+    std::vector<framebuffer<vp::cuda_backend>> none;
+    EXPECT_EQ(surfaces.draw_solid(solid_shader{}, none).code, vp::status_code::bad_solid_options);
 }

@@ -5,6 +5,7 @@
 #include <voxelpipe/device/base/launch_kernels.cuh>
 #include <voxelpipe/device/call/readback_kernels.cuh>
 #include <voxelpipe/device/scene/check_indices_kernels.cuh>
+#include <voxelpipe/device/scene/subset_kernels.cuh>
 #include <voxelpipe/voxelpipe.hpp>
 
 namespace voxelpipe::device {

@@ -7,6 +7,7 @@
 // are fixed beforehand; if the fragments do not fit, the lists are empty, and read_status reports what was needed.
 
 #include <voxelpipe/device/fragments/store_lists.cuh>
+#include <voxelpipe/device/scene/subset.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>
 
 namespace voxelpipe {
@@ -65,11 +66,13 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
     auto* const voxels = behind.take<std::uint64_t>(capacity);
     auto* const offsets = behind.take<std::uint64_t>(capacity + 1);
     auto* const primitives = behind.take<std::uint32_t>(capacity);
+    auto* const listed = behind.take<listed_draw>(core::has_subset(call.draws) ? call.draws.size() : 0);
     auto* const payloads = std::is_void_v<Payload> ? nullptr : behind.take<payload_storage<Payload>>(capacity);
     if constexpr (Run) {
         arena start = memory;
         auto* const state = start.take<pipeline_state>(1); // first in the call's memory
         zero_memory(state, start.used() - memory.used(), stream);
+        check_subsets(call.draws, &state->index_error, stream);
         output_pointers outputs;
         outputs.value.voxels = voxels;
         outputs.value.offsets = offsets;
@@ -81,6 +84,12 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
         launch_behind(publish_lists_kernel<Key, payload_storage<Payload>>, are_done ? 1 : fill_device(capacity),
                       threads_per_block, stream, stage::abuffer_emit, sorted, state, call.limits, counts, voxels,
                       offsets, primitives, payloads);
+        if (core::has_subset(call.draws)) {
+            const std::vector<listed_draw> draws = listed_draws(call.draws);
+            upload(
+                listed, draws.size(), [&](std::size_t d) { return draws[d]; }, stream);
+            renumber_lists(listed, draws.size(), primitives, &counts->fragments, capacity, stream);
+        }
         lists = {counts, voxels, offsets, primitives, payloads, call.g.extent};
     }
     memory = behind;
@@ -133,7 +142,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                           const grid& g, const abuffer_view<Payload>& lists,
                                           const voxelize_options& options, const workspace_limits& limits) {
-    const status s = core::validate_draws_on<cuda_backend>(draws);
+    const status s = core::validate_draws(draws);
     if (!s.ok() || !validate(g).ok() || limits.fragments > core::max_numbered) return 0;
     if (s.counts.triangles_in == 0) return sizeof(device::empty_lists);
     try {
@@ -156,7 +165,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         core::known_coverage<Known...>::set(options);
         lists = {};
         if (const status s = validate(g); !s.ok()) return s;
-        status s = core::validate_draws_on<cuda_backend>(draws);
+        status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (workspace.limits.fragments > core::max_numbered) return core::failure(status_code::size_overflow);
         try {

@@ -16,6 +16,7 @@
 #include <voxelpipe/device/call/list_arrays.cuh>
 #include <voxelpipe/device/scene/check_indices.cuh>
 #include <voxelpipe/device/scene/cub_sort.cuh>
+#include <voxelpipe/device/scene/subset.cuh>
 #include <voxelpipe/solid.hpp>
 #include <voxelpipe/sparse.hpp>
 #include <voxelpipe/tuning/tuning_strategy.hpp>
@@ -286,6 +287,7 @@ template <class Selector, class Mesh, class VertexShader, class FragmentShader, 
 status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                          const framebuffer_view<Targets...>& fb, const voxelize_options& options,
                          std::uint64_t triangles_in, Coverage) {
+    if (const status s = device::check_subsets(draws, *this); !s.ok()) return s;
     // Tiny triangles have few fragments, so the first guess stays within what lists can be sorted.
     return device::attempt(
         framebuffer_history_, {triangles_in, g.extent, g.offset, options.rule}, device::max_sorted_fragments, times,
@@ -308,6 +310,7 @@ status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader
                          abuffer<cuda_backend, Payload>& lists, const voxelize_options& options,
                          std::uint64_t triangles_in, Coverage) {
     using call_type = device::abuffer_call<draw<Mesh, VertexShader, FragmentShader>, payload_storage<Payload>>;
+    if (const status wrong = device::check_subsets(draws, *this); !wrong.ok()) return wrong;
     abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
     status s = device::attempt(
         list_history_, {triangles_in, g.extent, g.offset, options.rule}, core::max_numbered, times, stream,
@@ -333,6 +336,16 @@ status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader
                 filler.template fill<Coverage, std::uint32_t>(options.rule, guess.expected_voxels);
             }
             return false;
+        });
+    if (s.ok() && core::has_subset(draws))
+        s = guard([&] {
+            const std::vector<device::listed_draw> listed = device::listed_draws(draws);
+            const buffer<device::listed_draw> in_device(*this, array_view<const device::listed_draw>(listed));
+            device::with_runtime_errors([&] {
+                device::renumber_lists(in_device.data(), listed.size(), made.primitives.data(), nullptr,
+                                       made.primitives.size(), stream);
+            });
+            return s;
         });
     if (s.ok()) {
         made.extent = g.extent;

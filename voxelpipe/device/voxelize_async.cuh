@@ -97,7 +97,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                           const grid& g, const framebuffer_view<Targets...>& fb,
                                           const voxelize_options& options, const workspace_limits& limits) {
-    const status s = core::validate_draws_on<cuda_backend>(draws);
+    const status s = core::validate_draws(draws);
     if (!s.ok() || !validate(g).ok() || !device::are_numbered(limits)) return 0;
     if (s.counts.triangles_in == 0) return sizeof(device::pipeline_state);
     try {
@@ -119,7 +119,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         core::known_coverage<Known...>::set(options);
         if (const status s = validate(g); !s.ok()) return s;
         if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
-        status s = core::validate_draws_on<cuda_backend>(draws);
+        status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (!device::are_numbered(workspace.limits)) return core::failure(status_code::size_overflow);
         try {
@@ -138,6 +138,8 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                 device::launch_until(call.last_stage(), [&] {
                     device::arena memory(workspace.memory);
                     device::zero_memory(workspace.memory, call.zeroed_bytes(), backend.stream);
+                    device::check_subsets(draws, &static_cast<device::pipeline_state*>(workspace.memory)->index_error,
+                                          backend.stream);
                     core::known_coverage<Known...>::dispatch(
                         options.rule, [&]<coverage Rule>() { call.template launch<Rule>(memory, backend.stream); });
                     if (!workspace.limits.expects_deferred &&
@@ -170,6 +172,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
     } catch (const device::cuda_failure& e) {
         return device::to_status(e);
     }
+    if ((state.index_error & device::bad_numbers) != 0) return core::failure(status_code::bad_subset);
     if (state.index_error != 0) return core::failure(status_code::index_out_of_range, stage::coarse_raster);
     if (device::has_failed(state, device::to_capacities(workspace.limits))) {
         const device::capacities limits = device::to_capacities(workspace.limits);

@@ -32,15 +32,6 @@
 
 namespace voxelpipe::slabs {
 
-// The items [first, second) of `count` that a rank reads: contiguous, ascending with the rank, of about equal number.
-[[nodiscard]] inline std::pair<std::uint64_t, std::uint64_t> share_of(std::uint64_t count, int rank, int num_ranks) {
-    const auto at = [&](int r) {
-        const auto n = static_cast<std::uint64_t>(num_ranks), i = static_cast<std::uint64_t>(r);
-        return count / n * i + std::min(i, count % n);
-    };
-    return {at(rank), at(rank + 1)};
-}
-
 // Members marked "every rank" are collective: all ranks of the communicator call them in the same order. Options and
 // grid are the same on all of them.
 template <class Backend, class VertexShader, class Mesh = mesh_view<>>
@@ -70,7 +61,7 @@ public:
                                                  counts_of_layers_.add(reach);
                                                  memory_.push(mine_, 0, r);
                                              });
-        sum(counts_, added);
+        add_triangles(counts_, added);
         if (s.ok())
             num_triangles_ += chunk.part.whole != 0 ? chunk.part.whole : chunk.triangles.size();
         else if (failed_.ok())
@@ -277,15 +268,6 @@ private:
         MPI_Allreduce(MPI_IN_PLACE, &all.solid.max_winding, 1, MPI_UINT64_T, MPI_MAX, comm_);
         return all;
     }
-    static void sum(counters& all, const counters& one) {
-        all.triangles_in += one.triangles_in;
-        all.triangles_nonfinite += one.triangles_nonfinite;
-        all.triangles_too_far += one.triangles_too_far;
-        all.triangles_zero_area += one.triangles_zero_area;
-        all.triangles_outside += one.triangles_outside;
-        all.triangles_drawn += one.triangles_drawn;
-    }
-
     MPI_Comm comm_;
     Backend& backend_;
     grid grid_;

@@ -20,6 +20,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace voxelpipe::slabs {
@@ -86,6 +87,7 @@ private:
 struct plan_options {
     std::uint64_t triangle_cost = 1; // of each triangle that reaches the slab
     std::uint64_t layer_cost = 0;    // of each of its layers, such as their clear and their output
+    std::uint64_t voxel_cost = 0;    // of each of its voxels, whose number in a layer depends on the axis
     int align = 1;                   // slabs begin at multiples of this, from the computed part's first layer
     bool may_turn = true;            // x or y may be chosen; A-buffers and files that are written in order need z
     double turn_gain = 1.05;         // another axis than z must be better by more than this factor
@@ -115,6 +117,9 @@ class layer_costs {
 public:
     layer_costs(const histogram& counts, int axis, const plan_options& options)
         : options_(options), layers_(counts.extent()[axis]), step_(std::max(1, options.align)) {
+        const glm::ivec3 e = counts.extent();
+        const std::int64_t area = std::int64_t{e[(axis + 1) % 3]} * e[(axis + 2) % 3];
+        options_.layer_cost += options_.voxel_cost * static_cast<std::uint64_t>(area);
         const auto begins = counts.begins(axis), ends = counts.ends(axis);
         begun_.resize(begins.size() + 1);
         ended_.resize(ends.size() + 1);
@@ -235,9 +240,9 @@ struct classified {
 };
 // is_solid: as voxelize_solid needs them. Triangles beside the grid along x cross its rows too, and their reach is the
 // nearest layer; those of no area are kept.
-[[nodiscard]] inline classified classify(const core::snap_transform& snap, const glm::ivec3& extent, coverage rule,
-                                         const glm::vec3& a, const glm::vec3& b, const glm::vec3& c,
-                                         bool is_solid = false) {
+[[nodiscard]] VOXELPIPE_HD inline classified classify(const core::snap_transform& snap, const glm::ivec3& extent,
+                                                      coverage rule, const glm::vec3& a, const glm::vec3& b,
+                                                      const glm::vec3& c, bool is_solid = false) {
     const auto snapped = [&](const glm::vec3& p) { return core::snap(snap, p.x, p.y, p.z); };
     const core::snapped_position p = snapped(a), q = snapped(b), r = snapped(c);
     core::voxel_box whole{{{0, 0, 0}}, {{extent.x - 1, extent.y - 1, extent.z - 1}}};
@@ -248,8 +253,9 @@ struct classified {
                  ? core::classify<coverage::thin>(p, q, r, snap.fraction, whole, t.reach)
                  : core::classify<coverage::conservative>(p, q, r, snap.fraction, whole, t.reach);
     if (is_solid) {
-        t.reach.lo[0] = std::clamp<std::int64_t>(t.reach.lo[0], 0, extent.x - 1);
-        t.reach.hi[0] = std::clamp<std::int64_t>(t.reach.hi[0], 0, extent.x - 1);
+        const auto nearest = [&](std::int64_t x) { return x < 0 ? 0 : x < extent.x ? x : extent.x - 1; };
+        t.reach.lo[0] = nearest(t.reach.lo[0]);
+        t.reach.hi[0] = nearest(t.reach.hi[0]);
     } else if (t.kind == core::triangle_class::drawn && rule != coverage::conservative &&
                core::has_zero_area(p, q, r)) {
         t.kind = core::triangle_class::zero_area;
@@ -257,26 +263,55 @@ struct classified {
     return t;
 }
 
-// Adds a triangle to the counters that a call has.
-inline void count(counters& counts, core::triangle_class kind) {
-    ++counts.triangles_in;
+// Adds `count` triangles of a class to the counters that a call has.
+inline void count_class(counters& counts, core::triangle_class kind, std::uint64_t count = 1) {
+    counts.triangles_in += count;
     switch (kind) {
     case core::triangle_class::nonfinite:
-        ++counts.triangles_nonfinite;
+        counts.triangles_nonfinite += count;
         break;
     case core::triangle_class::too_far:
-        ++counts.triangles_too_far;
+        counts.triangles_too_far += count;
         break;
     case core::triangle_class::zero_area:
-        ++counts.triangles_zero_area;
+        counts.triangles_zero_area += count;
         break;
     case core::triangle_class::outside:
-        ++counts.triangles_outside;
+        counts.triangles_outside += count;
         break;
     case core::triangle_class::drawn:
-        ++counts.triangles_drawn;
+        counts.triangles_drawn += count;
         break;
     }
+}
+
+// Adds what different parts of a mesh have counted of their triangles.
+inline void add_triangles(counters& all, const counters& one) {
+    all.triangles_in += one.triangles_in;
+    all.triangles_nonfinite += one.triangles_nonfinite;
+    all.triangles_too_far += one.triangles_too_far;
+    all.triangles_zero_area += one.triangles_zero_area;
+    all.triangles_outside += one.triangles_outside;
+    all.triangles_drawn += one.triangles_drawn;
+}
+// Adds what different slabs have drawn: fragments, voxels and rows. Their triangles are not added up.
+inline void add_drawn(status& all, const status& one) {
+    all.counts.fragments += one.counts.fragments;
+    all.counts.fragments_discarded += one.counts.fragments_discarded;
+    all.counts.voxels += one.counts.voxels;
+    all.solid.open_rows += one.solid.open_rows;
+    all.solid.crossings += one.solid.crossings;
+    all.solid.max_winding = std::max(all.solid.max_winding, one.solid.max_winding);
+}
+
+// The items [first, second) of `count` that one of several ranks or devices reads: contiguous, ascending with the rank,
+// of about equal number.
+[[nodiscard]] inline std::pair<std::uint64_t, std::uint64_t> share_of(std::uint64_t count, int rank, int num_ranks) {
+    const auto at = [&](int r) {
+        const auto n = static_cast<std::uint64_t>(num_ranks), i = static_cast<std::uint64_t>(r);
+        return count / n * i + std::min(i, count % n);
+    };
+    return {at(rank), at(rank + 1)};
 }
 
 } // namespace voxelpipe::slabs

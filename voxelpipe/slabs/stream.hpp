@@ -174,7 +174,7 @@ private:
                 output out = make(s.where.extent);
                 s.drawn = draw_one<IsSolid>(records, shader, s.where, out, call);
                 if (s.drawn.ok()) {
-                    add(all, s.drawn);
+                    add_drawn(all, s.drawn);
                     sink(std::as_const(s), out);
                 }
             } catch (const std::bad_alloc&) {
@@ -321,15 +321,6 @@ private:
         for (std::size_t i = bins.size(); i-- > 0;)
             pending_.push_front({parts.crop(whole.where, i), std::move(bins[i]), {}});
         return true;
-    }
-
-    static void add(status& all, const status& one) {
-        all.counts.fragments += one.counts.fragments;
-        all.counts.fragments_discarded += one.counts.fragments_discarded;
-        all.counts.voxels += one.counts.voxels;
-        all.solid.open_rows += one.solid.open_rows;
-        all.solid.crossings += one.solid.crossings;
-        all.solid.max_winding = std::max(all.solid.max_winding, one.solid.max_winding);
     }
 
     Backend& backend_;

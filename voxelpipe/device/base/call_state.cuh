@@ -11,6 +11,10 @@
 
 namespace voxelpipe::device {
 
+// Bits of pipeline_state::index_error: an index that names no vertex, numbers of a subset that do not ascend below its
+// whole.
+inline constexpr unsigned int bad_index = 1, bad_numbers = 2;
+
 // Lies in global memory and is zero when a call starts. Totals go on counting past a capacity, so they say how much is
 // needed.
 struct pipeline_state {
@@ -19,8 +23,8 @@ struct pipeline_state {
     unsigned long long tile_pairs, tile_records;         // coarse raster
     unsigned long long list_fragments, fragment_records; // A-buffer
     unsigned long long list_voxels;
-    unsigned long long filtered, kept; // listed fragments that the shader discards, and all others
-    unsigned int index_error;
+    unsigned long long filtered, kept;              // listed fragments that the shader discards, and all others
+    unsigned int index_error;                       // bad_index and bad_numbers
     unsigned int num_items, num_splits, num_images; // tile split
     unsigned int next_item;                         // fine raster
     unsigned int num_ordered[5];                    // fragment order: lengths of order_lists

@@ -14,6 +14,7 @@
 #include <voxelpipe/device/fragments/radix_sort_kernels.cuh>
 #include <voxelpipe/device/scene/check_indices_kernels.cuh>
 #include <voxelpipe/device/scene/cub_sort_kernels.cuh>
+#include <voxelpipe/device/scene/subset_kernels.cuh>
 #include <voxelpipe/device/tiles/tile_passes_kernels.cuh>
 #else
 #include <voxelpipe/device/call/kernel_instances.cuh>

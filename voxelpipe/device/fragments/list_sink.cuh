@@ -36,7 +36,7 @@ struct listing_sink : sink_base<Call> {
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(const glm::uvec3& index) const {
         const std::uint32_t num = this->call.out.num_vertices;
         const bool ok = index.x < num && index.y < num && index.z < num;
-        if (!ok) atomicOr(&this->call.out.state->index_error, 1u);
+        if (!ok) atomicOr(&this->call.out.state->index_error, bad_index);
         return ok;
     }
     __device__ VOXELPIPE_INLINE void begin(std::uint32_t triangle) {

@@ -153,8 +153,10 @@ status cuda_backend::run_sparse(std::span<const draw<Mesh, VertexShader, Fragmen
                                 sparse_framebuffer<cuda_backend, Targets...>& fb, const voxelize_options& options,
                                 std::uint64_t triangles_in, Coverage) {
     if constexpr (device::may_follow_from_masks<FragmentShader, Targets...>)
-        if (device::follows_from_masks(draws, g, options.rule, triangles_in, fb))
+        if (device::follows_from_masks(draws, g, options.rule, triangles_in, fb)) {
+            if (const status s = device::check_subsets(draws, *this); !s.ok()) return s;
             return device::run_masks<Coverage>(*this, draws, g, fb, options, triangles_in);
+        }
     using shader = device::payload_shader<FragmentShader>;
     using payload = typename device::outputs_payload<core::shader_output<Mesh, VertexShader, FragmentShader>>::type;
     std::vector<draw<Mesh, VertexShader, shader>> listed;

@@ -26,7 +26,7 @@ __global__ void check_indices_kernel(const Index* indices, std::uint64_t count, 
         done = count / 4 * 4;
     }
     for (std::uint64_t i = done + thread; i < count; i += threads) bad = bad || indices[i] >= num_vertices;
-    if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, 1u);
+    if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, bad_index);
 }
 
 // *max must be 0 before.

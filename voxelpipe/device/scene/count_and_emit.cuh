@@ -129,7 +129,7 @@ __global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) v
         }
         b.counts[i] = n;
     }
-    if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, 1u);
+    if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, bad_index);
     if (op.counts_triangles) {
         const bool dropped = valid && !bad && kind != triangle_class::drawn;
         const int drawn = __syncthreads_count(static_cast<int>(valid && !bad && !dropped));

@@ -29,6 +29,11 @@ struct fragment_source {
         f.draw = t.draw;
         f.instance = t.instance;
         f.primitive = id;
+        if (d.numbers.whole != 0) {
+            const core::visible_numbers seen = d.numbers.of(t.triangle, t.instance);
+            f.triangle = seen.triangle;
+            f.primitive = seen.primitive;
+        }
         for (int i = 0; i < 3; ++i) {
             if constexpr (std::is_empty_v<varyings>)
                 f.vertex_varyings[i] = &none;

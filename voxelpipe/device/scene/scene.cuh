@@ -5,6 +5,7 @@
 // The scene as kernels see it. geometry: triangles and snapped positions, which is all that the coarse stages read.
 // scene: geometry with the draws' shaders and varyings.
 
+#include <voxelpipe/core/numbering.hpp>
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/device/base/call_state.cuh>
 #include <voxelpipe/device/base/launch.cuh>
@@ -116,6 +117,7 @@ template <class FragmentShader, class Varyings>
 struct draw_shading {
     FragmentShader fragment_shader;
     const Varyings* varyings; // per vertex; null if there are none
+    core::numbering numbers;
 };
 
 template <class FragmentShader, class Varyings>

@@ -4,6 +4,7 @@
 
 // Device memory for the draws' geometry and shading, for calls into framebuffers and A-buffers.
 
+#include <voxelpipe/core/numbering.hpp>
 #include <voxelpipe/device/scene/vertex_shade.cuh>
 
 #include <cstdint>
@@ -50,6 +51,8 @@ struct scene_memory {
         s.normal_factors = core::normal_factors(g);
         s.offset = g.offset;
         std::vector<draw_geometry> geometry_of(draws.size());
+        std::vector<core::numbering> numbers = core::make_numberings(draws);
+        numbers.resize(draws.size());
         std::size_t vertex = 0;
         std::uint32_t primitive = 0;
         for (std::size_t d = 0; d < draws.size(); ++d) {
@@ -63,7 +66,7 @@ struct scene_memory {
         }
         s.geo.num_primitives = primitive;
         s.geo.one = geometry_of[0];
-        s.one = {draws[0].fragment_shader, varyings_at(0)};
+        s.one = {draws[0].fragment_shader, varyings_at(0), numbers[0]};
         if (draws.size() > 1) {
             upload(
                 geometries, draws.size(), [&](std::size_t d) { return geometry_of[d]; }, stream);
@@ -71,7 +74,7 @@ struct scene_memory {
             upload(
                 shadings, draws.size(),
                 [&](std::size_t d) {
-                    const typename scene_type::shading one{draws[d].fragment_shader, varyings_at(first)};
+                    const typename scene_type::shading one{draws[d].fragment_shader, varyings_at(first), numbers[d]};
                     first += draws[d].mesh.num_vertices();
                     return one;
                 },

@@ -104,7 +104,7 @@ struct small_rows {
         if (valid) {
             t = load_solid_triangle(source, grid, i);
             if (!t.index_ok)
-                atomicOr(&state->index_error, 1u);
+                atomicOr(&state->index_error, bad_index);
             else if (source.is_counted(i))
                 totals.see(t.kind);
         }

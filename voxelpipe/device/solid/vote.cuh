@@ -54,7 +54,7 @@ __global__ __launch_bounds__(threads_per_block,
          i += warps) {
         const auto at = source.locate(first_triangle + static_cast<std::uint32_t>(i));
         if (!at.index_ok) {
-            if (lane == 0) atomicOr(&state->index_error, 1u);
+            if (lane == 0) atomicOr(&state->index_error, bad_index);
             continue;
         }
         const core::snapped_position p[3] = {source.exact(at, at.index.x), source.exact(at, at.index.y),

@@ -126,7 +126,7 @@ struct output_base {
     // True if all three indices name vertices; otherwise notes the error.
     [[nodiscard]] __device__ VOXELPIPE_INLINE bool check(const glm::uvec3& index) const {
         const bool ok = index.x < num_vertices && index.y < num_vertices && index.z < num_vertices;
-        if (!ok) atomicOr(&state->index_error, 1u);
+        if (!ok) atomicOr(&state->index_error, bad_index);
         return ok;
     }
 };

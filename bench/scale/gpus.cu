@@ -1,0 +1,280 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Several GPUs of one host: each cell is drawn by the first GPU alone, and by 2, 3, ... of all GPUs, which have a slab
+// each (slabs/devices.cuh); in the same run, by the host's clock around calls that wait. Efficiency is the time of one
+// GPU over the number of GPUs times theirs. Before it is timed, a cell is gathered on the first GPU and compared there
+// with what that GPU drew alone, where both fit. One GPU works for two where there is no other. Prints a table of
+// medians; --out writes it as CSV too.
+
+#include "device_record.hpp"
+#include "machine.hpp"
+#include "output.hpp"
+#include "scene_choice.hpp"
+#include "session.hpp"
+#include "table.hpp"
+
+#include <voxelpipe/slabs/devices.cuh>
+
+#include <CLI/CLI.hpp>
+
+#include <chrono>
+#include <cstdio>
+#include <iostream>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace vp = voxelpipe;
+namespace slabs = voxelpipe::slabs;
+using namespace bench;
+
+struct options {
+    std::string scenes = VOXELPIPE_SCENES_DIR, out;
+    std::vector<std::string> names;
+    std::vector<int> resolutions{512, 1024, 2048};
+    gpu::repetition repeat;
+    double triangle_bytes = slabs::device_options{}.triangle_bytes;
+};
+
+double now_ms() {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+template <class Call>
+double median_ms(const gpu::repetition& how, const Call& call) {
+    for (int i = 0; i < how.warmups; ++i) call();
+    std::vector<double> times;
+    const double start = now_ms();
+    while (static_cast<int>(times.size()) < how.runs &&
+           (static_cast<int>(times.size()) < how.least_runs || now_ms() - start < 1000 * how.seconds)) {
+        const double begin = now_ms();
+        call();
+        times.push_back(now_ms() - begin);
+    }
+    return summarize(times).median;
+}
+
+// Memory that is freed stays with each GPU's pool, as in a program that calls often.
+void keep_memory(int ordinal) {
+    cudaMemPool_t pool = nullptr;
+    std::uint64_t all = ~std::uint64_t{0};
+    gpu::check(cudaDeviceGetDefaultMemPool(&pool, ordinal), "pool");
+    gpu::check(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &all), "pool");
+}
+void trim_pools(const slabs::devices& gpus) {
+    gpus.for_each(gpus.size(), [&](std::size_t i, vp::cuda_backend& backend) {
+        cudaMemPool_t pool = nullptr;
+        gpu::check(cudaStreamSynchronize(backend.stream), "wait");
+        gpu::check(cudaDeviceGetDefaultMemPool(&pool, gpus.ordinal(i)), "pool");
+        gpu::check(cudaMemPoolTrimTo(pool, 0), "pool");
+    });
+}
+
+struct words_differ {
+    const std::uint32_t *a, *b;
+    unsigned long long* count;
+    __device__ void operator()(std::uint64_t i) const {
+        if (a[i] != b[i]) atomicAdd(count, 1ull);
+    }
+};
+
+struct measured {
+    double ms = 0, binning_ms = 0, gather_ms = 0;
+    std::string compared; // with the result of one GPU
+    std::string slabs_ms; // each GPU's own call, on its own
+};
+
+// One kind of call of one scene in one grid.
+template <class Output, class Shader>
+class cell {
+    static constexpr bool is_list = slabs::detail::is_abuffer<Output>;
+
+public:
+    cell(const options& how, const slabs::devices& one, const mesh_data& data, int n, const Shader& shader)
+        : how_(how), data_(data), grid_(vp::fit(data.positions, glm::ivec3(n))), shader_(shader),
+          backend_(one.backend(0)), mesh_(backend_, data.positions, data.triangles),
+          whole_(make(backend_, grid_.extent)) {
+        options_.count_voxels = is_list;
+        one_ms_ = median_ms(how_.repeat, [&] {
+            last_ = vp::voxelize(backend_, mesh_, grid_, vp::passthrough{}, shader_, whole_, options_);
+            if (last_.code == vp::status_code::out_of_memory) throw gpu::out_of_device_memory(last_.message());
+            last_.or_throw();
+        });
+    }
+    [[nodiscard]] double one_ms() const { return one_ms_; }
+    [[nodiscard]] const vp::counters& counts() const { return last_.counts; }
+
+    [[nodiscard]] measured draw_with(slabs::devices& gpus) {
+        measured m;
+        slabs::device_options cut;
+        cut.voxelize = options_;
+        cut.may_turn = false;
+        cut.voxel_bytes = slabs::detail::bytes_per_voxel<Output>;
+        cut.triangle_bytes = how_.triangle_bytes;
+        const vp::mesh_view<> view{data_.positions, data_.triangles};
+        (void)slabs::device_slabs(gpus, grid_, view, vp::passthrough{}, cut); // loads the kernels
+        const double begin = now_ms();
+        slabs::device_slabs drawn(gpus, grid_, view, vp::passthrough{}, cut);
+        m.binning_ms = now_ms() - begin;
+        auto parts = drawn.make([](vp::cuda_backend& backend, glm::ivec3 extent) { return make(backend, extent); });
+        vp::status s;
+        const auto call = [&] {
+            s = drawn.draw(shader_, parts);
+            s.or_throw();
+        };
+        call();
+        compare(drawn, gpus, parts, s, m);
+        m.ms = median_ms(how_.repeat, call);
+        for (std::size_t i = 0; i < drawn.size(); ++i) { // alone, so that no GPU waits for another
+            double ms = 0;
+            gpus.for_each(i + 1, [&](std::size_t k, vp::cuda_backend& backend) {
+                if (k != i) return;
+                ms = median_ms(how_.repeat, [&] {
+                    vp::voxelize(backend, drawn.mesh(i), drawn.slabs()[i].where, vp::passthrough{}, shader_, parts[i],
+                                 options_)
+                        .or_throw();
+                });
+            });
+            m.slabs_ms += (i == 0 ? "" : " ") + significant(ms);
+        }
+        return m;
+    }
+
+private:
+    [[nodiscard]] static Output make(vp::cuda_backend& backend, glm::ivec3 extent) {
+        if constexpr (is_list)
+            return Output{backend};
+        else
+            return Output{backend, extent};
+    }
+    template <class Slabs>
+    void compare(Slabs& drawn, slabs::devices& gpus, std::vector<Output>& parts, const vp::status& s, measured& m) {
+        if (!(s.counts == last_.counts)) throw std::runtime_error("other counts than one GPU's");
+        m.compared = "counts";
+        if constexpr (is_list) {
+            vp::host_abuffer<void> joined;
+            for (std::size_t i = 0; i < parts.size(); ++i)
+                slabs::append(joined, grid_, drawn.slabs()[i], parts[i].to_host(gpus.backend(i)));
+            const auto expected = whole_.to_host(backend_);
+            if (joined.voxels != expected.voxels || joined.offsets != expected.offsets ||
+                joined.primitives != expected.primitives)
+                throw std::runtime_error("other lists than one GPU's");
+            m.compared = "lists";
+        } else {
+            if (grid_.extent.x > 1024) return; // one framebuffer of the whole is enough
+            Output gathered = make(backend_, grid_.extent);
+            gpu::check(cudaStreamSynchronize(backend_.stream), "wait");
+            m.gather_ms = median_ms({1, 3, 1, 1}, [&] { drawn.template gather<0>(parts, gathered.view()).or_throw(); });
+            const auto& a = vp::get<0>(whole_).view();
+            const auto& b = vp::get<0>(gathered).view();
+            using element = std::remove_cvref_t<decltype(*a.elements)>;
+            using map = typename std::remove_cvref_t<decltype(a)>::map;
+            static_assert(sizeof(element) == sizeof(std::uint32_t));
+            vp::cuda_backend::buffer<unsigned long long> count(backend_, std::vector<unsigned long long>(1));
+            backend_.for_each(map::elements(grid_.extent),
+                              words_differ{reinterpret_cast<const std::uint32_t*>(a.elements),
+                                           reinterpret_cast<const std::uint32_t*>(b.elements), count.data()});
+            if (count.to_host(backend_)[0] != 0) throw std::runtime_error("other voxels than one GPU's");
+            m.compared = "voxels";
+        }
+    }
+
+    const options& how_;
+    const mesh_data& data_;
+    vp::grid grid_;
+    Shader shader_;
+    vp::voxelize_options options_;
+    vp::cuda_backend& backend_;
+    vp::mesh<vp::cuda_backend> mesh_;
+    Output whole_;
+    vp::status last_;
+    double one_ms_ = 0;
+};
+
+int run(const options& how, const std::string& command) {
+    using bits = vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, vp::blend::bit_or>>;
+    using sums = vp::framebuffer<vp::cuda_backend, vp::target<float, vp::blend::add>>;
+    using lists = vp::abuffer<vp::cuda_backend>;
+    std::vector<int> ordinals = slabs::devices::all();
+    if (ordinals.empty()) throw std::runtime_error("no GPU");
+    for (const int o : ordinals) keep_memory(o);
+    if (ordinals.size() == 1) ordinals.push_back(ordinals[0]);
+    slabs::devices one({ordinals[0]});
+    gpu::clock_watch watch;
+    table rows({"scene", "resolution", "cell", "triangles", "fragments", "gpus", "one_ms", "ms", "efficiency",
+                "slabs_ms", "binning_ms", "gather_ms", "compared"});
+    std::vector<std::string> notes;
+    bool failed = false;
+    for (const std::string& name : how.names.empty() ? available_scenes(how.scenes, notes) : how.names) {
+        const mesh_data data = find_mesh(how.scenes, name);
+        const auto measure = [&]<class Output>(std::type_identity<Output>, const char* kind, int n, auto shader) {
+            try {
+                trim_pools(one);
+                cell<Output, decltype(shader)> c(how, one, data, n, shader);
+                for (std::size_t k = 2; k <= ordinals.size(); ++k) {
+                    slabs::devices gpus({ordinals.begin(), ordinals.begin() + static_cast<std::ptrdiff_t>(k)});
+                    const measured m = c.draw_with(gpus);
+                    trim_pools(gpus);
+                    watch.read();
+                    const double efficiency = c.one_ms() / (static_cast<double>(k) * m.ms);
+                    rows.add_row({data.name, std::to_string(n), kind, std::to_string(c.counts().triangles_in),
+                                  std::to_string(c.counts().fragments), std::to_string(k), significant(c.one_ms(), 4),
+                                  significant(m.ms, 4), significant(efficiency), m.slabs_ms, significant(m.binning_ms),
+                                  m.gather_ms > 0 ? significant(m.gather_ms) : "", m.compared});
+                    say(data.name + " " + std::to_string(n) + " " + kind + ", " + std::to_string(k) +
+                        " GPUs: " + significant(c.one_ms(), 4) + " -> " + significant(m.ms, 4) + " ms, slabs " +
+                        m.slabs_ms + ", same " + m.compared);
+                }
+            } catch (const std::exception& e) {
+                failed = true;
+                notes.push_back("failed: " + data.name + " " + std::to_string(n) + " " + kind + ": " + e.what());
+                say(notes.back());
+                (void)cudaGetLastError();
+            }
+        };
+        for (const int n : how.resolutions) {
+            measure(std::type_identity<bits>{}, "bit", n, vp::constant(true));
+            measure(std::type_identity<sums>{}, "float_add", n, vp::constant(0.7f));
+            measure(std::type_identity<lists>{}, "abuffer", n, vp::constant(true));
+        }
+    }
+    std::string text = "# Several GPUs of one host\n\n" + gpu::describe_device(watch) + "- GPUs: ";
+    for (const int o : ordinals) text += std::to_string(o) + " ";
+    text += "\n- commit: " + describe_machine().commit + "\n- date: " + describe_machine().date + "\n" +
+            "- clocks over the run: " + watch.range() + "\n- command: `" + command +
+            "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
+            " calls by the host's clock, allocations and waits included, mesh on the devices\n"
+            "- slabs_ms: the slab of each GPU while the others rest; binning_ms: copying the mesh to all GPUs, cutting "
+            "and binning, once a mesh; gather_ms: all slabs to the first GPU\n";
+    for (const std::string& note : notes) text += "- " + note + "\n";
+    text += "\n" + rows.markdown();
+    std::cout << text;
+    if (!how.out.empty()) {
+        write_file(std::filesystem::path(how.out) / "gpu_scale.md", text);
+        write_file(std::filesystem::path(how.out) / "gpu_scale.csv", rows.csv());
+    }
+    return failed ? 1 : 0;
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+    options how;
+    CLI::App app{"One GPU against several of the same host, a slab each"};
+    app.add_option("--scenes", how.scenes, "Folder of the benchmark scenes (.vpm or .vpz)")->capture_default_str();
+    app.add_option("--mesh", how.names, "A scene, a generated mesh or a file; may be repeated. Default: five scenes");
+    app.add_option("--resolution", how.resolutions, "Voxels a side; may be repeated")->capture_default_str();
+    app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
+    app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
+    app.add_option("--triangle-bytes", how.triangle_bytes, "What a triangle costs when the grid is cut")
+        ->capture_default_str();
+    app.add_option("--out", how.out, "Folder for gpu_scale.md and gpu_scale.csv");
+    CLI11_PARSE(app, argc, argv);
+    try {
+        return run(how, bench::command_line(argc, argv));
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "bench_gpu_gpus: %s\n", e.what());
+        return 1;
+    }
+}

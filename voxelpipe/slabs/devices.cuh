@@ -1,0 +1,233 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Voxelizes with several GPUs of one host. The grid is cut into slabs of about equal work, one a GPU; each GPU keeps
+// the triangles that reach its slab, and draws them as often as it is asked to. All slabs together are the result of
+// one call with one GPU, bit for bit, and so are the counts. Results stay where they were drawn, until they are
+// gathered.
+//
+//   slabs::devices gpus;                                                       // all of the host
+//   slabs::device_slabs slabs(gpus, grid, mesh_in_host_memory, vertex_shader); // cuts, copies, counts
+//   auto parts = slabs.make([](vp::cuda_backend& gpu, glm::ivec3 extent) { return framebuffer{gpu, extent}; });
+//   slabs.draw(fragment_shader, parts).or_throw();
+//   slabs.gather<0>(parts, whole).or_throw();                                  // from GPU to GPU
+
+#include <voxelpipe/slabs/device_bins.cuh>
+#include <voxelpipe/slabs/device_set.cuh>
+#include <voxelpipe/slabs/plan.hpp>
+#include <voxelpipe/slabs/stream.hpp>
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe::slabs {
+
+// How a grid is cut for several GPUs.
+struct device_options {
+    voxelize_options voxelize = {}; // of each slab's call
+    // Bytes of the targets for each voxel, which are cleared or filled by a call. 0 balances the triangles alone.
+    double voxel_bytes = 0;
+    // What a triangle costs, in bytes of memory that its GPU could fill in the same time.
+    double triangle_bytes = 512;
+    int align = 1;         // slabs begin at multiples of this: 8 for targets in bricks that are gathered
+    bool may_turn = true;  // false: slabs along z, which A-buffers and gather() need
+    bool is_solid = false; // for draw_solid: triangles beside the grid along x count too, and slabs are along y or z
+};
+
+// One mesh in the slabs of several GPUs. Each GPU has all vertices, which its vertex shader sees as in one call, and
+// the triangles of its slab. An object is used by one thread at a time.
+template <class VertexShader, class... Attributes>
+class device_slabs {
+public:
+    using mesh_type = mesh_view<Attributes...>; // in host memory
+
+    // Copies the mesh; refers to the devices. Throws std::invalid_argument with the status's message if grid or mesh
+    // are not valid (no instances, no subset), and what the devices throw.
+    device_slabs(devices& gpus, const grid& g, const mesh_type& mesh, const VertexShader& shader,
+                 const device_options& options = {})
+        : gpus_(gpus), grid_(g), shader_(shader), options_(options), meshes_(gpus.size()) {
+        status s = validate(g);
+        if (s.ok()) s = core::validate_draws(std::span(&as_const(draw_of(mesh, constant_output<bool>{})), 1));
+        if (s.ok() && (mesh.copies.count != 1 || mesh.part.whole != 0)) s = core::failure(status_code::bad_subset);
+        if (s.ok()) s = cut(mesh);
+        if (!s.ok()) throw std::invalid_argument("voxelpipe::slabs: " + s.message());
+    }
+
+    // Slabs that have layers: one for each of the first GPUs.
+    [[nodiscard]] std::size_t size() const { return slabs_.size(); }
+    // Where they are, and what was drawn into each by the last call.
+    [[nodiscard]] const std::vector<slab>& slabs() const { return slabs_; }
+    // The triangles of a slab, in its GPU's memory, with the numbers of the whole: for calls of another kind.
+    [[nodiscard]] mesh_type mesh(std::size_t i) const { return meshes_[i]->view(); }
+    // How the grid was cut.
+    [[nodiscard]] const plan& cuts() const { return plan_; }
+    // Counts of the triangles in the whole grid.
+    [[nodiscard]] const counters& counts() const { return counts_; }
+
+    // make(cuda_backend&, glm::ivec3 extent) for each slab, on its GPU: framebuffers, A-buffers or sparse framebuffers.
+    template <class Make>
+    [[nodiscard]] auto make(const Make& make_one) {
+        using output = std::remove_cvref_t<std::invoke_result_t<const Make&, cuda_backend&, glm::ivec3>>;
+        std::vector<std::optional<output>> made(size());
+        gpus_.for_each(
+            size(), [&](std::size_t i, cuda_backend& gpu) { made[i].emplace(make_one(gpu, slabs_[i].where.extent)); });
+        std::vector<output> outputs;
+        outputs.reserve(size());
+        for (auto& o : made) outputs.push_back(std::move(*o));
+        return outputs;
+    }
+
+    // Draws every slab into its output, at once, and waits. Returns the counts of the whole, or the first failure;
+    // other slabs may have been drawn then. A-buffers need slabs along z (bad_crop otherwise).
+    template <class FragmentShader, class Output>
+    [[nodiscard]] status draw(const FragmentShader& shader, std::vector<Output>& outputs) {
+        if (detail::is_abuffer<Output> && plan_.axis != 2) return core::failure(status_code::bad_crop);
+        return draw_each(shader, outputs, [&](cuda_backend& gpu, auto draws, const grid& g, Output& out) {
+            return voxelize(gpu, draws, g, out, options_.voxelize);
+        });
+    }
+    // The same for solids, without repairs. Counts of rows are sums over the slabs.
+    template <class SolidShader, class Output>
+    [[nodiscard]] status draw_solid(const SolidShader& shader, std::vector<Output>& outputs,
+                                    const solid_options& how = {}) {
+        if (how.repair != repair::none || !options_.is_solid) return core::failure(status_code::bad_solid_options);
+        return draw_each(shader, outputs, [&](cuda_backend& gpu, auto draws, const grid& g, Output& out) {
+            return voxelize_solid(gpu, draws, g, out, how);
+        });
+    }
+
+    // Copies target I of every slab into that of a framebuffer of the whole grid, on any of the GPUs or in host memory
+    // that view() shows, and waits. Earlier work on the whole has ended. bad_crop: slabs are not along z, or do not
+    // begin with a brick of a tiled target.
+    template <std::size_t I, class Output, class... Targets>
+    [[nodiscard]] status gather(const std::vector<Output>& parts, const framebuffer_view<Targets...>& whole) {
+        using map = typename core::pack_element<I, Targets...>::type::map;
+        const auto& to = get<I>(whole.targets);
+        if (whole.extent != grid_.extent) return core::failure(status_code::extent_mismatch);
+        for (const slab& s : slabs_)
+            if (plan_.axis != 2 || (map::bricks && (s.where.offset.z - grid_.offset.z) % 8 != 0))
+                return core::failure(status_code::bad_crop);
+        gpus_.for_each(size(), [&](std::size_t i, cuda_backend& gpu) {
+            const grid& where = slabs_[i].where;
+            glm::ivec3 below = grid_.extent;
+            below.z = where.offset.z - grid_.offset.z;
+            const auto& from = get<I>(parts[i].view().targets);
+            const std::size_t cells = map::cells(where.extent);
+            device::with_runtime_errors([&] {
+                for (std::size_t p = 0; p < map::elements(grid_.extent) / map::cells(grid_.extent); ++p)
+                    device::check(cudaMemcpyAsync(to.elements + p * map::cells(grid_.extent) + map::cells(below),
+                                                  from.elements + p * cells, cells * sizeof(*to.elements),
+                                                  cudaMemcpyDefault, gpu.stream));
+                device::check(cudaStreamSynchronize(gpu.stream));
+            });
+        });
+        return {};
+    }
+
+private:
+    template <class Shader>
+    [[nodiscard]] auto draw_of(const mesh_type& mesh, const Shader& shader) const {
+        return voxelpipe::draw<mesh_type, VertexShader, Shader>{mesh, shader_, shader};
+    }
+    template <class T>
+    [[nodiscard]] static const T& as_const(const T& value) {
+        return value;
+    }
+
+    // Uploads the mesh, counts its triangles by layers, each GPU a share, cuts, and bins.
+    [[nodiscard]] status cut(const mesh_type& mesh) {
+        const std::size_t n = gpus_.size();
+        std::vector<histogram> layers(n, histogram(grid_.extent));
+        std::vector<counters> counted(n);
+        const status s = on_each(n, [&](std::size_t i, cuda_backend& gpu) {
+            meshes_[i] = std::make_unique<detail::binned_mesh<Attributes...>>(gpu, mesh);
+            const auto [first, last] = share_of(mesh.triangles.size(), static_cast<int>(i), static_cast<int>(n));
+            return meshes_[i]->count_layers(gpu, shader_, rule(), first, last - first, layers[i], counted[i]);
+        });
+        if (!s.ok()) return s;
+        for (std::size_t i = 0; i < n; ++i) {
+            add_triangles(counts_, counted[i]);
+            for (std::size_t w = 0; i != 0 && w < layers[0].words().size(); ++w)
+                layers[0].words()[w] += layers[i].words()[w];
+        }
+        plan_options how;
+        how.align = options_.align;
+        how.may_turn = options_.may_turn;
+        how.triangle_cost = static_cast<std::uint64_t>(8 * options_.triangle_bytes); // in bits
+        how.voxel_cost = static_cast<std::uint64_t>(8 * options_.voxel_bytes);
+        plan_ = split(layers[0], static_cast<int>(n), how);
+        if (options_.is_solid && plan_.axis == 0) {
+            how.may_turn = false;
+            plan_ = split(layers[0], static_cast<int>(n), how);
+        }
+        for (std::size_t i = 0; i < n; ++i) {
+            if (plan_.slabs[i].size() == 0) continue;
+            slab one;
+            one.where = plan_.crop(grid_, i);
+            slabs_.push_back(one);
+        }
+        return on_each(n, [&](std::size_t i, cuda_backend& gpu) {
+            if (i >= size())
+                meshes_[i].reset();
+            else
+                meshes_[i]->keep(gpu, shader_, rule(), plan_.axis, plan_.slabs[i]);
+            return status{};
+        });
+    }
+    [[nodiscard]] detail::bin_rule rule() const {
+        return {core::make_snap_transform(grid_), grid_.extent, options_.voxelize.rule, options_.is_solid};
+    }
+
+    template <class Shader, class Output, class Call>
+    [[nodiscard]] status draw_each(const Shader& shader, std::vector<Output>& outputs, const Call& call) {
+        if (outputs.size() != size()) return core::failure(status_code::extent_mismatch);
+        const status s = on_each(size(), [&](std::size_t i, cuda_backend& gpu) {
+            const auto one = draw_of(meshes_[i]->view(), shader);
+            return slabs_[i].drawn = call(gpu, std::span(&one, 1), slabs_[i].where, outputs[i]);
+        });
+        if (!s.ok()) return s;
+        status all;
+        for (slab& one : slabs_) {
+            one.voxels_before = all.counts.voxels;
+            one.fragments_before = all.counts.fragments;
+            add_drawn(all, one.drawn);
+        }
+        const counters drawn = all.counts;
+        all.counts = counts_;
+        all.counts.fragments = drawn.fragments;
+        all.counts.fragments_discarded = drawn.fragments_discarded;
+        all.counts.voxels = drawn.voxels;
+        return all;
+    }
+
+    // work(i, GPU) on the first `count` GPUs; the first failure.
+    template <class Work>
+    [[nodiscard]] status on_each(std::size_t count, const Work& work) {
+        std::vector<status> found(count);
+        gpus_.for_each(count,
+                       [&](std::size_t i, cuda_backend& gpu) { found[i] = gpu.guard([&] { return work(i, gpu); }); });
+        for (const status& s : found)
+            if (!s.ok()) return s;
+        return {};
+    }
+
+    devices& gpus_;
+    grid grid_;
+    VertexShader shader_;
+    device_options options_;
+    plan plan_;
+    counters counts_;
+    std::vector<slab> slabs_;
+    std::vector<std::unique_ptr<detail::binned_mesh<Attributes...>>> meshes_; // by GPU
+};
+
+} // namespace voxelpipe::slabs
