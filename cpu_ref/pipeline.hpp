@@ -12,6 +12,7 @@
 #include <voxelpipe/core/interpolate.hpp>
 #include <voxelpipe/core/numbering.hpp>
 #include <voxelpipe/core/primitive.hpp>
+#include <voxelpipe/triangle_counts.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <algorithm>
@@ -264,25 +265,10 @@ template <coverage Rule, class Key>
             if ((Rule == coverage::thin || s.arms != core::arm_set::none) && kind == core::triangle_class::drawn &&
                 core::has_zero_area(a, b_, c))
                 kind = core::triangle_class::zero_area;
-            switch (kind) {
-            case core::triangle_class::nonfinite:
-                ++counts.triangles_nonfinite;
-                break;
-            case core::triangle_class::too_far:
-                ++counts.triangles_too_far;
-                break;
-            case core::triangle_class::zero_area:
-                ++counts.triangles_zero_area;
-                break;
-            case core::triangle_class::outside:
-                ++counts.triangles_outside;
-                break;
-            case core::triangle_class::drawn:
-                ++counts.triangles_drawn;
+            core::count_class(counts, kind);
+            if (kind == core::triangle_class::drawn)
                 core::for_each_tile<Rule>(a, b_, c, s.snap.fraction, reach, tiles,
                                           [&](std::uint64_t tile) { pairs.push(static_cast<Key>(tile), id); });
-                break;
-            }
         }
         part.pairs = std::move(pairs);
         part.counts = counts;
@@ -296,11 +282,7 @@ template <coverage Rule, class Key>
             all.code = part.code;
             return all;
         }
-        all.counts.triangles_nonfinite += part.counts.triangles_nonfinite;
-        all.counts.triangles_too_far += part.counts.triangles_too_far;
-        all.counts.triangles_zero_area += part.counts.triangles_zero_area;
-        all.counts.triangles_outside += part.counts.triangles_outside;
-        all.counts.triangles_drawn += part.counts.triangles_drawn;
+        core::add_triangles(all.counts, part.counts);
         first[b + 1] = first[b] + part.pairs.size();
     }
     all.counts.triangles_in = n;

@@ -9,6 +9,7 @@
 #include <voxelpipe/core/crossing.hpp>
 #include <voxelpipe/core/holes.hpp>
 #include <voxelpipe/solid.hpp>
+#include <voxelpipe/triangle_counts.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -163,10 +164,7 @@ template <class Crossing>
                 all.code = part.code;
                 return all;
             }
-            all.counts.triangles_nonfinite += part.counts.triangles_nonfinite;
-            all.counts.triangles_too_far += part.counts.triangles_too_far;
-            all.counts.triangles_outside += part.counts.triangles_outside;
-            all.counts.triangles_drawn += part.counts.triangles_drawn;
+            core::add_triangles(all.counts, part.counts);
             first[b + 1] = first[b] + part.crossings.size();
         }
         all.counts.triangles_in = s.triangles_in;

@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A landscape in a grid that does not fit into the memory that the program allows itself: the mesh is made strip by
 // strip and never there as a whole, slabs of the grid are drawn one at a time, and terrain.raw gets one byte a voxel,
-// the number of triangles in it, x fastest. Another resolution, and another budget in MiB: 14_stream 512 64.
+// the number of triangles in it, x fastest. terrain.ppm shows the slabs in colours of their own. Another resolution,
+// and another budget in MiB: 14_stream 512 64.
+#include "picture.hpp"
+
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/slabs/stream.hpp>
 
@@ -38,6 +41,11 @@ int main(int argc, char** argv) {
     const std::uint64_t budget = std::uint64_t(argc > 2 ? std::atoi(argv[2]) : 256) << 20;
     vp::cpu_backend backend;
     const vp::grid grid = vp::fit(vp::bounding_box{{0, 0, 0}, {1, 1, 0.4}}, {n, n, n * 2 / 5});
+    // A quarter of the resolution, to be shown: numbers of slabs.
+    const int side = n / 4, height = grid.extent.z / 4;
+    std::vector<std::uint8_t> slab_at(static_cast<std::size_t>(side) * side * height);
+    std::uint8_t drawn = 0;
+    const auto place = [&](int x, int y, int z) { return (static_cast<std::size_t>(z) * side + y) * side + x; };
     // snippet: stream
     slabs::stream stream(backend, grid, vp::passthrough{}, {.memory = budget, .num_slabs = 8});
     for (int row = 0; row < 2 * n; ++row) {
@@ -53,15 +61,29 @@ int main(int argc, char** argv) {
             return counts{backend, extent};
         },
         [&](const slabs::slab& part, const counts& voxels) {
-            for (const std::uint8_t count : vp::get<0>(voxels).to_host(backend)) {
-                file.put(static_cast<char>(count));
-                occupied += count != 0 ? 1 : 0;
-            }
+            vp::for_each_voxel(vp::get<0>(voxels).to_host_target(backend),
+                               [&](const glm::ivec3& v, std::uint8_t count) {
+                                   file.put(static_cast<char>(count));
+                                   if (count == 0) return;
+                                   ++occupied;
+                                   const glm::ivec3 at = (v + part.where.offset) / 4;
+                                   if (at.x < side && at.y < side && at.z < height)
+                                       slab_at[place(at.x, at.y, at.z)] = drawn + 1;
+                               });
+            ++drawn;
             std::printf("layers %d to %d: %llu voxels\n", part.where.offset.z,
                         part.where.offset.z + part.where.extent.z,
                         static_cast<unsigned long long>(part.drawn.counts.voxels));
         });
     // end snippet
+    picture::write("terrain.ppm", {side, height, side},
+                   [&](int x, int y, int z) {
+                       const int slab = slab_at[place(x, z, y)]; // y points up there
+                       const float up = static_cast<float>(slab) / static_cast<float>(drawn);
+                       const glm::vec3 low(0.10f, 0.34f, 0.24f), high(0.95f, 0.90f, 0.80f);
+                       return slab == 0 ? glm::vec3(-1.0f) : glm::mix(low, high, up) * (slab % 2 == 0 ? 1.0f : 0.7f);
+                   },
+                   {.along = {-0.45f, -0.75f, -0.7f}, .zoom = 0.98f, .aspect = 1.6f});
     std::printf("%s: %llu triangles, %llu voxels\n", s.message().c_str(),
                 static_cast<unsigned long long>(s.counts.triangles_in), static_cast<unsigned long long>(occupied));
     return s.ok() && file && occupied == s.counts.voxels &&

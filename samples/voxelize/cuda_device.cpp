@@ -3,6 +3,8 @@
 // The part of cuda_device.hpp that needs no CUDA: what the facts mean.
 #include "cuda_device.hpp"
 
+#include <voxelpipe/slabs/plan.hpp>
+
 #include <algorithm>
 #include <utility>
 
@@ -33,6 +35,33 @@ std::uint64_t bytes_of(const scene& model) {
 }
 
 } // namespace
+
+std::vector<int> cut_layers(const scene& model, const voxelize_request& request, int num) {
+    namespace slabs = voxelpipe::slabs;
+    const voxelpipe::grid& grid = request.grid;
+    const double low = grid.part_origin().z, size = grid.voxel_size.z;
+    slabs::histogram layers(glm::ivec3(1, 1, grid.extent.z));
+    constexpr std::uint64_t most = 1 << 18; // triangles of the sample
+    const std::uint64_t step = model.triangle_count() / most + 1;
+    for (const instance& shown : model.instances) {
+        const primitive& part = model.primitives[shown.primitive];
+        for (std::size_t i = 0; i < part.triangles.size(); i += step) {
+            const double at = (shown.to_world(glm::dvec3(part.positions[part.triangles[i].x])).z - low) / size;
+            if (!(at >= 0) || at >= grid.extent.z) continue; // nor a number
+            const auto layer = static_cast<std::int64_t>(at);
+            layers.add({{{0, 0, layer}}, {{0, 0, layer}}});
+        }
+    }
+    // A triangle counts as much as the clear and the copy of some kilobytes.
+    slabs::plan_options how;
+    how.triangle_cost = 512 * step;
+    how.layer_cost = static_cast<std::uint64_t>(volume_bytes(request) / grid.extent.z);
+    how.may_turn = false;
+    std::vector<int> cuts;
+    for (const slabs::layer_range& r : slabs::split(layers, num, how).slabs) cuts.push_back(r.begin);
+    cuts.push_back(grid.extent.z);
+    return cuts;
+}
 
 cuda_start::cuda_start() {
     std::promise<cuda_facts> found;

@@ -6,11 +6,16 @@
 #include "pipeline.hpp"
 
 #include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/slabs/device_set.cuh>
 
 #include <algorithm>
+#include <memory>
 #include <stdexcept>
+#include <vector>
 
 namespace voxelize {
+
+namespace slabs = voxelpipe::slabs;
 
 namespace {
 
@@ -152,26 +157,74 @@ cuda_facts look_for_cuda() {
     return facts;
 }
 
+namespace {
+
+// Adds what another device has drawn of the same grid.
+void add_layers(voxelize_stats& all, const voxelize_stats& one) {
+    all.slabs += one.slabs;
+    all.triangles_drawn += one.triangles_drawn;
+    all.triangles_flat += one.triangles_flat;
+    all.fragments += one.fragments;
+    all.fragments_discarded += one.fragments_discarded;
+    all.voxels += one.voxels;
+}
+
+// A pipeline a GPU, with some of the surface's layers each; the first one does the rest.
+volume draw_on_devices(const slabs::devices& gpus, scene& model, const voxelize_request& request,
+                       voxelize_stats& stats) {
+    const std::size_t n = gpus.size();
+    const std::vector<int> cuts = cut_layers(model, request, static_cast<int>(n));
+    std::vector<voxelize_request> requests(n, request);
+    std::vector<voxelize_stats> of(n);
+    std::vector<std::unique_ptr<pipeline<vp::cuda_backend>>> pipelines(n);
+    for (std::size_t i = 1; i < n; ++i) requests[i].progress = nullptr;
+    const auto stats_of = [&](std::size_t i) -> voxelize_stats& { return i == 0 ? stats : of[i]; };
+    gpus.for_each(n, [&](std::size_t i, vp::cuda_backend& backend) {
+        pipelines[i] = std::make_unique<pipeline<vp::cuda_backend>>(backend, model, requests[i], stats_of(i));
+    });
+    volume result = pipelines[0]->unset_volume();
+    gpus.for_each(n, [&](std::size_t i, vp::cuda_backend&) {
+        if (cuts[i] < cuts[i + 1]) pipelines[i]->draw_layers(result, cuts[i], cuts[i + 1]);
+    });
+    for (std::size_t i = 1; i < n; ++i) add_layers(stats, of[i]);
+    gpus.for_each(1, [&](std::size_t, vp::cuda_backend&) { result = pipelines[0]->finish(std::move(result)); });
+    gpus.for_each(n, [&](std::size_t i, vp::cuda_backend&) { pipelines[i].reset(); });
+    return result;
+}
+
+} // namespace
+
 volume run_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request, voxelize_stats& stats) {
-    limited_memory memory{request.device_memory != 0 ? request.device_memory : UINT64_MAX};
-    vp::cuda_backend backend{nullptr, memory};
+    std::vector<int> ordinals;
+    for (int i = 0; i < (request.devices != 0 ? request.devices : facts.devices); ++i) ordinals.push_back(i);
+    std::vector<limited_memory> memory(ordinals.size(),
+                                       limited_memory{request.device_memory != 0 ? request.device_memory : UINT64_MAX});
+    slabs::devices gpus(ordinals);
+    for (std::size_t i = 0; i < gpus.size(); ++i) gpus.backend(i).resource = memory[i];
+    vp::cuda_backend& first = gpus.backend(0);
     stats.backend = "cuda";
     stats.device = facts.name;
+    stats.devices = static_cast<int>(gpus.size());
     stats.threads = thread_count(request.threads);
+    const auto refused = [&] {
+        return std::max_element(memory.begin(), memory.end(),
+                                [](const auto& a, const auto& b) { return a.refused() < b.refused(); })
+            ->refused();
+    };
     try {
         vp::stage_times times;
-        backend.times = &times;
-        backend.strategy = request.strategy;
-        volume result = pipeline<vp::cuda_backend>{backend, model, request, stats}.run();
+        first.times = &times;
+        for (std::size_t i = 0; i < gpus.size(); ++i) gpus.backend(i).strategy = request.strategy;
+        volume result = draw_on_devices(gpus, model, request, stats);
         constexpr std::string_view absent[] = {"abuffer_emit"};
         show_stages(stats, times, absent, "cuda_calls"); // launches, memory, the waits for the counters
-        stats.device_memory = memory.most();
-        stats.strategy = backend.last_strategy();
+        for (const limited_memory& m : memory) stats.device_memory = std::max(stats.device_memory, m.most());
+        stats.strategy = first.last_strategy();
         return result;
     } catch (const std::bad_alloc&) {
-        if (memory.refused() == 0) throw;
+        if (refused() == 0) throw;
         throw device_memory_error(
-            "the GPU has too little memory: at least " + std::to_string(memory.refused() >> 20) +
+            "the GPU has too little memory: at least " + std::to_string(refused() >> 20) +
             " MiB are needed, and of the " + std::to_string(facts.total_memory >> 20) + " MiB of the " + facts.name +
             ' ' + std::to_string(facts.free_memory >> 20) + " MiB were free" +
             (request.device_memory != 0

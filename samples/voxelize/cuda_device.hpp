@@ -11,6 +11,7 @@
 #include <future>
 #include <string>
 #include <thread>
+#include <vector>
 
 namespace voxelize {
 
@@ -68,13 +69,17 @@ private:
 // Why a scene cannot fit into that device's memory, as far as can be told before the attempt. Empty where it may.
 [[nodiscard]] std::string why_too_large(const cuda_facts& facts, const scene& model, const voxelize_request& request);
 
+// The first layers of NUM parts of the grid, and its end: parts of about equal work, as a sample of the triangles has
+// it.
+[[nodiscard]] std::vector<int> cut_layers(const scene& model, const voxelize_request& request, int num);
+
 // The device's memory did not suffice for the scene, the working memory and the lists of the pipeline.
 struct device_memory_error : memory_error {
     using memory_error::memory_error;
 };
 
-// On the first device, which look_for_cuda found usable. Leaves the scene whole, so that the CPU can take over where
-// this throws device_memory_error.
+// On the first request.devices devices, of which look_for_cuda found the first usable. Leaves the scene whole, so that
+// the CPU can take over where this throws device_memory_error.
 [[nodiscard]] volume run_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
                                  voxelize_stats& stats);
 

@@ -83,6 +83,13 @@ public:
     }
 
     [[nodiscard]] volume run() {
+        volume result = unset_volume();
+        draw_layers(result, 0, request_.grid.extent.z);
+        return finish(std::move(result));
+    }
+    // The parts of run(), for pipelines on several devices that share a volume: one makes it, each draws the surface of
+    // some layers, and one finishes it.
+    [[nodiscard]] volume unset_volume() const {
         volume result;
         const voxelpipe::grid& grid = request_.grid;
         for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -94,24 +101,23 @@ public:
         for (const target wanted : request_.targets)
             result.add_unset(std::string(info_of(wanted).name), info_of(wanted).type, info_of(wanted).components);
         // Channels that nobody asked for come last.
-        const std::size_t num_wanted = result.channels.size();
         if (keeps_bits_ && result.find(bits_name_) == nullptr) result.add_unset(bits_name_, scalar::bit);
-
-        const int passes = (draws_surface_ ? 1 : 0) + (wants(target::color_outer) ? 1 : 0) + (request_.solid ? 1 : 0);
-        const auto report_from = [this, passes](int pass, int slab, int slabs) {
-            report_ = [this, passes, pass, slab, slabs](double done) {
-                if (request_.progress) request_.progress((pass + (slab + done) / slabs) / passes);
-            };
-        };
-        if (draws_surface_)
-            stats_.slabs = for_each_slab(slab_depth(surface_voxel_bytes()),
-                                         [&](const voxelpipe::grid& part, int begin, int slab, int slabs) {
-                                             report_from(0, slab, slabs);
-                                             if (only_bits_)
-                                                 draw_bits(result, part, begin);
-                                             else
-                                                 draw_surface(result, part, begin);
-                                         });
+        return result;
+    }
+    // Layers [first, last).
+    void draw_layers(volume& result, int first, int last) {
+        if (!draws_surface_) return;
+        stats_.slabs = for_each_slab(first, last, slab_depth(surface_voxel_bytes()),
+                                     [&](const voxelpipe::grid& part, int begin, int slab, int slabs) {
+                                         report_from(0, slab, slabs);
+                                         if (only_bits_)
+                                             draw_bits(result, part, begin);
+                                         else
+                                             draw_surface(result, part, begin);
+                                     });
+    }
+    [[nodiscard]] volume finish(volume result) {
+        const int layers = request_.grid.extent.z;
         if (draws_lines_) // a voxel may have been drawn twice
             stats_.voxels = static_cast<std::uint64_t>(result.popcount(*result.find(bits_name_)));
         if (wants(target::normal)) count_cancelled_normals(result);
@@ -119,10 +125,11 @@ public:
             const voxelize_stats counted = stats_; // the same fragments again
             const std::vector<std::uint8_t> sides = outer_sides(result);
             constexpr double voxel_bytes = sizeof(std::uint64_t) + sizeof(std::uint8_t);
-            for_each_slab(slab_depth(voxel_bytes), [&](const voxelpipe::grid& part, int begin, int slab, int slabs) {
-                report_from(1, slab, slabs);
-                draw_outer(result, part, begin, sides);
-            });
+            for_each_slab(0, layers, slab_depth(voxel_bytes),
+                          [&](const voxelpipe::grid& part, int begin, int slab, int slabs) {
+                              report_from(1, slab, slabs);
+                              draw_outer(result, part, begin, sides);
+                          });
             std::vector<std::pair<std::string, double>> times = std::move(stats_.milliseconds);
             stats_ = counted;
             stats_.milliseconds = std::move(times);
@@ -130,15 +137,16 @@ public:
         if (request_.solid) {
             if (!wants(target::occupancy)) result.add_unset(inside_name_, scalar::bit);
             const double voxel_bytes = 0.125 + (counts_bodies() ? sizeof(std::uint32_t) : 0);
-            const int slabs =
-                for_each_slab(slab_depth(voxel_bytes), [&](const voxelpipe::grid& part, int begin, int slab, int all) {
-                    report_from(passes - 1, slab, all);
-                    draw_solid(result, part, begin);
-                });
+            const int slabs = for_each_slab(0, layers, slab_depth(voxel_bytes),
+                                            [&](const voxelpipe::grid& part, int begin, int slab, int all) {
+                                                report_from(num_passes() - 1, slab, all);
+                                                draw_solid(result, part, begin);
+                                            });
             if (!draws_surface_) stats_.slabs = slabs;
             finish_solid(result);
         }
-        result.channels.erase(result.channels.begin() + static_cast<std::ptrdiff_t>(num_wanted), result.channels.end());
+        result.channels.erase(result.channels.begin() + static_cast<std::ptrdiff_t>(request_.targets.size()),
+                              result.channels.end());
         return result;
     }
 
@@ -225,17 +233,29 @@ protected: // sparse_pipeline draws the same into bricks
         return depth < extent.z && depth > tile ? depth / tile * tile : depth;
     }
 
-    // VISIT(part of the grid, its first layer, number of the slab, how many there are); returns how many.
+    // For layers [first, last) of the grid: VISIT(part of the grid, its first layer, number of the slab, how many there
+    // are); returns how many.
     template <class Visit>
-    int for_each_slab(int depth, const Visit& visit) {
+    int for_each_slab(int first, int last, int depth, const Visit& visit) {
         const glm::ivec3 extent = request_.grid.extent;
-        const int slabs = (extent.z + depth - 1) / depth;
+        const int slabs = (last - first + depth - 1) / depth;
         for (int slab = 0; slab < slabs; ++slab) {
-            const int begin = slab * depth;
-            const glm::ivec3 size{extent.x, extent.y, std::min(depth, extent.z - begin)};
+            const int begin = first + slab * depth;
+            const glm::ivec3 size{extent.x, extent.y, std::min(depth, last - begin)};
             visit(uploaded_->relative_grid().crop({0, 0, begin}, size), begin, slab, slabs);
         }
         return slabs;
+    }
+
+    // Surface, outer colours, solid.
+    [[nodiscard]] int num_passes() const {
+        return (draws_surface_ ? 1 : 0) + (wants(target::color_outer) ? 1 : 0) + (request_.solid ? 1 : 0);
+    }
+    // The bar shows one slab of a pass from here on.
+    void report_from(int pass, int slab, int slabs) {
+        report_ = [this, pass, slab, slabs](double done) {
+            if (request_.progress) request_.progress((pass + (slab + done) / slabs) / num_passes());
+        };
     }
 
     // As numbers of triangles; of solids it is the number of bodies.

@@ -68,6 +68,7 @@ void print_text(std::ostream& stream, const run_report& report) {
         stream << " x " << grid.voxel_size.y << " x " << grid.voxel_size.z;
     stream << " from (" << grid.origin.x << ", " << grid.origin.y << ", " << grid.origin.z << ")\n";
     line("backend") << report.stats.backend << ", ";
+    if (report.stats.devices > 1) stream << report.stats.devices << " x ";
     if (!report.stats.device.empty()) stream << report.stats.device << ", ";
     stream << report.stats.threads << " threads, " << report.stats.slabs
            << (report.stats.slabs == 1 ? " slab" : " slabs");
@@ -140,6 +141,7 @@ void print_json(std::ostream& stream, const run_report& report) {
     for (const target id : report.request.targets) root["targets"].push_back(info_of(id).name);
     root["backend"] = report.stats.backend;
     if (!report.stats.device.empty()) root["device"] = report.stats.device;
+    if (report.stats.devices != 0) root["devices"] = report.stats.devices;
     if (!report.stats.no_cuda.empty()) root["no_cuda"] = report.stats.no_cuda;
     if (report.stats.strategy.value != voxelpipe::strategy::automatic)
         root["strategy"] = {{"name", to_string(report.stats.strategy.value)}, {"why", report.stats.strategy.why}};

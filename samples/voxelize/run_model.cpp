@@ -8,10 +8,12 @@
 #include "picture_levels.hpp"
 #include "sparse/sparse_formats.hpp"
 #include "sparse/sparse_voxelizer.hpp"
+#include "sparse/streamed_model.hpp"
 
 #include <cstdio>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <system_error>
 
 namespace voxelize {
@@ -64,6 +66,21 @@ std::vector<std::filesystem::path> write_output(sparse_volume& voxels, const com
     return files;
 }
 
+// Where a file lies.
+std::filesystem::path folder_of(const std::filesystem::path& file) {
+    return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+}
+
+// The corners of a model's box in place of its triangles, for messages about it.
+scene outline_of(const std::filesystem::path& file, const bounding_box& box, double scale) {
+    scene model;
+    primitive& part = model.primitives.emplace_back();
+    part.name = file.filename().string();
+    part.positions = {glm::vec3(box.low), glm::vec3(box.high)};
+    model.instances.push_back({0, affine::scaling(scale)});
+    return model;
+}
+
 // Does the work; every failure is an exception.
 void run(const command_line& options, clock::time_point begin, run_report& report) {
     report.input = options.input;
@@ -75,10 +92,13 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     report.request.cuda = start_cuda(options);
     load_options load = options.load;
     load.picture_hook = picture_reducer{options.grid, options.voxelize};
-    scene model = load_model(options.input, load);
+    std::optional<stl_file> stream = streamed_input(options);
+    bounding_box bounds;
+    if (stream) bounds = stream->bounds();
+    scene model = stream ? outline_of(options.input, bounds, load.scale) : load_model(options.input, load);
     report.warnings = options.warnings;
     report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
-    report.vertices = model.vertex_count();
+    report.vertices = stream ? 3 * stream->num_triangles() : model.vertex_count();
     for (const material& m : model.materials) report.materials.push_back(m.name);
     report.stats.milliseconds.emplace_back("read", milliseconds_since(start));
     start = clock::now();
@@ -87,14 +107,18 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
         error.warnings = report.warnings;
         throw error;
     };
-    const std::uint64_t elements = model.triangle_count() + model.line_count();
+    const std::uint64_t elements = stream ? stream->num_triangles() : model.triangle_count() + model.line_count();
     if (elements == 0) refuse("there are no triangles, lines or points to voxelize");
-    if (model.triangle_count() == 0 && options.voxelize.solid)
+    if (!stream && model.triangle_count() == 0 && options.voxelize.solid)
         refuse("there are only lines and points, which enclose nothing: --solid needs triangles");
     if (elements > UINT32_MAX)
         refuse("there are " + std::to_string(elements) + " triangles, lines and points, more than the " +
                std::to_string(UINT32_MAX) + " that can be numbered");
-    const bounding_box bounds = bounds_of(model, options.voxelize.threads);
+    if (!stream) bounds = bounds_of(model, options.voxelize.threads);
+    if (stream && !bounds.empty) {
+        const affine to_world = affine::scaling(load.scale);
+        bounds = {to_world(bounds.low), to_world(bounds.high), false};
+    }
     if (bounds.empty) refuse("nothing to voxelize has a corner at a finite position");
     report.request.grid = place_grid(options.grid, bounds);
     report.request.padding = options.grid.padding;
@@ -102,7 +126,8 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
         report.warnings.push_back(std::move(warning));
     report.stats.milliseconds.emplace_back("place", milliseconds_since(start));
 
-    const storage_decision storage = choose_storage(options.storage, report.request, options.outputs);
+    const storage_decision storage =
+        stream ? storage_decision{true, ""} : choose_storage(options.storage, report.request, options.outputs);
     const glm::ivec3 extent = report.request.grid.extent;
     if (!options.quiet && !storage.reason.empty())
         std::cerr << "voxelize: a sparse grid of " << extent.x << " x " << extent.y << " x " << extent.z
@@ -111,7 +136,12 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     report.request.progress = [&bar](double done) { bar.show(done); };
     volume voxels;
     sparse_volume bricks;
-    if (storage.sparse)
+    if (stream)
+        bricks = run_streamed_voxelizer(*stream, load.scale, report.request, folder_of(options.outputs.front()),
+                                        report.stats, [&](const std::string& how) {
+                                            if (!options.quiet) std::cerr << "voxelize: " << how << '\n';
+                                        });
+    else if (storage.sparse)
         bricks = run_sparse_voxelizer(std::move(model), report.request, report.stats);
     else
         voxels = run_voxelizer(std::move(model), report.request, report.stats);

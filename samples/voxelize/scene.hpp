@@ -79,6 +79,9 @@ struct primitive {
     std::vector<glm::vec2> texcoords;  // of the base-colour texture, its transform applied; empty: no texture
     std::vector<glm::vec4> colors;     // linear vertex colours and alpha; empty: white
     std::uint32_t material = 0;        // index into scene::materials
+    // Where the triangles are some of a larger mesh's: their numbers in it, ascending, and how many it has.
+    std::vector<std::uint32_t> numbers;
+    std::uint64_t whole = 0;
 };
 
 // A primitive with one transform to the world. Nothing is copied for it. A transform that mirrors exchanges the last

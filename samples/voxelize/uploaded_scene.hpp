@@ -134,6 +134,7 @@ private:
             // The scene's indices are in range.
             mesh.checked = {mesh.triangles.data(), mesh.triangles.size(), mesh.positions.size()};
             mesh.copies.count = r.instances.size();
+            if (part.whole != 0) mesh.part = {part.numbers.view(), part.whole};
             draws_.push_back({mesh, shader_of(part), part.fragment_shader});
             bits_draws_.push_back({mesh, {place}, vp::constant(true, 1U)});
             double_sided_.push_back(part.double_sided ? 1 : 0);
@@ -231,7 +232,9 @@ private:
                                                             {},
                                                             {},
                                                             static_cast<std::int32_t>(part.material),
-                                                            model.materials[part.material].double_sided});
+                                                            model.materials[part.material].double_sided,
+                                                            {backend_, part.numbers},
+                                                            part.whole});
             if (is_mirrored_[i] != 0) done.mirrored_triangles.push_back({backend_, turned});
             const material& m = model.materials[part.material];
             if (has_texcoords) done.vertex_shader.texcoords = done.texcoords.data();
@@ -280,6 +283,8 @@ private:
         surface_fragment_shader fragment_shader;
         std::int32_t material;
         bool double_sided;
+        stored<Backend, std::uint32_t> numbers; // in the whole mesh; see primitive
+        std::uint64_t whole;
     };
     std::vector<uploaded_primitive> primitives_;
     std::vector<char> is_mirrored_; // of the scene's primitives: whether an instance of it mirrors

@@ -101,7 +101,8 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
 // The GPU, where it can be used: stats.no_cuda says why where it cannot.
 std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_stats& stats) {
     const auto start = std::chrono::steady_clock::now();
-    const bool is_forced = request.strategy != voxelpipe::strategy::automatic; // how a GPU draws
+    // How a GPU draws, or how many do.
+    const bool is_forced = request.strategy != voxelpipe::strategy::automatic || request.devices != 1;
     if (request.backend == backend_choice::automatic && !is_forced && built_with_cuda()) {
         const work_size work = work_of(request, static_cast<double>(model.triangle_count() + model.line_count()),
                                        static_cast<double>(model_bytes(model)));
@@ -117,12 +118,16 @@ std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_
     stats.no_cuda = why_not(facts);
     if (!stats.no_cuda.empty()) {
         if (is_forced)
-            throw backend_error(std::string("--strategy ") + to_string(request.strategy) +
+            throw backend_error((request.devices != 1 ? std::string("--devices")
+                                                      : std::string("--strategy ") + to_string(request.strategy)) +
                                 " needs a GPU: " + stats.no_cuda);
         if (request.backend == backend_choice::cuda)
             throw backend_error("--backend cuda: " + stats.no_cuda + "; use --backend cpu");
         return std::nullopt;
     }
+    if (request.devices > facts.devices)
+        throw backend_error("--devices " + std::to_string(request.devices) + ": the NVIDIA driver shows " +
+                            std::to_string(facts.devices));
     const voxelize_stats before = stats;
     try {
         if (const std::string why = why_too_large(facts, model, request); !why.empty()) throw device_memory_error(why);

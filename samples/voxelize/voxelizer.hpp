@@ -49,6 +49,7 @@ struct voxelize_request {
     blend_alpha alpha = blend_alpha::weight;
     backend_choice backend = backend_choice::automatic;
     voxelpipe::strategy strategy = voxelpipe::strategy::automatic; // on a GPU
+    int devices = 1;                                               // GPUs that share the surface's layers; 0: all
     int threads = 0;                                               // 0: all cores
     // Bytes for what exists only while the pipeline runs. A grid that needs more is computed in slabs along z. 0: what
     // suits the backend and the run's memory.
@@ -61,6 +62,7 @@ struct voxelize_request {
 struct voxelize_stats {
     std::string backend;                 // "cpu" or "cuda"
     std::string device;                  // the GPU's name
+    int devices = 0;                     // GPUs that worked
     voxelpipe::strategy_choice strategy; // of the last call on a GPU
     std::string no_cuda;                 // why the choice between the two fell on the CPU
     std::string estimate;                // what the choice between the two went by; empty where there was none

@@ -13,6 +13,11 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
 
 using namespace tool_test;
 
@@ -228,6 +233,88 @@ void expect_refusal(const std::string& name, const std::string& bytes, int code)
 std::string text_of(const builder& file) {
     const std::vector<std::byte> bytes = file.glb();
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+// A wavy relief of 2 SIDE^2 triangles; a few are not finite, without area, or far outside.
+void write_stl(const fs::path& file, int side) {
+    const auto corner = [&](int x, int y) {
+        const auto at = [&](int i) { return static_cast<float>(i) / static_cast<float>(side); };
+        return std::array<float, 3>{at(x), at(y), 0.4f + 0.3f * std::sin(9 * at(x) + 4 * at(y))};
+    };
+    std::vector<char> bytes(84);
+    const auto count = static_cast<std::uint32_t>(2 * side * side);
+    std::memcpy(bytes.data() + 80, &count, sizeof(count));
+    const auto put = [&](std::array<float, 3> a, const std::array<float, 3>& b, const std::array<float, 3>& c, int n) {
+        if (n % 5003 == 7) a[1] = std::numeric_limits<float>::quiet_NaN();
+        if (n % 5003 == 9) a = b;
+        const std::array<std::array<float, 3>, 4> facet{std::array<float, 3>{}, a, b, c};
+        const auto* const raw = reinterpret_cast<const char*>(facet.data());
+        bytes.insert(bytes.end(), raw, raw + sizeof(facet));
+        bytes.insert(bytes.end(), 2, '\0');
+    };
+    for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x) {
+            put(corner(x, y), corner(x + 1, y), corner(x, y + 1), 2 * (y * side + x));
+            put(corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1), 2 * (y * side + x) + 1);
+        }
+    std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+}
+
+// A mesh that does not fit goes through temporary files, and gives the same voxels: under --max-memory, and under a
+// limit of address space.
+TEST(Memory, MeshesThatDoNotFitAreStreamed) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    write_stl(folder / "m.stl", 480);
+    const auto voxelize = [&](const std::string& out, const std::vector<std::string>& how,
+                              std::uint64_t address_space = 0) {
+        std::vector<std::string> arguments{folder / "m.stl",
+                                           "-o",
+                                           folder / out,
+                                           "-r",
+                                           "150",
+                                           "-t",
+                                           "occupancy,count,normal,triangle,depth",
+                                           "--scale",
+                                           "3",
+                                           "--padding",
+                                           "3",
+                                           "-j",
+                                           "2",
+                                           "--backend",
+                                           "cpu",
+                                           "--stats=json"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        return run(folder, arguments, address_space);
+    };
+    const auto expect_streamed = [&](const outcome& streamed, const std::string& out, int most) {
+        ASSERT_EQ(0, streamed.code) << streamed.err;
+        EXPECT_NE(std::string::npos, streamed.err.find("460800 triangles do not fit")) << streamed.err;
+        const json stats = json::parse(streamed.out);
+        EXPECT_GE(most, static_cast<double>(stats["peak_memory_bytes"].get<std::uint64_t>()) / (1 << 20));
+        EXPECT_LT(1, stats["slabs"].get<int>());
+        EXPECT_GT(fs::file_size(folder / out), 1000u);
+    };
+    const outcome tight = voxelize("tight.npz", {"--max-memory", "90"});
+    expect_streamed(tight, "tight.npz", 90);
+    // Nothing is left of the temporary files.
+    EXPECT_EQ(4, std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()))
+        << "m.stl, tight.npz, streams";
+#if VOXELPIPE_TOOL_HAS_ASSIMP
+    const outcome free = voxelize("free.npz", {"--sparse"});
+    ASSERT_EQ(0, free.code) << free.err;
+    EXPECT_EQ(std::string::npos, free.err.find("do not fit")) << free.err;
+    EXPECT_TRUE(read_file(folder / "free.npz") == read_file(folder / "tight.npz"));
+    const json a = json::parse(free.out), b = json::parse(tight.out);
+    for (const char* const name : {"triangles", "triangles_dropped", "fragments", "voxels"})
+        if (a.contains(name)) EXPECT_EQ(a[name], b[name]) << name;
+#endif
+    const outcome bounded = voxelize("bounded.npz", {}, std::uint64_t{220} << 20);
+    expect_streamed(bounded, "bounded.npz", 220);
+    EXPECT_TRUE(read_file(folder / "bounded.npz") == read_file(folder / "tight.npz"));
+    // Colours are not streamed: the need is named.
+    const outcome colors = voxelize("colors.npz", {"--max-memory", "90", "-t", "color"});
+    EXPECT_EQ(3, colors.code) << colors.err;
 }
 
 TEST(Memory, FilesThatClaimWhatTheyDoNotHoldEndWithTwo) {

@@ -124,7 +124,7 @@ public:
         const std::vector<unsigned long long> host = words.to_host(gpu);
         if (host[num_classes] != 0) return core::failure(status_code::index_out_of_range);
         for (std::size_t k = 0; k < num_classes; ++k)
-            count_class(counts, static_cast<core::triangle_class>(k), host[k]);
+            core::count_class(counts, static_cast<core::triangle_class>(k), host[k]);
         for (std::size_t w = 0; w < layers.words().size(); ++w) layers.words()[w] += host[count_words + w];
         return {};
     }

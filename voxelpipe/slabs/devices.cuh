@@ -155,7 +155,7 @@ private:
         });
         if (!s.ok()) return s;
         for (std::size_t i = 0; i < n; ++i) {
-            add_triangles(counts_, counted[i]);
+            core::add_triangles(counts_, counted[i]);
             for (std::size_t w = 0; i != 0 && w < layers[0].words().size(); ++w)
                 layers[0].words()[w] += layers[i].words()[w];
         }

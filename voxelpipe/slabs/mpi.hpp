@@ -61,7 +61,7 @@ public:
                                                  counts_of_layers_.add(reach);
                                                  memory_.push(mine_, 0, r);
                                              });
-        add_triangles(counts_, added);
+        core::add_triangles(counts_, added);
         if (s.ok())
             num_triangles_ += chunk.part.whole != 0 ? chunk.part.whole : chunk.triangles.size();
         else if (failed_.ok())

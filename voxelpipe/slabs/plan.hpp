@@ -13,6 +13,7 @@
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/status.hpp>
+#include <voxelpipe/triangle_counts.hpp>
 
 #include <glm/vec3.hpp>
 
@@ -263,37 +264,6 @@ struct classified {
     return t;
 }
 
-// Adds `count` triangles of a class to the counters that a call has.
-inline void count_class(counters& counts, core::triangle_class kind, std::uint64_t count = 1) {
-    counts.triangles_in += count;
-    switch (kind) {
-    case core::triangle_class::nonfinite:
-        counts.triangles_nonfinite += count;
-        break;
-    case core::triangle_class::too_far:
-        counts.triangles_too_far += count;
-        break;
-    case core::triangle_class::zero_area:
-        counts.triangles_zero_area += count;
-        break;
-    case core::triangle_class::outside:
-        counts.triangles_outside += count;
-        break;
-    case core::triangle_class::drawn:
-        counts.triangles_drawn += count;
-        break;
-    }
-}
-
-// Adds what different parts of a mesh have counted of their triangles.
-inline void add_triangles(counters& all, const counters& one) {
-    all.triangles_in += one.triangles_in;
-    all.triangles_nonfinite += one.triangles_nonfinite;
-    all.triangles_too_far += one.triangles_too_far;
-    all.triangles_zero_area += one.triangles_zero_area;
-    all.triangles_outside += one.triangles_outside;
-    all.triangles_drawn += one.triangles_drawn;
-}
 // Adds what different slabs have drawn: fragments, voxels and rows. Their triangles are not added up.
 inline void add_drawn(status& all, const status& one) {
     all.counts.fragments += one.counts.fragments;

@@ -112,7 +112,7 @@ template <class Varyings, class... Attributes, class VertexShader, class Visit>
         }
         r.number = static_cast<std::uint32_t>(number);
         const classified c = classify(snap, g.extent, rule, r.positions[0], r.positions[1], r.positions[2], is_solid);
-        count_class(counts, c.kind);
+        core::count_class(counts, c.kind);
         if (c.kind == core::triangle_class::drawn) visit(r, c.reach);
     }
     return {};

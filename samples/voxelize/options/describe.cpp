@@ -213,6 +213,19 @@ void describe_machine(CLI::App& app, command_line& options) {
                "paper), or automatic. All give the same bytes; not all can draw all targets. Default: automatic")
         ->option_text("NAME")
         ->group("Machine");
+    app.add_option_function<std::string>(
+           "--devices", [&options](const std::string& n) { options.voxelize.devices = n == "all" ? 0 : std::stoi(n); },
+           "GPUs that share the work, each with some layers of the grid: a number, or all that CUDA shows. The bytes "
+           "are "
+           "the same. A flood, --solid and color-outer are done by the first. Default: 1")
+        ->check(CLI::Validator(
+            [](std::string& n) {
+                const bool is_number = !n.empty() && n.size() < 5 && n.find_first_not_of("0123456789") == n.npos;
+                return n == "all" || (is_number && std::stoi(n) > 0) ? std::string() : "a number from 1 on, or all";
+            },
+            "", "devices"))
+        ->option_text("N|all")
+        ->group("Machine");
     app.add_option("-j,--threads", options.voxelize.threads, "Threads on the CPU. Default: 0, one for each core")
         ->check(CLI::Range(0, 1024).description(""))
         ->option_text("N")

@@ -44,23 +44,27 @@ storage_decision choose_storage(storage_choice choice, const voxelize_request& r
                                : "a dense one would take " + memory::mebibytes(dense)};
 }
 
-sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
-    voxelize_request inside = request;
-    inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
-    vp::cpu_backend backend{static_cast<unsigned>(thread_count(request.threads))};
+sparse_volume draw_sparse(scene& model, const voxelize_request& inside, const voxelpipe::grid& whole,
+                          voxelize_stats& stats) {
+    vp::cpu_backend backend{static_cast<unsigned>(thread_count(inside.threads))};
     vp::stage_times times;
     backend.times = &times;
     stats.backend = "cpu";
-    stats.threads = thread_count(request.threads);
-    sparse_volume result;
-    try {
-        result = sparse_pipeline<vp::cpu_backend>{backend, model, inside, stats}.run(request.grid);
-    } catch (const std::bad_alloc&) {
-        throw memory_error(memory::shortage(memory::fewer_voxels_hint));
-    }
+    stats.threads = thread_count(inside.threads);
+    sparse_volume result = sparse_pipeline<vp::cpu_backend>{backend, model, inside, stats}.run(whole);
     constexpr std::string_view absent[] = {"tile_split", "abuffer_emit", "clear"};
     show_stages(stats, times, absent, "");
     return result;
+}
+
+sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
+    voxelize_request inside = request;
+    inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
+    try {
+        return draw_sparse(model, inside, request.grid, stats);
+    } catch (const std::bad_alloc&) {
+        throw memory_error(memory::shortage(memory::fewer_voxels_hint));
+    }
 }
 
 } // namespace voxelize

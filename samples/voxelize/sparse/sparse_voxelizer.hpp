@@ -26,6 +26,10 @@ struct storage_decision {
 [[nodiscard]] storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
                                               std::span<const std::filesystem::path> outputs);
 
+// Draws the part `inside` of a grid; the volume has the shape of the whole. Consumes the scene. Throws std::bad_alloc.
+[[nodiscard]] sparse_volume draw_sparse(scene& model, const voxelize_request& inside, const voxelpipe::grid& whole,
+                                        voxelize_stats& stats);
+
 // Consumes the scene. Throws as run_voxelizer does.
 [[nodiscard]] sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
 
