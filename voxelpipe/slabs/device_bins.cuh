@@ -4,9 +4,8 @@
 
 // A mesh on one GPU, of whose triangles those stay that reach a slab.
 
-#include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/slabs/plan.hpp>
-#include <voxelpipe/voxelize.hpp>
+#include <voxelpipe/voxelpipe.hpp>
 
 #include <array>
 #include <cstddef>

@@ -4,7 +4,7 @@
 
 // The GPUs of one host that work together: a cuda_backend, a stream and a thread each.
 
-#include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/voxelpipe.hpp>
 
 #include <cstddef>
 #include <exception>
