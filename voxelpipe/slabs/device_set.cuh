@@ -6,6 +6,7 @@
 
 #include <voxelpipe/voxelpipe.hpp>
 
+#include <algorithm>
 #include <cstddef>
 #include <exception>
 #include <functional>
