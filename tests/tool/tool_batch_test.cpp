@@ -200,6 +200,9 @@ TEST(ToolBatch, ChecksItsOptions) {
     EXPECT_NE(error({"--list", "l", "-o", "{name}.npy", "--rank", "2", "--world-size", "2"}).find("below --world-size"),
               std::string::npos);
     EXPECT_NE(error({"m.obj", "-o", "x.npy", "--jobs", "2"}).find("--list"), std::string::npos);
+    ::setenv("PMI_SIZE", "2", 1); // as under mpiexec
+    EXPECT_NE(error({"m.obj", "-o", "x.npy"}).find("mpiexec has started 2 processes"), std::string::npos);
+    ::unsetenv("PMI_SIZE");
     const outcome missing = run(folder, {"--list", folder / "none.txt", "-o", folder / "{name}.npy"});
     EXPECT_EQ(missing.code, 4);
     EXPECT_NE(missing.err.find("cannot read the list"), std::string::npos);

@@ -38,7 +38,15 @@ void understand_batch(command_line& options, bool has_world) {
     batch_request& batch = options.batch;
     if (batch.list.empty() && options.input.empty()) throw usage_error("INPUT is required");
     if (options.outputs.empty()) throw usage_error("--output is required");
-    if (batch.list.empty()) return;
+    if (batch.list.empty()) {
+        // Each process would do the whole work, and write the same files.
+        const int processes = from_environment({"PMI_SIZE", "OMPI_COMM_WORLD_SIZE"}).value_or(1);
+        if (processes > 1)
+            throw usage_error("mpiexec has started " + std::to_string(processes) +
+                              " processes, and one model is drawn by one: --list shares many models among them, and a "
+                              "program with voxelpipe/slabs/mpi.hpp shares one");
+        return;
+    }
     if (!options.input.empty()) throw usage_error("INPUT and --list do not go together");
     for (const std::filesystem::path& output : options.outputs)
         if (output.string().find("{name}") == std::string::npos)
