@@ -49,6 +49,7 @@ present() {
         libminizip-dev) has_header minizip/zip.h ;;
         libassimp-dev) has_header assimp/Importer.hpp ;;
         libdeflate-dev) has_header libdeflate.h ;;
+        libzstd-dev) has_header zstd.h ;;
         libwebp-dev) has_header webp/decode.h ;;
         libdraco-dev) has_header draco/compression/decode.h ;;
         libmeshoptimizer-dev) has_header meshoptimizer.h ;;
@@ -96,7 +97,7 @@ Install them and run the same command again; on Debian or Ubuntu:
 
 # What the library, the tool and the samples are built with.
 build_packages=(g++ cmake ninja-build libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev zlib1g-dev
-    libminizip-dev libdeflate-dev libwebp-dev libassimp-dev libdraco-dev libmeshoptimizer-dev)
+    libminizip-dev libdeflate-dev libwebp-dev libassimp-dev libdraco-dev libmeshoptimizer-dev libzstd-dev)
 
 # What the tests need beside them: readers of NanoVDB files that are not ours, MPI for the slabs of several machines, and a
 # browser.

@@ -105,6 +105,8 @@ command_line parse_command_line(int argc, const char* const* argv) {
     understand_picture(options, raw);
     if (options.voxelize.backend == backend_choice::cpu && options.voxelize.strategy != voxelpipe::strategy::automatic)
         throw usage_error("--strategy says how a GPU draws; it does not go with --backend cpu");
+    if (options.write.zstd && !has_zstd())
+        throw usage_error("--zarr-codec zstd: this program was built without libzstd");
     if (options.voxelize.backend == backend_choice::cpu && options.voxelize.devices != 1)
         throw usage_error("--devices says how many GPUs draw; it does not go with --backend cpu");
     return options;

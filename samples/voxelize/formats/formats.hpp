@@ -21,6 +21,7 @@ namespace voxelize {
 
 struct write_options {
     int compression = 1;      // zlib level of .npz, .vti, .nrrd, .zarr, .schem: 0 stores (.schem: 1), 9 is smallest
+    bool zstd = false;        // .zarr: Zstandard instead of gzip, where has_zstd()
     up_axis up = up_axis::y;  // which world axis stands upright in .vox and .schem; glTF's is y
     int threads = 0;          // 0 takes all cores. No output depends on it
     bool merge_faces = false; // .ply, .obj, .glb: coplanar faces of equal colour become one rectangle
@@ -43,6 +44,9 @@ struct format {
 
 // True if voxels of this size are cubes, but for what fitting a grid loses by rounding.
 [[nodiscard]] bool are_cubic(const std::array<double, 3>& voxel_size);
+
+// Whether this program was built with libzstd.
+[[nodiscard]] bool has_zstd();
 
 // In the order in which --help lists them.
 [[nodiscard]] std::span<const format> formats();

@@ -18,6 +18,9 @@
 #include <new>
 #include <optional>
 #include <system_error>
+#ifdef VOXELIZE_HAS_ZSTD
+#include <zstd.h>
+#endif
 
 namespace voxelize {
 namespace {
@@ -44,6 +47,23 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes, int level) {
     std::vector<std::byte> out(libdeflate_gzip_compress_bound(compressor.get(), bytes.size()));
     out.resize(libdeflate_gzip_compress(compressor.get(), bytes.data(), bytes.size(), out.data(), out.size()));
     return out;
+}
+
+#ifdef VOXELIZE_HAS_ZSTD
+std::vector<std::byte> zstd(std::span<const std::byte> bytes, int level) {
+    std::vector<std::byte> out(ZSTD_compressBound(bytes.size()));
+    const std::size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), level);
+    if (ZSTD_isError(size) != 0) throw std::bad_alloc{}; // the only way to fail, with that much room
+    out.resize(size);
+    return out;
+}
+#endif
+
+std::vector<std::byte> packed_chunk(std::span<const std::byte> bytes, const write_options& options) {
+#ifdef VOXELIZE_HAS_ZSTD
+    if (options.zstd) return zstd(bytes, options.compression);
+#endif
+    return gzip(bytes, options.compression);
 }
 
 // How a channel is cut: chunks, in shards of the same number of them along each axis.
@@ -135,7 +155,7 @@ private:
                             row_bytes);
             }
         if (is_empty) return {};
-        return options_.compression == 0 ? raw : gzip(raw, options_.compression);
+        return options_.compression == 0 ? raw : packed_chunk(raw, options_);
     }
 
     void add(std::int64_t shard, const std::vector<std::byte>& bytes) {
@@ -180,8 +200,10 @@ private:
         constexpr zyx once{1, 1, 1}, side{chunk_side, chunk_side, chunk_side};
         const std::string little = R"({"name": "bytes", "configuration": {"endian": "little"}})";
         std::string inner = little;
+        const std::string level = R"("configuration": {"level": )" + std::to_string(options_.compression);
         if (options_.compression != 0)
-            inner += R"(, {"name": "gzip", "configuration": {"level": )" + std::to_string(options_.compression) + "}}";
+            inner += options_.zstd && has_zstd() ? R"(, {"name": "zstd", )" + level + ", \"checksum\": false}}"
+                                                 : R"(, {"name": "gzip", )" + level + "}}";
         return "{\n  \"zarr_format\": 3,\n  \"node_type\": \"array\",\n  \"shape\": " + list(layout_.extent, once) +
                ",\n  \"data_type\": \"" + std::string(types[static_cast<std::size_t>(c_.type)]) +
                "\",\n  \"chunk_grid\": {\"name\": \"regular\", \"configuration\": {\"chunk_shape\": " +
@@ -260,6 +282,14 @@ std::string group_description(const volume& v) {
 }
 
 } // namespace
+
+bool has_zstd() {
+#ifdef VOXELIZE_HAS_ZSTD
+    return true;
+#else
+    return false;
+#endif
+}
 
 std::vector<fs::path> write_zarr(const volume& v, const fs::path& path, const write_options& options) {
     fs::path target = path;

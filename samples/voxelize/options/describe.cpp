@@ -316,6 +316,10 @@ void describe_output(CLI::App& app, command_line& options) {
         ->group("Files");
     app.add_flag("--points", options.write.points, "Write the centres of the voxels into .ply, not their outer sides")
         ->group("Files");
+    add_choice(app, "--zarr-codec", options.write.zstd, {{"gzip", false}, {"zstd", true}},
+               "How the chunks of .zarr are compressed: gzip, which every reader has, or zstd. Default: gzip")
+        ->option_text("NAME")
+        ->group("Files");
     app.add_option("--compression", options.write.compression,
                    "Level of .npz, .vti, .nrrd, .zarr and .schem, 0 to 9. Default: 1")
         ->check(CLI::Range(0, 9).description(""))

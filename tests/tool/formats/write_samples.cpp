@@ -72,6 +72,7 @@ std::vector<sample_case> make_cases() {
     types.extensions.push_back(".html");
     sample_case& raw = add("raw", {13, 7, 5}, 2, false, true, any);
     raw.options.compression = 0;
+    if (has_zstd()) add("zstd", {150, 70, 90}, 5, true, false, {".zarr"}).options.zstd = true;
     add("glass", {16, 16, 16}, 2, true, false, {".png"}).options.preview.backdrop = *parse_background("transparent");
     return cases;
 }

@@ -58,6 +58,12 @@ TEST_F(Zarr, EmptyChunksHaveNoFileAndNoBytes) {
     write(v, folder_ / "a.zarr", options); // in place of the other
     EXPECT_LT(fs::file_size(folder_ / "a.zarr/count/c/0/0/0"), 3000u);
     EXPECT_EQ(names(), std::vector<std::string>{"a.zarr"});
+    EXPECT_NE(read_file(folder_ / "a.zarr/count/zarr.json").find("\"gzip\""), std::string::npos);
+    if (!has_zstd()) return;
+    options.zstd = true;
+    write(v, folder_ / "a.zarr", options);
+    EXPECT_LT(fs::file_size(folder_ / "a.zarr/count/c/0/0/0"), 3000u);
+    EXPECT_NE(read_file(folder_ / "a.zarr/count/zarr.json").find("\"zstd\""), std::string::npos);
 }
 
 TEST_F(Zarr, FilesDoNotDependOnThreads) {
