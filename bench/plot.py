@@ -43,6 +43,8 @@ CELL_NAMES = {
     "float_add_varying_tracked_conservative": "float add of a varying, changes tracked",
     "abuffer_thin": "A-buffer, thin",
     "abuffer_conservative": "A-buffer, conservative",
+    "bit_solid_even_odd": "solid in bits, even_odd",
+    "bit_solid_nonzero": "solid in bits, nonzero",
 }
 VARIANT_COLOURS = ["#1f6fb4", "#d1661c"]
 BASELINE, REFERENCE = "#8a8a8a", "#b0b0b0"

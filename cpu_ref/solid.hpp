@@ -94,7 +94,7 @@ template <class Crossing, class Finish>
     return finish(sweep, result);
 }
 
-// Of the voxels of `g` from `lead` on. finish is called with a sweep of either kind of crossings.
+// Draws the voxels of `g` from `lead` on. finish is called with a sweep of either kind of crossings.
 template <class Mesh, class VertexShader, class SolidShader, class Finish>
 [[nodiscard]] status run_solid(const execution& how, std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
                                const grid& g, const glm::ivec3& lead, const solid_options& options,

@@ -52,7 +52,7 @@ struct row_numbers {
     [[nodiscard]] std::size_t words() const { return static_cast<std::size_t>(tiles.tiles.x); }
 };
 
-// Where a row crosses a triangle: the first voxel beyond it, from the lowest that is drawn to the extent, and twice
+// A crossing of a row and a triangle: the first voxel beyond it, from the lowest that is drawn to the extent, and twice
 // that if it enters, one more if it leaves. One body needs no draw; 32 bits number the rows of every grid that a
 // framebuffer holds.
 struct call_crossing {
@@ -97,23 +97,15 @@ template <class Crossing>
         const core::snapped_position* const positions =
             part.positions + std::size_t{at.instance} * of_part.vertices_each;
         const std::uint32_t body = s.body[number];
-        std::uint64_t drawn = 0, outside = 0;
+        counters seen{};
         for (; i < last; ++i, ++triangle) {
             const glm::uvec3 t = *triangle;
             if (t.x >= of_part.vertices_each || t.y >= of_part.vertices_each || t.z >= of_part.vertices_each)
                 return status_code::index_out_of_range;
             const core::snapped_position &a = positions[t.x], &b = positions[t.y], &c = positions[t.z];
-            if (!core::is_drawable(a) || !core::is_drawable(b) || !core::is_drawable(c)) {
-                const bool nonfinite =
-                    a.x == core::nonfinite_mark || b.x == core::nonfinite_mark || c.x == core::nonfinite_mark;
-                ++(nonfinite ? counts.triangles_nonfinite : counts.triangles_too_far);
-                continue;
-            }
-            if (!core::meets_rows(a, b, c, fraction, whole, votes)) {
-                ++outside;
-                continue;
-            }
-            ++drawn;
+            const core::triangle_class kind = core::classify_for_rows(a, b, c, fraction, whole, votes);
+            core::count_class(seen, kind);
+            if (kind != core::triangle_class::drawn) continue;
             const core::row_box box = core::rows_within<0>(a, b, c, fraction, whole);
             if (box.empty()) continue;
             core::for_each_crossing<0, core::centre_offset<>>(
@@ -123,9 +115,7 @@ template <class Crossing>
                     found.emplace_back(rows.number(y, z), 2 * x + (winding > 0 ? 0 : 1), body);
                 });
         }
-        if (s.is_repair[number]) continue;
-        counts.triangles_drawn += drawn;
-        counts.triangles_outside += outside;
+        if (!s.is_repair[number]) core::add_triangles(counts, seen);
     }
     return status_code::ok;
 }

@@ -250,7 +250,7 @@ public:
         accumulate();
     }
 
-    // Of 32 voxels along x: inside, and outside; neither where their row is open.
+    // Bits of 32 voxels along x: inside, and outside; neither if their row is open.
     void vote(int x, int y, int z, std::uint32_t& for_it, std::uint32_t& against) const {
         const std::uint32_t in = inside_.get_bits(x, y, z);
         std::uint32_t open = 0;

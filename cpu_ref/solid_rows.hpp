@@ -46,7 +46,7 @@ public:
     virtual void end_row(int y, int z) = 0;
 };
 
-// What a thread needs for a row; as large as the largest row needs it, so that the sweep allocates nothing.
+// A thread's memory for a row, as large as the largest row needs it, so that the sweep allocates nothing.
 struct row_scratch {
     std::vector<std::uint32_t> mask;
     std::vector<std::uint32_t> order;
@@ -96,7 +96,7 @@ public:
     }
 
     [[nodiscard]] std::size_t num_beams() const { return beams_.size(); }
-    // Where the tiles of a beam lie; x is 0.
+    // The first tile of a beam, in tiles; x is 0.
     [[nodiscard]] glm::ivec3 first_tile(std::size_t item) const {
         const std::uint64_t row = beams_[item].number * tile_rows;
         return {0, rows_.y(row) / tile_size, rows_.z(row) / tile_size};

@@ -209,7 +209,7 @@ void sweep_all(const execution& how, const solid_sweep<Crossing>& sweep,
     add_counts(sweep, scratch, result.solid);
 }
 
-// Whether all draws that give fragments give the same values.
+// True if all draws that give fragments give the same values.
 template <class Draw>
 [[nodiscard]] bool has_same_values(std::span<const Draw> draws, bodies body) {
     if (body == bodies::call) return true;
@@ -221,7 +221,7 @@ template <class Draw>
 template <class Draw>
 using solid_shader_of = decltype(std::declval<const Draw&>().fragment_shader);
 
-// Whether the sweep has to find winding numbers for this shader.
+// True if the sweep has to find winding numbers for this shader.
 template <class Draw>
 inline constexpr bool shader_reads_winding = !core::is_constant<solid_shader_of<Draw>>;
 

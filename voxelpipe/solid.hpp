@@ -19,18 +19,18 @@
 
 namespace voxelpipe {
 
-// What is one body, with one winding number: all draws of the call together, which gives one fragment a voxel; or each
-// draw by itself, which gives one fragment for each draw that a voxel lies in.
+// The unit that is one body, with one winding number: all draws of the call together, which gives one fragment a voxel;
+// or each draw by itself, which gives one fragment for each draw that a voxel lies in.
 enum class bodies : std::uint8_t { call, draw };
 
-// Which voxels are drawn.
+// The voxels that are drawn.
 enum class solid_extent : std::uint8_t {
     centre, // those whose centre is inside
     outer,  // these and those whose closed box meets a triangle
     inner,  // those whose centre is inside and whose closed box meets no triangle
 };
 
-// What is done with meshes that are not closed.
+// Repairs of meshes that are not closed.
 enum class repair : std::uint8_t {
     none,        // a hole casts its shadow along +x; solid_counters::open_rows tells
     close_holes, // a cone is put over each hole's boundary, before anything else

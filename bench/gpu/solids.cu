@@ -1,13 +1,16 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Solids into bits on a GPU, by scene, grid and fill rule: the whole call, the same captured as a graph, a plain
-// baseline of ours (one thread a triangle, each voxel behind a crossing flipped by an atomic), whose bits must be the
-// same, the floor measured in the same run, and the fastest published figure. Prints a table of medians; --out writes
-// it as CSV too.
+// Solids into bits on a GPU, by scene, grid and fill rule or repair: the whole call, the same captured as a graph, a
+// plain baseline of ours (one thread a triangle, each voxel behind a crossing flipped by an atomic), whose bits must be
+// the same, the floor measured in the same run, and the fastest published figure. Repairs wait on the host, so they
+// have whole calls only. Prints a table of medians; --out writes it as CSV too. --scaling times both rules over
+// triangles, 10^3 to 10^7 on a sphere, and over grids instead.
 
 #include "device_record.hpp"
 #include "floors.hpp"
+#include "generated_on_device.hpp"
+#include "machine.hpp"
 #include "output.hpp"
 #include "scene_choice.hpp"
 #include "session.hpp"
@@ -83,8 +86,21 @@ struct options {
     std::vector<std::string> names;
     std::vector<int> resolutions{128, 256, 512, 1024};
     gpu::repetition repeat;
-    bool baseline = true;
+    bool baseline = true, repairs = true, scaling = false;
+    int scaling_resolution = 512, max_resolution = 2048; // of the series triangles, and where the series grid ends
 };
+
+// What a cell draws.
+struct solid_kind {
+    std::string_view name;
+    vp::solid_options options;
+};
+constexpr solid_kind rules[] = {{"even_odd", {.rule = vp::fill_rule::even_odd}},
+                                {"nonzero", {.rule = vp::fill_rule::nonzero}}};
+constexpr solid_kind repairs[] = {{"close_holes", {.rule = vp::fill_rule::nonzero, .repair = vp::repair::close_holes}},
+                                  {"exterior", {.repair = vp::repair::exterior}},
+                                  {"vote", {.repair = vp::repair::vote}}};
+bool is_parity(const solid_kind& kind) { return kind.options.rule == vp::fill_rule::even_odd; }
 
 struct published_solid {
     std::string_view scene;
@@ -118,17 +134,17 @@ public:
         draw_ = {view, {}, {true}};
     }
 
-    vp::status call(vp::fill_rule rule) {
-        const vp::status s = vp::voxelize_solid(backend_, draws(), grid_, framebuffer_, {.rule = rule});
+    vp::status call(const solid_kind& kind) {
+        const vp::status s = vp::voxelize_solid(backend_, draws(), grid_, framebuffer_, kind.options);
         if (s.code == vp::status_code::out_of_memory) throw gpu::out_of_device_memory(s.message());
         s.or_throw();
         return s;
     }
     // Times the call as a graph. Empty if no limits suffice.
-    sample time_async(vp::fill_rule rule, const gpu::repetition& how, std::uint64_t crossings) {
-        const vp::solid_options options{.rule = rule};
+    sample time_async(const solid_kind& kind, const gpu::repetition& how, std::uint64_t crossings) {
+        const vp::solid_options& options = kind.options;
         vp::workspace_limits limits;
-        limits.fragments = rule == vp::fill_rule::even_odd ? 0 : crossings + 1024;
+        limits.fragments = is_parity(kind) ? 0 : crossings + 1024;
         const std::size_t bytes = vp::solid_workspace_bytes(draws(), grid_, framebuffer_.view(), options, limits);
         const gpu::device_array<std::byte> memory(bytes);
         const vp::workspace_view workspace{memory.data(), bytes, limits};
@@ -186,24 +202,35 @@ int run(const options& how, const std::string& command) {
         for (const int n : how.resolutions) try {
                 solid_cell cell(session, mesh, vp::fit(data.positions, glm::ivec3(n)));
                 const double floor = gather + gpu::memset_ms(session, cell.bytes());
-                for (const auto rule : {vp::fill_rule::even_odd, vp::fill_rule::nonzero}) {
-                    const bool is_parity = rule == vp::fill_rule::even_odd;
-                    const vp::status s = cell.call(rule);
-                    const sample whole = gpu::time_calls(session, how.repeat, [&] { (void)cell.call(rule); });
+                for (const solid_kind& kind : rules) {
+                    const bool parity = is_parity(kind);
+                    const vp::status s = cell.call(kind);
+                    const sample whole = gpu::time_calls(session, how.repeat, [&] { (void)cell.call(kind); });
                     sample baseline;
-                    if (how.baseline && is_parity) baseline = cell.time_baseline({1, 5, 2, 1});
-                    const sample async = cell.time_async(rule, how.repeat, s.solid.crossings);
+                    if (how.baseline && parity) baseline = cell.time_baseline({1, 5, 2, 1});
+                    const sample async = cell.time_async(kind, how.repeat, s.solid.crossings);
                     watch.read();
                     const double peer = published_peer(data.name, n);
-                    if (peer > 0) ahead[is_parity ? 0 : 1].push_back(peer / whole.median);
-                    rows.add_row({data.name, std::to_string(n), is_parity ? "even_odd" : "nonzero",
+                    if (peer > 0) ahead[parity ? 0 : 1].push_back(peer / whole.median);
+                    rows.add_row({data.name, std::to_string(n), std::string(kind.name),
                                   std::to_string(data.triangles.size()), std::to_string(s.solid.crossings),
                                   std::to_string(s.counts.voxels), std::to_string(s.solid.open_rows), ms(whole.median),
                                   ms(async.median), ms(baseline.median), ms(floor), ms(peer), ratio(peer, whole.median),
                                   ratio(peer, async.median), ratio(baseline.median, whole.median)});
-                    say(data.name + " " + std::to_string(n) + (is_parity ? " even_odd " : " nonzero ") +
+                    say(data.name + " " + std::to_string(n) + " " + std::string(kind.name) + " " +
                         significant(whole.median) + " ms");
                 }
+                if (how.repairs)
+                    for (const solid_kind& kind : repairs) {
+                        const vp::status s = cell.call(kind);
+                        const sample whole = gpu::time_calls(session, how.repeat, [&] { (void)cell.call(kind); });
+                        rows.add_row({data.name, std::to_string(n), std::string(kind.name),
+                                      std::to_string(data.triangles.size()), std::to_string(s.solid.crossings),
+                                      std::to_string(s.counts.voxels), std::to_string(s.solid.open_rows),
+                                      ms(whole.median), "", "", ms(floor), "", "", "", ""});
+                        say(data.name + " " + std::to_string(n) + " " + std::string(kind.name) + " " +
+                            significant(whole.median) + " ms");
+                    }
                 session.trim();
             } catch (const std::exception& e) {
                 failed = true;
@@ -212,6 +239,7 @@ int run(const options& how, const std::string& command) {
             }
     }
     std::string text = "# Solids into bits on a GPU\n\n" + gpu::describe_device(watch) +
+                       "- commit: " + describe_machine().commit + "\n- date: " + describe_machine().date + "\n" +
                        "- clocks over the run: " + watch.range() + "\n- command: `" + command +
                        "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
                        " calls, CUDA events around the whole call, clear included, mesh on the device\n"
@@ -228,6 +256,70 @@ int run(const options& how, const std::string& command) {
     return failed ? 1 : 0;
 }
 
+// ---- the curves -----------------------------------------------------------------------------------------------------
+
+int run_scaling(const options& how, const std::string& command) {
+    gpu::session session;
+    gpu::clock_watch watch;
+    table rows({"series", "variant", "cell", "x", "resolution", "triangles", "fragments", "ms", "ms_q1", "ms_q3",
+                "runs", "async_ms", "baseline_ms", "mtriangles_per_s", "mfragments_per_s"});
+    std::vector<std::string> notes;
+    bool failed = false;
+    const auto point = [&](const std::string& series, const std::string& variant, double x,
+                           const gpu::resident_mesh& mesh, const vp::grid& g) {
+        const auto ms = [](double value) { return value > 0 ? significant(value, 4) : std::string{}; };
+        try {
+            solid_cell cell(session, mesh, g);
+            for (const solid_kind& kind : rules) {
+                const vp::status s = cell.call(kind);
+                const sample whole = gpu::time_calls(session, how.repeat, [&] { (void)cell.call(kind); });
+                sample baseline;
+                if (how.baseline && is_parity(kind)) baseline = cell.time_baseline({1, 3, 2, 1});
+                const sample async = cell.time_async(kind, how.repeat, s.solid.crossings);
+                watch.read();
+                const auto per_second = [&](std::uint64_t n) {
+                    return significant(static_cast<double>(n) / whole.median * 1e-3, 4);
+                };
+                rows.add_row({series, variant, "bit_solid_" + std::string(kind.name), significant(x, 9),
+                              std::to_string(g.extent.x), std::to_string(mesh.triangles.size()),
+                              std::to_string(s.solid.crossings), ms(whole.median), ms(whole.low_quartile),
+                              ms(whole.high_quartile), std::to_string(whole.runs), ms(async.median),
+                              ms(baseline.median), per_second(mesh.triangles.size()), per_second(s.solid.crossings)});
+                say(series + " " + significant(x, 9) + " " + std::string(kind.name) + " " + ms(whole.median) + " ms");
+            }
+        } catch (const std::exception& e) {
+            failed = true;
+            notes.push_back("failed: " + series + " " + significant(x, 9) + ": " + e.what());
+            say(notes.back());
+        }
+        session.trim();
+    };
+    const vp::grid unit = gpu::unit_grid(how.scaling_resolution);
+    for (const std::uint64_t wanted :
+         {1'000u, 3'000u, 10'000u, 30'000u, 100'000u, 300'000u, 1'000'000u, 3'000'000u, 10'000'000u}) {
+        const gpu::resident_mesh mesh = gpu::sphere_of_quads(gpu::quads_for(wanted), how.scaling_resolution);
+        point("triangles", "sphere", static_cast<double>(mesh.triangles.size()), mesh, unit);
+    }
+    const std::string name = how.names.empty() ? available_scenes(how.scenes, notes)[1] : how.names[0]; // dragon
+    const mesh_data data = find_mesh(how.scenes, name);
+    const gpu::resident_mesh mesh = gpu::upload(data);
+    for (int n = 64; n <= how.max_resolution; n *= 2)
+        point("grid", data.name, n, mesh, vp::fit(data.positions, glm::ivec3(n)));
+    std::string text = "# Solids into bits on a GPU, over triangles and grids\n\n" + gpu::describe_device(watch) +
+                       "- commit: " + describe_machine().commit + "\n- date: " + describe_machine().date + "\n" +
+                       "- clocks over the run: " + watch.range() + "\n- command: `" + command +
+                       "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
+                       " calls, clear included, mesh on the device; fragments: crossings\n";
+    for (const std::string& note : notes) text += "- " + note + "\n";
+    text += "\n" + rows.markdown();
+    std::cout << text;
+    if (!how.out.empty()) {
+        write_file(std::filesystem::path(how.out) / "gpu_solids_scaling.md", text);
+        write_file(std::filesystem::path(how.out) / "gpu_solids_scaling.csv", rows.csv());
+    }
+    return failed ? 1 : 0;
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
@@ -239,10 +331,14 @@ int main(int argc, char** argv) {
     app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
     app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
     app.add_flag("!--no-baseline", how.baseline, "Leave out the baseline");
-    app.add_option("--out", how.out, "Folder for gpu_solids.md and gpu_solids.csv");
+    app.add_flag("!--no-repairs", how.repairs, "Leave out the repairs");
+    app.add_flag("--scaling", how.scaling, "Curves over triangles and grids, instead of the table");
+    app.add_option("--most-resolution", how.max_resolution, "Where the curve over grids ends")->capture_default_str();
+    app.add_option("--out", how.out, "Folder for gpu_solids.md and gpu_solids.csv, or gpu_solids_scaling");
     CLI11_PARSE(app, argc, argv);
     try {
-        return run(how, bench::command_line(argc, argv));
+        const std::string command = bench::command_line(argc, argv);
+        return how.scaling ? run_scaling(how, command) : run(how, command);
     } catch (const std::exception& e) {
         std::fprintf(stderr, "bench_gpu_solids: %s\n", e.what());
         return 1;

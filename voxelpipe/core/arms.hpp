@@ -60,7 +60,7 @@ struct arm_setup : triangle_frame<Int> {
     triple<Int> plane;                   // the normal, its last component positive
     Int plane_low, plane_high;           // ceil(r), floor(r)
 
-    // Whether arm k of voxel i = (u, v, w) meets the triangle; a = plane . (2 i + 1).
+    // True if arm k of voxel i = (u, v, w) meets the triangle; a = plane . (2 i + 1).
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr bool meets_arm(int k, const triple<Int>& i, Int a) const {
         if (reach[k] == 0 || a - reach[k] > plane_high || a + reach[k] < plane_low) return false;
         const arm s = arm_of(set, k);

@@ -14,13 +14,13 @@
 // both, or none, as if the edge were beside the row. So on a closed mesh the crossings of a row alternate as those of a
 // row in general position do.
 
-#include <voxelpipe/core/triangle_setup.hpp>
+#include <voxelpipe/core/primitive.hpp>
 
 #include <cstdint>
 
 namespace voxelpipe {
 
-// Which winding numbers are inside. The winding number of a voxel is the sum of the crossings of its row below its
+// The winding numbers that are inside. The winding number of a voxel is the sum of the crossings of its row below its
 // centre: +1 where the row, going up, meets a triangle's front, -1 where it meets a back. It is 1 inside a closed mesh
 // whose fronts face outward.
 enum class fill_rule : std::uint8_t {
@@ -40,7 +40,7 @@ namespace core {
 template <int First = 0, int Second = 1, int Third = 2>
 struct centre_offset {
     static_assert((1 << First | 1 << Second | 1 << Third) == 7, "voxelpipe: each axis once");
-    // Whether the offset's product with the coefficients (x, y, z) is above 0; they are not all 0.
+    // True if the offset's product with the coefficients (x, y, z) is above 0; they are not all 0.
     template <class Int>
     [[nodiscard]] VOXELPIPE_HD static constexpr bool is_positive(const triple<Int>& c) {
         return c[First] != 0 ? c[First] > 0 : c[Second] != 0 ? c[Second] > 0 : c[Third] > 0;
@@ -215,7 +215,7 @@ VOXELPIPE_HD constexpr void for_each_crossing(const snapped_position& a, const s
         run(setup_crossings<Axis, Offset, int128>(a, b, c, fraction, has_steps));
 }
 
-// Whether a drawable triangle takes part in a solid of the grid, of which `whole` is the computed part: its closed box
+// True if a drawable triangle takes part in a solid of the grid, of which `whole` is the computed part: its closed box
 // meets the part's y and z intervals. Where it lies along x does not matter, for it flips what is behind it. With votes
 // (repair::vote) rows along y and z count as well: it meets two of the three intervals.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr bool meets_rows(const snapped_position& a,
@@ -228,6 +228,17 @@ VOXELPIPE_HD constexpr void for_each_crossing(const snapped_position& a, const s
     const bool y = meets(min3(a.y, b.y, c.y), max3(a.y, b.y, c.y), 1),
                z = meets(min3(a.z, b.z, c.z), max3(a.z, b.z, c.z), 2);
     return (y && z) || (votes && (y || z) && meets(min3(a.x, b.x, c.x), max3(a.x, b.x, c.x), 0));
+}
+
+// classify for a triangle of a solid; votes as in meets_rows.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE triangle_class classify_for_rows(const snapped_position& a,
+                                                                             const snapped_position& b,
+                                                                             const snapped_position& c, int fraction,
+                                                                             const voxel_box& whole,
+                                                                             bool votes = false) {
+    const triangle_class kind = classify_positions(a, b, c);
+    if (kind != triangle_class::drawn) return kind;
+    return meets_rows(a, b, c, fraction, whole, votes) ? triangle_class::drawn : triangle_class::outside;
 }
 
 } // namespace core

@@ -66,7 +66,7 @@ public:
         if (from != to) ends_[next_[std::min(from, to)]++] = std::max(from, to) << 1 | (from < to ? 0u : 1u);
     }
 
-    // What is left after cancelling, each edge as often as it is left.
+    // The edges left after cancelling, each as often as it is left.
     [[nodiscard]] std::vector<edge> boundary() {
         std::vector<edge> left;
         for (std::size_t v = 0; v + 1 < first_.size(); ++v) {

@@ -14,16 +14,23 @@ namespace voxelpipe::core {
 
 enum class triangle_class : std::uint8_t { drawn, nonfinite, too_far, zero_area, outside };
 
+// nonfinite or too_far if a position is; drawn otherwise.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE triangle_class classify_positions(const snapped_position& a,
+                                                                              const snapped_position& b,
+                                                                              const snapped_position& c) {
+    if (is_drawable(a) && is_drawable(b) && is_drawable(c)) return triangle_class::drawn;
+    const bool nonfinite = a.x == nonfinite_mark || b.x == nonfinite_mark || c.x == nonfinite_mark;
+    return nonfinite ? triangle_class::nonfinite : triangle_class::too_far;
+}
+
 // Classifies a triangle: drawn, or why not. `reach` receives the voxels that it may touch, clipped to the grid.
 template <coverage Rule>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE triangle_class classify(const snapped_position& a,
                                                                     const snapped_position& b,
                                                                     const snapped_position& c, int fraction,
                                                                     const voxel_box& whole, voxel_box& reach) {
-    if (!is_drawable(a) || !is_drawable(b) || !is_drawable(c)) {
-        const bool nonfinite = a.x == nonfinite_mark || b.x == nonfinite_mark || c.x == nonfinite_mark;
-        return nonfinite ? triangle_class::nonfinite : triangle_class::too_far;
-    }
+    const triangle_class kind = classify_positions(a, b, c);
+    if (kind != triangle_class::drawn) return kind;
     voxel_box box = bounds(a, b, c, fraction);
     if constexpr (Rule == coverage::thin) {
         // The depth at a touched column's centre is at most one voxel beyond the triangle's own depths.

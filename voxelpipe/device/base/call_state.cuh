@@ -25,8 +25,8 @@ struct pipeline_state {
     unsigned long long list_voxels;
     unsigned long long filtered, kept;              // listed fragments that the shader discards, and all others
     unsigned int index_error;                       // bad_index and bad_numbers
-    unsigned int num_items, num_splits, num_images; // tile split
-    unsigned int next_item;                         // fine raster
+    unsigned int num_items, num_splits, num_images; // tile split; solids: the last two count long rows
+    unsigned int next_item;                         // fine raster; solids: entries that have a place
     unsigned int num_ordered[5];                    // fragment order: lengths of order_lists
     unsigned long long longest_run; // of those, the longest run of one voxel that is too long for a block
     struct {

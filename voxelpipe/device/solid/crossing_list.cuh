@@ -10,6 +10,7 @@
 #include <voxelpipe/device/fragments/fragment_lists.cuh>
 #include <voxelpipe/device/fragments/radix_sort.cuh>
 #include <voxelpipe/device/scene/cub_sort.cuh>
+#include <voxelpipe/tuning/tuning_solid.hpp>
 
 #include <algorithm>
 #include <bit>
@@ -18,7 +19,7 @@
 
 namespace voxelpipe::device {
 
-// What changes at the voxel of an entry and holds from there on.
+// The change at the voxel of an entry, which holds from there on.
 enum class entry_kind : std::uint32_t { leave, enter, cover_begin, cover_end };
 
 // Position and kind in one word: a position is 0 .. extent, at most 2^20.
@@ -65,9 +66,32 @@ struct crossing_list {
     }
 };
 
+// The crossings of one body by row without a sort. They are listed with their rows and counted by row; then rows get
+// room for their entries, in any order, and each entry takes the next place of its row.
+struct row_groups {
+    std::uint32_t* counts = nullptr;  // of entries, by row; zeros before a call, and after it. Null: not used
+    crossing_list list{};             // keys of 32 bits
+    std::uint32_t* ends = nullptr;    // of rows in `grouped`
+    std::uint32_t* grouped = nullptr; // values, row by row
+    uint2* long_rows = nullptr;       // rows of more than tuning::lane_entries, and how many they have
+
+    [[nodiscard]] static row_groups take(arena& memory, std::uint64_t capacity, std::uint64_t num_rows,
+                                         std::uint32_t* counts) {
+        row_groups g;
+        g.counts = counts;
+        auto* const keys = memory.take<std::uint32_t>(capacity);
+        g.list = {keys, memory.take<std::uint32_t>(capacity), capacity, 1, false};
+        g.ends = memory.take<std::uint32_t>(num_rows);
+        g.grouped = memory.take<std::uint32_t>(capacity);
+        g.long_rows = memory.take<uint2>(capacity / (tuning::lane_entries + 1) + 1);
+        return g;
+    }
+};
+
 // Room for n items of each thread behind what *total counts: the number of the thread's first one. One atomic a block,
 // because atomics on one address wait for one another. All threads of the block take part.
-__device__ inline unsigned long long reserve_for_block(unsigned long long n, unsigned long long* total) {
+template <class Total>
+__device__ unsigned long long reserve_for_block(unsigned long long n, Total* total) {
     __shared__ unsigned long long first_of_warp[threads_per_block / 32];
     const unsigned lane = threadIdx.x % 32, warp = warp_in_block();
     unsigned long long before = n; // with its own
@@ -85,11 +109,67 @@ __device__ inline unsigned long long reserve_for_block(unsigned long long n, uns
             w = sum;
             sum += of_warp;
         }
-        const unsigned long long first = sum != 0 ? atomicAdd(total, sum) : 0;
+        const unsigned long long first = sum != 0 ? atomicAdd(total, static_cast<Total>(sum)) : 0;
         for (auto& w : first_of_warp) w += first;
     }
     __syncthreads();
     return first_of_warp[warp] + before - n;
+}
+
+// ---- grouping by row ------------------------------------------------------------------------------------------------
+
+// Gives each row room for its entries, and lists the long ones. A thread a row.
+template <class State>
+__global__ __launch_bounds__(threads_per_block) void place_rows_kernel(const __grid_constant__ row_groups groups,
+                                                                       std::uint64_t num_rows, State* state,
+                                                                       capacities limits) {
+    await_stream();
+    if (has_failed(*state, limits) || state->list_fragments == 0) return;
+    for (std::uint64_t start = std::uint64_t{blockIdx.x} * threads_per_block; start < num_rows;
+         start += std::uint64_t{gridDim.x} * threads_per_block) {
+        const std::uint64_t row = start + threadIdx.x;
+        const std::uint32_t n = row < num_rows ? groups.counts[row] : 0;
+        if (__syncthreads_or(static_cast<int>(n != 0)) == 0) continue;
+        const auto first = static_cast<std::uint32_t>(reserve_for_block(n, &state->next_item));
+        if (n != 0) groups.ends[row] = first;
+        if (n > tuning::lane_entries)
+            groups.long_rows[atomicAdd(&state->num_splits, 1u)] = uint2{static_cast<std::uint32_t>(row), n};
+    }
+}
+// Afterwards groups.ends says where the rows end.
+template <class State>
+__global__ __launch_bounds__(threads_per_block) void group_entries_kernel(const __grid_constant__ row_groups groups,
+                                                                          const State* state, capacities limits) {
+    constexpr int batch = 4; // entries of a thread at once
+    await_stream();
+    if (has_failed(*state, limits)) return;
+    const std::uint64_t num = state->list_fragments, step = std::uint64_t{gridDim.x} * threads_per_block;
+    const auto* const rows = static_cast<const std::uint32_t*>(groups.list.keys);
+    for (std::uint64_t first = std::uint64_t{blockIdx.x} * threads_per_block + threadIdx.x; first < num;
+         first += batch * step) {
+        std::uint32_t row[batch], value[batch], at[batch];
+#pragma unroll
+        for (int k = 0; k < batch; ++k) {
+            const std::uint64_t i = first + static_cast<std::uint64_t>(k) * step;
+            row[k] = i < num ? rows[i] : 0;
+            value[k] = i < num ? groups.list.values[i] : 0;
+        }
+#pragma unroll
+        for (int k = 0; k < batch; ++k)
+            if (first + static_cast<std::uint64_t>(k) * step < num) at[k] = atomicAdd(groups.ends + row[k], 1u);
+#pragma unroll
+        for (int k = 0; k < batch; ++k)
+            if (first + static_cast<std::uint64_t>(k) * step < num) groups.grouped[at[k]] = value[k];
+    }
+}
+// The values of each row behind each other in `grouped`.
+template <int = 0>
+void group_by_row(const row_groups& groups, std::uint64_t num_rows, pipeline_state* state, const capacities& limits,
+                  cudaStream_t stream) {
+    launch_behind(place_rows_kernel<pipeline_state>, fill_device(num_rows), threads_per_block, stream, stage::tile_sort,
+                  groups, num_rows, state, limits);
+    launch_behind(group_entries_kernel<pipeline_state>, fill_device(limits.fragments / 4 + 1), threads_per_block,
+                  stream, stage::tile_sort, groups, static_cast<const pipeline_state*>(state), limits);
 }
 
 // ---- the sort -------------------------------------------------------------------------------------------------------

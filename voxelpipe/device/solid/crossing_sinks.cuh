@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Where crossings go: into a list, or straight into bits.
+// Sinks of crossings: a list, or bits.
 
 #include <voxelpipe/device/solid/crossing_list.cuh>
 #include <voxelpipe/device/solid/solid_source.cuh>
@@ -11,12 +11,13 @@
 
 namespace voxelpipe::device {
 
-// Into the list, behind what is there. Order does not show.
+// Appends to the list. The order does not show.
 struct crossing_appender {
     static constexpr bool is_listing = true;
     crossing_list list;
-    bool is_split;           // a body a draw
-    std::uint32_t num_draws; // the cones of body k are draw num_draws + k
+    bool is_split;                   // a body a draw
+    std::uint32_t num_draws;         // the cones of body k are draw num_draws + k
+    std::uint32_t* counts = nullptr; // of entries, by row: row_groups; null: not wanted
 
     // at: the crossing's number in the list
     __device__ VOXELPIPE_INLINE void emit(const row_grid& grid, unsigned long long at, std::uint32_t draw,
@@ -26,12 +27,12 @@ struct crossing_appender {
                    : draw < num_draws ? draw
                                       : draw - num_draws,
                    entry_value::of(grid.position(first), winding > 0 ? entry_kind::enter : entry_kind::leave));
+        if (counts != nullptr) atomicAdd(counts + row, 1u);
     }
 };
 
-// The first bit behind the crossing changes; what lies further is for a later pass (solid/parity_rows.cuh). Rows that
-// are crossed are marked, a byte each, so that no atomic is needed, and those that are crossed behind the part an odd
-// number of times, by a bit each.
+// Toggles the first bit behind the crossing; a later pass spreads it (solid/parity_rows.cuh). Marks crossed rows by a
+// byte each, which needs no atomic, and rows crossed behind the part an odd number of times by a bit each.
 struct crossing_toggler {
     static constexpr bool is_listing = false;
     word* bits;

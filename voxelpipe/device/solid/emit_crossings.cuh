@@ -24,10 +24,11 @@ void find_row_codes(const shaded_triangles<Mesh, VertexShader>& triangles, const
 template <class Source, class Sink>
 void emit_crossings(const Source& source, const row_grid& grid, const Sink& sink, const row_triangles& kept,
                     pipeline_state* state, cudaStream_t stream) {
-    launch_behind(small_rows_kernel<Source, Sink>, fill_device(source.num_triangles, small_row_blocks),
+    launch_behind(small_rows_kernel<Source, Sink>, fill_device(source.num_triangles, tuning::small_row_blocks),
                   threads_per_block, stream, stage::coarse_raster, source, grid, sink, kept, state);
-    launch_behind(large_rows_kernel<Source, Sink>, static_cast<unsigned>(num_multiprocessors()) * 2, threads_per_block,
-                  stream, stage::coarse_raster, source, grid, sink, kept, state);
+    launch_behind(large_rows_kernel<Source, Sink>,
+                  static_cast<unsigned>(num_multiprocessors() * tuning::large_row_blocks), threads_per_block, stream,
+                  stage::coarse_raster, source, grid, sink, kept, state);
 }
 
 } // namespace voxelpipe::device

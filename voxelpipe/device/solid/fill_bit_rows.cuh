@@ -2,19 +2,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The sweep of one body, a constant, into targets of bits: a lane takes 32 voxels instead of one. A row of up to 64
-// entries is sorted in a warp's registers. The entries at which the inside begins or ends change bits of a row of
-// words, whose running parity is the inside.
+// The sweep of one body, a constant, into targets of bits, from crossings that are grouped by row. A warp takes 32
+// rows. Each lane sorts the entries of its row in registers and keeps the positions at which the inside begins or ends;
+// then the lanes make words of the rows, four neighbours each. Rows that are too long for a lane are done by a warp
+// each, which sorts up to 64 entries in registers. The cover joins as a mask. So nothing is sorted but rows, and
+// targets that are cleared to zero are written once, here.
 
 #include <voxelpipe/device/fragments/warp_sort.cuh>
 #include <voxelpipe/device/solid/fill_rows.cuh>
 #include <voxelpipe/device/solid/parity_rows.cuh>
+#include <voxelpipe/device/targets/clear_target.cuh>
+#include <voxelpipe/tuning/tuning_solid.hpp>
 
+#include <bit>
+#include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 namespace voxelpipe::device {
 
-// Which calls, as far as types tell.
+// True for types of calls that may take this path.
 template <class SolidShader, class Framebuffer>
 inline constexpr bool fills_bit_rows = false;
 template <class SolidShader, class... Targets>
@@ -116,56 +123,252 @@ private:
     unsigned carry_ = 0; // parity of the rounds before
 };
 
+// The output of a fill: one constant into targets of bits. Words of a row are 32 voxels along x.
 template <class Framebuffer, class Values>
-__global__ __launch_bounds__(threads_per_block) void fill_bit_rows_kernel(const __grid_constant__ crossing_list list,
-                                                                          const __grid_constant__ sweep_rules rules,
-                                                                          const __grid_constant__ Framebuffer fb,
-                                                                          const __grid_constant__ Values values,
-                                                                          pipeline_state* state, capacities limits) {
-    constexpr unsigned warps = threads_per_block / 32;
-    __shared__ sweep_memory memory[warps];
-    __shared__ word words[warps][32];
+struct bit_writer {
+    template <std::size_t K>
+    using target = typename targets_of<Framebuffer>::template at<K>;
+    static constexpr std::size_t count = targets_of<Framebuffer>::count;
+
+    // True if every word of a target is written, so that it need not be cleared before.
+    template <class Target>
+    [[nodiscard]] VOXELPIPE_HD static bool writes_all(const target_view<Target>& t) {
+        return !Target::map::bricks && t.load == load_operation::clear && !t.clear_value;
+    }
+    [[nodiscard]] __device__ static bool writes_all_of_any(const Framebuffer& fb) {
+        bool any = false;
+        core::for_each_index<count>(
+            [&]<std::size_t K>() VOXELPIPE_INLINE_LAMBDA { any = any || writes_all(voxelpipe::get<K>(fb.targets)); });
+        return any;
+    }
+    // Writes n words of a row from number first on; the inside's bits are `inside`. Nobody else writes to the row.
+    // by_four: n is 4 or 0, and rows begin at multiples of 16 bytes.
+    template <int N>
+    __device__ VOXELPIPE_INLINE static void write(const Framebuffer& fb, const Values& values, const word (&inside)[N],
+                                                  std::uint32_t n, std::uint32_t first, int y, int z, bool by_four) {
+        if (n == 0) return;
+        word any = 0;
+#pragma unroll
+        for (int k = 0; k < N; ++k) any |= inside[k];
+        core::for_each_index<count>([&]<std::size_t K>() VOXELPIPE_INLINE_LAMBDA {
+            const auto& t = voxelpipe::get<K>(fb.targets);
+            const bool is_all = writes_all(t);
+            if (t.load == load_operation::off || (any == 0 && !is_all)) return;
+            bool from_clear = false, from_set = true; // what a fragment makes of either bit
+            target<K>::traits::apply(from_clear, voxelpipe::get<K>(values));
+            target<K>::traits::apply(from_set, voxelpipe::get<K>(values));
+            const auto at = [&](std::uint32_t k) VOXELPIPE_INLINE_LAMBDA {
+                return t.elements + target<K>::map::cell(t.extent, static_cast<int>((first + k) * 32), y, z);
+            };
+            if constexpr (N == 4) {
+                if (is_all && by_four) {
+                    *reinterpret_cast<uint4*>(at(0)) =
+                        from_clear ? uint4{inside[0], inside[1], inside[2], inside[3]} : uint4{0, 0, 0, 0};
+                    return;
+                }
+            }
+#pragma unroll
+            for (int k = 0; k < N; ++k) {
+                if (static_cast<std::uint32_t>(k) >= n || (inside[k] == 0 && !is_all)) continue;
+                word* const w = at(static_cast<std::uint32_t>(k));
+                const word old = t.load == load_operation::clear && !t.clear_value ? 0 : *w;
+                *w = (old & ~inside[k]) | (inside[k] & ((from_set ? old : 0u) | (from_clear ? ~old : 0u)));
+            }
+        });
+    }
+};
+
+// A column of shared memory a lane: what it knows of its row.
+struct lane_column {
+    word (*entries)[32];
+    std::uint32_t lane;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE word& operator[](std::uint32_t k) const { return entries[k][lane]; }
+};
+
+// Sorts N numbers of a lane: a bitonic network, whose first step of each size compares mirror images.
+template <int N>
+__device__ VOXELPIPE_INLINE void sort_lane(word (&w)[N]) {
+#pragma unroll
+    for (int size = 2; size <= N; size *= 2) {
+#pragma unroll
+        for (int k = 0; k < N; ++k)
+            if ((k & size / 2) == 0) put_in_order(w[k], w[k ^ (size - 1)]);
+#pragma unroll
+        for (int apart = size / 4; apart > 0; apart /= 2)
+#pragma unroll
+            for (int k = 0; k < N; ++k)
+                if ((k & apart) == 0) put_in_order(w[k], w[k | apart]);
+    }
+}
+// Puts the positions at which the inside of a row begins or ends, in the part, into a column; returns how many there
+// are. values: the row's n <= N entries, in any order. Adds the row to the totals, but for its voxels.
+template <int N>
+[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t find_toggles(const std::uint32_t* values, std::uint32_t n,
+                                                                     const sweep_rules& rules, const lane_column& to,
+                                                                     sweep_totals& totals) {
+    const auto nx = static_cast<std::uint32_t>(rules.grid.extent.x);
+    word w[N];
+#pragma unroll
+    for (int k = 0; k < N; ++k) w[k] = static_cast<std::uint32_t>(k) < n ? values[k] : ~0u;
+    sort_lane(w);
+    std::int32_t winding = 0;
+    bool was_inside = false;
+    std::uint32_t found = 0;
+#pragma unroll
+    for (int k = 0; k < N; ++k) {
+        if (static_cast<std::uint32_t>(k) >= n) continue;
+        const entry_value e{w[k]}, next{k + 1 < N ? w[k + 1] : ~0u};
+        winding += e.step();
+        const auto at = static_cast<std::uint32_t>(e.position());
+        if (next.position() == e.position() || at >= nx) continue; // more at this voxel, or behind the part
+        totals.see(winding);
+        const bool is_inside = core::is_inside(rules.rule, winding);
+        if (is_inside != was_inside) to[found++] = at;
+        was_inside = is_inside;
+    }
+    totals.open_rows += static_cast<unsigned>(rules.rule == fill_rule::even_odd ? (winding & 1) != 0 : winding != 0);
+    return found;
+}
+// The bits of words first .. first + N - 1 of a row whose inside changes at the n positions of a column.
+template <int N>
+__device__ VOXELPIPE_INLINE void make_words(const lane_column& toggles, std::uint32_t n, std::uint32_t first,
+                                            word (&out)[N]) {
+#pragma unroll
+    for (int k = 0; k < N; ++k) out[k] = 0;
+    for (std::uint32_t i = 0; i < n; ++i) {
+        const int at = static_cast<int>(toggles[i]) - static_cast<int>(first * 32);
+#pragma unroll
+        for (int k = 0; k < N; ++k) {
+            const int of_word = at - 32 * k;
+            out[k] ^= of_word <= 0 ? ~0u : of_word < 32 ? ~0u << of_word : 0u;
+        }
+    }
+}
+
+// Joins n words of the cover to the inside, as the extent says.
+template <int N>
+__device__ VOXELPIPE_INLINE void add_cover(const sweep_rules& rules, const word* cover, std::uint32_t n,
+                                           word (&inside)[N]) {
+#pragma unroll
+    for (int k = 0; k < N; ++k) {
+        if (static_cast<std::uint32_t>(k) >= n) continue;
+        const word w = cover[k];
+        inside[k] = rules.extent == solid_extent::outer ? inside[k] | w : inside[k] & ~w;
+    }
+}
+
+struct row_memory {
+    word entries[tuning::lane_entries][32];
+    sweep_memory sweep;
+    word words[32];
+};
+
+template <class Framebuffer, class Values>
+__global__ __launch_bounds__(threads_per_block, tuning::fill_blocks) void fill_bit_rows_kernel(
+    const __grid_constant__ row_groups groups, const word* cover, const __grid_constant__ sweep_rules rules,
+    const __grid_constant__ Framebuffer fb, const __grid_constant__ Values values, std::uint32_t lanes_per_row,
+    bool by_four, pipeline_state* state, capacities limits) {
+    constexpr unsigned warps_of_block = threads_per_block / 32, whole_warp = 0xffffffffu;
+    using writer = bit_writer<Framebuffer, Values>;
+    __shared__ row_memory memory[warps_of_block];
     await_stream();
-    if (has_failed(*state, limits)) return;
-    const std::uint32_t lane = threadIdx.x % 32;
+    const bool failed = has_failed(*state, limits);
+    row_memory& mine = memory[warp_in_block()];
+    const std::uint32_t lane = threadIdx.x % 32, column = lane % lanes_per_row;
+    const std::uint32_t rows_at_once = 32 / lanes_per_row, words_at_once = lanes_per_row * tuning::row_words;
     const auto words_x = (static_cast<std::uint32_t>(rules.grid.extent.x) + 31) / 32;
+    const word last_bits = rules.grid.extent.x % 32 == 0 ? ~0u : (1u << rules.grid.extent.x % 32) - 1;
+    const bool writes_all = writer::writes_all_of_any(fb);
+    const auto ny = static_cast<std::uint64_t>(rules.grid.extent.y);
+    const std::uint64_t num = rules.grid.num_rows(), step = std::uint64_t{gridDim.x} * threads_per_block;
     sweep_totals totals;
-    for_each_row(list, rules, memory[warp_in_block()], state->list_fragments, [&](const row_sweep& sweep) {
-        const auto y = static_cast<int>(sweep.row % static_cast<std::uint64_t>(rules.grid.extent.y)),
-                   z = static_cast<int>(sweep.row / static_cast<std::uint64_t>(rules.grid.extent.y));
-        inside_words inside(sweep, words[warp_in_block()], totals);
-        for (std::uint32_t first = 0; first < words_x; first += 32) {
-            const word mask = inside.next(first);
-            totals.fragments += static_cast<unsigned>(__popc(mask));
-            if (mask != 0)
-                core::for_each_index<targets_of<Framebuffer>::count>([&]<std::size_t K>() VOXELPIPE_INLINE_LAMBDA {
-                    using target = typename targets_of<Framebuffer>::template at<K>;
-                    const auto& t = voxelpipe::get<K>(fb.targets);
-                    if (t.load == load_operation::off) return;
-                    bool from_clear = false, from_set = true; // what a fragment makes of either bit
-                    target::traits::apply(from_clear, voxelpipe::get<K>(values));
-                    target::traits::apply(from_set, voxelpipe::get<K>(values));
-                    word* const w =
-                        t.elements + target::map::cell(t.extent, static_cast<int>((first + lane) * 32), y, z);
-                    const bool was_cleared =
-                        t.load == load_operation::clear && !t.clear_value; // and nobody else writes
-                    const word old = was_cleared ? 0 : *w;
-                    *w = (old & ~mask) | (mask & ((from_set ? old : 0u) | (from_clear ? ~old : 0u)));
-                });
+    for (std::uint64_t start = (std::uint64_t{blockIdx.x} * warps_of_block + warp_in_block()) * 32; start < num;
+         start += step) {
+        const std::uint64_t row = start + lane;
+        const std::uint32_t n = row < num ? groups.counts[row] : 0;
+        const bool is_long = n > tuning::lane_entries;
+        if (n != 0) groups.counts[row] = 0;
+        const std::uint32_t most = __reduce_max_sync(whole_warp, is_long ? 0 : n);
+        const unsigned marked = __ballot_sync(whole_warp, static_cast<int>(n != 0));
+        if (failed || (marked == 0 && !writes_all && cover == nullptr)) continue;
+        std::uint32_t num_toggles = 0;
+        if (n != 0 && !is_long) {
+            const lane_column to{mine.entries, lane};
+            const std::uint32_t* const values = groups.grouped + (groups.ends[row] - n);
+            num_toggles = most <= 8    ? find_toggles<8>(values, n, rules, to, totals)
+                          : most <= 16 ? find_toggles<16>(values, n, rules, to, totals)
+                                       : find_toggles<tuning::lane_entries>(values, n, rules, to, totals);
+        }
+        __syncwarp(); // all columns are ready
+        const unsigned long_rows = __ballot_sync(whole_warp, static_cast<int>(is_long));
+        const auto y = static_cast<int>(row % ny), z = static_cast<int>(row / ny);
+        for (std::uint32_t turn = 0; turn < 32; turn += rows_at_once) {
+            const std::uint32_t of = turn + lane / lanes_per_row;
+            const std::uint32_t toggles = __shfl_sync(whole_warp, num_toggles, static_cast<int>(of));
+            const int row_y = __shfl_sync(whole_warp, y, static_cast<int>(of)),
+                      row_z = __shfl_sync(whole_warp, z, static_cast<int>(of));
+            const bool is_done =
+                start + of >= num || (long_rows >> of & 1u) != 0 || (toggles == 0 && !writes_all && cover == nullptr);
+            for (std::uint32_t first = column * tuning::row_words; !is_done && first < words_x;
+                 first += words_at_once) {
+                const std::uint32_t left = words_x - first, here = left < tuning::row_words ? left : tuning::row_words;
+                word inside[tuning::row_words];
+                make_words(lane_column{mine.entries, of}, toggles, first, inside);
+                if (cover != nullptr) add_cover(rules, cover + (start + of) * words_x + first, here, inside);
+#pragma unroll
+                for (std::uint32_t k = 0; k < tuning::row_words; ++k) {
+                    if (k >= left) inside[k] = 0;
+                    if (k + 1 == left) inside[k] &= last_bits;
+                    totals.fragments += static_cast<unsigned>(__popc(inside[k]));
+                }
+                writer::write(fb, values, inside, here, first, row_y, row_z, by_four);
+            }
             __syncwarp();
         }
-    });
+    }
+    // Long rows, one after the other, by whichever warp is free.
+    const std::uint32_t num_long = failed ? 0 : state->num_splits;
+    const crossing_list grouped{nullptr, groups.grouped, groups.list.capacity, 1, false};
+    for (;;) {
+        std::uint32_t ticket = 0;
+        if (lane == 0 && num_long != 0) ticket = atomicAdd(&state->num_images, 1u);
+        ticket = __shfl_sync(whole_warp, ticket, 0);
+        if (ticket >= num_long) break;
+        const std::uint64_t row = groups.long_rows[ticket].x, end = groups.ends[row];
+        const row_sweep sweep{grouped, rules, mine.sweep, row, {end - groups.long_rows[ticket].y, end}};
+        const auto y = static_cast<int>(row % ny), z = static_cast<int>(row / ny);
+        inside_words words(sweep, mine.words, totals);
+        for (std::uint32_t first = 0; first < words_x; first += 32) {
+            word inside[1] = {words.next(first)};
+            if (cover != nullptr)
+                add_cover(rules, cover + row * words_x + first + lane, first + lane < words_x ? 1 : 0, inside);
+            totals.fragments += static_cast<unsigned>(__popc(inside[0]));
+            writer::write(fb, values, inside, first + lane < words_x ? 1 : 0, first + lane, y, z, false);
+            __syncwarp();
+        }
+    }
     totals.voxels = totals.fragments; // one body
     totals.add_up(rules, state);
 }
 
-// As fill_rows, of calls with one body and without cover.
+// As fill_rows, for calls with one body whose crossings are grouped by row. cover: null, or the mask of the extent's
+// cover. Clears the targets that the kernel does not write as a whole.
 template <class SolidShader, class Framebuffer>
-void fill_bit_rows(const crossing_list& list, const sweep_rules& rules, const SolidShader& shader,
+void fill_bit_rows(const row_groups& groups, const word* cover, const sweep_rules& rules, const SolidShader& shader,
                    const Framebuffer& fb, pipeline_state* state, const capacities& limits, cudaStream_t stream) {
-    launch_behind(fill_bit_rows_kernel<Framebuffer, std::remove_cvref_t<decltype(shader.values)>>,
-                  fill_device(limits.fragments), threads_per_block, stream, stage::tile_resolve, list, rules, fb,
-                  shader.values, state, limits);
+    using values_type = std::remove_cvref_t<decltype(shader.values)>;
+    const std::uint32_t words_x = (static_cast<std::uint32_t>(rules.grid.extent.x) + 31) / 32,
+                        lanes = (words_x + tuning::row_words - 1) / tuning::row_words;
+    bool by_four = words_x % 4 == 0;
+    core::for_each_index<targets_of<Framebuffer>::count>([&]<std::size_t K>() {
+        const auto& t = voxelpipe::get<K>(fb.targets);
+        by_four = by_four && reinterpret_cast<std::uintptr_t>(t.elements) % 16 == 0;
+        if (t.load == load_operation::clear && !bit_writer<Framebuffer, values_type>::writes_all(t))
+            clear_target(t, state, limits, stream);
+    });
+    launch_behind(fill_bit_rows_kernel<Framebuffer, values_type>, fill_device(rules.grid.num_rows()), threads_per_block,
+                  stream, stage::tile_resolve, groups, cover, rules, fb, shader.values,
+                  std::bit_ceil(lanes < 32 ? lanes : 32u), by_four, state, limits);
 }
 
 } // namespace voxelpipe::device

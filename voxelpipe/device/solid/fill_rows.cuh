@@ -28,7 +28,7 @@ struct body_shaders {
 
 template <class Framebuffer>
 struct voxel_fold;
-// Of one voxel: what its fragments have come to in each target.
+// The values of one voxel in each target, as far as its fragments are folded.
 template <class... Targets>
 struct voxel_fold<framebuffer_view<Targets...>> {
     template <std::size_t K>
@@ -115,7 +115,7 @@ __global__ __launch_bounds__(threads_per_block) void fill_rows_kernel(
     totals.add_up(rules, state);
 }
 
-// Of entries that sort_crossings has sorted; targets that are cleared hold their clear values already.
+// The entries are sorted by sort_crossings; targets that are cleared hold their clear values already.
 template <class SolidShader, class Framebuffer>
 void fill_rows(const crossing_list& list, const sweep_rules& rules, const body_shaders<SolidShader>& shaders,
                const Framebuffer& fb, pipeline_state* state, const capacities& limits, cudaStream_t stream) {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What voxelpipe::cuda_kernels holds of solids, as call/kernel_instances.cuh: all whose kernels depend on no type of
+// The part of solids in voxelpipe::cuda_kernels, as call/kernel_instances.cuh: all whose kernels depend on no type of
 // the program, and meshes without attributes that are drawn as they are.
 
 #include <voxelpipe/device/solid/solid_call.cuh>
@@ -18,6 +18,7 @@
     HOW void find_row_codes(const shaded_triangles<mesh_view<>, passthrough>&, const row_grid&, const zeroed_memory&,  \
                             pipeline_state*, cudaStream_t);                                                            \
     HOW crossing_list sort_crossings<0>(const crossing_memory&, pipeline_state*, const capacities&, cudaStream_t);     \
+    HOW void group_by_row<0>(const row_groups&, std::uint64_t, pipeline_state*, const capacities&, cudaStream_t);      \
     HOW void end_parities<0>(word*, const row_marks&, const row_grid&, bool, pipeline_state*, cudaStream_t);           \
     HOW void raster_cover<0>(const cover_memory&, const draw_geometry&, std::uint32_t, const geometry&, const grid&,   \
                              pipeline_state*, cudaStream_t);                                                           \

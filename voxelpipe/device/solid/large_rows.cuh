@@ -6,13 +6,11 @@
 // bits. They are cut into work items of 32 lines of rows, a line a lane of a warp, which all warps share.
 
 #include <voxelpipe/device/solid/crossing_sinks.cuh>
+#include <voxelpipe/tuning/tuning_solid.hpp>
 
 #include <cstdint>
 
 namespace voxelpipe::device {
-
-inline constexpr int lines_per_item = 32; // rows of one z, one a lane
-inline constexpr int rows_per_line = 256; // of an item
 
 // ---- triangles of many rows -----------------------------------------------------------------------------------------
 
@@ -37,11 +35,11 @@ struct row_triangles {
         l.next_large = &state->solid.next_large;
         return l;
     }
-    // Whether the numbers of a call fit: at most so many items a triangle.
+    // True if the numbers of a call fit, with the most items that a triangle can have.
     [[nodiscard]] static bool holds(std::uint64_t num_triangles, const glm::ivec3& extent) {
         const auto parts = [](int n, int part) { return static_cast<std::uint64_t>((n + part - 1) / part); };
         return num_triangles < (std::uint64_t{1} << (64 - item_bits)) &&
-               num_triangles * parts(extent.z, lines_per_item) * parts(extent.y, rows_per_line) <
+               num_triangles * parts(extent.z, tuning::lines_per_item) * parts(extent.y, tuning::rows_per_line) <
                    (std::uint64_t{1} << item_bits);
     }
 };
@@ -50,8 +48,8 @@ struct row_triangles {
 struct item_grid {
     std::uint32_t by_z, by_y;
     __device__ VOXELPIPE_INLINE explicit item_grid(const core::row_box& rows)
-        : by_z(static_cast<std::uint32_t>((rows.v.hi - rows.v.lo) / lines_per_item + 1)),
-          by_y(static_cast<std::uint32_t>((rows.u.hi - rows.u.lo) / rows_per_line + 1)) {}
+        : by_z(static_cast<std::uint32_t>((rows.v.hi - rows.v.lo) / tuning::lines_per_item + 1)),
+          by_y(static_cast<std::uint32_t>((rows.u.hi - rows.u.lo) / tuning::rows_per_line + 1)) {}
     [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long count() const {
         return static_cast<unsigned long long>(by_z) * by_y;
     }
@@ -65,10 +63,9 @@ struct crossing_line {
 
 // The crossings of a line, in the 128-bit path: out of line, as in scene/int128_coverage.cuh. Returns which rows of the
 // line they are, and of the first 8 at most the voxels.
-inline constexpr int wide_line_batch = 8;
-[[nodiscard]] __device__ __noinline__ inline core::index_span wide_line(const core::snapped_position* p, int fraction,
-                                                                        const crossing_line& line, int& winding,
-                                                                        std::int64_t (&first)[wide_line_batch]) {
+[[nodiscard]] __device__ __noinline__ inline core::index_span
+wide_line(const core::snapped_position* p, int fraction, const crossing_line& line, int& winding,
+          std::int64_t (&first)[tuning::wide_line_batch]) {
     const auto t = core::setup_crossings<0, core::centre_offset<>, int128>(p[0], p[1], p[2], fraction, true);
     winding = t.winding;
     core::index_span found{0, -1};
@@ -77,8 +74,8 @@ inline constexpr int wide_line_batch = 8;
     core::narrow_row(t.edge, static_cast<int128>(line.z - t.origin[1]), lo, hi);
     if (lo > hi) return found;
     found = {lo + t.origin[0], hi + t.origin[0]};
-    const core::index_span some{found.lo,
-                                found.hi - found.lo < wide_line_batch ? found.hi : found.lo + wide_line_batch - 1};
+    const core::index_span some{
+        found.lo, found.hi - found.lo < tuning::wide_line_batch ? found.hi : found.lo + tuning::wide_line_batch - 1};
     core::for_each_crossing_in_row(t, line.z, some, [&](std::int64_t y, std::int64_t w) { first[y - found.lo] = w; });
     return found;
 }
@@ -105,7 +102,7 @@ struct line_of_triangle {
         core::index_span found{0, -1};
         if (!is_narrow) {
             int winding;
-            std::int64_t first[wide_line_batch];
+            std::int64_t first[tuning::wide_line_batch];
             found = wide_line(p, fraction, line, winding, first);
         } else if (narrow.winding != 0) {
             found = {line.y.lo - narrow.origin[0], line.y.hi - narrow.origin[0]};
@@ -125,13 +122,13 @@ struct line_of_triangle {
         }
         crossing_line rest = line;
         int winding = 0;
-        std::int64_t first[wide_line_batch];
+        std::int64_t first[tuning::wide_line_batch];
         for (;;) {
             const core::index_span found = wide_line(p, fraction, rest, winding, first);
             if (found.empty()) return;
-            for (int k = 0; k < wide_line_batch && found.lo + k <= found.hi; ++k)
+            for (int k = 0; k < tuning::wide_line_batch && found.lo + k <= found.hi; ++k)
                 emit(found.lo + k, rest.z, first[k], winding);
-            rest.y = {found.lo + wide_line_batch, found.hi};
+            rest.y = {found.lo + tuning::wide_line_batch, found.hi};
             if (rest.y.empty()) return;
         }
     }
@@ -164,9 +161,10 @@ __device__ VOXELPIPE_INLINE std::uint32_t emit_item(const Source& source, const 
         const core::row_box rows = core::rows_within<0>(p[0], p[1], p[2], grid.fraction, grid.whole_box());
         const item_grid parts(rows);
         const auto part = static_cast<std::uint32_t>(item - kept.first_items[lo]);
-        line.z = rows.v.lo + std::int64_t{part % parts.by_z} * lines_per_item + threadIdx.x % 32;
-        line.y.lo = rows.u.lo + std::int64_t{part / parts.by_z} * rows_per_line;
-        line.y.hi = line.y.lo + rows_per_line - 1 < rows.u.hi ? line.y.lo + rows_per_line - 1 : rows.u.hi;
+        line.z = rows.v.lo + std::int64_t{part % parts.by_z} * tuning::lines_per_item + threadIdx.x % 32;
+        line.y.lo = rows.u.lo + std::int64_t{part / parts.by_z} * tuning::rows_per_line;
+        line.y.hi =
+            line.y.lo + tuning::rows_per_line - 1 < rows.u.hi ? line.y.lo + tuning::rows_per_line - 1 : rows.u.hi;
         if (line.z > rows.v.hi) line.y.hi = line.y.lo - 1;
     }
     const line_of_triangle crossings(p, grid.fraction, line);
@@ -186,11 +184,9 @@ __device__ VOXELPIPE_INLINE std::uint32_t emit_item(const Source& source, const 
 }
 
 template <class Source, class Sink>
-__global__ __launch_bounds__(threads_per_block, 2) void large_rows_kernel(const __grid_constant__ Source source,
-                                                                          const __grid_constant__ row_grid grid,
-                                                                          const __grid_constant__ Sink sink,
-                                                                          const __grid_constant__ row_triangles kept,
-                                                                          pipeline_state* state) {
+__global__ __launch_bounds__(threads_per_block, tuning::large_row_blocks) void large_rows_kernel(
+    const __grid_constant__ Source source, const __grid_constant__ row_grid grid, const __grid_constant__ Sink sink,
+    const __grid_constant__ row_triangles kept, pipeline_state* state) {
     constexpr unsigned warps = threads_per_block / 32;
     await_stream();
     const unsigned long long items = *kept.next_large & row_triangles::item_mask;

@@ -13,7 +13,7 @@
 
 namespace voxelpipe::device {
 
-// How many voxels and fragments rows have, by the number of the row's first entry; and the sums before them.
+// Numbers of voxels and fragments of each row, by the number of the row's first entry, and their prefix sums.
 struct row_counts {
     std::uint32_t *voxels, *fragments;
     unsigned long long *first_voxel, *first_fragment;
@@ -167,7 +167,7 @@ struct solid_lists {
         end_stage(entries.clock, &stage_times::tile_resolve);
         return sorted;
     }
-    // Whether a row has 2^32 fragments or more.
+    // True if a row has 2^32 fragments or more.
     [[nodiscard]] static bool has_overlong_row(const pipeline_state& on_host) { return on_host.next_item != 0; }
     void write(const crossing_list& sorted, const memory& m, const pipeline_state& on_host,
                const solid_list_arrays<Payload>& to, cudaStream_t stream) const {

@@ -9,14 +9,15 @@
 #include <voxelpipe/device/solid/emit_crossings.cuh>
 #include <voxelpipe/device/solid/sweep_rows.cuh>
 #include <voxelpipe/device/targets/fill_from_mask.cuh>
+#include <voxelpipe/tuning/tuning_solid.hpp>
 
 #include <bit>
 #include <cstdint>
 
 namespace voxelpipe::device {
 
-// Which rows are crossed, a byte each, and which an odd number of times behind the part, a bit each. Zeros before a
-// call, and after it.
+// Marks of rows: a byte each if they are crossed, a bit each if behind the part and an odd number of times. Zeros
+// before a call, and after it.
 struct row_marks {
     std::uint8_t* marked;
     word* odd_behind;
@@ -28,7 +29,7 @@ struct row_marks {
     }
 };
 
-// Of a word whose bits change the parity from there on.
+// The parity of the bits up to each bit of a word.
 [[nodiscard]] __device__ VOXELPIPE_INLINE word parity_up_to(word w) {
     w ^= w << 1;
     w ^= w << 2;
@@ -37,17 +38,12 @@ struct row_marks {
     return w ^ w << 16;
 }
 
-inline constexpr std::uint32_t parity_words = 4; // of a lane
-inline constexpr std::uint32_t parity_loads = 4; // of such, before the first is used
-
 // A warp takes 32 rows, of which those that are marked share its lanes: lanes_per_row lanes, a power of two, have
-// parity_words words each, in rounds where a row has more. by_four: rows begin at multiples of 16 bytes.
+// tuning::row_words words each, in rounds where a row has more. by_four: rows begin at multiples of 16 bytes.
 template <class State>
-__global__ __launch_bounds__(threads_per_block, 4) void parity_rows_kernel(word* bits,
-                                                                           const __grid_constant__ row_marks marks,
-                                                                           const __grid_constant__ row_grid grid,
-                                                                           std::uint32_t lanes_per_row, bool by_four,
-                                                                           bool count_voxels, State* state) {
+__global__ __launch_bounds__(threads_per_block, tuning::parity_blocks) void parity_rows_kernel(
+    word* bits, const __grid_constant__ row_marks marks, const __grid_constant__ row_grid grid,
+    std::uint32_t lanes_per_row, bool by_four, bool count_voxels, State* state) {
     constexpr unsigned whole_warp = 0xffffffffu;
     __shared__ std::uint8_t rows_of_warps[threads_per_block / 32][32];
     await_stream();
@@ -55,7 +51,7 @@ __global__ __launch_bounds__(threads_per_block, 4) void parity_rows_kernel(word*
     const std::uint32_t lane = threadIdx.x % 32, words_x = (static_cast<std::uint32_t>(grid.extent.x) + 31) / 32;
     const std::uint32_t rows_at_once = 32 / lanes_per_row, column = lane % lanes_per_row,
                         of_turn = lane / lanes_per_row;
-    const std::uint32_t words_at_once = lanes_per_row * parity_words,
+    const std::uint32_t words_at_once = lanes_per_row * tuning::row_words,
                         rounds = (words_x + words_at_once - 1) / words_at_once;
     const unsigned before = (1u << lane) - 1,
                    of_row = lanes_per_row == 32 ? whole_warp : ((1u << lanes_per_row) - 1) << (lane - column);
@@ -87,21 +83,21 @@ __global__ __launch_bounds__(threads_per_block, 4) void parity_rows_kernel(word*
             const std::uint32_t step = rounds == 1 ? turn : turn / rounds, round = turn - step * rounds;
             place p{nullptr,
                     step * rows_at_once + of_turn,
-                    round * words_at_once + column * parity_words,
+                    round * words_at_once + column * tuning::row_words,
                     0,
                     round == 0,
                     round + 1 == rounds};
             if (p.rank < num_marked && p.x < words_x) {
                 p.at = bits + (i * 32 + rows[p.rank]) * words_x + p.x;
-                p.count = words_x - p.x < parity_words ? words_x - p.x : parity_words;
+                p.count = words_x - p.x < tuning::row_words ? words_x - p.x : tuning::row_words;
             }
             return p;
         };
         unsigned carry = 0;
-        for (std::uint32_t first = 0; first < turns; first += parity_loads) { // round by round, row after row
-            uint4 all[parity_loads];
+        for (std::uint32_t first = 0; first < turns; first += tuning::parity_loads) { // round by round, row after row
+            uint4 all[tuning::parity_loads];
 #pragma unroll
-            for (std::uint32_t k = 0; k < parity_loads; ++k) {
+            for (std::uint32_t k = 0; k < tuning::parity_loads; ++k) {
                 all[k] = uint4{0, 0, 0, 0};
                 if (first + k >= turns) break;
                 const place p = place_of(first + k);
@@ -115,7 +111,7 @@ __global__ __launch_bounds__(threads_per_block, 4) void parity_rows_kernel(word*
                 }
             }
 #pragma unroll
-            for (std::uint32_t k = 0; k < parity_loads; ++k) {
+            for (std::uint32_t k = 0; k < tuning::parity_loads; ++k) {
                 if (first + k >= turns) break;
                 const place p = place_of(first + k);
                 if (p.begins) carry = 0;
@@ -162,7 +158,7 @@ template <int = 0>
 void end_parities(word* bits, const row_marks& marks, const row_grid& grid, bool count_voxels, pipeline_state* state,
                   cudaStream_t stream) {
     const std::uint32_t words_x = (static_cast<std::uint32_t>(grid.extent.x) + 31) / 32,
-                        lanes = (words_x + parity_words - 1) / parity_words;
+                        lanes = (words_x + tuning::row_words - 1) / tuning::row_words;
     const bool by_four = words_x % 4 == 0 && reinterpret_cast<std::uintptr_t>(bits) % 16 == 0;
     launch_behind(parity_rows_kernel<pipeline_state>, fill_device(grid.num_rows()), threads_per_block, stream,
                   stage::tile_resolve, bits, marks, grid, std::bit_ceil(lanes < 32 ? lanes : 32u), by_four,

@@ -8,15 +8,11 @@
 
 #include <voxelpipe/core/small_crossing.hpp>
 #include <voxelpipe/device/solid/large_rows.cuh>
+#include <voxelpipe/tuning/tuning_solid.hpp>
 
 #include <cstdint>
 
 namespace voxelpipe::device {
-
-inline constexpr int small_row_blocks = 3;        // of a multiprocessor
-inline constexpr std::uint32_t looks_at_once = 4; // triangles of a lane whose corners are loaded together
-inline constexpr int lines_at_once = 16;          // of a triangle, whose rows are kept
-inline constexpr int small_crossing_count = 64;   // about, of a lane's triangle; one of more is cut
 
 // Memory that is to be zero before crossings come: whole uint4s, or none.
 struct zeroed_memory {
@@ -57,7 +53,7 @@ __global__ __launch_bounds__(threads_per_block) void find_row_codes_kernel(
     return __shfl_sync(0xffffffffu, first, 31) + before - n;
 }
 
-// What a thread has seen.
+// Counts of one thread.
 struct row_totals {
     std::uint32_t drawn = 0, nonfinite = 0, too_far = 0, outside = 0, crossings = 0;
 
@@ -84,8 +80,8 @@ struct row_totals {
 };
 
 struct warp_rows {
-    word lines[lines_at_once][32]; // of each lane's triangle
-    std::uint32_t queue[32 * looks_at_once + 31];
+    word lines[tuning::lines_at_once][32]; // of each lane's triangle
+    std::uint32_t queue[32 * tuning::looks_at_once + 31];
 };
 
 // A triangle a lane, maybe none.
@@ -96,7 +92,7 @@ struct small_rows {
     const Sink& sink;
     const row_triangles& kept;
     pipeline_state* state;
-    word (&lines)[lines_at_once][32];
+    word (&lines)[tuning::lines_at_once][32];
     row_totals totals;
 
     __device__ VOXELPIPE_INLINE void emit(bool valid, std::uint32_t i) {
@@ -124,7 +120,7 @@ struct small_rows {
         if (!is_small) at = core::small_triangle{};
         const core::small_crossings crossings(at, grid.fraction);
         // Twice the area that rows see tells how many there are.
-        const bool has_many = is_small && crossings.plane[0] >> (2 * grid.fraction + 1) > small_crossing_count;
+        const bool has_many = is_small && crossings.plane[0] >> (2 * grid.fraction + 1) > tuning::small_crossing_count;
         const bool is_large = has_rows && (!is_small || has_many);
         if (__ballot_sync(0xffffffffu, static_cast<int>(is_large)) != 0) leave(is_large, i, t.rows);
         is_small = is_small && !has_many && crossings.winding != 0; // others have no crossing
@@ -139,7 +135,7 @@ struct small_rows {
         while (__ballot_sync(0xffffffffu, static_cast<int>(z <= z1)) != 0) {
             std::uint32_t with_rows = 0, n = 0;
             const int z0 = z;
-            for (int k = 0; k < lines_at_once && z <= z1; ++k, ++z) {
+            for (int k = 0; k < tuning::lines_at_once && z <= z1; ++k, ++z) {
                 const word rows = ends.next(last);
                 lines[k][lane] = rows;
                 with_rows |= static_cast<std::uint32_t>(rows != 0) << k;
@@ -188,11 +184,11 @@ private:
 };
 
 template <class Source, class Sink>
-__global__ __launch_bounds__(threads_per_block, small_row_blocks) void small_rows_kernel(
+__global__ __launch_bounds__(threads_per_block, tuning::small_row_blocks) void small_rows_kernel(
     const __grid_constant__ Source source, const __grid_constant__ row_grid grid, const __grid_constant__ Sink sink,
     const __grid_constant__ row_triangles kept, pipeline_state* state) {
     constexpr unsigned warps = threads_per_block / 32;
-    constexpr std::uint64_t step = 32 * looks_at_once;
+    constexpr std::uint64_t step = 32 * tuning::looks_at_once;
     __shared__ warp_rows memory[warps];
     await_stream();
     if constexpr (!Sink::is_listing)
@@ -209,19 +205,19 @@ __global__ __launch_bounds__(threads_per_block, small_row_blocks) void small_row
     };
     for (std::uint64_t first = (std::uint64_t{blockIdx.x} * warps + warp_in_block()) * step;
          first < source.num_triangles; first += std::uint64_t{gridDim.x} * warps * step) {
-        typename Source::located at[looks_at_once];
-        typename Source::corners corners[looks_at_once];
-        bool is_there[looks_at_once];
+        typename Source::located at[tuning::looks_at_once];
+        typename Source::corners corners[tuning::looks_at_once];
+        bool is_there[tuning::looks_at_once];
 #pragma unroll
-        for (std::uint32_t k = 0; k < looks_at_once; ++k) {
+        for (std::uint32_t k = 0; k < tuning::looks_at_once; ++k) {
             const std::uint64_t i = first + 32 * k + lane;
             is_there[k] = i < source.num_triangles;
             at[k] = source.locate(is_there[k] ? static_cast<std::uint32_t>(i) : 0);
         }
 #pragma unroll
-        for (std::uint32_t k = 0; k < looks_at_once; ++k) corners[k] = source.fetch(at[k]);
+        for (std::uint32_t k = 0; k < tuning::looks_at_once; ++k) corners[k] = source.fetch(at[k]);
 #pragma unroll
-        for (std::uint32_t k = 0; k < looks_at_once; ++k) {
+        for (std::uint32_t k = 0; k < tuning::looks_at_once; ++k) {
             const auto i = static_cast<std::uint32_t>(first + 32 * k + lane);
             const first_look look = source.look(corners[k], grid);
             const bool waits = is_there[k] && look == first_look::unknown;

@@ -59,7 +59,7 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         plan.limits = limits;
     }
 
-    // Whether entries, keys and work items of the call can be numbered.
+    // True if entries, keys and work items of the call can be numbered.
     [[nodiscard]] bool fits() const {
         return plan.limits.fragments <= max_listed_entries && num_keys() <= (uint128{1} << 64) &&
                row_triangles::holds(plan.num_primitives, plan.g.extent);
@@ -88,12 +88,15 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         SolidShader* shaders = nullptr; // by draw, where they differ
         row_triangles kept{};
         crossing_memory list;
+        row_groups by_row;
         cover_memory cover;
         exterior_memory exterior;
         vote_memory vote;
     };
-    // is_listing: otherwise the crossings go elsewhere.
-    [[nodiscard]] memory take(arena& a, bool is_listing = true) const {
+    // Crossings toggle bits, are grouped by row, or go into one list that is sorted, and the cover with them.
+    enum class crossing_use { toggles, groups, sorts };
+    // counts: of the rows, for crossing_use::groups.
+    [[nodiscard]] memory take(arena& a, crossing_use use = crossing_use::sorts, std::uint32_t* counts = nullptr) const {
         memory m;
         std::size_t vertices = 0, most = 0;
         for (const draw_type& d : draws) {
@@ -108,7 +111,10 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         m.geometries = a.take<draw_geometry>(num_parts() > 1 ? num_parts() : 0);
         if (is_split()) m.shaders = a.take<SolidShader>(draws.size());
         m.kept = row_triangles::take(a, plan.num_primitives);
-        if (is_listing) m.list = crossing_memory::take(a, plan.limits.fragments, num_keys(), num_bodies());
+        if (use == crossing_use::sorts)
+            m.list = crossing_memory::take(a, plan.limits.fragments, num_keys(), num_bodies());
+        if (use == crossing_use::groups)
+            m.by_row = row_groups::take(a, plan.limits.fragments, rows().num_rows(), counts);
         if (has_cover()) m.cover = cover_memory::take(a, most, plan.g, plan.limits);
         if (plan.options.repair == repair::exterior)
             m.exterior = exterior_memory::take(a, plan.g.extent, plan.options.closing);
@@ -132,6 +138,16 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         const crossing_list sorted = sort_crossings(m.list, state, plan.limits, stream);
         end_stage(clock, &stage_times::tile_sort);
         return sorted;
+    }
+    // Groups the crossings by row, in memory that is taken for crossing_use::groups. The cover stays in its mask.
+    void launch_groups(const memory& m, pipeline_state* state, cudaStream_t stream) const {
+        if (makes_sets())
+            emit_sets(m, {}, state, stream);
+        else
+            emit(m, crossing_appender{m.by_row.list, false, static_cast<std::uint32_t>(draws.size()), m.by_row.counts},
+                 {}, state, stream);
+        group_by_row(m.by_row, rows().num_rows(), state, plan.limits, stream);
+        end_stage(clock, &stage_times::tile_sort);
     }
     // Gives all crossings to a sink, and the list the cover where that is wanted. zeros: memory that is to be zero
     // before; none unless shades_on_the_spot.
@@ -221,7 +237,7 @@ private:
             raster_cover(m.cover, geometry_of[draws.size() + body], cones[body].num_triangles, geo, plan.g, state,
                          stream);
     }
-    // Bodies that repair::exterior or repair::vote decides, as runs of cover. Waits.
+    // Bodies that repair::exterior or repair::vote decides, as runs of cover, or of one body as the mask. Waits.
     void emit_sets(const memory& m, const crossing_list& list, pipeline_state* state, cudaStream_t stream) const {
         std::vector<draw_geometry> geometry_of;
         const geometry geo = shade(m, geometry_of, stream);
@@ -236,7 +252,7 @@ private:
                 add_votes(m.vote, stored_triangles{geo, rows(), plan.num_primitives, plan.num_primitives}, begin,
                           end - begin, rows(), m.cover.mask, state, stream);
             }
-            list_cover(m.cover, rows(), list, body, state, stream);
+            if (m.by_row.counts == nullptr) list_cover(m.cover, rows(), list, body, state, stream);
         });
         if (plan.options.repair == repair::exterior) {
             take_counts(m.cover, state, stream);
@@ -248,7 +264,7 @@ private:
         m.cover.start(stream);
         for_each_body([&](std::uint32_t body, std::size_t first, std::size_t last) {
             cover_body(m, geo, geometry_of, body, first, last, state, stream);
-            list_cover(m.cover, rows(), list, body, state, stream);
+            if (m.by_row.counts == nullptr) list_cover(m.cover, rows(), list, body, state, stream);
         });
         end_stage(clock, &stage_times::fine_raster);
     }
@@ -275,7 +291,7 @@ struct solid_call<draw<Mesh, VertexShader, SolidShader>, framebuffer_view<Target
     }
 
     using parity = parity_target<SolidShader, framebuffer_type>;
-    // Whether crossings change bits of the target where they lie. Then no capacity can be too small, and nothing fails
+    // True if crossings change bits of the target where they lie. Then no capacity can be too small, and nothing fails
     // once indices are known to be right.
     [[nodiscard]] bool is_parity() const {
         if constexpr (parity::is_possible)
@@ -284,19 +300,23 @@ struct solid_call<draw<Mesh, VertexShader, SolidShader>, framebuffer_view<Target
         return false;
     }
 
+    // True if the crossings are grouped by row.
+    [[nodiscard]] bool is_grouped() const {
+        return fills_bit_rows<SolidShader, framebuffer_type> && !entries.is_split() && !is_parity() &&
+               entries.rows().num_rows() <= 0xffffffffu;
+    }
+
     [[nodiscard]] std::size_t plan_memory() const {
         arena memory;
-        (void)memory.take<pipeline_state>(1);
-        if (is_parity()) (void)row_marks::take(memory, entries.rows());
-        (void)entries.take(memory, !is_parity());
+        take_zeroed(memory);
+        (void)entries.take(memory, crossing_use());
         return memory.used();
     }
     // Bytes at the start of the workspace that must be zero on entry. A finished call leaves them zero, but for the
     // state.
     [[nodiscard]] std::size_t zeroed_bytes() const {
         arena memory;
-        (void)memory.take<pipeline_state>(1);
-        if (is_parity()) (void)row_marks::take(memory, entries.rows());
+        take_zeroed(memory);
         return memory.used();
     }
     void launch(arena& memory, cudaStream_t stream) const {
@@ -309,6 +329,12 @@ struct solid_call<draw<Mesh, VertexShader, SolidShader>, framebuffer_view<Target
                 return;
             }
         }
+        if constexpr (fills_bit_rows<SolidShader, framebuffer_type>) {
+            if (is_grouped()) {
+                launch_groups(memory, state, stream);
+                return;
+            }
+        }
         const auto m = entries.take(memory);
         const auto& limits = entries.plan.limits;
         const auto shaders = entries.shaders(m, stream);
@@ -318,25 +344,33 @@ struct solid_call<draw<Mesh, VertexShader, SolidShader>, framebuffer_view<Target
             if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
         });
         end_stage(entries.clock, &stage_times::clear);
-        fill(sorted, shaders, state, stream);
+        fill_rows(sorted, entries.rules(), shaders, fb, state, limits, stream);
         end_stage(entries.clock, &stage_times::tile_resolve);
     }
 
 private:
-    void fill(const crossing_list& sorted, const body_shaders<SolidShader>& shaders, pipeline_state* state,
-              cudaStream_t stream) const {
-        if constexpr (fills_bit_rows<SolidShader, framebuffer_type>) {
-            if (!entries.is_split() && !entries.has_cover()) {
-                fill_bit_rows(sorted, entries.rules(), shaders.one, fb, state, entries.plan.limits, stream);
-                return;
-            }
-        }
-        fill_rows(sorted, entries.rules(), shaders, fb, state, entries.plan.limits, stream);
+    using uses = typename solid_entries<draw_type>::crossing_use;
+    [[nodiscard]] uses crossing_use() const {
+        return is_parity() ? uses::toggles : is_grouped() ? uses::groups : uses::sorts;
+    }
+    // Takes the memory that zeroed_bytes() counts.
+    void take_zeroed(arena& memory) const {
+        (void)memory.take<pipeline_state>(1);
+        if (is_parity()) (void)row_marks::take(memory, entries.rows());
+        if (is_grouped()) (void)memory.take<std::uint32_t>(entries.rows().num_rows());
+    }
+    void launch_groups(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+        auto* const counts = memory.take<std::uint32_t>(entries.rows().num_rows());
+        const auto m = entries.take(memory, uses::groups, counts);
+        entries.launch_groups(m, state, stream);
+        fill_bit_rows(m.by_row, m.cover.mask, entries.rules(), entries.draws[0].fragment_shader, fb, state,
+                      entries.plan.limits, stream);
+        end_stage(entries.clock, &stage_times::tile_resolve);
     }
     void launch_parity(arena& memory, pipeline_state* state, cudaStream_t stream) const {
         const row_grid rows = entries.rows();
         const row_marks marks = row_marks::take(memory, rows);
-        const auto m = entries.take(memory, false);
+        const auto m = entries.take(memory, uses::toggles);
         for (const draw_type& d : entries.draws)
             if (!d.mesh.has_checked_indices() && d.mesh.triangles.size() != 0)
                 check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);

@@ -124,7 +124,7 @@ struct cover_memory {
             m.cells = take_cell_buffers(memory, static_cast<std::uint32_t>(max_triangles), limits.fragment_records);
         return m;
     }
-    // Once a call.
+    // Called once a call.
     void start(cudaStream_t stream) const {
         check(cudaMemsetAsync(state, 0, sizeof(*state), stream), stage::fine_raster);
     }
@@ -134,7 +134,7 @@ struct cover_memory {
     }
 };
 
-// Of one thread: the call runs again with room for as many records as the largest draw has wanted.
+// One thread. The call runs again with room for as many records as the largest draw has wanted.
 template <class State>
 __global__ void note_records_kernel(const State* of_draw, State* of_call) {
     if (of_draw->fragment_records > of_call->fragment_records) of_call->fragment_records = of_draw->fragment_records;
@@ -182,7 +182,7 @@ void list_cover(const cover_memory& m, const row_grid& grid, const crossing_list
                   static_cast<const word*>(m.mask), grid, to, body, state);
 }
 
-// Of a call without crossings.
+// For a call without crossings.
 template <int = 0>
 void take_counts(const cover_memory& m, pipeline_state* state, cudaStream_t stream) {
     take_counts_kernel<pipeline_state><<<1, 1, 0, stream>>>(m.state, state);

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Where the triangles of a solid come from: one mesh that is shaded on the spot, or the positions that vertex_shade
+// Sources of a solid's triangles: one mesh that is shaded on the spot, or the positions that vertex_shade
 // left of any number of draws; and which rows each of them may cross.
 
 #include <voxelpipe/core/crossing.hpp>
@@ -32,7 +32,7 @@ struct row_grid {
     }
 };
 
-// What a first look at a triangle tells. Most small ones lie between the centres of all rows.
+// The result of a first look at a triangle. Most small ones lie between the centres of all rows.
 enum class first_look : std::uint8_t { no_rows, outside, unknown };
 
 // A vertex among the centres of rows, in 16 bits an axis: 0 before the part, then 1 and the number of the part's
@@ -87,7 +87,7 @@ struct shaded_triangles {
         const glm::uvec3 index = source.triangle(i);
         return {index, index.x < num_vertices && index.y < num_vertices && index.z < num_vertices};
     }
-    // What the first look needs.
+    // Input of the first look.
     struct corners {
         std::uint32_t a, b, c;
     };
@@ -192,18 +192,13 @@ __device__ __noinline__ void find_wide_rows(const Source& source, const row_grid
     using core::triangle_class;
     const core::snapped_position p[3] = {source.exact(at, at.index.x), source.exact(at, at.index.y),
                                          source.exact(at, at.index.z)};
-    if (!core::is_drawable(p[0]) || !core::is_drawable(p[1]) || !core::is_drawable(p[2])) {
-        const bool nonfinite =
-            p[0].x == core::nonfinite_mark || p[1].x == core::nonfinite_mark || p[2].x == core::nonfinite_mark;
-        t.kind = nonfinite ? triangle_class::nonfinite : triangle_class::too_far;
-        return;
-    }
     const core::voxel_box whole = grid.whole_box();
-    if (!core::meets_rows(p[0], p[1], p[2], grid.fraction, whole)) t.kind = triangle_class::outside;
+    t.kind = core::classify_for_rows(p[0], p[1], p[2], grid.fraction, whole);
+    if (t.kind == triangle_class::nonfinite || t.kind == triangle_class::too_far) return;
     t.rows = core::rows_within<0>(p[0], p[1], p[2], grid.fraction, whole);
 }
 
-// Which rows triangle i may cross.
+// Finds the rows that triangle i may cross.
 template <class Source>
 [[nodiscard]] __device__ VOXELPIPE_INLINE solid_triangle load_solid_triangle(const Source& source, const row_grid& grid,
                                                                              std::uint32_t i) {

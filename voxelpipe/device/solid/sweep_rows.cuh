@@ -14,7 +14,7 @@
 
 namespace voxelpipe::device {
 
-// What a sweep is told of its call.
+// A sweep's parameters.
 struct sweep_rules {
     row_grid grid;
     glm::ivec3 offset; // of the computed part in the whole grid
@@ -37,7 +37,7 @@ struct body_at_voxel {
 };
 inline constexpr std::uint64_t max_listed_entries = 0x7fffffffu;
 
-// What a warp works in.
+// Shared memory of a warp.
 struct sweep_memory {
     std::int32_t winding[32], cover[32];
 };
@@ -119,7 +119,7 @@ struct row_sweep {
             f(body_at_voxel{body, winding, is_inside && x0 + static_cast<int>(lane) < rules.grid.extent.x});
         });
     }
-    // Where bodies that are open end: nowhere in the row. Otherwise behind the last entry.
+    // The voxels that a row's entries reach: to the row's end if a body is open, else up to the last entry.
     struct reach {
         std::uint32_t num_open; // bodies
         int begin, end;         // voxels
@@ -151,7 +151,7 @@ struct row_sweep {
     }
 };
 
-// Of a thread; added up for a block by add_up.
+// Totals of a thread; add_up adds those of a block.
 struct sweep_totals {
     unsigned long long open_rows = 0, fragments = 0, discarded = 0, voxels = 0;
     std::uint32_t max_winding = 0;

@@ -59,16 +59,9 @@ __global__ __launch_bounds__(threads_per_block,
         }
         const core::snapped_position p[3] = {source.exact(at, at.index.x), source.exact(at, at.index.y),
                                              source.exact(at, at.index.z)};
-        triangle_class kind = triangle_class::drawn;
-        if (!core::is_drawable(p[0]) || !core::is_drawable(p[1]) || !core::is_drawable(p[2]))
-            kind = p[0].x == core::nonfinite_mark || p[1].x == core::nonfinite_mark || p[2].x == core::nonfinite_mark
-                       ? triangle_class::nonfinite
-                       : triangle_class::too_far;
-        const bool is_drawable = kind == triangle_class::drawn;
-        if (is_drawable && !core::meets_rows(p[0], p[1], p[2], grid.fraction, whole, true))
-            kind = triangle_class::outside;
+        const triangle_class kind = core::classify_for_rows(p[0], p[1], p[2], grid.fraction, whole, true);
         if (lane == 0) ++classes[static_cast<int>(kind)];
-        if (!is_drawable) continue;
+        if (kind != triangle_class::drawn) continue;
         const core::row_box rows = core::rows_within<Axis>(p[0], p[1], p[2], grid.fraction, whole);
         for (std::int64_t v = rows.v.lo + lane; v <= rows.v.hi; v += 32)
             core::for_each_crossing<Axis, core::centre_offset<>>(

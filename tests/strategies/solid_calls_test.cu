@@ -1,0 +1,239 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+//
+// Solids in calls that run again, fail or do not wait, of instances, and with repairs.
+#include "solid_drawings.hpp"
+
+using namespace device_test;
+
+// ---- calls ----------------------------------------------------------------------------------------------------------
+
+// The third call like those before it is a graph; vertices may change meanwhile, and other calls come in between.
+TEST(Solids, RepeatedCalls) {
+    const vp::grid g = box_grid({40, 24, 22});
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    bit_target<vp::cpu_backend> a{cpu, g.extent};
+    bit_target<vp::cuda_backend> b{gpu, g.extent};
+    mesh_data m = tied_bodies(22.0f, 6, 2);
+    vp::mesh<vp::cuda_backend> on_device(gpu, m.positions, m.triangles);
+    for (int i = 0; i < 12; ++i) {
+        SCOPED_TRACE(i);
+        const vp::solid_options options{.rule = i / 6 == 0 ? vp::fill_rule::even_odd : vp::fill_rule::nonzero};
+        if (i % 6 == 3) {
+            for (glm::vec3& p : m.positions) p += glm::vec3(0.5f, 1.0f, 0.25f);
+            ASSERT_EQ(cudaMemcpy(const_cast<glm::vec3*>(on_device.view().positions.data()), m.positions.data(),
+                                 m.positions.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
+                      cudaSuccess);
+        }
+        const vp::mesh<vp::cpu_backend> on_host(cpu, m.positions, m.triangles);
+        const auto shader = vp::constant(true);
+        const vp::status sa = vp::voxelize_solid(cpu, on_host, g, vp::passthrough{}, shader, a, options);
+        const vp::status sb = vp::voxelize_solid(gpu, on_device, g, vp::passthrough{}, shader, b, options);
+        ASSERT_TRUE(sa.ok() && sb.ok());
+        expect_same_counts(sa.counts, sb.counts);
+        EXPECT_EQ(sa.solid, sb.solid);
+        expect_same_bytes(vp::get<0>(a).to_host(cpu), vp::get<0>(b).to_host(gpu), "bits");
+    }
+}
+
+// A bad index: the same status on both backends, and targets keep what they held.
+TEST(Solids, ABadIndexWritesNothing) {
+    const vp::grid g = box_grid({40, 24, 22});
+    vp::cuda_backend gpu;
+    bit_target<vp::cuda_backend> fb{gpu, g.extent};
+    mesh_data m = tied_bodies(22.0f, 6, 2);
+    {
+        const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
+        ASSERT_TRUE(vp::voxelize_solid(gpu, mesh, g, vp::passthrough{}, vp::constant(true), fb).ok());
+    }
+    const std::vector<std::uint32_t> before = vp::get<0>(fb).to_host(gpu);
+    m.triangles[17].y = static_cast<std::uint32_t>(m.positions.size());
+    const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
+    std::vector<vp::solid_options> options;
+    for (const auto rule : all_rules) options.push_back({.rule = rule});
+    for (const auto repair : {vp::repair::close_holes, vp::repair::exterior, vp::repair::vote})
+        options.push_back({.repair = repair});
+    for (const vp::solid_options& o : options) {
+        SCOPED_TRACE(static_cast<int>(o.rule) + 10 * static_cast<int>(o.repair));
+        const vp::status s =
+            vp::voxelize_solid(gpu, view_of(mesh, indices::unknown), g, vp::passthrough{}, vp::constant(true), fb, o);
+        EXPECT_EQ(s.code, vp::status_code::index_out_of_range) << s.message();
+        EXPECT_EQ(s.triangle, 17u);
+        EXPECT_EQ(before, vp::get<0>(fb).to_host(gpu));
+    }
+}
+
+// Without memory the call says so, and targets keep what they held.
+TEST(Solids, NoMemoryWritesNothing) {
+    const vp::grid g = box_grid({40, 24, 22});
+    counting_resource memory;
+    vp::cuda_backend gpu(nullptr, memory);
+    bit_target<vp::cuda_backend> fb{gpu, g.extent};
+    const mesh_data m = tied_bodies(22.0f, 6, 2);
+    const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
+    ASSERT_TRUE(vp::voxelize_solid(gpu, mesh, g, vp::passthrough{}, vp::constant(true), fb).ok());
+    const std::vector<std::uint32_t> before = vp::get<0>(fb).to_host(gpu);
+    gpu.release();
+    memory.limit = memory.live + 1000;
+    const vp::status s =
+        vp::voxelize_solid(gpu, mesh, g, vp::passthrough{}, vp::constant(true), fb, {.rule = vp::fill_rule::positive});
+    EXPECT_EQ(s.code, vp::status_code::out_of_memory) << s.message();
+    EXPECT_EQ(before, vp::get<0>(fb).to_host(gpu));
+}
+
+// In the caller's memory: capacities that are too small are told and nothing is written; a captured call is replayed
+// with other vertices.
+TEST(Solids, Async) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::constant_output<bool>>;
+    const vp::grid g = box_grid({40, 24, 22});
+    const stream_owner stream;
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu(stream.stream);
+    mesh_data m = tied_bodies(22.0f, 6, 2);
+    const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
+    const draw_type draw{mesh.view(), {}, {true}};
+    const std::span<const draw_type> draws(&draw, 1);
+    bit_target<vp::cpu_backend> a{cpu, g.extent};
+    bit_target<vp::cuda_backend> b{gpu, g.extent};
+    const auto expect_same = [&](const vp::solid_options& options, const vp::status& sb) {
+        const vp::mesh<vp::cpu_backend> on_host(cpu, m.positions, m.triangles);
+        const vp::status sa = vp::voxelize_solid(cpu, on_host, g, vp::passthrough{}, vp::constant(true), a, options);
+        ASSERT_TRUE(sb.ok()) << sb.message();
+        expect_same_counts(sa.counts, sb.counts);
+        EXPECT_EQ(sa.solid, sb.solid);
+        expect_same_bytes(vp::get<0>(a).to_host(cpu), vp::get<0>(b).to_host(gpu), "bits");
+    };
+    for (const auto rule : {vp::fill_rule::even_odd, vp::fill_rule::nonzero}) {
+        SCOPED_TRACE(static_cast<int>(rule));
+        const bool needs_room = rule == vp::fill_rule::nonzero;
+        const vp::solid_options options{.rule = rule};
+        vp::workspace_limits limits;
+        limits.expects_deferred = needs_room; // is not asked
+        limits.fragments = needs_room ? 10 : 0;
+        std::size_t bytes = vp::solid_workspace_bytes(draws, g, b.view(), options, limits);
+        ASSERT_NE(bytes, 0u);
+        vp::cuda_backend::buffer<std::byte> memory(gpu, std::size_t{1} << 22);
+        const vp::status small =
+            vp::voxelize_solid_async(gpu, draws, g, b.view(), options, {memory.data(), bytes - 1, limits});
+        EXPECT_EQ(small.code, vp::status_code::capacity_exceeded);
+        EXPECT_EQ(small.required.bytes, bytes);
+        if (needs_room) {
+            const auto before = vp::get<0>(b).to_host(gpu);
+            const vp::workspace_view workspace{memory.data(), memory.size(), limits};
+            ASSERT_TRUE(vp::voxelize_solid_async(gpu, draws, g, b.view(), options, workspace).ok());
+            EXPECT_EQ(vp::read_status(gpu, workspace, &limits).code, vp::status_code::capacity_exceeded);
+            EXPECT_EQ(before, vp::get<0>(b).to_host(gpu));
+            EXPECT_GT(limits.fragments, 10u);
+            limits.fragments += limits.fragments / 2; // the vertices will move
+        }
+        bytes = vp::solid_workspace_bytes(draws, g, b.view(), options, limits);
+        ASSERT_LE(bytes, memory.size());
+        const vp::workspace_view workspace{memory.data(), bytes, limits};
+        cudaGraph_t graph = nullptr;
+        cudaGraphExec_t replay = nullptr;
+        ASSERT_EQ(cudaStreamBeginCapture(stream.stream, cudaStreamCaptureModeRelaxed), cudaSuccess);
+        ASSERT_TRUE(vp::voxelize_solid_async(gpu, draws, g, b.view(), options, workspace).ok());
+        ASSERT_EQ(cudaStreamEndCapture(stream.stream, &graph), cudaSuccess);
+        ASSERT_EQ(cudaGraphInstantiate(&replay, graph, 0), cudaSuccess);
+        for (int i = 0; i < 3; ++i) {
+            ASSERT_EQ(cudaGraphLaunch(replay, stream.stream), cudaSuccess);
+            expect_same(options, vp::read_status(gpu, workspace));
+            for (glm::vec3& p : m.positions) p += glm::vec3(-0.5f, 0.0f, 0.25f);
+            ASSERT_EQ(cudaMemcpyAsync(const_cast<glm::vec3*>(mesh.view().positions.data()), m.positions.data(),
+                                      m.positions.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice, stream.stream),
+                      cudaSuccess);
+            ASSERT_EQ(cudaStreamSynchronize(stream.stream), cudaSuccess);
+        }
+        cudaGraphExecDestroy(replay);
+        cudaGraphDestroy(graph);
+    }
+}
+
+// Two instances that lie in the same place, each with vertices of its own.
+TEST(Solids, InstancesAreTheCpus) {
+    const mesh_data m = tied_bodies(22.0f, 8, 9);
+    const vp::grid g = box_grid({40, 24, 22});
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    const vp::mesh<vp::cpu_backend> here(cpu, m.positions, m.triangles);
+    const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
+    bit_target<vp::cpu_backend> a{cpu, g.extent};
+    bit_target<vp::cuda_backend> b{gpu, g.extent};
+    for (const auto extent : {vp::solid_extent::centre, vp::solid_extent::outer})
+        for (const auto repair : {vp::repair::none, vp::repair::close_holes}) {
+            const vp::solid_options options{.rule = vp::fill_rule::nonzero, .extent = extent, .repair = repair};
+            const vp::status sa = vp::voxelize_solid(cpu, here.view(vp::instances{2}), g, vp::passthrough{},
+                                                     vp::constant(true), a, options);
+            const vp::status sb = vp::voxelize_solid(gpu, there.view(vp::instances{2}), g, vp::passthrough{},
+                                                     vp::constant(true), b, options);
+            ASSERT_TRUE(sa.ok() && sb.ok()) << sa.message() << sb.message();
+            EXPECT_EQ(sa.counts.triangles_in, 2 * m.triangles.size());
+            expect_same_counts(sa.counts, sb.counts);
+            EXPECT_EQ(sa.solid, sb.solid);
+            expect_same_bytes(vp::get<0>(a).to_host(cpu), vp::get<0>(b).to_host(gpu), "bits");
+        }
+}
+
+// ---- repairs --------------------------------------------------------------------------------------------------------
+
+TEST(Solids, ClosedHoles) {
+    const drawing_of_everything all{broken_meshes(), {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};
+    const drawing_of_bits bits{broken_meshes(), {{}}, {{true}}}, one{{broken_meshes()[0]}, {{}}, {{true}}};
+    const vp::grid g = box_grid({37, 26, 25});
+    for (const std::uint64_t max_edges : {std::uint64_t{3}, ~std::uint64_t{0}})
+        for (const auto of : all_bodies) {
+            vp::solid_options options{.rule = vp::fill_rule::even_odd,
+                                      .bodies = of,
+                                      .repair = vp::repair::close_holes,
+                                      .max_hole_edges = max_edges};
+            bits.expect_same(g, options);
+            one.expect_same(g.crop({5, 6, 7}, {20, 9, 11}), options);
+            options.rule = vp::fill_rule::nonzero;
+            options.extent = vp::solid_extent::outer;
+            all.expect_same(g, options);
+            expect_same_lists<std::uint32_t>(broken_meshes(), id_of_fragment{5}, g, options);
+        }
+}
+
+TEST(Solids, ExteriorAndVote) {
+    const drawing_of_everything all{broken_meshes(), {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};
+    const drawing_of_bits bits{broken_meshes(), {{}}, {{true}}};
+    for (const auto of : all_bodies) {
+        for (const int closing : {0, 1, 3}) {
+            SCOPED_TRACE(closing);
+            const vp::solid_options options{.bodies = of, .repair = vp::repair::exterior, .closing = closing};
+            bits.expect_same(box_grid({37, 26, 25}), options);
+            all.expect_same(box_grid({37, 26, 25}), options, loading::load);
+        }
+        const vp::solid_options options{.bodies = of, .repair = vp::repair::vote};
+        bits.expect_same(box_grid({37, 26, 25}), options);
+        all.expect_same(box_grid({64, 26, 25}).crop({3, 5, 2}, {40, 17, 20}), options);
+        expect_same_lists<std::uint32_t>(broken_meshes(), id_of_fragment{5}, box_grid({37, 26, 25}), options);
+    }
+    const drawing_of_bits one{{broken_meshes()[1]}, {{}}, {{true}}};
+    one.expect_same(box_grid({130, 41, 43}), {.repair = vp::repair::exterior, .closing = 35});
+}
+
+// The whole of a maze is reached, whatever the number of turns.
+TEST(Solids, ExteriorOfAMaze) {
+    mesh_data m;
+    for (int i = 0; i < 6; ++i) { // walls one after the other, each with a gap at another end
+        const float x = 4.5f + 5.0f * static_cast<float>(i), low = i % 2 == 0 ? 0.0f : 3.0f, high = low + 20.5f;
+        add_quad(m, {x, low, 0.0f}, {x, high, 0.0f}, {x, high, 24.0f}, {x, low, 24.0f}, false);
+    }
+    for (const float y : {0.0f, 24.0f})
+        add_quad(m, {4.5f, y, 0.0f}, {29.5f, y, 0.0f}, {29.5f, y, 24.0f}, {4.5f, y, 24.0f}, false);
+    for (const float z : {0.5f, 23.5f})
+        add_quad(m, {4.5f, 0.0f, z}, {29.5f, 0.0f, z}, {29.5f, 24.0f, z}, {4.5f, 24.0f, z}, false);
+    const drawing_of_bits maze{{m}, {{}}, {{true}}};
+    maze.expect_same(box_grid({34, 24, 24}), {.repair = vp::repair::exterior});
+    for (const bool is_low_open : {true, false}) { // a long tube, whose one end is the only way in
+        mesh_data box;
+        add_box(box, {10.5f, 2.5f, 2.5f}, {100.5f, 9.5f, 8.5f});
+        const auto first = box.triangles.begin() + (is_low_open ? 0 : 2); // of the face at that end
+        box.triangles.erase(first, first + 2);
+        const drawing_of_bits tube{{box}, {{}}, {{true}}};
+        tube.expect_same(box_grid({110, 12, 12}), {.repair = vp::repair::exterior});
+    }
+}
