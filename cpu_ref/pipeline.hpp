@@ -183,7 +183,7 @@ template <class Draw>
 [[nodiscard]] bool are_numbered(std::span<const Draw> draws) {
     return std::all_of(draws.begin(), draws.end(), [](const Draw& d) {
         const auto& part = d.mesh.part;
-        if (part.whole == 0 || part.numbers.size() == 0) return true;
+        if (part.whole == 0 || part.checked != 0 || part.numbers.size() == 0) return true;
         return std::is_sorted(part.numbers.begin(), part.numbers.end(), std::less_equal<>{}) &&
                part.numbers[part.numbers.size() - 1] < part.whole;
     });

@@ -40,6 +40,9 @@ struct instances {
 struct subset {
     backend_view<const std::uint32_t> numbers = {}; // one per triangle: its number in the whole mesh; ascending
     std::uint64_t whole = 0;                        // triangles of the whole mesh; 0: the mesh_view is the whole
+    // Not 0: the numbers are known to ascend below `whole`. Otherwise each call reads them, and one on a GPU waits once
+    // more. As wide as the rest, so that a view has no padding: calls are compared by their bytes.
+    std::uint64_t checked = 0;
 };
 
 // A triangle mesh in memory that somebody else owns: the CPU backend reads host memory, cuda_backend device memory.

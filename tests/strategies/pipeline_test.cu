@@ -131,6 +131,7 @@ TEST(Pipeline, NumbersOfSubsetsThatCannotBeWriteNothing) {
     const vp::grid g = box_grid({20, 20, 20});
     const vp::mesh mesh{be, m.positions, m.triangles};
     vp::framebuffer<vp::cuda_backend, sum> fb{be, g.extent};
+    vp::framebuffer<vp::cuda_backend, sum> other{be, g.extent};
     vp::abuffer<vp::cuda_backend> lists{be};
     ASSERT_TRUE(vp::voxelize(be, mesh, g, vp::passthrough{}, vp::constant(1.0f), fb).ok());
     const std::vector<float> before = vp::get<0>(fb).to_host(be);
@@ -151,6 +152,8 @@ TEST(Pipeline, NumbersOfSubsetsThatCannotBeWriteNothing) {
         const vp::workspace_view workspace{memory.data(), bytes, limits};
         ASSERT_TRUE(vp::voxelize_async(be, draws, g, fb.view(), {}, workspace).ok());
         EXPECT_EQ(vp::read_status(be, workspace).code, vp::status_code::bad_subset);
+        view.part.checked = 1; // the caller's word, and constants need no numbers
+        EXPECT_TRUE(vp::voxelize(be, view, g, vp::passthrough{}, vp::constant(2.0f), other).ok());
     };
     expect_refused({3, 4, 50}); // beyond the whole
     expect_refused({3, 3, 9});  // twice

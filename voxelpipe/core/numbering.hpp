@@ -39,6 +39,13 @@ template <class Draw>
     return std::any_of(draws.begin(), draws.end(), [](const Draw& d) { return d.mesh.part.whole != 0; });
 }
 
+// Whether a call has to read numbers before it draws.
+template <class Draw>
+[[nodiscard]] bool has_unchecked_subset(std::span<const Draw> draws) {
+    return std::any_of(draws.begin(), draws.end(),
+                       [](const Draw& d) { return d.mesh.part.whole != 0 && d.mesh.part.checked == 0; });
+}
+
 // One a draw; empty if no draw is a subset. The draws are valid.
 template <class Draw>
 [[nodiscard]] std::vector<numbering> make_numberings(std::span<const Draw> draws) {

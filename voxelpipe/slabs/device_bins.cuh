@@ -148,7 +148,7 @@ public:
     [[nodiscard]] view_type view() const {
         view_type v = all();
         v.checked = {v.triangles.data(), v.triangles.size(), v.positions.size()};
-        v.part = {numbers_.view(), whole_};
+        v.part = {numbers_.view(), whole_, 1};
         return v;
     }
 

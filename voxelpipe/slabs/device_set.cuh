@@ -87,7 +87,9 @@ public:
         return ordinals;
     }
 
+    // How many were named.
     [[nodiscard]] std::size_t size() const { return members_.size(); }
+    // A GPU's number, as it was named.
     [[nodiscard]] int ordinal(std::size_t i) const { return members_[i]->ordinal; }
     // Its calls are made where its GPU is the current one: within for_each().
     [[nodiscard]] cuda_backend& backend(std::size_t i) const { return members_[i]->backend; }

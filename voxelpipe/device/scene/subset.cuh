@@ -27,13 +27,13 @@ VOXELPIPE_DECLARES_KERNELS void check_numbers(const std::uint32_t* numbers, std:
 template <class Draw>
 void check_subsets(std::span<const Draw> draws, unsigned int* error, cudaStream_t stream) {
     for (const Draw& d : draws)
-        if (const auto& part = d.mesh.part; part.whole != 0 && part.numbers.size() != 0)
+        if (const auto& part = d.mesh.part; part.whole != 0 && part.checked == 0 && part.numbers.size() != 0)
             check_numbers(part.numbers.data(), part.numbers.size(), part.whole, error, stream);
 }
 // The same at once, with a wait: bad_subset, or a failure of the device.
 template <class Draw>
 [[nodiscard]] status check_subsets(std::span<const Draw> draws, const stream_memory& memory) {
-    if (!core::has_subset(draws)) return {};
+    if (!core::has_unchecked_subset(draws)) return {};
     try {
         const device_block flag(sizeof(unsigned int), memory.resource, memory.stream);
         auto* const error = static_cast<unsigned int*>(flag.data());
