@@ -126,6 +126,20 @@ def solids():
     return head_line("h200", "solids.csv") + " Milliseconds, medians of 15 calls.\n\n" + table(head, body)
 
 
+def solid_rules():
+    """Both rules and the repairs into bits, of the newest design."""
+    rows = {(r["scene"], r["resolution"], r["rule"]): r for r in read(ROOT / "h200" / "solids.csv")}
+    body = []
+    for scene, n in dict.fromkeys(key[:2] for key in rows):
+        if n == "256":
+            continue
+        odd, nonzero, *repairs = (rows[scene, n, rule] for rule in ("even_odd", "nonzero", "vote", "close_holes"))
+        body.append([f"{scene} {n}", short(odd["ms"]), short(nonzero["ms"]), f"{float(nonzero['ms']) / float(odd['ms']):.2f} ×"] +
+                    [short(r["ms"]) for r in repairs] + [short(odd["floor_ms"])])
+    head = ["scene, N", "even_odd", "nonzero", "nonzero / even_odd", "vote", "close_holes", "floor"]
+    return head_line("h200", "solids.csv") + " Milliseconds, medians of 15 calls.\n\n" + table(head, body)
+
+
 def solid_summary():
     """Two scenes at 512, and the mean over all scenes from 512 on."""
     rows = solid_rows()
@@ -147,7 +161,7 @@ def icosphere():
 
 
 TABLES = {"times": times, "means": means, "summary": summary, "icosphere": icosphere, "solids": solids,
-          "solid_summary": solid_summary}
+          "solid_rules": solid_rules, "solid_summary": solid_summary}
 
 
 def main():

@@ -141,7 +141,8 @@ def plot_series(name, rows, label, out):
     resolutions = {r["resolution"] for r in rows}
     where = f", {resolutions.pop()}³ voxels" if len(resolutions) == 1 else ""
     figure.suptitle(f"{name}: {', '.join(variants)}{where}" + (f" — {label}" if label else ""), fontsize=11)
-    figure.savefig(out / f"scaling_{name}.png", dpi=110)
+    kind = "scaling_solids" if all(c.startswith("bit_solid") for c in cells) else "scaling"
+    figure.savefig(out / f"{kind}_{name}.png", dpi=110)
     plt.close(figure)
 
 
@@ -283,9 +284,9 @@ def plot_cpu(rows, label, out):
         axes.set_xlabel("voxels along a side, N")
         tidy(axes)
     panels[0][0].set_ylabel("milliseconds")
-    figure.legend(*panels[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=len(meshes), fontsize=8,
+    figure.legend(*panels[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=min(len(meshes), 2 * len(cells)), fontsize=8,
                   frameon=False)
-    save(figure, label, "CPU table", out, "cpu.png")
+    save(figure, label, "CPU table", out, "cpu_solids.png" if all("solid" in c for c in cells) else "cpu.png")
 
 
 def plot_published(rows, label, out):

@@ -18,13 +18,12 @@ namespace voxelpipe::device {
 enum class tile_reach : std::uint8_t { none, some, all };
 
 // The flood's grid in tiles. Words of a tile: y of the tile, then z. Voxels of a tile beyond the box count as walls.
-// A tile has a copy of its walls from the first time that something of it is reached.
 struct flood_tiles {
     static constexpr int depth = tuning::flood_tile_z;
     static constexpr std::uint64_t words = std::uint64_t{32} * depth; // of a tile
     bit_box box;
     glm::ivec3 count;
-    word *walls, *reached;           // of tiles of tile_reach::some
+    word *walls, *reached;           // of tiles with walls; reached: of tile_reach::some
     std::uint8_t *has_walls, *reach; // reach: a tile_reach
     unsigned* is_awake;              // tiles that have work
     unsigned* changed;               // by launch, whether it changed a tile
@@ -80,48 +79,36 @@ __global__ void place_walls_kernel(const Word* mask, const __grid_constant__ bit
     });
 }
 
-// Calls f(number, word of the row, y, z) for all words of a box, neighbours by neighbouring lanes; the loads of several
-// rows go out together.
-template <class F>
-__device__ VOXELPIPE_INLINE void for_each_word(const bit_box& box, F&& f) {
-    constexpr int batch = 4; // rows
-    const auto ny = static_cast<std::uint32_t>(box.extent.y), words_x = box.words_x();
-    const std::uint64_t rows = std::uint64_t{ny} * static_cast<std::uint32_t>(box.extent.z),
-                        warps = std::uint64_t{gridDim.x} * (threads_per_block / 32);
-    for (std::uint64_t first = (std::uint64_t{blockIdx.x} * (threads_per_block / 32) + warp_in_block()) * batch;
-         first < rows; first += warps * batch) {
-        const auto y0 = static_cast<int>(first % ny), z0 = static_cast<int>(first / ny);
-        for (std::uint32_t x = threadIdx.x % 32; x < words_x; x += 32)
-#pragma unroll
-            for (int k = 0; k < batch; ++k) {
-                const bool is_next = y0 + k >= box.extent.y; // a later z
-                if (first + static_cast<unsigned>(k) >= rows) continue;
-                f((first + static_cast<unsigned>(k)) * words_x + x, x, is_next ? (y0 + k) % box.extent.y : y0 + k,
-                  is_next ? z0 + (y0 + k) / box.extent.y : z0);
-            }
-    }
-}
-
-// Nothing is reached, and the tiles at the box's faces are awake. Tiles that the box fills in part have walls.
+// Tells which tiles have walls, and copies these. The flood begins in the tiles at the box's faces. A warp a tile.
 template <class Word>
-__global__ void start_flood_kernel(const __grid_constant__ flood_tiles tiles, Word* is_awake) {
-    for_each_number(tiles.size(), [&](std::uint64_t tile) {
-        const glm::ivec3 at = tiles.position(tile), extent = tiles.box.extent;
-        const bool is_partial =
-            (at.x + 1) * 32 > extent.x || (at.y + 1) * 32 > extent.y || (at.z + 1) * flood_tiles::depth > extent.z;
+__global__ __launch_bounds__(threads_per_block) void start_flood_kernel(const Word* walls,
+                                                                        const __grid_constant__ flood_tiles tiles) {
+    constexpr int depth = flood_tiles::depth;
+    const int lane = static_cast<int>(threadIdx.x % 32);
+    const std::uint64_t warps = std::uint64_t{gridDim.x} * (threads_per_block / 32);
+    for (std::uint64_t tile = std::uint64_t{blockIdx.x} * (threads_per_block / 32) + warp_in_block();
+         tile < tiles.size(); tile += warps) {
+        const glm::ivec3 at = tiles.position(tile);
+        const int y = at.y * 32 + lane;
+        const auto x = static_cast<std::uint32_t>(at.x);
+        const word valid = y < tiles.box.extent.y ? tiles.box.valid_bits(x) : 0;
+        word w[depth], any = 0;
+        for (int k = 0; k < depth; ++k) {
+            const int z = at.z * depth + k;
+            const bool is_in = valid != 0 && z < tiles.box.extent.z;
+            w[k] = is_in ? walls[tiles.box.first_word(y, z) + x] | ~valid : ~0u;
+            any |= w[k];
+        }
+        const bool has_walls = __any_sync(0xffffffffu, static_cast<int>(any != 0)) != 0;
+        if (has_walls)
+            for (int k = 0; k < depth; ++k) tiles.walls[flood_tiles::word_of(tile, lane, k)] = w[k];
+        if (lane != 0) continue;
+        tiles.has_walls[tile] = has_walls ? 1 : 0;
+        tiles.reach[tile] = static_cast<std::uint8_t>(tile_reach::none);
         const bool is_outermost = at.x == 0 || at.y == 0 || at.z == 0 || at.x + 1 == tiles.count.x ||
                                   at.y + 1 == tiles.count.y || at.z + 1 == tiles.count.z;
-        tiles.has_walls[tile] = is_partial ? 1 : 0;
-        tiles.reach[tile] = static_cast<std::uint8_t>(tile_reach::none);
-        is_awake[tile] = is_outermost ? 1 : 0;
-    });
-}
-template <class Word>
-__global__ __launch_bounds__(threads_per_block) void find_walls_kernel(const Word* walls,
-                                                                       const __grid_constant__ flood_tiles tiles) {
-    for_each_word(tiles.box, [&](std::uint64_t i, std::uint32_t x, int y, int z) {
-        if (walls[i] != 0) tiles.has_walls[tiles.number({static_cast<int>(x), y / 32, z / flood_tiles::depth})] = 1;
-    });
+        tiles.is_awake[tile] = is_outermost ? 1 : 0;
+    }
 }
 
 // The bits of `open` that a run of open bits joins to one of `seeds`, which are open, in a row or in 32 rows at once.
@@ -155,22 +142,19 @@ class tile_flood {
     static constexpr int depth = flood_tiles::depth;
 
 public:
-    // walls: of the box.
-    __device__ VOXELPIPE_INLINE tile_flood(const flood_tiles& tiles, const word* walls, std::uint64_t tile)
-        : tiles_(tiles), walls_(walls), tile_(tile), at_(tiles.position(tile)) {}
+    __device__ VOXELPIPE_INLINE tile_flood(const flood_tiles& tiles, std::uint64_t tile)
+        : tiles_(tiles), tile_(tile), at_(tiles.position(tile)) {}
 
     // Spreads what the tile and its neighbours have. Returns whether the tile has changed.
     __device__ VOXELPIPE_INLINE bool spread() const {
         const tile_reach before = tiles_.reach_now(tile_);
         if (before == tile_reach::all) return false;
         const bool has_walls = tiles_.has_walls[tile_] != 0;
-        const bool is_first = before == tile_reach::none;
         word open[depth], now[depth], old[depth];
 #pragma unroll
         for (int k = 0; k < depth; ++k) {
-            const std::uint64_t at = flood_tiles::word_of(tile_, lane_, k);
-            open[k] = !has_walls ? ~0u : is_first ? open_in_box(k) : ~tiles_.walls[at];
-            old[k] = is_first ? 0u : tiles_.reached[at];
+            open[k] = has_walls ? ~tiles_.walls[flood_tiles::word_of(tile_, lane_, k)] : ~0u;
+            old[k] = before == tile_reach::some ? tiles_.reached[flood_tiles::word_of(tile_, lane_, k)] : 0u;
             now[k] = old[k];
         }
         add_neighbours(now);
@@ -190,9 +174,7 @@ public:
 #pragma unroll
         for (int k = 0; k < depth; ++k) {
             const word news = now[k] & ~old[k];
-            const std::uint64_t at = flood_tiles::word_of(tile_, lane_, k);
-            if (news != 0 || is_first) tiles_.reached[at] = now[k];
-            if (is_first) tiles_.walls[at] = ~open[k];
+            if (news != 0 || before == tile_reach::none) tiles_.reached[flood_tiles::word_of(tile_, lane_, k)] = now[k];
             any |= news;
         }
         wake_neighbours(any & 1u, any >> 31, any, now[0] & ~old[0], now[depth - 1] & ~old[depth - 1],
@@ -246,15 +228,7 @@ private:
     [[nodiscard]] __device__ VOXELPIPE_INLINE word word_of(const face& f, int y, int z) const {
         return f.is_all ? ~0u : tiles_.reached_now(f.tile, y, z);
     }
-    // The voxels of a row that are no walls.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE word open_in_box(int k) const {
-        const int y = at_.y * 32 + lane_, z = at_.z * depth + k;
-        const auto x = static_cast<std::uint32_t>(at_.x);
-        if (y >= tiles_.box.extent.y || z >= tiles_.box.extent.z) return 0;
-        return ~walls_[tiles_.box.first_word(y, z) + x] & tiles_.box.valid_bits(x);
-    }
-    // Spreads `now` through `open`: slices of one z that have news along x and y, then all along z, until nothing
-    // changes. old: what has been spread before.
+    // Spreads `now` through `open`. old: what has been spread already.
     __device__ VOXELPIPE_INLINE void flood(const word (&open)[depth], word (&now)[depth],
                                            const word (&old)[depth]) const {
         word done[depth];
@@ -308,7 +282,6 @@ private:
     }
 
     const flood_tiles& tiles_;
-    const word* const walls_;
     const std::uint64_t tile_;
     const glm::ivec3 at_;
     const int lane_ = static_cast<int>(threadIdx.x % 32);
@@ -319,8 +292,7 @@ private:
 template <class Word>
 __global__ __launch_bounds__(threads_per_block,
                              tuning::flood_blocks) void flood_tiles_kernel(const __grid_constant__ flood_tiles tiles,
-                                                                           const Word* walls, int launch,
-                                                                           Word* changed) {
+                                                                           int launch, Word* changed) {
     await_stream();
     if (launch > 0 && changed[launch - 1] == 0) return;
     const unsigned lane = threadIdx.x % 32;
@@ -338,13 +310,35 @@ __global__ __launch_bounds__(threads_per_block,
             __syncwarp();
             for (; awake != 0; awake &= awake - 1) {
                 const auto k = static_cast<std::uint64_t>(__ffs(static_cast<int>(awake)) - 1);
-                has_changed = tile_flood(tiles, walls, first + k * warps).spread() || has_changed;
+                has_changed = tile_flood(tiles, first + k * warps).spread() || has_changed;
             }
         }
         // Tiles that are still awake have work for the next launch.
         has_changed = has_changed || tiles.wakes(mine);
     }
     if (has_changed) *const_cast<volatile Word*>(changed + launch) = 1;
+}
+
+// Calls f(number, word of the row, y, z) for all words of a box, neighbours by neighbouring lanes; the loads of several
+// rows go out together.
+template <class F>
+__device__ VOXELPIPE_INLINE void for_each_word(const bit_box& box, F&& f) {
+    constexpr int batch = 4; // rows
+    const auto ny = static_cast<std::uint32_t>(box.extent.y), words_x = box.words_x();
+    const std::uint64_t rows = std::uint64_t{ny} * static_cast<std::uint32_t>(box.extent.z),
+                        warps = std::uint64_t{gridDim.x} * (threads_per_block / 32);
+    for (std::uint64_t first = (std::uint64_t{blockIdx.x} * (threads_per_block / 32) + warp_in_block()) * batch;
+         first < rows; first += warps * batch) {
+        const auto y0 = static_cast<int>(first % ny), z0 = static_cast<int>(first / ny);
+        for (std::uint32_t x = threadIdx.x % 32; x < words_x; x += 32)
+#pragma unroll
+            for (int k = 0; k < batch; ++k) {
+                const bool is_next = y0 + k >= box.extent.y; // a later z
+                if (first + static_cast<unsigned>(k) >= rows) continue;
+                f((first + static_cast<unsigned>(k)) * words_x + x, x, is_next ? (y0 + k) % box.extent.y : y0 + k,
+                  is_next ? z0 + (y0 + k) / box.extent.y : z0);
+            }
+    }
 }
 
 // Row-major words of what is reached; is_inverse: of what is not.
@@ -397,13 +391,12 @@ struct exterior_memory {
 template <int = 0>
 void flood_from_outside(const flood_tiles& tiles, const word* walls, cudaStream_t stream) {
     const unsigned blocks = fill_device(tiles.size() * 32, tuning::flood_blocks);
-    start_flood_kernel<word><<<fill_device(tiles.size()), threads_per_block, 0, stream>>>(tiles, tiles.is_awake);
-    find_walls_kernel<word><<<fill_device(tiles.box.num_words()), threads_per_block, 0, stream>>>(walls, tiles);
+    start_flood_kernel<word><<<fill_device(tiles.size() * 32), threads_per_block, 0, stream>>>(walls, tiles);
     check(cudaGetLastError(), stage::fine_raster);
     for (unsigned goes_on = 1; goes_on != 0;) {
         check(cudaMemsetAsync(tiles.changed, 0, tuning::flood_launches * sizeof(unsigned), stream), stage::fine_raster);
         for (int launch = 0; launch < tuning::flood_launches; ++launch)
-            launch_behind(flood_tiles_kernel<word>, blocks, threads_per_block, stream, stage::fine_raster, tiles, walls,
+            launch_behind(flood_tiles_kernel<unsigned>, blocks, threads_per_block, stream, stage::fine_raster, tiles,
                           launch, tiles.changed);
         check(cudaMemcpyAsync(&goes_on, tiles.changed + tuning::flood_launches - 1, sizeof(unsigned),
                               cudaMemcpyDeviceToHost, stream),
