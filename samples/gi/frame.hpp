@@ -6,13 +6,13 @@
 
 #include "pixels.hpp"
 #include "renderer.hpp"
+#include "stopwatch.hpp"
 #include "voxels.hpp"
 
 #include <voxelpipe/direction_mips.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <numbers>
@@ -41,7 +41,7 @@ class frame_renderer : public renderer {
 
 public:
     frame_renderer(Backend backend, scene s, const settings& how)
-        : backend_(std::move(backend)), scene_(std::move(s)), how_(how), fine_(fit(scene_, how.resolution, 2)),
+        : backend_(std::move(backend)), watch_(backend_), scene_(std::move(s)), how_(how), fine_(fit(scene_, how.resolution, 2)),
           coarse_(fit(scene_, how.resolution, 1)), rest_(upload(scene_.positions)),
           placed_(backend_, scene_.positions.size()), normals_(upload(scene_.normals)), colors_(upload(scene_.colors)),
           texcoords_(upload(scene_.texcoords)), triangles_(upload(scene_.triangles)),
@@ -56,60 +56,35 @@ public:
     }
 
     [[nodiscard]] frame render(double time) override {
-        frame made;
-        const auto timed = [&](const char* stage, auto&& work) {
-            const auto start = std::chrono::steady_clock::now();
-            work();
-            finish();
-            const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
-            made.milliseconds.emplace_back(stage, took.count());
-        };
-        const world w = make_world(time);
-        timed("vertices", [&] {
-            backend_.for_each(placed_.size(),
-                              place_vertices{rest_.data(), placed_.data(), glm::vec3(origin_),
-                                             glm::vec3(scene_.motion(time)), static_cast<float>(per_unit_),
-                                             scene_.first_moving, scene_.end_moving});
-        });
-        timed("bits", [&] { draw_bits(); });
-        timed("voxels", [&] {
-            const light_fragments shader{w, vp::dense_bits(vp::get<0>(bits_).view())};
-            check(vp::voxelize<vp::coverage::conservative>(backend_, mesh(), coarse_, vp::passthrough{}, shader,
-                                                           voxels_));
-        });
-        timed("lists", [&] {
-            check(vp::voxelize<vp::coverage::conservative>(backend_, mesh(), coarse_, vp::passthrough{}, vp::constant(),
-                                                           lists_));
-            backend_.for_each(slots_.size(), clear_slots{slots_.data()});
-            backend_.for_each(lists_.num_voxels(), number_slots{lists_.voxels.data(), slots_.data()});
-        });
+        const world w = make_world();
+        watch_.start();
+        backend_.for_each(placed_.size(), place_vertices{rest_.data(), placed_.data(), glm::vec3(origin_),
+                                                         glm::vec3(scene_.motion(time)), static_cast<float>(per_unit_),
+                                                         scene_.first_moving, scene_.end_moving});
+        watch_.end("vertices");
+        draw_bits();
+        watch_.end("bits");
+        draw_voxels(w);
+        watch_.end("voxels");
+        draw_lists();
+        watch_.end("lists");
         // The first frame has no last one: light bounces a few times within it.
         const int rounds = has_last_ ? 1 : 4;
-        double lighting = 0, folding = 0;
         for (int i = 0; i < rounds; ++i) {
-            timed("bounce", [&] {
-                std::swap(mips_, last_);
-                const voxel_views views = view_voxels();
-                const std::uint64_t n = mips_.view().num_voxels(0);
-                backend_.for_each(n,
-                                  light_surfaces{views, w, last_.view(), has_last_, mips_.finest(), mips_.facings()});
-                backend_.for_each(n, light_insides{views, mips_.finest(), mips_.facings()});
-            });
-            timed("mips", [&] { mips_.build(backend_); });
+            bounce(w);
+            watch_.end("bounce");
+            mips_.build(backend_);
+            watch_.end("mips");
             has_last_ = true;
-            folding += made.milliseconds.back().second;
-            made.milliseconds.pop_back();
-            lighting += made.milliseconds.back().second;
-            made.milliseconds.pop_back();
         }
-        made.milliseconds.emplace_back("bounce", lighting);
-        made.milliseconds.emplace_back("mips", folding);
-        timed("pixels", [&] {
-            backend_.for_each(pixels_.size(),
-                              draw_pixels{w, mips_.view(), lists_view(), make_eye(time), how_.view, how_.level,
-                                          how_.width, how_.height, how_.samples, scene_.exposure, pixels_.data()});
-            made.pixels = pixels_.to_host(backend_);
-        });
+        backend_.for_each(pixels_.size(), draw_pixels{w, mips_.view(), lists_view(), make_eye(time), how_.view,
+                                                      how_.level, how_.width, how_.height, how_.samples,
+                                                      scene_.exposure, pixels_.data()});
+        watch_.end("pixels");
+        frame made;
+        made.pixels = pixels_.to_host(backend_);
+        watch_.end("copy");
+        made.milliseconds = watch_.times();
         return made;
     }
     [[nodiscard]] std::string device() const override;
@@ -172,6 +147,25 @@ private:
         check(vp::voxelize<vp::coverage::conservative>(backend_, all, fine_, vp::passthrough{}, vp::constant(true),
                                                        bits_));
     }
+    void draw_voxels(const world& w) {
+        const light_fragments shader{w, vp::dense_bits(vp::get<0>(bits_).view())};
+        check(
+            vp::voxelize<vp::coverage::conservative>(backend_, mesh(), coarse_, vp::passthrough{}, shader, voxels_));
+    }
+    void draw_lists() {
+        check(vp::voxelize<vp::coverage::conservative>(backend_, mesh(), coarse_, vp::passthrough{}, vp::constant(),
+                                                       lists_));
+        backend_.for_each(slots_.size(), clear_slots{slots_.data()});
+        backend_.for_each(lists_.num_voxels(), number_slots{lists_.voxels.data(), slots_.data()});
+    }
+    // Light of this frame's voxels, with what the last frame's send there.
+    void bounce(const world& w) {
+        std::swap(mips_, last_);
+        const voxel_views views = view_voxels();
+        const std::uint64_t n = mips_.view().num_voxels(0);
+        backend_.for_each(n, light_surfaces{views, w, last_.view(), has_last_, mips_.finest(), mips_.facings()});
+        backend_.for_each(n, light_insides{views, mips_.finest(), mips_.facings()});
+    }
     [[nodiscard]] voxel_views view_voxels() const {
         return {vp::get<0>(voxels_).view(),
                 vp::get<1>(voxels_).view(),
@@ -185,7 +179,7 @@ private:
     [[nodiscard]] triangle_lists lists_view() const {
         return {slots_.data(), lists_.offsets.data(), lists_.primitives.data(), coarse_.extent};
     }
-    [[nodiscard]] world make_world(double) const {
+    [[nodiscard]] world make_world() const {
         world w;
         w.positions = placed_.data();
         w.normals = normals_.data();
@@ -219,12 +213,12 @@ private:
     static void check(const vp::status& s) {
         if (!s.ok()) throw std::runtime_error(s.message());
     }
-    void finish() {} // a backend that runs behind waits here
 
     double per_unit_ = 1;    // voxels a unit of the world
     glm::dvec3 origin_{0.0}; // of the grid, world
     bool has_last_ = false;
     Backend backend_;
+    stopwatch<Backend> watch_;
     scene scene_;
     settings how_;
     vp::grid fine_, coarse_;

@@ -27,6 +27,14 @@ scene make_scene(const settings& s) {
     return load_scene(s.scene);
 }
 
+std::unique_ptr<renderer> make_renderer(scene world, const settings& s) {
+    if (s.backend == backend_choice::cpu) return make_cpu_renderer(std::move(world), s);
+    const std::string why = why_no_cuda();
+    if (why.empty()) return make_cuda_renderer(std::move(world), s);
+    if (s.backend == backend_choice::cuda) throw usage_error("--backend cuda: " + why);
+    return make_cpu_renderer(std::move(world), s);
+}
+
 // Medians over the frames but the first, which does more.
 void print_stats(const std::vector<frame>& frames, const std::string& device) {
     std::cout << "milliseconds a frame on " << device << (frames.size() > 1 ? ", median without the first" : "")
@@ -40,21 +48,21 @@ void print_stats(const std::vector<frame>& frames, const std::string& device) {
     for (std::size_t stage = 0; stage < frames[0].milliseconds.size(); ++stage) {
         std::vector<double> times;
         for (std::size_t i = first; i < frames.size(); ++i) times.push_back(frames[i].milliseconds[stage].second);
-        std::printf("  %-10s%10.1f\n", frames[0].milliseconds[stage].first.c_str(), median(times));
+        std::printf("  %-10s%10.2f\n", frames[0].milliseconds[stage].first.c_str(), median(times));
     }
     for (std::size_t i = first; i < frames.size(); ++i) {
         double sum = 0;
         for (const auto& [stage, ms] : frames[i].milliseconds) sum += ms;
         totals.push_back(sum);
     }
-    std::printf("  %-10s%10.1f\n", "frame", median(totals));
+    std::printf("  %-10s%10.2f\n", "frame", median(totals));
 }
 
 void run(const settings& s) {
     scene world = make_scene(s);
     if (!s.quiet)
         for (const std::string& warning : world.warnings) std::cerr << "gi: warning: " << warning << '\n';
-    const std::unique_ptr<renderer> renderer = make_cpu_renderer(std::move(world), s);
+    const std::unique_ptr<renderer> renderer = make_renderer(std::move(world), s);
     if (s.window) return show_window(*renderer, s);
     const std::unique_ptr<film> out = open_film(s);
     voxelize::progress_bar bar{!s.quiet && s.frames > 1};

@@ -6,19 +6,19 @@
 
 #include "scene.hpp"
 #include "settings.hpp"
+#include "stopwatch.hpp"
 
 #include <glm/gtc/type_precision.hpp>
 
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace gi {
 
 struct frame {
-    std::vector<glm::u8vec4> pixels;                          // rows from the top, sRGB
-    std::vector<std::pair<std::string, double>> milliseconds; // of each stage, in order
+    std::vector<glm::u8vec4> pixels; // rows from the top, sRGB
+    stage_list milliseconds;
 };
 
 class renderer {
@@ -31,7 +31,12 @@ public:
     [[nodiscard]] virtual std::string device() const = 0;
 };
 
-// Takes what it needs of the scene by value.
+// Both take what they need of the scene by value. The pictures of both are the same bytes.
 [[nodiscard]] std::unique_ptr<renderer> make_cpu_renderer(scene s, const settings& how);
+// On the first GPU. Throws std::runtime_error where why_no_cuda says something, and with CUDA's text.
+[[nodiscard]] std::unique_ptr<renderer> make_cuda_renderer(scene s, const settings& how);
+
+// Why frames cannot be rendered on a GPU: the rest of a sentence. Empty where they can.
+[[nodiscard]] std::string why_no_cuda();
 
 } // namespace gi

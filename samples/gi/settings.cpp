@@ -34,6 +34,13 @@ view_choice read_view(const std::string& text, int& level) {
     throw usage_error("--view is final, direct, ao, indirect, voxels or level:K with K from 0 to 10, not " + text);
 }
 
+backend_choice read_backend(const std::string& text) {
+    if (text == "auto") return backend_choice::automatic;
+    if (text == "cpu") return backend_choice::cpu;
+    if (text == "cuda") return backend_choice::cuda;
+    throw usage_error("--backend is auto, cpu or cuda, not " + text);
+}
+
 void check_range(const char* name, double value, double low, double high) {
     const auto text = [](double v) { return std::to_string(static_cast<long long>(v)); };
     if (!(value >= low && value <= high))
@@ -44,7 +51,7 @@ void check_range(const char* name, double value, double low, double high) {
 
 settings parse_command_line(int argc, const char* const* argv) {
     settings s;
-    std::string size = "1280x720", view = "final";
+    std::string size = "1280x720", view = "final", backend = "auto";
     CLI::App app{"Voxel cone tracing: a scene that is voxelized again in every frame, lit by its own voxels.", "gi"};
     app.footer("\nOutputs: .mp4, .mkv, .webm (needs ffmpeg; without it a .png a frame beside it), or .png.\n"
                "Exit codes: 0 done, 1 command line, 2 scene, 3 memory, 4 output, 70 a bug.");
@@ -59,6 +66,7 @@ settings parse_command_line(int argc, const char* const* argv) {
     app.add_option("--round", s.round, "frames of a whole round")->capture_default_str();
     app.add_option("--samples", s.samples, "rays a side of a pixel: 2 is 4 a pixel")->capture_default_str();
     app.add_flag("--still", s.still, "nothing moves, every frame stands at --start");
+    app.add_option("--backend", backend, "auto, cpu or cuda; the pictures are the same")->capture_default_str();
     app.add_option("--threads", s.threads, "0: one for each core")->capture_default_str();
     app.add_flag("--window", s.window, "show it in a window instead, until that is closed");
     app.add_flag("--stats", s.stats, "print milliseconds of each stage");
@@ -71,6 +79,7 @@ settings parse_command_line(int argc, const char* const* argv) {
         throw usage_error(e.what());
     }
     s.view = read_view(view, s.level);
+    s.backend = read_backend(backend);
     if (!read_size(size, s.width, s.height)) throw usage_error("--size is WIDTHxHEIGHT, not " + size);
     check_range("--size's width", s.width, 1, 16384);
     check_range("--size's height", s.height, 1, 16384);

@@ -11,6 +11,9 @@
 
 namespace gi {
 
+// Where frames are rendered: `automatic` takes a GPU if the program is built for one and finds it.
+enum class backend_choice : std::uint8_t { automatic, cpu, cuda };
+
 enum class view_choice : std::uint8_t { final, direct, ao, indirect, level };
 
 struct settings {
@@ -25,7 +28,8 @@ struct settings {
     int level = 0;        // of view_choice::level
     int samples = 1;      // a side of a pixel
     bool still = false;   // nothing moves
-    unsigned threads = 0; // 0: one for each core
+    backend_choice backend = backend_choice::automatic;
+    unsigned threads = 0; // of the CPU; 0: one for each core
     bool stats = false, quiet = false, window = false;
 };
 

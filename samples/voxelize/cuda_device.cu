@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// The tool's pipeline for cuda_backend, and the look at the machine before it.
+// The tool's pipeline for cuda_backend.
 #include "cuda_device.hpp"
 
 #include "pipeline.hpp"
@@ -59,37 +59,6 @@ struct memory_access<vp::cuda_backend> {
 
 namespace {
 
-__global__ void empty_kernel() {}
-
-// "8.0, 9.0", from nvcc's list 800,900.
-std::string architecture_list() {
-    std::string text;
-    for (const int number : {__CUDA_ARCH_LIST__}) {
-        if (!text.empty()) text += ", ";
-        text += std::to_string(number / 100) + '.' + std::to_string(number % 100 / 10);
-    }
-    return text;
-}
-
-// Fills in the device until a call fails, and returns that call's error.
-cudaError_t look_at_device(cuda_facts& facts) {
-    if (const cudaError_t error = cudaGetDeviceCount(&facts.devices); error != cudaSuccess) return error;
-    if (facts.devices == 0) return cudaErrorNoDevice;
-    cudaDeviceProp properties{};
-    if (const cudaError_t error = cudaGetDeviceProperties(&properties, 0); error != cudaSuccess) return error;
-    facts.name = properties.name;
-    facts.capability = properties.major * 10 + properties.minor;
-    if (const cudaError_t error = cudaSetDevice(0); error != cudaSuccess) return error;
-    std::size_t free = 0, total = 0;
-    if (const cudaError_t error = cudaMemGetInfo(&free, &total); error != cudaSuccess) return error;
-    facts.free_memory = free;
-    facts.total_memory = total;
-    empty_kernel<<<1, 1>>>();
-    if (const cudaError_t error = cudaGetLastError(); error != cudaSuccess) return error;
-    facts.has_kernel = true;
-    return cudaStreamSynchronize(nullptr);
-}
-
 // The device's pool of memory up to a limit, as a resource of cuda_backend. Knows how much was held at most, and
 // whether a request was refused: the pipeline reports that and the host's lack of memory alike.
 class limited_memory {
@@ -124,40 +93,6 @@ private:
     std::uint64_t most_ = 0;
     std::uint64_t refused_ = 0;
 };
-
-} // namespace
-
-bool built_with_cuda() { return true; }
-
-cuda_facts look_for_cuda() {
-    cuda_facts facts;
-    facts.built_in = true;
-    facts.architectures = architecture_list();
-    (void)cudaRuntimeGetVersion(&facts.runtime);
-    (void)cudaDriverGetVersion(&facts.driver);
-    const cudaError_t error = look_at_device(facts);
-    switch (error) {
-    case cudaSuccess:
-        break;
-    case cudaErrorInsufficientDriver: // also where there is none
-        facts.driver_too_old = facts.driver != 0;
-        break;
-    case cudaErrorNoDevice:
-        facts.devices = 0;
-        break;
-    case cudaErrorNoKernelImageForDevice:
-    case cudaErrorInvalidDeviceFunction:
-    case cudaErrorUnsupportedPtxVersion: // PTX for newer devices, but from a newer toolkit than the driver's
-        facts.has_kernel = false;
-        break;
-    default:
-        facts.error = cudaGetErrorString(error);
-    }
-    (void)cudaGetLastError();
-    return facts;
-}
-
-namespace {
 
 // Adds what another device has drawn of the same grid.
 void add_layers(voxelize_stats& all, const voxelize_stats& one) {
