@@ -51,6 +51,12 @@ struct dense_bits {
         }
         return mask;
     }
+    // Voxels v to v + (3, 0, 0) as bits 0 to 3; those outside are 0. v is within the extent, v.x a multiple of 4.
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t row_of_four(const glm::ivec3& v) const {
+        const int left = extent.x - v.x;
+        const std::uint32_t row = left < 4 ? (1u << left) - 1u : 15u;
+        return word(v.x, v.y, v.z) >> (v.x & 31) & row;
+    }
     // The first voxel along origin + t * direction, 0 <= t <= limit, as octree_view::first_hit, in the numbers of the
     // bits; rank is the linear id, (z * ny + y) * nx + x.
     [[nodiscard]] VOXELPIPE_HD voxel_hit first_hit(const glm::dvec3& origin, const glm::dvec3& direction,

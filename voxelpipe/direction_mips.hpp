@@ -6,8 +6,9 @@
 // al. 2011), and their samples: what cone tracing reads. A value is a glm::vec4: colour multiplied by opacity, and
 // opacity. A voxel's value in a direction is what one sees who looks along it: in each of its four columns the nearer
 // child lies over the farther one, and the columns are averaged. So a wall that is lit on one side keeps its two sides
-// apart, and a layer that fills a voxel's cross-section is opaque on every level. Values have 11 significant bits, so
-// that their products with weights are exact and samples need few fused steps, which are slow on a plain x86-64.
+// apart, and a layer that fills a voxel's cross-section is opaque on every level. Values are stored in 8 bytes, with 11
+// significant bits each, so that their products with weights are exact and samples need few fused steps, which are slow
+// on a plain x86-64.
 
 #include <voxelpipe/core/exact.hpp>
 #include <voxelpipe/framebuffer.hpp>
@@ -60,16 +61,42 @@ inline constexpr int num_directions = 6;
 
 namespace core {
 
-// The nearest value of 11 significant bits, as a half has, of float's range; ties to even.
+// The nearest value of 11 significant bits, of float's range; ties to even.
 [[nodiscard]] VOXELPIPE_HD inline float to_11_bits(float v) {
     const auto bits = bit_cast<std::uint32_t>(v);
     return bit_cast<float>((bits + 0xfffu + (bits >> 13 & 1u)) & ~0x1fffu);
 }
-[[nodiscard]] VOXELPIPE_HD inline glm::vec4 to_11_bits(const glm::vec4& v) {
-    return {to_11_bits(v.x), to_11_bits(v.y), to_11_bits(v.z), to_11_bits(v.w)};
-}
 
 } // namespace core
+
+// Light and opacity in 8 bytes: four halves, x lowest, of values from 0 to 65504. Smaller ones become 0 where they are
+// below 2^-14.
+struct alignas(8) packed_light {
+    std::uint32_t xy = 0, zw = 0;
+    friend bool operator==(const packed_light&, const packed_light&) = default;
+};
+// To the nearest, ties to even; what is larger than 65504 becomes that, and what is not a number 0.
+[[nodiscard]] VOXELPIPE_HD inline packed_light pack_light(const glm::vec4& v) {
+    std::uint32_t h[4];
+    for (int k = 0; k < 4; ++k) {
+        const float bounded = v[k] < 65504.0f ? v[k] : 65504.0f;
+        const auto bits = core::bit_cast<std::uint32_t>(bounded);
+        h[k] = v[k] >= 0x1p-14f ? (bits + 0xfffu + (bits >> 13 & 1u) - (112u << 23)) >> 13 : 0u;
+    }
+    return {h[0] | h[1] << 16, h[2] | h[3] << 16};
+}
+namespace core {
+// 2^-112 times the values: a shift away, since halves and floats differ in the exponent's bias.
+[[nodiscard]] VOXELPIPE_HD inline glm::vec4 unpack_scaled(const packed_light& p) {
+    return {bit_cast<float>(p.xy << 13 & 0x0fffe000u), bit_cast<float>(p.xy >> 3 & 0x0fffe000u),
+            bit_cast<float>(p.zw << 13 & 0x0fffe000u), bit_cast<float>(p.zw >> 3 & 0x0fffe000u)};
+}
+} // namespace core
+// Exact.
+[[nodiscard]] VOXELPIPE_HD inline glm::vec4 unpack_light(const packed_light& p) {
+    const glm::vec4 v = core::unpack_scaled(p);
+    return {exact::mul(v.x, 0x1p112f), exact::mul(v.y, 0x1p112f), exact::mul(v.z, 0x1p112f), exact::mul(v.w, 0x1p112f)};
+}
 
 // The way that a voxel's surface faces, in 24 bits: a unit vector's parts as signed bytes, x lowest. 0 faces all ways.
 [[nodiscard]] VOXELPIPE_HD inline std::uint32_t pack_facing(const glm::vec3& normal) {
@@ -96,8 +123,8 @@ namespace core {
 // Refers to the levels. finest: one value a voxel, level 0. coarse: the levels from 1 on, one after the other, each as
 // six arrays, one a direction. x fastest, then y, then z.
 struct direction_mips_view {
-    const glm::vec4* finest = nullptr;      // level 0
-    const glm::vec4* coarse = nullptr;      // levels 1 to last_level
+    const packed_light* finest = nullptr;   // level 0
+    const packed_light* coarse = nullptr;   // levels 1 to last_level
     const std::uint32_t* facings = nullptr; // of level 0; null: all voxels face all ways
     glm::ivec3 extent{0};                   // of level 0
     int last_level = 0;                     // the level of one voxel
@@ -109,7 +136,7 @@ struct direction_mips_view {
         return static_cast<std::size_t>(e.x) * static_cast<std::size_t>(e.y) * static_cast<std::size_t>(e.z);
     }
     // The array of a level and direction; level 0 has one for all directions.
-    [[nodiscard]] VOXELPIPE_HD const glm::vec4* values(int level, int direction) const {
+    [[nodiscard]] VOXELPIPE_HD const packed_light* values(int level, int direction) const {
         if (level == 0) return finest;
         return coarse + first[level] + static_cast<std::size_t>(direction) * num_voxels(level);
     }
@@ -118,15 +145,12 @@ struct direction_mips_view {
         const glm::ivec3 e = mip_extent(extent, level);
         if (v.x < 0 || v.y < 0 || v.z < 0 || v.x >= e.x || v.y >= e.y || v.z >= e.z) return glm::vec4(0.0f);
         const std::size_t i = index(e, v);
-        if (level != 0) return values(level, direction)[i];
-        glm::vec3 along(0.0f);
-        along[direction >> 1] = (direction & 1) != 0 ? -1.0f : 1.0f;
-        return seen(i, along);
+        return level != 0 ? unpack_light(values(level, direction)[i]) : seen(i, axis_of(direction));
     }
 
     // The value of a level around `position`, in voxels of level 0, for a look along the unit vector `along`: linear
     // between the eight nearest voxels (zero outside), the three directions that `along` has a part in weighted by its
-    // squares.
+    // squares. Zero where the voxels have no opacity in the first of these.
     [[nodiscard]] VOXELPIPE_HD glm::vec4 sample(int level, const glm::vec3& position, const glm::vec3& along) const {
         const glm::ivec3 e = mip_extent(extent, level);
         const float scale = core::bit_cast<float>(static_cast<std::uint32_t>(127 - level) << 23); // 2^-level
@@ -139,23 +163,25 @@ struct direction_mips_view {
             low[a] = static_cast<int>(exact::add(p, 1.0f)) - 1; // floor
             high_part[a] = exact::sub(p, static_cast<float>(low[a]));
         }
-        const glm::vec4* from[3];
-        float weight[3];
-        const int sides = level == 0 ? 1 : 3;
-        if (level == 0) {
-            from[0] = finest;
-            weight[0] = 1.0f;
-        } else {
-            const std::size_t n = num_voxels(level);
-            const glm::vec4* const start = coarse + first[level];
-            for (int a = 0; a < 3; ++a) {
-                from[a] = start + static_cast<std::size_t>(2 * a + (along[a] < 0.0f ? 1 : 0)) * n;
-                weight[a] = exact::mul(along[a], along[a]);
-            }
+        std::size_t slot[8];
+        unsigned inside = 0;
+        for (int c = 0; c < 8; ++c) {
+            const glm::ivec3 v(low[0] + (c & 1), low[1] + (c >> 1 & 1), low[2] + (c >> 2));
+            const bool is_inside = v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < e.x && v.y < e.y && v.z < e.z;
+            slot[c] = is_inside ? index(e, v) : 0;
+            inside |= (is_inside ? 1u : 0u) << c;
         }
+        const packed_light* const from = level == 0 ? finest : values(level, along.x < 0.0f ? 1 : 0);
+        packed_light first[8];
+        std::uint32_t opacity = 0;
+        for (int c = 0; c < 8; ++c) {
+            first[c] = (inside >> c & 1u) != 0 ? from[slot[c]] : packed_light{};
+            opacity |= first[c].zw >> 16;
+        }
+        if (opacity == 0) return glm::vec4(0.0f);
+
         // Weights in multiples of 2^-13, which add up to 1: the largest takes what the others' rounding left.
         float part[8], left = 1.0f;
-        std::size_t slot[8];
         int largest = 0;
         for (int c = 0; c < 8; ++c) {
             const auto along_axis = [&](int a) {
@@ -165,34 +191,46 @@ struct direction_mips_view {
             left = exact::sub(left, part[c]);
             if (part[c] > part[largest]) largest = c;
         }
-        part[largest] = exact::add(part[largest], left);
-        for (int c = 0; c < 8; ++c) {
-            const glm::ivec3 v(low[0] + (c & 1), low[1] + (c >> 1 & 1), low[2] + (c >> 2));
-            const bool inside = v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < e.x && v.y < e.y && v.z < e.z;
-            slot[c] = inside ? index(e, v) : 0;
-            if (!inside) part[c] = 0.0f;
-        }
-        glm::vec4 sum(0.0f);
-        for (int s = 0; s < sides; ++s) {
-            glm::vec4 mean(0.0f);
+        // A weight of 13 bits times a value of 11 is exact: contracted or not, a sum of them rounds once a term.
+        for (int c = 0; c < 8; ++c) part[c] = c == largest ? exact::add(part[c], left) : part[c];
+        glm::vec4 mean(0.0f);
+        if (level == 0) {
             for (int c = 0; c < 8; ++c) {
-                // A weight of 13 bits times a value of 11 is exact: contracted or not, this rounds once.
-                const glm::vec4 value = level == 0 ? seen(slot[c], along) : from[s][slot[c]];
-                for (int k = 0; k < 4; ++k) mean[k] += part[c] * value[k];
+                const glm::vec4 value = (inside >> c & 1u) != 0 ? shown(first[c], slot[c], along) : glm::vec4(0.0f);
+                for (int k = 0; k < 4; ++k) mean[k] = exact::add(mean[k], exact::mul(part[c], value[k]));
             }
-            for (int k = 0; k < 4; ++k) sum[k] = exact::fma(weight[s], mean[k], sum[k]);
+            return mean;
+        }
+        for (int c = 0; c < 8; ++c) part[c] = exact::mul(part[c], 0x1p112f); // of unpack_scaled
+        const auto mean_of = [&](const auto& light) {
+            glm::vec4 sum(0.0f);
+            for (int c = 0; c < 8; ++c) {
+                const glm::vec4 value = core::unpack_scaled(light(c));
+                for (int k = 0; k < 4; ++k) sum[k] = add_product(part[c], value[k], sum[k]);
+            }
+            return sum;
+        };
+        glm::vec4 sum = mean_of([&](int c) { return first[c]; });
+        for (int k = 0; k < 4; ++k) sum[k] = exact::mul(exact::mul(along.x, along.x), sum[k]);
+        for (int a = 1; a < 3; ++a) {
+            const packed_light* const side = values(level, 2 * a + (along[a] < 0.0f ? 1 : 0));
+            mean = mean_of([&](int c) { return (inside >> c & 1u) != 0 ? side[slot[c]] : packed_light{}; });
+            const float weight = exact::mul(along[a], along[a]);
+            for (int k = 0; k < 4; ++k) sum[k] = exact::fma(weight, mean[k], sum[k]);
         }
         return sum;
     }
-    // The same between two levels: `level` is from 0 to last_level, and what lies beyond counts as its end.
+    // The same between two levels: `level` is from 0 to last_level, and what lies beyond counts as its end. Zero where
+    // the higher one is.
     [[nodiscard]] VOXELPIPE_HD glm::vec4 sample(float level, const glm::vec3& position, const glm::vec3& along) const {
         if (!(level > 0.0f)) return sample(0, position, along);
         if (level >= static_cast<float>(last_level)) return sample(last_level, position, along);
         const int below = static_cast<int>(level);
         const float above = exact::sub(level, static_cast<float>(below));
+        if (above == 0.0f) return sample(below, position, along);
+        const glm::vec4 b = sample(below + 1, position, along); // covers what the lower one looks at
+        if (b.w == 0.0f) return glm::vec4(0.0f);
         const glm::vec4 a = sample(below, position, along);
-        if (above == 0.0f) return a;
-        const glm::vec4 b = sample(below + 1, position, along);
         glm::vec4 mixed;
         for (int k = 0; k < 4; ++k) mixed[k] = exact::lerp(a[k], b[k], above);
         return mixed;
@@ -200,50 +238,84 @@ struct direction_mips_view {
 
     // Voxel i of level 0 for a look along a unit vector.
     [[nodiscard]] VOXELPIPE_HD glm::vec4 seen(std::size_t i, const glm::vec3& along) const {
-        glm::vec4 v = finest[i];
+        return shown(finest[i], i, along);
+    }
+    // The same, of what stands there.
+    [[nodiscard]] VOXELPIPE_HD glm::vec4 shown(const packed_light& light, std::size_t i, const glm::vec3& along) const {
+        glm::vec4 v = unpack_light(light);
         if (facings == nullptr) return v;
         const float part = facing_part(facings[i], along);
         for (int k = 0; k < 3; ++k) v[k] = core::to_11_bits(exact::mul(v[k], part));
         return v;
+    }
+    // The unit vector of a number of a direction.
+    [[nodiscard]] VOXELPIPE_HD static glm::vec3 axis_of(int direction) {
+        glm::vec3 along(0.0f);
+        along[direction >> 1] = (direction & 1) != 0 ? -1.0f : 1.0f;
+        return along;
     }
     // Where voxel v of an array of extent e stands.
     [[nodiscard]] VOXELPIPE_HD static std::size_t index(const glm::ivec3& e, const glm::ivec3& v) {
         const auto wide = [](int n) { return static_cast<std::size_t>(n); };
         return (wide(v.z) * wide(e.y) + wide(v.y)) * wide(e.x) + wide(v.x);
     }
+
+private:
+    // a * b + c where a * b is exact: one rounding, fused or not.
+    [[nodiscard]] VOXELPIPE_HD static float add_product(float a, float b, float c) {
+#if defined(__CUDA_ARCH__)
+        return exact::fma(a, b, c);
+#else
+        return exact::add(exact::mul(a, b), c);
+#endif
+    }
 };
 
 namespace core {
 
-struct round_mip_voxel {
-    glm::vec4* finest;
-    VOXELPIPE_HD void operator()(std::uint64_t i) const { finest[i] = to_11_bits(finest[i]); }
-};
-
 // Makes voxel i of a level, for all six directions.
 struct fold_mip_level {
     direction_mips_view mips;
-    glm::vec4* out; // the level's first array
+    packed_light* out; // the level's first array
     int level;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const glm::ivec3 e = mip_extent(mips.extent, level);
+        const glm::ivec3 e = mip_extent(mips.extent, level), below = mip_extent(mips.extent, level - 1);
         const auto nx = static_cast<std::uint64_t>(e.x), ny = static_cast<std::uint64_t>(e.y);
         const glm::ivec3 corner(2 * static_cast<int>(i % nx), 2 * static_cast<int>(i / nx % ny),
                                 2 * static_cast<int>(i / (nx * ny)));
         const std::size_t n = mips.num_voxels(level);
+        packed_light light[8];
+        std::size_t slot[8];
+        bool inside[8];
+        std::uint32_t opacity = 0;
+        for (int c = 0; c < 8; ++c) {
+            const glm::ivec3 v = corner + glm::ivec3(c & 1, c >> 1 & 1, c >> 2);
+            inside[c] = v.x < below.x && v.y < below.y && v.z < below.z;
+            slot[c] = inside[c] ? direction_mips_view::index(below, v) : 0;
+            light[c] = inside[c] ? mips.values(level - 1, 0)[slot[c]] : packed_light{};
+            opacity |= light[c].zw >> 16;
+        }
         for (int d = 0; d < num_directions; ++d) {
+            packed_light& to = out[static_cast<std::size_t>(d) * n + i];
+            if (opacity == 0) { // most of a scene is empty
+                to = {};
+                continue;
+            }
+            const packed_light* const from = mips.values(level - 1, d);
             glm::vec4 children[8];
             for (int c = 0; c < 8; ++c)
-                children[c] = mips.fetch(level - 1, d, corner + glm::ivec3(c & 1, c >> 1 & 1, c >> 2));
-            out[static_cast<std::size_t>(d) * n + i] = to_11_bits(fold_along(children, d));
+                children[c] = !inside[c]   ? glm::vec4(0.0f)
+                              : level == 1 ? mips.shown(light[c], slot[c], direction_mips_view::axis_of(d))
+                                           : unpack_light(d == 0 ? light[c] : from[slot[c]]);
+            to = pack_light(fold_along(children, d));
         }
     }
 };
 
 } // namespace core
 
-// Owns the levels, on Backend: 16 bytes a voxel for level 0, 6/7 of that for all others, and 4 bytes a voxel with
+// Owns the levels, on Backend: 8 bytes a voxel for level 0, 6/7 of that for all others, and 4 bytes a voxel with
 // facings. The constructor allocates and does not initialise. Throws what Backend::buffer throws.
 template <class Backend>
 class direction_mips {
@@ -258,17 +330,15 @@ public:
         if (with_facings) view_.facings = facings_.data();
     }
     // Level 0, to be written by the caller on the backend: x fastest, then y, then z.
-    [[nodiscard]] glm::vec4* finest() { return finest_.data(); }
+    [[nodiscard]] packed_light* finest() { return finest_.data(); }
     // Where each voxel of level 0 faces, to be written likewise: pack_facing. The two sides of a wall then keep apart
     // on levels whose voxels are wider than it. Null without facings.
     [[nodiscard]] std::uint32_t* facings() { return view_.facings != nullptr ? facings_.data() : nullptr; }
     // For samples, on the backend. Valid as long as this object.
     [[nodiscard]] const direction_mips_view& view() const { return view_; }
 
-    // Rounds level 0 to 11 significant bits, as all levels have them, and makes the others. In the order of the
-    // backend's stream.
+    // Makes the other levels. In the order of the backend's stream.
     void build(Backend& backend) {
-        backend.for_each(view_.num_voxels(0), core::round_mip_voxel{finest_.data()});
         for (int level = 1; level <= view_.last_level; ++level)
             backend.for_each(view_.num_voxels(level),
                              core::fold_mip_level{view_, coarse_.data() + view_.first[level], level});
@@ -287,7 +357,7 @@ private:
     template <class T>
     using buffer = typename Backend::template buffer<T>;
     direction_mips_view view_;
-    buffer<glm::vec4> finest_, coarse_;
+    buffer<packed_light> finest_, coarse_;
     buffer<std::uint32_t> facings_;
 };
 

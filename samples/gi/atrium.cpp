@@ -194,11 +194,7 @@ scene make_atrium() {
     b.add(make_ball(0.24, 16), {.color = glm::vec3(0.0f), .emission = {34.0f, 17.0f, 5.0f}}, part_kind::moving);
 
     scene s = b.finish();
-    const glm::vec3 sun = glm::normalize(glm::vec3(0.3f, 1.15f, 0.5f));
-    s.light.position = glm::vec4(sun, 0.0f);
-    s.light.side_u = 0.008f * glm::normalize(glm::cross(sun, glm::vec3(0, 0, 1)));
-    s.light.side_v = 0.008f * glm::normalize(glm::cross(sun, s.light.side_u));
-    s.light.color = {38.0f, 31.0f, 21.0f};
+    set_sun(s, {0.3f, 1.15f, 0.5f}, 0.008f, {38.0f, 31.0f, 21.0f});
     s.sky_above = {0.42f, 0.80f, 1.65f};
     s.sky_level = {0.95f, 1.15f, 1.4f};
     s.exposure = 0.52f;

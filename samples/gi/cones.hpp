@@ -2,11 +2,40 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Cones through the levels of light: at each step the level whose voxels are as wide as the cone, front to back.
+// Cones through the levels of light: at each step the level whose voxels are as wide as the cone, front to back. A
+// point sends a few of a set of cones over its hemisphere; its neighbours send the others, and a mean over the
+// neighbours has them all.
 
 #include "world.hpp"
 
+#include <cmath>
+#include <numbers>
+
 namespace gi {
+
+// Cones around +z that share the hemisphere: each stands for the same part of the irradiance.
+struct cone_set {
+    static constexpr int most = 64;
+    glm::vec3 directions[most];
+    int count = 0;
+    int phases = 0;   // a point of phase p sends cones p, p + phases, p + 2 * phases ...
+    float spread = 0; // tangent of half of a cone's angle
+};
+
+// count is a multiple of phases, at most cone_set::most.
+[[nodiscard]] inline cone_set make_cone_set(int count, int phases) {
+    cone_set s;
+    s.count = count;
+    s.phases = phases;
+    const double each = 1.0 - 1.0 / count; // cosine of half the angle of a cone with its part of the hemisphere
+    s.spread = static_cast<float>(std::sqrt(1 - each * each) / each);
+    for (int i = 0; i < count; ++i) { // a spiral, as sunflowers have it
+        const double squared = (i + 0.5) / count, r = std::sqrt(squared);
+        const double angle = i * std::numbers::pi * (3 - std::sqrt(5.0));
+        s.directions[i] = glm::vec3(r * std::cos(angle), r * std::sin(angle), std::sqrt(1 - squared));
+    }
+    return s;
+}
 
 // log2 of a width of at least 1, linear between powers of two: the same bits on every machine.
 [[nodiscard]] VOXELPIPE_HD inline float level_of(float width) {
@@ -20,29 +49,34 @@ struct cone_light {
     float occlusion = 0.0f; // by what is near: 0 open, 1 closed
 };
 
-// From `start` voxels away on; the cone is 2 * spread * t voxels wide at distance t. Samples are `narrowest` voxels
-// wide at least.
+// One cone, from `start` voxels away on; it is 2 * spread * t voxels wide at distance t.
+struct cone {
+    glm::vec3 from, direction; // of a surface; unit
+    float rise;                // cosine between direction and the surface's normal
+    float spread, start;
+    float narrowest; // voxels that samples are wide at least
+};
 [[nodiscard]] VOXELPIPE_HD inline cone_light trace_cone(const vp::direction_mips_view& mips, const world& w,
-                                                        const glm::vec3& from, const glm::vec3& direction, float spread,
-                                                        float start, float narrowest) {
+                                                        const cone& c) {
     cone_light result;
-    float opacity = 0.0f, t = start;
+    float opacity = 0.0f, t = c.start;
     const auto longest = static_cast<float>(mips.extent.x > mips.extent.y ? mips.extent.x : mips.extent.y);
     const float reach =
         1.8f * (longest > static_cast<float>(mips.extent.z) ? longest : static_cast<float>(mips.extent.z));
     const float near = 0.16f * longest; // what AO counts
     while (t < reach && opacity < 0.99f) {
-        // Narrower than the cone, and not much wider than walls are thick: a wider sample would reach behind the
-        // surface that the cone starts from, to the far side of its wall.
-        const float wide = 1.4f * spread * t < w.widest ? 1.4f * spread * t : w.widest;
-        const float width = wide > narrowest ? wide : narrowest;
-        const glm::vec3 at = from + direction * t;
+        // Narrower than the cone, than reaches down to the surface that it starts from, and than would reach through
+        // the thinnest wall.
+        const float high = 0.8f * (c.narrowest + c.rise * t), most = high < w.widest ? high : w.widest;
+        const float wide = 1.4f * c.spread * t < most ? 1.4f * c.spread * t : most;
+        const float width = wide > c.narrowest ? wide : c.narrowest;
+        const glm::vec3 at = c.from + c.direction * t;
         bool outside = false; // and on its way out
         for (int a = 0; a < 3; ++a)
-            outside =
-                outside || (direction[a] < 0.0f ? at[a] < -width : at[a] > static_cast<float>(mips.extent[a]) + width);
+            outside = outside ||
+                      (c.direction[a] < 0.0f ? at[a] < -width : at[a] > static_cast<float>(mips.extent[a]) + width);
         if (outside) break;
-        const glm::vec4 v = mips.sample(level_of(width), at, direction);
+        const glm::vec4 v = mips.sample(level_of(width), at, c.direction);
         if (v.w > 0.0f) {
             // Opacities along a cone are added, not multiplied. A sample is the part of the cone that is closed there;
             // linear filtering spreads a wall over several samples, which multiplied let a fifth of the light through a
@@ -56,39 +90,29 @@ struct cone_light {
         }
         t = t + 0.75f * width;
     }
-    result.light = result.light + w.sky(direction) * (opacity < 0.99f ? 1.0f - opacity : 0.0f);
+    result.light = result.light + w.sky(c.direction) * (opacity < 0.99f ? 1.0f - opacity : 0.0f);
     return result;
 }
 
-// Six cones over the hemisphere around the normal: irradiance / pi, and mean occlusion by the cosine. turn, from 0 to
-// 1, turns five of them from where they are to their neighbours.
+// The mean of a phase's cones: irradiance / pi, and occlusion, as far as this phase knows them.
 [[nodiscard]] VOXELPIPE_HD inline cone_light gather(const vp::direction_mips_view& mips, const world& w,
-                                                    const glm::vec3& at, const glm::vec3& normal, float narrowest,
-                                                    float turn) {
+                                                    const cone_set& set, int phase, const glm::vec3& at,
+                                                    const glm::vec3& normal, float narrowest) {
     // Any two vectors across the normal that turn with it continuously around most of the sphere.
     const glm::vec3 other = normal.y > -0.9f && normal.y < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
     const glm::vec3 c = glm::cross(normal, other);
     const glm::vec3 p = c / vp::exact::sqrt(glm::dot(c, c)), q = glm::cross(p, normal);
-    const float half = 0.72654253f * turn, scale = 1.0f / (1.0f + half * half); // tan 36 degrees
-    const float cosine = (1.0f - half * half) * scale, sine = 2.0f * half * scale;
-    const glm::vec3 u = p * cosine + q * sine, v = q * cosine - p * sine;
-    // One along the normal, five at 60 degrees from it, each 60 degrees wide.
-    constexpr float sides[6][3] = {{0.0f, 0.0f, 1.0f},
-                                   {0.8660254f, 0.0f, 0.5f},
-                                   {0.26761657f, 0.82363910f, 0.5f},
-                                   {-0.70062927f, 0.50903696f, 0.5f},
-                                   {-0.70062927f, -0.50903696f, 0.5f},
-                                   {0.26761657f, -0.82363910f, 0.5f}};
     cone_light sum;
-    const glm::vec3 from = at + normal * narrowest;
-    for (int i = 0; i < 6; ++i) {
-        const glm::vec3 d = u * sides[i][0] + v * sides[i][1] + normal * sides[i][2];
-        const cone_light l = trace_cone(mips, w, from, d, 0.57735f, 0.6f * narrowest, narrowest);
-        const float part = i == 0 ? 0.25f : 0.15f;
-        sum.light = sum.light + l.light * part;
-        sum.occlusion = sum.occlusion + l.occlusion * part;
+    const glm::vec3 from = at + normal * (1.3f * narrowest);
+    for (int i = phase; i < set.count; i += set.phases) {
+        const glm::vec3 d = set.directions[i];
+        const cone_light l =
+            trace_cone(mips, w, {from, p * d.x + q * d.y + normal * d.z, d.z, set.spread, 0.6f * narrowest, narrowest});
+        sum.light = sum.light + l.light;
+        sum.occlusion = sum.occlusion + l.occlusion;
     }
-    return sum;
+    const float part = static_cast<float>(set.phases) / static_cast<float>(set.count);
+    return {sum.light * part, sum.occlusion * part};
 }
 
 } // namespace gi

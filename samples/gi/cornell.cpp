@@ -46,7 +46,6 @@ scene make_cornell() {
     s.light.color = lamp_color;
     s.sky_above = s.sky_level = glm::vec3(0.015f);
     s.exposure = 1.9f;
-    s.wall = wall;
     s.motion = [](double t) {
         const double a = 2 * pi * t + 0.9;
         return glm::dvec3(0.74 * std::sin(a), 0.34 + 0.16 * std::sin(2 * a), 0.66 * std::cos(a) + 0.1);

@@ -41,14 +41,16 @@ class frame_renderer : public renderer {
 
 public:
     frame_renderer(Backend backend, scene s, const settings& how)
-        : backend_(std::move(backend)), watch_(backend_), scene_(std::move(s)), how_(how), fine_(fit(scene_, how.resolution, 2)),
-          coarse_(fit(scene_, how.resolution, 1)), rest_(upload(scene_.positions)),
-          placed_(backend_, scene_.positions.size()), normals_(upload(scene_.normals)), colors_(upload(scene_.colors)),
-          texcoords_(upload(scene_.texcoords)), triangles_(upload(scene_.triangles)),
+        : backend_(std::move(backend)), watch_(backend_), scene_(std::move(s)), how_(how),
+          fine_(fit(scene_, how.resolution, 2)), coarse_(fit(scene_, how.resolution, 1)),
+          rest_(upload(scene_.positions)), placed_(backend_, scene_.positions.size()), normals_(upload(scene_.normals)),
+          colors_(upload(scene_.colors)), texcoords_(upload(scene_.texcoords)), triangles_(upload(scene_.triangles)),
           triangle_materials_(upload(scene_.triangle_materials)), materials_(upload(scene_.materials)),
           textures_(backend_, std::size_t{0}), tables_(upload(std::vector{voxelize::make_color_tables()})),
-          bits_(backend_, fine_.extent), voxels_(backend_, coarse_.extent), mips_(backend_, coarse_.extent, true),
+          bits_(backend_, fine_.extent), blockers_(backend_, fine_.extent), mips_(backend_, coarse_.extent, true),
           last_(backend_, coarse_.extent, true), lists_(backend_), slots_(backend_, mips_.view().num_voxels(0)),
+          filled_(backend_, coarse_.extent), lit_(backend_, std::size_t{0}), gathered_(backend_, std::size_t{0}),
+          points_(backend_, num_rays(how)), received_(backend_, num_rays(how)),
           pixels_(backend_, static_cast<std::size_t>(how.width) * static_cast<std::size_t>(how.height)) {
         upload_textures();
         checked_ = vp::check_indices(backend_, triangles_.view());
@@ -64,10 +66,10 @@ public:
         watch_.end("vertices");
         draw_bits();
         watch_.end("bits");
-        draw_voxels(w);
-        watch_.end("voxels");
         draw_lists();
         watch_.end("lists");
+        light_voxels(w);
+        watch_.end("light");
         // The first frame has no last one: light bounces a few times within it.
         const int rounds = has_last_ ? 1 : 4;
         for (int i = 0; i < rounds; ++i) {
@@ -77,9 +79,7 @@ public:
             watch_.end("mips");
             has_last_ = true;
         }
-        backend_.for_each(pixels_.size(), draw_pixels{w, mips_.view(), lists_view(), make_eye(time), how_.view,
-                                                      how_.level, how_.width, how_.height, how_.samples,
-                                                      scene_.exposure, pixels_.data()});
+        draw(w, make_eye(time));
         watch_.end("pixels");
         frame made;
         made.pixels = pixels_.to_host(backend_);
@@ -147,37 +147,60 @@ private:
         check(vp::voxelize<vp::coverage::conservative>(backend_, all, fine_, vp::passthrough{}, vp::constant(true),
                                                        bits_));
     }
-    void draw_voxels(const world& w) {
-        const light_fragments shader{w, vp::dense_bits(vp::get<0>(bits_).view())};
-        check(
-            vp::voxelize<vp::coverage::conservative>(backend_, mesh(), coarse_, vp::passthrough{}, shader, voxels_));
-    }
     void draw_lists() {
-        check(vp::voxelize<vp::coverage::conservative>(backend_, mesh(), coarse_, vp::passthrough{}, vp::constant(),
+        check(vp::voxelize<vp::coverage::conservative>(backend_, mesh(), coarse_, vp::passthrough{}, list_fragments{},
                                                        lists_));
         backend_.for_each(slots_.size(), clear_slots{slots_.data()});
         backend_.for_each(lists_.num_voxels(), number_slots{lists_.voxels.data(), slots_.data()});
+        filled_.build(backend_, slot_rows{slots_.data(), coarse_.extent});
+    }
+    void light_voxels(const world& w) {
+        const std::size_t n = lists_.num_voxels();
+        if (lit_.size() < n) {
+            lit_ = buffer<lit_voxel>(backend_, n + n / 8);
+            gathered_ = buffer<gathered>(backend_, n + n / 8);
+        }
+        blockers_.build(backend_, vp::bit_rows{bits()});
+        backend_.for_each(n, light_fragments{w, lists_view(), blockers_.view(), lit_.data()});
     }
     // Light of this frame's voxels, with what the last frame's send there.
     void bounce(const world& w) {
         std::swap(mips_, last_);
-        const voxel_views views = view_voxels();
-        const std::uint64_t n = mips_.view().num_voxels(0);
-        backend_.for_each(n, light_surfaces{views, w, last_.view(), has_last_, mips_.finest(), mips_.facings()});
-        backend_.for_each(n, light_insides{views, mips_.finest(), mips_.facings()});
+        const triangle_lists lists = lists_view();
+        const std::size_t n = lists_.num_voxels();
+        if (has_last_)
+            backend_.for_each(n, gather_voxels{w, lists, last_.view(), voxel_cones_, lit_.data(), gathered_.data()});
+        backend_.for_each(n, light_surfaces{lists, bits(), lit_.data(), has_last_ ? gathered_.data() : nullptr,
+                                            mips_.finest(), mips_.facings()});
+        backend_.for_each(mips_.view().num_voxels(0),
+                          light_insides{lists, bits(), lit_.data(), mips_.finest(), mips_.facings()});
     }
-    [[nodiscard]] voxel_views view_voxels() const {
-        return {vp::get<0>(voxels_).view(),
-                vp::get<1>(voxels_).view(),
-                vp::get<2>(voxels_).view(),
-                vp::get<3>(voxels_).view(),
-                vp::get<4>(voxels_).view(),
-                vp::get<5>(voxels_).view(),
-                vp::dense_bits(vp::get<0>(bits_).view()),
-                coarse_.extent};
+    void draw(const world& w, const eye_rays& rays) {
+        if (how_.view == view_choice::level) {
+            eye_rays one_a_pixel = rays;
+            one_a_pixel.width = how_.width;
+            one_a_pixel.height = how_.height;
+            backend_.for_each(pixels_.size(),
+                              draw_level{w, mips_.view(), one_a_pixel, how_.level, scene_.exposure, pixels_.data()});
+            return;
+        }
+        const triangle_lists lists = lists_view();
+        backend_.for_each(points_.size(), see_points{w, lists, rays, points_.data()});
+        watch_.end("rays");
+        backend_.for_each(receive_light::count(rays), receive_light{w, mips_.view(), lists, rays, how_.view,
+                                                                    pixel_cones_, points_.data(), received_.data()});
+        watch_.end("cones");
+        backend_.for_each(pixels_.size(), draw_pixels{w, rays, how_.view, how_.samples, scene_.exposure, points_.data(),
+                                                      received_.data(), pixels_.data()});
     }
+    [[nodiscard]] vp::dense_bits bits() const { return vp::dense_bits(vp::get<0>(bits_).view()); }
     [[nodiscard]] triangle_lists lists_view() const {
-        return {slots_.data(), lists_.offsets.data(), lists_.primitives.data(), coarse_.extent};
+        return {slots_.data(),          lists_.voxels.data(), lists_.offsets.data(), lists_.primitives.data(),
+                lists_.payloads.data(), filled_.view(),       coarse_.extent};
+    }
+    [[nodiscard]] static std::size_t num_rays(const settings& s) {
+        return static_cast<std::size_t>(s.width) * static_cast<std::size_t>(s.height) *
+               static_cast<std::size_t>(s.samples * s.samples);
     }
     [[nodiscard]] world make_world() const {
         world w;
@@ -197,7 +220,7 @@ private:
             w.light.side_u *= scale;
             w.light.side_v *= scale;
         }
-        w.widest = std::max(4.0f, static_cast<float>(1.4 * scene_.wall * per_unit_));
+        if (scene_.wall > 0) w.widest = std::max(4.0f, static_cast<float>(1.4 * scene_.wall * per_unit_));
         w.sky_above = scene_.sky_above;
         w.sky_level = scene_.sky_level;
         return w;
@@ -207,8 +230,12 @@ private:
         const glm::dvec3 forward = glm::normalize(c.target - c.eye);
         const glm::dvec3 right = glm::normalize(glm::cross(forward, glm::dvec3(0, 1, 0)));
         const double tall = std::tan(c.field_of_view * std::numbers::pi / 360);
-        return {glm::vec3((c.eye - origin_) * per_unit_), glm::vec3(forward),
-                glm::vec3(right * (tall * how_.width / how_.height)), glm::vec3(glm::cross(right, forward) * tall)};
+        return {glm::vec3((c.eye - origin_) * per_unit_),
+                glm::vec3(forward),
+                glm::vec3(right * (tall * how_.width / how_.height)),
+                glm::vec3(glm::cross(right, forward) * tall),
+                how_.width * how_.samples,
+                how_.height * how_.samples};
     }
     static void check(const vp::status& s) {
         if (!s.ok()) throw std::runtime_error(s.message());
@@ -232,10 +259,16 @@ private:
     std::vector<buffer<glm::u8vec4>> texels_;
     vp::checked_indices checked_;
     vp::framebuffer<Backend, bits_target> bits_;
-    voxel_framebuffer<Backend> voxels_;
+    vp::brick_bits<Backend> blockers_; // of bits_
     vp::direction_mips<Backend> mips_, last_;
-    vp::abuffer<Backend> lists_;
+    vp::abuffer<Backend, glm::vec2> lists_;
     buffer<std::uint32_t> slots_;
+    vp::brick_bits<Backend> filled_; // voxels with triangles
+    buffer<lit_voxel> lit_;          // of those voxels, and a little more
+    buffer<gathered> gathered_;
+    cone_set voxel_cones_ = make_cone_set(16, 8), pixel_cones_ = make_cone_set(32, eye_rays::num_phases);
+    buffer<seen_point> points_;
+    buffer<received_light> received_;
     buffer<glm::u8vec4> pixels_;
 };
 

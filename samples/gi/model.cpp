@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// A model's file as a scene. Nothing of it is filled: its triangles are sheets, whatever they enclose.
+// A model's file as a scene. Parts of it that are closed are filled, the others are sheets.
 
+#include "closed_parts.hpp"
 #include "parts.hpp"
 
 #include "../voxelize/model_file.hpp"
@@ -40,7 +41,9 @@ void append_instance(scene& s, const voxelize::primitive& p, const voxelize::aff
 } // namespace
 
 scene load_scene(const std::filesystem::path& file) {
-    voxelize::scene model = voxelize::load_model(file);
+    voxelize::load_options options;
+    options.gltf.shading = true;
+    voxelize::scene model = voxelize::load_model(file, options);
     scene loaded;
     for (const voxelize::instance& shown : model.instances)
         append_instance(loaded, model.primitives[shown.primitive], shown.to_world);
@@ -79,18 +82,28 @@ scene load_scene(const std::filesystem::path& file) {
     s.normals.insert(s.normals.end(), loaded.normals.begin(), loaded.normals.end());
     s.colors.insert(s.colors.end(), loaded.colors.begin(), loaded.colors.end());
     s.texcoords.insert(s.texcoords.end(), loaded.texcoords.begin(), loaded.texcoords.end());
-    for (const glm::uvec3& t : loaded.triangles) s.triangles.push_back(t + vertices);
-    for (const std::uint32_t m : loaded.triangle_materials) s.triangle_materials.push_back(looks + m);
-    for (const voxelize::material& m : model.materials)
-        s.materials.push_back(
-            {.color = glm::vec3(m.base_color),
-             .emission = m.emission,
-             .roughness = m.roughness,
-             // The reader leaves out textures but the base colour's; a textured metal is mostly paint.
-             .metallic = m.texture < 0 ? m.metallic : 0.0f,
-             .texture = m.texture,
-             .cutoff = m.alpha == voxelize::alpha_mode::mask ? m.alpha_cutoff : -1.0f,
-             .density = 2.0f});
+    const std::vector<bool> closed = find_closed(loaded.positions, loaded.triangles);
+    for (const bool wanted : {true, false}) { // closed parts follow those of the stage
+        for (std::size_t i = 0; i < loaded.triangles.size(); ++i) {
+            if (closed[i] != wanted) continue;
+            s.triangles.push_back(loaded.triangles[i] + vertices);
+            s.triangle_materials.push_back(looks + 2 * loaded.triangle_materials[i] + (wanted ? 0 : 1));
+        }
+        if (wanted) s.num_closed = s.triangles.size();
+    }
+    for (const voxelize::material& m : model.materials) {
+        const material look{.color = glm::vec3(m.base_color),
+                            .emission = m.emission,
+                            .roughness = m.roughness,
+                            .metallic = m.metallic,
+                            .texture = m.texture,
+                            .roughness_texture = m.roughness_texture,
+                            .emission_texture = m.emission_texture,
+                            .cutoff = m.alpha == voxelize::alpha_mode::mask ? m.alpha_cutoff : -1.0f};
+        s.materials.push_back(look); // for closed parts, then for sheets
+        s.materials.push_back(look);
+        s.materials.back().density = 2.0f;
+    }
     s.textures = std::move(model.textures);
     s.pictures = std::move(model.images);
     s.warnings = std::move(model.warnings);
@@ -98,11 +111,7 @@ scene load_scene(const std::filesystem::path& file) {
     const double above = 0.12 * round;
     s.low = {centre.x - reach, low.y - 0.08 * reach, centre.z - reach};
     s.high = {centre.x + reach, high.y + above, centre.z + reach};
-    const glm::vec3 sun = glm::normalize(glm::vec3(0.55f, 1.0f, 0.65f));
-    s.light.position = glm::vec4(sun, 0.0f);
-    s.light.side_u = 0.03f * glm::normalize(glm::cross(sun, glm::vec3(0, 0, 1)));
-    s.light.side_v = 0.03f * glm::normalize(glm::cross(sun, s.light.side_u));
-    s.light.color = {5.6f, 5.1f, 4.4f};
+    set_sun(s, {0.55f, 1.0f, 0.65f}, 0.03f, {5.6f, 5.1f, 4.4f});
     s.sky_above = {0.55f, 0.75f, 1.1f};
     s.sky_level = {0.85f, 0.85f, 0.85f};
     s.exposure = 0.85f;

@@ -84,6 +84,14 @@ void add_hexahedron(mesh& m, const std::array<vec3, 8>& c) {
     }
 }
 
+void set_sun(scene& s, const glm::vec3& direction, float radius, const glm::vec3& irradiance) {
+    const glm::vec3 sun = glm::normalize(direction);
+    s.light.position = glm::vec4(sun, 0.0f);
+    s.light.side_u = radius * glm::normalize(glm::cross(sun, glm::vec3(0, 0, 1)));
+    s.light.side_v = radius * glm::normalize(glm::cross(sun, s.light.side_u));
+    s.light.color = irradiance;
+}
+
 mesh make_ball(double radius, int segments) {
     mesh m;
     m.add_patch(2 * segments, segments, [&](double u, double v) {

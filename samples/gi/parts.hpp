@@ -40,6 +40,8 @@ private:
 [[nodiscard]] mesh placed(mesh m, double degrees, vec3 by);
 // A box with eight corners of any place: those of the low y, counter-clockwise from above, then those above them.
 void add_hexahedron(mesh& m, const std::array<vec3, 8>& corners);
+// Lights the scene by a sun in that direction, whose disc at distance 1 has that radius.
+void set_sun(scene& s, const glm::vec3& direction, float radius, const glm::vec3& irradiance);
 [[nodiscard]] mesh make_ball(double radius, int segments = 32);
 
 } // namespace gi

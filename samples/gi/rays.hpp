@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A small ray tracer over the voxels: an A-buffer has the triangles of each voxel, a walk through the grid tests those
-// of the voxels that a ray meets. Made again in every frame, in one call.
+// A small ray tracer over the voxels: an A-buffer has the triangles of each voxel, a walk through the bricks of the
+// grid tests those of the voxels that a ray meets. Made again in every frame.
 
 #include "world.hpp"
 
 #include <voxelpipe/abuffer.hpp>
-#include <voxelpipe/core/cell_walk.hpp>
+#include <voxelpipe/brick_bits.hpp>
 
 namespace gi {
 
@@ -19,11 +19,32 @@ struct ray_hit {
     glm::vec3 weights{0.0f}; // barycentric
 };
 
+// The fragment shader of the frame's one pass: where in the voxel the triangle was met, for the light of the voxel.
+struct list_fragments {
+    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+        const glm::vec3 weights = f.clamped_barycentric();
+        return vp::outputs(glm::vec2(weights.y, weights.z));
+    }
+};
+
 struct triangle_lists {
     const std::uint32_t* slots = nullptr; // of each voxel its number among those with triangles, plus 1; 0: none
+    const std::uint64_t* voxels = nullptr;
     const std::uint64_t* offsets = nullptr;
     const std::uint32_t* primitives = nullptr;
+    const glm::vec2* weights = nullptr; // of list_fragments
+    vp::brick_bits_view filled;         // the voxels with triangles
     glm::ivec3 extent{0};
+
+    [[nodiscard]] VOXELPIPE_HD glm::ivec3 voxel(std::uint64_t i) const {
+        const auto nx = static_cast<std::uint64_t>(extent.x), ny = static_cast<std::uint64_t>(extent.y);
+        return {static_cast<int>(i % nx), static_cast<int>(i / nx % ny), static_cast<int>(i / (nx * ny))};
+    }
+    // 0 outside the grid.
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t slot(const glm::ivec3& v) const {
+        if (v.x < 0 || v.y < 0 || v.z < 0 || v.x >= extent.x || v.y >= extent.y || v.z >= extent.z) return 0;
+        return slots[vp::direction_mips_view::index(extent, v)];
+    }
 
     // The nearest triangle along the ray, or any within `limit` if `any`.
     [[nodiscard]] VOXELPIPE_HD ray_hit trace(const world& w, const glm::vec3& origin, const glm::vec3& direction,
@@ -31,9 +52,8 @@ struct triangle_lists {
         ray_hit best;
         best.distance = limit;
         const triangle_lists& lists = *this;
-        vp::walk_cells(extent, origin, direction, limit, [&](const vp::walked_cell<float>& at) {
+        filled.walk(origin, direction, limit, [&](const vp::walked_cell<float>& at) {
             const std::uint32_t slot = lists.slots[vp::direction_mips_view::index(lists.extent, at.cell)];
-            if (slot == 0) return false;
             for (std::uint64_t i = lists.offsets[slot - 1]; i < lists.offsets[slot]; ++i) {
                 intersect(w, lists.primitives[i], origin, direction, best);
                 if (any && best.found) return true;
@@ -68,7 +88,7 @@ private:
     }
 };
 
-// Makes triangle_lists::slots: zero all, then number those of the A-buffer.
+// Make triangle_lists::slots: zero all, then number those of the A-buffer.
 struct clear_slots {
     std::uint32_t* slots;
     VOXELPIPE_HD void operator()(std::uint64_t i) const { slots[i] = 0; }
@@ -77,6 +97,17 @@ struct number_slots {
     const std::uint64_t* voxels;
     std::uint32_t* slots;
     VOXELPIPE_HD void operator()(std::uint64_t i) const { slots[voxels[i]] = static_cast<std::uint32_t>(i + 1); }
+};
+// For brick_bits::build.
+struct slot_rows {
+    const std::uint32_t* slots;
+    glm::ivec3 extent;
+    VOXELPIPE_HD std::uint32_t operator()(const glm::ivec3& v) const {
+        const std::uint32_t* const row = slots + vp::direction_mips_view::index(extent, v);
+        std::uint32_t bits = 0;
+        for (int k = 0; k < 4 && v.x + k < extent.x; ++k) bits |= (row[k] != 0 ? 1u : 0u) << k;
+        return bits;
+    }
 };
 
 } // namespace gi

@@ -18,13 +18,15 @@
 namespace gi {
 
 struct material {
-    glm::vec3 color{0.8f};    // linear; multiplies the texture and the vertices' colours
-    glm::vec3 emission{0.0f}; // radiance
-    float roughness = 1.0f;   // 0 to 1; 1 has no reflection but the diffuse one
-    float metallic = 0.0f;    // 0 or 1
-    int texture = -1;         // index into scene::textures
-    float cutoff = -1.0f;     // fragments whose alpha is less are cut off
-    bool is_light = false;    // shows scene::light: its emission is for the eye, shadow rays bring it to surfaces
+    glm::vec3 color{0.8f};      // linear; multiplies the texture and the vertices' colours
+    glm::vec3 emission{0.0f};   // radiance
+    float roughness = 1.0f;     // 0 to 1; 1 has no reflection but the diffuse one
+    float metallic = 0.0f;      // 0 to 1
+    int texture = -1;           // index into scene::textures
+    int roughness_texture = -1; // G, linear, multiplies the roughness, B the metallic factor
+    int emission_texture = -1;  // multiplies the emission
+    float cutoff = -1.0f;       // fragments whose alpha is less are cut off
+    bool is_light = false;      // shows scene::light: its emission is for the eye, shadow rays bring it to surfaces
     // Opacity of a voxel whose eighths are all filled. 1 for closed parts, whose inside is filled; 2 for sheets, which
     // fill half of a voxel at most.
     float density = 1.0f;
@@ -58,7 +60,7 @@ struct scene {
     gi::light light;
     glm::vec3 sky_above{0.0f}, sky_level{0.0f}; // radiance of the sky at the zenith and below the horizon
     float exposure = 1.0f;
-    double wall = 0;                // thickness of the thinnest that keeps light out, in the scene's units
+    double wall = 0;                // thickness of the thinnest one with light outside; 0: there is none outside
     glm::dvec3 low{0.0}, high{1.0}; // bounds of all that is drawn at any time
 
     // Both for a time of 0 to 1, at which they return to their start.

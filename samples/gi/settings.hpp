@@ -25,9 +25,9 @@ struct settings {
     double start = 0;   // time of the first frame; a whole round is 1
     double round = 240; // frames of a whole round
     view_choice view = view_choice::final;
-    int level = 0;        // of view_choice::level
-    int samples = 1;      // a side of a pixel
-    bool still = false;   // nothing moves
+    int level = 0;      // of view_choice::level
+    int samples = 1;    // a side of a pixel
+    bool still = false; // nothing moves
     backend_choice backend = backend_choice::automatic;
     unsigned threads = 0; // of the CPU; 0: one for each core
     bool stats = false, quiet = false, window = false;

@@ -3,11 +3,11 @@
 #pragma once
 
 // The scene as voxels, made again in every frame: bits at twice the resolution, insides filled, for opacity and
-// shadows; then one pass with six targets, whose fragment shader lights each fragment by a ray through these bits; then
-// one value of light a voxel, with what bounced in the last frame.
+// shadows; one pass that lists the triangles of each voxel (rays.hpp); the light of what they show there; and what
+// bounced in the last frame.
 
 #include "cones.hpp"
-#include "world.hpp"
+#include "rays.hpp"
 
 #include <voxelpipe/dense_bits.hpp>
 #include <voxelpipe/voxelpipe.hpp>
@@ -15,121 +15,172 @@
 namespace gi {
 
 using bits_target = vp::target<vp::bit, vp::blend::bit_or>;
-using sum_target = vp::target<glm::vec3, vp::blend::add>;
-using count_target = vp::target<std::uint32_t, vp::blend::count>;
-using density_target = vp::target<float, vp::blend::max>;
 
-template <class Backend>
-using voxel_framebuffer = // reflected light, emission, colour, normal, number of fragments, density
-    vp::framebuffer<Backend, sum_target, sum_target, sum_target, sum_target, count_target, density_target>;
+// Means over a voxel's fragments.
+struct lit_voxel {
+    glm::vec3 light{0.0f};  // that leaves it: what it emits and reflects of the light source
+    glm::vec3 color{0.0f};  // diffuse reflectance
+    glm::vec3 normal{0.0f}; // unit, or 0
+    float density = 0;      // the largest; 0: all fragments are cut off
+    bool has_side = false;  // its fragments face one way
+};
 
+// The density times the share of a voxel's eighths that are filled, so that nothing jumps when a surface moves.
+[[nodiscard]] VOXELPIPE_HD inline float opacity_of(const vp::dense_bits& bits, const glm::ivec3& v, float density) {
+    const float a = density * static_cast<float>(vp::exact::count_ones(bits.children(v))) * 0.125f;
+    return a < 1.0f ? a : 1.0f;
+}
+
+// Number i of the voxels with triangles: their fragments, in the order of the list.
 struct light_fragments {
     gi::world world;
-    vp::dense_bits bits; // at twice the resolution
+    triangle_lists lists;
+    vp::brick_bits_view blockers; // bits at twice the resolution
+    lit_voxel* out;
 
-    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
-        const surface s = world.at(f.triangle, f.clamped_barycentric());
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        lit_voxel sum;
+        float count = 0.0f;
+        for (std::uint64_t k = lists.offsets[i]; k < lists.offsets[i + 1]; ++k) {
+            const glm::vec2 yz = lists.weights[k];
+            const surface s = world.at(lists.primitives[k], {1.0f - yz.x - yz.y, yz.x, yz.y});
+            if (s.cut) continue;
+            const glm::vec3 diffuse = s.color * (1.0f - 0.7f * s.metallic); // what a metal reflects blurs here
+            sum.light = sum.light + diffuse * world.light.color * (light_at(s) * (1.0f / 3.14159265f));
+            if (!s.is_light) sum.light = sum.light + s.emission;
+            sum.color = sum.color + diffuse;
+            sum.normal = sum.normal + s.normal;
+            sum.density = s.density > sum.density ? s.density : sum.density;
+            count = count + 1.0f;
+        }
+        if (count > 0.0f) {
+            const float part = 1.0f / count;
+            const float length = vp::exact::sqrt(glm::dot(sum.normal, sum.normal));
+            sum.light = sum.light * part;
+            sum.color = sum.color * part;
+            sum.has_side = sum.density <= 1.0f && length > 0.3f * count;
+            sum.normal = length > 0.0f ? sum.normal / length : glm::vec3(0.0f);
+        }
+        out[i] = sum;
+    }
+
+private:
+    [[nodiscard]] VOXELPIPE_HD float light_at(const surface& s) const {
         const bool sheet = s.density > 1.0f;
-        // A ray starts outside of the voxels that the surface itself fills.
-        glm::vec3 irradiance(0.0f);
-        constexpr float corners[4][2] = {{-0.5f, -0.5f}, {0.5f, -0.5f}, {-0.5f, 0.5f}, {0.5f, 0.5f}};
-        const int samples = world.light.position.w == 0.0f ? 1 : 4;
+        float sum = 0.0f;
+        const int samples = num_light_points(world.light);
         for (int i = 0; i < samples; ++i) {
-            const float u = samples == 1 ? 0.0f : corners[i][0], v = samples == 1 ? 0.0f : corners[i][1];
-            const light_sample l = sample_light(world.light, s.position, s.normal, sheet, u, v);
-            if (l.irradiance == glm::vec3(0.0f)) continue;
+            const light_sample l = sample_light_point(world.light, s.position, s.normal, sheet, i);
+            if (l.part == 0.0f) continue;
+            // A ray starts outside of the voxels that the surface itself fills.
             const float side = glm::dot(l.direction, s.normal) < 0.0f ? -1.0f : 1.0f;
             const glm::vec3 start = s.position + s.normal * (1.4f * side) + l.direction * 0.4f;
             const float limit = l.distance - 3.0f; // short of the lamp's own voxels
-            if (limit > 0.0f && bits.blocks(start * 2.0f, l.direction, limit * 2.0f)) continue;
-            irradiance = irradiance + l.irradiance * (1.0f / static_cast<float>(samples));
+            if (limit > 0.0f && blockers.blocks(start * 2.0f, l.direction, limit * 2.0f)) continue;
+            sum = sum + l.part * (1.0f / static_cast<float>(samples));
         }
-        const glm::vec3 diffuse = s.color * (1.0f - 0.7f * s.metallic); // what a metal reflects blurs here
-        return vp::outputs(diffuse * irradiance * (1.0f / 3.14159265f), s.is_light ? glm::vec3(0.0f) : s.emission,
-                           diffuse, s.normal, 1u, s.density)
-            .discard_if(s.cut);
+        return sum;
     }
 };
 
-// The targets of one frame, as the steps below read them.
-struct voxel_views {
-    vp::target_view<sum_target> reflected, emitted, color, normal;
-    vp::target_view<count_target> count;
-    vp::target_view<density_target> density;
-    vp::dense_bits bits;
-    glm::ivec3 extent;
-
-    [[nodiscard]] VOXELPIPE_HD glm::ivec3 voxel(std::uint64_t i) const {
-        const auto nx = static_cast<std::uint64_t>(extent.x), ny = static_cast<std::uint64_t>(extent.y);
-        return {static_cast<int>(i % nx), static_cast<int>(i / nx % ny), static_cast<int>(i / (nx * ny))};
-    }
-    // The density times the share of the voxel's eighths that are filled, so that nothing jumps when a surface moves.
-    [[nodiscard]] VOXELPIPE_HD float opacity(const glm::ivec3& v, float density_of_voxel) const {
-        const float a = density_of_voxel * static_cast<float>(vp::exact::count_ones(bits.children(v))) * 0.125f;
-        return a < 1.0f ? a : 1.0f;
-    }
+// What the last frame's voxels send to number i, by the cones of its phase.
+struct gathered {
+    glm::vec3 light{0.0f};
+    std::uint32_t facing = 0; // of its normal
 };
-
-// Light of the voxels that a surface touches: its mean of the fragments, and the bounce of what the last frame's voxels
-// sent there.
-struct light_surfaces {
-    voxel_views voxels;
+struct gather_voxels {
     gi::world world;
+    triangle_lists lists;
     vp::direction_mips_view last;
-    bool bounces; // false: there is no last frame
-    glm::vec4* out;
+    cone_set cones; // of 8 phases
+    const lit_voxel* voxels;
+    gathered* out;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const lit_voxel& voxel = voxels[i];
+        gathered g;
+        if (voxel.normal != glm::vec3(0.0f)) {
+            const glm::ivec3 v = lists.voxel(lists.voxels[i]);
+            const int phase = (v.x & 1) + 2 * (v.y & 1) + 4 * (v.z & 1);
+            const glm::vec3 at = glm::vec3(v) + 0.5f;
+            g.light = gather(last, world, cones, phase, at, voxel.normal, 2.0f).light;
+            if (voxel.density > 1.0f)
+                g.light = (g.light + gather(last, world, cones, phase, at, -voxel.normal, 2.0f).light) * 0.5f;
+            g.facing = vp::pack_facing(voxel.normal);
+        }
+        out[i] = g;
+    }
+};
+
+// Light of number i with what bounced: the mean of what it and its neighbours that face as it does have gathered.
+struct light_surfaces {
+    triangle_lists lists;
+    vp::dense_bits bits;
+    const lit_voxel* voxels;
+    const gathered* bounced; // null: there is no last frame
+    vp::packed_light* out;
     std::uint32_t* facings;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const glm::ivec3 v = voxels.voxel(i);
-        const std::uint32_t n = voxels.count(v.x, v.y, v.z);
-        out[i] = glm::vec4(0.0f);
-        facings[i] = 0;
-        if (n == 0) return;
-        const float part = 1.0f / static_cast<float>(n), density = voxels.density(v.x, v.y, v.z);
-        glm::vec3 light = (voxels.reflected(v.x, v.y, v.z) + voxels.emitted(v.x, v.y, v.z)) * part;
-        const glm::vec3 sum = voxels.normal(v.x, v.y, v.z);
-        const float length = vp::exact::sqrt(glm::dot(sum, sum));
-        if (bounces && length > 0.0f) {
-            const glm::vec3 normal = sum / length, at = glm::vec3(v) + 0.5f;
-            glm::vec3 gathered = gather(last, world, at, normal, 2.0f, 0.0f).light;
-            if (density > 1.0f) gathered = (gathered + gather(last, world, at, -normal, 2.0f, 0.0f).light) * 0.5f;
-            light = light + voxels.color(v.x, v.y, v.z) * part * gathered;
-        }
-        const float a = voxels.opacity(v, density);
-        out[i] = glm::vec4(light * a, a);
+        const lit_voxel& voxel = voxels[i];
+        const glm::ivec3 v = lists.voxel(lists.voxels[i]);
+        glm::vec3 light = voxel.light;
+        if (bounced != nullptr && voxel.normal != glm::vec3(0.0f)) light = light + voxel.color * mean_around(v, voxel);
+        const float a = opacity_of(bits, v, voxel.density);
+        out[lists.voxels[i]] = vp::pack_light(glm::vec4(light * a, a));
         // Light leaves on the side of the normal. Sheets let it through; a voxel that holds all of a small thing has no
         // side.
-        if (density <= 1.0f && length > 0.3f * static_cast<float>(n)) facings[i] = vp::pack_facing(sum / length);
+        facings[lists.voxels[i]] = voxel.has_side ? vp::pack_facing(voxel.normal) : 0;
+    }
+
+private:
+    [[nodiscard]] VOXELPIPE_HD glm::vec3 mean_around(const glm::ivec3& v, const lit_voxel& voxel) const {
+        glm::vec3 sum(0.0f);
+        float weights = 0.0f;
+        for (int k = 0; k < 27; ++k) {
+            const glm::ivec3 step(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+            const std::uint32_t slot = lists.slot(v + step);
+            if (slot == 0) continue;
+            const gathered& g = bounced[slot - 1];
+            if (!(vp::facing_part(g.facing, -voxel.normal) == 1.0f) || g.facing == 0) continue;
+            // 2 in the middle and 1 beside it along each axis, so that all phases have the same part.
+            const float weight = static_cast<float>(8 >> (step.x * step.x + step.y * step.y + step.z * step.z));
+            sum = sum + g.light * weight;
+            weights = weights + weight;
+        }
+        return weights > 0.0f ? sum / weights : sum;
     }
 };
 
-// Filled voxels that no surface touches get the light of their neighbours: through a surface voxel that is filled in
-// part, one sees the one behind it.
+// All other voxels. Filled ones get the light of their neighbours: through a surface voxel that is filled in part, one
+// sees the one behind it.
 struct light_insides {
-    voxel_views voxels;
-    glm::vec4* out; // of light_surfaces; only other voxels are read than written
+    triangle_lists lists;
+    vp::dense_bits bits;
+    const lit_voxel* voxels;
+    vp::packed_light* out; // of light_surfaces; only other voxels are read than written
     std::uint32_t* facings;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const glm::ivec3 v = voxels.voxel(i);
-        if (voxels.count(v.x, v.y, v.z) != 0) return;
-        const float a = voxels.opacity(v, 1.0f);
-        if (a == 0.0f) return;
+        if (lists.slots[i] != 0) return;
+        const glm::ivec3 v = lists.voxel(i);
+        const float a = opacity_of(bits, v, 1.0f);
         glm::vec4 sum(0.0f);
         glm::vec3 normal(0.0f);
-        for (int side = 0; side < 6; ++side) {
-            glm::ivec3 w = v;
-            w[side >> 1] += (side & 1) != 0 ? 1 : -1;
-            if (!voxels.count.has(w.x, w.y, w.z) || voxels.count(w.x, w.y, w.z) == 0) continue;
-            sum = sum + out[vp::direction_mips_view::index(voxels.extent, w)];
-            normal = normal + voxels.normal(w.x, w.y, w.z) * (1.0f / static_cast<float>(voxels.count(w.x, w.y, w.z)));
-        }
+        if (a != 0.0f)
+            for (int side = 0; side < 6; ++side) {
+                glm::ivec3 w = v;
+                w[side >> 1] += (side & 1) != 0 ? 1 : -1;
+                const std::uint32_t slot = lists.slot(w);
+                if (slot == 0) continue;
+                sum = sum + vp::unpack_light(out[vp::direction_mips_view::index(lists.extent, w)]);
+                normal = normal + voxels[slot - 1].normal;
+            }
         // Between two sides of a thin wall it stays dark.
         const float length = vp::exact::sqrt(glm::dot(normal, normal));
         const bool lit = sum.w > 0.0f && length > 0.5f;
-        out[i] = lit ? glm::vec4(glm::vec3(sum) * (a / sum.w), a) : glm::vec4(0.0f, 0.0f, 0.0f, a);
-        if (lit) facings[i] = vp::pack_facing(normal / length);
+        out[i] = vp::pack_light(lit ? glm::vec4(glm::vec3(sum) * (a / sum.w), a) : glm::vec4(0.0f, 0.0f, 0.0f, a));
+        facings[i] = lit ? vp::pack_facing(normal / length) : 0;
     }
 };
 

@@ -30,6 +30,8 @@ struct surface {
     float roughness = 1, metallic = 0, density = 1;
     bool is_light = false;
     bool cut = false; // by its material's alpha
+
+    [[nodiscard]] VOXELPIPE_HD bool is_shiny() const { return roughness < 0.99f || metallic > 0.0f; }
 };
 
 // Memory of the backend, not owned.
@@ -43,7 +45,7 @@ struct world {
     const voxelize::color_tables* tables = nullptr;
     gi::light light;
     glm::vec3 sky_above{0.0f}, sky_level{0.0f};
-    float widest = 4; // voxels that a cone's samples are wide at most
+    float widest = 1e9f; // voxels that a cone's samples are wide at most
 
     // weights: barycentric, of the triangle's three corners.
     [[nodiscard]] VOXELPIPE_HD surface at(std::uint32_t triangle, const glm::vec3& weights) const {
@@ -64,11 +66,26 @@ struct world {
             s.cut = texel.w < m.cutoff;
         }
         s.emission = m.emission;
+        if (m.emission_texture >= 0)
+            s.emission =
+                s.emission * glm::vec3(voxelize::sample(textures[m.emission_texture], *tables, mixed(texcoords)));
         s.roughness = m.roughness;
         s.metallic = m.metallic;
+        if (m.roughness_texture >= 0) {
+            const glm::vec4 texel = voxelize::sample<voxelize::linear_texel_decoder>(textures[m.roughness_texture],
+                                                                                     *tables, mixed(texcoords));
+            s.roughness = s.roughness * texel.y;
+            s.metallic = s.metallic * texel.z;
+        }
         s.density = m.density;
         s.is_light = m.is_light;
         return s;
+    }
+
+    // A vector across the triangle, towards the side from which it runs counter-clockwise.
+    [[nodiscard]] VOXELPIPE_HD glm::vec3 across(std::uint32_t triangle) const {
+        const glm::uvec3 t = triangles[triangle];
+        return glm::cross(positions[t.y] - positions[t.x], positions[t.z] - positions[t.x]);
     }
 
     // Radiance that comes from outside the grid, against `direction`.
@@ -78,12 +95,13 @@ struct world {
     }
 };
 
-// The light of one point of the light source at a surface: where it is, and the irradiance that it alone would give if
-// it stood for the whole light; 0 if the surface faces away. Sheets take light from both sides.
+// The light of one point of the light source at a surface: where it is, and by what the light's colour is to be
+// multiplied for the irradiance that this point would give if it stood for the whole light; 0 if the surface faces
+// away. Sheets take light from both sides.
 struct light_sample {
     glm::vec3 direction{0.0f}; // unit, from the surface
     float distance = 0;        // to the rectangle, or far out of the grid
-    glm::vec3 irradiance{0.0f};
+    float part = 0;
 };
 
 // u, v: the point of the source, each from -1 to 1.
@@ -100,14 +118,30 @@ sample_light(const light& l, const glm::vec3& from, const glm::vec3& normal, boo
     float cosine = glm::dot(s.direction, normal);
     if (both_sides && cosine < 0.0f) cosine = -cosine;
     if (!(cosine > 0.0f)) return s;
-    if (sun) {
-        s.irradiance = l.color * cosine;
-    } else {
+    s.part = cosine;
+    if (!sun) {
         const glm::vec3 across = glm::cross(l.side_u, l.side_v); // a quarter of its area; the front looks down
         const float sent = across.y > 0.0f ? glm::dot(s.direction, across) : -glm::dot(s.direction, across);
-        if (sent > 0.0f) s.irradiance = l.color * (cosine * (4.0f * sent / squared));
+        s.part = sent > 0.0f ? cosine * (4.0f * sent / squared) : 0.0f;
     }
     return s;
+}
+
+// Points that stand for the whole light: the sun's middle, or those of a lamp's quarters.
+[[nodiscard]] VOXELPIPE_HD inline int num_light_points(const light& l) { return l.position.w == 0.0f ? 1 : 4; }
+[[nodiscard]] VOXELPIPE_HD inline light_sample
+sample_light_point(const light& l, const glm::vec3& from, const glm::vec3& normal, bool both_sides, int number) {
+    if (l.position.w == 0.0f) return sample_light(l, from, normal, both_sides, 0.0f, 0.0f);
+    return sample_light(l, from, normal, both_sides, (number & 1) != 0 ? 0.5f : -0.5f,
+                        (number & 2) != 0 ? 0.5f : -0.5f);
+}
+// By what the light's colour is to be multiplied for the irradiance where nothing is in its way.
+[[nodiscard]] VOXELPIPE_HD inline float mean_light(const light& l, const glm::vec3& from, const glm::vec3& normal,
+                                                   bool both_sides) {
+    float sum = 0.0f;
+    const int count = num_light_points(l);
+    for (int i = 0; i < count; ++i) sum = sum + sample_light_point(l, from, normal, both_sides, i).part;
+    return sum / static_cast<float>(count);
 }
 
 } // namespace gi

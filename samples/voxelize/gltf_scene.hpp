@@ -59,6 +59,9 @@ struct gltf_options {
     // others have no texture then.
     bool colors = true;
     bool blend_cuts = false;
+    // Reads textures of roughness and emission too, for programs that light the model. Those with coordinates other
+    // than the base colour's are left out, with a warning.
+    bool shading = false;
 };
 
 // Gives the bytes of a file that a .gltf names. The path is relative, normalised, percent-decoded and never leaves

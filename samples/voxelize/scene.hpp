@@ -59,11 +59,13 @@ struct material {
     std::int32_t texture = no_texture; // index into scene::textures
     alpha_mode alpha = alpha_mode::opaque;
     float alpha_cutoff = 0.5F;
-    // For programs that light the model. Factors only: where a texture says more, roughness and metallic keep these
-    // defaults.
+    // For programs that light the model. Without gltf_options::shading there are factors only: where a texture says
+    // more, these keep their defaults. All textures of a material are reached by the same coordinates.
     glm::vec3 emission{0.0F};
     float roughness = 0.6F;
     float metallic = 0.0F;
+    std::int32_t roughness_texture = no_texture; // G, linear, multiplies the roughness, B the metallic factor
+    std::int32_t emission_texture = no_texture;  // multiplies the emission
     // As the file says; nothing here asks for it. A voxelization has no viewer: both sides of every face count,
     // double-sided or not. Normals are the front's, the side from which the corners run counter-clockwise.
     bool double_sided = false;

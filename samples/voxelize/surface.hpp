@@ -40,6 +40,15 @@ struct texel_decoder {
     }
 };
 
+// Texels that are no colours: all four channels are linear.
+struct linear_texel_decoder {
+    using texel = glm::u8vec4;
+    const color_tables* tables;
+    [[nodiscard]] VOXELPIPE_HD glm::vec4 operator()(const glm::u8vec4& t) const {
+        return {tables->fraction[t.r], tables->fraction[t.g], tables->fraction[t.b], tables->fraction[t.a]};
+    }
+};
+
 [[nodiscard]] VOXELPIPE_HD inline vp::wrap_mode field_wrap(wrap_mode mode) {
     return mode == wrap_mode::repeat            ? vp::wrap_mode::repeat
            : mode == wrap_mode::mirrored_repeat ? vp::wrap_mode::mirror
@@ -47,8 +56,9 @@ struct texel_decoder {
 }
 
 // The texture at UV: (0, 0) is the top left corner of the picture, texel centres lie at halves.
-[[nodiscard]] VOXELPIPE_HD inline glm::vec4 sample(const sampled_texture& t, const color_tables& tables, glm::vec2 uv) {
-    vp::field2d<glm::vec4, texel_decoder> field{t.texels, t.width, t.height};
+template <class Decoder = texel_decoder>
+[[nodiscard]] VOXELPIPE_HD glm::vec4 sample(const sampled_texture& t, const color_tables& tables, glm::vec2 uv) {
+    vp::field2d<glm::vec4, Decoder> field{t.texels, t.width, t.height};
     if (t.filter == filter_mode::nearest) field.filter = vp::filter_mode::nearest;
     field.wrap_x = field_wrap(t.wrap_s);
     field.wrap_y = field_wrap(t.wrap_t);

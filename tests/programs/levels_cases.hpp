@@ -4,6 +4,7 @@
 
 // Levels of dense grids, samples of light and rays through bits, for both backends.
 
+#include <voxelpipe/brick_bits.hpp>
 #include <voxelpipe/dense_bits.hpp>
 #include <voxelpipe/dense_levels.hpp>
 
@@ -78,12 +79,12 @@ template <class Backend>
 // ---- light ----------------------------------------------------------------------------------------------------------
 
 struct set_light {
-    glm::vec4* finest;
+    vp::packed_light* finest;
     std::uint32_t* facings; // or null
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         const float opacity = hash(i) % 3 == 0 ? fraction(i + 7) : 0.0f;
-        finest[i] = {vp::exact::mul(opacity, fraction(3 * i)), vp::exact::mul(opacity, fraction(5 * i)),
-                     vp::exact::mul(opacity, 0.25f), opacity};
+        finest[i] = vp::pack_light({vp::exact::mul(opacity, fraction(3 * i)), vp::exact::mul(opacity, fraction(5 * i)),
+                                    vp::exact::mul(opacity, 0.25f), opacity});
         if (facings == nullptr) return;
         glm::vec3 normal(0.0f);
         normal[static_cast<int>(i % 3)] = i % 2 == 0 ? 0.6f : -0.6f;
@@ -132,11 +133,12 @@ struct ray_result {
     std::uint64_t rank;
     glm::ivec3 voxel;
     std::int32_t face;      // axis, 8 from above, -1 no voxel
-    std::uint32_t blocked;  // in float
+    std::uint32_t blocked;  // in float: 1 by bits, 2 by bricks
     std::uint32_t children; // of a voxel
 };
 struct cast_rays {
     vp::dense_bits bits;
+    vp::brick_bits_view bricks;
     ray_result* out;
     [[nodiscard]] VOXELPIPE_HD static glm::dvec3 origin_of(std::uint64_t i) {
         glm::dvec3 o;
@@ -163,7 +165,7 @@ struct cast_rays {
             hit.rank,
             hit.voxel,
             hit.found ? hit.axis + (hit.from_above ? 8 : 0) : -1,
-            bits.blocks(of, df, 100.0f) ? 1u : 0u,
+            (bits.blocks(of, df, 100.0f) ? 1u : 0u) + (bricks.blocks(of, df, 100.0f) ? 2u : 0u),
             bits.children({static_cast<int>(h % 19), static_cast<int>(h / 19 % 11), static_cast<int>(h / 209 % 15)})};
     }
 };
@@ -174,7 +176,10 @@ template <class Backend>
     const typename Backend::template buffer<std::uint32_t> there(
         backend, vp::array_view<const std::uint32_t>(words.data(), words.size()));
     typename Backend::template buffer<ray_result> out(backend, std::size_t{num_rays});
-    backend.for_each(num_rays, cast_rays{vp::dense_bits(there.data(), extent), out.data()});
+    const vp::dense_bits bits(there.data(), extent);
+    vp::brick_bits<Backend> bricks(backend, extent);
+    bricks.build(backend, vp::bit_rows{bits});
+    backend.for_each(num_rays, cast_rays{bits, bricks.view(), out.data()});
     return out.to_host(backend);
 }
 
@@ -184,6 +189,6 @@ inline std::uint64_t digest(std::span<const std::byte> bytes) {
     return h;
 }
 
-inline constexpr std::uint64_t golden_light = 7070624062285590006u;
+inline constexpr std::uint64_t golden_light = 16839960021420615407u;
 
 } // namespace levels

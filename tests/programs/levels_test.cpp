@@ -101,6 +101,21 @@ TEST(DenseLevels, DoNotDependOnTheNumberOfThreads) {
 
 // ---- light ----------------------------------------------------------------------------------------------------------
 
+TEST(PackedLight, RoundsAsAHalfDoes) {
+    for (std::uint64_t i = 0; i < 20000; ++i) {
+        float v = vp::core::bit_cast<float>(0x38800000u + levels::hash(i) % 0x0effe000u);              // 2^-14 to 65504
+        if (i % 3 == 0) v = vp::core::bit_cast<float>(vp::core::bit_cast<std::uint32_t>(v) & ~0xfffu); // with ties
+        const vp::half expected(v);
+        const vp::packed_light p = vp::pack_light({v, 0.0f, v, 1.0f});
+        ASSERT_EQ(p.xy, expected.bits) << v;
+        ASSERT_EQ(p.zw, expected.bits | 0x3c000000u) << v;
+        EXPECT_EQ(vp::unpack_light(p),
+                  glm::vec4(static_cast<float>(expected), 0.0f, static_cast<float>(expected), 1.0f));
+    }
+    const float least = 0x1p-14f, nan = std::nanf("");
+    EXPECT_EQ(vp::unpack_light(vp::pack_light({least, 0.99f * least, 1e9f, nan})), glm::vec4(least, 0, 65504, 0));
+}
+
 TEST(DirectionMips, HaveTheirGoldenBytes) {
     cpu_backend backend{2};
     EXPECT_EQ(levels::digest(levels::all_light(backend)), levels::golden_light);
@@ -110,14 +125,15 @@ TEST(DirectionMips, KeepALayerOpaqueAndItsSidesApart) {
     cpu_backend backend{2};
     vp::direction_mips<cpu_backend> mips(backend, {32, 32, 32});
     const auto size = glm::ivec3(32);
-    for (std::size_t i = 0; i < 32768; ++i) mips.finest()[i] = glm::vec4(0.0f);
+    for (std::size_t i = 0; i < 32768; ++i) mips.finest()[i] = {};
     // A wall of three layers across x, red towards -x and blue towards +x.
     for (int z = 0; z < 32; ++z)
         for (int y = 0; y < 32; ++y)
             for (int x = 14; x <= 16; ++x)
-                mips.finest()[vp::direction_mips_view::index(size, {x, y, z})] = x == 14   ? glm::vec4(1, 0, 0, 1)
-                                                                                 : x == 15 ? glm::vec4(0, 0, 0, 1)
-                                                                                           : glm::vec4(0, 0, 1, 1);
+                mips.finest()[vp::direction_mips_view::index(size, {x, y, z})] =
+                    vp::pack_light(x == 14   ? glm::vec4(1, 0, 0, 1)
+                                   : x == 15 ? glm::vec4(0, 0, 0, 1)
+                                             : glm::vec4(0, 0, 1, 1));
     mips.build(backend);
     const vp::direction_mips_view& v = mips.view();
     ASSERT_EQ(v.last_level, 5);
@@ -141,14 +157,14 @@ TEST(DirectionMips, ShowLightOnTheSideThatAVoxelFaces) {
     const glm::ivec3 size(8);
     vp::direction_mips<cpu_backend> mips(backend, size, true);
     for (std::size_t i = 0; i < 512; ++i) {
-        mips.finest()[i] = glm::vec4(0.0f);
+        mips.finest()[i] = {};
         mips.facings()[i] = 0;
     }
     // A layer that is lit on its upper side.
     for (int z = 0; z < 8; ++z)
         for (int x = 0; x < 8; ++x) {
             const std::size_t i = vp::direction_mips_view::index(size, {x, 3, z});
-            mips.finest()[i] = glm::vec4(1.0f);
+            mips.finest()[i] = vp::pack_light(glm::vec4(1.0f));
             mips.facings()[i] = vp::pack_facing({0, 1, 0});
         }
     mips.build(backend);
@@ -231,7 +247,8 @@ TEST(DenseBits, RaysMeetTheNearestBox) {
         }
         const levels::ray_result& r = results[i];
         ASSERT_EQ(r.face >= 0, where.x >= 0) << i;
-        disagreeing += r.blocked != (where.x >= 0 ? 1u : 0u) ? 1 : 0;
+        EXPECT_TRUE(r.blocked == 0 || r.blocked == 3) << i; // bits and bricks agree
+        disagreeing += (r.blocked != 0) != (where.x >= 0) ? 1 : 0;
         if (where.x < 0) continue;
         ++found;
         ASSERT_EQ(r.voxel, where) << i;
@@ -246,6 +263,49 @@ TEST(DenseBits, RaysMeetTheNearestBox) {
     }
     EXPECT_GT(found, 250);
     EXPECT_LT(disagreeing, 3); // float meets another voxel only where a ray grazes one
+}
+
+// A ray passes empty bricks at once, and meets the cells that single steps lead to, at the same distances.
+TEST(BrickBits, RaysMeetTheCellsThatStepsLeadTo) {
+    cpu_backend backend{2};
+    const glm::ivec3 size(61, 34, 50);
+    std::vector<std::uint32_t> words(vp::core::storage_map<vp::bit, vp::layout::linear>::elements(size));
+    const vp::dense_bits bits(words.data(), size);
+    for (int i = 0; i < 300; ++i) {
+        const std::uint32_t h = levels::hash(static_cast<std::uint64_t>(i));
+        const glm::ivec3 v(h % 61, h / 61 % 34, h / 2074 % 50);
+        words[vp::core::storage_map<vp::bit, vp::layout::linear>::cell(size, v.x, v.y, v.z)] |= 1u << (v.x & 31);
+    }
+    vp::brick_bits<cpu_backend> bricks(backend, size);
+    bricks.build(backend, vp::bit_rows{bits});
+    std::size_t met = 0;
+    for (std::uint64_t i = 0; i < 12000; ++i) {
+        glm::vec3 o(levels::cast_rays::origin_of(i)), d(levels::cast_rays::direction_of(i));
+        if (i % 5 == 0) { // along diagonals, through corners of cells
+            o = glm::floor(o);
+            for (int a = 0; a < 3; ++a) d[a] = d[a] < 0 ? -1.0f : 1.0f;
+        }
+        std::vector<vp::walked_cell<float>> expected, found;
+        vp::walk_cells(size, o, d, 90.0f, [&](const vp::walked_cell<float>& at) {
+            if (bits(at.cell)) expected.push_back(at);
+            return false;
+        });
+        EXPECT_FALSE(bricks.view().walk(o, d, 90.0f, [&](const vp::walked_cell<float>& at) {
+            found.push_back(at);
+            return false;
+        }));
+        ASSERT_EQ(found.size(), expected.size()) << i;
+        for (std::size_t k = 0; k < found.size(); ++k) {
+            ASSERT_EQ(found[k].cell, expected[k].cell) << i;
+            EXPECT_EQ(found[k].enter, expected[k].enter);
+            EXPECT_EQ(found[k].leave, expected[k].leave);
+            EXPECT_EQ(found[k].axis, expected[k].axis);
+            EXPECT_EQ(found[k].from_above, expected[k].from_above);
+        }
+        EXPECT_EQ(bricks.view().blocks(o, d, 90.0f), !expected.empty());
+        met += found.size();
+    }
+    EXPECT_GT(met, 300u);
 }
 
 TEST(DenseBits, HaveTheEightBitsOfALargerVoxel) {

@@ -4,7 +4,9 @@
 
 #include "text.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
 namespace voxelize::gltf {
@@ -51,9 +53,9 @@ void material_reader::read_factors() {
         if (source.alphaMode == "BLEND") result.alpha = alpha_mode::blend;
         result.alpha_cutoff = static_cast<float>(source.alphaCutoff);
         result.double_sided = source.doubleSided;
-        if (source.emissiveTexture.index < 0 && source.emissiveFactor.size() == 3)
+        if ((source.emissiveTexture.index < 0 || options_.shading) && source.emissiveFactor.size() == 3)
             for (int i = 0; i < 3; ++i) result.emission[i] = static_cast<float>(source.emissiveFactor[std::size_t(i)]);
-        if (source.pbrMetallicRoughness.metallicRoughnessTexture.index < 0) {
+        if (source.pbrMetallicRoughness.metallicRoughnessTexture.index < 0 || options_.shading) {
             result.roughness = static_cast<float>(source.pbrMetallicRoughness.roughnessFactor);
             result.metallic = static_cast<float>(source.pbrMetallicRoughness.metallicFactor);
         }
@@ -61,30 +63,70 @@ void material_reader::read_factors() {
     }
 }
 
-std::optional<texture_coordinates> material_reader::want_texture(std::size_t material_index) {
-    const tinygltf::TextureInfo& info = model_.materials[material_index].pbrMetallicRoughness.baseColorTexture;
-    if (info.index < 0) return std::nullopt;
+std::vector<material_reader::wanted_texture> material_reader::textures_of(std::size_t material_index) const {
+    const tinygltf::Material& source = model_.materials[material_index];
     const alpha_mode alpha = scene_.materials[material_index].alpha;
     const bool cuts = alpha == alpha_mode::mask || (alpha == alpha_mode::blend && options_.blend_cuts);
-    if (!options_.colors && !cuts) return std::nullopt;
-    const std::vector<std::uint32_t>& pictures = bytes_.texture_images(static_cast<std::size_t>(info.index));
-    if (!wanted_[material_index]) {
-        wanted_[material_index] = true;
-        queue_.push_back(material_index);
+    std::vector<wanted_texture> found;
+    const auto add = [&](const tinygltf::TextureInfo& info, std::int32_t material::*field, const char* name) {
+        if (info.index >= 0) found.push_back({&info, field, name});
+    };
+    if (options_.colors || cuts)
+        add(source.pbrMetallicRoughness.baseColorTexture, &material::texture, "baseColorTexture");
+    if (options_.shading) {
+        add(source.pbrMetallicRoughness.metallicRoughnessTexture, &material::roughness_texture,
+            "metallicRoughnessTexture");
+        if (scene_.materials[material_index].emission != glm::vec3(0.0F))
+            add(source.emissiveTexture, &material::emission_texture, "emissiveTexture");
+    }
+    return found;
+}
+
+std::optional<texture_coordinates> material_reader::want_texture(std::size_t material_index) {
+    const std::vector<wanted_texture> textures = textures_of(material_index);
+    if (textures.empty()) return std::nullopt;
+    bool has_picture = false;
+    if (!wanted_[material_index]) queue_.push_back(material_index);
+    for (const wanted_texture& wanted : textures) {
+        const std::vector<std::uint32_t>& pictures =
+            bytes_.texture_images(static_cast<std::size_t>(wanted.info->index));
+        has_picture = has_picture || !pictures.empty();
+        if (wanted_[material_index]) continue;
         for (const std::uint32_t picture : pictures)
             users_[picture].push_back(static_cast<std::uint32_t>(material_index));
     }
-    if (pictures.empty()) return std::nullopt;
-    return coordinates_of(info);
+    wanted_[material_index] = true;
+    if (!has_picture) return std::nullopt;
+    return coordinates_of(*textures.front().info);
 }
 
 void material_reader::read_textures(const load_hooks& hooks) {
     for (const std::size_t index : queue_) {
-        const tinygltf::TextureInfo& info = model_.materials[index].pbrMetallicRoughness.baseColorTexture;
-        scene_.materials[index].texture = scene_texture(static_cast<std::size_t>(info.index), hooks);
+        const std::vector<wanted_texture> textures = textures_of(index);
+        for (const wanted_texture& wanted : textures) {
+            if (coordinates_of(*wanted.info) == coordinates_of(*textures.front().info))
+                scene_.materials[index].*wanted.field =
+                    scene_texture(static_cast<std::size_t>(wanted.info->index), hooks);
+            else
+                leave_out(index, wanted);
+        }
     }
-    for (primitive& part : scene_.primitives)
-        if (scene_.materials[part.material].texture == material::no_texture) part.texcoords = {};
+    for (primitive& part : scene_.primitives) {
+        const material& m = scene_.materials[part.material];
+        if (std::max({m.texture, m.roughness_texture, m.emission_texture}) == material::no_texture) part.texcoords = {};
+    }
+}
+
+void material_reader::leave_out(std::size_t material_index, const wanted_texture& wanted) {
+    scene_.warnings.push_back("materials[" + std::to_string(material_index) + "]." + wanted.name +
+                              " is left out: its coordinates are not those of the material's other textures");
+    material& m = scene_.materials[material_index];
+    const material defaults;
+    if (wanted.field == &material::emission_texture) m.emission = defaults.emission;
+    if (wanted.field == &material::roughness_texture) {
+        m.roughness = defaults.roughness;
+        m.metallic = defaults.metallic;
+    }
 }
 
 std::int32_t material_reader::scene_texture(std::size_t index, const load_hooks& hooks) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// glTF materials -> the base colour part of them, with the textures that it needs. A texture that cannot be had is a
-// warning, not an error: no geometry is lost, the colour factor stands alone.
+// glTF materials -> the base colour part of them, and where it is asked for what lights need, with their textures. A
+// texture that cannot be had is a warning, not an error: no geometry is lost, the colour factor stands alone.
 
 #include "accessor.hpp"
 
@@ -18,11 +18,12 @@
 
 namespace voxelize::gltf {
 
-// How the base-colour texture of a material is reached from a primitive's attributes.
+// How the textures of a material are reached from a primitive's attributes.
 struct texture_coordinates {
     int set = 0; // TEXCOORD_<set>
     // u' = m[0] u + m[1] v + m[2],  v' = m[3] u + m[4] v + m[5]
     std::array<double, 6> m{1, 0, 0, 0, 1, 0};
+    friend bool operator==(const texture_coordinates&, const texture_coordinates&) = default;
 };
 
 class material_reader {
@@ -36,15 +37,23 @@ public:
     // Fills scene.materials with the file's, all without their textures.
     void read_factors();
 
-    // Called for each primitive that is read: the coordinates of its material's texture, or nothing if it has none.
+    // Called for each primitive that is read: the coordinates of its material's textures, or nothing if it has none.
     // Decodes nothing yet.
     [[nodiscard]] std::optional<texture_coordinates> want_texture(std::size_t material);
 
     // Called when all primitives are read: decodes the textures that they want, in the order in which they were asked
-    // for, and sets material.texture. Primitives whose texture cannot be had lose their coordinates.
+    // for, and sets the material's numbers of them. Primitives whose texture cannot be had lose their coordinates.
     void read_textures(const load_hooks& hooks);
 
 private:
+    struct wanted_texture {
+        const tinygltf::TextureInfo* info;
+        std::int32_t material::*field;
+        const char* name; // in the file
+    };
+    // Those of a material that the options ask for, the base colour's first.
+    [[nodiscard]] std::vector<wanted_texture> textures_of(std::size_t material) const;
+    void leave_out(std::size_t material, const wanted_texture& wanted);
     [[nodiscard]] std::int32_t scene_texture(std::size_t texture, const load_hooks& hooks);
     // INSTEAD says in the warning what is done without the picture.
     [[nodiscard]] std::int32_t scene_image(std::size_t image, const char* instead, const load_hooks& hooks);
