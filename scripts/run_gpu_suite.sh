@@ -147,6 +147,8 @@ for part in "${parts[@]}"; do
     tool)
         samples=ON target=voxelize_gpu_files_test build_suite gpu-tool
         run_program tool voxelize_gpu_files_test build/gpu-tool/tests/tool/voxelize_gpu_files_test
+        samples=ON target=gi_gpu_test build_suite gpu-tool
+        run_program tool gi_gpu_test build/gpu-tool/tests/gi/gi_gpu_test
         ;;
     sanitizer)
         [[ $step == build ]] || command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Bits in bricks of 4 x 4 x 4, one word each, for rays: a ray passes an empty brick in one step and meets the cells that
-// walk_cells leads it to. Made from a target of bits, or from any other answer to whether a cell is set.
+// Bits in bricks of 4 x 4 x 4, one word each, and blocks of 4 x 4 x 4 bricks, for rays: a ray passes an empty brick or
+// block in one step and meets the cells that walk_cells leads it to. Made from a target of bits, or from any other
+// answer to whether a cell is set.
 
 #include <voxelpipe/core/cell_walk.hpp>
 #include <voxelpipe/dense_bits.hpp>
@@ -15,19 +16,25 @@
 
 namespace voxelpipe {
 
-// Refers to the bricks, x fastest, then y, then z. Cell (x, y, z) of a brick is bit x + 4 y + 16 z.
+// Refers to the bricks and blocks, x fastest, then y, then z. Cell (x, y, z) of a brick is bit x + 4 y + 16 z, and so
+// is a brick of a block, set if any of its cells is.
 struct brick_bits_view {
     const std::uint64_t* bricks = nullptr; // not owned
-    glm::ivec3 extent{0};                  // in cells
+    const std::uint64_t* blocks_of_bricks = nullptr;
+    glm::ivec3 extent{0}; // in cells
 
+    // The number of bricks for cells, and of blocks for bricks.
     [[nodiscard]] VOXELPIPE_HD static glm::ivec3 num_bricks(const glm::ivec3& extent) {
         return {(extent.x + 3) >> 2, (extent.y + 3) >> 2, (extent.z + 3) >> 2};
     }
-    // The brick of a cell, which is within the extent.
-    [[nodiscard]] VOXELPIPE_HD std::uint64_t brick_of(const glm::ivec3& v) const {
+    // The word of a cell, in words for so many cells.
+    [[nodiscard]] VOXELPIPE_HD static std::size_t word_of(const glm::ivec3& v, const glm::ivec3& extent) {
         const glm::ivec3 n = num_bricks(extent);
         const auto wide = [](int i) { return static_cast<std::size_t>(i); };
-        return bricks[(wide(v.z >> 2) * wide(n.y) + wide(v.y >> 2)) * wide(n.x) + wide(v.x >> 2)];
+        return (wide(v.z >> 2) * wide(n.y) + wide(v.y >> 2)) * wide(n.x) + wide(v.x >> 2);
+    }
+    [[nodiscard]] VOXELPIPE_HD static int bit_of(const glm::ivec3& v) {
+        return (v.x & 3) + 4 * (v.y & 3) + 16 * (v.z & 3);
     }
     // Calls visit(walked_cell<float>) for every set cell that the ray meets, as walk_cells would, until one call
     // returns true. Returns true if a call did.
@@ -37,14 +44,15 @@ struct brick_bits_view {
         cell_walk<float> walk(extent, origin, direction, limit);
         if (!walk.good()) return false;
         while (true) {
-            const glm::ivec3 v = walk.at.cell;
-            const std::uint64_t brick = brick_of(v);
-            if (brick == 0) {
-                const glm::ivec3 low(v.x & ~3, v.y & ~3, v.z & ~3);
-                if (!walk.leave_box(low, low + 4)) return false;
+            const glm::ivec3 v = walk.at.cell, in_bricks(v.x >> 2, v.y >> 2, v.z >> 2);
+            const std::uint64_t block = blocks_of_bricks[word_of(in_bricks, num_bricks(extent))];
+            if ((block >> bit_of(in_bricks) & 1u) == 0) {
+                const int side = block == 0 ? 16 : 4;
+                const glm::ivec3 low(v.x & -side, v.y & -side, v.z & -side);
+                if (!walk.leave_box(low, low + side)) return false;
                 continue;
             }
-            if ((brick >> ((v.x & 3) + 4 * (v.y & 3) + 16 * (v.z & 3)) & 1u) != 0) {
+            if ((bricks[word_of(v, extent)] >> bit_of(v) & 1u) != 0) {
                 walk.look();
                 if (visit(static_cast<const walked_cell<float>&>(walk.at))) return true;
             }
@@ -87,6 +95,21 @@ struct make_brick {
 
 } // namespace core
 
+// Four bricks of a block, as rows of cells are of bricks.
+namespace core {
+struct brick_rows {
+    const std::uint64_t* bricks;
+    glm::ivec3 extent; // in bricks
+    VOXELPIPE_HD std::uint32_t operator()(const glm::ivec3& v) const {
+        const auto wide = [](int i) { return static_cast<std::size_t>(i); };
+        const std::uint64_t* const row = bricks + (wide(v.z) * wide(extent.y) + wide(v.y)) * wide(extent.x) + wide(v.x);
+        std::uint32_t bits = 0;
+        for (int k = 0; k < 4 && v.x + k < extent.x; ++k) bits |= (row[k] != 0 ? 1u : 0u) << k;
+        return bits;
+    }
+};
+} // namespace core
+
 // Rows of a target of bits, for brick_bits::build.
 struct bit_rows {
     dense_bits bits;
@@ -99,16 +122,20 @@ template <class Backend>
 class brick_bits {
 public:
     brick_bits(Backend& backend, const glm::ivec3& extent)
-        : extent_(extent), bricks_(backend, count_of(extent)) {}
+        : extent_(extent), bricks_(backend, count_of(extent)),
+          blocks_(backend, count_of(brick_bits_view::num_bricks(extent))) {}
 
     // Makes all bricks. rows(v), a functor for the backend, gives the cells v to v + (3, 0, 0) as bits 0 to 3: 0 for
     // those outside; v.x is a multiple of 4. In the order of the backend's stream.
     template <class Rows>
     void build(Backend& backend, const Rows& rows) {
         backend.for_each(bricks_.size(), core::make_brick<Rows>{rows, extent_, bricks_.data()});
+        const glm::ivec3 bricks = brick_bits_view::num_bricks(extent_);
+        backend.for_each(blocks_.size(),
+                         core::make_brick<core::brick_rows>{{bricks_.data(), bricks}, bricks, blocks_.data()});
     }
     // Valid as long as this object.
-    [[nodiscard]] brick_bits_view view() const { return {bricks_.data(), extent_}; }
+    [[nodiscard]] brick_bits_view view() const { return {bricks_.data(), blocks_.data(), extent_}; }
 
 private:
     [[nodiscard]] static std::size_t count_of(const glm::ivec3& extent) {
@@ -116,7 +143,7 @@ private:
         return static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) * static_cast<std::size_t>(n.z);
     }
     glm::ivec3 extent_;
-    typename Backend::template buffer<std::uint64_t> bricks_;
+    typename Backend::template buffer<std::uint64_t> bricks_, blocks_;
 };
 
 } // namespace voxelpipe

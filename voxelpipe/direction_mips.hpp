@@ -24,10 +24,7 @@ namespace voxelpipe {
 
 // Extent of a level: half of the one before, rounded up.
 [[nodiscard]] VOXELPIPE_HD inline glm::ivec3 mip_extent(const glm::ivec3& extent, int level) {
-    const auto half = [&](int n) {
-        return static_cast<int>((std::int64_t{n} + (std::int64_t{1} << level) - 1) >> level);
-    };
-    return {half(extent.x), half(extent.y), half(extent.z)};
+    return {((extent.x - 1) >> level) + 1, ((extent.y - 1) >> level) + 1, ((extent.z - 1) >> level) + 1};
 }
 // The last level, of one voxel.
 [[nodiscard]] VOXELPIPE_HD inline int last_mip_level(const glm::ivec3& extent) {
@@ -163,20 +160,29 @@ struct direction_mips_view {
             low[a] = static_cast<int>(exact::add(p, 1.0f)) - 1; // floor
             high_part[a] = exact::sub(p, static_cast<float>(low[a]));
         }
-        std::size_t slot[8];
-        unsigned inside = 0;
-        for (int c = 0; c < 8; ++c) {
-            const glm::ivec3 v(low[0] + (c & 1), low[1] + (c >> 1 & 1), low[2] + (c >> 2));
-            const bool is_inside = v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < e.x && v.y < e.y && v.z < e.z;
-            slot[c] = is_inside ? index(e, v) : 0;
-            inside |= (is_inside ? 1u : 0u) << c;
+        // The eight voxels as steps from the lowest. Those outside are read at the edge, with a weight of 0.
+        int begin[3], step[3];
+        bool inside[3][2];
+        for (int a = 0; a < 3; ++a) {
+            inside[a][0] = low[a] >= 0;
+            inside[a][1] = low[a] + 1 < e[a];
+            begin[a] = inside[a][0] ? low[a] : 0;
+            step[a] = inside[a][0] && inside[a][1] ? 1 : 0;
         }
-        const packed_light* const from = level == 0 ? finest : values(level, along.x < 0.0f ? 1 : 0);
-        packed_light first[8];
+        const std::size_t lowest = index(e, {begin[0], begin[1], begin[2]});
+        const int step_y = step[1] * e.x, step_z = step[2] * (e.x * e.y);
+        const auto slot = [&](int c) {
+            return lowest + static_cast<std::size_t>(((c & 1) != 0 ? step[0] : 0) + ((c & 2) != 0 ? step_y : 0) +
+                                                     ((c & 4) != 0 ? step_z : 0));
+        };
+        const std::size_t n = num_voxels(level);
+        const packed_light* const from = level == 0 ? finest : coarse + first[level];
+        const packed_light* side = level == 0 || along.x >= 0.0f ? from : from + n;
+        packed_light light[8];
         std::uint32_t opacity = 0;
         for (int c = 0; c < 8; ++c) {
-            first[c] = (inside >> c & 1u) != 0 ? from[slot[c]] : packed_light{};
-            opacity |= first[c].zw >> 16;
+            light[c] = side[slot(c)];
+            opacity |= light[c].zw >> 16;
         }
         if (opacity == 0) return glm::vec4(0.0f);
 
@@ -189,32 +195,36 @@ struct direction_mips_view {
             };
             part[c] = exact::sub(exact::fma(exact::mul(along_axis(0), along_axis(1)), along_axis(2), 1024.0f), 1024.0f);
             left = exact::sub(left, part[c]);
-            if (part[c] > part[largest]) largest = c;
+        }
+        float most = part[0];
+        for (int c = 1; c < 8; ++c) {
+            largest = part[c] > most ? c : largest;
+            most = part[c] > most ? part[c] : most;
+        }
+        for (int c = 0; c < 8; ++c) {
+            part[c] = c == largest ? exact::add(part[c], left) : part[c];
+            if (!(inside[0][c & 1] && inside[1][c >> 1 & 1] && inside[2][c >> 2])) part[c] = 0.0f;
         }
         // A weight of 13 bits times a value of 11 is exact: contracted or not, a sum of them rounds once a term.
-        for (int c = 0; c < 8; ++c) part[c] = c == largest ? exact::add(part[c], left) : part[c];
-        glm::vec4 mean(0.0f);
+        glm::vec4 sum(0.0f);
         if (level == 0) {
             for (int c = 0; c < 8; ++c) {
-                const glm::vec4 value = (inside >> c & 1u) != 0 ? shown(first[c], slot[c], along) : glm::vec4(0.0f);
-                for (int k = 0; k < 4; ++k) mean[k] = exact::add(mean[k], exact::mul(part[c], value[k]));
-            }
-            return mean;
-        }
-        for (int c = 0; c < 8; ++c) part[c] = exact::mul(part[c], 0x1p112f); // of unpack_scaled
-        const auto mean_of = [&](const auto& light) {
-            glm::vec4 sum(0.0f);
-            for (int c = 0; c < 8; ++c) {
-                const glm::vec4 value = core::unpack_scaled(light(c));
+                const glm::vec4 value = shown(light[c], slot(c), along);
                 for (int k = 0; k < 4; ++k) sum[k] = add_product(part[c], value[k], sum[k]);
             }
             return sum;
-        };
-        glm::vec4 sum = mean_of([&](int c) { return first[c]; });
-        for (int k = 0; k < 4; ++k) sum[k] = exact::mul(exact::mul(along.x, along.x), sum[k]);
-        for (int a = 1; a < 3; ++a) {
-            const packed_light* const side = values(level, 2 * a + (along[a] < 0.0f ? 1 : 0));
-            mean = mean_of([&](int c) { return (inside >> c & 1u) != 0 ? side[slot[c]] : packed_light{}; });
+        }
+        for (int c = 0; c < 8; ++c) part[c] = exact::mul(part[c], 0x1p112f); // of unpack_scaled
+        for (int a = 0; a < 3; ++a) {
+            if (a != 0) {
+                side = from + static_cast<std::size_t>(2 * a + (along[a] < 0.0f ? 1 : 0)) * n;
+                for (int c = 0; c < 8; ++c) light[c] = side[slot(c)];
+            }
+            glm::vec4 mean(0.0f);
+            for (int c = 0; c < 8; ++c) {
+                const glm::vec4 value = core::unpack_scaled(light[c]);
+                for (int k = 0; k < 4; ++k) mean[k] = add_product(part[c], value[k], mean[k]);
+            }
             const float weight = exact::mul(along[a], along[a]);
             for (int k = 0; k < 4; ++k) sum[k] = exact::fma(weight, mean[k], sum[k]);
         }

@@ -198,7 +198,7 @@ scene make_atrium() {
     s.sky_above = {0.42f, 0.80f, 1.65f};
     s.sky_level = {0.95f, 1.15f, 1.4f};
     s.exposure = 0.52f;
-    s.wall = wall;
+    s.wall = 1.25 * wall; // what passes through the outer walls is not seen here
     s.motion = [](double t) {
         const double a = 2 * pi * t + 3.7;
         return glm::dvec3(4.7 * std::sin(a), 1.75 + 0.35 * std::sin(3 * a), 4.3 * std::cos(a));

@@ -54,7 +54,7 @@ struct cone {
     glm::vec3 from, direction; // of a surface; unit
     float rise;                // cosine between direction and the surface's normal
     float spread, start;
-    float narrowest; // voxels that samples are wide at least
+    float narrowest, widest; // voxels that samples are wide at least and at most
 };
 [[nodiscard]] VOXELPIPE_HD inline cone_light trace_cone(const vp::direction_mips_view& mips, const world& w,
                                                         const cone& c) {
@@ -67,8 +67,8 @@ struct cone {
     while (t < reach && opacity < 0.99f) {
         // Narrower than the cone, than reaches down to the surface that it starts from, and than would reach through
         // the thinnest wall.
-        const float high = 0.8f * (c.narrowest + c.rise * t), most = high < w.widest ? high : w.widest;
-        const float wide = 1.4f * c.spread * t < most ? 1.4f * c.spread * t : most;
+        const float high = w.shape.lift * (c.narrowest + c.rise * t), most = high < c.widest ? high : c.widest;
+        const float wide = w.shape.overlap * c.spread * t < most ? w.shape.overlap * c.spread * t : most;
         const float width = wide > c.narrowest ? wide : c.narrowest;
         const glm::vec3 at = c.from + c.direction * t;
         bool outside = false; // and on its way out
@@ -78,11 +78,8 @@ struct cone {
         if (outside) break;
         const glm::vec4 v = mips.sample(level_of(width), at, c.direction);
         if (v.w > 0.0f) {
-            // Opacities along a cone are added, not multiplied. A sample is the part of the cone that is closed there;
-            // linear filtering spreads a wall over several samples, which multiplied let a fifth of the light through a
-            // closed room's walls. Steps of three quarters of a sample's width would add up to a wall with a weight of
-            // 3/4; somewhat more closes cones that are widening too.
-            const float closed = 0.95f * v.w, open = 1.0f - opacity;
+            // Opacities along a cone are added: multiplied they let a fifth of the light through a closed room's walls.
+            const float closed = w.shape.weight * v.w, open = 1.0f - opacity;
             const float weight = closed < open ? closed : open;
             result.light = result.light + glm::vec3(v) * (weight / v.w);
             result.occlusion = result.occlusion + weight * (near / (near + t));
@@ -106,8 +103,9 @@ struct cone {
     const glm::vec3 from = at + normal * (1.3f * narrowest);
     for (int i = phase; i < set.count; i += set.phases) {
         const glm::vec3 d = set.directions[i];
-        const cone_light l =
-            trace_cone(mips, w, {from, p * d.x + q * d.y + normal * d.z, d.z, set.spread, 0.6f * narrowest, narrowest});
+        const cone_light l = trace_cone(
+            mips, w,
+            {from, p * d.x + q * d.y + normal * d.z, d.z, set.spread, 0.6f * narrowest, narrowest, w.shape.widest});
         sum.light = sum.light + l.light;
         sum.occlusion = sum.occlusion + l.occlusion;
     }

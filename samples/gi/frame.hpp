@@ -34,6 +34,15 @@ struct place_vertices {
     }
 };
 
+// Runs a functor that traces rays or cones. A backend may have its own way for these (cuda.cu).
+template <class Backend>
+struct tracer {
+    template <class F>
+    static void run(Backend& backend, std::uint64_t count, const F& f) {
+        backend.for_each(count, f);
+    }
+};
+
 template <class Backend>
 class frame_renderer : public renderer {
     template <class T>
@@ -49,8 +58,9 @@ public:
           textures_(backend_, std::size_t{0}), tables_(upload(std::vector{voxelize::make_color_tables()})),
           bits_(backend_, fine_.extent), blockers_(backend_, fine_.extent), mips_(backend_, coarse_.extent, true),
           last_(backend_, coarse_.extent, true), lists_(backend_), slots_(backend_, mips_.view().num_voxels(0)),
-          filled_(backend_, coarse_.extent), lit_(backend_, std::size_t{0}), gathered_(backend_, std::size_t{0}),
-          points_(backend_, num_rays(how)), received_(backend_, num_rays(how)),
+          filled_(backend_, coarse_.extent), irradiances_(backend_, std::size_t{0}), lit_(backend_, std::size_t{0}),
+          gathered_(backend_, std::size_t{0}), seen_(backend_, num_rays(how)), near_(backend_, num_rays(how)),
+          received_(backend_, num_rays(how)), mirrored_(backend_, num_rays(how)),
           pixels_(backend_, static_cast<std::size_t>(how.width) * static_cast<std::size_t>(how.height)) {
         upload_textures();
         checked_ = vp::check_indices(backend_, triangles_.view());
@@ -160,8 +170,12 @@ private:
             lit_ = buffer<lit_voxel>(backend_, n + n / 8);
             gathered_ = buffer<gathered>(backend_, n + n / 8);
         }
+        if (irradiances_.size() < lists_.num_fragments())
+            irradiances_ = buffer<float>(backend_, lists_.num_fragments() + lists_.num_fragments() / 8);
         blockers_.build(backend_, vp::bit_rows{bits()});
-        backend_.for_each(n, light_fragments{w, lists_view(), blockers_.view(), lit_.data()});
+        tracer<Backend>::run(backend_, lists_.num_fragments(),
+                             light_fragments{w, lists_view(), blockers_.view(), irradiances_.data()});
+        backend_.for_each(n, fold_fragments{w, lists_view(), irradiances_.data(), lit_.data()});
     }
     // Light of this frame's voxels, with what the last frame's send there.
     void bounce(const world& w) {
@@ -169,7 +183,8 @@ private:
         const triangle_lists lists = lists_view();
         const std::size_t n = lists_.num_voxels();
         if (has_last_)
-            backend_.for_each(n, gather_voxels{w, lists, last_.view(), voxel_cones_, lit_.data(), gathered_.data()});
+            tracer<Backend>::run(backend_, n,
+                                 gather_voxels{w, lists, last_.view(), voxel_cones_, lit_.data(), gathered_.data()});
         backend_.for_each(n, light_surfaces{lists, bits(), lit_.data(), has_last_ ? gathered_.data() : nullptr,
                                             mips_.finest(), mips_.facings()});
         backend_.for_each(mips_.view().num_voxels(0),
@@ -185,13 +200,20 @@ private:
             return;
         }
         const triangle_lists lists = lists_view();
-        backend_.for_each(points_.size(), see_points{w, lists, rays, points_.data()});
+        const ray_order order(rays);
+        const ray_data data{seen_.data(), near_.data(), received_.data(), mirrored_.data()};
+        const auto trace = [&](const auto& pass) { tracer<Backend>::run(backend_, order.count(), pass); };
+        const view_choice view = how_.view;
+        trace(see_points{w, lists, rays, order, data});
+        if (view == view_choice::final || view == view_choice::direct) trace(see_light{w, lists, order, data});
         watch_.end("rays");
-        backend_.for_each(receive_light::count(rays), receive_light{w, mips_.view(), lists, rays, how_.view,
-                                                                    pixel_cones_, points_.data(), received_.data()});
+        if (view != view_choice::direct)
+            trace(receive_light{w, mips_.view(), order, view == view_choice::ao, pixel_cones_, data});
+        if (view == view_choice::final || view == view_choice::indirect)
+            trace(receive_mirrored{w, mips_.view(), rays, order, data});
         watch_.end("cones");
-        backend_.for_each(pixels_.size(), draw_pixels{w, rays, how_.view, how_.samples, scene_.exposure, points_.data(),
-                                                      received_.data(), pixels_.data()});
+        backend_.for_each(pixels_.size(),
+                          draw_pixels{w, rays, view, how_.samples, scene_.exposure, order, data, pixels_.data()});
     }
     [[nodiscard]] vp::dense_bits bits() const { return vp::dense_bits(vp::get<0>(bits_).view()); }
     [[nodiscard]] triangle_lists lists_view() const {
@@ -220,7 +242,7 @@ private:
             w.light.side_u *= scale;
             w.light.side_v *= scale;
         }
-        if (scene_.wall > 0) w.widest = std::max(4.0f, static_cast<float>(1.4 * scene_.wall * per_unit_));
+        if (scene_.wall > 0) w.shape.widest = std::max(4.0f, static_cast<float>(2.0 * scene_.wall * per_unit_));
         w.sky_above = scene_.sky_above;
         w.sky_level = scene_.sky_level;
         return w;
@@ -264,11 +286,14 @@ private:
     vp::abuffer<Backend, glm::vec2> lists_;
     buffer<std::uint32_t> slots_;
     vp::brick_bits<Backend> filled_; // voxels with triangles
+    buffer<float> irradiances_;      // of the lists' fragments, and a little more
     buffer<lit_voxel> lit_;          // of those voxels, and a little more
     buffer<gathered> gathered_;
-    cone_set voxel_cones_ = make_cone_set(16, 8), pixel_cones_ = make_cone_set(32, eye_rays::num_phases);
-    buffer<seen_point> points_;
+    cone_set voxel_cones_ = make_cone_set(8, 8), pixel_cones_ = make_cone_set(16, eye_rays::num_phases);
+    buffer<seen_point> seen_; // one of these for each ray
+    buffer<near_point> near_;
     buffer<received_light> received_;
+    buffer<glm::vec3> mirrored_;
     buffer<glm::u8vec4> pixels_;
 };
 

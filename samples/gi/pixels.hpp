@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// From rays to pixels, in three passes: the nearest triangle along each ray; there a ray to the light, a few diffuse
-// cones and a specular one; then the mean of what neighbours on the same surface received, and the colour. Or, in one
-// pass, a view of the voxels of a level.
+// From rays to pixels: the nearest triangle along each ray; there a ray to the light, a cone for diffuse light and one
+// for reflections; then the mean of what neighbours on the same surface received, and the colour. Or, in one pass, a
+// view of the voxels of a level.
 
 #include "cones.hpp"
 #include "rays.hpp"
@@ -30,36 +30,80 @@ struct eye_rays {
     static constexpr int num_phases = 16;
 };
 
-// What a ray meets.
-struct alignas(16) seen_point {
-    static constexpr std::uint32_t nothing = ~0u;
-    glm::vec3 position{0.0f}; // grid coordinates
-    std::uint32_t triangle = nothing;
+// Rays in the order in which they are worked on: blocks of 32 x 16. Threads that work side by side have neighbours, 8 x
+// 4, or rays of one phase, which send their cones the same way.
+struct ray_order {
+    static constexpr int across = 32, down = 16, in_block = across * down;
+    int width, height, blocks_across;
+    explicit ray_order(const eye_rays& rays)
+        : width(rays.width), height(rays.height), blocks_across((rays.width + across - 1) / across) {}
+
+    [[nodiscard]] std::uint64_t count() const {
+        return static_cast<std::uint64_t>(blocks_across) * static_cast<std::uint64_t>((height + down - 1) / down) *
+               in_block;
+    }
+    // False for numbers without a ray.
+    [[nodiscard]] VOXELPIPE_HD bool place(std::uint64_t i, bool by_phase, glm::ivec2& at) const {
+        const auto block = static_cast<int>(i / in_block), number = static_cast<int>(i % in_block);
+        const int group = number / 32, x = number & 7, y = number / 8 & 3, gx = group & 3, gy = group >> 2;
+        at.x = block % blocks_across * across + (by_phase ? 4 * x + gx : 8 * gx + x);
+        at.y = block / blocks_across * down + (by_phase ? 4 * y + gy : 4 * gy + y);
+        return at.x < width && at.y < height;
+    }
+    [[nodiscard]] VOXELPIPE_HD std::size_t index(const glm::ivec2& at) const {
+        return static_cast<std::size_t>(at.y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(at.x);
+    }
+};
+
+// What a ray meets: for its own pixel, and what neighbours ask.
+struct seen_point {
     glm::vec3 normal{0.0f}; // towards the eye
-    float y = 0, z = 0;     // barycentric weights of the second and third corner
+    std::uint32_t triangle = 0;
+    float y = 0, z = 0; // barycentric weights of the second and third corner
+};
+struct alignas(16) near_point {
+    glm::vec3 position{0.0f};
+    std::uint32_t facing = 0; // of the normal, packed; 0: the ray meets nothing
+};
+// What arrives at a point, as far as its phase knows it.
+struct alignas(16) received_light {
+    glm::vec3 diffuse{0.0f}; // irradiance / pi of the cones; of view_choice::ao, their occlusion
+    float visible = -1;      // part of the light; less than 0: not known
+};
+
+// One of each for a ray.
+struct ray_data {
+    seen_point* seen;
+    near_point* near;
+    received_light* received;
+    glm::vec3* mirrored;
 };
 
 struct see_points {
     gi::world world;
     triangle_lists lists;
     eye_rays rays;
-    seen_point* out;
+    ray_order order;
+    ray_data data;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const auto n = static_cast<std::uint64_t>(rays.width);
-        const glm::vec3 direction = rays.direction(static_cast<int>(i % n), static_cast<int>(i / n));
+        glm::ivec2 at;
+        if (!order.place(i, false, at)) return;
+        const glm::vec3 direction = rays.direction(at.x, at.y);
         const ray_hit hit = lists.trace(world, rays.eye, direction, 1e6f, false);
         seen_point p;
+        near_point n;
         if (hit.found) {
             const surface s = world.at(hit.triangle, hit.weights);
-            p.position = s.position;
             // By the triangle's own side, so that neighbours agree where the interpolated normal is across the ray.
             p.normal = glm::dot(world.across(hit.triangle), direction) > 0.0f ? -s.normal : s.normal;
             p.triangle = hit.triangle;
             p.y = hit.weights.y;
             p.z = hit.weights.z;
+            n = {s.position, vp::pack_facing(p.normal)};
         }
-        out[i] = p;
+        data.seen[order.index(at)] = p;
+        data.near[order.index(at)] = n;
     }
 };
 
@@ -70,85 +114,78 @@ struct see_points {
     return static_cast<float>((h ^ h >> 16) >> 8) * 0x1p-24f;
 }
 
-// What arrives at a point, as far as its phase knows it.
-struct alignas(16) received_light {
-    glm::vec3 diffuse{0.0f}; // irradiance / pi of the cones
-    float occlusion = 0;     // of the cones
-    glm::vec3 mirrored{0.0f};
-    float visible = -1; // part of the light; less than 0: not known
+// The visible part of the light, by rays to points of it: the sun in 4 x 4 parts, a lamp in 4 x 8, those of the ray's
+// phase, each at a place of its own. Less than 0 if the surface faces away from them.
+struct see_light {
+    gi::world world;
+    triangle_lists lists;
+    ray_order order;
+    ray_data data;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        glm::ivec2 at;
+        if (!order.place(i, false, at)) return;
+        const std::size_t ray = order.index(at);
+        if (data.near[ray].facing == 0) return;
+        const glm::vec3 position = data.near[ray].position, normal = data.seen[ray].normal;
+        const std::uint32_t noise =
+            static_cast<std::uint32_t>(at.x) * 0x9e3779b9u ^ static_cast<std::uint32_t>(at.y) * 0x85ebca6bu;
+        const std::uint32_t count = world.light.position.w == 0.0f ? 1 : 2;
+        float all = 0.0f, seen = 0.0f;
+        for (std::uint32_t k = 0; k < count; ++k) {
+            const float within = (static_cast<float>(k) + noise_of(noise + 2 * k + 1)) / static_cast<float>(count);
+            const float u = 0.5f * (static_cast<float>(at.x & 3) + noise_of(noise + 2 * k)) - 1.0f,
+                        v = 0.5f * (static_cast<float>(at.y & 3) + within) - 1.0f;
+            const light_sample l = sample_light(world.light, position, normal, false, u, v);
+            if (l.part == 0.0f) continue;
+            all = all + l.part;
+            if (!lists.blocks(world, position + normal * 0.12f, l.direction, l.distance - 0.6f)) seen = seen + l.part;
+        }
+        data.received[ray].visible = all > 0.0f ? seen / all : -1.0f;
+    }
 };
 
 struct receive_light {
     gi::world world;
     vp::direction_mips_view mips;
-    triangle_lists lists;
-    eye_rays rays;
-    view_choice view;
+    ray_order order;
+    bool wants_occlusion;
     cone_set cones; // of 16 phases
-    const seen_point* points;
-    received_light* out;
-
-    // Rays of one phase come one after the other, 32 of each block of 32 x 16, so that threads that work side by side
-    // send their cones the same way.
-    static constexpr int block_x = 32, block_y = 16;
-    [[nodiscard]] static std::uint64_t count(const eye_rays& rays) {
-        const auto blocks = [](int n, int size) { return static_cast<std::uint64_t>((n + size - 1) / size); };
-        return blocks(rays.width, block_x) * blocks(rays.height, block_y) * (block_x * block_y);
-    }
+    ray_data data;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const int in_block = static_cast<int>(i % (block_x * block_y)), phase = in_block / 32, lane = in_block % 32;
-        const auto block = static_cast<int>(i / (block_x * block_y)), across = (rays.width + block_x - 1) / block_x;
-        const int x = block % across * block_x + 4 * (lane & 7) + (phase & 3),
-                  y = block / across * block_y + 4 * (lane >> 3) + (phase >> 2);
-        if (x >= rays.width || y >= rays.height) return;
-        const std::size_t ray =
-            static_cast<std::size_t>(y) * static_cast<std::size_t>(rays.width) + static_cast<std::size_t>(x);
-        const seen_point& p = points[ray];
-        if (p.triangle == seen_point::nothing) return;
-        received_light r;
-        if (view == view_choice::final || view == view_choice::direct) r.visible = visible(p, x, y);
-        if (view != view_choice::direct) {
-            const cone_light around = gather(mips, world, cones, phase, p.position, p.normal, 1.0f);
-            r.diffuse = around.light;
-            r.occlusion = around.occlusion;
-        }
-        if (view == view_choice::final || view == view_choice::indirect) {
-            const surface s = world.at(p.triangle, {1.0f - p.y - p.z, p.y, p.z});
-            if (s.is_shiny()) r.mirrored = mirrored(p, s, rays.direction(x, y));
-        }
-        out[ray] = r;
+        glm::ivec2 at;
+        if (!order.place(i, true, at)) return;
+        const std::size_t ray = order.index(at);
+        if (data.near[ray].facing == 0) return;
+        const cone_light around = gather(mips, world, cones, eye_rays::phase(at.x, at.y), data.near[ray].position,
+                                         data.seen[ray].normal, 1.0f);
+        data.received[ray].diffuse = wants_occlusion ? glm::vec3(around.occlusion) : around.light;
     }
+};
 
-private:
-    // The visible part of the light, by rays to points of it: the sun in 4 x 4 parts, a lamp in 4 x 8, those of the
-    // ray's phase, each at a place of its own. Less than 0 if the surface faces away from them.
-    [[nodiscard]] VOXELPIPE_HD float visible(const seen_point& p, int x, int y) const {
-        const std::uint32_t noise =
-            static_cast<std::uint32_t>(x) * 0x9e3779b9u ^ static_cast<std::uint32_t>(y) * 0x85ebca6bu;
-        const std::uint32_t count = world.light.position.w == 0.0f ? 1 : 2;
-        float all = 0.0f, seen = 0.0f;
-        for (std::uint32_t k = 0; k < count; ++k) {
-            const float within = (static_cast<float>(k) + noise_of(noise + 2 * k + 1)) / static_cast<float>(count);
-            const float u = 0.5f * (static_cast<float>(x & 3) + noise_of(noise + 2 * k)) - 1.0f,
-                        v = 0.5f * (static_cast<float>(y & 3) + within) - 1.0f;
-            const light_sample l = sample_light(world.light, p.position, p.normal, false, u, v);
-            if (l.part == 0.0f) continue;
-            all = all + l.part;
-            if (!lists.blocks(world, p.position + p.normal * 0.12f, l.direction, l.distance - 0.6f))
-                seen = seen + l.part;
-        }
-        return all > 0.0f ? seen / all : -1.0f;
-    }
-    // One cone along the mirrored ray, as wide as the surface is rough.
-    [[nodiscard]] VOXELPIPE_HD glm::vec3 mirrored(const seen_point& p, const surface& s,
-                                                  const glm::vec3& direction) const {
+// One cone along the mirrored ray, as wide as the surface is rough.
+struct receive_mirrored {
+    gi::world world;
+    vp::direction_mips_view mips;
+    eye_rays rays;
+    ray_order order;
+    ray_data data;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        glm::ivec2 at;
+        if (!order.place(i, false, at)) return;
+        const std::size_t ray = order.index(at);
+        if (data.near[ray].facing == 0) return;
+        const seen_point& p = data.seen[ray];
+        const surface s = world.at(p.triangle, {1.0f - p.y - p.z, p.y, p.z});
+        if (!s.is_shiny()) return;
+        const glm::vec3 direction = rays.direction(at.x, at.y);
         const float along = glm::dot(direction, p.normal);
-        const float spread = s.roughness * 0.7f > 0.03f ? s.roughness * 0.7f : 0.03f;
-        return trace_cone(
-                   mips, world,
-                   {p.position + p.normal * 1.2f, direction - p.normal * (2.0f * along), -along, spread, 1.0f, 1.0f})
-            .light;
+        const float spread = s.roughness * 0.55f > 0.025f ? s.roughness * 0.55f : 0.025f;
+        const cone c{
+            s.position + p.normal * 1.2f, direction - p.normal * (2.0f * along), -along, spread, 1.0f, 1.0f, 1e9f};
+        data.mirrored[ray] = trace_cone(mips, world, c).light;
     }
 };
 
@@ -158,8 +195,8 @@ struct draw_pixels {
     view_choice view;
     int samples; // a side of a pixel
     float exposure;
-    const seen_point* points;
-    const received_light* received;
+    ray_order order;
+    ray_data data;
     glm::u8vec4* out; // rows from the top
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
@@ -184,16 +221,14 @@ struct draw_pixels {
     }
 
 private:
-    [[nodiscard]] VOXELPIPE_HD std::size_t index(int x, int y) const {
-        return static_cast<std::size_t>(y) * static_cast<std::size_t>(rays.width) + static_cast<std::size_t>(x);
-    }
     [[nodiscard]] VOXELPIPE_HD glm::vec3 radiance(int x, int y) const {
-        const seen_point& p = points[index(x, y)];
+        const std::size_t ray = order.index({x, y});
         const glm::vec3 direction = rays.direction(x, y);
-        if (p.triangle == seen_point::nothing)
+        if (data.near[ray].facing == 0)
             return view == view_choice::final || view == view_choice::direct ? world.sky(direction) : glm::vec3(0.0f);
-        const received_light around = mean_around(x, y, p);
-        if (view == view_choice::ao) return glm::vec3(3.0f * (1.0f - around.occlusion) / exposure);
+        const received_light around = mean_around(x, y);
+        if (view == view_choice::ao) return glm::vec3(3.0f * (1.0f - around.diffuse.x) / exposure);
+        const seen_point& p = data.seen[ray];
         const surface s = world.at(p.triangle, {1.0f - p.y - p.z, p.y, p.z});
         const glm::vec3 diffuse = s.color * (1.0f - s.metallic);
         glm::vec3 light(0.0f);
@@ -203,7 +238,7 @@ private:
                         (around.visible * mean_light(world.light, s.position, p.normal, false) * (1.0f / 3.14159265f));
         if (view == view_choice::direct) return light;
         light = light + diffuse * around.diffuse;
-        if (s.is_shiny()) light = light + reflectance(s, p, direction) * received[index(x, y)].mirrored;
+        if (s.is_shiny()) light = light + reflectance(s, p, direction) * data.mirrored[ray];
         return light;
     }
     // Schlick's.
@@ -218,33 +253,37 @@ private:
 
     // The mean over the 5 x 5 rays around one that meet the same surface. Weights 1 2 2 2 1 along each side give every
     // phase the same part.
-    [[nodiscard]] VOXELPIPE_HD received_light mean_around(int x, int y, const seen_point& p) const {
+    [[nodiscard]] VOXELPIPE_HD received_light mean_around(int x, int y) const {
+        const near_point p = data.near[order.index({x, y})];
+        glm::vec3 normal;
+        for (int a = 0; a < 3; ++a) normal[a] = part_of_facing(p.facing, a);
         received_light sum;
         sum.visible = 0.0f;
         float weights = 0.0f, light_weights = 0.0f;
         for (int row = y - 2; row <= y + 2; ++row)
             for (int column = x - 2; column <= x + 2; ++column) {
                 if (row < 0 || column < 0 || row >= rays.height || column >= rays.width) continue;
-                const seen_point& q = points[index(column, row)];
-                if (q.triangle == seen_point::nothing) continue;
-                const float apart = glm::dot(q.position - p.position, p.normal);
-                if (!(apart < 0.7f && apart > -0.7f && glm::dot(p.normal, q.normal) > 0.85f)) continue;
+                const near_point q = data.near[order.index({column, row})];
+                const float apart = glm::dot(q.position - p.position, normal);
+                float same = 0.0f;
+                for (int a = 0; a < 3; ++a) same = same + normal[a] * part_of_facing(q.facing, a);
+                if (!(apart < 0.7f && apart > -0.7f && same > 0.85f)) continue;
                 const float weight =
                     (row == y - 2 || row == y + 2 ? 1.0f : 2.0f) * (column == x - 2 || column == x + 2 ? 1.0f : 2.0f);
-                const received_light& r = received[index(column, row)];
+                const received_light r = data.received[order.index({column, row})];
                 sum.diffuse = sum.diffuse + r.diffuse * weight;
-                sum.occlusion = sum.occlusion + r.occlusion * weight;
+                weights = weights + weight;
                 if (r.visible >= 0.0f) {
                     sum.visible = sum.visible + r.visible * weight;
                     light_weights = light_weights + weight;
                 }
-                weights = weights + weight;
             }
-        const float part = 1.0f / weights; // the ray itself is one of them
-        sum.diffuse = sum.diffuse * part;
-        sum.occlusion = sum.occlusion * part;
+        sum.diffuse = sum.diffuse / weights; // the ray itself is one of them
         if (light_weights > 0.0f) sum.visible = sum.visible / light_weights;
         return sum;
+    }
+    [[nodiscard]] VOXELPIPE_HD static float part_of_facing(std::uint32_t facing, int axis) {
+        return static_cast<float>(static_cast<std::int8_t>(facing >> (8 * axis) & 0xffu)) * (1.0f / 127.0f);
     }
 };
 

@@ -46,6 +46,11 @@ struct triangle_lists {
         return slots[vp::direction_mips_view::index(extent, v)];
     }
 
+    // What the list's fragment number i shows.
+    [[nodiscard]] VOXELPIPE_HD surface fragment(const world& w, std::uint64_t i) const {
+        return w.at(primitives[i], {1.0f - weights[i].x - weights[i].y, weights[i].x, weights[i].y});
+    }
+
     // The nearest triangle along the ray, or any within `limit` if `any`.
     [[nodiscard]] VOXELPIPE_HD ray_hit trace(const world& w, const glm::vec3& origin, const glm::vec3& direction,
                                              float limit, bool any) const {

@@ -60,7 +60,9 @@ struct scene {
     gi::light light;
     glm::vec3 sky_above{0.0f}, sky_level{0.0f}; // radiance of the sky at the zenith and below the horizon
     float exposure = 1.0f;
-    double wall = 0;                // thickness of the thinnest one with light outside; 0: there is none outside
+    // Half of the width of cones' samples at most, in the scene's units; 0: no limit. Samples wider than 1.4 times a
+    // wall let some light through it; narrower ones take less of what is far away, which gives stripes.
+    double wall = 0;
     glm::dvec3 low{0.0}, high{1.0}; // bounds of all that is drawn at any time
 
     // Both for a time of 0 to 1, at which they return to their start.

@@ -31,22 +31,48 @@ struct lit_voxel {
     return a < 1.0f ? a : 1.0f;
 }
 
-// Number i of the voxels with triangles: their fragments, in the order of the list.
+// By what the light's colour is to be multiplied for the irradiance at fragment i of the list: all of it, or none if a
+// ray to a point of the light meets a filled voxel. Of the four points of a lamp, voxels that lie side by side take
+// different ones.
 struct light_fragments {
     gi::world world;
     triangle_lists lists;
     vp::brick_bits_view blockers; // bits at twice the resolution
+    float* out;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const surface s = lists.fragment(world, i);
+        const bool sheet = s.density > 1.0f;
+        const glm::ivec3 v(s.position);
+        const int number = (v.x & 1) + 2 * ((v.y + v.z) & 1);
+        const light_sample l = sample_light_point(world.light, s.position, s.normal, sheet, number);
+        float part = mean_light(world.light, s.position, s.normal, sheet);
+        if (part > 0.0f && l.part > 0.0f) {
+            // A ray starts outside of the voxels that the surface itself fills.
+            const float side = glm::dot(l.direction, s.normal) < 0.0f ? -1.0f : 1.0f;
+            const glm::vec3 start = s.position + s.normal * (1.4f * side) + l.direction * 0.4f;
+            const float limit = l.distance - 3.0f; // short of the lamp's own voxels
+            if (limit > 0.0f && blockers.blocks(start * 2.0f, l.direction, limit * 2.0f)) part = 0.0f;
+        }
+        out[i] = part;
+    }
+};
+
+// Number i of the voxels with triangles: the means of its fragments, in the order of the list.
+struct fold_fragments {
+    gi::world world;
+    triangle_lists lists;
+    const float* irradiances; // of light_fragments
     lit_voxel* out;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         lit_voxel sum;
         float count = 0.0f;
         for (std::uint64_t k = lists.offsets[i]; k < lists.offsets[i + 1]; ++k) {
-            const glm::vec2 yz = lists.weights[k];
-            const surface s = world.at(lists.primitives[k], {1.0f - yz.x - yz.y, yz.x, yz.y});
+            const surface s = lists.fragment(world, k);
             if (s.cut) continue;
             const glm::vec3 diffuse = s.color * (1.0f - 0.7f * s.metallic); // what a metal reflects blurs here
-            sum.light = sum.light + diffuse * world.light.color * (light_at(s) * (1.0f / 3.14159265f));
+            sum.light = sum.light + diffuse * world.light.color * (irradiances[k] * (1.0f / 3.14159265f));
             if (!s.is_light) sum.light = sum.light + s.emission;
             sum.color = sum.color + diffuse;
             sum.normal = sum.normal + s.normal;
@@ -62,24 +88,6 @@ struct light_fragments {
             sum.normal = length > 0.0f ? sum.normal / length : glm::vec3(0.0f);
         }
         out[i] = sum;
-    }
-
-private:
-    [[nodiscard]] VOXELPIPE_HD float light_at(const surface& s) const {
-        const bool sheet = s.density > 1.0f;
-        float sum = 0.0f;
-        const int samples = num_light_points(world.light);
-        for (int i = 0; i < samples; ++i) {
-            const light_sample l = sample_light_point(world.light, s.position, s.normal, sheet, i);
-            if (l.part == 0.0f) continue;
-            // A ray starts outside of the voxels that the surface itself fills.
-            const float side = glm::dot(l.direction, s.normal) < 0.0f ? -1.0f : 1.0f;
-            const glm::vec3 start = s.position + s.normal * (1.4f * side) + l.direction * 0.4f;
-            const float limit = l.distance - 3.0f; // short of the lamp's own voxels
-            if (limit > 0.0f && blockers.blocks(start * 2.0f, l.direction, limit * 2.0f)) continue;
-            sum = sum + l.part * (1.0f / static_cast<float>(samples));
-        }
-        return sum;
     }
 };
 

@@ -34,6 +34,16 @@ struct surface {
     [[nodiscard]] VOXELPIPE_HD bool is_shiny() const { return roughness < 0.99f || metallic > 0.0f; }
 };
 
+// How wide a cone's samples are, and what they count.
+struct cone_shape {
+    float widest = 1e9f;  // voxels at most
+    float overlap = 1.9f; // by half of the cone's width
+    float lift = 0.7f;    // by the height over the surface that the cone starts from, at most
+    // Linear filtering spreads a wall over several samples. Steps of three quarters of a sample's width add up to a
+    // wall with a weight of 3/4; more closes cones that are widening too.
+    float weight = 1.1f;
+};
+
 // Memory of the backend, not owned.
 struct world {
     const glm::vec3 *positions = nullptr, *normals = nullptr, *colors = nullptr;
@@ -45,7 +55,7 @@ struct world {
     const voxelize::color_tables* tables = nullptr;
     gi::light light;
     glm::vec3 sky_above{0.0f}, sky_level{0.0f};
-    float widest = 1e9f; // voxels that a cone's samples are wide at most
+    cone_shape shape;
 
     // weights: barycentric, of the triangle's three corners.
     [[nodiscard]] VOXELPIPE_HD surface at(std::uint32_t triangle, const glm::vec3& weights) const {

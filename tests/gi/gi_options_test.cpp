@@ -28,7 +28,7 @@ TEST(GiProgram, WritesOnePicture) {
     ASSERT_EQ(made.code, 0) << made.err;
     EXPECT_EQ(made.err, "");
     EXPECT_EQ(read_file(folder / "x.png").substr(1, 3), "PNG");
-    for (const char* stage : {"bits", "voxels", "lists", "bounce", "mips", "pixels", "frame"})
+    for (const char* stage : {"bits", "lists", "light", "bounce", "mips", "rays", "cones", "pixels", "frame"})
         EXPECT_NE(made.out.find(std::string("  ") + stage), std::string::npos) << stage;
     const outcome again = run_gi(folder, quick(folder / "y.png", {"--frames", "1"}));
     EXPECT_EQ(read_file(folder / "x.png"), read_file(folder / "y.png")) << again.err;
@@ -66,6 +66,7 @@ TEST(GiProgram, NamesMistakes) {
         {1, {"--no-such-option"}, "--no-such-option"},
         {1, quick(folder / "x.png", {"--view", "sideways"}), "--view is final"},
         {1, quick(folder / "x.png", {"--view", "level:11"}), "--view is final"},
+        {1, quick(folder / "x.png", {"--backend", "gpu"}), "--backend is auto, cpu or cuda"},
         {1, {"--size", "16by9"}, "--size is WIDTHxHEIGHT"},
         {1, {"--size", "0x9"}, "--size's width"},
         {1, {"--resolution", "15"}, "--resolution is from 16"},
