@@ -60,7 +60,7 @@ public:
                 };
                 const int forward = direction_[a] > 0 ? 1 : -1;
                 const S p = exact::fma(at.enter, direction_[a], origin_[a]);
-                int cell = p <= static_cast<S>(low[a])     ? low[a]
+                int cell = p <= static_cast<S>(low[a])    ? low[a]
                            : p >= static_cast<S>(high[a]) ? high[a] - 1
                                                           : static_cast<int>(p);
                 if ((cell - before[a]) * forward < 0) cell = before[a];
