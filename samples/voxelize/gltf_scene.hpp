@@ -59,8 +59,8 @@ struct gltf_options {
     // others have no texture then.
     bool colors = true;
     bool blend_cuts = false;
-    // Reads textures of roughness and emission too, for programs that light the model. Those with coordinates other
-    // than the base colour's are left out, with a warning.
+    // Reads roughness, metal and emission too, for programs that light the model. Textures with coordinates other than
+    // the base colour's are left out, with a warning.
     bool shading = false;
 };
 

@@ -59,8 +59,8 @@ struct material {
     std::int32_t texture = no_texture; // index into scene::textures
     alpha_mode alpha = alpha_mode::opaque;
     float alpha_cutoff = 0.5F;
-    // For programs that light the model. Without gltf_options::shading there are factors only: where a texture says
-    // more, these keep their defaults. All textures of a material are reached by the same coordinates.
+    // For programs that light the model: read with gltf_options::shading alone. All textures of a material are reached
+    // by the same coordinates.
     glm::vec3 emission{0.0F};
     float roughness = 0.6F;
     float metallic = 0.0F;

@@ -56,6 +56,51 @@ std::vector<int> first_pixel(const scene& scene) {
 
 json with_webp(int source) { return {{"source", 0}, {"extensions", {{"EXT_texture_webp", {{"source", source}}}}}}; }
 
+// Programs that light a model ask for more than its colours. A texture with coordinates of its own is left out, with
+// its factors; without one the factors stand alone.
+TEST(GltfPictures, TexturesOfLightAreReadWhereTheyAreAskedFor) {
+    builder file =
+        with_texture({{"source", 0}}, {{{"uri", green_png()}}, {{"uri", green_png()}}, {{"uri", green_png()}}});
+    file.root["textures"] = {{{"source", 0}}, {{"source", 1}}, {{"source", 2}}};
+    json& material = file.root["materials"][0];
+    material["pbrMetallicRoughness"]["metallicRoughnessTexture"] = {{"index", 1}};
+    material["pbrMetallicRoughness"]["roughnessFactor"] = 0.25;
+    material["emissiveTexture"] = {{"index", 2}};
+    material["emissiveFactor"] = {1.0, 0.5, 0.0};
+    const scene colors = load(file);
+    EXPECT_EQ(1U, colors.images.size());
+    EXPECT_EQ(-1, colors.materials[0].roughness_texture);
+    EXPECT_EQ(-1, colors.materials[0].emission_texture);
+    EXPECT_EQ(glm::vec3(0.0f), colors.materials[0].emission);
+
+    voxelize::gltf_options shading;
+    shading.shading = true;
+    const scene lit = voxelize::load_gltf(file.glb(), {}, {}, shading);
+    EXPECT_EQ("", text_of(lit.warnings));
+    EXPECT_EQ(3U, lit.images.size());
+    EXPECT_EQ(1, lit.materials[0].roughness_texture);
+    EXPECT_EQ(2, lit.materials[0].emission_texture);
+    EXPECT_EQ(0.25f, lit.materials[0].roughness);
+    EXPECT_EQ(1.0f, lit.materials[0].metallic);
+    EXPECT_EQ(glm::vec3(1.0f, 0.5f, 0.0f), lit.materials[0].emission);
+
+    material["emissiveTexture"]["texCoord"] = 1;
+    const scene apart = voxelize::load_gltf(file.glb(), {}, {}, shading);
+    EXPECT_EQ("materials[0].emissiveTexture is left out: its coordinates are not those of the material's other "
+              "textures\n",
+              text_of(apart.warnings));
+    EXPECT_EQ(-1, apart.materials[0].emission_texture);
+    EXPECT_EQ(glm::vec3(0.0f), apart.materials[0].emission);
+    EXPECT_EQ(2U, apart.images.size());
+
+    material["pbrMetallicRoughness"].erase("baseColorTexture"); // the others have coordinates too
+    material["emissiveTexture"]["texCoord"] = 0;
+    const scene plain = voxelize::load_gltf(file.glb(), {}, {}, shading);
+    EXPECT_EQ(3U, plain.primitives[0].texcoords.size());
+    EXPECT_EQ(-1, plain.materials[0].texture);
+    EXPECT_EQ(0, plain.materials[0].roughness_texture);
+}
+
 TEST(GltfPictures, WebpIsPreferredToItsFallback) {
     builder file = with_texture(with_webp(1), {{{"uri", green_png()}}, {{"uri", red_webp}}});
     file.root["extensionsUsed"] = {"EXT_texture_webp"};

@@ -78,11 +78,27 @@ void checker::check_materials() {
         if (const auto pbr = material.object("pbrMetallicRoughness")) {
             pbr->check_numbers("baseColorFactor", 4);
             if (const auto info = pbr->object("baseColorTexture")) check_texture_info(*info);
-            pbr->keep_only({"baseColorFactor", "baseColorTexture"});
+            if (options_.shading) {
+                (void)pbr->number("metallicFactor");
+                (void)pbr->number("roughnessFactor");
+                if (const auto info = pbr->object("metallicRoughnessTexture")) check_texture_info(*info);
+                pbr->keep_only({"baseColorFactor", "baseColorTexture", "metallicFactor", "roughnessFactor",
+                                "metallicRoughnessTexture"});
+            } else {
+                pbr->keep_only({"baseColorFactor", "baseColorTexture"});
+            }
+        }
+        if (options_.shading) {
+            material.check_numbers("emissiveFactor", 3);
+            if (const auto info = material.object("emissiveTexture")) check_texture_info(*info);
         }
         if (const auto extensions = material.object("extensions"))
             if (const auto old = extensions->object("KHR_materials_pbrSpecularGlossiness")) use_diffuse(material, *old);
-        material.keep_only({"name", "alphaMode", "alphaCutoff", "doubleSided", "pbrMetallicRoughness"});
+        if (options_.shading)
+            material.keep_only({"name", "alphaMode", "alphaCutoff", "doubleSided", "pbrMetallicRoughness",
+                                "emissiveFactor", "emissiveTexture"});
+        else
+            material.keep_only({"name", "alphaMode", "alphaCutoff", "doubleSided", "pbrMetallicRoughness"});
     });
 }
 
@@ -94,6 +110,7 @@ void checker::use_diffuse(const json_at& material, const json_at& extension) con
         check_texture_info(*info);
         base["baseColorTexture"] = info->value();
     }
+    base["metallicFactor"] = 0;
     material.value()["pbrMetallicRoughness"] = std::move(base);
 }
 

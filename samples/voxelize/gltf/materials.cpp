@@ -53,9 +53,10 @@ void material_reader::read_factors() {
         if (source.alphaMode == "BLEND") result.alpha = alpha_mode::blend;
         result.alpha_cutoff = static_cast<float>(source.alphaCutoff);
         result.double_sided = source.doubleSided;
-        if ((source.emissiveTexture.index < 0 || options_.shading) && source.emissiveFactor.size() == 3)
-            for (int i = 0; i < 3; ++i) result.emission[i] = static_cast<float>(source.emissiveFactor[std::size_t(i)]);
-        if (source.pbrMetallicRoughness.metallicRoughnessTexture.index < 0 || options_.shading) {
+        if (options_.shading) {
+            if (source.emissiveFactor.size() == 3)
+                for (int i = 0; i < 3; ++i)
+                    result.emission[i] = static_cast<float>(source.emissiveFactor[std::size_t(i)]);
             result.roughness = static_cast<float>(source.pbrMetallicRoughness.roughnessFactor);
             result.metallic = static_cast<float>(source.pbrMetallicRoughness.metallicFactor);
         }
