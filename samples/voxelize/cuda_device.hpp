@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The GPU, seen from plain C++: what a look at the machine finds, why it cannot be used in words for a person, and the
-// pipeline on it. Defined in cuda_device.cu and cuda_look.cu where the program is built with CUDA, in no_cuda.cpp where it
-// is not.
+// pipeline on it. Defined in cuda_device.cu and cuda_look.cu where the program is built with CUDA, in no_cuda.cpp where
+// it is not.
 
 #include "voxelizer.hpp"
 
