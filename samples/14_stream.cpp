@@ -43,9 +43,11 @@ int main(int argc, char** argv) {
     const vp::grid grid = vp::fit(vp::bounding_box{{0, 0, 0}, {1, 1, 0.4}}, {n, n, n * 2 / 5});
     // A quarter of the resolution, to be shown: numbers of slabs.
     const int side = n / 4, height = grid.extent.z / 4;
-    std::vector<std::uint8_t> slab_at(static_cast<std::size_t>(side) * side * height);
+    std::vector<std::uint8_t> slab_at(static_cast<std::size_t>(std::int64_t{side} * side * height));
     std::uint8_t drawn = 0;
-    const auto place = [&](int x, int y, int z) { return (static_cast<std::size_t>(z) * side + y) * side + x; };
+    const auto place = [&](int x, int y, int z) {
+        return static_cast<std::size_t>((std::int64_t{z} * side + y) * side + x);
+    };
     // snippet: stream
     slabs::stream stream(backend, grid, vp::passthrough{}, {.memory = budget, .num_slabs = 8});
     for (int row = 0; row < 2 * n; ++row) {
