@@ -31,10 +31,13 @@ from meshes import sphere  # noqa: E402
 
 
 def version(package):
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return None
+    """Of an installed package, under whichever of its names; None where it is not."""
+    for name in (package, f"{package}-cpu"):
+        try:
+            return importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            pass
+    return None
 
 
 clock = time.perf_counter
@@ -129,6 +132,7 @@ def plot(rows, path):
         axes.plot(*zip(*cells), marker="o", linewidth=2 if name.startswith("voxelpipe") else 1.2, label=name)
     axes.set(xscale="log", yscale="log", xlabel="voxels a side", ylabel=f"milliseconds{' of processor time' if clock is time.process_time else ''} a call", title="A sphere of 524,288 triangles")
     axes.set_xticks(sorted({r["resolution"] for r in rows}), labels=[str(n) for n in sorted({r["resolution"] for r in rows})])
+    axes.minorticks_off()
     axes.grid(True, which="major", alpha=0.3)
     axes.legend(frameon=False)
     figure.tight_layout()
