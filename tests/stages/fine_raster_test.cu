@@ -137,7 +137,7 @@ void compare_passes(stages<marked>& s) {
     // snippet: two passes
     const auto scene = buffers.shade(s.on_device(), s.g, stream);
     const device::scene<extreme_values, vp::no_varyings> other{
-        scene.geo, {extreme_values{}, nullptr}, nullptr, scene.normal_factors, scene.offset};
+        scene.geo, {extreme_values{}, nullptr, {}}, nullptr, scene.normal_factors, scene.offset};
     const device::tile_work work = device::coarse_pass<Rule>(scene.geo, tiles, m.state, limits, stream);
     clear_targets(d_marks.view(), m.state, limits, stream);
     device::fine_pass<Rule, policy>(scene, d_marks.view(), work, {}, m.state, limits, stream);
