@@ -94,20 +94,26 @@ TEST(Diagonal, AColumnMayHaveAGap) {
     EXPECT_EQ(lists.to_host(backend).primitives.size(), count(covered));
 }
 
+// Two triangles at `at` along an axis, from `low` to `high` along the next two.
+mesh rectangle(int axis, float at, const glm::vec2& low, const glm::vec2& high) {
+    mesh m;
+    for (const glm::vec2& corner : {low, glm::vec2(high.x, low.y), high, glm::vec2(low.x, high.y)}) {
+        glm::vec3 p{};
+        p[axis] = at;
+        p[(axis + 1) % 3] = corner.x;
+        p[(axis + 2) % 3] = corner.y;
+        m.positions.push_back(p);
+    }
+    m.triangles = {{0, 1, 2}, {0, 2, 3}};
+    return m;
+}
+
 TEST(Crosshair, ARectangleCoversTheCentresThatItHoldsAndBothSidesOfATie) {
     const vp::grid g = unit_grid(glm::ivec3(12));
     for (int axis = 0; axis < 3; ++axis)
         for (const float at : {3.0f, 3.25f, 3.5f, 4.0f}) {
-            mesh m;
-            // From 2.5 to 7.5 and from 1.25 to 9: centres 2.5 .. 7.5 and 1.5 .. 8.5.
-            for (const auto& [u, v] : {std::pair{2.5f, 1.25f}, {7.5f, 1.25f}, {7.5f, 9.0f}, {2.5f, 9.0f}}) {
-                glm::vec3 p{};
-                p[axis] = at;
-                p[(axis + 1) % 3] = u;
-                p[(axis + 2) % 3] = v;
-                m.positions.push_back(p);
-            }
-            m.triangles = {{0, 1, 2}, {0, 2, 3}};
+            // Centres 2.5 .. 7.5 and 1.5 .. 8.5.
+            const mesh m = rectangle(axis, at, {2.5f, 1.25f}, {7.5f, 9.0f});
             const std::size_t layers = at == 3.0f || at == 4.0f ? 2 : 1;
             EXPECT_EQ(count(surface(m, g, vp::coverage::crosshair)), layers * 6 * 8) << axis << ' ' << at;
         }
@@ -119,15 +125,7 @@ TEST(Diagonal, ARectangleCoversTheDiagonalsThatItHolds) {
     const vp::grid g = unit_grid(glm::ivec3(12));
     for (int axis = 0; axis < 3; ++axis)
         for (const float at : {3.0f, 3.25f, 3.5f, 4.0f}) {
-            mesh m;
-            for (const auto& [u, v] : {std::pair{2.5f, 1.75f}, {7.5f, 1.75f}, {7.5f, 9.0f}, {2.5f, 9.0f}}) {
-                glm::vec3 p{};
-                p[axis] = at;
-                p[(axis + 1) % 3] = u;
-                p[(axis + 2) % 3] = v;
-                m.positions.push_back(p);
-            }
-            m.triangles = {{0, 1, 2}, {0, 2, 3}};
+            const mesh m = rectangle(axis, at, {2.5f, 1.75f}, {7.5f, 9.0f});
             // Points along u: integers at 3 and 4, i + 0.25 and i + 0.75 at 3.25, i + 0.5 at 3.5. A voxel is covered if
             // it has one within the rectangle along u, and one along v. A corner belongs to two voxels a side.
             const std::size_t layers = at == 3.0f || at == 4.0f ? 2 : 1;
