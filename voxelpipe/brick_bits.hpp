@@ -19,9 +19,9 @@ namespace voxelpipe {
 // Refers to the bricks and blocks, x fastest, then y, then z. Cell (x, y, z) of a brick is bit x + 4 y + 16 z, and so
 // is a brick of a block, set if any of its cells is.
 struct brick_bits_view {
-    const std::uint64_t* bricks = nullptr; // not owned
-    const std::uint64_t* blocks_of_bricks = nullptr;
-    glm::ivec3 extent{0}; // in cells
+    const std::uint64_t* bricks = nullptr;           // not owned
+    const std::uint64_t* blocks_of_bricks = nullptr; // not owned
+    glm::ivec3 extent{0};                            // in cells
 
     // The number of bricks for cells, and of blocks for bricks.
     [[nodiscard]] VOXELPIPE_HD static glm::ivec3 num_bricks(const glm::ivec3& extent) {
@@ -33,6 +33,7 @@ struct brick_bits_view {
         const auto wide = [](int i) { return static_cast<std::size_t>(i); };
         return (wide(v.z >> 2) * wide(n.y) + wide(v.y >> 2)) * wide(n.x) + wide(v.x >> 2);
     }
+    // The bit of a cell in its brick's word, or of a brick in its block's.
     [[nodiscard]] VOXELPIPE_HD static int bit_of(const glm::ivec3& v) {
         return (v.x & 3) + 4 * (v.y & 3) + 16 * (v.z & 3);
     }
@@ -112,7 +113,8 @@ struct brick_rows {
 
 // Rows of a target of bits, for brick_bits::build.
 struct bit_rows {
-    dense_bits bits;
+    dense_bits bits; // the target, on the backend that builds
+    // Cells v to v + (3, 0, 0) as bits 0 to 3.
     VOXELPIPE_HD std::uint32_t operator()(const glm::ivec3& v) const { return bits.row_of_four(v); }
 };
 
@@ -121,6 +123,7 @@ struct bit_rows {
 template <class Backend>
 class brick_bits {
 public:
+    // extent: cells, each at least 1.
     brick_bits(Backend& backend, const glm::ivec3& extent)
         : extent_(extent), bricks_(backend, count_of(extent)),
           blocks_(backend, count_of(brick_bits_view::num_bricks(extent))) {}

@@ -69,7 +69,8 @@ namespace core {
 // Light and opacity in 8 bytes: four halves, x lowest, of values from 0 to 65504. Smaller ones become 0 where they are
 // below 2^-14.
 struct alignas(8) packed_light {
-    std::uint32_t xy = 0, zw = 0;
+    std::uint32_t xy = 0; // y above x
+    std::uint32_t zw = 0; // w above z
     friend bool operator==(const packed_light&, const packed_light&) = default;
 };
 // To the nearest, ties to even; what is larger than 65504 becomes that, and what is not a number 0.
