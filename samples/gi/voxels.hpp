@@ -31,9 +31,8 @@ struct lit_voxel {
     return a < 1.0f ? a : 1.0f;
 }
 
-// By what the light's colour is to be multiplied for the irradiance at fragment i of the list: all of it, or none if a
-// ray to a point of the light meets a filled voxel. Of the four points of a lamp, voxels that lie side by side take
-// different ones.
+// The factor of the light's colour that gives the irradiance at fragment i of the list. It is 0 if a filled voxel lies on
+// the ray to the light. A lamp has four points that rays go to; neighbouring voxels take different ones.
 struct light_fragments {
     gi::world world;
     triangle_lists lists;
