@@ -31,8 +31,8 @@ struct lit_voxel {
     return a < 1.0f ? a : 1.0f;
 }
 
-// The factor of the light's colour that gives the irradiance at fragment i of the list. It is 0 if a filled voxel lies on
-// the ray to the light. A lamp has four points that rays go to; neighbouring voxels take different ones.
+// The factor of the light's colour that gives the irradiance at fragment i of the list. It is 0 if a filled voxel lies
+// on the ray to the light. A lamp has four points that rays go to; neighbouring voxels take different ones.
 struct light_fragments {
     gi::world world;
     triangle_lists lists;
