@@ -30,6 +30,7 @@
 #include <voxelpipe/device/optional/solid.cuh>
 #include <voxelpipe/device/optional/solid_async.cuh>
 #include <voxelpipe/device/optional/sparse.cuh>
+#include <voxelpipe/device/optional/sparse_async.cuh>
 #include <voxelpipe/device/optional/sparse_solid.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>
 #endif

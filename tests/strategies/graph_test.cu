@@ -17,32 +17,6 @@ namespace {
 using namespace device_test;
 namespace blend = voxelpipe::blend;
 
-// A captured call that can be launched again.
-class captured_graph {
-public:
-    captured_graph(cudaStream_t stream, const std::function<vp::status()>& call) {
-        EXPECT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
-        const vp::status s = call();
-        EXPECT_EQ(cudaStreamEndCapture(stream, &graph_), cudaSuccess);
-        EXPECT_TRUE(s.ok()) << s.message();
-        EXPECT_EQ(cudaGraphGetNodes(graph_, nullptr, &num_nodes_), cudaSuccess);
-        EXPECT_EQ(cudaGraphInstantiate(&instance_, graph_, 0), cudaSuccess);
-    }
-    captured_graph(const captured_graph&) = delete;
-    captured_graph& operator=(const captured_graph&) = delete;
-    ~captured_graph() {
-        cudaGraphExecDestroy(instance_);
-        cudaGraphDestroy(graph_);
-    }
-    [[nodiscard]] std::size_t num_nodes() const { return num_nodes_; }
-    void launch(cudaStream_t stream) const { ASSERT_EQ(cudaGraphLaunch(instance_, stream), cudaSuccess); }
-
-private:
-    cudaGraph_t graph_ = nullptr;
-    cudaGraphExec_t instance_ = nullptr;
-    std::size_t num_nodes_ = 0; // kernels and other nodes
-};
-
 // Meshes with the same triangles and different vertices. The first is on the device.
 struct moving_mesh {
     std::vector<mesh_data> poses;

@@ -32,11 +32,19 @@ struct workspace_limits {
     bool expects_deferred = true;
     // As cuda_backend::strategy.
     voxelpipe::strategy strategy = voxelpipe::strategy::automatic;
+    // Sparse results alone: bricks of 8 x 8 x 8 voxels, voxels that exist, and nodes of 128 x 128 x 128 voxels with a
+    // brick. Grids of at most 2048 voxels a side have no nodes.
+    std::uint64_t bricks = 0, voxels = 0, nodes = 0;
 
     // A start for a mesh whose triangles are mostly smaller than a tile.
     [[nodiscard]] static workspace_limits for_triangles(std::uint64_t triangles) {
         const auto first = tuning::first_capacities(triangles);
-        return {first[0], first[1], first[2], first[3]};
+        workspace_limits l;
+        l.tile_pairs = first[0];
+        l.tile_records = first[1];
+        l.fragments = first[2];
+        l.fragment_records = first[3];
+        return l;
     }
 };
 
@@ -174,10 +182,14 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
     }
     if ((state.index_error & device::bad_numbers) != 0) return core::failure(status_code::bad_subset);
     if (state.index_error != 0) return core::failure(status_code::index_out_of_range, stage::coarse_raster);
-    if (device::has_failed(state, device::to_capacities(workspace.limits))) {
-        const device::capacities limits = device::to_capacities(workspace.limits);
-        status s = core::failure(status_code::capacity_exceeded, device::find_overflow(state, limits));
-        s.required = {state.tile_pairs, state.list_fragments, 0};
+    const device::capacities limits = device::to_capacities(workspace.limits);
+    const auto& bricks = state.sparse;
+    const bool lacks_bricks = bricks.nodes > workspace.limits.nodes || bricks.bricks > workspace.limits.bricks ||
+                              bricks.voxels > workspace.limits.voxels;
+    if (device::has_failed(state, limits) || lacks_bricks) {
+        status s = core::failure(status_code::capacity_exceeded,
+                                 lacks_bricks ? stage::tile_resolve : device::find_overflow(state, limits));
+        s.required = {state.tile_pairs, state.list_fragments, 0, bricks.bricks, bricks.voxels};
         if (need != nullptr) {
             const auto larger = [](std::uint64_t a, std::uint64_t b) { return a > b ? a : b; };
             *need = {larger(workspace.limits.tile_pairs, state.tile_pairs),
@@ -187,7 +199,10 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                      workspace.limits.lists_fragments,
                      workspace.limits.orders_long_voxels || state.longest_ordered() != 0,
                      workspace.limits.expects_deferred || !state.deferred.are_none(),
-                     workspace.limits.strategy};
+                     workspace.limits.strategy,
+                     larger(workspace.limits.bricks, bricks.bricks),
+                     larger(workspace.limits.voxels, bricks.voxels),
+                     larger(workspace.limits.nodes, bricks.nodes)};
         }
         return s;
     }

@@ -48,6 +48,9 @@ struct pipeline_state {
         unsigned long long open_rows, max_winding;
         unsigned long long next_large; // row_triangles
     } solid;                           // solid/
+    struct {
+        unsigned long long nodes, bricks, voxels;
+    } sparse; // what a sparse call in the caller's memory needs
 
     // For capacities::longest_ordered: 0 if the windows order all voxels, 1 if a block can take the longest that they
     // leave.

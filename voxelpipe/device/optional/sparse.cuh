@@ -95,7 +95,8 @@ template <class Payload, class... Targets>
         const fold_target<target> fold{get<I>(background),           t.load,        t.keeps_sums,
                                        get<I>(before.values).data(), values.data(), get<I>(made.sums).data()};
         launch_kernel(false, fold_voxels<I, target, Payload>, num_blocks(made.num_voxels), threads_per_block, 0,
-                      backend.stream, stage::tile_resolve, fold, made.num_voxels,
+                      backend.stream, stage::tile_resolve, fold,
+                      static_cast<const std::uint64_t*>(made.offsets.data() + made.keys.size()),
                       static_cast<const std::uint32_t*>(listed.data()),
                       static_cast<const std::uint32_t*>(existing.data()), lists.offsets.data(), lists.payloads.data());
     });

@@ -25,11 +25,16 @@ inline constexpr std::uint32_t no_source = 0xffffffffu;
 
 // Voxels that become bricks, at most 2^32 - 2 in all.
 struct brick_voxels {
-    const std::uint64_t* listed; // linear numbers in the part of the grid
-    std::uint32_t num_listed;
-    glm::ivec3 extent, offset, whole; // of the part; of the grid
-    brick_table kept;                 // bricks that stay
-    std::uint32_t num_kept;           // their voxels
+    const std::uint64_t* listed;          // linear numbers in the part of the grid
+    std::uint32_t num_listed;             // how many, or at most
+    glm::ivec3 extent, offset, whole;     // of the part; of the grid
+    brick_table kept;                     // bricks that stay
+    std::uint32_t num_kept;               // their voxels
+    const std::uint64_t* count = nullptr; // on the device: how many are listed, if the host does not know
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint64_t size() const {
+        return count == nullptr ? num_listed : *count;
+    }
 };
 
 // Arrays of the result, and where its voxels come from.
@@ -55,7 +60,7 @@ struct brick_arrays {
 template <int = 0> // compiled where it is called
 __global__ void mark_listed_voxels(const brick_voxels from, index_level level, int shift) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    if (i >= from.num_listed) return;
+    if (i >= from.size()) return;
     const glm::ivec3 at = place_of(from.listed[i], from.extent, from.offset);
     const std::uint64_t key = short_morton_key(at.x >> shift, at.y >> shift, at.z >> shift);
     level.set(key, 1ull << (key & 63u));
@@ -70,7 +75,7 @@ __global__ void mark_kept_bricks(const brick_table table, index_level level, int
 template <int = 0> // compiled where it is called
 __global__ void mask_listed_voxels(const brick_voxels from, index_level bricks, brick_mask* masks) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    if (i >= from.num_listed) return;
+    if (i >= from.size()) return;
     const std::uint64_t key = core::morton_key(place_of(from.listed[i], from.extent, from.offset));
     const auto bit = static_cast<unsigned>(key % core::sparse_brick_voxels);
     brick_mask& mask = masks[bricks.number_of(key / core::sparse_brick_voxels)];
@@ -89,7 +94,7 @@ __global__ void mask_kept_voxels(const brick_table table, index_level bricks, br
 template <int = 0> // compiled where it is called
 __global__ void place_listed_voxels(const brick_voxels from, index_level bricks, const brick_arrays to) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    if (i >= from.num_listed) return;
+    if (i >= from.size()) return;
     const std::uint64_t key = core::morton_key(place_of(from.listed[i], from.extent, from.offset));
     const std::uint32_t brick = bricks.number_of(key / core::sparse_brick_voxels);
     const auto bit = static_cast<unsigned>(key % core::sparse_brick_voxels);
@@ -277,7 +282,7 @@ void build_bricks(const stream_memory& memory, const brick_voxels& from, const A
     if (from.num_listed == 0 && from.num_kept == 0) {
         (void)allocate_bricks(0);
         (void)allocate_voxels(0, 0);
-    } else if (std::max({from.whole.x, from.whole.y, from.whole.z}) <= brick_index<>::max_extent) {
+    } else if (std::max({from.whole.x, from.whole.y, from.whole.z}) <= max_index_extent) {
         build_bricks_by_index(memory, from, allocate_bricks, allocate_voxels);
     } else {
         build_bricks_by_sort(memory, from, allocate_bricks, allocate_voxels);

@@ -80,18 +80,20 @@ __global__ void count_word_bits(const index_word* words, std::uint32_t count, st
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i < count) counts[i] = static_cast<unsigned>(__popcll(words[i].bits));
 }
+// Numbers from `most` on, of bits that are too many for the caller's memory, are `most` to `most` + 63.
 template <int = 0> // compiled where it is called
 __global__ void number_words(index_word* words, std::uint32_t count, const unsigned long long* before,
-                             unsigned long long* total) {
+                             std::uint32_t most, unsigned long long* total) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i >= count) return;
-    words[i].before = static_cast<std::uint32_t>(before[i]);
+    words[i].before = before[i] < most ? static_cast<std::uint32_t>(before[i]) : most;
     if (i + 1 == count) *total = before[i] + static_cast<unsigned>(__popcll(words[i].bits));
 }
-// The keys of all bits, in order. node_keys: of the nodes that the words belong to; null if there are no nodes.
+// The keys of all bits, in order; of the first `most`. node_keys: of the nodes that the words belong to; null if there
+// are no nodes.
 template <int = 0> // compiled where it is called
 __global__ void list_keys(const index_word* words, std::uint32_t count, const std::uint64_t* node_keys,
-                          std::uint64_t* keys) {
+                          std::uint64_t most, std::uint64_t* keys) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i >= count) return;
     const index_word w = words[i];
@@ -100,28 +102,33 @@ __global__ void list_keys(const index_word* words, std::uint32_t count, const st
         node_keys == nullptr ? i
                              : node_keys[i >> index_level::log2_node_words] << index_level::log2_node_words | (i & 63u);
     std::uint64_t at = w.before;
-    for (unsigned long long bits = w.bits; bits != 0; bits &= bits - 1)
+    for (unsigned long long bits = w.bits; bits != 0 && at < most; bits &= bits - 1)
         keys[at++] = number << 6 | static_cast<unsigned>(__ffsll(static_cast<long long>(bits)) - 1);
 }
 
-// Memory and numbers of an index for bricks of a grid of at most 2^16 voxels a side. Marking comes in between: first
-// nodes(), if has_nodes(); make_words(); then bricks(); make_numbers().
+inline constexpr int max_index_extent = 1 << 16; // voxels a side
+// Words of the level that has a bit for every cell of the grid, nodes or bricks; has_nodes says which.
+[[nodiscard]] inline std::uint64_t num_top_words(const glm::ivec3& whole, bool& has_nodes) {
+    constexpr unsigned max_bricks_without_nodes = 256; // along a side
+    const auto largest = static_cast<unsigned>(std::max({whole.x, whole.y, whole.z}));
+    const unsigned side = std::bit_ceil((largest + 7) / 8);
+    has_nodes = side > max_bricks_without_nodes;
+    const std::uint64_t cells = has_nodes ? side >> index_level::log2_node : side;
+    return std::max<std::uint64_t>(1, cells * cells * cells / 64);
+}
+
+// Memory and numbers of an index for bricks of a grid of at most max_index_extent voxels a side. Marking comes in
+// between: first nodes(), if has_nodes(); make_words(); then bricks(); make_numbers().
 template <int = 0> // so that programs that do not call it compile no kernels
 class brick_index {
 public:
-    static constexpr int max_extent = 1 << 16;
-    static constexpr int max_bricks_without_nodes = 256; // along a side
-
     // Throws as device_buffer does.
     brick_index(const stream_memory& memory, const glm::ivec3& whole)
         : memory_(memory), nodes_(memory, std::size_t{0}), words_(memory, std::size_t{0}),
           node_keys_(memory, std::size_t{0}), total_(memory, std::size_t{1}) {
-        const auto largest = static_cast<unsigned>(std::max({whole.x, whole.y, whole.z}));
-        const unsigned side = std::bit_ceil((largest + 7) / 8);
-        has_nodes_ = side > max_bricks_without_nodes;
+        const std::uint64_t words = num_top_words(whole, has_nodes_);
         index_word_buffer& all = has_nodes_ ? nodes_ : words_;
-        const std::uint64_t cells = has_nodes_ ? side >> index_level::log2_node : side;
-        all = index_word_buffer(memory, std::max<std::uint64_t>(1, cells * cells * cells / 64));
+        all = index_word_buffer(memory, words);
         clear(all);
     }
     [[nodiscard]] bool has_nodes() const { return has_nodes_; }
@@ -133,7 +140,7 @@ public:
         if (num != 0)
             launch_kernel(false, list_keys<0>, num_blocks(nodes_.size()), threads_per_block, 0, memory_.stream,
                           stage::tile_sort, static_cast<const index_word*>(nodes_.data()),
-                          static_cast<std::uint32_t>(nodes_.size()), static_cast<const std::uint64_t*>(nullptr),
+                          static_cast<std::uint32_t>(nodes_.size()), static_cast<const std::uint64_t*>(nullptr), num,
                           node_keys_.data());
         words_ = index_word_buffer(memory_, std::max<std::uint64_t>(1, num << index_level::log2_node_words));
         clear(words_);
@@ -143,10 +150,10 @@ public:
     [[nodiscard]] std::uint64_t make_numbers() { return number(words_); }
     // Of all bricks, in order.
     void write_keys(std::uint64_t* keys) {
-        launch_kernel(false, list_keys<0>, num_blocks(words_.size()), threads_per_block, 0, memory_.stream,
-                      stage::tile_sort, static_cast<const index_word*>(words_.data()),
-                      static_cast<std::uint32_t>(words_.size()),
-                      static_cast<const std::uint64_t*>(has_nodes_ ? node_keys_.data() : nullptr), keys);
+        launch_kernel(
+            false, list_keys<0>, num_blocks(words_.size()), threads_per_block, 0, memory_.stream, stage::tile_sort,
+            static_cast<const index_word*>(words_.data()), static_cast<std::uint32_t>(words_.size()),
+            static_cast<const std::uint64_t*>(has_nodes_ ? node_keys_.data() : nullptr), ~std::uint64_t{0}, keys);
     }
 
 private:
@@ -166,7 +173,7 @@ private:
                       static_cast<const index_word*>(words.data()), n, counts.data());
         sum_counts(counts.data(), before.data(), n, storage.data(), storage.size(), where, stream);
         launch_kernel(false, number_words<0>, num_blocks(n), threads_per_block, 0, stream, where, words.data(), n,
-                      static_cast<const unsigned long long*>(before.data()), total_.data());
+                      static_cast<const unsigned long long*>(before.data()), ~std::uint32_t{0}, total_.data());
         unsigned long long total = 0;
         check(cudaMemcpyAsync(&total, total_.data(), sizeof(total), cudaMemcpyDeviceToHost, stream), where);
         check(cudaStreamSynchronize(stream), where);

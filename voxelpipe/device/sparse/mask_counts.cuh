@@ -32,19 +32,24 @@ __global__ void count_masks(const brick_mask* masks, std::uint32_t count, std::u
 }
 
 // Counts the voxels of `bricks` masks, more than 0 of them, and writes the rank of each brick's first voxel, and one
-// more, the number of voxels. *totals is zero before.
+// more, the number of voxels. *totals is zero before. storage: cell_scan_bytes(bricks).
+template <int = 0>
+void rank_bricks(const brick_mask* masks, std::uint32_t bricks, std::uint32_t* counts, std::uint64_t* offsets,
+                 mask_totals* totals, void* storage, stage where, cudaStream_t stream) {
+    static_assert(sizeof(unsigned long long) == sizeof(std::uint64_t));
+    launch_kernel(false, count_masks<0>, num_blocks(bricks), threads_per_block, 0, stream, where, masks, bricks, counts,
+                  totals);
+    sum_counts(counts, reinterpret_cast<unsigned long long*>(offsets), bricks, storage, cell_scan_bytes(bricks), where,
+               stream);
+    check(cudaMemcpyAsync(offsets + bricks, &totals->voxels, sizeof(std::uint64_t), cudaMemcpyDeviceToDevice, stream),
+          where);
+}
+// The same, in memory of its own.
 template <int = 0>
 void rank_bricks(const stream_memory& memory, const brick_mask* masks, std::uint32_t bricks, std::uint32_t* counts,
                  std::uint64_t* offsets, mask_totals* totals, stage where) {
-    static_assert(sizeof(unsigned long long) == sizeof(std::uint64_t));
     device_buffer<std::byte> storage(memory, cell_scan_bytes(bricks));
-    launch_kernel(false, count_masks<0>, num_blocks(bricks), threads_per_block, 0, memory.stream, where, masks, bricks,
-                  counts, totals);
-    sum_counts(counts, reinterpret_cast<unsigned long long*>(offsets), bricks, storage.data(), storage.size(), where,
-               memory.stream);
-    check(cudaMemcpyAsync(offsets + bricks, &totals->voxels, sizeof(std::uint64_t), cudaMemcpyDeviceToDevice,
-                          memory.stream),
-          where);
+    rank_bricks(masks, bricks, counts, offsets, totals, storage.data(), where, memory.stream);
 }
 
 } // namespace voxelpipe::device

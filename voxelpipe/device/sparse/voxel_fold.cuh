@@ -30,16 +30,17 @@ struct fold_target {
     core::kept_sum<Target>* sums;
 };
 
+// num_voxels, on the device: how many there are. existing: null if no voxel existed.
 template <std::size_t I, class Target, class Payload>
-__global__ void fold_voxels(const fold_target<Target> t, std::uint64_t num_voxels, const std::uint32_t* listed,
+__global__ void fold_voxels(const fold_target<Target> t, const std::uint64_t* num_voxels, const std::uint32_t* listed,
                             const std::uint32_t* existing, const std::uint64_t* first, const Payload* payloads) {
     using map = core::rank_map<Target>;
     using traits = typename Target::traits;
     const std::uint64_t rank = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    const bool in = rank < num_voxels;
+    const bool in = rank < *num_voxels;
     typename Target::value_type value{};
     if (in) {
-        const std::uint32_t from = listed[rank], old = existing[rank];
+        const std::uint32_t from = listed[rank], old = existing == nullptr ? no_source : existing[rank];
         const bool loaded = old != no_source && t.load != load_operation::clear;
         if (loaded)
             value = map::load(t.before, old);

@@ -1,0 +1,157 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Bricks in memory of the caller, for calls that never wait: an index, keys, masks and ranks with room for a fixed
+// number of nodes, bricks and voxels. Only the device knows how many there are. Nodes and bricks that are too many
+// share the spare ones behind the last, so that no kernel writes outside; then the result is empty.
+
+#include <voxelpipe/device/base/call_state.cuh>
+#include <voxelpipe/device/sparse/brick_index.cuh>
+#include <voxelpipe/device/sparse/mask_counts.cuh>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+namespace voxelpipe {
+
+// How many bricks of 8^3 voxels and how many voxels a sparse call has made: both 0 if it failed.
+struct sparse_counts {
+    std::uint64_t bricks, voxels;
+};
+
+namespace device {
+
+struct brick_room {
+    std::uint64_t nodes, bricks, voxels;
+};
+
+// What number_words and list_keys give numbers to beyond the room.
+inline constexpr std::uint64_t spare_cells = 64;
+// Voxels of a failed call have the ranks of one brick.
+inline constexpr std::uint64_t spare_ranks = core::sparse_brick_voxels;
+
+// The index of brick_index.cuh in an arena.
+template <int = 0> // so that programs that do not call it compile no kernels
+class bounded_index {
+public:
+    bounded_index(const glm::ivec3& whole, const brick_room& room, arena& memory)
+        : num_top_(static_cast<std::uint32_t>(num_top_words(whole, has_nodes_))), room_(room),
+          top_(memory.take<index_word>(num_top_)) {
+        num_words_ = num_top_;
+        words_ = top_;
+        if (has_nodes_) {
+            num_words_ = static_cast<std::uint32_t>((room.nodes + spare_cells) << index_level::log2_node_words);
+            words_ = memory.take<index_word>(num_words_);
+            node_keys_ = memory.take<std::uint64_t>(room.nodes + spare_cells);
+        }
+        const std::uint32_t most = std::max(num_top_, num_words_);
+        counts_ = memory.take<std::uint32_t>(most);
+        before_ = memory.take<unsigned long long>(most);
+        storage_ = memory.take<std::byte>(cell_scan_bytes(most));
+    }
+    [[nodiscard]] bool has_nodes() const { return has_nodes_; }
+    [[nodiscard]] index_level nodes() const { return {nullptr, top_}; }
+    [[nodiscard]] index_level bricks() const { return {has_nodes_ ? top_ : nullptr, words_}; }
+
+    // Before anything is marked.
+    void clear(cudaStream_t stream) const {
+        check(cudaMemsetAsync(top_, 0, num_top_ * sizeof(index_word), stream));
+        if (has_nodes_) check(cudaMemsetAsync(words_, 0, num_words_ * sizeof(index_word), stream));
+    }
+    // After the nodes have been marked. *total becomes their number.
+    void number_nodes(unsigned long long* total, cudaStream_t stream) const {
+        number(top_, num_top_, room_.nodes, total, stream);
+        launch_kernel(false, list_keys<0>, num_blocks(num_top_), threads_per_block, 0, stream, stage::tile_sort,
+                      static_cast<const index_word*>(top_), num_top_, static_cast<const std::uint64_t*>(nullptr),
+                      room_.nodes, node_keys_);
+    }
+    // After the bricks have been marked. *total becomes their number; their keys are written in order.
+    void number_bricks(unsigned long long* total, std::uint64_t* keys, cudaStream_t stream) const {
+        number(words_, num_words_, room_.bricks, total, stream);
+        launch_kernel(false, list_keys<0>, num_blocks(num_words_), threads_per_block, 0, stream, stage::tile_sort,
+                      static_cast<const index_word*>(words_), num_words_, static_cast<const std::uint64_t*>(node_keys_),
+                      room_.bricks, keys);
+    }
+
+private:
+    void number(index_word* words, std::uint32_t n, std::uint64_t most, unsigned long long* total,
+                cudaStream_t stream) const {
+        constexpr stage where = stage::tile_sort;
+        launch_kernel(false, count_word_bits<0>, num_blocks(n), threads_per_block, 0, stream, where,
+                      static_cast<const index_word*>(words), n, counts_);
+        sum_counts(counts_, before_, n, storage_, cell_scan_bytes(n), where, stream);
+        launch_kernel(false, number_words<0>, num_blocks(n), threads_per_block, 0, stream, where, words, n,
+                      static_cast<const unsigned long long*>(before_), static_cast<std::uint32_t>(most), total);
+    }
+
+    bool has_nodes_ = false;
+    std::uint32_t num_top_, num_words_ = 0;
+    brick_room room_;
+    index_word *top_, *words_ = nullptr;
+    std::uint64_t* node_keys_ = nullptr;
+    std::uint32_t* counts_;
+    unsigned long long* before_;
+    std::byte* storage_;
+};
+
+// Publishes the counts, and notes what the call needs. Keys behind the last are ~0, which no brick has, so that the
+// whole array can be bisected. Without room, no key is left and every rank is that of an empty result.
+template <int = 0> // compiled where it is called
+__global__ void publish_bricks(pipeline_state* state, capacities limits, brick_room room, bool count_voxels,
+                               const mask_totals* totals, sparse_counts* counts, std::uint64_t* keys,
+                               std::uint64_t* offsets) {
+    const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+    const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
+    const unsigned long long bricks = state->sparse.bricks, voxels = totals->voxels;
+    const bool failed =
+        has_failed(*state, limits) || state->sparse.nodes > room.nodes || bricks > room.bricks || voxels > room.voxels;
+    if (thread == 0) {
+        *counts = {failed ? 0 : bricks, failed ? 0 : voxels};
+        state->sparse.voxels = voxels; // nobody here reads these two
+        state->voxels = count_voxels && !failed ? voxels : 0;
+    }
+    for (std::uint64_t i = thread; i < room.bricks; i += threads)
+        if (failed || i >= bricks) keys[i] = ~std::uint64_t{0};
+    if (!failed) return;
+    for (std::uint64_t i = thread; i <= room.bricks + spare_cells; i += threads) offsets[i] = 0;
+}
+
+// The arrays of a result.
+template <int = 0>
+struct bounded_bricks {
+    brick_room room;
+    mask_totals* totals;
+    sparse_counts* counts;
+    bounded_index<> index;
+    std::uint64_t* keys;
+    brick_mask* masks;      // and spare ones, which are empty
+    std::uint64_t* offsets; // one more than masks
+    std::uint32_t* of_masks;
+    std::byte* storage;
+
+    bounded_bricks(const glm::ivec3& whole, const brick_room& r, arena& memory)
+        : room(r), totals(memory.take<mask_totals>(1)), counts(memory.take<sparse_counts>(1)), index(whole, r, memory),
+          keys(memory.take<std::uint64_t>(r.bricks)), masks(memory.take<brick_mask>(num_masks())),
+          offsets(memory.take<std::uint64_t>(num_masks() + 1)), of_masks(memory.take<std::uint32_t>(num_masks())),
+          storage(memory.take<std::byte>(cell_scan_bytes(num_masks()))) {}
+    [[nodiscard]] std::uint32_t num_masks() const { return static_cast<std::uint32_t>(room.bricks + spare_cells); }
+
+    // Before anything is marked.
+    void clear(cudaStream_t stream) const {
+        index.clear(stream);
+        check(cudaMemsetAsync(totals, 0, sizeof(mask_totals), stream));
+        check(cudaMemsetAsync(masks, 0, num_masks() * sizeof(brick_mask), stream));
+    }
+    // When the masks are complete.
+    void publish(pipeline_state* state, const capacities& limits, bool count_voxels, cudaStream_t stream) const {
+        constexpr stage where = stage::fine_raster;
+        rank_bricks(masks, num_masks(), of_masks, offsets, totals, storage, where, stream);
+        launch_kernel(false, publish_bricks<0>, fill_device(num_masks()), threads_per_block, 0, stream, where, state,
+                      limits, room, count_voxels, static_cast<const mask_totals*>(totals), counts, keys, offsets);
+    }
+};
+
+} // namespace device
+} // namespace voxelpipe
