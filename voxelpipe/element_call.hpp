@@ -107,6 +107,12 @@ template <class Payload, class Output>
         return get<0>(out.values);
 }
 
+// Where the fragments of a draw are listed, in the backend's memory.
+struct element_room {
+    std::uint64_t first;
+    std::uint64_t fits; // 0: there is no room, and nothing is listed
+};
+
 // Shades and lists the voxels of each element.
 template <coverage Rule, int K, class V, class FragmentShader, class Payload>
 struct list_voxels {
@@ -115,7 +121,8 @@ struct list_voxels {
     std::uint32_t draw, first_primitive;
     glm::ivec3 extent, offset;
     const std::uint64_t* first_of_element;
-    std::uint64_t first; // of the draw, in the arrays
+    std::uint64_t first;      // of the draw, in the arrays
+    const element_room* room; // in place of `first`; may be null
     std::uint64_t* keys;
     std::uint32_t *order, *primitives;
     Payload* payloads;
@@ -124,7 +131,7 @@ struct list_voxels {
     VOXELPIPE_ANY_CALLABLE
     template <class Index>
     VOXELPIPE_HD void operator()(Index i) const {
-        if (first_of_element[i + 1] == first_of_element[i]) return;
+        if (first_of_element[i + 1] == first_of_element[i] || (room != nullptr && room->fits == 0)) return;
         const auto e = all.in.locate(static_cast<std::uint32_t>(i));
         const snapped_position a = all.position(e.index[0]), b = all.position(e.index[K - 1]);
         const V &of_a = all.vertices[e.index[0]].varyings, &of_b = all.vertices[e.index[K - 1]].varyings;
@@ -137,7 +144,7 @@ struct list_voxels {
         f.normal = glm::vec3(0.0f);
         f.vertex_varyings[0] = f.vertex_varyings[2] = &of_a;
         f.vertex_varyings[1] = &of_b;
-        std::uint64_t to = first + first_of_element[i];
+        std::uint64_t to = (room != nullptr ? room->first : first) + first_of_element[i];
         std::uint64_t discarded = 0;
         all.template for_each_voxel<Rule>(a, b, [&](const auto& t, const auto& p, std::int64_t w) {
             f.axis = t.is_point ? 0 : t.axis;
@@ -225,7 +232,7 @@ template <coverage Rule, class Backend, class View, class VertexShader, class Fr
         backend.for_each(of.all.count,
                          passes::list_voxels<Rule, size, V, FragmentShader, payload_storage<payload>>{
                              of.all, draws[d].fragment_shader, static_cast<std::uint32_t>(d), first_primitive, g.extent,
-                             g.offset, of.first_of_element.data(), first, part.keys.data(), part.order.data(),
+                             g.offset, of.first_of_element.data(), first, nullptr, part.keys.data(), part.order.data(),
                              part.primitives.data(), part.payloads.data(), counts.data()});
         first += of.num_fragments;
         first_primitive += static_cast<std::uint32_t>(of.all.count);

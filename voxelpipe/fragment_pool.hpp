@@ -29,6 +29,16 @@ namespace voxelpipe::core {
 
 namespace pool {
 
+// A number that the host knows, or one in the backend's memory.
+struct length {
+    std::uint64_t value;
+    const std::uint64_t* at = nullptr; // null: `value`
+
+    VOXELPIPE_HD length(std::uint64_t n) : value(n) {} // NOLINT(*-explicit-*): most are plain numbers
+    VOXELPIPE_HD explicit length(const std::uint64_t* in_memory) : value(0), at(in_memory) {}
+    VOXELPIPE_HD operator std::uint64_t() const { return at != nullptr ? *at : value; } // NOLINT(*-explicit-*)
+};
+
 // Fragment i of lists, from number `first` on.
 template <class Payload>
 struct take_lists {
@@ -54,8 +64,10 @@ struct gather {
     const Payload* payloads;
     std::uint32_t* to_primitives;
     Payload* to_payloads;
+    length count; // others are left out
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (i >= count) return;
         to_primitives[i] = primitives[order[i]];
         if constexpr (!std::is_same_v<Payload, no_payload>) to_payloads[i] = payloads[order[i]];
     }
@@ -63,7 +75,7 @@ struct gather {
 // 1 for the first fragment of a voxel; a last element of 0, so that the sums end with the total.
 struct mark_first {
     const std::uint64_t* keys;
-    std::uint64_t count;
+    length count;
     std::uint32_t* is_first;
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         is_first[i] = i < count && (i == 0 || keys[i] != keys[i - 1]) ? 1 : 0;
@@ -72,11 +84,11 @@ struct mark_first {
 struct store_voxels {
     const std::uint64_t *keys, *rank;
     const std::uint32_t* is_first;
-    std::uint64_t count;
+    length count;
     std::uint64_t *voxels, *offsets;
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         if (i == count)
-            offsets[rank[i]] = count;
+            offsets[rank[i]] = i;
         else if (is_first[i] != 0) {
             voxels[rank[i]] = keys[i];
             offsets[rank[i]] = i;
@@ -89,8 +101,10 @@ struct fold {
     target_view<Target> target;
     const std::uint64_t *voxels, *offsets;
     const Payload* payloads;
+    length count; // of voxels
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (i >= count) return;
         using map = typename Target::map;
         using traits = typename Target::traits;
         const auto nx = static_cast<std::uint64_t>(target.extent.x), ny = static_cast<std::uint64_t>(target.extent.y);
@@ -176,7 +190,7 @@ public:
         lists.primitives = buffer<std::uint32_t>(backend, kept);
         lists.payloads = buffer<stored>(backend, std::is_void_v<Payload> ? 0 : kept);
         backend.for_each(kept, pool::gather<stored>{from.order.data(), from.primitives.data(), from.payloads.data(),
-                                                    lists.primitives.data(), lists.payloads.data()});
+                                                    lists.primitives.data(), lists.payloads.data(), kept});
         from.primitives = buffer<std::uint32_t>(backend, 0);
         from.payloads = buffer<stored>(backend, 0);
         buffer<std::uint32_t> is_first(backend, kept + 1);
@@ -236,8 +250,9 @@ template <class Backend, class Payload, class... Targets>
         using target = typename pack_element<I, Targets...>::type;
         const auto& t = voxelpipe::get<I>(fb.targets);
         if (t.load == load_operation::off) return;
-        backend.for_each(lists.num_voxels(), pool::fold<I, target, Payload>{
-                                                 t, lists.voxels.data(), lists.offsets.data(), lists.payloads.data()});
+        backend.for_each(lists.num_voxels(),
+                         pool::fold<I, target, Payload>{t, lists.voxels.data(), lists.offsets.data(),
+                                                        lists.payloads.data(), lists.num_voxels()});
     });
     return s;
 }

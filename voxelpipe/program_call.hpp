@@ -79,6 +79,7 @@ struct origin_shader {
     const std::uint32_t* origins;
     std::uint32_t each; // input primitives of an instance
     std::uint32_t draw, first_primitive;
+    const std::uint32_t* moved = nullptr; // added to the primitives, in the backend's memory; null: nothing
 
     VOXELPIPE_ANY_CALLABLE
     template <class V>
@@ -88,7 +89,7 @@ struct origin_shader {
         f.triangle = origin % each;
         f.instance = origin / each;
         f.draw = draw;
-        f.primitive = drawn.primitive + first_primitive;
+        f.primitive = drawn.primitive + first_primitive + (moved != nullptr ? *moved : 0);
         return shader(f);
     }
 };
@@ -314,6 +315,12 @@ inline void add_counts(counters& to, const counters& more) {
     to.fragments_discarded += more.fragments_discarded;
 }
 
+// True if the emitted triangles hold those that a tessellation leaves out. They are no input of a geometry program.
+template <class Amplify>
+inline constexpr bool counts_left_out = true;
+template <class Tessellation, class Geometry>
+inline constexpr bool counts_left_out<tessellate_then_geometry<Tessellation, Geometry>> = false;
+
 // Triangles that are left out lie outside of the grid, and are none of those that are counted there.
 [[nodiscard]] inline status without_left_out(status s, std::uint64_t left_out) {
     s.counts.triangles_in -= std::min(s.counts.triangles_in, left_out);
@@ -349,7 +356,7 @@ public:
             total += amplified_.back()->total();
         }
         const std::vector<std::uint64_t> counts = counts_.to_host(backend);
-        left_out_ = counts[index_of(program_count::left_out)];
+        if (counts_left_out<Amplify>) left_out_ = counts[index_of(program_count::left_out)];
         state_ = check_counts(counts, total);
     }
     [[nodiscard]] const status& state() const { return state_; }
@@ -399,7 +406,7 @@ private:
             return {m.view(),
                     {},
                     {draws_[d].fragment_shader, m.origins.data(), each, static_cast<std::uint32_t>(d),
-                     static_cast<std::uint32_t>(first)}};
+                     static_cast<std::uint32_t>(first), nullptr}};
         }
     }
 

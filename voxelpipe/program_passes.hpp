@@ -136,6 +136,7 @@ struct emit_points {
     std::uint64_t first, count;
     glm::vec3 outside;
     Sink sink;
+    const std::uint64_t* bound = nullptr; // of points that are emitted, in the backend's memory; null: all
 
     VOXELPIPE_ANY_CALLABLE
     template <class Index>
@@ -144,6 +145,7 @@ struct emit_points {
             sink.store(i, vertex_output<W>{outside, W{}});
             return;
         }
+        if (bound != nullptr && i >= *bound) return;
         const std::uint32_t number = find_owner(all.first_point, all.count, first + i);
         const auto local = static_cast<std::uint32_t>(first + i - all.first_point[number]);
         const lattice patch = lattice::unpack(all.levels[number]);
@@ -183,9 +185,15 @@ struct emit_triangles {
     std::uint64_t begin, first_point;
     std::uint32_t left_out;
     glm::uvec3* triangles;
-    std::uint32_t* origins; // may be null
+    std::uint32_t* origins;               // may be null
+    const std::uint64_t* bound = nullptr; // others are left out; in the backend's memory; null: none
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (bound != nullptr && i >= *bound) {
+            triangles[i] = glm::uvec3(left_out);
+            if (origins != nullptr) origins[i] = 0;
+            return;
+        }
         const std::uint32_t number = find_owner(all.first_triangle, all.count, begin + i);
         const auto t = lattice_triangle_of(static_cast<std::uint32_t>(begin + i - all.first_triangle[number]));
         const auto index = [&](const lattice_index& p) {
@@ -224,10 +232,12 @@ struct run_geometry {
     glm::uvec3* triangles;
     std::uint32_t* origins; // may be null
     std::uint64_t* counts;
+    const std::uint64_t* bound = nullptr; // if it is 0, in the backend's memory, nothing is emitted; may be null
 
     VOXELPIPE_ANY_CALLABLE
     template <class Index>
     VOXELPIPE_HD void operator()(Index k) const {
+        if (num_triangles == nullptr && bound != nullptr && *bound == 0) return;
         const std::uint64_t i = first_input + k;
         if (i == all.count) {
             num_triangles[i] = 0;

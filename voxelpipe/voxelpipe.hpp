@@ -27,6 +27,8 @@
 #if defined(__CUDACC__)
 #include <voxelpipe/device/abuffer_async.cuh>
 #include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/device/optional/element_async.cuh>
+#include <voxelpipe/device/optional/program_async.cuh>
 #include <voxelpipe/device/optional/solid.cuh>
 #include <voxelpipe/device/optional/solid_async.cuh>
 #include <voxelpipe/device/optional/sparse.cuh>

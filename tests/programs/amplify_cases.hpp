@@ -101,6 +101,8 @@ results draw_with(Backend& backend, const vp::grid& grid, const Draw& draw) {
     vp::status s = draw(shader{}, fb);
     EXPECT_TRUE(s.ok()) << s.message();
     r.counts = s.counts;
+    EXPECT_EQ(r.counts.triangles_in, r.counts.triangles_dropped() + r.counts.triangles_zero_area +
+                                         r.counts.triangles_outside + r.counts.triangles_drawn);
     r.ids = vp::get<0>(fb).to_host(backend);
     r.sums = vp::get<1>(fb).to_host(backend);
     r.parities = vp::get<2>(fb).to_host(backend);

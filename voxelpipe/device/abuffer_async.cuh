@@ -58,7 +58,8 @@ namespace device {
 // Carves the memory and, with Run, launches every stage and sets the view. Stages write straight to the final arrays if
 // they can.
 template <coverage Rule, bool Run, class Key, class Payload, class Call>
-void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
+void list_async(const Call& call, const workspace_view& workspace, arena& memory, abuffer_view<Payload>& lists,
+                cudaStream_t stream) {
     arena behind = memory; // behind the memory of the stages
     call.template plan_memory<Key>(behind);
     const std::size_t capacity = call.limits.fragments;
@@ -72,6 +73,7 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
         arena start = memory;
         auto* const state = start.take<pipeline_state>(1); // first in the call's memory
         zero_memory(state, start.used() - memory.used(), stream);
+        take_stop(workspace, state, stream);
         check_subsets(call.draws, &state->index_error, stream);
         output_pointers outputs;
         outputs.value.voxels = voxels;
@@ -96,18 +98,19 @@ void list_async(const Call& call, arena& memory, abuffer_view<Payload>& lists, c
 }
 
 template <class Coverage, bool Run, class Payload, class Call>
-void list_async(const Call& call, coverage rule, arena& memory, abuffer_view<Payload>& lists, cudaStream_t stream) {
+void list_async(const Call& call, coverage rule, const workspace_view& workspace, arena& memory,
+                abuffer_view<Payload>& lists, cudaStream_t stream) {
     const bool small = num_voxels(call.g) < std::numeric_limits<std::uint32_t>::max();
     Coverage::dispatch(rule, [&]<coverage Rule>() {
-        small ? list_async<Rule, Run, std::uint32_t>(call, memory, lists, stream)
-              : list_async<Rule, Run, std::uint64_t>(call, memory, lists, stream);
+        small ? list_async<Rule, Run, std::uint32_t>(call, workspace, memory, lists, stream)
+              : list_async<Rule, Run, std::uint64_t>(call, workspace, memory, lists, stream);
     });
 }
 
 template <class Call, class Payload>
 [[nodiscard]] std::size_t list_bytes(const Call& call, coverage rule, abuffer_view<Payload> lists) {
     arena plan;
-    list_async<core::known_coverage<>, false>(call, rule, plan, lists, nullptr);
+    list_async<core::known_coverage<>, false>(call, rule, {}, plan, lists, nullptr);
     return plan.used();
 }
 
@@ -191,7 +194,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
             }
             device::launch_until(stage::abuffer_emit, [&] {
                 device::arena memory(workspace.memory);
-                device::list_async<core::known_coverage<Known...>, true>(call, options.rule, memory, lists,
+                device::list_async<core::known_coverage<Known...>, true>(call, options.rule, workspace, memory, lists,
                                                                          backend.stream);
             });
         } catch (const device::cuda_failure& e) {

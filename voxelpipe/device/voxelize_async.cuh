@@ -55,6 +55,9 @@ struct workspace_view {
     void* memory = nullptr;  // on the device, aligned to 256 bytes
     std::size_t bytes = 0;   // at least workspace_bytes(...)
     workspace_limits limits; // that `bytes` was computed for
+    // For calls behind others that may fail on the device, such as programs: 0 or `device::stopped`, in device memory
+    // when the stream reaches the call, which then writes no target. May be null.
+    const unsigned int* stop = nullptr;
 };
 
 namespace device {
@@ -81,6 +84,13 @@ auto with_call(std::span<const Draw> draws, const grid& g, const Framebuffer& fb
         });
 }
 
+// Takes over workspace.stop, once the state is zero.
+inline void take_stop(const workspace_view& workspace, pipeline_state* state, cudaStream_t stream) {
+    if (workspace.stop != nullptr)
+        check(cudaMemcpyAsync(&state->index_error, workspace.stop, sizeof(*workspace.stop), cudaMemcpyDeviceToDevice,
+                              stream));
+}
+
 // A call without triangles.
 template <class... Targets>
 [[nodiscard]] status clear_async(cuda_backend& backend, const framebuffer_view<Targets...>& fb,
@@ -93,6 +103,7 @@ template <class... Targets>
     auto* const state = static_cast<pipeline_state*>(workspace.memory);
     launch_until(stage::fine_raster, [&] {
         check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), backend.stream));
+        take_stop(workspace, state, backend.stream);
         clear_framebuffer(fb, state, backend.stream);
     });
     return {};
@@ -146,6 +157,8 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                 device::launch_until(call.last_stage(), [&] {
                     device::arena memory(workspace.memory);
                     device::zero_memory(workspace.memory, call.zeroed_bytes(), backend.stream);
+                    device::take_stop(workspace, static_cast<device::pipeline_state*>(workspace.memory),
+                                      backend.stream);
                     device::check_subsets(draws, &static_cast<device::pipeline_state*>(workspace.memory)->index_error,
                                           backend.stream);
                     core::known_coverage<Known...>::dispatch(

@@ -12,8 +12,8 @@
 namespace voxelpipe::device {
 
 // Bits of pipeline_state::index_error: an index that names no vertex, numbers of a subset that do not ascend below its
-// whole.
-inline constexpr unsigned int bad_index = 1, bad_numbers = 2;
+// whole, or that the work before the call asks for nothing to be written (workspace_view::stop).
+inline constexpr unsigned int bad_index = 1, bad_numbers = 2, stopped = 4;
 
 // Lies in global memory and is zero when a call starts. Totals go on counting past a capacity, so they say how much is
 // needed.
@@ -24,7 +24,7 @@ struct pipeline_state {
     unsigned long long list_fragments, fragment_records; // A-buffer
     unsigned long long list_voxels;
     unsigned long long filtered, kept;              // listed fragments that the shader discards, and all others
-    unsigned int index_error;                       // bad_index and bad_numbers
+    unsigned int index_error;                       // bad_index, bad_numbers, stopped
     unsigned int num_items, num_splits, num_images; // tile split; solids: the last two count long rows
     unsigned int next_item;                         // fine raster; solids: entries that have a place
     unsigned int num_ordered[5];                    // fragment order: lengths of order_lists
