@@ -54,7 +54,6 @@ std::vector<std::filesystem::path> write_output(volume& voxels, const command_li
 // The same of a sparse volume; .nvdb takes the colours that --help promises too.
 std::vector<std::filesystem::path> write_output(sparse_volume& voxels, const command_line& options,
                                                 const std::filesystem::path& output, const write_options& how) {
-    memory::require(dense_bytes(voxels, output), "a dense grid for " + output.filename().string());
     std::vector<channel> aside;
     if (const format* const f = find_format(output); f->all_channels && !f->only_sparse)
         while (aside.size() < options.implied.size()) {

@@ -102,13 +102,14 @@ TEST(ToolSparse, SolidsHoldTheVoxelsAndValuesOfADenseRun) {
     }
 }
 
-// A picture drawn from bricks, a dense file made of them, and .nvdb by either way.
+// A picture drawn from bricks, dense files read from them, shapes, and .nvdb by either way.
 TEST(ToolSparse, WritesTheSameFilesAsADenseRun) {
+    constexpr const char* extensions[] = {".png", ".nvdb", ".vti", ".vox", ".glb"};
     const scratch_folder folder;
     gltf_test::small_world().write_glb(folder / "m.glb");
     const auto voxelize = [&](const std::string& name, std::vector<std::string> more) {
         std::vector<std::string> arguments{folder / "m.glb", "-r", "90", "--image-size", "320x240"};
-        for (const char* extension : {".png", ".nvdb", ".vti", ".vox"}) {
+        for (const char* extension : extensions) {
             arguments.emplace_back("-o");
             arguments.push_back(folder / (name + extension));
         }
@@ -121,11 +122,43 @@ TEST(ToolSparse, WritesTheSameFilesAsADenseRun) {
     voxelize("one", {"--sparse", "-j", "1"});
     voxelize("five", {"--sparse", "-j", "5"});
     voxelize("slabs", {"--sparse", "--work-memory", "1"});
-    for (const std::string extension : {".png", ".nvdb", ".vti", ".vox"}) {
+    for (const std::string extension : extensions) {
         const std::string dense = read_file(folder / ("d" + extension));
         EXPECT_LT(100U, dense.size());
         for (const char* name : {"s", "one", "five", "slabs"})
             EXPECT_TRUE(dense == read_file(folder / (name + extension))) << name << extension;
+    }
+}
+
+// Shapes of several .vox models, of joined faces, of points, of the other axis upright, of solids without colours.
+TEST(ToolSparse, WritesTheSameShapesAsADenseRun) {
+    const std::vector<std::vector<std::string>> runs{
+        {"-r", "270", "--coverage", "thin", "--up", "z", "-o", "$.vox"},
+        {"-r", "61", "--merge", "--up", "z", "-o", "$.glb", "-o", "$.obj", "-o", "$.ply", "-o", "$.schem"},
+        {"-r", "50", "--points", "-t", "occupancy", "-o", "$.ply", "-o", "$.vox", "-o", "$.xyz"},
+        {"-r", "50", "--solid", "exterior", "-t", "occupancy", "-o", "$.glb", "-o", "$.binvox", "-o", "$.schem", "-o",
+         "$.nrrd"}};
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    for (const std::vector<std::string>& one : runs) {
+        std::vector<std::string> names;
+        for (const char* how : {"--dense", "--sparse"}) {
+            std::vector<std::string> arguments{folder / "m.glb", how};
+            for (std::string argument : one) {
+                if (argument.front() == '$') {
+                    if (how == std::string("--dense")) names.push_back(argument.substr(1));
+                    argument = folder / (how + argument.substr(1));
+                }
+                arguments.push_back(argument);
+            }
+            const outcome result = run(folder, arguments);
+            ASSERT_EQ(0, result.code) << result.err;
+        }
+        for (const std::string& name : names) {
+            const std::string dense = read_file(folder / ("--dense" + name));
+            EXPECT_LT(100U, dense.size());
+            EXPECT_TRUE(dense == read_file(folder / ("--sparse" + name))) << name;
+        }
     }
 }
 
@@ -152,13 +185,16 @@ TEST(ToolSparse, IsChosenWhereItHasToBeAndSaysSo) {
     result = voxelize({"-o", folder / "a.vti", "-r", "400", "-t", "depth", "--max-memory", "150"});
     EXPECT_EQ(0, result.code) << result.err;
     EXPECT_NE(std::string::npos, result.err.find("a dense one would take")) << result.err;
-    // .glb is made of a dense grid, and says what is missing.
-    result = voxelize({"-o", folder / "a.glb", "-r", "400", "-t", "occupancy,color", "--max-memory", "200"});
-    EXPECT_EQ(3, result.code) << result.err;
-    result =
-        voxelize({"-o", folder / "a.glb", "-r", "400", "-t", "occupancy,color", "--max-memory", "200", "--sparse"});
-    EXPECT_EQ(3, result.code) << result.err;
-    EXPECT_NE(std::string::npos, result.err.find("a dense grid for a.glb")) << result.err;
+    // So are shapes of the voxels, which --dense makes too large.
+    for (const char* name : {"a.glb", "a.vox"}) {
+        std::vector<std::string> arguments{"-o",         folder / name, "-r",           "400", "-t", "occupancy,color",
+                                           "--coverage", "thin",        "--max-memory", "200"};
+        result = voxelize(arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        EXPECT_NE(std::string::npos, result.err.find("a dense one would take")) << result.err;
+        arguments.emplace_back("--dense");
+        EXPECT_EQ(3, voxelize(arguments).code);
+    }
     result = voxelize({"-o", folder / "a.npz", "-t", "color-outer", "--sparse"});
     EXPECT_EQ(5, result.code) << result.err;
     EXPECT_NE(std::string::npos, result.err.find("color-outer needs a dense grid")) << result.err;

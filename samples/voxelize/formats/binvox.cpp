@@ -7,8 +7,6 @@
 #include "text.hpp"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 
 namespace voxelize {
 namespace {
@@ -52,36 +50,11 @@ private:
     std::uint64_t length_ = 0;
 };
 
-// Transposes a 32 x 32 bit matrix in place: bit c of row r becomes bit r of row c.
-void transpose(std::array<std::uint32_t, 32>& rows) {
-    std::uint32_t mask = 0x0000ffffu;
-    for (unsigned half = 16; half != 0; half >>= 1, mask ^= mask << half)
-        for (unsigned r = 0; r < 32; r = (r + half + 1) & ~half) {
-            const std::uint32_t swapped = (rows[r] >> half ^ rows[r + half]) & mask;
-            rows[r] ^= swapped << half;
-            rows[r + half] ^= swapped;
-        }
-}
-
-// Adds the first n bits of a word, run by run.
-void add_bits(run_writer& runs, std::uint32_t bits, int n) {
-    for (int at = 0; at < n;) {
-        const bool value = (bits >> at & 1u) != 0;
-        const std::uint32_t rest = bits >> at;
-        const int length = std::min(value ? std::countr_one(rest) : std::countr_zero(rest), n - at);
-        runs.add(value, static_cast<std::uint64_t>(length));
-        at += length;
-    }
-}
-
 } // namespace
 
-std::vector<std::filesystem::path> write_binvox(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_binvox(const voxel_shape& v, const std::filesystem::path& path,
                                                 const write_options& options) {
-    const channel& bits = *v.occupancy();
-    const std::int64_t nx = v.extent[0], ny = v.extent[1], nz = v.extent[2];
-    const std::int64_t side = std::max({nx, ny, nz});
-    const auto empty = [](std::int64_t n) { return static_cast<std::uint64_t>(n); };
+    const auto side = static_cast<std::uint64_t>(*std::max_element(v.extent.begin(), v.extent.end()));
 
     output_file out(path);
     const std::string n = std::to_string(side);
@@ -89,36 +62,24 @@ std::vector<std::filesystem::path> write_binvox(const volume& v, const std::file
     out.write("translate " + number(v.origin[0]) + " " + number(v.origin[1]) + " " + number(v.origin[2]) + "\n");
     out.write("scale " + number(v.voxel_size[0] * static_cast<double>(side)) + "\ndata\n");
 
-    // The file wants x slowest and the bits have it fastest. So take one column of words, 32 slices of x, at a time,
-    // and transpose it in blocks of 32 rows along y: then slice x reads as nz rows of ny packed bits.
-    const std::int64_t row_words = (ny + 31) / 32;
-    std::vector<std::uint32_t> slices(static_cast<std::size_t>(32 * nz * row_words));
-    const auto slice_word = [&](std::int64_t x, std::int64_t k, std::int64_t w) -> std::uint32_t& {
-        return slices[static_cast<std::size_t>((x * nz + k) * row_words + w)];
-    };
-    progress_meter meter(options.progress, static_cast<std::uint64_t>(nx));
+    // x is slowest in the file and y fastest.
+    const brick_order order(v, 0);
+    progress_meter meter(options.progress, order.num_layers());
     run_writer runs(out);
-    for (std::int64_t column = 0; column < v.words_per_row(); ++column) {
-        for (std::int64_t k = 0; k < nz; ++k)
-            for (std::int64_t w = 0; w < row_words; ++w) {
-                std::array<std::uint32_t, 32> block{};
-                for (std::int64_t j = 32 * w; j < std::min(32 * w + 32, ny); ++j)
-                    block[static_cast<std::size_t>(j - 32 * w)] = v.word(bits, column, j, k);
-                transpose(block);
-                for (std::int64_t x = 0; x < 32; ++x) slice_word(x, k, w) = block[static_cast<std::size_t>(x)];
-            }
-        const std::int64_t count = std::min<std::int64_t>(32, nx - 32 * column);
-        for (std::int64_t x = 0; x < count; ++x) {
-            for (std::int64_t k = 0; k < nz; ++k) {
-                for (std::int64_t w = 0; w < row_words; ++w)
-                    add_bits(runs, slice_word(x, k, w), static_cast<int>(std::min<std::int64_t>(32, ny - 32 * w)));
-                runs.add(false, empty(side - ny));
-            }
-            runs.add(false, empty((side - nz) * side));
-        }
-        meter.advance(static_cast<std::uint64_t>(count));
+    std::uint64_t written = 0; // voxels of the cube
+    for (std::size_t layer = 0; layer < order.num_layers(); ++layer) {
+        for (unsigned x = 0; x < 8; ++x)
+            order.for_each_voxel(order.layer(layer), x, [&](std::size_t, const glm::ivec3& voxel) {
+                const std::uint64_t at =
+                    (static_cast<std::uint64_t>(voxel.x) * side + static_cast<std::uint64_t>(voxel.z)) * side +
+                    static_cast<std::uint64_t>(voxel.y);
+                runs.add(false, at - written);
+                runs.add(true, 1);
+                written = at + 1;
+            });
+        meter.advance(1);
     }
-    for (std::int64_t x = nx; x < side; ++x) runs.add(false, empty(side * side));
+    runs.add(false, side * side * side - written);
     runs.finish();
     out.commit();
     return {path};

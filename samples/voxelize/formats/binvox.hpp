@@ -7,10 +7,11 @@
 // differ from axis to axis is refused. translate is the grid's origin, scale the side of the cube, both in world units.
 
 #include "formats.hpp"
+#include "voxel_shape.hpp"
 
 namespace voxelize {
 
-std::vector<std::filesystem::path> write_binvox(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_binvox(const voxel_shape& v, const std::filesystem::path& path,
                                                 const write_options& options);
 
 } // namespace voxelize

@@ -12,6 +12,7 @@
 #include "schem.hpp"
 #include "text.hpp"
 #include "vox.hpp"
+#include "voxel_shape.hpp"
 #include "vti.hpp"
 #include "zarr.hpp"
 
@@ -25,8 +26,13 @@
 namespace voxelize {
 namespace {
 
-using writer = std::vector<std::filesystem::path> (*)(const volume&, const std::filesystem::path&,
-                                                      const write_options&);
+// A writer takes dense channels, or the occupied voxels and their colours.
+struct writer {
+    std::vector<std::filesystem::path> (*of_channels)(const volume&, const std::filesystem::path&,
+                                                      const write_options&) = nullptr;
+    std::vector<std::filesystem::path> (*of_shape)(const voxel_shape&, const std::filesystem::path&,
+                                                   const write_options&) = nullptr;
+};
 
 constexpr auto all_formats = std::to_array<format>({
     {".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", false, true, false, false},
@@ -49,26 +55,42 @@ constexpr auto all_formats = std::to_array<format>({
 #endif
 });
 constexpr auto all_writers = std::to_array<writer>({
-    write_npy,
-    write_npz,
-    write_vox,
-    write_schem,
-    write_binvox,
-    write_vti,
-    write_nrrd,
-    write_zarr,
-    write_glb,
-    write_obj,
-    write_ply,
-    write_xyz,
-    write_png,
-    write_page,
-    write_nvdb,
+    {write_npy},
+    {write_npz},
+    {nullptr, write_vox},
+    {nullptr, write_schem},
+    {nullptr, write_binvox},
+    {write_vti},
+    {write_nrrd},
+    {write_zarr},
+    {nullptr, write_glb},
+    {nullptr, write_obj},
+    {nullptr, write_ply},
+    {nullptr, write_xyz},
+    {write_png},
+    {write_page},
+    {write_nvdb},
 #ifdef VOXELIZE_HAS_OPENVDB
-    write_vdb,
+    {write_vdb},
 #endif
 });
 static_assert(all_formats.size() == all_writers.size());
+
+std::size_t number_of(const format& f) { return static_cast<std::size_t>(&f - all_formats.data()); }
+
+const format& known_format(const std::filesystem::path& path) {
+    if (const format* const f = find_format(path); f != nullptr) return *f;
+    std::string known;
+    for (const format& each : all_formats) known += (known.empty() ? "" : ", ") + std::string(each.extension);
+    throw write_error(path, "no writer for this extension; there are " + known);
+}
+
+void check_cubes(const format& f, const std::array<double, 3>& voxel_size, const std::filesystem::path& path) {
+    if (!f.needs_cubes || are_cubic(voxel_size)) return;
+    const auto& [x, y, z] = voxel_size;
+    throw write_error(path, std::string(f.extension) + " has one voxel size for all axes, but this grid's are " +
+                                number(x) + ", " + number(y) + " and " + number(z));
+}
 
 } // namespace
 
@@ -89,22 +111,22 @@ const format* find_format(const std::filesystem::path& path) {
 
 std::vector<std::filesystem::path> write(const volume& v, const std::filesystem::path& path,
                                          const write_options& options) {
-    const format* f = find_format(path);
-    if (f == nullptr) {
-        std::string known;
-        for (const format& each : all_formats) known += (known.empty() ? "" : ", ") + std::string(each.extension);
-        throw write_error(path, "no writer for this extension; there are " + known);
-    }
+    const format& f = known_format(path);
     v.check();
     if (v.channels.empty()) throw write_error(path, "there is no channel to write");
-    if (f->needs_occupancy && v.occupancy() == nullptr)
-        throw write_error(path, std::string(f->extension) + " needs the occupancy");
-    if (f->needs_cubes && !are_cubic(v.voxel_size)) {
-        const auto& [x, y, z] = v.voxel_size;
-        throw write_error(path, std::string(f->extension) + " has one voxel size for all axes, but this grid's are " +
-                                    number(x) + ", " + number(y) + " and " + number(z));
-    }
-    return all_writers[static_cast<std::size_t>(f - all_formats.data())](v, path, options);
+    if (f.needs_occupancy && v.occupancy() == nullptr)
+        throw write_error(path, std::string(f.extension) + " needs the occupancy");
+    check_cubes(f, v.voxel_size, path);
+    const writer& w = all_writers[number_of(f)];
+    if (w.of_shape != nullptr) return w.of_shape(voxel_shape(v, options.threads), path, options);
+    return w.of_channels(v, path, options);
+}
+
+std::vector<std::filesystem::path> write(const voxel_shape& v, const std::filesystem::path& path,
+                                         const write_options& options) {
+    const format& f = known_format(path);
+    check_cubes(f, v.voxel_size, path);
+    return all_writers[number_of(f)].of_shape(v, path, options);
 }
 
 } // namespace voxelize

@@ -61,4 +61,10 @@ struct format {
 std::vector<std::filesystem::path> write(const volume& v, const std::filesystem::path& path,
                                          const write_options& options = {});
 
+// The same of occupied voxels and their colours (voxel_shape.hpp), for formats that show those alone: all but .npy,
+// .npz, .vti, .nrrd, .zarr, .png, .html, .nvdb and .vdb.
+class voxel_shape;
+std::vector<std::filesystem::path> write(const voxel_shape& v, const std::filesystem::path& path,
+                                         const write_options& options);
+
 } // namespace voxelize

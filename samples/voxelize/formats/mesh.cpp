@@ -9,7 +9,6 @@
 #include "voxel_mesh.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <memory>
@@ -26,7 +25,9 @@ std::uint8_t green(std::uint32_t rgb) { return static_cast<std::uint8_t>(rgb >> 
 std::uint8_t blue(std::uint32_t rgb) { return static_cast<std::uint8_t>(rgb >> 16); }
 
 // World coordinate of lattice plane `n` + `part` along an axis.
-double world(const volume& v, std::size_t axis, double n) { return std::fma(n, v.voxel_size[axis], v.origin[axis]); }
+double world(const voxel_shape& v, std::size_t axis, double n) {
+    return std::fma(n, v.voxel_size[axis], v.origin[axis]);
+}
 
 template <class T>
 void put(std::string& out, T value) {
@@ -73,7 +74,7 @@ std::vector<mesh_part> split(std::span<const voxel_face> faces, const std::files
 // Finds the faces and hands each part of them to WRITE(output_file&, welded_mesh, progress_meter&); commits all at the
 // end.
 template <class Write>
-std::vector<std::filesystem::path> write_parts(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_parts(const voxel_shape& v, const std::filesystem::path& path,
                                                const write_options& options, std::uint64_t most, const Write& write) {
     if (options.faces_per_file != 0) most = std::min(most, options.faces_per_file);
     auto probe = std::make_unique<output_file>(path); // a path that cannot be written costs no work
@@ -100,7 +101,7 @@ std::vector<std::filesystem::path> write_parts(const volume& v, const std::files
 struct coordinate_texts {
     std::array<std::vector<std::string>, 3> of_axis;
 
-    coordinate_texts(const volume& v, double shift, std::int64_t more) {
+    coordinate_texts(const voxel_shape& v, double shift, std::int64_t more) {
         for (std::size_t a = 0; a < 3; ++a)
             for (std::int64_t n = 0; n < v.extent[a] + more; ++n)
                 of_axis[a].push_back(number(world(v, a, static_cast<double>(n) + shift)));
@@ -117,43 +118,24 @@ std::string fraction_text(int b) {
     return {text.data(), end};
 }
 
-// Calls visit(i, j, k) for the occupied voxels of a run of rows.
-template <class Visit>
-void for_each_occupied(const volume& v, const channel& bits, std::int64_t row, std::int64_t end, const Visit& visit) {
-    for (; row < end; ++row) {
-        const std::int64_t j = row % v.extent[1], k = row / v.extent[1];
-        for (std::int64_t w = 0; w < v.words_per_row(); ++w)
-            for (std::uint32_t word = v.word(bits, w, j, k); word != 0; word &= word - 1)
-                visit(32 * w + std::countr_zero(word), j, k);
-    }
-}
-
-// FORMAT(out, i, j, k) for every occupied voxel, in storage order.
+// FORMAT(text, brick, glm::ivec3 voxel) for every occupied voxel, in storage order.
 template <class Format>
-void write_voxels(output_file& out, const volume& v, const write_options& options, const Format& format) {
-    const channel& bits = *v.occupancy();
-    const std::int64_t rows = v.extent[1] * v.extent[2];
-    progress_meter meter(options.progress, static_cast<std::uint64_t>(rows));
-    const int workers = thread_count(options.threads);
-    constexpr std::int64_t block_rows = 512;
-    const std::int64_t at_once = block_rows * 4 * workers;
-    for (std::int64_t begin = 0; begin < rows; begin += at_once) {
-        const std::int64_t end = std::min(rows, begin + at_once);
-        std::vector<std::string> blocks(static_cast<std::size_t>((end - begin + block_rows - 1) / block_rows));
-        parallel_for(blocks.size(), workers, [&](std::size_t b) {
-            const std::int64_t first = begin + static_cast<std::int64_t>(b) * block_rows;
-            for_each_occupied(v, bits, first, std::min(end, first + block_rows),
-                              [&](std::int64_t i, std::int64_t j, std::int64_t k) { format(blocks[b], i, j, k); });
+void write_voxels(output_file& out, const voxel_shape& v, const write_options& options, const Format& format) {
+    const brick_order order(v, 2);
+    const std::size_t planes = 8 * order.num_layers();
+    progress_meter meter(options.progress, planes);
+    ordered_for(
+        planes, thread_count(options.threads),
+        [&](std::size_t n) {
+            std::string text;
+            order.for_each_voxel(order.layer(n / 8), static_cast<unsigned>(n % 8),
+                                 [&](std::size_t brick, const glm::ivec3& voxel) { format(text, brick, voxel); });
+            return text;
+        },
+        [&](std::size_t, const std::string& text) {
+            out.write(text);
+            meter.advance(1);
         });
-        for (const std::string& block : blocks) out.write(block);
-        meter.advance(static_cast<std::uint64_t>(end - begin));
-    }
-}
-
-std::uint32_t color_at(const volume& v, const channel& colors, std::int64_t i, std::int64_t j, std::int64_t k) {
-    const std::byte* at = colors.data.data() + v.index(i, j, k) * colors.components;
-    return std::to_integer<std::uint32_t>(at[0]) | std::to_integer<std::uint32_t>(at[1]) << 8 |
-           std::to_integer<std::uint32_t>(at[2]) << 16;
 }
 
 std::string ply_header(std::uint64_t vertices, bool colored, std::optional<std::size_t> faces) {
@@ -170,15 +152,13 @@ void put_color(std::string& out, std::uint32_t rgb) {
     put(out, blue(rgb));
 }
 
-std::vector<std::filesystem::path> write_ply_points(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_ply_points(const voxel_shape& v, const std::filesystem::path& path,
                                                     const write_options& options) {
-    const channel* colors = find_colors(v);
     output_file out(path);
-    out.write(ply_header(static_cast<std::uint64_t>(v.popcount()), colors != nullptr, std::nullopt));
-    write_voxels(out, v, options, [&](std::string& text, std::int64_t i, std::int64_t j, std::int64_t k) {
-        const std::array<std::int64_t, 3> at{i, j, k};
-        for (std::size_t a = 0; a < 3; ++a) put(text, world(v, a, static_cast<double>(at[a]) + 0.5));
-        if (colors != nullptr) put_color(text, color_at(v, *colors, i, j, k));
+    out.write(ply_header(v.num_voxels(), v.colored(), std::nullopt));
+    write_voxels(out, v, options, [&](std::string& text, std::size_t brick, const glm::ivec3& voxel) {
+        for (int a = 0; a < 3; ++a) put(text, world(v, static_cast<std::size_t>(a), voxel[a] + 0.5));
+        if (v.colored()) put_color(text, v.rgb(brick, voxel));
     });
     out.commit();
     return {path};
@@ -199,7 +179,7 @@ struct glb_layout {
     std::uint64_t positions = 0, colors = 0, indices = 0, total = 0; // offsets into the BIN chunk, and its length
 };
 
-std::string glb_json(const volume& v, const welded_mesh& mesh, bool colored, const glb_layout& at) {
+std::string glb_json(const voxel_shape& v, const welded_mesh& mesh, bool colored, const glb_layout& at) {
     std::array<std::uint32_t, 3> low{}, high{};
     for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
         for (std::size_t a = 0; a < 3; ++a) {
@@ -244,9 +224,9 @@ std::string glb_json(const volume& v, const welded_mesh& mesh, bool colored, con
     return json;
 }
 
-void write_glb_part(output_file& out, const volume& v, const welded_mesh& mesh, const write_options& options,
+void write_glb_part(output_file& out, const voxel_shape& v, const welded_mesh& mesh, const write_options& options,
                     progress_meter& meter) {
-    const bool colored = find_colors(v) != nullptr;
+    const bool colored = v.colored();
     glb_layout at;
     at.colors = 12 * static_cast<std::uint64_t>(mesh.vertices.size());
     at.indices = at.colors + (colored ? 8 * static_cast<std::uint64_t>(mesh.vertices.size()) : 0);
@@ -287,10 +267,10 @@ void write_glb_part(output_file& out, const volume& v, const welded_mesh& mesh, 
 
 } // namespace
 
-std::vector<std::filesystem::path> write_ply(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_ply(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options) {
     if (options.points) return write_ply_points(v, path, options);
-    const bool colored = find_colors(v) != nullptr;
+    const bool colored = v.colored();
     return write_parts(
         v, path, options, max_faces, [&](output_file& out, const welded_mesh& mesh, progress_meter& meter) {
             out.write(ply_header(mesh.vertices.size(), colored, mesh.quads.size()));
@@ -306,9 +286,9 @@ std::vector<std::filesystem::path> write_ply(const volume& v, const std::filesys
         });
 }
 
-std::vector<std::filesystem::path> write_obj(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_obj(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options) {
-    const bool colored = find_colors(v) != nullptr;
+    const bool colored = v.colored();
     const coordinate_texts coordinates(v, 0, 1);
     std::vector<std::string> fractions;
     fractions.reserve(256);
@@ -334,7 +314,7 @@ std::vector<std::filesystem::path> write_obj(const volume& v, const std::filesys
         });
 }
 
-std::vector<std::filesystem::path> write_glb(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_glb(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options) {
     return write_parts(v, path, options, max_glb_faces,
                        [&](output_file& out, const welded_mesh& mesh, progress_meter& meter) {
@@ -342,15 +322,15 @@ std::vector<std::filesystem::path> write_glb(const volume& v, const std::filesys
                        });
 }
 
-std::vector<std::filesystem::path> write_xyz(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_xyz(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options) {
-    const channel* colors = find_colors(v);
     const coordinate_texts centers(v, 0.5, 0);
     output_file out(path);
-    write_voxels(out, v, options, [&](std::string& text, std::int64_t i, std::int64_t j, std::int64_t k) {
-        centers.append(text, static_cast<std::size_t>(i), static_cast<std::size_t>(j), static_cast<std::size_t>(k));
-        if (colors != nullptr) {
-            const std::uint32_t rgb = color_at(v, *colors, i, j, k);
+    write_voxels(out, v, options, [&](std::string& text, std::size_t brick, const glm::ivec3& voxel) {
+        centers.append(text, static_cast<std::size_t>(voxel.x), static_cast<std::size_t>(voxel.y),
+                       static_cast<std::size_t>(voxel.z));
+        if (v.colored()) {
+            const std::uint32_t rgb = v.rgb(brick, voxel);
             for (const std::uint8_t c : {red(rgb), green(rgb), blue(rgb)})
                 text.append(1, ' ').append(std::to_string(c));
         }

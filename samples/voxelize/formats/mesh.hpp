@@ -3,7 +3,7 @@
 #pragma once
 
 // The voxels as geometry, in world units and on the world's axes (glTF's, for a glTF model; write_options::up changes
-// nothing here). Colours are find_colors(v)'s; without any, the files have none, .glb a material of clay.
+// nothing here). Without colours the files have none, .glb a material of clay.
 //
 //   .obj, .ply, .glb   the sides between occupied and empty voxels (voxel_mesh.hpp), corners shared by equal colours.
 //                      Quads in .obj and .ply, pairs of triangles in .glb. With merge_faces far fewer of them, whose
@@ -18,16 +18,17 @@
 // OUT.1.glb, OUT.2.glb, ..., each whole in itself. Points of .ply are counted in 64 bits.
 
 #include "formats.hpp"
+#include "voxel_shape.hpp"
 
 namespace voxelize {
 
-std::vector<std::filesystem::path> write_ply(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_ply(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options);
-std::vector<std::filesystem::path> write_obj(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_obj(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options);
-std::vector<std::filesystem::path> write_glb(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_glb(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options);
-std::vector<std::filesystem::path> write_xyz(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_xyz(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options);
 
 } // namespace voxelize

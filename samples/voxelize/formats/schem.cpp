@@ -70,13 +70,13 @@ constexpr std::array<block_color, 49> blocks{{
 static_assert(blocks.size() < 128, "a block's number takes one byte");
 
 // The number in the file of the block nearest to a colour, the lowest of equals.
-std::byte nearest_block(const std::array<int, 3>& color) {
+std::byte nearest_block(std::uint32_t rgb) {
     std::size_t best = 0;
     int least = std::numeric_limits<int>::max();
     for (std::size_t n = 0; n < blocks.size(); ++n) {
         int distance = 0;
         for (std::size_t a = 0; a < 3; ++a) {
-            const int d = blocks[n].color[a] - color[a];
+            const int d = blocks[n].color[a] - static_cast<int>(rgb >> 8 * a & 0xffU);
             distance += d * d;
         }
         if (distance < least) {
@@ -155,31 +155,26 @@ nbt tail() {
 }
 
 // Rows [from, to) of the file's blocks: x fastest, then the file's z, then its y.
-std::vector<std::byte> block_rows(const volume& v, const channel* colors, up_axis up, std::int64_t from,
+std::vector<std::byte> block_rows(const voxel_shape& v, const brick_order& order, up_axis up, std::int64_t from,
                                   std::int64_t to) {
-    const channel& bits = *v.occupancy();
     const std::int64_t length = up == up_axis::y ? v.extent[2] : v.extent[1];
-    const std::byte plain = nearest_block({clay[0], clay[1], clay[2]});
     std::vector<std::byte> out(static_cast<std::size_t>((to - from) * v.extent[0]));
     std::byte* row = out.data();
-    std::array<int, 3> last_color{-1, -1, -1};
+    std::uint32_t last_color = ~std::uint32_t{0}; // no colour
     std::byte last{};
     for (std::int64_t r = from; r < to; ++r, row += v.extent[0]) {
         const std::int64_t y = r / length, z = r % length;
         const std::int64_t j = up == up_axis::y ? y : v.extent[1] - 1 - z, k = up == up_axis::y ? z : y;
-        for (std::int64_t w = 0; w < v.words_per_row(); ++w)
-            for (std::uint32_t word = v.word(bits, w, j, k); word != 0; word &= word - 1) {
-                const std::int64_t i = 32 * w + std::countr_zero(word);
-                if (colors == nullptr) {
-                    row[i] = plain;
-                    continue;
-                }
-                const std::byte* rgb = colors->data.data() + v.index(i, j, k) * colors->components;
-                std::array<int, 3> color{};
-                for (std::size_t a = 0; a < 3; ++a) color[a] = std::to_integer<int>(rgb[a]);
+        const auto bricks = brick_order::row_of(order.layer_at(static_cast<int>(k / 8)), static_cast<int>(j / 8));
+        for (const brick_order::placed& p : bricks) {
+            const auto n = static_cast<unsigned>(k % 8), b = static_cast<unsigned>(j % 8);
+            for (unsigned bits = brick_row(v.mask(p.brick), 2, n, b); bits != 0; bits &= bits - 1) {
+                const glm::ivec3 voxel = order.voxel_at(p, n, static_cast<unsigned>(std::countr_zero(bits)), b);
+                const std::uint32_t color = v.rgb(p.brick, voxel);
                 if (color != last_color) last = nearest_block(last_color = color);
-                row[i] = last;
+                row[voxel.x] = last;
             }
+        }
     }
     return out;
 }
@@ -188,11 +183,12 @@ std::vector<std::byte> block_rows(const volume& v, const channel* colors, up_axi
 
 std::span<const block_color> schem_blocks() { return blocks; }
 
-std::vector<std::filesystem::path> write_schem(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_schem(const voxel_shape& v, const std::filesystem::path& path,
                                                const write_options& options) {
     constexpr std::int64_t most_side = std::numeric_limits<std::int16_t>::max();
     constexpr std::int64_t most_blocks = std::numeric_limits<std::int32_t>::max();
-    if (*std::max_element(v.extent.begin(), v.extent.end()) > most_side || v.num_voxels() > most_blocks)
+    if (*std::max_element(v.extent.begin(), v.extent.end()) > most_side ||
+        v.extent[0] * v.extent[1] * v.extent[2] > most_blocks)
         throw write_error(path, "too large for .schem, which ends at 32767 blocks a side and 2^31 in all; use .npz, "
                                 ".vti or .nrrd");
     std::array<std::int64_t, 3> size = v.extent;
@@ -200,7 +196,7 @@ std::vector<std::filesystem::path> write_schem(const volume& v, const std::files
     const std::int64_t rows = size[1] * size[2];
     const std::int64_t piece_rows = std::max<std::int64_t>(1, (std::int64_t{1} << 20) / size[0]);
     const auto pieces = static_cast<std::size_t>((rows + piece_rows - 1) / piece_rows);
-    const channel* const colors = find_colors(v);
+    const brick_order order(v, 2);
 
     output_file out(path);
     progress_meter meter(options.progress, pieces);
@@ -219,7 +215,7 @@ std::vector<std::filesystem::path> write_schem(const volume& v, const std::files
         [&](std::size_t n) {
             const std::int64_t from = static_cast<std::int64_t>(n) * piece_rows;
             const std::vector<std::byte> bytes =
-                block_rows(v, colors, options.up, from, std::min(rows, from + piece_rows));
+                block_rows(v, order, options.up, from, std::min(rows, from + piece_rows));
             return compressor.compress(bytes, 1);
         },
         [&](std::size_t, const std::shared_ptr<const compressed_piece>& piece) {

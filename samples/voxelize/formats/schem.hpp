@@ -12,6 +12,7 @@
 
 #include "../preview.hpp"
 #include "formats.hpp"
+#include "voxel_shape.hpp"
 
 #include <span>
 #include <string_view>
@@ -26,7 +27,7 @@ struct block_color {
 // The blocks that voxels become; in a file, block n has the number n + 1, and air is 0.
 [[nodiscard]] std::span<const block_color> schem_blocks();
 
-std::vector<std::filesystem::path> write_schem(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_schem(const voxel_shape& v, const std::filesystem::path& path,
                                                const write_options& options);
 
 } // namespace voxelize

@@ -10,9 +10,9 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <limits>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -60,56 +60,44 @@ void write_chunk(output_file& out, std::string_view id, const chunk_bytes& conte
     out.write(content.bytes());
 }
 
-// One model: voxels [low, low + size) of the volume, and how many of them are set.
+// One model: voxels [low, low + size) of the volume, and its bricks, which are neighbours in Morton order.
 struct block {
     int3 low{};
     int3 size{};
-    std::uint64_t count = 0;
+    std::size_t first = 0, last = 0; // bricks
+    std::uint64_t count = 0;         // voxels
 };
 
-// Calls visit(i, j) for each set voxel of layer k of the block, in storage order.
-template <class Visit>
-void for_each_voxel(const volume& v, const channel& bits, const block& b, std::int64_t k, Visit visit) {
-    const std::int64_t end = b.low[0] + b.size[0];
-    for (std::int64_t j = b.low[1]; j < b.low[1] + b.size[1]; ++j)
-        for (std::int64_t w = b.low[0] / 32; 32 * w < end; ++w)
-            for (std::uint32_t word = v.word(bits, w, j, k); word != 0; word &= word - 1)
-                visit(32 * w + std::countr_zero(word), j);
-}
-
-std::uint64_t count_voxels(const volume& v, const channel& bits, const block& b) {
-    std::uint64_t count = 0;
-    for (std::int64_t k = b.low[2]; k < b.low[2] + b.size[2]; ++k)
-        for (std::int64_t j = b.low[1]; j < b.low[1] + b.size[1]; ++j)
-            for (std::int64_t w = b.low[0] / 32; 32 * w < b.low[0] + b.size[0]; ++w)
-                count += static_cast<std::uint64_t>(std::popcount(v.word(bits, w, j, k)));
-    return count;
-}
-
-// Blocks of 256 with something in them; the first one if all are empty, since a file has at least one model.
-std::vector<block> split(const volume& v, const channel& bits, int threads) {
+// Blocks of 256 with something in them, z slowest; the first one if all are empty, since a file has at least one model.
+std::vector<block> split(const voxel_shape& v) {
+    constexpr int log2_bricks = 3 * 5; // 32 along each axis
+    static_assert(max_side == std::int64_t{8} << log2_bricks / 3);
+    const auto block_at = [&](const int3& low) {
+        block b{low};
+        for (std::size_t a = 0; a < 3; ++a) b.size[a] = std::min(max_side, v.extent[a] - low[a]);
+        return b;
+    };
     std::vector<block> blocks;
-    for (std::int64_t k = 0; k < v.extent[2]; k += max_side)
-        for (std::int64_t j = 0; j < v.extent[1]; j += max_side)
-            for (std::int64_t i = 0; i < v.extent[0]; i += max_side) {
-                block b{{i, j, k}, {}, 0};
-                for (std::size_t a = 0; a < 3; ++a) b.size[a] = std::min(max_side, v.extent[a] - b.low[a]);
-                blocks.push_back(b);
-            }
-    parallel_for(blocks.size(), threads, [&](std::size_t n) { blocks[n].count = count_voxels(v, bits, blocks[n]); });
-    std::erase_if(blocks, [](const block& b) { return b.count == 0; });
-    if (blocks.empty()) {
-        block b{{0, 0, 0}, {}, 0};
-        for (std::size_t a = 0; a < 3; ++a) b.size[a] = std::min(max_side, v.extent[a]);
-        blocks.push_back(b);
+    for (std::size_t first = 0, last = 0; first < v.num_bricks(); first = last) {
+        const std::uint64_t key = v.key(first) >> log2_bricks;
+        while (last < v.num_bricks() && v.key(last) >> log2_bricks == key) ++last;
+        const glm::ivec3 at = voxelpipe::core::morton_position(key);
+        block& b = blocks.emplace_back(block_at({at.x * max_side, at.y * max_side, at.z * max_side}));
+        b.first = first;
+        b.last = last;
+        b.count = v.first_rank(last) - v.first_rank(first);
     }
+    if (blocks.empty()) blocks.push_back(block_at({0, 0, 0}));
+    std::sort(blocks.begin(), blocks.end(), [](const block& a, const block& b) {
+        return std::tie(a.low[2], a.low[1], a.low[0]) < std::tie(b.low[2], b.low[1], b.low[0]);
+    });
     return blocks;
 }
 
 // From the volume's axes to MagicaVoxel's.
 class axes {
 public:
-    axes(const volume& v, up_axis up) : extent_(v.extent), turn_(up == up_axis::y) {}
+    axes(const voxel_shape& v, up_axis up) : extent_(v.extent), turn_(up == up_axis::y) {}
 
     [[nodiscard]] int3 size(const int3& s) const { return turn_ ? int3{s[0], s[2], s[1]} : s; }
     // Low corner of a box; where an axis turns around, the box's high side becomes the low one.
@@ -124,35 +112,28 @@ private:
 
 // Palette and, for each RGB value as a 24-bit number, the palette index 1..255 of the voxels that have it.
 struct coloring {
-    const channel* colors = nullptr; // null: every voxel has index 1
     palette colors_used;
-    std::vector<std::uint8_t> index_of;
+    std::vector<std::uint8_t> index_of; // empty: every voxel has index 1
 
-    [[nodiscard]] std::uint32_t rgb(const volume& v, std::int64_t i, std::int64_t j, std::int64_t k) const {
-        const std::byte* at = colors->data.data() + v.index(i, j, k) * colors->components;
-        return std::to_integer<std::uint32_t>(at[0]) | std::to_integer<std::uint32_t>(at[1]) << 8 |
-               std::to_integer<std::uint32_t>(at[2]) << 16;
-    }
-    [[nodiscard]] std::uint8_t index(const volume& v, std::int64_t i, std::int64_t j, std::int64_t k) const {
-        return colors == nullptr ? std::uint8_t{1} : index_of[rgb(v, i, j, k)];
+    [[nodiscard]] std::uint8_t index(std::uint32_t rgb) const {
+        return index_of.empty() ? std::uint8_t{1} : index_of[rgb];
     }
 };
 
-coloring make_coloring(const volume& v, const channel& bits, const std::vector<block>& blocks, int threads) {
+coloring make_coloring(const voxel_shape& v, int threads) {
     coloring result;
-    result.colors = find_colors(v);
-    if (result.colors == nullptr) {
+    if (!v.colored()) {
         result.colors_used.entries = {clay};
         return result;
     }
     std::vector<std::uint32_t> histogram(std::size_t{1} << 24); // a file has fewer than 2^29 voxels
-    for (const block& b : blocks)
-        parallel_for(static_cast<std::size_t>(b.size[2]), threads, [&](std::size_t layer) {
-            const std::int64_t k = b.low[2] + static_cast<std::int64_t>(layer);
-            for_each_voxel(v, bits, b, k, [&](std::int64_t i, std::int64_t j) {
-                std::atomic_ref(histogram[result.rgb(v, i, j, k)]).fetch_add(1, std::memory_order_relaxed);
-            });
-        });
+    constexpr std::size_t bricks_at_once = 256;
+    parallel_for((v.num_bricks() + bricks_at_once - 1) / bricks_at_once, threads, [&](std::size_t part) {
+        const std::size_t first = part * bricks_at_once, last = std::min(v.num_bricks(), first + bricks_at_once);
+        for (std::size_t b = first; b < last; ++b)
+            v.for_each_color(
+                b, [&](std::uint32_t rgb) { std::atomic_ref(histogram[rgb]).fetch_add(1, std::memory_order_relaxed); });
+    });
     std::vector<counted_color> distinct;
     std::vector<std::uint32_t> values;
     for (std::uint32_t value = 0; value < histogram.size(); ++value) {
@@ -169,24 +150,25 @@ coloring make_coloring(const volume& v, const channel& bits, const std::vector<b
     return result;
 }
 
-void write_model(output_file& out, const volume& v, const channel& bits, const block& b, const axes& to_file,
-                 const coloring& colors, int threads) {
+void write_model(output_file& out, const voxel_shape& v, const block& b, const axes& to_file, const coloring& colors,
+                 int threads) {
     chunk_bytes size;
     for (const std::int64_t s : to_file.size(b.size)) size.integer(s);
     write_chunk(out, "SIZE", size);
     write_chunk_head(out, "XYZI", 4 + 4 * b.count, 0);
     out.write_value(static_cast<std::int32_t>(b.count));
     const int3 low = to_file.low(b.low, b.size);
+    const brick_order order(v, 2, b.first, b.last);
     ordered_for(
-        static_cast<std::size_t>(b.size[2]), threads,
+        order.num_layers(), threads,
         [&](std::size_t n) {
-            const std::int64_t k = b.low[2] + static_cast<std::int64_t>(n);
             std::vector<std::byte> layer;
-            for_each_voxel(v, bits, b, k, [&](std::int64_t i, std::int64_t j) {
-                const int3 at = to_file.low({i, j, k}, {1, 1, 1});
-                for (std::size_t a = 0; a < 3; ++a) layer.push_back(static_cast<std::byte>(at[a] - low[a]));
-                layer.push_back(static_cast<std::byte>(colors.index(v, i, j, k)));
-            });
+            for (unsigned k = 0; k < 8; ++k)
+                order.for_each_voxel(order.layer(n), k, [&](std::size_t brick, const glm::ivec3& voxel) {
+                    const int3 at = to_file.low({voxel.x, voxel.y, voxel.z}, {1, 1, 1});
+                    for (std::size_t a = 0; a < 3; ++a) layer.push_back(static_cast<std::byte>(at[a] - low[a]));
+                    layer.push_back(static_cast<std::byte>(colors.index(v.rgb(brick, voxel))));
+                });
             return layer;
         },
         [&](std::size_t, const std::vector<std::byte>& layer) { out.write(layer); });
@@ -194,8 +176,8 @@ void write_model(output_file& out, const volume& v, const channel& bits, const b
 
 // Root transform 0 -> group 1 -> for model n: transform 2 + 2n -> shape 3 + 2n. A transform carries the model's centre,
 // floor(size / 2), to its position.
-std::vector<std::pair<std::string_view, chunk_bytes>> scene_graph(const volume& v, const std::vector<block>& blocks,
-                                                                  const axes& to_file) {
+std::vector<std::pair<std::string_view, chunk_bytes>>
+scene_graph(const voxel_shape& v, const std::vector<block>& blocks, const axes& to_file) {
     std::vector<std::pair<std::string_view, chunk_bytes>> chunks;
     const auto transform = [&](std::int64_t node, std::int64_t child, std::int64_t layer, const std::string* at) {
         chunk_bytes c;
@@ -244,11 +226,10 @@ std::vector<std::pair<std::string_view, chunk_bytes>> scene_graph(const volume& 
 
 } // namespace
 
-std::vector<std::filesystem::path> write_vox(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_vox(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options) {
-    const channel& bits = *v.occupancy();
     const int threads = thread_count(options.threads);
-    const std::vector<block> blocks = split(v, bits, threads);
+    const std::vector<block> blocks = split(v);
     const axes to_file(v, options.up);
     const bool single = *std::max_element(v.extent.begin(), v.extent.end()) <= max_side;
 
@@ -261,14 +242,14 @@ std::vector<std::filesystem::path> write_vox(const volume& v, const std::filesys
     if (children > static_cast<std::uint64_t>(std::numeric_limits<std::int32_t>::max()))
         throw write_error(path, "too large for .vox, whose chunks end at 2 GiB; use .npz, .vti or .nrrd");
 
-    const coloring colors = make_coloring(v, bits, blocks, threads);
+    const coloring colors = make_coloring(v, threads);
     progress_meter meter(options.progress, blocks.size());
     output_file out(path);
     out.write("VOX ");
     out.write_value<std::int32_t>(single ? 150 : 200);
     write_chunk_head(out, "MAIN", 0, children);
     for (const block& b : blocks) {
-        write_model(out, v, bits, b, to_file, colors, threads);
+        write_model(out, v, b, to_file, colors, threads);
         meter.advance(1);
     }
     for (const auto& [id, content] : graph) write_chunk(out, id, content);

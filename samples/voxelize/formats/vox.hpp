@@ -15,10 +15,11 @@
 // one, all voxels are clay.
 
 #include "formats.hpp"
+#include "voxel_shape.hpp"
 
 namespace voxelize {
 
-std::vector<std::filesystem::path> write_vox(const volume& v, const std::filesystem::path& path,
+std::vector<std::filesystem::path> write_vox(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options);
 
 } // namespace voxelize

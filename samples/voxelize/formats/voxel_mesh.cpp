@@ -4,7 +4,6 @@
 #include "voxel_mesh.hpp"
 
 #include "../parallel.hpp"
-#include "../preview.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -13,63 +12,14 @@
 namespace voxelize {
 namespace {
 
-constexpr std::uint32_t packed(const rgb8& c) {
-    return static_cast<std::uint32_t>(c[0]) | static_cast<std::uint32_t>(c[1]) << 8 |
-           static_cast<std::uint32_t>(c[2]) << 16;
-}
-
-// Occupancy by words, empty outside the grid, and colours.
-class voxel_reader {
-public:
-    explicit voxel_reader(const volume& v) : v_(v), bits_(*v.occupancy()), colors_(find_colors(v)) {}
-
-    [[nodiscard]] std::uint32_t word(std::int64_t w, std::int64_t j, std::int64_t k) const {
-        if (w < 0 || w >= v_.words_per_row() || j < 0 || j >= v_.extent[1] || k < 0 || k >= v_.extent[2]) return 0;
-        return v_.word(bits_, w, j, k);
-    }
-    [[nodiscard]] std::uint32_t rgb(std::int64_t i, std::int64_t j, std::int64_t k) const {
-        if (colors_ == nullptr) return packed(clay);
-        const std::byte* at = colors_->data.data() + v_.index(i, j, k) * colors_->components;
-        return std::to_integer<std::uint32_t>(at[0]) | std::to_integer<std::uint32_t>(at[1]) << 8 |
-               std::to_integer<std::uint32_t>(at[2]) << 16;
-    }
-    // Voxels of a word whose neighbour on that side is empty.
-    [[nodiscard]] std::uint32_t exposed(int direction, std::int64_t w, std::int64_t j, std::int64_t k) const {
-        const std::uint32_t here = word(w, j, k);
-        if (here == 0) return 0;
-        switch (direction) {
-        case 0:
-            return here & ~(here << 1 | word(w - 1, j, k) >> 31);
-        case 1:
-            return here & ~(here >> 1 | word(w + 1, j, k) << 31);
-        case 2:
-            return here & ~word(w, j - 1, k);
-        case 3:
-            return here & ~word(w, j + 1, k);
-        case 4:
-            return here & ~word(w, j, k - 1);
-        default:
-            return here & ~word(w, j, k + 1);
-        }
-    }
-
-private:
-    const volume& v_;
-    const channel& bits_;
-    const channel* colors_;
-};
-
 // Joins single sides of one plane, which come by second axis, then first.
 class rectangle_merger {
 public:
-    rectangle_merger(std::int64_t width, std::int64_t height)
-        : width_(static_cast<std::uint32_t>(width)), height_(static_cast<std::uint32_t>(height)),
-          cells_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {}
-
     void merge(std::span<const voxel_face> sides, std::vector<voxel_face>& out) {
         if (sides.empty()) return;
         const std::size_t u = (sides[0].direction / 2U + 1U) % 3U;
         const std::size_t v = (sides[0].direction / 2U + 2U) % 3U;
+        begin(sides, u, v);
         for (const voxel_face& side : sides) cell(side.low[u], side.low[v]) = present | side.rgb;
         for (const voxel_face& side : sides) {
             const std::uint32_t from = side.low[u];
@@ -77,11 +27,11 @@ public:
             const std::uint32_t color = cell(from, row);
             if (color == 0) continue; // joined to an earlier one
             std::uint32_t to = from + 1;
-            while (to < width_ && cell(to, row) == color) ++to;
+            while (to < end_[0] && cell(to, row) == color) ++to;
             do {
                 for (std::uint32_t i = from; i < to; ++i) cell(i, row) = 0;
                 ++row;
-            } while (row < height_ && is_row_of(color, from, to, row));
+            } while (row < end_[1] && is_row_of(color, from, to, row));
             voxel_face face = side;
             face.size = {to - from, row - side.low[v]};
             out.push_back(face);
@@ -91,69 +41,103 @@ public:
 private:
     static constexpr std::uint32_t present = std::uint32_t{1} << 24;
 
-    std::uint32_t& cell(std::uint32_t u, std::uint32_t v) { return cells_[static_cast<std::size_t>(v) * width_ + u]; }
+    // Makes room for the box around the sides.
+    void begin(std::span<const voxel_face> sides, std::size_t u, std::size_t v) {
+        low_ = {sides[0].low[u], sides[0].low[v]};
+        end_ = low_;
+        for (const voxel_face& side : sides) {
+            low_ = {std::min(low_[0], side.low[u]), std::min(low_[1], side.low[v])};
+            end_ = {std::max(end_[0], side.low[u] + 1), std::max(end_[1], side.low[v] + 1)};
+        }
+        const std::size_t cells = std::size_t{end_[0] - low_[0]} * (end_[1] - low_[1]);
+        if (cells_.size() < cells) cells_.resize(cells);
+    }
+    std::uint32_t& cell(std::uint32_t u, std::uint32_t v) {
+        return cells_[std::size_t{v - low_[1]} * (end_[0] - low_[0]) + (u - low_[0])];
+    }
     bool is_row_of(std::uint32_t color, std::uint32_t from, std::uint32_t to, std::uint32_t row) {
         for (std::uint32_t i = from; i < to; ++i)
             if (cell(i, row) != color) return false;
         return true;
     }
 
-    std::uint32_t width_;
-    std::uint32_t height_;
-    std::vector<std::uint32_t> cells_; // `present` and the colour, or 0; all 0 between calls
+    std::array<std::uint32_t, 2> low_{}, end_{}; // of the plane's sides, along u and v
+    std::vector<std::uint32_t> cells_;           // `present` and the colour, or 0; all 0 between calls
 };
 
-// The work that a thread takes at a time: all layers along x in one column of words, or one layer along y or z.
-class layer_group {
-public:
-    layer_group(const volume& v, const voxel_reader& reader, std::size_t axis, std::int64_t number)
-        : v_(v), reader_(reader), axis_(axis), number_(number) {}
+// The planes of a brick along an axis: bit 8 * b + a of plane n is the voxel at a along axis + 1 and b along axis + 2.
+using brick_planes = std::array<std::uint64_t, 8>;
 
-    void append(std::vector<voxel_face>& out, bool merge) const {
-        std::array<std::vector<voxel_face>, 64> layers; // layer, direction; only x has more than one layer
-        for (std::int64_t k = axis_ == 2 ? number_ : 0; k < (axis_ == 2 ? number_ + 1 : v_.extent[2]); ++k) {
-            // Sides come by the second axis of their plane, then by the first: for y that is x by z.
-            for (std::int64_t j = axis_ == 1 ? number_ : 0; j < (axis_ == 1 ? number_ + 1 : v_.extent[1]); ++j)
-                for (std::int64_t w = axis_ == 0 ? number_ : 0; w < (axis_ == 0 ? number_ + 1 : v_.words_per_row());
-                     ++w)
-                    add_word(layers, w, j, k);
-        }
-        if (axis_ == 1)
-            for (std::size_t side = 0; side < 2; ++side)
-                std::sort(layers[side].begin(), layers[side].end(), [](const voxel_face& a, const voxel_face& b) {
-                    return a.low[0] != b.low[0] ? a.low[0] < b.low[0] : a.low[2] < b.low[2];
-                });
+brick_planes planes_of(const voxelpipe::brick_mask& mask, int axis) {
+    brick_planes planes{};
+    for (unsigned n = 0; n < 8; ++n)
+        for (unsigned b = 0; b < 8; ++b) planes[n] |= std::uint64_t{brick_row(mask, axis, n, b)} << 8 * b;
+    return planes;
+}
+
+// The sides across an axis of one layer of bricks, which a thread finds at a time.
+class layer_sides {
+public:
+    layer_sides(const voxel_shape& shape, const brick_order& order, int axis,
+                std::span<const brick_order::placed> layer)
+        : shape_(shape), order_(order), axis_(axis), layer_(layer), below_(order.layer_at(layer.front().at() - 1)),
+          above_(order.layer_at(layer.front().at() + 1)) {}
+
+    void append(std::vector<voxel_face>& out, bool merge) {
+        brick_order::for_each_row(layer_, [&](std::span<const brick_order::placed> row) { add_row(row); });
         if (!merge) {
-            for (const std::vector<voxel_face>& layer : layers) out.insert(out.end(), layer.begin(), layer.end());
+            for (const std::vector<voxel_face>& plane : planes_) out.insert(out.end(), plane.begin(), plane.end());
             return;
         }
-        rectangle_merger merger(v_.extent[(axis_ + 1) % 3], v_.extent[(axis_ + 2) % 3]);
-        for (const std::vector<voxel_face>& layer : layers) merger.merge(layer, out);
+        rectangle_merger merger;
+        for (const std::vector<voxel_face>& plane : planes_) merger.merge(plane, out);
     }
 
 private:
-    void add_word(std::array<std::vector<voxel_face>, 64>& layers, std::int64_t w, std::int64_t j,
-                  std::int64_t k) const {
-        for (std::uint8_t side = 0; side < 2; ++side) {
-            const auto direction = static_cast<std::uint8_t>(2 * axis_ + side);
-            for (std::uint32_t bits = reader_.exposed(direction, w, j, k); bits != 0; bits &= bits - 1) {
-                const int bit = std::countr_zero(bits);
-                const std::int64_t i = 32 * w + bit;
-                voxel_face face;
-                face.low = {static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j),
-                            static_cast<std::uint32_t>(k)};
-                face.low[axis_] += side; // the plane beyond the voxel
-                face.rgb = reader_.rgb(i, j, k);
-                face.direction = direction;
-                layers[(axis_ == 0 ? 2 * static_cast<std::size_t>(bit) : 0) + side].push_back(face);
+    // The voxels of each plane of a brick whose neighbour below is empty, and those whose neighbour above is.
+    using exposed_planes = std::array<std::uint64_t, 16>;
+
+    // Planes of the brick beside this one, in a layer whose bricks before it are no longer wanted.
+    brick_planes neighbour(std::span<const brick_order::placed>& layer, const brick_order::placed& of) const {
+        while (!layer.empty() && layer.front().in_layer() < of.in_layer()) layer = layer.subspan(1);
+        if (layer.empty() || layer.front().in_layer() != of.in_layer()) return {};
+        return planes_of(shape_.mask(layer.front().brick), axis_);
+    }
+    void add_row(std::span<const brick_order::placed> row) {
+        exposed_.clear();
+        for (const brick_order::placed& p : row) {
+            const brick_planes here = planes_of(shape_.mask(p.brick), axis_), below = neighbour(below_, p),
+                               above = neighbour(above_, p);
+            exposed_planes& exposed = exposed_.emplace_back();
+            for (std::size_t n = 0; n < 8; ++n) {
+                exposed[2 * n] = here[n] & ~(n == 0 ? below[7] : here[n - 1]);
+                exposed[2 * n + 1] = here[n] & ~(n == 7 ? above[0] : here[n + 1]);
             }
         }
+        for (unsigned b = 0; b < 8; ++b)
+            for (std::size_t i = 0; i < row.size(); ++i)
+                for (unsigned n = 0; n < 16; ++n) {
+                    auto bits = static_cast<unsigned>(exposed_[i][n] >> 8 * b & 0xffU);
+                    for (; bits != 0; bits &= bits - 1)
+                        add_side(row[i], n, static_cast<unsigned>(std::countr_zero(bits)), b);
+                }
+    }
+    void add_side(const brick_order::placed& p, unsigned n, unsigned a, unsigned b) {
+        const glm::ivec3 voxel = order_.voxel_at(p, n / 2, a, b);
+        voxel_face face;
+        for (int i = 0; i < 3; ++i) face.low[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(voxel[i]);
+        face.low[static_cast<std::size_t>(axis_)] += n % 2; // the plane beyond the voxel
+        face.rgb = shape_.rgb(p.brick, voxel);
+        face.direction = static_cast<std::uint8_t>(2 * static_cast<unsigned>(axis_) + n % 2);
+        planes_[n].push_back(face);
     }
 
-    const volume& v_;
-    const voxel_reader& reader_;
-    std::size_t axis_;
-    std::int64_t number_;
+    const voxel_shape& shape_;
+    const brick_order& order_;
+    int axis_;
+    std::span<const brick_order::placed> layer_, below_, above_;
+    std::vector<exposed_planes> exposed_;            // of the bricks of a row
+    std::array<std::vector<voxel_face>, 16> planes_; // two directions each
 };
 
 // The four corners of a face, counter-clockwise seen from outside.
@@ -204,24 +188,28 @@ private:
 
 } // namespace
 
-std::vector<voxel_face> voxel_faces(const volume& v, bool merge, int threads,
+std::vector<voxel_face> voxel_faces(const voxel_shape& shape, bool merge, int threads,
                                     const std::function<void(double)>& progress) {
-    const voxel_reader reader(v);
-    const std::array<std::size_t, 3> groups{static_cast<std::size_t>(v.words_per_row()),
-                                            static_cast<std::size_t>(v.extent[1]),
-                                            static_cast<std::size_t>(v.extent[2])};
-    const std::size_t total = groups[0] + groups[1] + groups[2];
-    std::vector<std::vector<voxel_face>> parts(total);
+    struct layer_of_axis {
+        int axis;
+        std::size_t layer;
+    };
+    std::vector<brick_order> orders;
+    std::vector<layer_of_axis> work;
+    for (int axis = 0; axis < 3; ++axis) {
+        orders.emplace_back(shape, axis);
+        for (std::size_t n = 0; n < orders.back().num_layers(); ++n) work.push_back({axis, n});
+    }
+    std::vector<std::vector<voxel_face>> parts(work.size());
     parallel_for(
-        total, thread_count(threads),
+        work.size(), thread_count(threads),
         [&](std::size_t n) {
-            std::size_t axis = 0;
-            std::size_t number = n;
-            for (; number >= groups[axis]; ++axis) number -= groups[axis];
-            layer_group(v, reader, axis, static_cast<std::int64_t>(number)).append(parts[n], merge);
+            const auto [axis, layer] = work[n];
+            const brick_order& order = orders[static_cast<std::size_t>(axis)];
+            layer_sides(shape, order, axis, order.layer(layer)).append(parts[n], merge);
         },
         [&](std::size_t finished) {
-            if (progress) progress(static_cast<double>(finished) / static_cast<double>(total));
+            if (progress) progress(static_cast<double>(finished) / static_cast<double>(work.size()));
         });
     std::size_t count = 0;
     for (const std::vector<voxel_face>& part : parts) count += part.size();

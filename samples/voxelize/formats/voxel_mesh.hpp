@@ -5,7 +5,7 @@
 // The surface of the occupied voxels as rectangles: one for each side of a voxel that has no occupied neighbour there
 // (voxels at the grid's border have none outside). Shared by the writers of .ply, .obj and .glb.
 
-#include "../volume.hpp"
+#include "voxel_shape.hpp"
 
 #include <array>
 #include <cstdint>
@@ -29,9 +29,8 @@ struct voxel_face {
 
 // All faces, by axis, then layer along it, then direction, then position; the same list for any number of threads. With
 // `merge`, sides of equal colour in one plane are joined greedily: each rectangle first grows along its first axis,
-// then along its second. The colours are find_colors(v)'s, or clay. `v` has an occupancy channel. `progress` gets 0..1
-// from the calling thread; it may be empty.
-[[nodiscard]] std::vector<voxel_face> voxel_faces(const volume& v, bool merge, int threads,
+// then along its second. `progress` gets 0..1 from the calling thread; it may be empty.
+[[nodiscard]] std::vector<voxel_face> voxel_faces(const voxel_shape& shape, bool merge, int threads,
                                                   const std::function<void(double)>& progress);
 
 // Faces as an indexed mesh in which equal corners of equal colour are one vertex.

@@ -202,7 +202,7 @@ std::vector<std::filesystem::path> write_page(const sparse_volume& v, const std:
 
 std::vector<std::filesystem::path> write_page(const volume& v, const std::filesystem::path& path,
                                               const write_options& options) {
-    return write_page(make_sparse(v), path, options);
+    return write_page(make_sparse(v, options.threads), path, options);
 }
 
 } // namespace voxelize

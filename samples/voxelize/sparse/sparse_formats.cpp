@@ -11,6 +11,7 @@
 #include "../formats/output_file.hpp"
 #include "../formats/png.hpp"
 #include "../formats/progress.hpp"
+#include "../formats/voxel_shape.hpp"
 #include "../page/page.hpp"
 
 #include <voxelpipe/host_sparse.hpp>
@@ -188,23 +189,12 @@ std::vector<std::filesystem::path> write_sparse_png(const sparse_volume& v, cons
     });
 }
 
-// ---- the others: by a dense volume
-// ------------------------------------------------------------------------------------
+// ---- the others
+// -------------------------------------------------------------------------------------------------------
 
 // Formats whose writers take the channels piece by piece, so that no dense one is ever there.
 bool is_streamed(const std::string& extension) {
     return extension == ".vti" || extension == ".nrrd" || extension == ".zarr";
-}
-
-// Formats that hold all channels take them all, others the occupancy and colours.
-std::vector<channel> channels_for(const sparse_volume& v, const std::filesystem::path& path) {
-    const format* const f = find_format(path);
-    std::vector<channel> taken;
-    for (const channel& c : v.channels)
-        if (f == nullptr || f->all_channels || c.type == scalar::bit ||
-            (f->shows_colors && &c == find_colors(v.channels)))
-            taken.push_back(c);
-    return taken;
 }
 
 } // namespace
@@ -214,32 +204,15 @@ bool is_sparse_format(const std::filesystem::path& path) {
     return f != nullptr && f->only_sparse;
 }
 
-bool is_written_sparse(const std::filesystem::path& path) {
-    const std::string extension = lower_extension(path);
-    return is_sparse_format(path) || extension == ".npz" || extension == ".npy" || extension == ".png" ||
-           extension == ".html" || is_streamed(extension);
-}
-
-double dense_bytes(const sparse_volume& v, const std::filesystem::path& path) {
-    if (is_written_sparse(path)) return 0;
-    double voxel = 0;
-    const format* const f = find_format(path);
-    for (const channel& c : v.channels)
-        if (f == nullptr || f->all_channels || c.type == scalar::bit || f->shows_colors)
-            voxel += c.type == scalar::bit ? 0.125 : static_cast<double>(size_of(c.type)) * c.components;
-    return voxel * static_cast<double>(v.shape.extent[0]) * static_cast<double>(v.shape.extent[1]) *
-           static_cast<double>(v.shape.extent[2]);
-}
-
 std::vector<std::filesystem::path> write_nvdb(const volume& v, const std::filesystem::path& path,
                                               const write_options& options) {
-    return write_nvdb(make_sparse(v), path, options);
+    return write_nvdb(make_sparse(v, options.threads), path, options);
 }
 
 #ifdef VOXELIZE_HAS_OPENVDB
 std::vector<std::filesystem::path> write_vdb(const volume& v, const std::filesystem::path& path,
                                              const write_options& options) {
-    return write_vdb(make_sparse(v), path, options);
+    return write_vdb(make_sparse(v, options.threads), path, options);
 }
 #endif
 
@@ -255,7 +228,7 @@ std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const st
     if (extension == ".png") return write_sparse_png(v, path, options);
     if (extension == ".html") return write_page(v, path, options);
     if (is_streamed(extension)) return write(as_dense(v, v.channels), path, options); // they hold all channels
-    return write(make_dense(v, channels_for(v, path)), path, options);
+    return write(voxel_shape(v), path, options);                                      // they show the occupied voxels
 }
 
 } // namespace voxelize

@@ -5,7 +5,8 @@
 // Writers of sparse volumes. .nvdb holds a grid for each channel (occupancy as a mask); .vdb see vdb.hpp. .npz holds
 // coords, (n, 3) int32 with columns x, y and z, in the Morton order of the voxels, and an array for each channel but
 // the occupancy; .npy holds the coords, and each channel in a file of its own beside it. .png is drawn from the bricks.
-// Other formats are written from a dense volume, made of the channels that they take.
+// .vti, .nrrd and .zarr read the bricks as if they were dense, piece by piece; formats of shapes (voxel_shape.hpp) read
+// the bricks themselves. No output makes a dense volume.
 
 #include "../formats/formats.hpp"
 #include "sparse_volume.hpp"
@@ -17,12 +18,6 @@ namespace voxelize {
 
 // Formats that hold occupied voxels alone.
 [[nodiscard]] bool is_sparse_format(const std::filesystem::path& path);
-// Formats that are written without a dense volume.
-[[nodiscard]] bool is_written_sparse(const std::filesystem::path& path);
-
-// The channels of a dense volume for this output, in bytes; 0 where none is made.
-[[nodiscard]] double dense_bytes(const sparse_volume& v, const std::filesystem::path& path);
-
 // As write() of formats.hpp, for a sparse volume.
 std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const std::filesystem::path& path,
                                                 const write_options& options);

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sparse_volume.hpp"
 
+#include "../parallel.hpp"
 #include "../targets.hpp"
 
 #include <voxelpipe/core/brick_lookup.hpp>
@@ -18,30 +19,6 @@ namespace voxelize {
 std::uint32_t empty_value(const channel& c) {
     const std::optional<target> id = target_named(c.name);
     return id ? info_of(*id).empty : 0;
-}
-
-volume make_dense(const sparse_volume& v, std::span<const channel> channels) {
-    volume dense = v.shape;
-    const voxelpipe::brick_table table = v.table();
-    for (const channel& from : channels) {
-        channel& to = dense.add(from.name, from.type, from.components);
-        if (from.type == scalar::bit) {
-            for (std::uint64_t b = 0; b < table.count; ++b)
-                voxelpipe::for_each_voxel_in(
-                    table, b, [&](const glm::ivec3& p, std::uint64_t) { dense.set_bit(to, p.x, p.y, p.z); });
-            continue;
-        }
-        const std::size_t size = size_of(from.type) * static_cast<std::size_t>(from.components);
-        if (const std::uint32_t empty = empty_value(from); empty != 0) // of four bytes
-            for (std::size_t at = 0; at < to.data.size(); at += sizeof(empty))
-                std::memcpy(to.data.data() + at, &empty, sizeof(empty));
-        for (std::uint64_t b = 0; b < table.count; ++b)
-            voxelpipe::for_each_voxel_in(table, b, [&](const glm::ivec3& p, std::uint64_t rank) {
-                std::memcpy(to.data.data() + static_cast<std::size_t>(dense.index(p.x, p.y, p.z)) * size,
-                            from.data.data() + rank * size, size);
-            });
-    }
-    return dense;
 }
 
 namespace {
@@ -83,6 +60,14 @@ private:
     int log2_slots_;
     std::vector<std::uint32_t> slots_;
 };
+
+// Sets voxels of a brick along x, bit by bit.
+void add_row(voxelpipe::brick_mask& mask, int y, int z, std::uint32_t bits) {
+    const auto at = static_cast<unsigned>(voxelpipe::core::morton_key(0, y, z));
+    const auto four = [](std::uint64_t n) { return (n & 3) | (n & 12) << 6; };
+    mask.words[at / 64] |= four(bits & 15) << at % 64;
+    mask.words[at / 64 + 1] |= four(bits >> 4) << at % 64;
+}
 
 } // namespace
 
@@ -157,50 +142,58 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
     return result;
 }
 
-sparse_volume make_sparse(const volume& v) {
+sparse_volume find_bricks(const volume& v, int threads) {
+    const channel& bits = *v.occupancy();
+    const std::int64_t bricks_x = (v.extent[0] + 7) / 8, bricks_y = (v.extent[1] + 7) / 8;
+    const auto layers = static_cast<std::size_t>((v.extent[2] + 7) / 8);
+    // The bricks of each layer as they come in storage order, then all by their keys.
+    using brick = std::pair<std::uint64_t, voxelpipe::brick_mask>;
+    std::vector<std::vector<brick>> found(layers);
+    parallel_for(layers, thread_count(threads), [&](std::size_t n) {
+        const auto low = 8 * static_cast<std::int64_t>(n);
+        std::vector<voxelpipe::brick_mask> masks(static_cast<std::size_t>(bricks_x * bricks_y));
+        for (std::int64_t k = low; k < std::min(low + 8, v.extent[2]); ++k)
+            for (std::int64_t j = 0; j < v.extent[1]; ++j)
+                for (std::int64_t w = 0; w < v.words_per_row(); ++w) {
+                    std::uint32_t word = v.word(bits, w, j, k);
+                    for (std::int64_t x = 4 * w; word != 0; ++x, word >>= 8)
+                        add_row(masks[static_cast<std::size_t>(j / 8 * bricks_x + x)], static_cast<int>(j % 8),
+                                static_cast<int>(k % 8), word & 0xffU);
+                }
+        for (std::int64_t y = 0; y < bricks_y; ++y)
+            for (std::int64_t x = 0; x < bricks_x; ++x)
+                if (const voxelpipe::brick_mask& mask = masks[static_cast<std::size_t>(y * bricks_x + x)];
+                    mask != voxelpipe::brick_mask{})
+                    found[n].emplace_back(
+                        voxelpipe::core::morton_key(static_cast<int>(x), static_cast<int>(y), static_cast<int>(n)),
+                        mask);
+    });
+    std::vector<const brick*> bricks;
+    for (const std::vector<brick>& layer : found)
+        for (const brick& b : layer) bricks.push_back(&b);
+    std::sort(bricks.begin(), bricks.end(), [](const brick* a, const brick* b) { return a->first < b->first; });
     sparse_volume result;
     result.shape.extent = v.extent;
     result.shape.origin = v.origin;
     result.shape.voxel_size = v.voxel_size;
-    const channel& bits = *v.occupancy();
-    // The bricks, as they come in storage order, then by their keys.
-    std::vector<std::pair<std::uint64_t, voxelpipe::brick_mask>> bricks;
-    const std::int64_t bricks_x = (v.extent[0] + 7) / 8, bricks_y = (v.extent[1] + 7) / 8;
-    std::vector<voxelpipe::brick_mask> layer(static_cast<std::size_t>(bricks_x * bricks_y));
-    for (std::int64_t k = 0; k < v.extent[2]; ++k) {
-        if (k % 8 == 0) std::fill(layer.begin(), layer.end(), voxelpipe::brick_mask{});
-        for (std::int64_t j = 0; j < v.extent[1]; ++j)
-            for (std::int64_t w = 0; w < v.words_per_row(); ++w)
-                for (std::uint32_t word = v.word(bits, w, j, k); word != 0; word &= word - 1) {
-                    const std::int64_t i = 32 * w + std::countr_zero(word);
-                    const auto bit = static_cast<std::size_t>(voxelpipe::core::morton_key(
-                        static_cast<int>(i % 8), static_cast<int>(j % 8), static_cast<int>(k % 8)));
-                    layer[static_cast<std::size_t>(j / 8 * bricks_x + i / 8)].words[bit / 64] |= std::uint64_t{1}
-                                                                                                 << bit % 64;
-                }
-        if (k % 8 != 7 && k + 1 != v.extent[2]) continue;
-        for (std::int64_t y = 0; y < bricks_y; ++y)
-            for (std::int64_t x = 0; x < bricks_x; ++x) {
-                const voxelpipe::brick_mask& mask = layer[static_cast<std::size_t>(y * bricks_x + x)];
-                if (mask.count() != 0)
-                    bricks.emplace_back(
-                        voxelpipe::core::morton_key(static_cast<int>(x), static_cast<int>(y), static_cast<int>(k / 8)),
-                        mask);
-            }
-    }
-    std::sort(bricks.begin(), bricks.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     std::uint64_t rank = 0;
-    for (const auto& [key, mask] : bricks) {
-        result.keys.push_back(key);
-        result.masks.push_back(mask);
+    for (const brick* b : bricks) {
+        result.keys.push_back(b->first);
+        result.masks.push_back(b->second);
         result.offsets.push_back(rank);
-        rank += mask.count();
+        rank += b->second.count();
     }
     if (!bricks.empty()) result.offsets.push_back(rank);
+    return result;
+}
+
+sparse_volume make_sparse(const volume& v, int threads) {
+    sparse_volume result = find_bricks(v, threads);
+    const std::uint64_t rank = result.num_voxels();
     const voxelpipe::brick_table table = result.table();
     for (const channel& from : v.channels) {
         channel to{from.name, from.type, from.components, {}};
-        if (&from != &bits) {
+        if (&from != v.occupancy()) {
             const std::size_t size = size_of(from.type) * static_cast<std::size_t>(from.components);
             to.data.resize(static_cast<std::size_t>(rank) * size);
             for (std::uint64_t b = 0; b < table.count; ++b)

@@ -54,9 +54,6 @@ struct sparse_volume {
 // The bits of each component of a voxel that does not exist.
 [[nodiscard]] std::uint32_t empty_value(const channel& c);
 
-// The dense volume; with all channels, or only those named so. Its memory is the caller's to care for.
-[[nodiscard]] volume make_dense(const sparse_volume& v, std::span<const channel> channels);
-
 // The dense volume without its memory: channels that read the bricks, as those do that can be streamed. Refers to V and
 // to the channels.
 [[nodiscard]] volume as_dense(const sparse_volume& v, std::span<const channel> channels);
@@ -64,7 +61,10 @@ struct sparse_volume {
 // One volume of parts of one grid that share no brick; they have the same channels, which are freed one by one.
 [[nodiscard]] sparse_volume join_slabs(std::vector<sparse_volume>&& parts);
 
+// The bricks of the occupied voxels of a dense volume, which has the channel "occupancy"; without channels.
+[[nodiscard]] sparse_volume find_bricks(const volume& v, int threads);
+
 // The occupied voxels of a dense volume, with the values of its other channels. It has the channel "occupancy".
-[[nodiscard]] sparse_volume make_sparse(const volume& v);
+[[nodiscard]] sparse_volume make_sparse(const volume& v, int threads);
 
 } // namespace voxelize

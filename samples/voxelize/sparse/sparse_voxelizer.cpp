@@ -26,11 +26,10 @@ storage_decision choose_storage(storage_choice choice, const voxelize_request& r
     if (choice == storage_choice::dense) return {};
     const auto bricks_alone = std::find_if(outputs.begin(), outputs.end(), is_sparse_format);
     const bool needs_bricks = bricks_alone != outputs.end();
-    const bool takes_bricks = std::all_of(outputs.begin(), outputs.end(), is_written_sparse);
     const double dense = volume_bytes(request);
     const bool fits = dense <= static_cast<double>(memory::room());
     const bool insists = choice == storage_choice::sparse;
-    if (!insists && !needs_bricks && (fits || !takes_bricks)) return {};
+    if (!insists && !needs_bricks && fits) return {};
     const char* refused = nullptr;
     if (wants(request, target::color_outer)) refused = "--target color-outer needs a dense grid";
     if (request.backend == backend_choice::cuda)

@@ -36,10 +36,10 @@ std::uint64_t area(const std::vector<voxel_face>& faces) {
 TEST_F(Mesh, ABoxHasTheFacesOfItsSides) {
     // Over the border of a word along x, and up to the grid's border on two sides.
     const volume v = make_box({70, 6, 5}, {30, 2, 0}, {70, 5, 4});
-    const auto faces = voxel_faces(v, false, 1, {});
+    const auto faces = voxel_faces(voxel_shape(v, 1), false, 1, {});
     EXPECT_EQ(faces.size(), 2u * (40 * 3 + 3 * 4 + 40 * 4));
     EXPECT_EQ(area(faces), faces.size());
-    const auto merged = voxel_faces(v, true, 1, {});
+    const auto merged = voxel_faces(voxel_shape(v, 1), true, 1, {});
     ASSERT_EQ(merged.size(), 6u);
     EXPECT_EQ(area(merged), area(faces));
     using corner = std::array<std::uint32_t, 3>;
@@ -57,7 +57,7 @@ TEST_F(Mesh, MergingKeepsColoursApart) {
     volume v = make_box({4, 1, 1}, {0, 0, 0}, {4, 1, 1});
     channel& color = v.add("color", scalar::u8, 4);
     for (std::size_t i = 0; i < 4; ++i) color.data[4 * i] = static_cast<std::byte>(i < 3 ? 7 : 9);
-    const auto faces = voxel_faces(v, true, 1, {});
+    const auto faces = voxel_faces(voxel_shape(v, 1), true, 1, {});
     EXPECT_EQ(faces.size(), 2u + 4 * 2);
     std::map<std::uint32_t, std::uint64_t> by_color;
     for (const voxel_face& f : faces) by_color[f.rgb] += std::uint64_t{f.size[0]} * f.size[1];
@@ -66,7 +66,7 @@ TEST_F(Mesh, MergingKeepsColoursApart) {
 
 TEST_F(Mesh, CornersAreSharedByEqualColours) {
     volume v = make_box({3, 3, 3}, {0, 0, 0}, {2, 2, 2});
-    welded_mesh mesh = weld(voxel_faces(v, false, 1, {}), v.extent, 1);
+    welded_mesh mesh = weld(voxel_faces(voxel_shape(v, 1), false, 1, {}), v.extent, 1);
     EXPECT_EQ(mesh.vertices.size(), 26u); // of the 27 corners all but the middle
     EXPECT_EQ(mesh.quads.size(), 24u);
     // Closed and the same way around: every edge is used once in each direction.
@@ -77,15 +77,15 @@ TEST_F(Mesh, CornersAreSharedByEqualColours) {
     // In two colours the corners of the seam are there twice.
     channel& color = v.add("color", scalar::u8, 3);
     for (std::size_t n = 0; n < color.data.size(); n += 3) color.data[n] = static_cast<std::byte>(n / 3 % 3);
-    mesh = weld(voxel_faces(v, false, 1, {}), v.extent, 1);
+    mesh = weld(voxel_faces(voxel_shape(v, 1), false, 1, {}), v.extent, 1);
     EXPECT_EQ(mesh.vertices.size(), 26u + 8);
 }
 
 TEST_F(Mesh, ThreadsChangeNothing) {
     const volume v = make_colored({70, 41, 37}, 3);
     for (const bool merge : {false, true}) {
-        const auto one = voxel_faces(v, merge, 1, {});
-        EXPECT_TRUE(one == voxel_faces(v, merge, 5, {}));
+        const auto one = voxel_faces(voxel_shape(v, 1), merge, 1, {});
+        EXPECT_TRUE(one == voxel_faces(voxel_shape(v, 1), merge, 5, {}));
         const welded_mesh a = weld(one, v.extent, 1), b = weld(one, v.extent, 5);
         EXPECT_TRUE(a.quads == b.quads);
         EXPECT_EQ(a.vertices.size(), b.vertices.size());

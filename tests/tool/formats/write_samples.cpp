@@ -135,7 +135,7 @@ int main(int argc, char** argv) {
                 for (const auto& path : write(c.v, folder / (c.name + extension), c.options))
                     files[extension].push_back(path.filename().string());
             if (c.density != 0 && c.extensions.front() == ".npy") {
-                const sparse_volume bricks = make_sparse(c.v);
+                const sparse_volume bricks = make_sparse(c.v, 1);
                 for (const std::string extension : {".npz", ".npy"})
                     for (const auto& path : write_sparse(bricks, folder / (c.name + "_sparse" + extension), c.options))
                         files[".sparse_" + extension.substr(1)].push_back(path.filename().string());
