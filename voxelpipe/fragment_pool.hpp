@@ -39,11 +39,25 @@ struct length {
     VOXELPIPE_HD operator std::uint64_t() const { return at != nullptr ? *at : value; } // NOLINT(*-explicit-*)
 };
 
+// A part of a grid, and its voxels' numbers in the whole.
+struct grid_part {
+    glm::ivec3 begin, size, whole;
+
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t number_in_whole(std::uint64_t voxel) const {
+        if (size == whole) return voxel;
+        const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
+        const std::uint64_t row = voxel / wide(size.x), layer = row / wide(size.y);
+        const std::uint64_t x = voxel - row * wide(size.x) + wide(begin.x),
+                            y = row - layer * wide(size.y) + wide(begin.y), z = layer + wide(begin.z);
+        return (z * wide(whole.y) + y) * wide(whole.x) + x;
+    }
+};
 // Fragment i of lists, from number `first` on.
 template <class Payload>
 struct take_lists {
     const std::uint64_t *voxels, *offsets;
     std::uint32_t num_voxels, first_primitive;
+    grid_part part;
     const std::uint32_t* primitives;
     const Payload* payloads;
     std::uint64_t first;
@@ -52,7 +66,7 @@ struct take_lists {
     Payload* to_payloads;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        keys[first + i] = voxels[find_owner(offsets, num_voxels, i)];
+        keys[first + i] = part.number_in_whole(voxels[find_owner(offsets, num_voxels, i)]);
         order[first + i] = static_cast<std::uint32_t>(first + i);
         to_primitives[first + i] = primitives[i] + first_primitive;
         if constexpr (!std::is_same_v<Payload, no_payload>) to_payloads[first + i] = payloads[i];
@@ -70,6 +84,26 @@ struct gather {
         if (i >= count) return;
         to_primitives[i] = primitives[order[i]];
         if constexpr (!std::is_same_v<Payload, no_payload>) to_payloads[i] = payloads[order[i]];
+    }
+};
+// Lists behind others, of which there are first_voxel voxels and first_fragment fragments.
+template <class Payload>
+struct append {
+    const std::uint64_t *voxels, *offsets;
+    std::uint64_t num_voxels, num_fragments;
+    const std::uint32_t* primitives;
+    const Payload* payloads;
+    std::uint64_t first_voxel, first_fragment;
+    std::uint64_t *to_voxels, *to_offsets;
+    std::uint32_t* to_primitives;
+    Payload* to_payloads;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (i < num_voxels) to_voxels[first_voxel + i] = voxels[i];
+        if (i <= num_voxels) to_offsets[first_voxel + i] = first_fragment + offsets[i];
+        if (i >= num_fragments) return;
+        to_primitives[first_fragment + i] = primitives[i];
+        if constexpr (!std::is_same_v<Payload, no_payload>) to_payloads[first_fragment + i] = payloads[i];
     }
 };
 // 1 for the first fragment of a voxel; a last element of 0, so that the sums end with the total.
@@ -149,16 +183,17 @@ public:
         buffer<stored> payloads;
     };
 
-    void add(abuffer<Backend, Payload>&& lists, std::uint32_t first_primitive) {
+    // begin: of the lists' part of the grid.
+    void add(abuffer<Backend, Payload>&& lists, std::uint32_t first_primitive, const glm::ivec3& begin) {
         total_ += lists.num_fragments();
-        if (lists.num_fragments() != 0) lists_.push_back({std::move(lists), first_primitive});
+        if (lists.num_fragments() != 0) lists_.push_back({std::move(lists), first_primitive, begin});
     }
     [[nodiscard]] std::uint64_t size() const { return total_; }
 
     // The lists of all parts. Throws std::length_error if fragments are too many to be numbered.
     [[nodiscard]] abuffer<Backend, Payload> join(Backend& backend, const glm::ivec3& extent) {
         if (total_ > max_fragments) throw std::length_error("voxelpipe: too many fragments");
-        if (lists_.size() == 1 && lists_[0].first_primitive == 0) {
+        if (lists_.size() == 1 && lists_[0].first_primitive == 0 && lists_[0].lists.extent == extent) {
             abuffer<Backend, Payload> only = std::move(lists_[0].lists);
             lists_.clear();
             return only;
@@ -167,11 +202,18 @@ public:
         std::uint64_t first = 0;
         for (entry& e : lists_) {
             const auto& l = e.lists;
-            backend.for_each(l.num_fragments(),
-                             pool::take_lists<stored>{l.voxels.data(), l.offsets.data(),
-                                                      static_cast<std::uint32_t>(l.num_voxels()), e.first_primitive,
-                                                      l.primitives.data(), l.payloads.data(), first, all.keys.data(),
-                                                      all.order.data(), all.primitives.data(), all.payloads.data()});
+            backend.for_each(l.num_fragments(), pool::take_lists<stored>{l.voxels.data(),
+                                                                         l.offsets.data(),
+                                                                         static_cast<std::uint32_t>(l.num_voxels()),
+                                                                         e.first_primitive,
+                                                                         {e.begin, l.extent, extent},
+                                                                         l.primitives.data(),
+                                                                         l.payloads.data(),
+                                                                         first,
+                                                                         all.keys.data(),
+                                                                         all.order.data(),
+                                                                         all.primitives.data(),
+                                                                         all.payloads.data()});
             first += l.num_fragments();
             e.lists = abuffer<Backend, Payload>(backend);
         }
@@ -210,6 +252,7 @@ private:
     struct entry {
         abuffer<Backend, Payload> lists;
         std::uint32_t first_primitive;
+        glm::ivec3 begin;
     };
     std::vector<entry> lists_;
     std::uint64_t total_ = 0;
@@ -238,14 +281,17 @@ template <class Backend, class Payload>
     out = std::move(lists);
     return s;
 }
-template <class Backend, class Payload, class... Targets>
-[[nodiscard]] status store_pooled(Backend& backend, const grid&, abuffer<Backend, Payload>&& lists,
-                                  const framebuffer_view<Targets...>& fb, bool count_voxels, status s) {
-    s.counts.fragments = lists.num_fragments();
-    s.counts.voxels = count_voxels ? lists.num_voxels() : 0;
+// Clears the targets, before lists are folded into them.
+template <class Backend, class... Targets>
+[[nodiscard]] status begin_fold(Backend& backend, const framebuffer_view<Targets...>& fb) {
     if (const status cleared = backend.clear(fb); !cleared.ok()) return cleared;
     // The log does not describe the targets any longer.
     if (fb.changes != nullptr) backend.for_each(change_log::header_words, pool::zero_words{fb.changes});
+    return {};
+}
+// Lists of each voxel are folded at once.
+template <class Backend, class Payload, class... Targets>
+void fold_lists(Backend& backend, const abuffer<Backend, Payload>& lists, const framebuffer_view<Targets...>& fb) {
     for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
         using target = typename pack_element<I, Targets...>::type;
         const auto& t = voxelpipe::get<I>(fb.targets);
@@ -254,6 +300,14 @@ template <class Backend, class Payload, class... Targets>
                          pool::fold<I, target, Payload>{t, lists.voxels.data(), lists.offsets.data(),
                                                         lists.payloads.data(), lists.num_voxels()});
     });
+}
+template <class Backend, class Payload, class... Targets>
+[[nodiscard]] status store_pooled(Backend& backend, const grid&, abuffer<Backend, Payload>&& lists,
+                                  const framebuffer_view<Targets...>& fb, bool count_voxels, status s) {
+    s.counts.fragments = lists.num_fragments();
+    s.counts.voxels = count_voxels ? lists.num_voxels() : 0;
+    if (const status begun = begin_fold(backend, fb); !begun.ok()) return begun;
+    fold_lists(backend, lists, fb);
     return s;
 }
 

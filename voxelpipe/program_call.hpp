@@ -9,6 +9,7 @@
 
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/fragment_pool.hpp>
+#include <voxelpipe/program_parts.hpp>
 #include <voxelpipe/program_passes.hpp>
 #include <voxelpipe/sparse.hpp>
 #include <voxelpipe/voxelize.hpp>
@@ -31,13 +32,16 @@ struct program_options : voxelize_options {
     // Most triangles of the programs that are in memory at once, at least 1 and at most 2^30. They take some 30 bytes
     // each, and what the vertices' varyings take. Results do not depend on it.
     std::uint64_t chunk_triangles = std::uint64_t{1} << 24;
+    // Bytes, about, that the lists of a call in more than one chunk may take at once; 0: what there is. If there are
+    // more fragments, the grid is drawn in parts, and the programs run again for each. Results do not depend on it.
+    std::uint64_t list_bytes = 0;
 
     program_options() = default;
     // A coverage alone, or options of a call without programs, may be given in their place.
     program_options(const voxelize_options& o) : voxelize_options(o) {} // NOLINT(*-explicit-*)
     program_options(coverage rule_) : voxelize_options{rule_, true} {}  // NOLINT(*-explicit-*)
-    program_options(coverage rule_, std::uint64_t chunk_triangles_)
-        : voxelize_options{rule_, true}, chunk_triangles(chunk_triangles_) {}
+    program_options(coverage rule_, std::uint64_t chunk_triangles_, std::uint64_t list_bytes_ = 0)
+        : voxelize_options{rule_, true}, chunk_triangles(chunk_triangles_), list_bytes(list_bytes_) {}
 };
 
 namespace core {
@@ -306,15 +310,6 @@ name_bad_input(Backend& backend, std::span<const draw<Mesh, VertexShader, Fragme
     return s;
 }
 
-inline void add_counts(counters& to, const counters& more) {
-    to.triangles_nonfinite += more.triangles_nonfinite;
-    to.triangles_too_far += more.triangles_too_far;
-    to.triangles_zero_area += more.triangles_zero_area;
-    to.triangles_outside += more.triangles_outside;
-    to.triangles_drawn += more.triangles_drawn;
-    to.fragments_discarded += more.fragments_discarded;
-}
-
 // True if the emitted triangles hold those that a tessellation leaves out. They are no input of a geometry program.
 template <class Amplify>
 inline constexpr bool counts_left_out = true;
@@ -517,48 +512,72 @@ struct listing<abuffer<Backend, Payload>> {
     using shader = FragmentShader;
 };
 
+// A call whose triangles are `chunk` at most at once. Sets `has_written` once a target has been written.
 template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class Amplify,
           class Output>
-[[nodiscard]] status run_program(Backend& backend,
-                                 std::span<const draw<Mesh, VertexShader, FragmentShader, Amplify>> draws,
-                                 const grid& g, Output& out, const program_options& options) {
+[[nodiscard]] status
+run_in_chunks(Backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader, Amplify>> draws, const grid& g,
+              Output& out, const program_options& options, std::uint64_t chunk, bool& has_written) {
     using output_type = std::remove_const_t<Output>;
     using call_type = program_call<Backend, Mesh, VertexShader, FragmentShader, Amplify, is_constant<FragmentShader>>;
     using emitted_draw = typename call_type::emitted_draw;
+    using payload = typename pooled<output_type, program_output<Mesh, VertexShader, FragmentShader, Amplify>>::payload;
     const voxelize_options& plain = options;
-    const call_type call(backend, draws, g, options.chunk_triangles);
+    const call_type call(backend, draws, g, chunk);
     if (!call.state().ok()) return name_bad_input(backend, draws, call.state());
     if (call.fits())
         return call.draw_at_once(
             [&](std::span<const emitted_draw> emitted) { return voxelize<Known...>(backend, emitted, g, out, plain); });
 
-    const auto list = [&]<class View, class Shader, class Emitted>(std::type_identity<draw<View, Shader, Emitted>>) {
+    const auto list_chunks = [&]<class View, class Shader, class Emitted>(
+                                 std::type_identity<draw<View, Shader, Emitted>>, const grid& part, const auto& take) {
         using listed = typename listing<output_type>::template shader<Emitted>;
-        using payload =
-            typename pooled<output_type, program_output<Mesh, VertexShader, FragmentShader, Amplify>>::payload;
         using listed_draw = draw<View, Shader, listed>;
-        fragment_pool<Backend, payload> pool;
-        status all;
-        const status s = call.draw_in_chunks([&](const emitted_draw& chunk, std::uint32_t first) {
-            const listed_draw d{chunk.mesh, chunk.vertex_shader, listed{chunk.fragment_shader}};
+        return call.draw_in_chunks([&](const emitted_draw& made, std::uint32_t first) {
+            const listed_draw d{made.mesh, made.vertex_shader, listed{made.fragment_shader}};
             abuffer<Backend, payload> lists(backend);
-            const status of_chunk = voxelize<Known...>(backend, std::span<const listed_draw>(&d, 1), g, lists, plain);
-            if (of_chunk.ok()) {
-                add_counts(all.counts, of_chunk.counts);
-                pool.add(std::move(lists), first);
-            }
+            const status of_chunk =
+                voxelize<Known...>(backend, std::span<const listed_draw>(&d, 1), part, lists, plain);
+            if (of_chunk.ok()) take(std::move(lists), first, of_chunk.counts);
             return of_chunk;
         });
-        if (!s.ok()) {
-            status failed = s;
-            failed.counts.triangles_in = call.state().counts.triangles_in - call.left_out();
-            return failed;
-        }
-        all.counts.triangles_in = call.state().counts.triangles_in;
-        return store_pooled(backend, g, pool.join(backend, g.extent), out, plain.count_voxels,
-                            without_left_out(all, call.left_out()));
     };
-    return list(std::type_identity<emitted_draw>{});
+    const auto list = [&](const grid& part, const auto& take) {
+        return list_chunks(std::type_identity<emitted_draw>{}, part, take);
+    };
+    // Voxels, offsets, primitives and payloads of the lists, the same in one array of all, and two of keys and numbers
+    // for the sort.
+    constexpr std::uint64_t bytes_each = 48 + 2 * (4 + sizeof(payload_storage<payload>));
+    const std::uint64_t most = options.list_bytes == 0 ? ~std::uint64_t{0} : options.list_bytes / bytes_each;
+    part_store<Backend, payload, output_type> store(backend, out);
+    status all;
+    part_drawing<Backend, payload, decltype(store), decltype(list)> parts(backend, g, store, list, most);
+    status s = parts.draw(all.counts);
+    all.counts.triangles_in = call.state().counts.triangles_in;
+    if (s.ok())
+        s = store.finish(backend, g, plain.count_voxels, without_left_out(all, call.left_out()));
+    else
+        s.counts = {.triangles_in = all.counts.triangles_in - call.left_out()};
+    has_written = store.has_written();
+    return s;
+}
+template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class Amplify,
+          class Output>
+[[nodiscard]] status run_program(Backend& backend,
+                                 std::span<const draw<Mesh, VertexShader, FragmentShader, Amplify>> draws,
+                                 const grid& g, Output& out, const program_options& options) {
+    // If there is no memory for a chunk, smaller ones may do.
+    constexpr std::uint64_t least = 1024;
+    for (std::uint64_t chunk = options.chunk_triangles;; chunk /= 16) {
+        bool has_written = false;
+        const bool is_last = chunk <= least;
+        try {
+            const status s = run_in_chunks<Known...>(backend, draws, g, out, options, chunk, has_written);
+            if (s.code != status_code::out_of_memory || is_last || has_written) return s;
+        } catch (const std::bad_alloc&) {
+            if (is_last || has_written) throw;
+        }
+    }
 }
 
 template <class T>
@@ -590,7 +609,8 @@ using view_type_of = std::remove_cvref_t<decltype(view_of(std::declval<const Vie
 // framebuffer. Fragments have the number of the input primitive (triangle), its instance and draw; `primitive` numbers
 // the triangles that the programs make. counts.triangles_in counts those, without the ones that a tessellation leaves
 // out. Beside the errors of voxelize: bad_level, bad_count, and too_many_triangles for more than 2^32 - 1 triangles,
-// whose true number is in counts.triangles_in. A call that fails has written nothing. Waits.
+// whose true number is in counts.triangles_in. A call that fails has written nothing, unless the memory runs out while
+// parts of the grid are drawn. Waits.
 template <coverage... Known, class Backend, class Mesh, class VertexShader, class FragmentShader, class Amplify,
           class Output>
 requires core::is_amplifier<Amplify>

@@ -23,9 +23,11 @@ void expect_same_for_all_chunks(const unit::small_mesh& m, const Amplify& amplif
             results first;
             bool is_first = true;
             for (const unsigned threads : {1u, 8u})
-                for (const std::uint64_t chunk : {std::uint64_t{1} << 24, std::uint64_t{1} << 10, std::uint64_t{77}}) {
+                for (const vp::program_options& capacities : // the last: in parts of the grid
+                     {vp::program_options(rule, 1 << 24), vp::program_options(rule, 1 << 10),
+                      vp::program_options(rule, 77), vp::program_options(rule, 1 << 10, 500'000)}) {
                     backend_type backend = unit::make_backend(threads);
-                    const results r = draw_all(backend, m, grid, amplify, {rule, chunk});
+                    const results r = draw_all(backend, m, grid, amplify, capacities);
                     if (is_first) {
                         first = r;
                         EXPECT_GT(r.counts.fragments, min_fragments);
@@ -46,6 +48,19 @@ TEST(GeometryProgram, DoesNotDependOnChunksOrThreads) {
 TEST(GeometryProgram, FollowsATessellation) {
     expect_same_for_all_chunks(unit::make_mesh(3, 12, extent),
                                vp::tessellate{waves{4.1f, 1.0f}} | vp::geometry{prism{0.8f}}, 40);
+}
+
+// Down to parts of one voxel.
+TEST(Tessellation, DoesNotDependOnTheMemoryOfLists) {
+    const unit::small_mesh m = unit::make_mesh(8, 4, {6, 5, 7});
+    const vp::grid grid = unit::unit_grid({6, 5, 7}).crop({1, 0, 2}, {4, 4, 3});
+    backend_type backend = unit::make_backend();
+    const vp::tessellate<waves> amplify{{1.3f, 0.5f}};
+    const vp::coverage rule = vp::coverage::conservative;
+    const results expected = draw_all(backend, m, grid, amplify, {rule});
+    EXPECT_GT(expected.counts.fragments, 40u);
+    for (const std::uint64_t bytes : {1u, 1'000u, 4'000u})
+        expect_same(expected, draw_all(backend, m, grid, amplify, {rule, 16, bytes}));
 }
 
 // A mesh with the program's levels 1 is drawn as without a program, byte for byte.

@@ -137,9 +137,10 @@ void expect_same_programs(std::uint64_t seed, int triangles, const Amplify& ampl
     vp::cpu_backend cpu;
     const programs::results expected = programs::draw_all<rule>(cpu, m, g, amplify, {rule});
     EXPECT_GT(expected.counts.voxels, 50u);
-    for (const std::uint64_t chunk : {std::uint64_t{1} << 24, std::uint64_t{300}}) {
+    const vp::program_options capacities[] = {{rule, 1 << 24}, {rule, 300}, {rule, 300, 60'000}};
+    for (const vp::program_options& options : capacities) {
         vp::cuda_backend gpu;
-        programs::expect_same(expected, programs::draw_all<rule>(gpu, m, g, amplify, {rule, chunk}));
+        programs::expect_same(expected, programs::draw_all<rule>(gpu, m, g, amplify, options));
     }
 }
 TEST(DevicePrograms, TessellationIsTheCpus) {
@@ -150,9 +151,54 @@ TEST(DevicePrograms, GeometryOfATessellationIsTheCpus) {
     expect_same_programs(3, 20, vp::tessellate{programs::waves{4.1f, 1.0f}} | vp::geometry{programs::prism{0.8f}});
 }
 
-// ---- calls that do not wait -----------------------------------------------------------------------------------------
-
 constexpr vp::coverage async_rule = vp::coverage::thin;
+
+// Memory that runs out.
+struct limited_resource {
+    std::uint64_t limit, used = 0, peak = 0;
+    int refused = 0;
+    void* allocate_async(std::size_t bytes, std::size_t, cudaStream_t stream) {
+        if (used + bytes > limit) {
+            ++refused;
+            throw std::bad_alloc();
+        }
+        used += bytes;
+        peak = used > peak ? used : peak;
+        void* p = nullptr;
+        EXPECT_EQ(cudaMallocAsync(&p, bytes, stream), cudaSuccess);
+        return p;
+    }
+    void deallocate_async(void* p, std::size_t bytes, std::size_t, cudaStream_t stream) {
+        used -= bytes;
+        EXPECT_EQ(cudaFreeAsync(p, stream), cudaSuccess);
+    }
+};
+// Fragments for which there is no memory at once are drawn in parts of the grid.
+TEST(DevicePrograms, DrawInPartsIfMemoryRunsOut) {
+    const unit::small_mesh m = unit::make_mesh(7, 200, extent);
+    const vp::grid g = box_grid(extent);
+    const vp::tessellate<programs::waves> amplify{{2.0f, 1.0f}};
+    const auto draw = [&](limited_resource& resource) {
+        stream_owner owner;
+        vp::cuda_backend gpu{owner.stream, resource};
+        gpu.use_graphs = false; // whose memory comes from elsewhere
+        const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
+        programs::framebuffer_of<vp::cuda_backend> fb{gpu, g.extent};
+        const vp::status s = vp::voxelize<async_rule>(gpu, mesh, g, programs::add_surface{}, amplify,
+                                                      programs::shader{}, fb, vp::program_options(async_rule, 3000));
+        EXPECT_TRUE(s.ok()) << s.message();
+        return std::pair(vp::get<0>(fb).to_host(gpu), vp::get<1>(fb).to_host(gpu));
+    };
+    limited_resource all{~std::uint64_t{0}};
+    const auto expected = draw(all);
+    limited_resource less{all.peak - all.peak / 8};
+    const auto found = draw(less);
+    EXPECT_GT(less.refused, 0);
+    expect_same_bytes(expected.first, found.first, "ids");
+    expect_same_bytes(expected.second, found.second, "sums");
+}
+
+// ---- calls that do not wait -----------------------------------------------------------------------------------------
 
 // Two meshes through the same programs.
 template <class Backend, class FragmentShader, class Amplify>
