@@ -151,7 +151,7 @@ private:
         abuffer_view<payload> lists;
         list_async<Coverage, Run>(make_list_call<listed_type, payload>(std::span<const listed_type>(shaded), g,
                                                                        options.rule, triangles, limits),
-                                  options.rule, memory, lists, stream);
+                                  options.rule, {}, memory, lists, stream);
         const bounded_bricks<> bricks(g.whole_extent(), to_room(limits), memory);
         auto* const listed = memory.take<std::uint32_t>(limits.voxels + spare_ranks);
         const auto values = take_values(memory);
