@@ -6,7 +6,7 @@
 
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/io/nanovdb.hpp>
-#include <voxelpipe/octree.hpp>
+#include <voxelpipe/backend_octree.hpp>
 
 #include <cmath>
 #include <cstdio>
@@ -63,18 +63,21 @@ int main(int argc, char** argv) {
     // end snippet
 
     // Rays from the front through the octree, and from what they meet to the sun.
-    const vp::octree tree(voxels);
+    // snippet: octree
+    const vp::backend_octree tree(backend, surface);
+    const vp::octree_view nodes = tree.view(); // refers to the tree, in the backend's memory
+    // end snippet
     const glm::dvec3 centre = glm::dvec3(grid.extent) * 0.5, sun = glm::normalize(glm::dvec3(-0.4, 0.7, 0.8));
     int hits = 0, rays = 0;
     picture::write_pixels("knot.ppm", 1.1f, [&](float x, float y, const glm::vec2&) {
         const glm::dvec3 from = centre + 1.12 * n * glm::dvec3(1.1 * (x - 0.5), 0.5 - y, 1.0);
-        const vp::voxel_hit hit = tree.first_hit(from, {0, 0, -1});
+        const vp::voxel_hit hit = nodes.first_hit(from, {0, 0, -1});
         ++rays;
         if (!hit.found) return glm::mix(glm::vec3(0.42f, 0.52f, 0.64f), glm::vec3(0.78f, 0.80f, 0.82f), y);
         ++hits;
         const glm::vec3 color = glm::vec3(vp::get<0>(voxels)[hit.rank]) / 255.0f, normal = 2.55f * color - 1.28f;
         const glm::dvec3 above = from - glm::dvec3(0, 0, hit.distance) + 0.01 * n * glm::dvec3(normal);
-        const bool is_lit = !tree.first_hit(above, sun).found;
+        const bool is_lit = !nodes.first_hit(above, sun).found;
         return color * color * (0.4f + (is_lit ? 0.9f * std::max(0.0f, glm::dot(normal, glm::vec3(sun))) : 0.0f));
     });
     return hits > rays / 8 && voxels.num_voxels() == drawn.counts.voxels && file ? 0 : 1;

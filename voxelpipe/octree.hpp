@@ -2,17 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// An octree over a sparse framebuffer, on the host: nodes of 2, 4, 8 ... voxels a side, in the Morton order of their
-// places, so that the nodes below a node are a stretch of each level; values for every level by a reducer
-// (reducers.hpp); and a ray through it. A node exists if a voxel below it does: the levels are the OR of the finest,
-// not what a voxelization at half the resolution gives, which snaps otherwise.
+// An octree over a sparse framebuffer, on the host (backend_octree.hpp: on a GPU): nodes of 2, 4, 8 ... voxels a side,
+// in the Morton order of their places, so that the nodes below a node are a stretch of each level; values for every
+// level by a reducer (reducers.hpp); and a ray through it. A node exists if a voxel below it does: the levels are the
+// OR of the finest, not what a voxelization at half the resolution gives, which snaps otherwise.
 
 #include <voxelpipe/core/octree_view.hpp>
 #include <voxelpipe/host_sparse.hpp>
-#include <voxelpipe/reducers.hpp>
+#include <voxelpipe/octree_nodes.hpp>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -23,6 +22,20 @@
 #include <vector>
 
 namespace voxelpipe {
+
+template <class Backend>
+class backend_octree;
+
+namespace core {
+
+// Levels of an octree whose root holds a grid.
+[[nodiscard]] inline int octree_depth(const glm::ivec3& whole_extent) {
+    const int side = std::max({whole_extent.x, whole_extent.y, whole_extent.z});
+    return std::max(log2_sparse_brick,
+                    side <= 1 ? 0 : static_cast<int>(std::bit_width(static_cast<unsigned>(side - 1))));
+}
+
+} // namespace core
 
 // Owns its nodes: 9 bytes each. Level l of 1 .. num_levels() has nodes of 2^l voxels a side, the last one the root
 // alone; level 0 are the voxels. Places count in the whole grid.
@@ -76,10 +89,17 @@ public:
         if (num_levels() != 0) visit(num_levels(), 0, 0, level, f);
     }
 
+    // Whether two have the same nodes.
+    friend bool operator==(const octree&, const octree&) = default;
+
 private:
+    template <class Backend>
+    friend class backend_octree;
+
     struct nodes {
         std::vector<std::uint8_t> masks;
         std::vector<std::uint64_t> first;
+        friend bool operator==(const nodes&, const nodes&) = default;
     };
 
     template <class F>
@@ -97,10 +117,7 @@ private:
     void build(const brick_table& table, const glm::ivec3& whole_extent) {
         num_voxels_ = table.num_voxels();
         if (table.count == 0) return;
-        const int depth =
-            std::max(core::log2_sparse_brick,
-                     std::max({ceil_log2(whole_extent.x), ceil_log2(whole_extent.y), ceil_log2(whole_extent.z)}));
-        levels_.resize(static_cast<std::size_t>(depth));
+        levels_.resize(static_cast<std::size_t>(core::octree_depth(whole_extent)));
         // A brick is a node of level 3. Its mask has a word for each child and a byte for each grandchild.
         for (std::uint64_t b = 0; b < table.count; ++b) {
             std::uint64_t rank = table.offsets[b];
@@ -138,9 +155,6 @@ private:
             keys.swap(above);
         }
     }
-    [[nodiscard]] static int ceil_log2(int n) {
-        return n <= 1 ? 0 : static_cast<int>(std::bit_width(static_cast<unsigned>(n - 1)));
-    }
 
     std::vector<nodes> levels_;
     std::uint64_t num_voxels_ = 0;
@@ -159,123 +173,45 @@ private:
     std::vector<std::vector<T>> levels_;
 };
 
-namespace core {
-
-// The number of fragments of each voxel, where a reducer asks for them.
-template <class Reducer>
-struct counted_target {
-    template <class Host>
-    static std::uint64_t count(const Host&, std::uint64_t) {
-        return 1; // voxels
-    }
-};
-template <std::size_t C>
-struct counted_target<reduce::mean<C>> {
-    template <class Host>
-    static std::uint64_t count(const Host& h, std::uint64_t rank) {
-        return static_cast<std::uint64_t>(voxelpipe::get<C>(h)[rank]);
-    }
-};
-
-template <std::size_t I, class Host>
-using reduced_target = typename Host::template target_type<I>;
-
-template <std::size_t I, class Reducer, class Host>
-[[nodiscard]] auto reduce_terms(const octree& tree, const Host& h) {
-    using target = reduced_target<I, Host>;
-    using value = typename target::value_type;
-    using parts = components_of<value>;
-    using format = blend_tree_sum<typename target::blend_type, typename parts::scalar>;
-    constexpr bool divides = !std::is_same_v<Reducer, reduce::sum>;
-    using scalar = std::conditional_t<divides, typename format::quotient, typename format::total>;
-    using result = typename parts::template with<scalar>;
-    struct node {
-        std::array<typename format::sum, static_cast<std::size_t>(parts::count)> sums{};
-        std::uint64_t count = 0;
-    };
-    const auto& kept = voxelpipe::get<I>(h.sums);
-    const auto of_voxel = [&](std::uint64_t rank) {
-        node n;
-        n.count = counted_target<Reducer>::count(h, rank);
-        const value v = voxelpipe::get<I>(h)[rank];
-        for (int c = 0; c < parts::count; ++c) {
-            auto& sum = n.sums[static_cast<std::size_t>(c)];
-            if constexpr (has_wide_sums<target> && is_floating<typename parts::scalar>) {
-                if (!kept.empty()) {
-                    if constexpr (parts::count > 1)
-                        sum = widen(kept[rank].c[c]);
-                    else
-                        sum = widen(kept[rank]);
-                    continue;
-                }
-            }
-            sum = format::begin(parts::at(v, c));
-        }
-        return n;
-    };
-    octree_levels<result> levels;
-    std::vector<node> below, here;
-    for (int l = 1; l <= tree.num_levels(); ++l) {
-        const auto masks = tree.masks(l);
-        const auto first = tree.first(l);
-        here.assign(masks.size(), {});
-        std::vector<result>& out = levels.add();
-        out.resize(masks.size());
-        for (std::size_t i = 0; i < masks.size(); ++i) {
-            const auto children = static_cast<unsigned>(std::popcount(masks[i]));
-            for (std::uint64_t c = first[i]; c < first[i] + children; ++c) {
-                const node& from = l == 1 ? of_voxel(c) : below[c];
-                for (std::size_t k = 0; k < from.sums.size(); ++k) here[i].sums[k].add(from.sums[k]);
-                here[i].count += from.count;
-            }
-            std::uint64_t divisor = here[i].count;
-            if constexpr (std::is_same_v<Reducer, reduce::mean_of_volume>) divisor = std::uint64_t{1} << (3 * l);
-            for (int k = 0; k < parts::count; ++k) {
-                const auto& sum = here[i].sums[static_cast<std::size_t>(k)];
-                if constexpr (divides)
-                    components_of<result>::at(out[i], k) = divisor == 0 ? scalar{} : format::divide(sum, divisor);
-                else
-                    components_of<result>::at(out[i], k) = format::end(sum);
-            }
-        }
-        below.swap(here);
-    }
-    return levels;
-}
-
-} // namespace core
-
 // The values of target I on every level. `tree` is of `host`. Sums and means are exact and rounded once a node; the
 // others fold the up to 8 children of each node, in Morton order, level by level. Values that do not exist do not
 // count. The results have the target's type, bits as 0 and 1 in bytes; sums of integers are 64-bit, means of integers
 // doubles.
 template <std::size_t I, class Reducer, class... Targets>
 [[nodiscard]] auto reduce_levels(const octree& tree, const host_sparse<Targets...>& host, const Reducer& reducer) {
-    using host_type = host_sparse<Targets...>;
     if (host.num_voxels() != tree.num_nodes(0) || !get<I>(host).enabled())
         throw std::invalid_argument(
             "voxelpipe::reduce_levels: the octree is of other voxels, or the target is disabled");
     if constexpr (core::sums_terms<Reducer>) {
         static_cast<void>(reducer);
-        return core::reduce_terms<I, Reducer>(tree, host);
-    } else {
-        using target_value = typename core::reduced_target<I, host_type>::value_type;
-        using value = std::conditional_t<std::is_same_v<target_value, bool>, std::uint8_t, target_value>;
-        octree_levels<value> levels;
-        std::array<value, 8> children;
+        using sum_nodes = core::sum_octree_nodes<I, Reducer, Targets...>;
+        const auto voxels = sum_nodes::terms::of(host);
+        octree_levels<typename sum_nodes::terms::result> levels;
+        std::vector<typename sum_nodes::node> below, here;
         for (int l = 1; l <= tree.num_levels(); ++l) {
-            const auto masks = tree.masks(l);
-            const auto first = tree.first(l);
-            const std::span<const value> below = l == 1 ? std::span<const value>() : levels.at(l - 1);
-            std::vector<value> out;
-            out.reserve(masks.size());
-            for (std::size_t i = 0; i < masks.size(); ++i) {
-                const auto n = static_cast<std::size_t>(std::popcount(masks[i]));
-                for (std::size_t c = 0; c < n; ++c)
-                    children[c] = l == 1 ? value(get<I>(host)[first[i] + c]) : below[first[i] + c];
-                out.push_back(core::fold_of<Reducer, value>::fold(reducer, std::span<const value>(children.data(), n)));
-            }
-            levels.add() = std::move(out);
+            auto& values = levels.add();
+            values.resize(tree.num_nodes(l));
+            here.resize(values.size());
+            const sum_nodes sum{voxels,       l,           tree.masks(l).data(), tree.first(l).data(),
+                                below.data(), here.data(), values.data()};
+            for (std::uint64_t i = 0; i < values.size(); ++i) sum(i);
+            below.swap(here);
+        }
+        return levels;
+    } else {
+        using fold_nodes = core::fold_octree_nodes<Reducer, typename core::pack_element<I, Targets...>::type>;
+        octree_levels<typename fold_nodes::value> levels;
+        for (int l = 1; l <= tree.num_levels(); ++l) {
+            auto& values = levels.add();
+            values.resize(tree.num_nodes(l));
+            const fold_nodes fold{reducer,
+                                  get<I>(host.values).data(),
+                                  l,
+                                  tree.masks(l).data(),
+                                  tree.first(l).data(),
+                                  l == 1 ? nullptr : levels.at(l - 1).data(),
+                                  values.data()};
+            for (std::uint64_t i = 0; i < values.size(); ++i) fold(i);
         }
         return levels;
     }

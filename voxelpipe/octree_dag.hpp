@@ -5,6 +5,7 @@
 // An octree of which equal subtrees are stored once: a directed acyclic graph, geometry only. Built from the leaves up:
 // nodes of a level with the same mask and the same children become one.
 
+#include <voxelpipe/core/octree_dag_view.hpp>
 #include <voxelpipe/octree.hpp>
 
 #include <algorithm>
@@ -17,6 +18,9 @@
 #include <vector>
 
 namespace voxelpipe {
+
+template <class Backend>
+class backend_octree_dag;
 
 // An octree whose equal parts are there once: a directed acyclic graph. On the host; owns its nodes.
 class octree_dag {
@@ -40,26 +44,30 @@ public:
             bytes += l.masks.size() + (l.first.size() + l.children.size()) * sizeof(std::uint32_t);
         return bytes;
     }
-    // True if a voxel exists, in the numbers of the whole grid; false outside.
-    [[nodiscard]] bool contains(const glm::ivec3& voxel) const {
-        if (levels_.empty()) return false;
-        for (int a = 0; a < 3; ++a)
-            if (voxel[a] < 0 || voxel[a] >> num_levels() != 0) return false;
-        std::uint32_t n = 0;
-        for (int l = num_levels();; --l) {
-            const level& at = levels_[static_cast<std::size_t>(l) - 1];
-            const auto c = static_cast<unsigned>((voxel.x >> (l - 1) & 1) | (voxel.y >> (l - 1) & 1) << 1 |
-                                                 (voxel.z >> (l - 1) & 1) << 2);
-            if ((at.masks[n] >> c & 1u) == 0) return false;
-            if (l == 1) return true;
-            n = at.children[at.first[n] + static_cast<unsigned>(std::popcount(at.masks[n] & ((1u << c) - 1)))];
+    // Refers to the graph.
+    [[nodiscard]] octree_dag_view view() const {
+        octree_dag_view v;
+        v.num_levels = num_levels();
+        for (std::size_t l = 0; l < levels_.size(); ++l) {
+            v.masks[l] = levels_[l].masks.data();
+            v.first[l] = levels_[l].first.data();
+            v.children[l] = levels_[l].children.data();
         }
+        return v;
     }
+    // True if a voxel exists, in the numbers of the whole grid; false outside.
+    [[nodiscard]] bool contains(const glm::ivec3& voxel) const { return view().contains(voxel); }
+    // Whether two have the same nodes in the same order.
+    friend bool operator==(const octree_dag&, const octree_dag&) = default;
 
 private:
+    template <class Backend>
+    friend class backend_octree_dag;
+
     struct level {
         std::vector<std::uint8_t> masks;
         std::vector<std::uint32_t> first, children;
+        friend bool operator==(const level&, const level&) = default;
     };
     using node = std::array<std::uint32_t, 9>; // the mask, and the children from the first on
 

@@ -7,6 +7,7 @@
 
 #include "device_record.hpp"
 #include "machine.hpp"
+#include "octrees.cuh"
 #include "output.hpp"
 #include "scene_choice.hpp"
 #include "session.hpp"
@@ -19,6 +20,7 @@
 #include <cstdio>
 #include <iostream>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace {
@@ -31,7 +33,7 @@ struct options {
     std::vector<std::string> names;
     std::vector<int> resolutions{1024, 4096, 16384};
     gpu::repetition repeat;
-    int largest_mean = 4096, largest_dense = 1024;
+    int largest_mean = 4096, largest_dense = 1024, largest_octree = 0;
 };
 
 struct published_sparse {
@@ -96,13 +98,14 @@ private:
 struct measured {
     double ms = 0;
     std::uint64_t bricks = 0, voxels = 0, fragments = 0, bytes = 0, peak = 0;
-    vp::stage_times stages; // of one more call
+    vp::stage_times stages;   // of one more call
+    gpu::octree_times octree; // where it is wanted
 };
 
 // One kind of output of one scene in one grid. A backend of its own, so that no memory is there before.
 template <class Framebuffer, class VertexShader, class Shader>
 measured measure(gpu::session& s, const gpu::resident_mesh& mesh, const vp::grid& g, const Shader& shader,
-                 const gpu::repetition& how) {
+                 const gpu::repetition& how, bool wants_octree = false) {
     s.wait();
     s.trim();
     vp::cuda_backend backend(s.stream());
@@ -131,6 +134,8 @@ measured measure(gpu::session& s, const gpu::resident_mesh& mesh, const vp::grid
     m.ms = gpu::time_calls(s, how, call).median;
     backend.times = &m.stages;
     call();
+    if constexpr (std::is_same_v<Framebuffer, vp::sparse_framebuffer<vp::cuda_backend, sum, count>>)
+        if (wants_octree) m.octree = gpu::time_octree(s, backend, framebuffer, how);
     return m;
 }
 
@@ -148,6 +153,8 @@ int run(const options& how, const std::string& command) {
     table rows({"scene", "resolution", "output", "bricks", "voxels", "fragments", "ms", "dense_ms", "peer_ms",
                 "dense/ours", "peer/ours", "result_MiB", "peak_MiB", "peak/result", "coarse_ms", "sort_ms", "fine_ms",
                 "resolve_ms"});
+    table octrees({"scene", "resolution", "voxels", "nodes", "tree_MiB", "build_ms", "host_build_ms", "mean_ms",
+                   "host_mean_ms", "dag_nodes", "dag_MiB", "dag_ms", "host_dag_ms", "rays_ms", "host_rays_ms", "hits"});
     std::vector<std::string> notes;
     const std::vector<std::string> names = how.names.empty() ? available_scenes(how.scenes, notes) : how.names;
     const auto ms = [](double value) { return value > 0 ? significant(value, 4) : std::string{}; };
@@ -167,7 +174,8 @@ int run(const options& how, const std::string& command) {
                         dense = is_mean
                                     ? measure<dense_mean, pass_position>(session, mesh, g, give_position{}, how.repeat)
                                     : measure<dense_bits, vp::passthrough>(session, mesh, g, bits, how.repeat);
-                    m = is_mean ? measure<sparse_mean, pass_position>(session, mesh, g, give_position{}, how.repeat)
+                    m = is_mean ? measure<sparse_mean, pass_position>(session, mesh, g, give_position{}, how.repeat,
+                                                                      n <= how.largest_octree)
                                 : measure<sparse_bits, vp::passthrough>(session, mesh, g, bits, how.repeat);
                     watch.read();
                     const double peer = is_mean ? 0 : published_peer(data.name, n);
@@ -177,6 +185,12 @@ int run(const options& how, const std::string& command) {
                          ratio(dense.ms, m.ms), ratio(peer, m.ms), mib(m.bytes), mib(m.peak),
                          ratio(static_cast<double>(m.peak), static_cast<double>(m.bytes)), ms(m.stages.coarse_raster),
                          ms(m.stages.tile_sort), ms(m.stages.fine_raster), ms(m.stages.tile_resolve)});
+                    if (const gpu::octree_times& t = m.octree; t.nodes != 0)
+                        octrees.add_row({data.name, std::to_string(n), std::to_string(m.voxels),
+                                         std::to_string(t.nodes), mib(t.bytes), ms(t.build), ms(t.host_build),
+                                         ms(t.mean), ms(t.host_mean), std::to_string(t.dag_nodes), mib(t.dag_bytes),
+                                         ms(t.dag), ms(t.host_dag), ms(t.rays), ms(t.host_rays),
+                                         std::to_string(t.hits)});
                     say(data.name + " " + std::to_string(n) + (is_mean ? " mean " : " occupancy ") + significant(m.ms) +
                         " ms, peak " + mib(m.peak) + " MiB");
                 } catch (const std::exception& e) {
@@ -198,10 +212,16 @@ int run(const options& how, const std::string& command) {
                        "- peer: quoted, the fastest of five public sparse voxelizers on an NVIDIA H200\n";
     for (const std::string& note : notes) text += "- " + note + "\n";
     text += "\n" + rows.markdown();
+    if (how.largest_octree > 0)
+        text +=
+            "\nOctrees over the framebuffers of the mean, all byte-equal to the host's; host: one thread; mean: of the "
+            "four sums on every level; rays: 1024 x 1024, parallel\n\n" +
+            octrees.markdown();
     std::cout << text;
     if (!how.out.empty()) {
         write_file(std::filesystem::path(how.out) / "gpu_sparse.md", text);
         write_file(std::filesystem::path(how.out) / "gpu_sparse.csv", rows.csv());
+        if (how.largest_octree > 0) write_file(std::filesystem::path(how.out) / "gpu_octrees.csv", octrees.csv());
     }
     return failed ? 1 : 0;
 }
@@ -218,7 +238,9 @@ int main(int argc, char** argv) {
     app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
     app.add_option("--largest-mean", how.largest_mean, "Largest grid of the mean")->capture_default_str();
     app.add_option("--largest-dense", how.largest_dense, "Largest grid of dense targets")->capture_default_str();
-    app.add_option("--out", how.out, "Folder for gpu_sparse.md and gpu_sparse.csv");
+    app.add_option("--largest-octree", how.largest_octree, "Largest grid of octrees, of the mean; 0: none")
+        ->capture_default_str();
+    app.add_option("--out", how.out, "Folder for gpu_sparse.md, gpu_sparse.csv and gpu_octrees.csv");
     CLI11_PARSE(app, argc, argv);
     try {
         return run(how, bench::command_line(argc, argv));

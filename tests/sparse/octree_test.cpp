@@ -5,8 +5,7 @@
 // subtrees, against plain loops over the voxels.
 
 #include "api_model.hpp"
-
-#include <voxelpipe/octree_dag.hpp>
+#include "octree_cases.hpp"
 
 #include <gtest/gtest.h>
 
@@ -247,6 +246,31 @@ TEST(Octree, RaysMeetTheFirstVoxel) {
         ASSERT_FALSE(tree.first_hit(from, direction, least * 0.999 - 1e-9).found) << i;
     }
     EXPECT_GT(hits, 100);
+}
+
+// The passes that a GPU runs too.
+TEST(Octree, OfABackendIsTheHosts) {
+    backend_type backend = unit::make_backend();
+    const vp::grid part = unit::unit_grid(whole).crop({5, 3, 11}, {90, 140, 50});
+    const unit::small_mesh mesh = unit::make_mesh(21, 60, whole);
+    framebuffer fb{backend, part.extent};
+    static_cast<void>(octree_cases::compare_nodes(backend, fb, fb.to_host(backend))); // nothing drawn
+    fb.keep_sums<0>();
+    ASSERT_TRUE(vp::voxelize(backend, mesh.view(), part, vp::passthrough{}, shader{}, fb));
+    const host h = fb.to_host(backend);
+    const auto tree = octree_cases::compare_nodes(backend, fb, h);
+    const auto compare = [&]<std::size_t I, class Reducer>(const Reducer& reducer, const char* what) {
+        octree_cases::compare_levels<I>(backend, tree, fb, h, reducer, what);
+    };
+    compare.template operator()<0>(vp::reduce::mean<1>{}, "mean");
+    compare.template operator()<4>(vp::reduce::mean_of_volume{}, "mean of volume");
+    compare.template operator()<5>(vp::reduce::sum{}, "sum");
+    compare.template operator()<2>(vp::reduce::max{}, "max");
+    compare.template operator()<3>(vp::reduce::majority{}, "majority");
+    compare.template operator()<3>(octree_cases::middle{}, "the caller's");
+    framebuffer without{backend, part.extent, 0b111110};
+    ASSERT_TRUE(vp::voxelize(backend, mesh.view(), part, vp::passthrough{}, shader{}, without));
+    EXPECT_THROW((void)vp::reduce_levels<0>(backend, tree, without, vp::reduce::min{}), std::invalid_argument);
 }
 
 TEST(OctreeDag, HoldsTheSameVoxelsInFewerNodes) {

@@ -4,6 +4,7 @@
 // Sparse framebuffers on the device: the bytes of cpu_backend, for every blend, clear and load and off, kept sums,
 // crops, several draws, and grids beyond 32-bit cells.
 
+#include "../sparse/octree_cases.hpp"
 #include "api_model.hpp"
 #include "async_lists.hpp"
 #include "device_test.hpp"
@@ -272,6 +273,37 @@ TEST(DeviceSparse, LookupsByHashFindTheRanks) {
     unit::for_each_voxel(extent, [&](int x, int y, int z) {
         ASSERT_EQ(found[unit::linear(extent, {x, y, z})], host.table().find({x, y, z}));
     });
+}
+
+// Nodes, graphs, values of levels by every reducer, and rays.
+TEST(DeviceSparse, OctreesAreTheCpus) {
+    const glm::ivec3 extent{45, 34, 37};
+    pair p(extent);
+    static_cast<void>(octree_cases::compare_nodes(p.device, p.on_device, p.on_host.to_host(p.host)));
+    p.prepare([](auto& fb) { fb.template keep_sums<2>(); });
+    p.draw({unit::make_mesh(1, 25, extent)}, unit::unit_grid(extent), vp::coverage::conservative, "drawn");
+    const auto host = p.on_host.to_host(p.host);
+    const auto tree = octree_cases::compare_nodes(p.device, p.on_device, host);
+    const auto compare = [&]<std::size_t I, class Reducer>(const Reducer& reducer, const char* what) {
+        octree_cases::compare_levels<I>(p.device, tree, p.on_device, host, reducer, what);
+    };
+    compare.template operator()<0>(vp::reduce::bit_or{}, "or of bits");
+    compare.template operator()<1>(vp::reduce::max{}, "max");
+    compare.template operator()<1>(octree_cases::middle{}, "the caller's");
+    compare.template operator()<2>(vp::reduce::sum{}, "sum of kept sums");
+    compare.template operator()<2>(vp::reduce::mean<6>{}, "mean of kept sums");
+    compare.template operator()<3>(vp::reduce::mean_of_voxels{}, "mean of voxels, of planes of doubles");
+    compare.template operator()<4>(vp::reduce::mean_of_volume{}, "mean of the volume, of integers");
+    compare.template operator()<5>(vp::reduce::min{}, "min of halfs");
+    compare.template operator()<4>(vp::reduce::majority{}, "majority");
+
+    // Twenty levels.
+    unit::small_mesh mesh = unit::make_mesh(4, 15, {40, 40, 40});
+    for (glm::vec3& v : mesh.positions) v += glm::vec3(65000, 30001, 20007);
+    const vp::grid far = unit::unit_grid({1 << 20, 1 << 20, 1 << 20}).crop({64990, 29999, 20003}, {45, 41, 46});
+    pair q(far.extent);
+    q.draw({mesh}, far, vp::coverage::conservative, "a crop");
+    EXPECT_EQ(octree_cases::compare_nodes(q.device, q.on_device, q.on_host.to_host(q.host)).num_levels(), 20);
 }
 
 TEST(DeviceSparse, LimitsChangeNothing) {

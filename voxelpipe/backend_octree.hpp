@@ -1,0 +1,285 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// An octree over a sparse framebuffer in the memory of a backend, built there: the nodes, values and rays of
+// octree.hpp, bit for bit. Its passes are functors for Backend::for_each, so that a program that does not use it
+// compiles none.
+
+#include <voxelpipe/octree.hpp>
+#include <voxelpipe/sparse.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe {
+
+namespace core {
+
+// Bit i: byte i of a word is not 0.
+[[nodiscard]] VOXELPIPE_HD inline unsigned bytes_in_use(std::uint64_t word) {
+    word |= word >> 4;
+    word |= word >> 2;
+    word |= word >> 1;
+    return static_cast<unsigned>((word & 0x0101010101010101u) * 0x0102040810204080u >> 56);
+}
+
+// Nodes of levels 2 and 1 in each brick; the last count is 0, for the sums.
+struct count_brick_nodes {
+    brick_table table;
+    std::uint32_t *words, *bytes;
+
+    VOXELPIPE_HD void operator()(std::uint64_t b) const {
+        unsigned w = 0, n = 0;
+        if (b < table.count)
+            for (const std::uint64_t word : table.masks[b].words) {
+                w += word != 0 ? 1 : 0;
+                n += count_ones(bytes_in_use(word));
+            }
+        words[b] = w;
+        bytes[b] = n;
+    }
+};
+
+// Levels 1 to 3, a call for each word of the bricks' masks: a node of level 2.
+struct make_brick_nodes {
+    brick_table table;
+    const std::uint64_t *first_word, *first_byte; // of each brick
+    std::uint8_t* masks[3];
+    std::uint64_t* first[3];
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const std::uint64_t b = i >> 3;
+        const auto w = static_cast<unsigned>(i & 7u);
+        const brick_mask& mask = table.masks[b];
+        std::uint64_t node = first_word[b], leaf = first_byte[b], rank = table.offsets[b];
+        unsigned words = 0;
+        for (unsigned k = 0; k < 8; ++k) {
+            const std::uint64_t word = mask.words[k];
+            words |= (word != 0 ? 1u : 0u) << k;
+            if (k >= w) continue;
+            node += word != 0 ? 1 : 0;
+            leaf += count_ones(bytes_in_use(word));
+            rank += count_ones(word);
+        }
+        if (w == 0) {
+            masks[2][b] = static_cast<std::uint8_t>(words);
+            first[2][b] = first_word[b];
+        }
+        const std::uint64_t word = mask.words[w];
+        if (word == 0) return;
+        masks[1][node] = static_cast<std::uint8_t>(bytes_in_use(word));
+        first[1][node] = leaf;
+        for (unsigned k = 0; k < 8; ++k) {
+            const auto byte = static_cast<std::uint8_t>(word >> (8 * k));
+            if (byte == 0) continue;
+            masks[0][leaf] = byte;
+            first[0][leaf++] = rank;
+            rank += count_ones(byte);
+        }
+    }
+};
+
+// 1 for nodes that are the first of their parent; the last count is 0.
+struct count_parents {
+    const std::uint64_t* keys;
+    std::uint64_t count;
+    std::uint32_t* is_first;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        is_first[i] = i < count && (i == 0 || keys[i] >> 3 != keys[i - 1] >> 3) ? 1 : 0;
+    }
+};
+// The parents, each by its first child.
+struct make_parents {
+    const std::uint64_t* keys;
+    std::uint64_t count;
+    const std::uint32_t* is_first;
+    const std::uint64_t* parent;
+    std::uint64_t* parent_keys;
+    std::uint8_t* masks;
+    std::uint64_t* first;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (is_first[i] == 0) return;
+        unsigned mask = 0;
+        for (std::uint64_t c = i; c < count && keys[c] >> 3 == keys[i] >> 3; ++c) mask |= 1u << (keys[c] & 7u);
+        parent_keys[parent[i]] = keys[i] >> 3;
+        masks[parent[i]] = static_cast<std::uint8_t>(mask);
+        first[parent[i]] = i;
+    }
+};
+
+} // namespace core
+
+// Owns its nodes, 9 bytes each, in memory of Backend. Levels as octree's.
+template <class Backend>
+class backend_octree {
+public:
+    // Memory of the backend.
+    template <class T>
+    using buffer = typename Backend::template buffer<T>;
+
+    // Of bricks in memory of the backend, up to the least root that holds the whole grid; no level where no voxel
+    // exists. Fewer than 2^32 - 1 bricks; throws std::length_error otherwise, and what a buffer throws. Waits once a
+    // level.
+    backend_octree(Backend& backend, const brick_table& table, const glm::ivec3& whole_extent) {
+        if (table.count >= max_bricks) throw std::length_error("voxelpipe: an octree takes fewer than 2^32 - 1 bricks");
+        if (table.count != 0) build(backend, table, whole_extent);
+    }
+    // Of what the framebuffer holds now.
+    template <class... Targets>
+    backend_octree(Backend& backend, const sparse_framebuffer<Backend, Targets...>& fb)
+        : backend_octree(backend, fb.view().table, fb.where().whole_extent()) {
+        num_voxels_ = fb.num_voxels();
+    }
+
+    // Levels above the voxels; 0 if there are none.
+    [[nodiscard]] int num_levels() const { return static_cast<int>(masks_.size()); }
+    // A level, from 0 on; level 0 of a framebuffer or of bricks that the constructor read.
+    [[nodiscard]] std::uint64_t num_nodes(int level) const {
+        return level == 0 ? num_voxels_ : masks_[static_cast<std::size_t>(level) - 1].size();
+    }
+    // Bytes that the nodes take.
+    [[nodiscard]] std::uint64_t num_bytes() const {
+        std::uint64_t count = 0;
+        for (const auto& m : masks_) count += m.size();
+        return count * (sizeof(std::uint8_t) + sizeof(std::uint64_t));
+    }
+    // As octree's, in memory of the backend.
+    [[nodiscard]] const buffer<std::uint8_t>& masks(int level) const {
+        return masks_[static_cast<std::size_t>(level) - 1];
+    }
+    // As octree's, in memory of the backend.
+    [[nodiscard]] const buffer<std::uint64_t>& first(int level) const {
+        return first_[static_cast<std::size_t>(level) - 1];
+    }
+    // Refers to the octree; for code that runs on the backend, rays among it.
+    [[nodiscard]] octree_view view() const {
+        octree_view v;
+        v.num_levels = num_levels();
+        for (std::size_t l = 0; l < masks_.size(); ++l) {
+            v.masks[l] = masks_[l].data();
+            v.first[l] = first_[l].data();
+        }
+        return v;
+    }
+    // Copies everything, then waits.
+    [[nodiscard]] octree to_host(Backend& backend) const {
+        octree tree;
+        tree.num_voxels_ = num_voxels_;
+        for (std::size_t l = 0; l < masks_.size(); ++l)
+            tree.levels_.push_back({masks_[l].to_host(backend), first_[l].to_host(backend)});
+        return tree;
+    }
+
+private:
+    static constexpr std::uint64_t max_bricks = 0xffffffffu;
+
+    void add_level(Backend& backend, std::uint64_t nodes) {
+        masks_.emplace_back(backend, static_cast<std::size_t>(nodes));
+        first_.emplace_back(backend, static_cast<std::size_t>(nodes));
+    }
+    void build(Backend& backend, const brick_table& table, const glm::ivec3& whole_extent) {
+        const auto bricks = static_cast<std::size_t>(table.count);
+        num_voxels_ = backend.read(backend_view<const std::uint64_t>{table.offsets + bricks, 1})[0];
+        buffer<std::uint32_t> counts(backend, bricks + 1);
+        {
+            buffer<std::uint32_t> words(backend, bricks + 1);
+            buffer<std::uint64_t> first_word(backend, bricks + 1), first_byte(backend, bricks + 1);
+            backend.for_each(bricks + 1, core::count_brick_nodes{table, words.data(), counts.data()});
+            add_level(backend, backend.sum(counts, first_byte));
+            add_level(backend, backend.sum(words, first_word));
+            add_level(backend, bricks);
+            backend.for_each(table.count * 8,
+                             core::make_brick_nodes{table,
+                                                    first_word.data(),
+                                                    first_byte.data(),
+                                                    {masks_[0].data(), masks_[1].data(), masks_[2].data()},
+                                                    {first_[0].data(), first_[1].data(), first_[2].data()}});
+        }
+        buffer<std::uint64_t> below(backend, std::size_t{0});
+        const std::uint64_t* keys = table.keys;
+        std::uint64_t count = bricks;
+        for (int l = 4; l <= core::octree_depth(whole_extent); ++l) {
+            const auto n = static_cast<std::size_t>(count);
+            if (counts.size() != n + 1) counts = buffer<std::uint32_t>(backend, n + 1);
+            buffer<std::uint64_t> parent(backend, n + 1);
+            backend.for_each(n + 1, core::count_parents{keys, count, counts.data()});
+            const std::uint64_t parents = backend.sum(counts, parent);
+            buffer<std::uint64_t> above(backend, static_cast<std::size_t>(parents));
+            add_level(backend, parents);
+            backend.for_each(count, core::make_parents{keys, count, counts.data(), parent.data(), above.data(),
+                                                       masks_.back().data(), first_.back().data()});
+            below = std::move(above);
+            keys = below.data();
+            count = parents;
+        }
+    }
+
+    std::vector<buffer<std::uint8_t>> masks_;
+    std::vector<buffer<std::uint64_t>> first_;
+    std::uint64_t num_voxels_ = 0;
+};
+template <class Backend, class... Targets>
+backend_octree(Backend&, const sparse_framebuffer<Backend, Targets...>&) -> backend_octree<Backend>;
+
+// The values of a target on every level, in memory of Backend: at(level), levels from 1 on.
+template <class Backend, class T>
+class backend_octree_levels {
+public:
+    using values_type = typename Backend::template buffer<T>; // of a level
+
+    // Values of a level's nodes, 1 to num_levels().
+    [[nodiscard]] const values_type& at(int level) const { return levels_[static_cast<std::size_t>(level) - 1]; }
+    [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); } // As the octree's.
+    // A level more, its values unset.
+    values_type& add(Backend& backend, std::uint64_t nodes) {
+        return levels_.emplace_back(backend, static_cast<std::size_t>(nodes));
+    }
+
+private:
+    std::vector<values_type> levels_;
+};
+
+// As reduce_levels of the host, on the backend, of the voxels that `fb` holds; `tree` is of `fb`. A functor of the
+// caller runs there. Throws what a buffer throws.
+template <std::size_t I, class Reducer, class Backend, class... Targets>
+[[nodiscard]] auto reduce_levels(Backend& backend, const backend_octree<Backend>& tree,
+                                 const sparse_framebuffer<Backend, Targets...>& fb, const Reducer& reducer) {
+    const auto& arrays = fb.contents();
+    if (fb.num_voxels() != tree.num_nodes(0) || (fb.num_voxels() != 0 && get<I>(arrays.values).size() == 0))
+        throw std::invalid_argument(
+            "voxelpipe::reduce_levels: the octree is of other voxels, or the target is disabled");
+    if constexpr (core::sums_terms<Reducer>) {
+        static_cast<void>(reducer);
+        using sum_nodes = core::sum_octree_nodes<I, Reducer, Targets...>;
+        using node = typename sum_nodes::node;
+        const auto voxels = sum_nodes::terms::of(arrays);
+        backend_octree_levels<Backend, typename sum_nodes::terms::result> levels;
+        typename Backend::template buffer<node> below(backend, std::size_t{0});
+        for (int l = 1; l <= tree.num_levels(); ++l) {
+            auto& values = levels.add(backend, tree.num_nodes(l));
+            typename Backend::template buffer<node> here(backend, values.size());
+            backend.for_each(values.size(), sum_nodes{voxels, l, tree.masks(l).data(), tree.first(l).data(),
+                                                      below.data(), here.data(), values.data()});
+            below = std::move(here);
+        }
+        return levels;
+    } else {
+        using fold_nodes = core::fold_octree_nodes<Reducer, typename core::pack_element<I, Targets...>::type>;
+        backend_octree_levels<Backend, typename fold_nodes::value> levels;
+        for (int l = 1; l <= tree.num_levels(); ++l) {
+            auto& values = levels.add(backend, tree.num_nodes(l));
+            backend.for_each(values.size(), fold_nodes{reducer, get<I>(arrays.values).data(), l, tree.masks(l).data(),
+                                                       tree.first(l).data(), l == 1 ? nullptr : levels.at(l - 1).data(),
+                                                       values.data()});
+        }
+        return levels;
+    }
+}
+
+} // namespace voxelpipe
