@@ -14,7 +14,7 @@ import pathlib
 import sys
 
 MODULES = ["numpy", "vtkmodules", "nrrd", "trimesh", "PIL", "pyvox", "midvoxio", "pygltflib", "mcschematic", "zarr",
-           "tensorstore"]
+           "tensorstore", "tinyvdb"]
 
 
 def have_modules():
@@ -153,6 +153,29 @@ def check_sparse_npy(case, files):
 
     values = {file.name.split(".")[1]: np.load(file) for file in files[1:]}
     check_sparse_values(case, np.load(files[0]), values)
+
+
+def check_nvdb(case, files):
+    """tinyvdb reads the values of the first grid, if they are floats, and names, types, boxes and numbers of voxels of all."""
+    import numpy as np
+    from tinyvdb._tinyvdb_nanovdb import NanoVDBFile
+
+    occupied = expected(case, [c[0] for c in case["channels"]].index("occupancy"))
+    z, y, x = np.nonzero(occupied)
+    types = {"bit": "Mask", "u8x4": "RGBA8", "f32x1": "Float", "f32x3": "Vec3f", "u32x1": "UInt32", "i32x1": "Int32"}
+    file = NanoVDBFile(str(files[0]))
+    assert file.grid_count() == len(case["channels"]), file.grid_count()
+    for n, (name, kind, components) in enumerate(case["channels"]):
+        assert file.grid_name(n) == name, file.grid_name(n)
+        assert file.grid_type(n) == types[kind if kind == "bit" else f"{kind}x{components}"], file.grid_type(n)
+        assert file.active_voxel_count(n) == len(x), (name, file.active_voxel_count(n))
+        low, high = file.bbox(n)
+        assert low == (x.min(), y.min(), z.min()) and high == (x.max(), y.max(), z.max()), (name, low, high)
+        close(file.voxel_size(n), case["voxel_size"][0], name)
+    want = np.where(occupied != 0, expected(case, 0), np.float32(0))
+    got = np.array([[[file.get(0, i, j, k) for i in range(want.shape[2])] for j in range(want.shape[1])]
+                    for k in range(want.shape[0])], np.float32)
+    same(got, want, case["channels"][0][0])
 
 
 def check_vti(case, files):

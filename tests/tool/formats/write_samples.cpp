@@ -73,6 +73,16 @@ std::vector<sample_case> make_cases() {
     sample_case& raw = add("raw", {13, 7, 5}, 2, false, true, any);
     raw.options.compression = 0;
     if (has_zstd()) add("zstd", {150, 70, 90}, 5, true, false, {".zarr"}).options.zstd = true;
+    // Of the types that .nvdb has; floats first.
+    sample_case& grids = add("grids", {150, 17, 40}, 5, false, false, {".nvdb"});
+    grids.v.channels.clear();
+    grids.v.add("f32x1", scalar::f32);
+    grids.v.add("occupancy", scalar::bit);
+    grids.v.add("color", scalar::u8, 4);
+    grids.v.add("f32x3", scalar::f32, 3);
+    grids.v.add("u32x1", scalar::u32);
+    grids.v.add("i32x1", scalar::i32);
+    for (std::size_t n = 0; n < grids.v.channels.size(); ++n) fill(grids.v, n, grids.density);
     add("glass", {16, 16, 16}, 2, true, false, {".png"}).options.preview.backdrop = *parse_background("transparent");
     return cases;
 }
