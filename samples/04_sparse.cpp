@@ -5,8 +5,8 @@
 #include "picture.hpp"
 
 #include <cpu_ref/backend.hpp>
-#include <voxelpipe/io/nanovdb.hpp>
 #include <voxelpipe/backend_octree.hpp>
+#include <voxelpipe/io/nanovdb.hpp>
 
 #include <cmath>
 #include <cstdio>
