@@ -64,6 +64,14 @@
 #endif
 #endif
 
+// Keeps a function of device code out of line: integers of 128 bits, whose divisions would fill its callers with code
+// that hardly any triangle runs.
+#if defined(__CUDA_ARCH__)
+#define VOXELPIPE_DEVICE_NOINLINE __attribute__((noinline))
+#else
+#define VOXELPIPE_DEVICE_NOINLINE
+#endif
+
 // An internal error, not the caller's. Compiled out with NDEBUG.
 #if !defined(VOXELPIPE_ASSERT)
 #define VOXELPIPE_ASSERT(condition) assert(condition)

@@ -22,14 +22,17 @@
 
 namespace voxelpipe::device {
 
-// The strategies that these types allow.
+// The strategies that these types allow. A constant in bits is never listed: bits are blended in place, and the rare
+// calls that could not be (draws of several constants into bits that are loaded, with voxels counted) go to tiles. The
+// kernels of lists would be a quarter of what such a program compiles.
 template <class FragmentShader, class Framebuffer>
 inline constexpr possible_strategies strategies_of{};
 template <class FragmentShader, class... Targets>
 inline constexpr possible_strategies strategies_of<FragmentShader, framebuffer_view<Targets...>> = {
     core::is_constant<FragmentShader>&& depends_on_mask<framebuffer_view<Targets...>>,
     core::is_constant<FragmentShader> && (is_immediate<Targets>() && ...),
-    is_resolvable<framebuffer_view<Targets...>> && !target_groups<framebuffer_view<Targets...>>::has_ordered,
+    is_resolvable<framebuffer_view<Targets...>> && !target_groups<framebuffer_view<Targets...>>::has_ordered &&
+        !(core::is_constant<FragmentShader> && has_only_bits<framebuffer_view<Targets...>>),
     target_groups<framebuffer_view<Targets...>>::has_ordered,
 };
 

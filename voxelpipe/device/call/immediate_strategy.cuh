@@ -93,10 +93,7 @@ private:
                                                                        plan.targets.modes, marks};
         if constexpr (has_only_values<framebuffer_type>) {
             if (plan.targets.only_blends() && all_in_use(plan.fb)) {
-                if (is_tracked())
-                    draw_into(blended_output<framebuffer_type, values_type, true>{output});
-                else
-                    draw_into(blended_output<framebuffer_type, values_type, false>{output});
+                draw_into(blended_output<framebuffer_type, values_type>{output});
                 return;
             }
         }

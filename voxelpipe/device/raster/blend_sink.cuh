@@ -39,15 +39,14 @@ struct blending_sink : sink_base<Call> {
     // If the output has marks: marks the chunks that a triangle may touch, or, of a split triangle, those that it does
     // touch.
     __device__ VOXELPIPE_INLINE void mark_boxes(bool wanted, const int32_triangle& r) const {
-        if constexpr (Call::output::has_marks)
-            if (this->call.out.marks.words != nullptr) device::mark_boxes<Call::rule>(this->call.out.marks, wanted, r);
+        if (this->call.out.marks.words != nullptr) device::mark_boxes<Call::rule>(this->call.out.marks, wanted, r);
     }
     __device__ VOXELPIPE_INLINE void mark_row(int x0, int x1, int y, int z) const {
-        if constexpr (merges_equal_voxels && Call::output::has_marks)
+        if constexpr (merges_equal_voxels)
             if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_row(x0, x1, y, z);
     }
     __device__ VOXELPIPE_INLINE void mark_brick(const std::int32_t (&corner)[3], unsigned lane) const {
-        if constexpr (merges_equal_voxels && Call::output::has_marks)
+        if constexpr (merges_equal_voxels)
             if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_brick(corner, lane);
     }
     // Blends the voxels x0 + i of a row, for the bits i of the mask.
@@ -177,11 +176,10 @@ struct framebuffer_output {
     // Facts for the compiler: all targets are in use, and all values are true, or the mode of all is to blend.
     static constexpr bool only_sets = false;
     static constexpr bool only_blends = false;
-    static constexpr bool has_marks = true; // the output may have marks
     Framebuffer fb;
     Values values;
     immediate_modes<targets_of<Framebuffer>::count> modes;
-    chunk_marks marks; // of targets that hold values
+    chunk_marks marks; // of targets that hold values; without words if no chunk is to be marked
 
     __device__ VOXELPIPE_INLINE static void prepare(std::uint64_t, std::uint64_t) {} // work for a later kernel
     // True if check_indices has run; otherwise the sink checks all indices.
@@ -193,14 +191,13 @@ template <class Framebuffer>
 inline constexpr bool has_only_values = false;
 template <class... Targets>
 inline constexpr bool has_only_values<framebuffer_view<Targets...>> = (has_value_rows<Targets> && ...);
-template <class Framebuffer, class Values, bool HasMarks>
+template <class Framebuffer, class Values>
 struct blended_output : framebuffer_output<Framebuffer, Values> {
     template <class Call>
     using sink = blending_sink<Call>;
     template <class Call>
     using deferred_sink = sink<Call>;
     static constexpr bool only_blends = true;
-    static constexpr bool has_marks = HasMarks;
 };
 
 } // namespace voxelpipe::device

@@ -51,9 +51,9 @@ struct first_memory {
 template <class Call>
 inline constexpr bool has_close_cubes = Call::output::only_sets && (Call::rule == coverage::conservative);
 
-// A warp of the first pass. Every warp has its own queues, so no thread waits for another warp. Alone: there is no
-// deferred pass (raster_first). Close: batches are tried as close cubes.
-template <class Call, bool Alone, bool Close>
+// A warp of the first pass. Every warp has its own queues, so no thread waits for another warp. Close: batches are
+// tried as close cubes.
+template <class Call, bool Close>
 struct first_warp {
     static constexpr bool thin = Call::rule == coverage::thin;
     using triangle_class = core::triangle_class;
@@ -69,6 +69,7 @@ struct first_warp {
     class_writer& writer;
     std::uint32_t* oversized; // the block's oversized triangles
     unsigned& num_oversized;
+    bool alone;        // there is no deferred pass (raster_first)
     int num_cubes = 0; // thin triangles that wait
     static constexpr std::uint32_t not_close =
         1u << 31; // flag of a code, which has 16 bits: the previous batch was not close
@@ -221,11 +222,13 @@ struct first_warp {
                 index = next;
             }
         }
-        if constexpr (thin && Alone) {
-            if (num_cubes != 0) drain_cubes<false>();
-        } else if constexpr (thin) { // defers the remaining cubes
-            const int at = static_cast<int>(lane);
-            writer.push(at < num_cubes ? static_cast<int>(size_class::tiny) : -1, memory.thin.cubes.triangle[at]);
+        if constexpr (thin) {
+            if (!alone) { // defers the remaining cubes
+                const int at = static_cast<int>(lane);
+                writer.push(at < num_cubes ? static_cast<int>(size_class::tiny) : -1, memory.thin.cubes.triangle[at]);
+            } else if (num_cubes != 0) {
+                drain_cubes<false>();
+            }
         }
         if (begin >= num) return 0;
         const std::uint32_t batches = (num - begin - 1) / step + 1, of_last = num - (begin + (batches - 1) * step);
@@ -269,19 +272,23 @@ draw_remaining(const Call& call, unsigned* dropped, first_memory<Call> (&memorie
     return sink.end();
 }
 
-// The first pass. Alone: no deferred pass follows, because calls like this one deferred little. Each block then draws
-// its own deferred triangles at its end if they are few; if not, they are missing, and the call fails. `again`: a copy
-// of the call for out-of-line functions. If its own address were taken, the compiler would reload the call after each
-// reduction.
-template <class Call, bool Alone, bool Close>
-__device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& again, pipeline_state* state) {
+// The first pass. is_alone: no deferred pass follows, because calls like this one deferred little. Each block then
+// draws its own deferred triangles at its end if they are few; if not, they are missing, and the call fails. `again`: a
+// copy of the call for out-of-line functions. If its own address were taken, the compiler would reload the call after
+// each reduction.
+template <class Call, bool Close>
+__global__ __launch_bounds__(tuning::raster_threads,
+                             first_min_blocks<Call>) void first_pass_kernel(const __grid_constant__ Call call,
+                                                                            const __grid_constant__ Call again,
+                                                                            bool is_alone, pipeline_state* state) {
     using sink_type = typename Call::sink;
     __shared__ first_memory<Call> memories[raster_warps];
     __shared__ unsigned slots[size_class::count][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_oversized;
     const glm::uvec3 index = load_index(call.in, blockIdx.x * tuning::raster_threads + threadIdx.x);
     await_stream();
-    if constexpr (Alone)
+    const bool alone = Call::output::can_skip_deferred_pass && is_alone;
+    if (alone)
         call.out.prepare(std::uint64_t{blockIdx.x} * tuning::raster_threads + threadIdx.x,
                          std::uint64_t{gridDim.x} * tuning::raster_threads);
     if (call.out.is_checked() && state->index_error != 0) return;
@@ -292,19 +299,19 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
     sink_type sink(call, dropped, memory.sink);
     class_writer writer{call.lists, memory.queues};
     const std::uint32_t step = gridDim.x * tuning::raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
-    first_warp<Call, Alone, Close> warp{
-        call,
-        memory,
-        sink,
-        writer,
-        call.lists.oversized + std::size_t{blockIdx.x} * batches * tuning::raster_threads,
-        num_oversized};
+    first_warp<Call, Close> warp{call,
+                                 memory,
+                                 sink,
+                                 writer,
+                                 call.lists.oversized + std::size_t{blockIdx.x} * batches * tuning::raster_threads,
+                                 num_oversized,
+                                 alone};
     const unsigned looked_at = warp.run(index);
     __syncthreads();
     split_oversized(call, sink, warp.oversized, num_oversized);
     writer.note(slots);
     int left = class_writer::many;
-    if constexpr (Alone)
+    if (alone)
         left = writer.count();
     else
         __syncthreads();
@@ -316,20 +323,6 @@ __device__ VOXELPIPE_INLINE void raster_first(const Call& call, const Call& agai
     }
     sink.finish(state);
     count_looked_at(looked_at, dropped, state);
-}
-
-template <class Call, bool Close>
-__global__ __launch_bounds__(tuning::raster_threads,
-                             first_min_blocks<Call>) void first_pass_kernel(const __grid_constant__ Call call,
-                                                                            pipeline_state* state) {
-    raster_first<Call, false, Close>(call, call, state);
-}
-template <class Call, bool Close>
-__global__ __launch_bounds__(tuning::raster_threads,
-                             first_min_blocks<Call>) void only_pass_kernel(const __grid_constant__ Call call,
-                                                                           const __grid_constant__ Call again,
-                                                                           pipeline_state* state) {
-    raster_first<Call, true, Close>(call, again, state);
 }
 
 // ---- host -----------------------------------------------------------------------------------------------------------
@@ -362,15 +355,8 @@ void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStr
         if constexpr (has_close_cubes<Call>) are_close = may_be_close(triangles, call.in.extent);
         const unsigned blocks = raster_blocks(triangles, first_min_blocks<Call>);
         const auto launch = [&]<bool Close>() {
-            if constexpr (Call::output::can_skip_deferred_pass) {
-                if (skips_deferred_pass) {
-                    launch_kernel(!is_first, only_pass_kernel<Call, Close>, blocks, tuning::raster_threads, 0, stream,
-                                  where, call, call, state);
-                    return;
-                }
-            }
             launch_kernel(!is_first, first_pass_kernel<Call, Close>, blocks, tuning::raster_threads, 0, stream, where,
-                          call, state);
+                          call, call, skips_deferred_pass, state);
         };
         if (are_close)
             launch.template operator()<has_close_cubes<Call>>();
