@@ -38,8 +38,8 @@ struct stepped_floor {
 // Narrows [lo, hi] to the x with a*x + b*y + c >= 0 for all three half-planes. The result is an interval, so a short
 // row is narrowed from its ends; a long one is solved by division.
 template <class Int>
-VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row_inline(const half_plane<Int> (&h)[3], Int y, std::int64_t& lo,
-                                                               std::int64_t& hi) {
+VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row(const half_plane<Int> (&h)[3], Int y, std::int64_t& lo,
+                                                        std::int64_t& hi) {
     const Int r[3] = {h[0].b * y + h[0].c, h[1].b * y + h[1].c, h[2].b * y + h[2].c};
     if (hi - lo >= 6) {
         Int first = lo, last = hi;
@@ -70,18 +70,6 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row_inline(const half_plane<
     };
     while (lo <= hi && !inside(lo)) ++lo;
     while (lo < hi && !inside(hi)) --hi;
-}
-VOXELPIPE_HD VOXELPIPE_DEVICE_NOINLINE constexpr void narrow_row_wide(const half_plane<int128> (&h)[3], int128 y,
-                                                                      std::int64_t& lo, std::int64_t& hi) {
-    narrow_row_inline(h, y, lo, hi);
-}
-template <class Int>
-VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row(const half_plane<Int> (&h)[3], Int y, std::int64_t& lo,
-                                                        std::int64_t& hi) {
-    if constexpr (sizeof(Int) == sizeof(int128))
-        narrow_row_wide(h, y, lo, hi);
-    else
-        narrow_row_inline(h, y, lo, hi);
 }
 
 // Calls emit(u, v, w_first, w_last) for every column with covered voxels inside `clip` (x y z, in voxels of the setup's
