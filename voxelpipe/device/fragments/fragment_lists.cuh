@@ -43,16 +43,26 @@ struct fragment_cells {
     [[nodiscard]] __device__ core::voxel_box cells(const core::voxel_box& reach) const { return reach; }
     [[nodiscard]] __device__ cell_counts count(const geometry&, const loaded_triangle& t, std::uint32_t primitive,
                                                const core::voxel_box& box, bool) const {
-        cell_counts n;
-        shade_fragments<Rule>(s, t, primitive, box,
-                              [&](int, int, int, const auto& out) { ++(out.keep ? n.kept : n.discarded); });
-        return n;
+        return walk(t, primitive, box, nothing);
     }
-    __device__ void emit(const geometry& geo, const loaded_triangle& t, std::uint32_t primitive,
-                         const core::voxel_box& box, bool, unsigned long long at) const {
-        const auto nx = static_cast<std::uint64_t>(geo.extent.x), ny = static_cast<std::uint64_t>(geo.extent.y);
+    __device__ void emit(const geometry&, const loaded_triangle& t, std::uint32_t primitive, const core::voxel_box& box,
+                         bool, unsigned long long at) const {
+        (void)walk(t, primitive, box, at);
+    }
+
+private:
+    static constexpr unsigned long long nothing = ~0ull;
+
+    // Shades the triangle's fragments within the box and returns how many are kept and discarded. Stores the kept ones
+    // from `at` on, unless `at` is `nothing`. Out of line and shared by all kernels that count or store: it is most of
+    // their code, and what a shader computes is compiled once.
+    __device__ __noinline__ cell_counts walk(const loaded_triangle& t, std::uint32_t primitive,
+                                             const core::voxel_box& box, unsigned long long at) const {
+        const auto nx = static_cast<std::uint64_t>(s.geo.extent.x), ny = static_cast<std::uint64_t>(s.geo.extent.y);
+        cell_counts n;
         shade_fragments<Rule>(s, t, primitive, box, [&](int x, int y, int z, const auto& out) {
-            if (!out.keep) return;
+            ++(out.keep ? n.kept : n.discarded);
+            if (!out.keep || at == nothing) return;
             const std::uint64_t voxel = (static_cast<std::uint64_t>(z) * ny + static_cast<std::uint64_t>(y)) * nx +
                                         static_cast<std::uint64_t>(x);
             if (are_wide)
@@ -66,6 +76,7 @@ struct fragment_cells {
             values[at] = has_payload ? static_cast<std::uint32_t>(at) : primitive;
             ++at;
         });
+        return n;
     }
 };
 
