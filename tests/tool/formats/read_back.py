@@ -374,13 +374,12 @@ def check_sides(case, triangles, colors, relative):
         low, high = rectangles[:, :3].copy(), rectangles[:, 3:].copy()
         low[:, d // 2] -= d % 2  # from the plane to the voxel before it
         high[:, d // 2] = low[:, d // 2] + 1
-        cells, owners = [], []
-        for n, (a, b) in enumerate(zip(low, high)):
-            grid = np.stack(np.meshgrid(*[np.arange(a[m], b[m]) for m in range(3)], indexing="ij"), -1).reshape(-1, 3)
-            cells.append(grid)
-            owners.append(np.full(len(grid), n))
-        cells = np.concatenate(cells) if cells else np.zeros((0, 3), int)
-        owners = np.concatenate(owners) if owners else np.zeros(0, int)
+        size = high - low
+        number = size.prod(axis=1)
+        owners = np.repeat(np.arange(len(low)), number)
+        within = np.arange(len(owners)) - np.repeat(np.cumsum(number) - number, number)
+        nj, nk = size[owners, 1], size[owners, 2]
+        cells = low[owners] + np.stack([within // (nj * nk), within // nk % nj, within % nk], axis=1)
         joined += len(cells) - len(rectangles)
         order = np.lexsort(cells.T)
         wanted = voxels[np.lexsort(voxels.T)]
