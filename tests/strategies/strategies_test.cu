@@ -19,7 +19,8 @@ constexpr vp::strategy every_strategy[] = {vp::strategy::occupancy_mask, vp::str
 // Strategies that serve a program, in the order above.
 using served = std::array<bool, 5>;
 constexpr served by_mask{true, true, true, false, true}, in_place{false, true, true, false, true},
-    reduced{false, false, true, false, true}, folded{false, false, false, true, true};
+    reduced{false, false, true, false, true}, folded{false, false, false, true, true},
+    mask_of_bits{true, true, false, false, true}, bits_in_place{false, true, false, false, true};
 
 // The forced strategy cannot serve the call: the targets stay as another call has left them.
 template <class... Targets, class Shader>
@@ -94,11 +95,11 @@ void compare(const Shader& shader, const served& serves, start how) {
 
 TEST(Strategies, ConstantsGiveTheSameBitsByEach) {
     for (const start how : {start::clear, start::load}) {
-        compare<vp::target<vp::bit, blend::bit_or>>(vp::constant(true), by_mask, how);
+        compare<vp::target<vp::bit, blend::bit_or>>(vp::constant(true), mask_of_bits, how);
         compare<vp::target<float, blend::max>>(vp::constant(2.5f), by_mask, how);
         compare<vp::target<std::uint8_t, blend::min>, vp::target<vp::bit, blend::bit_and>>(
             vp::constant(std::uint8_t{7}, false), by_mask, how);
-        compare<vp::target<vp::bit, blend::bit_xor>>(vp::constant(true), in_place, how);
+        compare<vp::target<vp::bit, blend::bit_xor>>(vp::constant(true), bits_in_place, how);
         compare<vp::target<std::uint32_t, blend::add>>(vp::constant(3u), in_place, how);
     }
     // A sum of floats is counted in place, which needs a cleared target.
@@ -140,7 +141,29 @@ TEST(Strategies, TheBackendSaysWhichOneItTook) {
     EXPECT_EQ(gpu.last_strategy().value, vp::strategy::sorted_reduce);
 }
 
-// The same through voxelize_async, whose limits name the strategy.
+// A constant in bits that cannot be blended in place, for its voxels are counted and not all are known to be clear, is
+// drawn in tiles and never listed.
+TEST(Strategies, AConstantInBitsIsNeverListed) {
+    const mesh_data m = mixed_triangles(120, 20.0f, 94);
+    const vp::grid g = box_grid({23, 17, 33});
+    const vp::voxelize_options options{vp::coverage::conservative, true};
+    using flipped = vp::target<vp::bit, blend::bit_xor>;
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    vp::framebuffer<vp::cpu_backend, flipped> expected{cpu, g.extent};
+    vp::framebuffer<vp::cuda_backend, flipped> fb{gpu, g.extent};
+    for (const start how : {start::clear, start::load}) {
+        const auto shader = vp::constant(true);
+        const vp::status s = draw_framebuffer(cpu, expected, m, g, vp::passthrough{}, shader, options, how);
+        const vp::status done = draw_framebuffer(gpu, fb, m, g, vp::passthrough{}, shader, options, how);
+        ASSERT_TRUE(s.ok() && done.ok());
+        EXPECT_EQ(gpu.last_strategy().value, vp::strategy::tiled);
+        expect_same_counts(s.counts, done.counts);
+        expect_same_bytes(vp::get<0>(expected).to_host(cpu), vp::get<0>(fb).to_host(gpu), "flipped");
+    }
+}
+
+// Strategies of voxelize_async, whose limits name them.
 TEST(Strategies, AsynchronousCallsAreForcedByTheirLimits) {
     const mesh_data m = mixed_triangles(200, 20.0f, 93);
     const vp::grid g = box_grid({23, 17, 33});
@@ -162,11 +185,11 @@ TEST(Strategies, AsynchronousCallsAreForcedByTheirLimits) {
         limits.strategy = every_strategy[i];
         vp::framebuffer<vp::cuda_backend, bits> fb{gpu, g.extent};
         const std::size_t bytes = vp::workspace_bytes(draws, g, fb.view(), options, limits);
-        EXPECT_EQ(bytes == 0, !by_mask[i]);
+        EXPECT_EQ(bytes == 0, !mask_of_bits[i]);
         vp::cuda_backend::buffer<std::byte> memory(gpu, bytes);
         const vp::workspace_view workspace{memory.data(), bytes, limits};
         const vp::status s = vp::voxelize_async(gpu, draws, g, fb.view(), options, workspace);
-        if (!by_mask[i]) {
+        if (!mask_of_bits[i]) {
             EXPECT_EQ(s.code, vp::status_code::strategy_unavailable);
             continue;
         }

@@ -63,7 +63,7 @@ namespace device {
 struct possible_strategies {
     bool occupancy_mask = false; // a constant shader, and blends that give the same for one fragment as for many
     bool immediate = false;      // a constant shader, and targets that are blended or counted where they lie
-    bool sorted_reduce = false;  // blends that do not depend on the order
+    bool sorted_reduce = false;  // blends in any order, but for a constant in bits alone
     bool sorted_fold = false;    // some blend depends on it
 };
 
