@@ -308,9 +308,12 @@ template <class Int>
 // floor(a / b), b > 0
 template <class Int>
 [[nodiscard]] VOXELPIPE_HD constexpr Int floor_div(Int a, Int b) {
-    if constexpr (sizeof(Int) == sizeof(int128)) return floor_div_wide(a, b);
-    const Int q = a / b;
-    return q - static_cast<Int>(a % b < 0);
+    if constexpr (sizeof(Int) == sizeof(int128)) {
+        return floor_div_wide(a, b);
+    } else {
+        const Int q = a / b;
+        return q - static_cast<Int>(a % b < 0);
+    }
 }
 
 // ceil(a / b), b > 0
