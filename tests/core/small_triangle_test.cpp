@@ -8,6 +8,8 @@
 
 #include <voxelpipe/core/brick_triangle.hpp>
 #include <voxelpipe/core/coverage.hpp>
+#include <voxelpipe/core/mask_triangle.hpp>
+#include <voxelpipe/core/morton.hpp>
 #include <voxelpipe/core/small_conservative.hpp>
 #include <voxelpipe/core/small_thin.hpp>
 #include <voxelpipe/core/thin_cube.hpp>
@@ -16,6 +18,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <random>
 #include <set>
@@ -494,6 +497,132 @@ TEST(BrickTriangle, RowsOfTheLargestTrianglesAreTheGeneralSet) {
         }
     EXPECT_GT(rows, static_cast<std::uint64_t>(5 * unit::cases(300)));
     EXPECT_GT(far_rows, static_cast<std::uint64_t>(unit::cases(300)));
+}
+
+namespace {
+
+// What rows of a brick leave, by the bits that go into its mask. `brick`: its first voxel.
+voxels voxels_of_mask_brick(const mask_triangle& t, const voxel_box& box, const triple<std::int64_t>& brick) {
+    const auto o = turn_to_row(t.row, static_cast<int>(brick[0] - box.lo[0]), static_cast<int>(brick[1] - box.lo[1]),
+                               static_cast<int>(brick[2] - box.lo[2]));
+    if (!meets_mask_brick(t, o)) return {};
+    int from[3], to[3];
+    for (int k = 0; k < 3; ++k) {
+        from[k] = static_cast<int>(std::max<std::int64_t>(box.lo[k] - brick[k], 0));
+        to[k] = static_cast<int>(std::min<std::int64_t>(box.hi[k] - brick[k], mask_brick_size - 1));
+    }
+    const auto lo = turn_to_row(t.row, from[0], from[1], from[2]), hi = turn_to_row(t.row, to[0], to[1], to[2]);
+    const small_box part{{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
+    const small_conservative s = in_mask_brick(t, o);
+    const mask_rows rows(s, part);
+    const near_plane plane(s.n, s.below, s.above, 0, true);
+    std::uint64_t words[8] = {};
+    for (std::uint64_t left = rows.met; left != 0; left &= left - 1) {
+        const int at = std::countr_zero(left), across = at % 8, deep = at / 8;
+        const auto limit = static_cast<std::uint32_t>(rows.by_across >> 8 * across & rows.by_deep >> 8 * deep & 255u);
+        if (limit == 0) continue;
+        place_mask_row(
+            t.row, across, deep, s.plane_bits<true>(plane, 0, across, deep, limit),
+            [&](unsigned word, std::uint32_t bits) { words[word / 2] |= std::uint64_t{bits} << (word % 2 * 32); });
+    }
+    voxels found;
+    for (unsigned bit = 0; bit < 512; ++bit) {
+        if ((words[bit / 64] >> bit % 64 & 1u) == 0) continue;
+        const glm::ivec3 p = morton_position(bit);
+        found.insert(
+            {static_cast<int>(brick[0]) + p.x, static_cast<int>(brick[1]) + p.y, static_cast<int>(brick[2]) + p.z});
+    }
+    return found;
+}
+
+} // namespace
+
+TEST(MaskTriangle, BricksMakeTheGeneralSet) {
+    generator g;
+    std::uint64_t covered = 0;
+    for (const int fraction : {4, 8, 10, 12, 14, 16, 17})
+        for (int i = 0; i < unit::cases(400); ++i) {
+            g.fraction = fraction;
+            snapped_position v[3];
+            g.triangle(v);
+            const auto stretch = g.number(1, 4);
+            for (auto& p : v) {
+                p.x = v[0].x + (p.x - v[0].x) * stretch;
+                p.z = v[0].z + (p.z - v[0].z) * stretch;
+            }
+            const voxel_box box = bounds(v[0], v[1], v[2], fraction);
+            const mask_triangle t(v[0], v[1], v[2], box.lo, fraction);
+            voxels found;
+            const auto first = [&](int k) { return box.lo[k] & ~std::int64_t{mask_brick_size - 1}; };
+            for (std::int64_t z = first(2); z <= box.hi[2]; z += mask_brick_size)
+                for (std::int64_t y = first(1); y <= box.hi[1]; y += mask_brick_size)
+                    for (std::int64_t x = first(0); x <= box.hi[0]; x += mask_brick_size)
+                        found.merge(voxels_of_mask_brick(t, box, {{x, y, z}}));
+            const voxels expected = by_the_general_path<span_rule::conservative>(v, fraction, box);
+            covered += expected.size();
+            ASSERT_EQ(found, expected) << "fraction " << fraction << ", triangle " << i;
+        }
+    EXPECT_GT(covered, static_cast<std::uint64_t>(80 * unit::cases(400)));
+}
+
+// Up to the largest edges that fit, 65,536 voxels and more: bricks about points of the triangle, which lie anywhere,
+// and the range of depths that bricks are looked for in.
+TEST(MaskTriangle, BricksOfTheLargestTrianglesAreTheGeneralSet) {
+    generator g;
+    std::uint64_t covered = 0, missed = 0;
+    for (const int fraction : {8, 9, 11, 12, 14, 16})
+        for (int i = 0; i < unit::cases(300); ++i) {
+            g.fraction = fraction;
+            const std::int64_t most = std::int64_t{1} << mask_triangle::max_edge_bits;
+            const std::int64_t size[3] = {g.number(most / 2, most), g.number(0, most >> g.number(0, 20)),
+                                          g.number(most / 2, most)};
+            const auto axis = static_cast<int>(g.number(0, 2));
+            const snapped_position corner{g.number(-most, most), g.number(-most, most), g.number(-most, most)};
+            snapped_position v[3];
+            for (auto& p : v) {
+                const auto at =
+                    to_xyz<std::int64_t>(axis, g.number(0, size[0]), g.number(0, size[1]), g.number(0, size[2]));
+                p = {corner.x + at[0], corner.y + at[1], corner.z + at[2]};
+            }
+            ASSERT_TRUE(mask_triangle::fits(v[0], v[1], v[2]));
+            const voxel_box box = bounds(v[0], v[1], v[2], fraction);
+            const mask_triangle t(v[0], v[1], v[2], box.lo, fraction);
+            for (int k = 0; k < 10; ++k) {
+                const double a = static_cast<double>(g.number(0, 1000)) / 1000,
+                             b = static_cast<double>(g.number(0, 1000)) / 1000 * (1 - a);
+                const auto near = [&](std::int64_t p, std::int64_t q, std::int64_t r) {
+                    return static_cast<std::int64_t>(static_cast<double>(p) + a * static_cast<double>(q - p) +
+                                                     b * static_cast<double>(r - p)) >>
+                           fraction;
+                };
+                triple<std::int64_t> brick{
+                    {near(v[0].x, v[1].x, v[2].x), near(v[0].y, v[1].y, v[2].y), near(v[0].z, v[1].z, v[2].z)}};
+                voxel_box clip{};
+                for (int d = 0; d < 3; ++d) {
+                    brick[d] = (brick[d] + g.number(-6, 6)) & ~std::int64_t{mask_brick_size - 1};
+                    clip.lo[d] = brick[d];
+                    clip.hi[d] = brick[d] + mask_brick_size - 1;
+                }
+                clip = intersect(clip, box);
+                if (clip.empty()) continue;
+                const voxels expected = by_the_general_path<span_rule::conservative>(v, fraction, clip),
+                             found = voxels_of_mask_brick(t, box, brick);
+                ASSERT_EQ(found, expected) << "fraction " << fraction << ", triangle " << i;
+                covered += found.size();
+                missed += found.empty() ? 1 : 0;
+                const auto origin =
+                    to_uvw<std::int64_t>(axis, brick[0] - box.lo[0], brick[1] - box.lo[1], brick[2] - box.lo[2]);
+                double first = 0, last = 0;
+                t.depths(axis, static_cast<int>(origin[0]), static_cast<int>(origin[1]), first, last);
+                for (const auto& [x, y, z] : found) {
+                    const auto at = to_uvw<std::int64_t>(axis, x - box.lo[0], y - box.lo[1], z - box.lo[2]);
+                    ASSERT_GE(static_cast<double>(at[2]), first);
+                    ASSERT_LE(static_cast<double>(at[2]), last);
+                }
+            }
+        }
+    EXPECT_GT(covered, static_cast<std::uint64_t>(5000 * unit::cases(30)));
+    EXPECT_GT(missed, static_cast<std::uint64_t>(unit::cases(300)));
 }
 
 TEST(SmallTriangle, NearPositionsSnapAsAllDo) {

@@ -12,9 +12,12 @@
 
 #include <voxelpipe/slabs/devices.cuh>
 
+#include <glm/geometric.hpp>
+
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <random>
 
 namespace vp = voxelpipe;
 namespace blend = voxelpipe::blend;
@@ -180,6 +183,32 @@ TEST(DeviceSparse, GivesTheBytesOfTheCpu) {
     }
 }
 
+// Voxels of more fragments than a thread folds alone: two neighbours, so that a block shares two.
+TEST(DeviceSparse, VoxelsOfVeryManyFragmentsGiveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{12, 9, 10};
+    const vp::grid grid = unit::unit_grid(extent);
+    unit::small_mesh mesh = unit::make_mesh(41, 12, extent), more = unit::make_mesh(42, 12, extent);
+    std::mt19937 random{43};
+    std::uniform_real_distribution<float> inside(0.1f, 0.9f);
+    for (unit::small_mesh* m : {&mesh, &more})
+        for (int i = 0; i < 3600; ++i) {
+            const auto first = static_cast<std::uint32_t>(m->positions.size());
+            for (int k = 0; k < 3; ++k)
+                m->positions.emplace_back(5.0f + static_cast<float>(i % 2) + inside(random), 4.0f + inside(random),
+                                          4.0f + inside(random));
+            m->triangles.emplace_back(first, first + 1, first + 2);
+        }
+    pair p(extent);
+    p.draw({mesh}, grid, vp::coverage::conservative, "cleared");
+    p.prepare([](auto& fb) {
+        vp::core::for_each_index<8>([&]<std::size_t I>() { vp::get<I>(fb).load(); });
+        vp::get<3>(fb).clear({2.5, -1.0});
+        fb.template keep_sums<2>();
+        fb.template keep_sums<3>();
+    });
+    p.draw({more}, grid, vp::coverage::conservative, "loaded, sums kept");
+}
+
 // mesh_view::part: shaders see the numbers of the whole; masks have none.
 TEST(DeviceSparse, SubsetsGiveTheBytesOfTheCpu) {
     const glm::ivec3 extent{45, 34, 37};
@@ -252,6 +281,33 @@ TEST(DeviceSparse, ConstantShadersGiveTheBytesOfTheCpu) {
             few.draw(moved, part, rule, "a crop of it", constant_shader);
             EXPECT_GT(few.on_host.num_voxels(), 100u);
         }
+    }
+}
+
+// Triangles that pass through a part of a large grid: longer than 64 bits hold, and longer than the grid's size twice,
+// so that each is a floor, a wall or a slope there; with many small ones. The part begins on a brick.
+TEST(DeviceSparse, LargeTrianglesGiveTheBytesOfTheCpu) {
+    for (const int side : {4096, 65536}) {
+        const vp::grid whole = unit::unit_grid({side, side, side});
+        const glm::ivec3 offset{side - 416, 1896, 248};
+        const vp::grid part = whole.crop(offset, {88, 72, 61});
+        unit::small_mesh mesh = unit::make_mesh(51, 40, {80, 60, 60});
+        for (glm::vec3& q : mesh.positions) q += glm::vec3(offset);
+        const glm::vec3 middle = glm::vec3(offset) + glm::vec3(40.3f, 33.1f, 29.7f);
+        for (const float length : {60.0f, 1000.0f, static_cast<float>(side) * 0.9f, static_cast<float>(side) * 3.0f})
+            for (int k = 0; k < 4; ++k) {
+                const glm::vec3 slopes[4] = {{0.02f, 1.0f, 0.3f}, {1.0f, -0.7f, 0.01f}, {0.3f, 0.2f, -1.0f}, {1, 1, 1}};
+                const glm::vec3 n = glm::normalize(slopes[k]),
+                                a = glm::normalize(glm::cross(n, glm::vec3(0.1f, 0.7f, 0.2f))), b = glm::cross(n, a);
+                const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+                mesh.positions.push_back(middle + length * (0.5f * a + 0.1f * b));
+                mesh.positions.push_back(middle + length * (-0.3f * a + 0.4f * b));
+                mesh.positions.push_back(middle + length * (-0.2f * a - 0.5f * b));
+                mesh.triangles.emplace_back(first, first + 1, first + 2);
+            }
+        constant_pair p(part.extent);
+        p.draw({mesh}, part, vp::coverage::conservative, "a part of a large grid", constant_shader);
+        EXPECT_GT(p.on_host.num_voxels(), 10000u);
     }
 }
 

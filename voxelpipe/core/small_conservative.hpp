@@ -17,6 +17,7 @@ struct near_plane {
     float n[3], middle;  // along x from x0 on; negated if rows are to be clipped and n[0] < 0
     float half, inverse; // S / 2; 1 / (64 n[0])
 
+    near_plane() = default;
     VOXELPIPE_HD VOXELPIPE_INLINE near_plane(const std::int64_t (&normal)[3], std::int64_t below, std::int64_t above,
                                              int x0, bool clips)
         : n{static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2])},
@@ -288,7 +289,6 @@ struct small_conservative {
         }
     }
 
-private:
     // plane_bits by floats, if they are sure. Clips: they clip; otherwise they only test whether the plane leaves
     // everything, which takes fewer registers.
     template <bool Clips>
@@ -317,6 +317,7 @@ private:
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t rows_at_z(int y, int z) const {
         return small_line<Length>(yz[0].at(y, z), yz[1].at(y, z), yz[2].at(y, z), yz[0].a, yz[1].a, yz[2].a);
     }
+private:
     // Bit x is set if three values, stepped x times, are all >= 0; x = 0 .. last.
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE static std::uint32_t line(std::int32_t e0, std::int32_t e1,
                                                                           std::int32_t e2, std::int32_t s0,

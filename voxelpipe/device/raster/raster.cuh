@@ -342,12 +342,12 @@ __global__ __launch_bounds__(tuning::raster_threads,
     return left <= std::min(batches, at_once) * tuning::max_left_of_block;
 }
 
-// is_first: these are a call's first kernels. They read indices before they wait for the stream, so they must not start
-// early: a kernel of the caller may still be writing them. skips_deferred_pass: triangles that the first pass defers
-// all the same are not drawn, and the call fails.
+// The first pass alone. is_first: these are a call's first kernels. They read indices before they wait for the stream,
+// so they must not start early: a kernel of the caller may still be writing them. skips_deferred_pass: triangles that
+// the first pass defers all the same are not drawn, and the call fails.
 template <class Call>
-void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
-                   bool skips_deferred_pass = false) {
+void launch_first_pass(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first,
+                       bool skips_deferred_pass = false) {
     static_assert(fragment_sink<typename Call::sink> && fragment_sink<typename Call::deferred_sink>);
     const unsigned triangles = call.in.num_triangles;
     if constexpr (Call::output::defers) {
@@ -366,6 +366,12 @@ void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStr
         launch_kernel(!is_first, block_raster_kernel<Call>, raster_blocks(triangles, tuning::value_blocks),
                       tuning::raster_threads, 0, stream, where, call, state);
     }
+}
+// The raster of a draw; arguments as above.
+template <class Call>
+void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
+                   bool skips_deferred_pass = false) {
+    launch_first_pass(call, state, where, stream, is_first, skips_deferred_pass);
     if (skips_deferred_pass) return;
     const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
     launch_behind(deferred_pass_kernel<Call>, multiprocessors * deferred_min_blocks<Call>, tuning::raster_threads,

@@ -190,6 +190,25 @@ struct split_work_items {
     }
 };
 
+// Draws a part of a piece of a triangle that takes 128 bits. All lanes call it, with the same triangle.
+template <class Call, class Sink>
+__device__ VOXELPIPE_INLINE void raster_wide_piece(const Call& call, Sink& sink, std::uint32_t triangle,
+                                                   const split_pieces<Call::rule>& pieces, std::int64_t piece,
+                                                   unsigned part, bool valid) {
+    const glm::uvec3 index = call.in.source.triangle(triangle);
+    const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
+                                 c = call.in.source.position(index.z);
+    const bool wanted = valid && pieces.has_rows(piece, part);
+    emit_with_retry(sink, [&] {
+        if (!wanted) return;
+        span_writer<Sink> writer{sink};
+        for_each_wide_span<core::to_rule(Call::rule)>(
+            a, b, c, call.in.fraction, pieces.piece(piece, part),
+            [&](const wide_span& s) { writer.span(pieces.axes.dominant, s.u, s.v, s.w_first, s.w_last); });
+        writer.flush();
+    });
+}
+
 // Draws the pieces of all split triangles; parts warp, warp + warps, ... of the work items are this warp's, a piece per
 // lane. Conservative: the lanes find the bricks that the triangle meets in their columns, and group_lanes of them then
 // draw a brick each.
@@ -197,9 +216,7 @@ template <class Call, class Sink>
 __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink, brick_memory<Call::rule>& memory,
                                                    unsigned warp, unsigned warps) {
     constexpr bool thin = Call::rule == coverage::thin;
-    constexpr auto rule = core::to_rule(Call::rule);
     constexpr int per_work_item = split_pieces<Call::rule>::per_work_item;
-    using sink_type = Sink;
     const unsigned lane = threadIdx.x % 32;
     const split_work_items all(call.lists);
     const unsigned long long items = all.work_items;
@@ -242,18 +259,7 @@ __device__ VOXELPIPE_INLINE void raster_work_items(const Call& call, Sink& sink,
         const bool valid =
             piece < pieces.count() && of_item * parts / per_work_item == static_cast<unsigned>(i % parts);
         if (setup.is_narrow == 0) {
-            const glm::uvec3 index = call.in.source.triangle(setup.triangle);
-            const core::snapped_position a = call.in.source.position(index.x), b = call.in.source.position(index.y),
-                                         c = call.in.source.position(index.z);
-            const bool wanted = valid && pieces.has_rows(piece, of_piece);
-            emit_with_retry(sink, [&] {
-                if (!wanted) return;
-                span_writer<sink_type> writer{sink};
-                for_each_wide_span<rule>(
-                    a, b, c, call.in.fraction, pieces.piece(piece, of_piece),
-                    [&](const wide_span& s) { writer.span(pieces.axes.dominant, s.u, s.v, s.w_first, s.w_last); });
-                writer.flush();
-            });
+            raster_wide_piece(call, sink, setup.triangle, pieces, piece, of_piece, valid);
             continue;
         }
         if constexpr (thin) {

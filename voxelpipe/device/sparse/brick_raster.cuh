@@ -8,6 +8,7 @@
 #include <voxelpipe/device/base/call_state.cuh>
 #include <voxelpipe/device/raster/raster_draws.cuh>
 #include <voxelpipe/device/sparse/brick_sinks.cuh>
+#include <voxelpipe/device/sparse/mask_pass.cuh>
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/voxelize.hpp>
 
@@ -100,8 +101,16 @@ private:
                 const auto out = output(base);
                 const raster_call<Rule, source_type, std::remove_cvref_t<decltype(out)>> call{
                     {source, triangles, fraction, extent}, out, deferred_.with(state)};
-                launch_raster(call, state, where, stream_, is_first && is_first_pass_);
+                const bool starts = is_first && is_first_pass_;
                 is_first_pass_ = false;
+                if constexpr (Rule == coverage::conservative &&
+                              std::is_same_v<std::remove_cvref_t<decltype(out)>, masking_output>)
+                    if (g_.offset % core::sparse_brick_size == glm::ivec3(0)) {
+                        launch_first_pass(call, state, where, stream_, starts);
+                        launch_mask_pass(call, state, where, stream_);
+                        return;
+                    }
+                launch_raster(call, state, where, stream_, starts);
             });
     }
 

@@ -3,15 +3,18 @@
 #pragma once
 
 // Values of the voxels of a sparse framebuffer: a thread a voxel folds its fragments in the order of their primitives,
-// which is the meaning of every blend. The fragments' outputs come from an A-buffer whose payload is all of them.
+// which is the meaning of every blend; a block shares a voxel of very many. The fragments' outputs come from an
+// A-buffer whose payload is all of them.
 
 #include <voxelpipe/all_outputs.hpp>
 #include <voxelpipe/device/base/launch.cuh>
 #include <voxelpipe/device/sparse/brick_build.cuh>
 #include <voxelpipe/sparse.hpp>
+#include <voxelpipe/tuning/tuning_fragments.hpp>
 
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 namespace voxelpipe::device {
 
@@ -30,35 +33,115 @@ struct fold_target {
     core::kept_sum<Target>* sums;
 };
 
-// num_voxels, on the device: how many there are. existing: null if no voxel existed.
+// How the parts of a voxel's fragments are joined, where their order does not matter. A part begins with the identity.
+template <class Target>
+VOXELPIPE_HD void merge_parts(typename Target::traits::accumulator& a,
+                              const typename Target::traits::accumulator& part) {
+    using blend_type = typename Target::blend_type;
+    using value_type = typename Target::value_type;
+    if constexpr (core::has_wide_sums<Target>)
+        core::add_sums(a, part);
+    else if constexpr (std::is_same_v<blend_type, blend::count>)
+        core::blend_traits<blend::add, value_type>::apply(a, part);
+    else
+        Target::traits::apply(a, part);
+}
+
+// A voxel of very many fragments, which its block shares.
+struct long_voxel {
+    std::uint64_t first, last;
+    unsigned thread; // that has the voxel
+};
+
+// Applies the fragments of a long voxel to the sum of the thread that has it. The block's threads fold a part each; if
+// the order matters, the fold is serial, and they fetch for that thread. All threads of the block call it; `memory` is
+// unused before and after.
+template <std::size_t I, class Target, class Payload>
+__device__ void fold_together(const long_voxel& v, const Payload* payloads, unsigned char* memory,
+                              typename Target::traits::accumulator& sum) {
+    using traits = typename Target::traits;
+    using accumulator = typename traits::accumulator;
+    using value = std::remove_cvref_t<decltype(get<I>(payloads[0]))>;
+    using part_type = std::conditional_t<traits::order_free, accumulator, value>;
+    static_assert(alignof(part_type) <= 16);
+    constexpr unsigned fits = tuning::fold_bytes / sizeof(part_type);
+    constexpr unsigned most = fits < threads_per_block ? fits : threads_per_block;
+    static_assert(most != 0, "voxelpipe: a value of a sparse framebuffer is too large");
+    auto* const parts = reinterpret_cast<part_type*>(memory);
+    const unsigned mine = threadIdx.x;
+    if constexpr (traits::order_free) {
+        if (mine < most) {
+            auto part = traits::begin(traits::identity());
+            for (std::uint64_t f = v.first + mine; f < v.last; f += most) traits::apply(part, get<I>(payloads[f]));
+            parts[mine] = part;
+        }
+        __syncthreads();
+        for (unsigned n = most; n > 1;) { // the upper parts join the lower ones
+            const unsigned half = (n + 1) / 2;
+            if (mine + half < n) merge_parts<Target>(parts[mine], parts[mine + half]);
+            __syncthreads();
+            n = half;
+        }
+        if (mine == v.thread) merge_parts<Target>(sum, parts[0]);
+        __syncthreads();
+    } else {
+        for (std::uint64_t from = v.first; from < v.last; from += most) {
+            const unsigned n = v.last - from < most ? static_cast<unsigned>(v.last - from) : most;
+            if (mine < n) parts[mine] = get<I>(payloads[from + mine]);
+            __syncthreads();
+            if (mine == v.thread)
+                for (unsigned i = 0; i < n; ++i) traits::apply(sum, parts[i]);
+            __syncthreads();
+        }
+    }
+}
+
+// num_voxels, on the device: how many there are. existing: null if no voxel existed. Of the fragments of a target whose
+// last one wins, that one alone is applied.
 template <std::size_t I, class Target, class Payload>
 __global__ void fold_voxels(const fold_target<Target> t, const std::uint64_t* num_voxels, const std::uint32_t* listed,
                             const std::uint32_t* existing, const std::uint64_t* first, const Payload* payloads) {
     using map = core::rank_map<Target>;
     using traits = typename Target::traits;
+    __shared__ __align__(16) unsigned char memory[tuning::fold_bytes];
+    __shared__ long_voxel long_voxels[threads_per_block];
+    __shared__ unsigned num_long;
+    constexpr bool last_wins = std::is_same_v<typename Target::blend_type, blend::replace>;
     const std::uint64_t rank = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     const bool in = rank < *num_voxels;
-    typename Target::value_type value{};
+    std::uint32_t from = no_source, old = no_source;
+    std::uint64_t begin = 0, end = 0;
     if (in) {
-        const std::uint32_t from = listed[rank], old = existing == nullptr ? no_source : existing[rank];
-        const bool loaded = old != no_source && t.load != load_operation::clear;
-        if (loaded)
-            value = map::load(t.before, old);
-        else
-            value = t.background;
-        // Sums that are kept begin without the clear value, which is added at the end.
-        if (t.load != load_operation::off || t.keeps_sums) {
-            auto sum = traits::begin(t.keeps_sums && !loaded ? traits::identity() : value);
-            if (t.load != load_operation::off && from != no_source)
-                for (std::uint64_t f = first[from]; f < first[from + 1]; ++f) traits::apply(sum, get<I>(payloads[f]));
-            if constexpr (core::has_wide_sums<Target>) {
-                if (t.keeps_sums) {
-                    t.sums[rank] = sum;
-                    if (!loaded) core::add_sums(sum, traits::begin(t.background));
-                }
-            }
-            if (t.keeps_sums || from != no_source) value = traits::end(sum);
+        from = listed[rank];
+        if (existing != nullptr) old = existing[rank];
+        if (t.load != load_operation::off && from != no_source) {
+            begin = first[from];
+            end = first[from + 1];
+            if constexpr (last_wins) begin = end - 1;
         }
+    }
+    if (threadIdx.x == 0) num_long = 0;
+    __syncthreads();
+    const bool is_long = end - begin > tuning::max_folded_alone;
+    if (is_long) long_voxels[atomicAdd(&num_long, 1u)] = {begin, end, threadIdx.x};
+    __syncthreads();
+    const bool loaded = old != no_source && t.load != load_operation::clear;
+    typename Target::value_type value = t.background;
+    if (loaded) value = map::load(t.before, old);
+    // Sums that are kept begin without the clear value, which is added at the end.
+    auto sum = traits::begin(t.keeps_sums && !loaded ? traits::identity() : value);
+    if (!is_long)
+        for (std::uint64_t f = begin; f < end; ++f) traits::apply(sum, get<I>(payloads[f]));
+    const unsigned n = num_long;
+    for (unsigned k = 0; k < n; ++k) fold_together<I, Target>(long_voxels[k], payloads, memory, sum);
+    if (in && (t.load != load_operation::off || t.keeps_sums)) {
+        if constexpr (core::has_wide_sums<Target>) {
+            if (t.keeps_sums) {
+                t.sums[rank] = sum;
+                if (!loaded) core::add_sums(sum, traits::begin(t.background));
+            }
+        }
+        if (t.keeps_sums || from != no_source) value = traits::end(sum);
     }
     if constexpr (map::is_bit) { // a word has the bits of a warp
         const unsigned word = __ballot_sync(0xffffffffu, in && value);
