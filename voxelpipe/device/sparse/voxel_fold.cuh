@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
+#include <utility>
 
 namespace voxelpipe::device {
 
@@ -53,26 +54,43 @@ struct long_voxel {
     unsigned thread; // that has the voxel
 };
 
-// Applies the fragments of a long voxel to the sum of the thread that has it. The block's threads fold a part each; if
-// the order matters, the fold is serial, and they fetch for that thread. All threads of the block call it; `memory` is
-// unused before and after.
+// What threads that share a voxel pass on: sums, or values where the order matters. None, if it does not fit.
 template <std::size_t I, class Target, class Payload>
-__device__ void fold_together(const long_voxel& v, const Payload* payloads, unsigned char* memory,
-                              typename Target::traits::accumulator& sum) {
+using fold_part = std::conditional_t<Target::traits::order_free, typename Target::traits::accumulator,
+                                     std::remove_cvref_t<decltype(get<I>(std::declval<const Payload&>()))>>;
+static_assert(tuning::max_folded_alone >= threads_per_block);
+template <class Part>
+inline constexpr bool can_share = alignof(Part) <= 16 && sizeof(Part) <= tuning::fold_bytes;
+
+// Applies the fragments of a long voxel to the sum of the thread that has it, and returns the thread's sum. The block's
+// threads fold a part each; if the order matters, the fold is serial, and they fetch for that thread. All threads of
+// the block call it; `memory` is unused before and after. Out of line and by value, so that the kernel's bound on
+// registers costs this alone: folds of short voxels wait for memory, and need many warps.
+template <std::size_t I, class Target, class Payload>
+__device__ __noinline__ typename Target::traits::accumulator fold_together(const long_voxel v, const Payload* payloads,
+                                                                           unsigned char* memory,
+                                                                           typename Target::traits::accumulator sum) {
     using traits = typename Target::traits;
-    using accumulator = typename traits::accumulator;
-    using value = std::remove_cvref_t<decltype(get<I>(payloads[0]))>;
-    using part_type = std::conditional_t<traits::order_free, accumulator, value>;
-    static_assert(alignof(part_type) <= 16);
+    using part_type = fold_part<I, Target, Payload>;
     constexpr unsigned fits = tuning::fold_bytes / sizeof(part_type);
     constexpr unsigned most = fits < threads_per_block ? fits : threads_per_block;
-    static_assert(most != 0, "voxelpipe: a value of a sparse framebuffer is too large");
     auto* const parts = reinterpret_cast<part_type*>(memory);
     const unsigned mine = threadIdx.x;
     if constexpr (traits::order_free) {
         if (mine < most) {
+            // There are more fragments than threads. A user's blend begins with the first of them: nothing says that
+            // its identity changes no value.
+            using value_type = typename Target::value_type;
+            using blend_type = typename Target::blend_type;
+            constexpr bool is_users =
+                core::user_blend<blend_type, value_type> || core::user_blend_template<blend_type, value_type>;
             auto part = traits::begin(traits::identity());
-            for (std::uint64_t f = v.first + mine; f < v.last; f += most) traits::apply(part, get<I>(payloads[f]));
+            std::uint64_t f = v.first + mine;
+            if constexpr (is_users) {
+                part = get<I>(payloads[f]);
+                f += most;
+            }
+            for (; f < v.last; f += most) traits::apply(part, get<I>(payloads[f]));
             parts[mine] = part;
         }
         __syncthreads();
@@ -94,13 +112,16 @@ __device__ void fold_together(const long_voxel& v, const Payload* payloads, unsi
             __syncthreads();
         }
     }
+    return sum;
 }
 
 // num_voxels, on the device: how many there are. existing: null if no voxel existed. Of the fragments of a target whose
 // last one wins, that one alone is applied.
 template <std::size_t I, class Target, class Payload>
-__global__ void fold_voxels(const fold_target<Target> t, const std::uint64_t* num_voxels, const std::uint32_t* listed,
-                            const std::uint32_t* existing, const std::uint64_t* first, const Payload* payloads) {
+__global__ __launch_bounds__(threads_per_block,
+                             6) void fold_voxels(const fold_target<Target> t, const std::uint64_t* num_voxels,
+                                                 const std::uint32_t* listed, const std::uint32_t* existing,
+                                                 const std::uint64_t* first, const Payload* payloads) {
     using map = core::rank_map<Target>;
     using traits = typename Target::traits;
     __shared__ __align__(16) unsigned char memory[tuning::fold_bytes];
@@ -122,7 +143,8 @@ __global__ void fold_voxels(const fold_target<Target> t, const std::uint64_t* nu
     }
     if (threadIdx.x == 0) num_long = 0;
     __syncthreads();
-    const bool is_long = end - begin > tuning::max_folded_alone;
+    constexpr bool shares = can_share<fold_part<I, Target, Payload>>;
+    const bool is_long = shares && end - begin > tuning::max_folded_alone;
     if (is_long) long_voxels[atomicAdd(&num_long, 1u)] = {begin, end, threadIdx.x};
     __syncthreads();
     const bool loaded = old != no_source && t.load != load_operation::clear;
@@ -133,7 +155,8 @@ __global__ void fold_voxels(const fold_target<Target> t, const std::uint64_t* nu
     if (!is_long)
         for (std::uint64_t f = begin; f < end; ++f) traits::apply(sum, get<I>(payloads[f]));
     const unsigned n = num_long;
-    for (unsigned k = 0; k < n; ++k) fold_together<I, Target>(long_voxels[k], payloads, memory, sum);
+    if constexpr (shares)
+        for (unsigned k = 0; k < n; ++k) sum = fold_together<I, Target>(long_voxels[k], payloads, memory, sum);
     if (in && (t.load != load_operation::off || t.keeps_sums)) {
         if constexpr (core::has_wide_sums<Target>) {
             if (t.keeps_sums) {
