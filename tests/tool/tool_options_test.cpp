@@ -67,6 +67,7 @@ std::set<std::string> all_options() {
             "--up AXIS",
             "--compression N",
             "--zarr-codec NAME",
+            "--levels",
             "--merge",
             "--points",
             "--stats [json]",

@@ -20,12 +20,14 @@
 namespace voxelize {
 
 struct write_options {
-    int compression = 1;      // zlib level of .npz, .vti, .nrrd, .zarr, .schem: 0 stores (.schem: 1), 9 is smallest
-    bool zstd = false;        // .zarr: Zstandard instead of gzip, where has_zstd()
-    up_axis up = up_axis::y;  // which world axis stands upright in .vox and .schem; glTF's is y
-    int threads = 0;          // 0 takes all cores. No output depends on it
-    bool merge_faces = false; // .ply, .obj, .glb: coplanar faces of equal colour become one rectangle
-    bool points = false;      // .ply holds the voxels' centres, not their outer sides
+    int compression = 1;     // zlib level of .npz, .vti, .nrrd, .zarr, .schem: 0 stores (.schem: 1), 9 is smallest
+    bool zstd = false;       // .zarr: Zstandard instead of gzip, where has_zstd()
+    bool levels = false;     // .zarr: each channel with its mip levels, an OME-Zarr multiscale group
+    int pieces = 0;          // .pvti, .nvdb: slabs along z, a piece or a grid of each channel each; 0: the format's own
+    up_axis up = up_axis::y; // which world axis stands upright in .vox and .schem; glTF's is y
+    int threads = 0;         // 0 takes all cores. No output depends on it
+    bool merge_faces = false;             // .ply, .obj, .glb: coplanar faces of equal colour become one rectangle
+    bool points = false;                  // .ply holds the voxels' centres, not their outer sides
     std::uint64_t faces_per_file = 0;     // .ply, .obj, .glb: most faces in a file; 0: what the format can number
     preview_options preview;              // camera and light of .png
     std::function<void(double)> progress; // called with 0..1 now and then, from the calling thread; may be empty
@@ -40,6 +42,7 @@ struct format {
     bool shows_colors;            // takes the colours of find_colors() where there are any
     bool needs_cubes;             // knows one voxel size for all axes: without are_cubic() the writer refuses
     bool only_sparse = false;     // holds the voxels that are occupied and no others
+    bool has_levels = false;      // obeys write_options::levels
 };
 
 // True if voxels of this size are cubes, but for what fitting a grid loses by rounding.

@@ -314,6 +314,9 @@ void describe_output(CLI::App& app, command_line& options) {
         ->group("Files");
     app.add_flag("--points", options.write.points, "Write the centres of the voxels into .ply, not their outer sides")
         ->group("Files");
+    app.add_flag("--levels", options.write.levels,
+                 "Write each value of .zarr with its mip levels, as an OME-Zarr multiscale image")
+        ->group("Files");
     add_choice(app, "--zarr-codec", options.write.zstd, {{"gzip", false}, {"zstd", true}},
                "How the chunks of .zarr are compressed: gzip, which every reader has, or zstd. Default: gzip")
         ->option_text("NAME")

@@ -157,6 +157,10 @@ void understand_outputs(command_line& options, const raw_options& raw) {
         needs_occupancy = needs_occupancy || found->needs_occupancy;
         shows_colors = shows_colors || found->shows_colors;
     }
+    if (options.write.levels && std::none_of(options.outputs.begin(), options.outputs.end(),
+                                             [](const auto& output) { return find_format(output)->has_levels; }))
+        throw usage_error("--levels: " + lower(options.outputs.front().extension().string()) +
+                          " has no levels; .zarr has");
     std::vector<target>& targets = options.voxelize.targets;
     targets.clear();
     for (const std::string& name : raw.targets) {

@@ -214,7 +214,124 @@ def check_nrrd(case, files):
         assert header["kinds"][-3:] == ["domain"] * 3 and len(header["kinds"]) == (3 if components == 1 else 4)
 
 
+def srgb_tables():
+    """Linear light of the 256 bytes, and the least light that each byte stands for."""
+    import numpy as np
+
+    def linear(encoded):
+        return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+
+    threshold = linear((np.arange(256) - 0.5) / 255).astype(np.float32)
+    threshold[0] = 0
+    return linear(np.arange(256) / 255).astype(np.float32), threshold
+
+
+def children(values, fill):
+    """The eight voxels below each of the next level, as an array (..., 8)."""
+    import numpy as np
+
+    even = np.pad(values, [(0, n % 2) for n in values.shape], constant_values=fill)
+    return np.stack([even[z::2, y::2, x::2] for z in (0, 1) for y in (0, 1) for x in (0, 1)], axis=-1)
+
+
+def sum_of_children(planes):
+    import numpy as np
+
+    return np.stack([children(planes[..., c], 0).sum(axis=-1) for c in range(planes.shape[-1])], axis=-1)
+
+
+def majority(values):
+    """The commonest of eight values other than -1, the least of several; -1 if there is none."""
+    import numpy as np
+
+    best, most = np.full(values.shape[:-1], -1), np.zeros(values.shape[:-1], int)
+    for candidate in range(3):
+        count = (values == candidate).sum(axis=-1)
+        best, most = np.where(count > most, candidate, best), np.maximum(count, most)
+    return best
+
+
+def levels_of(name, finest):
+    """The mip levels of a target from 1 on, until a level has 64 voxels along each axis; components last."""
+    import numpy as np
+
+    linear, threshold = srgb_tables()
+    value, sums, levels = finest, None, []
+    if name in ("color", "color-replace", "color-outer"):
+        light = np.rint(linear[finest[..., :3]].astype(float) * 0xFFFFFF).astype(np.uint64) * finest[..., 3:]
+        sums = np.concatenate([light, finest[..., 3:].astype(np.uint64), finest.any(axis=-1)[..., None].astype(np.uint64)], -1)
+    elif name == "normal":
+        sums = finest.astype(float)
+    while max(value.shape[:3]) > 64:
+        if name == "occupancy":
+            value = children(value, False).any(axis=-1)
+        elif name in ("count", "triangle"):
+            value = children(value, 0 if name == "count" else -1).max(axis=-1)
+        elif name == "color-max":
+            value = np.stack([children(value[..., c], 0).max(axis=-1) for c in range(4)], axis=-1)
+        elif name == "material":
+            value = majority(children(value, -1)).astype(np.int32)
+        elif name == "depth":
+            value = np.fmin.reduce(children(value, np.nan), axis=-1)
+        elif name == "normal":
+            sums = sum_of_children(sums)
+            whole = sums.astype(np.float32).astype(float)
+            length = np.sqrt((whole**2).sum(axis=-1, keepdims=True))
+            value = np.where(length > 2.0**-10, whole / np.where(length > 0, length, 1), 0).astype(np.float32)
+        else:
+            sums = sum_of_children(sums)
+            mean = sums[..., :4] / np.maximum(sums[..., 4:], 1)
+            light = (mean[..., :3] / np.where(mean[..., 3:] > 0, mean[..., 3:], 1) / 0xFFFFFF).astype(np.float32)
+            encoded = np.searchsorted(threshold, light, side="right") - 1
+            value = np.concatenate([encoded, np.floor(mean[..., 3:] + 0.5)], axis=-1).astype(np.uint8)
+        levels.append(value)
+    return levels
+
+
+def check_zarr_levels(case, files):
+    import numpy as np
+    import tensorstore
+    import zarr
+
+    names = [c[0] for c in case["channels"]]
+    occupied = expected(case, names.index("occupancy")).astype(bool)
+    empty = {"material": -1, "triangle": -1, "depth": np.nan}
+    group = zarr.open_group(files[0], mode="r")
+    assert sorted(group.group_keys()) == sorted(names) and not list(group.array_keys())
+    for n, (name, kind, components) in enumerate(case["channels"]):
+        finest = occupied if kind == "bit" else expected(case, n)
+        if name in ("material", "triangle"):
+            finest = (finest.view(np.uint32) % (3 if name == "material" else 2**31)).astype(np.int32)
+        if kind != "bit":
+            there = occupied if components == 1 else occupied[..., None]
+            finest = np.where(there, finest, np.array(empty.get(name, 0), finest.dtype))
+        want = [finest] + levels_of(name, finest)
+        assert len(want) == 4, len(want)
+        ome = group[name].attrs["ome"]
+        assert ome["version"] == "0.5"
+        (scales,) = ome["multiscales"]
+        letters = "czyx" if components > 1 else "zyx"
+        assert scales["axes"] == [{"name": a, "type": "channel" if a == "c" else "space"} for a in letters], scales["axes"]
+        assert [d["path"] for d in scales["datasets"]] == ["0", "1", "2", "3"]
+        for level, dataset in enumerate(scales["datasets"]):
+            what = f"{files[0].name}: {name}, level {level}"
+            scale, translation = dataset["coordinateTransformations"]
+            size = np.array(case["voxel_size"][::-1]) * 2**level
+            close(scale["scale"], [1] * (components > 1) + list(size), what)
+            close(translation["translation"], [0] * (components > 1) + list(np.array(case["origin"][::-1]) + size / 2), what)
+            stored = want[level] if components == 1 else np.moveaxis(want[level], -1, 0)
+            array = group[name][str(level)]
+            assert array.metadata.dimension_names == tuple(letters), array.metadata.dimension_names
+            spec = {"driver": "zarr3", "kvstore": {"driver": "file", "path": str(files[0] / name / str(level))}}
+            for got in (array[...], np.asarray(tensorstore.open(spec).result().read().result())):
+                assert got.shape == stored.shape and got.dtype == stored.dtype, (what, got.shape, got.dtype)
+                off = np.count_nonzero((got != stored) & ~((got != got) & (stored != stored)))
+                assert off == 0, f"{what}: {off} of {stored.size} values differ"
+
+
 def check_zarr(case, files):
+    if case["name"] == "levels":
+        return check_zarr_levels(case, files)
     import numpy as np
     import tensorstore
     import zarr

@@ -6,6 +6,7 @@
 #include "formats/formats.hpp"
 #include "formats/schem.hpp"
 #include "sparse/sparse_formats.hpp"
+#include "targets.hpp"
 #include "test_volumes.hpp"
 
 #include <cstdio>
@@ -35,6 +36,28 @@ volume with_channels(std::array<std::int64_t, 3> extent, std::uint32_t density, 
                 v.add(std::string(name_of(static_cast<scalar>(type))) + "x" + std::to_string(components),
                       static_cast<scalar>(type), components);
     for (std::size_t n = density == 0 ? 1 : 0; n < v.channels.size(); ++n) fill(v, n, density);
+    return v;
+}
+
+// Every target, empty where no voxel is occupied; three materials, numbers of triangles.
+volume with_targets(std::array<std::int64_t, 3> extent, std::uint32_t density) {
+    volume v = make_volume(extent);
+    for (const target_info& info : target_table) v.add(std::string(info.name), info.type, info.components);
+    for (std::size_t n = 0; n < v.channels.size(); ++n) fill(v, n, density);
+    for (std::size_t n = 1; n < v.channels.size(); ++n) {
+        const std::size_t each = v.channels[n].data.size() / static_cast<std::size_t>(v.num_voxels());
+        for (std::int64_t at = 0; at < v.num_voxels(); ++at) {
+            std::byte* const value = v.channels[n].data.data() + static_cast<std::size_t>(at) * each;
+            std::uint32_t bits;
+            std::memcpy(&bits, value, 4);
+            if (target_table[n].id == target::material) bits %= 3;
+            if (target_table[n].id == target::triangle) bits &= 0x7fffffff;
+            if (v.occupied(at % extent[0], at / extent[0] % extent[1], at / (extent[0] * extent[1])))
+                std::memcpy(value, &bits, 4);
+            else
+                for (std::size_t i = 0; i < each; i += 4) std::memcpy(value + i, &target_table[n].empty, 4);
+        }
+    }
     return v;
 }
 
@@ -83,6 +106,9 @@ std::vector<sample_case> make_cases() {
     grids.v.add("u32x1", scalar::u32);
     grids.v.add("i32x1", scalar::i32);
     for (std::size_t n = 0; n < grids.v.channels.size(); ++n) fill(grids.v, n, grids.density);
+    cases.push_back({"levels", with_targets({150, 20, 270}, 7), 7, {".zarr"}, {}});
+    cases.back().v.voxel_size = {0.1, 0.25, 3};
+    cases.back().options.levels = true;
     add("glass", {16, 16, 16}, 2, true, false, {".png"}).options.preview.backdrop = *parse_background("transparent");
     return cases;
 }

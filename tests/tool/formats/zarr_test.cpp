@@ -5,6 +5,7 @@
 // readers (read_back.py).
 
 #include "formats/formats.hpp"
+#include "sparse/sparse_formats.hpp"
 #include "test_volumes.hpp"
 
 #include <sys/resource.h>
@@ -77,6 +78,30 @@ TEST_F(Zarr, FilesDoNotDependOnThreads) {
     EXPECT_EQ(all, files(folder_ / "three.zarr"));
     for (const std::string& file : all)
         EXPECT_EQ(read_file(folder_ / "one.zarr" / file), read_file(folder_ / "three.zarr" / file)) << file;
+}
+
+TEST_F(Zarr, LevelsOfBricksAreThoseOfADenseGrid) {
+    volume v = make_colored({200, 9, 70});
+    channel& color = *v.find("color"); // a voxel that is not occupied has none
+    for (std::int64_t at = 0; at < v.num_voxels(); ++at)
+        if (!v.occupied(at % 200, at / 200 % 9, at / 1800)) std::memset(color.data.data() + 4 * at, 0, 4);
+    write_options options;
+    options.levels = true;
+    options.threads = 1;
+    write(v, folder_ / "dense.zarr", options);
+    options.threads = 2;
+    write_sparse(make_sparse(v, 1), folder_ / "bricks.zarr", options);
+    const auto all = files(folder_ / "dense.zarr");
+    EXPECT_EQ(all, (std::vector<std::string>{"color/0/c/0/0/0/0", "color/0/zarr.json", "color/1/c/0/0/0/0",
+                                             "color/1/zarr.json", "color/2/c/0/0/0/0", "color/2/zarr.json",
+                                             "color/zarr.json", "occupancy/0/c/0/0/0", "occupancy/0/zarr.json",
+                                             "occupancy/1/c/0/0/0", "occupancy/1/zarr.json", "occupancy/2/c/0/0/0",
+                                             "occupancy/2/zarr.json", "occupancy/zarr.json", "zarr.json"}));
+    EXPECT_EQ(all, files(folder_ / "bricks.zarr"));
+    for (const std::string& file : all)
+        EXPECT_EQ(read_file(folder_ / "dense.zarr" / file), read_file(folder_ / "bricks.zarr" / file)) << file;
+    v.add("temperature", scalar::f32);
+    EXPECT_THROW(write(v, folder_ / "dense.zarr", options), write_error);
 }
 
 TEST_F(Zarr, ReplacesOnlyAGroup) {
