@@ -116,7 +116,8 @@ template <int Limbs>
     if (divisor != 1) { // a quotient of 64 bits or more, and whether anything is left
         const int shift = 128 - exact::bit_width(m.magnitude);
         const uint128 shifted = m.magnitude << shift;
-        m.magnitude = shifted / divisor | static_cast<uint128>(shifted % divisor != 0);
+        const exact::wide_quotient q = exact::divide(shifted, divisor);
+        m.magnitude = q.quotient | static_cast<uint128>(q.has_rest);
         m.exponent -= shift;
     }
     return exact::round_to_binary(m.magnitude, m.exponent + log2_quantum, mantissa_bits, exponent_bits) |

@@ -53,6 +53,18 @@ TEST(RoundToBinary, IsTheCompilersConversionOfWideIntegers) {
     }
 }
 
+TEST(Divide, IsTheCompilersDivisionOfWideIntegers) {
+    splitmix64 random(11);
+    for (std::int64_t i = 0; i < unit::cases(1'000'000); ++i) {
+        const uint128 a = any_magnitude(random, 128);
+        const auto b = static_cast<std::uint64_t>(any_magnitude(random, i % 3 == 0 ? 64 : 33));
+        if (b == 0) continue;
+        const ex::wide_quotient q = ex::divide(a, b);
+        ASSERT_TRUE(q.quotient == a / b);
+        ASSERT_EQ(q.has_rest, a % b != 0);
+    }
+}
+
 TEST(RoundToBinary, ScalesAsLdexpDoesIntoSubnormalsAndInfinity) {
     splitmix64 random(2);
     for (std::int64_t i = 0; i < unit::cases(2'000'000); ++i) {

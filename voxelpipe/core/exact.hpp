@@ -370,6 +370,24 @@ template <class Int>
     return high != 0 ? 64 + bit_width(high) : bit_width(static_cast<std::uint64_t>(a));
 }
 
+// A quotient rounded down, and whether something is left.
+struct wide_quotient {
+    uint128 quotient;
+    bool has_rest;
+};
+// a / b; b is not 0. Divisors below 2^32 take three divisions of 64 bits, where 128 bits have none of their own.
+[[nodiscard]] VOXELPIPE_HD inline wide_quotient divide(uint128 a, std::uint64_t b) {
+    if (b >> 32 != 0) {
+        const uint128 quotient = a / b;
+        return {quotient, quotient * b != a};
+    }
+    const auto high = static_cast<std::uint64_t>(a >> 64), low = static_cast<std::uint64_t>(a);
+    const std::uint64_t top = high / b;
+    const std::uint64_t middle = (high - top * b) << 32 | low >> 32, middle_quotient = middle / b;
+    const std::uint64_t rest = (middle - middle_quotient * b) << 32 | (low & 0xffffffffu), low_quotient = rest / b;
+    return {static_cast<uint128>(top) << 64 | middle_quotient << 32 | low_quotient, low_quotient * b != rest};
+}
+
 // Nearest integer multiple of 2^shift, in units of 2^shift, ties to even. 0 <= shift < 128.
 [[nodiscard]] VOXELPIPE_HD inline uint128 shift_right_rne(uint128 a, int shift) {
     if (shift == 0) return a;
