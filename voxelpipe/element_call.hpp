@@ -15,6 +15,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -35,6 +36,22 @@ enum class element_count : std::uint8_t { nonfinite, too_far, outside, bad_index
 
 namespace passes {
 
+// Calls visit(setup, voxel x y z, w) for each voxel of a drawable element within `whole`.
+VOXELPIPE_ANY_CALLABLE
+template <coverage Rule, class Visit>
+VOXELPIPE_HD void for_each_element_voxel(const snapped_position& a, const snapped_position& b, int fraction,
+                                         const voxel_box& whole, Visit&& visit) {
+    const auto run = [&](const auto& t) {
+        for_each_segment_voxel<Rule>(t, whole, [&](std::int64_t u, std::int64_t v, std::int64_t w) {
+            visit(t, to_xyz(t.axis, static_cast<int>(u), static_cast<int>(v), static_cast<int>(w)), w);
+        });
+    };
+    if (is_narrow_segment(a, b))
+        run(segment_setup<std::int64_t>(a, b, fraction));
+    else
+        run(segment_setup<int128>(a, b, fraction));
+}
+
 // The elements of one draw, after the vertex shader. K: 1 or 2 vertices each.
 template <int K, class V>
 struct snapped_elements {
@@ -52,15 +69,7 @@ struct snapped_elements {
     VOXELPIPE_ANY_CALLABLE
     template <coverage Rule, class Visit>
     VOXELPIPE_HD void for_each_voxel(const snapped_position& a, const snapped_position& b, Visit&& visit) const {
-        const auto run = [&](const auto& t) {
-            for_each_segment_voxel<Rule>(t, whole, [&](std::int64_t u, std::int64_t v, std::int64_t w) {
-                visit(t, to_xyz(t.axis, static_cast<int>(u), static_cast<int>(v), static_cast<int>(w)), w);
-            });
-        };
-        if (is_narrow_segment(a, b))
-            run(segment_setup<std::int64_t>(a, b, snap.fraction));
-        else
-            run(segment_setup<int128>(a, b, snap.fraction));
+        for_each_element_voxel<Rule>(a, b, snap.fraction, whole, visit);
     }
 };
 
@@ -174,6 +183,11 @@ struct list_voxels {
 template <coverage Rule, class Backend, class View, class VertexShader, class FragmentShader, class Output>
 [[nodiscard]] status run_elements(Backend& backend, std::span<const draw<View, VertexShader, FragmentShader>> draws,
                                   const grid& g, Output& out, bool count_voxels) {
+    if constexpr (requires { backend.template draw_elements<Rule>(draws, g, out, count_voxels); }) {
+        // Without lists, if the backend knows how.
+        if (const std::optional<status> s = backend.template draw_elements<Rule>(draws, g, out, count_voxels))
+            return *s;
+    }
     using elements = elements_of<View>;
     using V = typename shaded<View, VertexShader>::varyings;
     using output_type = std::remove_const_t<Output>;

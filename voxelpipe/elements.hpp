@@ -69,8 +69,8 @@ struct element_indices {
     };
     [[nodiscard]] VOXELPIPE_HD located locate(std::uint32_t i) const {
         located e{};
-        e.number = i % each;
-        e.instance = i / each;
+        e.instance = i < each ? 0 : i / each; // most have one instance
+        e.number = i - e.instance * each;
         e.ok = true;
         for (int k = 0; k < K; ++k) {
             std::uint64_t at = std::uint64_t{e.number} * step + static_cast<std::uint32_t>(k);

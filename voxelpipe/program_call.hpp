@@ -523,6 +523,11 @@ run_in_chunks(Backend& backend, std::span<const draw<Mesh, VertexShader, Fragmen
     using emitted_draw = typename call_type::emitted_draw;
     using payload = typename pooled<output_type, program_output<Mesh, VertexShader, FragmentShader, Amplify>>::payload;
     const voxelize_options& plain = options;
+    if constexpr (requires { backend.template draw_patches<Known...>(draws, g, out, plain, chunk); }) {
+        // Without their triangles in memory, if the backend knows how.
+        const std::optional<status> s = backend.template draw_patches<Known...>(draws, g, out, plain, chunk);
+        if (s) return s->ok() ? *s : name_bad_input(backend, draws, *s);
+    }
     const call_type call(backend, draws, g, chunk);
     if (!call.state().ok()) return name_bad_input(backend, draws, call.state());
     if (call.fits())

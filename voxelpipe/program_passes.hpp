@@ -84,6 +84,41 @@ struct patches {
     const std::uint64_t *first_triangle, *first_point;
 };
 
+// The patch of the first of 32 consecutive numbers, of triangles or of points.
+struct patch_batch {
+    std::uint32_t patch;
+    std::uint32_t local; // number within the patch
+    std::uint32_t point; // the patch's first
+    std::uint32_t levels;
+
+    static constexpr std::uint32_t size = 32, is_mixed = std::uint32_t{1} << 31; // a flag of levels: not all are its
+};
+// Finds the patch that each batch begins in.
+struct find_batches {
+    const std::uint64_t *first, *first_point; // of triangles or points; of points
+    const std::uint32_t* levels;
+    std::uint32_t count; // of patches
+    patch_batch* to;
+
+    VOXELPIPE_HD void operator()(std::uint64_t batch) const {
+        const std::uint64_t i = batch * patch_batch::size;
+        const std::uint32_t patch = find_owner(first, count, i);
+        to[batch] = {patch, static_cast<std::uint32_t>(i - first[patch]),
+                     static_cast<std::uint32_t>(first_point[patch]),
+                     levels[patch] | (i + patch_batch::size > first[patch + 1] ? patch_batch::is_mixed : 0)};
+    }
+};
+// The patch that has number i, of a batch that begins in `patch`.
+[[nodiscard]] VOXELPIPE_HD inline std::uint32_t find_owner_near(const std::uint64_t* first, std::uint32_t patch,
+                                                                std::uint32_t count, std::uint64_t i) {
+    for (int k = 0; k < 4; ++k) {
+        if (first[patch + 1] > i) return patch;
+        ++patch;
+    }
+    const std::uint32_t rest = count - patch; // each patch has a number at least
+    return patch + find_owner(first + patch, rest < patch_batch::size ? rest : patch_batch::size, i);
+}
+
 // The points that triangles [begin, end) use: [to[0], to[1]).
 template <class V>
 struct find_points {
@@ -137,6 +172,7 @@ struct emit_points {
     glm::vec3 outside;
     Sink sink;
     const std::uint64_t* bound = nullptr; // of points that are emitted, in the backend's memory; null: all
+    const patch_batch* batches = nullptr; // of points; null: each is searched for
 
     VOXELPIPE_ANY_CALLABLE
     template <class Index>
@@ -146,9 +182,22 @@ struct emit_points {
             return;
         }
         if (bound != nullptr && i >= *bound) return;
-        const std::uint32_t number = find_owner(all.first_point, all.count, first + i);
-        const auto local = static_cast<std::uint32_t>(first + i - all.first_point[number]);
-        const lattice patch = lattice::unpack(all.levels[number]);
+        std::uint32_t number = 0, local = 0, level = 0;
+        if (batches != nullptr) {
+            const patch_batch b = batches[(first + i) / patch_batch::size];
+            number = b.patch;
+            local = b.local + static_cast<std::uint32_t>((first + i) % patch_batch::size);
+            level = b.levels;
+            if ((level & patch_batch::is_mixed) != 0)
+                number = find_owner_near(all.first_point, number, all.count, first + i);
+        } else {
+            number = find_owner(all.first_point, all.count, first + i);
+        }
+        if (batches == nullptr || (level & patch_batch::is_mixed) != 0) {
+            local = static_cast<std::uint32_t>(first + i - all.first_point[number]);
+            level = all.levels[number];
+        }
+        const lattice patch = lattice::unpack(level);
         const lattice_point at = patch.point(lattice_index::of(local));
         const auto e = all.in.locate(number);
         const vertex_output<V> v[3] = {all.vertices[e.index[0]], all.vertices[e.index[1]], all.vertices[e.index[2]]};

@@ -28,6 +28,8 @@
 #include <voxelpipe/device/abuffer_async.cuh>
 #include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/device/optional/element_async.cuh>
+#include <voxelpipe/device/optional/elements.cuh>
+#include <voxelpipe/device/optional/patches.cuh>
 #include <voxelpipe/device/optional/program_async.cuh>
 #include <voxelpipe/device/optional/solid.cuh>
 #include <voxelpipe/device/optional/solid_async.cuh>

@@ -86,7 +86,7 @@ using framebuffer_of = vp::framebuffer<Backend, ids, sums, bits>;
 
 // What a call gives in a framebuffer, lists, a sparse framebuffer and, with a constant shader, in bits.
 struct results {
-    vp::counters counts;
+    vp::counters counts, of_constants;
     std::vector<glm::uvec4> ids, payloads;
     std::vector<float> sums;
     std::vector<std::uint32_t> parities, constants, primitives;
@@ -122,6 +122,7 @@ results draw_with(Backend& backend, const vp::grid& grid, const Draw& draw) {
     vp::framebuffer<Backend, vp::target<vp::bit, blend::bit_or>> occupied{backend, grid.extent};
     s = draw(vp::constant(true), occupied);
     EXPECT_TRUE(s.ok()) << s.message();
+    r.of_constants = s.counts;
     r.constants = vp::get<0>(occupied).to_host(backend);
     return r;
 }
@@ -143,6 +144,7 @@ results draw_plain(Backend& backend, const unit::small_mesh& m, const vp::grid& 
 }
 inline void expect_same(const results& a, const results& b) {
     EXPECT_EQ(a.counts, b.counts);
+    EXPECT_EQ(a.of_constants, b.of_constants);
     EXPECT_TRUE(unit::same_bytes(a.ids, b.ids));
     EXPECT_TRUE(unit::same_bytes(a.sums, b.sums));
     EXPECT_TRUE(unit::same_bytes(a.parities, b.parities));

@@ -39,6 +39,17 @@ std::int64_t doubled_area(const plane_point& a, const plane_point& b, const plan
     return (b.w1 - a.w1) * (c.w2 - a.w2) - (b.w2 - a.w2) * (c.w1 - a.w1);
 }
 
+TEST(Lattice, NumbersAreFoundInEveryRow) {
+    for (int row = 0; row <= max_tessellation_level; ++row)
+        for (const int column : {0, row / 2, row}) {
+            const lattice_index at = lattice_index::of(lattice_index{row, column}.number());
+            EXPECT_TRUE(at.row == row && at.column == column) << row << " " << column;
+            if (row == max_tessellation_level) continue;
+            const lattice_index p = lattice_triangle_of(static_cast<std::uint32_t>(row * row + 2 * column)).p[0];
+            EXPECT_TRUE(p.row == row && p.column == column) << row << " " << column;
+        }
+}
+
 TEST(Lattice, CoversThePatchOnceForEveryLevelUpTo12) {
     for (int l0 = 1; l0 <= 12; ++l0)
         for (int l1 = 1; l1 <= 12; ++l1)

@@ -93,6 +93,14 @@ TEST(DeviceInstances, OfConstantsAreTheCpus) {
                                                             {strategy::occupancy_mask});
 }
 
+// More triangles than a pass takes: most of them have no area and lie in one voxel.
+TEST(DeviceInstances, AreDrawnInPasses) {
+    mesh_data m = mixed_triangles(64, 12.0f, 11);
+    m.triangles.resize(vp::tuning::max_pass_triangles / 3, glm::uvec3(m.triangles[0].x));
+    expect_same_instances<vp::coverage::conservative, bits>(m, 4, placed{}, vp::constant(true),
+                                                            {vp::strategy::immediate});
+}
+
 TEST(DeviceInstances, OfShadersAreTheCpus) {
     const mesh_data m = mixed_triangles(100, 30.0f, 4);
     using vp::strategy;
@@ -342,6 +350,11 @@ TEST(DevicePrograms, WithoutWaitsReportWhatIsWrong) {
     const vp::program_workspace_view workspace{const_cast<unsigned char*>(memory.memory.data()), bytes, limits};
     ASSERT_TRUE(vp::voxelize_async<async_rule>(gpu, there.span(), g, fb.view(), {async_rule}, workspace).ok());
     EXPECT_EQ(vp::read_status(gpu, workspace).code, vp::status_code::index_out_of_range);
+    vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>> constants{gpu, g.extent};
+    const vp::status s =
+        vp::voxelize<async_rule>(gpu, there.a, g, programs::add_surface{}, amplify, vp::constant(true), constants);
+    EXPECT_EQ(s.code, vp::status_code::index_out_of_range);
+    EXPECT_EQ(s.triangle, 3u);
     EXPECT_EQ(vp::voxelize_async<async_rule>(gpu, there.span(), g, fb.view(), {async_rule}, {nullptr, 0, limits}).code,
               vp::status_code::capacity_exceeded);
 }
@@ -385,6 +398,61 @@ void expect_same_async_elements(const View& here, const View& there) {
         });
     expect_same_on_host(expected.to_host(cpu), found);
 }
+// Drawn without lists: several draws, cleared and loaded targets that are blended or counted in place.
+template <vp::coverage Rule, class... Targets, class View, class FragmentShader>
+void expect_same_constants(const View& here, const View& there, const FragmentShader& fs) {
+    const vp::grid g = box_grid(extent).crop({3, 1, 5}, {40, 36, 41});
+    using draw_type = vp::draw<View, elements::place, FragmentShader>;
+    const draw_type on_cpu[] = {{here, {}, fs}, {here, {}, fs}}, on_gpu[] = {{there, {}, fs}, {there, {}, fs}};
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    vp::framebuffer<vp::cpu_backend, Targets...> a{cpu, g.extent};
+    vp::framebuffer<vp::cuda_backend, Targets...> b{gpu, g.extent};
+    for (const start how : {start::clear, start::load}) {
+        if (how == start::load)
+            vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+                vp::get<I>(a).load();
+                vp::get<I>(b).load();
+            });
+        const vp::status s = vp::voxelize<Rule>(cpu, std::span<const draw_type>(on_cpu), g, a);
+        const vp::status t = vp::voxelize<Rule>(gpu, std::span<const draw_type>(on_gpu), g, b);
+        ASSERT_TRUE(s.ok() && t.ok()) << s.message() << t.message();
+        EXPECT_GT(s.counts.voxels, 100u);
+        expect_same_counts(s.counts, t.counts);
+        vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu), "target");
+        });
+    }
+}
+TEST(DeviceElements, OfConstantsAreTheCpus) {
+    const std::vector<glm::vec3> vertices = elements::make_vertices(9, 200, extent);
+    std::vector<std::uint32_t> indices;
+    for (std::uint32_t i = 0; i < 300; ++i) indices.push_back(i * 7 % 400);
+    vp::cuda_backend gpu;
+    const vp::cuda_backend::buffer<glm::vec3> there(gpu, array_of(vertices));
+    const vp::cuda_backend::buffer<std::uint32_t> there_indices(gpu, array_of(indices));
+    using vp::coverage;
+    using counts = vp::target<std::uint32_t, blend::count>;
+    using any_bits = vp::target<vp::bit, blend::bit_or>;
+    const vp::lines_view<> here_lines{.positions = vertices, .indices = indices, .copies = {2}},
+        there_lines{.positions = there.view(), .indices = there_indices.view(), .copies = {2}};
+    expect_same_constants<coverage::conservative, counts, any_bits>(here_lines, there_lines, vp::constant(1u, true));
+    expect_same_constants<coverage::thin, sums, bits>(here_lines, there_lines, vp::constant(0.1f, true));
+    const vp::points_view<> here_points{.positions = vertices, .copies = {2}},
+        there_points{.positions = there.view(), .copies = {2}};
+    expect_same_constants<coverage::thin, counts>(here_points, there_points, vp::constant(1u));
+    expect_same_constants<coverage::conservative, any_bits>(here_points, there_points, vp::constant(true));
+
+    std::vector<std::uint32_t> bad = indices;
+    bad[5] = 400;
+    const vp::cuda_backend::buffer<std::uint32_t> bad_there(gpu, array_of(bad));
+    vp::framebuffer<vp::cuda_backend, counts> fb{gpu, extent};
+    const vp::lines_view<> bad_lines{.positions = there.view(), .indices = bad_there.view()};
+    const vp::status s =
+        vp::voxelize<coverage::thin>(gpu, bad_lines, box_grid(extent), elements::place{}, vp::constant(1u), fb);
+    EXPECT_EQ(s.code, vp::status_code::index_out_of_range);
+}
+
 TEST(DeviceElements, WithoutWaitsAreTheCpus) {
     const std::vector<glm::vec3> vertices = elements::make_vertices(4, 120, extent);
     vp::cuda_backend gpu;

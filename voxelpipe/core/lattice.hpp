@@ -40,10 +40,10 @@ struct lattice_index {
         return static_cast<std::uint32_t>(row) * static_cast<std::uint32_t>(row + 1) / 2 +
                static_cast<std::uint32_t>(column);
     }
-    // The inverse. The root of a number below 2^52 is rounded correctly, and that of a square is exact: its floor is
-    // right.
+    // The inverse. 8 number + 1 is below 2^24, so its root is rounded correctly, and that of a square is exact. The
+    // other roots of a row stay 2 / (row + 1) below the next one's: their floor is right.
     [[nodiscard]] VOXELPIPE_HD static lattice_index of(std::uint32_t number) {
-        const int row = (static_cast<int>(exact::sqrt(8.0 * number + 1.0)) - 1) / 2;
+        const int row = (static_cast<int>(exact::sqrt(static_cast<float>(8 * number + 1))) - 1) / 2;
         return {row, static_cast<int>(number - lattice_index{row, 0}.number())};
     }
 };
@@ -53,9 +53,10 @@ struct lattice_triangle {
     lattice_index p[3];
 };
 
-// Triangle `number` of any lattice that has one.
+// Triangle `number` of any lattice that has one. Below 2^20, the root of a number that is no square is at least 2^-21
+// of it below the next integer.
 [[nodiscard]] VOXELPIPE_HD inline lattice_triangle lattice_triangle_of(std::uint32_t number) {
-    const int row = static_cast<int>(exact::sqrt(static_cast<double>(number)));
+    const int row = static_cast<int>(exact::sqrt(static_cast<float>(number)));
     const int i = static_cast<int>(number) - row * row, c = i / 2;
     if (i % 2 == 0) return {{{row, c}, {row + 1, c}, {row + 1, c + 1}}};
     return {{{row, c}, {row + 1, c + 1}, {row, c + 1}}};

@@ -17,6 +17,7 @@
 #include <voxelpipe/device/scene/check_indices.cuh>
 #include <voxelpipe/device/scene/cub_sort.cuh>
 #include <voxelpipe/device/scene/subset.cuh>
+#include <voxelpipe/program.hpp>
 #include <voxelpipe/solid.hpp>
 #include <voxelpipe/sparse.hpp>
 #include <voxelpipe/tuning/tuning_strategy.hpp>
@@ -157,6 +158,20 @@ public:
     // Implements voxelize of nothing into a sparse framebuffer.
     template <class... Targets>
     [[nodiscard]] status clear_sparse(const grid& g, sparse_framebuffer<cuda_backend, Targets...>& fb);
+
+    // Implements voxelize of points and lines where lists are not needed; otherwise returns nothing. Arguments are
+    // validated. Defined in device/optional/elements.cuh.
+    template <coverage Rule, class View, class VertexShader, class FragmentShader, class... Targets>
+    [[nodiscard]] std::optional<status> draw_elements(std::span<const draw<View, VertexShader, FragmentShader>> draws,
+                                                      const grid& g, const framebuffer_view<Targets...>& fb,
+                                                      bool count_voxels);
+
+    // Implements voxelize with a tessellation where its triangles need not be in memory; otherwise returns nothing.
+    // Arguments are validated. most: triangles. Defined in device/optional/patches.cuh.
+    template <coverage... Known, class Mesh, class VertexShader, class FragmentShader, class Program, class... Targets>
+    [[nodiscard]] std::optional<status>
+    draw_patches(std::span<const draw<Mesh, VertexShader, FragmentShader, tessellate<Program>>> draws, const grid& g,
+                 const framebuffer_view<Targets...>& fb, const voxelize_options& options, std::uint64_t most);
 
     // Used by brick_slots; table and slots are in device memory. Throws std::runtime_error with the CUDA error. Defined
     // in device/optional/sparse.cuh.

@@ -16,6 +16,10 @@ namespace voxelpipe::tuning {
 // The raster is launched once per draw. Calls of more draws go through tiles, whose launches take all draws.
 inline constexpr std::size_t max_raster_draws = 16;
 
+// A raster without tiles draws many instances in passes of at most so many triangles, or of one instance: the shaded
+// vertices of a pass stay in L2.
+inline constexpr std::uint64_t max_pass_triangles = std::uint64_t{1} << 21;
+
 // The last pass of a mask reads all of it, so larger ones are not used.
 inline constexpr std::uint64_t max_mask_bytes = std::uint64_t{512} << 20;
 // If the targets could also be blended in place, a mask pays up to this size, as long as it stays in L2, and if voxels

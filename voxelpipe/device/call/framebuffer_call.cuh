@@ -49,6 +49,18 @@ struct framebuffer_plan {
     immediate_plan<targets_of<Framebuffer>::count> targets; // for constant shaders
 };
 
+// Clears the targets of a call. counts: targets may hold numbers of fragments (immediate_plan).
+template <class Framebuffer, class Tracking>
+void clear_for(const framebuffer_plan<Framebuffer>& plan, bool counts, const Tracking& tracking,
+               const pipeline_state* state, cudaStream_t stream) {
+    core::for_each_index<targets_of<Framebuffer>::count>([&]<std::size_t K>() {
+        auto t = voxelpipe::get<K>(plan.fb.targets);
+        if (counts && plan.targets.counts(K)) t.clear_value = {}; // the number of fragments
+        if (t.load == load_operation::clear && !tracking.by_chunks[K]) clear_target(t, state, plan.limits, stream);
+    });
+    clear_by_chunks(tracking, plan.fb, state, plan.limits, stream);
+}
+
 template <class Draw, class Framebuffer, tuning::fine_raster_policy Policy>
 struct framebuffer_call;
 template <class Mesh, class VertexShader, class FragmentShader, class Framebuffer, tuning::fine_raster_policy Policy>
@@ -97,6 +109,8 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     // these strategies write no target before all triangles are drawn, so a wrong guess only costs time.
     [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t num_deferred) const {
         if (draws.size() != 1 || !defers_few(max_triangles(), num_deferred)) return false;
+        if (max_pass_triangles() != max_triangles() && !lists_fragments())
+            return false; // the state has the last pass's
         return chosen() == strategy::occupancy_mask || lists_fragments();
     }
 
@@ -164,9 +178,17 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         for (const draw_type& d : draws) most = std::max<std::size_t>(most, d.mesh.num_triangles());
         return most;
     }
-    [[nodiscard]] std::size_t max_vertices() const {
+    // The same of a pass over some instances (raster_each_draw).
+    [[nodiscard]] std::size_t max_pass_triangles() const {
         std::size_t most = 0;
-        for (const draw_type& d : draws) most = std::max<std::size_t>(most, d.mesh.num_vertices());
+        for (const draw_type& d : draws)
+            most = std::max<std::size_t>(most, d.mesh.triangles.size() * instances_of_pass(d.mesh));
+        return most;
+    }
+    [[nodiscard]] std::size_t max_pass_vertices() const {
+        std::size_t most = 0;
+        for (const draw_type& d : draws)
+            most = std::max<std::size_t>(most, d.mesh.positions.size() * instances_of_pass(d.mesh));
         return most;
     }
     // The raster shades vertices itself if that costs no more than reading them: once per corner instead of once per
@@ -183,8 +205,8 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     template <class Raster>
     void raster_draws(const vertex_positions& positions, pipeline_state* state, cudaStream_t stream,
                       const Raster& raster) const {
-        raster_each_draw<shades_in_raster>(draws, core::make_snap_transform(plan.g), positions, state, clock, stream,
-                                           raster);
+        raster_each_draw<shades_in_raster, true>(draws, core::make_snap_transform(plan.g), positions, state, clock,
+                                                 stream, raster);
     }
     template <class Source>
     [[nodiscard]] raster_input<Source> raster_input_of(const draw_type& d, const Source& source) const {
@@ -192,13 +214,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
                 plan.g.extent};
     }
     void clear_targets(const tracking_type& tracking, const pipeline_state* state, cudaStream_t stream) const {
-        core::for_each_index<groups::count>([&]<std::size_t K>() {
-            auto t = voxelpipe::get<K>(plan.fb.targets);
-            if (chosen() == strategy::immediate && plan.targets.counts(K))
-                t.clear_value = {}; // the number of fragments
-            if (t.load == load_operation::clear && !tracking.by_chunks[K]) clear_target(t, state, plan.limits, stream);
-        });
-        clear_by_chunks(tracking, plan.fb, state, plan.limits, stream);
+        clear_for(plan, chosen() == strategy::immediate, tracking, state, stream);
         end_stage(clock, &stage_times::clear);
     }
 
@@ -213,6 +229,8 @@ private:
         f.fragment_capacity = plan.limits.fragments;
         f.fits_int32 = core::arms_of(plan.options.rule) == core::arm_set::none &&
                        is_listable(plan.num_primitives, core::make_snap_transform(plan.g).fraction, plan.g.extent);
+        f.fits_in_passes = core::arms_of(plan.options.rule) == core::arm_set::none &&
+                           is_listable(max_pass_triangles(), core::make_snap_transform(plan.g).fraction, plan.g.extent);
         if constexpr (core::is_constant<FragmentShader>)
             f.all_draws_equal = std::all_of(draws.begin(), draws.end(), [&](const draw_type& d) {
                 return std::memcmp(&draws[0].fragment_shader.values, &d.fragment_shader.values,

@@ -40,8 +40,8 @@ struct immediate_strategy {
         });
         has_own_marks = has_own_marks && !is_tracked(); // the log's marks hold the same
         if (has_own_marks) marks = chunk_marks::take(memory, c.plan.g.extent);
-        positions = vertex_positions::take(memory, Call::shades_in_raster ? 0 : c.max_vertices());
-        deferred = deferred_triangles::take(memory, c.max_triangles());
+        positions = vertex_positions::take(memory, Call::shades_in_raster ? 0 : c.max_pass_vertices());
+        deferred = deferred_triangles::take(memory, c.max_pass_triangles());
     }
 
     template <coverage Rule>
@@ -78,14 +78,15 @@ private:
         const auto draw_into = [&](const auto& output) {
             const raster_call<Rule, Source, std::remove_cvref_t<decltype(output)>> raster{
                 call.raster_input_of(d, source), output, deferred.with(state)};
-            launch_raster(raster, state, stage::fine_raster, stream);
+            launch_raster(raster, state, stage::fine_raster, stream, false, false,
+                          call.draws.size() == 1 ? plan.num_primitives : 0);
             end_stage(call.clock, &stage_times::fine_raster);
         };
         if constexpr (is_mask_itself<framebuffer_type>) {
             const auto& t = voxelpipe::get<0>(plan.fb.targets);
             if (plan.targets.modes.of[0] == immediate_mode::blend && t.load != load_operation::off &&
                 voxelpipe::get<0>(d.fragment_shader.values)) {
-                draw_into(mask_output{t.elements, plan.g.extent, Call::num_source_vertices(d.mesh), state, true});
+                draw_into(mask_output{t.elements, plan.g.extent, call.num_source_vertices(d.mesh), state, true});
                 return;
             }
         }

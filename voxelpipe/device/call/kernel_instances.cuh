@@ -16,9 +16,9 @@
 // In namespace voxelpipe::device, up to the calls. Vertex shades by a kernel, for the library's vertex shaders.
 #define VOXELPIPE_VERTEX_SHADES(HOW)                                                                                   \
     HOW void vertex_shade(const mesh_view<>&, const passthrough&, const core::snap_transform&, std::uint32_t,          \
-                          const vertex_positions&, no_varyings*, cudaStream_t);                                        \
+                          const vertex_positions&, no_varyings*, cudaStream_t, std::uint32_t);                         \
     HOW void vertex_shade(const mesh_view<>&, const transform&, const core::snap_transform&, std::uint32_t,            \
-                          const vertex_positions&, no_varyings*, cudaStream_t);                                        \
+                          const vertex_positions&, no_varyings*, cudaStream_t, std::uint32_t);                         \
     HOW void write_arguments(draw_geometry*, const argument_chunk<draw_geometry, 3072 / sizeof(draw_geometry)>&, int,  \
                              cudaStream_t);
 
@@ -32,7 +32,7 @@
 
 #define VOXELPIPE_MASK_RASTER(HOW, RULE, ...)                                                                          \
     HOW void launch_raster(const raster_call<RULE, __VA_ARGS__, mask_output>&, pipeline_state*, stage, cudaStream_t,   \
-                           bool, bool);
+                           bool, bool, std::uint32_t);
 #define VOXELPIPE_MASK_RASTERS(HOW)                                                                                    \
     VOXELPIPE_MASK_RASTER(HOW, coverage::conservative, stored_source)                                                  \
     VOXELPIPE_MASK_RASTER(HOW, coverage::thin, stored_source)                                                          \

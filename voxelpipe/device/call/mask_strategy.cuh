@@ -23,8 +23,8 @@ struct mask_strategy {
 
     mask_strategy(const Call& c, arena& memory)
         : call(c), mask(memory.take<word>(mask_target::map::elements(c.plan.g.extent))),
-          positions(vertex_positions::take(memory, Call::shades_in_raster ? 0 : c.max_vertices())),
-          deferred(deferred_triangles::take(memory, c.max_triangles())) {}
+          positions(vertex_positions::take(memory, Call::shades_in_raster ? 0 : c.max_pass_vertices())),
+          deferred(deferred_triangles::take(memory, c.max_pass_triangles())) {}
 
     template <coverage Rule>
     void launch(pipeline_state* state, cudaStream_t stream) const {
@@ -36,7 +36,8 @@ struct mask_strategy {
                 {mask, call.plan.g.extent, num_vertices, state, false},
                 deferred.with(state)};
             launch_raster(raster, state, stage::fine_raster, stream, is_first,
-                          call.plan.limits.skips_deferred_pass != 0);
+                          call.plan.limits.skips_deferred_pass != 0,
+                          call.draws.size() == 1 ? call.plan.num_primitives : 0);
             end_stage(call.clock, &stage_times::fine_raster);
         });
         fill_from_mask(mask, call.plan.fb, call.track(), call.draws[0].fragment_shader.values,

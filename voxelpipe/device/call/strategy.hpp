@@ -76,6 +76,7 @@ struct call_facts {
     std::uint64_t mask_bytes = 0;        // of an occupancy mask
     std::uint64_t fragment_capacity = 0; // fragments that the lists hold
     bool fits_int32 = false;             // the raster of 32 bits serves grid, mesh and coverage (int32_triangle)
+    bool fits_in_passes = false;         // it does in passes of some instances, which lists cannot take
     bool all_draws_equal = false;        // constant shaders: each draw gives the same values
     bool blends_in_place = false;        // every target is blended or counted where it lies, for these values
     bool counts_are_cheap = false;       // and reading the counted ones costs less than tiles would
@@ -93,11 +94,12 @@ inline constexpr std::uint64_t max_listed_voxels = 0xffffffffu;
 // ---- can it? --------------------------------------------------------------------------------------------------------
 
 [[nodiscard]] constexpr bool can_use_mask(const call_facts& f) {
-    return f.possible.occupancy_mask && f.all_draws_equal && f.fits_int32 && f.num_draws <= tuning::max_raster_draws &&
-           f.mask_bytes <= tuning::max_mask_bytes;
+    return f.possible.occupancy_mask && f.all_draws_equal && (f.fits_int32 || f.fits_in_passes) &&
+           f.num_draws <= tuning::max_raster_draws && f.mask_bytes <= tuning::max_mask_bytes;
 }
 [[nodiscard]] constexpr bool can_use_immediate(const call_facts& f) {
-    return f.possible.immediate && f.blends_in_place && f.fits_int32 && f.num_draws <= tuning::max_raster_draws;
+    return f.possible.immediate && f.blends_in_place && (f.fits_int32 || f.fits_in_passes) &&
+           f.num_draws <= tuning::max_raster_draws;
 }
 [[nodiscard]] constexpr bool can_list(const call_facts& f) {
     return f.may_list && f.fits_int32 && f.num_draws <= tuning::max_raster_draws && f.num_voxels < max_listed_voxels &&

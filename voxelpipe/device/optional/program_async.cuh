@@ -231,11 +231,13 @@ struct async_lattice {
         points.run(stream);
         run_pass(1, make_lattice_room{triangles.total(), points.total(), capacity, state, room}, stream);
     }
+    [[nodiscard]] core::passes::patches<V> patches() const {
+        return {vertices, in, static_cast<std::uint32_t>(num_patches), levels, triangles.offsets(), points.offsets()};
+    }
     template <class Sink>
     void emit(const lattice_size& capacity, const program_room* room, const glm::vec3& outside, const Sink& sink,
               std::uint32_t left_out, glm::uvec3* to, std::uint32_t* origins, cudaStream_t stream) const {
-        const core::passes::patches<V> all{
-            vertices, in, static_cast<std::uint32_t>(num_patches), levels, triangles.offsets(), points.offsets()};
+        const core::passes::patches<V> all = patches();
         run_pass(capacity.points + 1,
                  core::passes::emit_points<Program, V, W, Sink>{program, all, 0, capacity.points, outside, sink,
                                                                 &room->lattice.points},
