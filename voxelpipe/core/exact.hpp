@@ -372,8 +372,8 @@ template <class Int>
 
 // A quotient rounded down, and whether something is left.
 struct wide_quotient {
-    uint128 quotient;
-    bool has_rest;
+    uint128 quotient; // rounded down
+    bool has_rest;    // what was divided is no multiple
 };
 // a / b; b is not 0. Divisors below 2^32 take three divisions of 64 bits, where 128 bits have none of their own.
 [[nodiscard]] VOXELPIPE_HD inline wide_quotient divide(uint128 a, std::uint64_t b) {
