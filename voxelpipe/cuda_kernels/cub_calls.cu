@@ -14,9 +14,6 @@ namespace voxelpipe::device {
                               stage, cudaStream_t);                                                                    \
     template void fill_end(KEY*, std::uint32_t*, const unsigned long long*, std::uint64_t, const pipeline_state*,      \
                            const capacities&, cudaStream_t);                                                           \
-    template std::size_t select_bytes<KEY>(std::uint64_t);                                                             \
-    template void select_voxels(const KEY*, std::uint64_t*, pipeline_state*, const capacities&, void*, std::size_t,    \
-                                cudaStream_t);                                                                         \
     template void prepare_sort(KEY*, std::uint32_t*, std::uint64_t, const sort_preparation&, const pipeline_state*,    \
                                const capacities&, cudaStream_t);
 VOXELPIPE_KEY(std::uint32_t)

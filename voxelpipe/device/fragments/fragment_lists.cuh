@@ -221,7 +221,8 @@ sort_lists(const list_buffers<Key, Payload>& b, const output_pointers& outputs, 
     lists.payloads = b.payloads;
     lists.first_of_voxel = b.first_of_voxel;
     lists.pointers = b.pointers;
-    select_voxels(lists.keys, b.first_of_voxel, state, limits, b.storage, b.storage_bytes, stream);
+    select_voxels({lists.keys, sizeof(Key) == sizeof(std::uint64_t)}, b.first_of_voxel, state, limits, b.storage,
+                  b.storage_bytes, stream);
     end_stage(clock, &stage_times::abuffer_emit);
     return lists;
 }
@@ -294,7 +295,7 @@ template <class Key, class Payload>
             b.values[i] = memory.take<std::uint32_t>(capacity);
         }
     }
-    b.storage_bytes = select_bytes<Key>(capacity);
+    b.storage_bytes = select_bytes(capacity);
     if (may_count && counting_memory::suits(num_voxels, capacity)) {
         b.counting = counting_memory::take(memory, capacity, num_voxels);
     } else if (are_sorted_here<Key>(capacity)) {

@@ -93,8 +93,8 @@ struct cell_counts {
 //                                                             is the triangle's own
 //   emit(geometry, triangle, primitive, box, whole, offset)   stores the cells that count() counts, from offset on
 template <class Op>
-__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void count_small_kernel(
-    const __grid_constant__ geometry geo, const __grid_constant__ Op op, cell_buffers b, pipeline_state* state) {
+__device__ VOXELPIPE_INLINE void count_small(const geometry& geo, const Op& op, const cell_buffers& b,
+                                             pipeline_state* state) {
     using core::triangle_class;
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     const bool valid = i < geo.num_primitives;
@@ -168,8 +168,8 @@ __device__ void for_each_record(const geometry& geo, const Op& op, const cell_bu
 }
 
 template <class Op>
-__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void count_large_kernel(
-    const __grid_constant__ geometry geo, const __grid_constant__ Op op, cell_buffers b, pipeline_state* state) {
+__device__ VOXELPIPE_INLINE void count_large(const geometry& geo, const Op& op, const cell_buffers& b,
+                                             pipeline_state* state) {
     unsigned long long all = 0, discarded = 0;
     if (state->index_error == 0) {
         for_each_record(geo, op, b,
@@ -191,9 +191,8 @@ __global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) v
 }
 
 template <class Op>
-__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void emit_small_kernel(
-    const __grid_constant__ geometry geo, const __grid_constant__ Op op, cell_buffers b, const pipeline_state* state,
-    capacities limits) {
+__device__ VOXELPIPE_INLINE void emit_small(const geometry& geo, const Op& op, const cell_buffers& b,
+                                            const pipeline_state* state, const capacities& limits) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i >= geo.num_primitives || has_failed(*state, limits) || b.counts[i] == 0) return;
     const auto id = static_cast<std::uint32_t>(i);
@@ -208,9 +207,8 @@ __global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) v
 // counts[i] is decremented to what remains of primitive i. A primitive's records take their offsets in any order: the
 // later stable sort by cell hides it, because a primitive meets a cell once.
 template <class Op>
-__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void emit_large_kernel(
-    const __grid_constant__ geometry geo, const __grid_constant__ Op op, cell_buffers b, const pipeline_state* state,
-    capacities limits) {
+__device__ VOXELPIPE_INLINE void emit_large(const geometry& geo, const Op& op, const cell_buffers& b,
+                                            const pipeline_state* state, const capacities& limits) {
     if (has_failed(*state, limits)) return;
     for_each_record(geo, op, b,
                     [&](std::uint32_t id, const loaded_triangle& t, bool valid, const core::voxel_box& box) {
@@ -232,11 +230,39 @@ __global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) v
                     });
 }
 
+// True for a stage that has a second pass.
+template <class Op>
+concept stores_cells = requires {
+    &Op::emit;
+};
+
+// A kernel is both passes over its triangles: what finds their cells, most of its code, is compiled once for the two.
+enum class cell_pass { count, emit };
+template <class Op>
+__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void small_cells_kernel(
+    const __grid_constant__ geometry geo, const __grid_constant__ Op op, const __grid_constant__ cell_buffers b,
+    pipeline_state* state, const __grid_constant__ capacities limits, cell_pass pass) {
+    if (pass == cell_pass::count)
+        count_small(geo, op, b, state);
+    else if constexpr (stores_cells<Op>)
+        emit_small(geo, op, b, state, limits);
+}
+template <class Op>
+__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void large_cells_kernel(
+    const __grid_constant__ geometry geo, const __grid_constant__ Op op, const __grid_constant__ cell_buffers b,
+    pipeline_state* state, const __grid_constant__ capacities limits, cell_pass pass) {
+    if (pass == cell_pass::count)
+        count_large(geo, op, b, state);
+    else if constexpr (stores_cells<Op>)
+        emit_large(geo, op, b, state, limits);
+}
+
 // Counts the cells of the large primitives, then computes the offsets of all.
 template <class Op>
 void count_large_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state,
                        void* scan_storage, std::size_t scan_bytes, stage where, cudaStream_t stream) {
-    count_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state);
+    large_cells_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(
+        geo, op, b, state, capacities{}, cell_pass::count);
     check(cudaGetLastError(), where);
     sum_counts(b.counts, b.offsets, geo.num_primitives, scan_storage, scan_bytes, where, stream);
 }
@@ -245,22 +271,25 @@ void count_large_cells(const geometry& geo, const Op& op, const cell_buffers& b,
 template <class Op>
 void count_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state, void* scan_storage,
                  std::size_t scan_bytes, stage where, cudaStream_t stream) {
-    count_small_kernel<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state);
+    small_cells_kernel<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(
+        geo, op, b, state, capacities{}, cell_pass::count);
     check(cudaGetLastError(), where);
     count_large_cells(geo, op, b, state, scan_storage, scan_bytes, where, stream);
 }
 
 template <class Op>
-void emit_large_cells(const geometry& geo, const Op& op, const cell_buffers& b, const pipeline_state* state,
+void emit_large_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state,
                       const capacities& limits, stage where, cudaStream_t stream) {
-    emit_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
+    large_cells_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state, limits,
+                                                                                              cell_pass::emit);
     check(cudaGetLastError(), where);
 }
 
 template <class Op>
-void emit_cells(const geometry& geo, const Op& op, const cell_buffers& b, const pipeline_state* state,
+void emit_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state,
                 const capacities& limits, stage where, cudaStream_t stream) {
-    emit_small_kernel<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state, limits);
+    small_cells_kernel<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state, limits,
+                                                                                         cell_pass::emit);
     check(cudaGetLastError(), where);
     emit_large_cells(geo, op, b, state, limits, where, stream);
 }

@@ -44,13 +44,23 @@ VOXELPIPE_DECLARES_KERNELS void sum_counts(const std::uint32_t* counts, unsigned
                                            cudaStream_t stream);
 
 // Bytes of storage for select_voxels.
-template <class Key>
-[[nodiscard]] std::size_t select_bytes(std::uint64_t capacity);
+VOXELPIPE_DECLARES_KERNELS [[nodiscard]] std::size_t select_bytes(std::uint64_t capacity);
+
+// Sorted keys of either width: a kernel that only compares them serves both.
+struct sorted_keys {
+    const void* keys; // std::uint64_t if are_wide, otherwise std::uint32_t
+    bool are_wide;
+
+    [[nodiscard]] __device__ bool differ(std::uint64_t i, std::uint64_t k) const {
+        if (are_wide) return static_cast<const std::uint64_t*>(keys)[i] != static_cast<const std::uint64_t*>(keys)[k];
+        return static_cast<const std::uint32_t*>(keys)[i] != static_cast<const std::uint32_t*>(keys)[k];
+    }
+};
 
 // Writes the index of each voxel's first fragment, ascending, among state->list_fragments sorted keys, and their number
 // to state->list_voxels: 0 if the call has failed.
-template <class Key>
-void select_voxels(const Key* keys, std::uint64_t* first_of_voxel, pipeline_state* state, const capacities& limits,
-                   void* storage, std::size_t bytes, cudaStream_t stream);
+VOXELPIPE_DECLARES_KERNELS void select_voxels(const sorted_keys& keys, std::uint64_t* first_of_voxel,
+                                              pipeline_state* state, const capacities& limits, void* storage,
+                                              std::size_t bytes, cudaStream_t stream);
 
 } // namespace voxelpipe::device

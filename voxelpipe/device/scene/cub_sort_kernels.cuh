@@ -69,32 +69,29 @@ VOXELPIPE_DEFINES_KERNELS void sum_counts(const std::uint32_t* counts, unsigned 
 }
 
 // True if fragment i of the sorted ones is the first of its voxel.
-template <class Key>
 struct is_first_of_voxel {
-    const Key* keys;
+    sorted_keys keys;
     const pipeline_state* state;
     capacities limits;
     [[nodiscard]] __device__ bool operator()(unsigned long long i) const {
-        return !has_failed(*state, limits) && i < state->list_fragments && (i == 0 || keys[i] != keys[i - 1]);
+        return !has_failed(*state, limits) && i < state->list_fragments && (i == 0 || keys.differ(i, i - 1));
     }
 };
 
-template <class Key>
-std::size_t select_bytes(std::uint64_t capacity) {
+VOXELPIPE_DEFINES_KERNELS std::size_t select_bytes(std::uint64_t capacity) {
     std::size_t bytes = 0;
     check(cub::DeviceSelect::If(nullptr, bytes, thrust::counting_iterator<unsigned long long>(0),
                                 static_cast<std::uint64_t*>(nullptr), static_cast<unsigned long long*>(nullptr),
-                                capacity, is_first_of_voxel<Key>{}),
+                                capacity, is_first_of_voxel{}),
           stage::abuffer_emit);
     return bytes;
 }
 
-template <class Key>
-void select_voxels(const Key* keys, std::uint64_t* first_of_voxel, pipeline_state* state, const capacities& limits,
-                   void* storage, std::size_t bytes, cudaStream_t stream) {
+VOXELPIPE_DEFINES_KERNELS void select_voxels(const sorted_keys& keys, std::uint64_t* first_of_voxel,
+                                             pipeline_state* state, const capacities& limits, void* storage,
+                                             std::size_t bytes, cudaStream_t stream) {
     check(cub::DeviceSelect::If(storage, bytes, thrust::counting_iterator<unsigned long long>(0), first_of_voxel,
-                                &state->list_voxels, limits.fragments, is_first_of_voxel<Key>{keys, state, limits},
-                                stream),
+                                &state->list_voxels, limits.fragments, is_first_of_voxel{keys, state, limits}, stream),
           stage::abuffer_emit);
 }
 

@@ -165,9 +165,11 @@ void raster_cover(const cover_memory& m, const draw_geometry& of_draw, std::uint
     b.num_cells = &m.state->list_fragments;
     check(cudaMemsetAsync(b.num_records, 0, sizeof(*b.num_records), stream), stage::fine_raster);
     const cover_cells<coverage::conservative> op{m.mask, g.extent};
-    count_small_kernel<<<num_blocks(num_triangles), threads_per_block, 0, stream>>>(one, op, b, m.state);
+    small_cells_kernel<<<num_blocks(num_triangles), threads_per_block, 0, stream>>>(one, op, b, m.state, capacities{},
+                                                                                    cell_pass::count);
     check(cudaGetLastError(), stage::fine_raster);
-    count_large_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(one, op, b, m.state);
+    large_cells_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(
+        one, op, b, m.state, capacities{}, cell_pass::count);
     check(cudaGetLastError(), stage::fine_raster);
     note_records_kernel<pipeline_state><<<1, 1, 0, stream>>>(m.state, state);
     check(cudaGetLastError(), stage::fine_raster);
