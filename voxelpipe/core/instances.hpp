@@ -23,24 +23,13 @@ public:
           reciprocal_(divisor_ != 1 ? static_cast<std::uint32_t>((std::uint64_t{1} << 32) / divisor_) : ~0u) {}
 
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::uint32_t of(std::uint32_t n) const {
-        const std::uint32_t rest = n - nearly(n) * divisor_, less = rest - divisor_;
+        // The reciprocal is rounded down by less than 1, so that the quotient is at most 1 too small.
+        const auto quotient = static_cast<std::uint32_t>((std::uint64_t{n} * reciprocal_) >> 32);
+        const std::uint32_t rest = n - quotient * divisor_, less = rest - divisor_;
         return rest < less ? rest : less; // below the divisor, `less` wraps around
-    }
-    // n divided by the divisor, and the remainder.
-    struct parts {
-        std::uint32_t quotient, remainder;
-    };
-    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr parts divide(std::uint32_t n) const {
-        const std::uint32_t quotient = nearly(n), rest = n - quotient * divisor_;
-        const bool is_less = rest >= divisor_;
-        return {quotient + (is_less ? 1 : 0), is_less ? rest - divisor_ : rest};
     }
 
 private:
-    // The reciprocal is rounded down by less than 1, so that the quotient is at most 1 too small.
-    [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr std::uint32_t nearly(std::uint32_t n) const {
-        return static_cast<std::uint32_t>((std::uint64_t{n} * reciprocal_) >> 32);
-    }
     std::uint32_t divisor_ = 1, reciprocal_ = ~0u;
 };
 

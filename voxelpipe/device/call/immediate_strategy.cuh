@@ -78,8 +78,7 @@ private:
         const auto draw_into = [&](const auto& output) {
             const raster_call<Rule, Source, std::remove_cvref_t<decltype(output)>> raster{
                 call.raster_input_of(d, source), output, deferred.with(state)};
-            launch_raster(raster, state, stage::fine_raster, stream, false, false,
-                          call.draws.size() == 1 ? plan.num_primitives : 0);
+            launch_raster(raster, state, stage::fine_raster, stream);
             end_stage(call.clock, &stage_times::fine_raster);
         };
         if constexpr (is_mask_itself<framebuffer_type>) {

@@ -344,17 +344,15 @@ __global__ __launch_bounds__(tuning::raster_threads,
 
 // The first pass alone. is_first: these are a call's first kernels. They read indices before they wait for the stream,
 // so they must not start early: a kernel of the caller may still be writing them. skips_deferred_pass: triangles that
-// the first pass defers all the same are not drawn, and the call fails. triangles_of_call: of all passes over
-// instances, if known.
+// the first pass defers all the same are not drawn, and the call fails.
 template <class Call>
 void launch_first_pass(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first,
-                       bool skips_deferred_pass = false, std::uint32_t triangles_of_call = 0) {
+                       bool skips_deferred_pass = false) {
     static_assert(fragment_sink<typename Call::sink> && fragment_sink<typename Call::deferred_sink>);
     const unsigned triangles = call.in.num_triangles;
     if constexpr (Call::output::defers) {
         bool are_close = false;
-        if constexpr (has_close_cubes<Call>)
-            are_close = may_be_close(std::max(triangles, triangles_of_call), call.in.extent);
+        if constexpr (has_close_cubes<Call>) are_close = may_be_close(triangles, call.in.extent);
         const unsigned blocks = raster_blocks(triangles, first_min_blocks<Call>);
         const auto launch = [&]<bool Close>() {
             launch_kernel(!is_first, first_pass_kernel<Call, Close>, blocks, tuning::raster_threads, 0, stream, where,
@@ -372,8 +370,8 @@ void launch_first_pass(const Call& call, pipeline_state* state, stage where, cud
 // The raster of a draw; arguments as above.
 template <class Call>
 void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
-                   bool skips_deferred_pass = false, std::uint32_t triangles_of_call = 0) {
-    launch_first_pass(call, state, where, stream, is_first, skips_deferred_pass, triangles_of_call);
+                   bool skips_deferred_pass = false) {
+    launch_first_pass(call, state, where, stream, is_first, skips_deferred_pass);
     if (skips_deferred_pass) return;
     const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
     launch_behind(deferred_pass_kernel<Call>, multiprocessors * deferred_min_blocks<Call>, tuning::raster_threads,

@@ -59,7 +59,6 @@ struct shading_source {
 // Reads the positions that vertex_shade stored.
 struct stored_source {
     draw_geometry geometry;
-    core::remainder_by triangles_each = core::remainder_by(geometry.triangles.each);
 
     using loaded = device::int32_position;
     [[nodiscard]] __device__ VOXELPIPE_INLINE loaded load(std::uint32_t vertex) const {
@@ -77,11 +76,8 @@ struct stored_source {
     [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
         return geometry.positions.exact[vertex];
     }
-    // Without a branch, as above.
     [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const {
-        const auto at = triangles_each.divide(i);
-        return core::move_to_instance(geometry.triangles.triangles[at.remainder], geometry.triangles.vertices_each,
-                                      at.quotient * geometry.triangles.vertices_each);
+        return geometry.triangles[i];
     }
 };
 
