@@ -68,6 +68,7 @@ std::set<std::string> all_options() {
             "--compression N",
             "--zarr-codec NAME",
             "--levels",
+            "--pieces N",
             "--merge",
             "--points",
             "--stats [json]",

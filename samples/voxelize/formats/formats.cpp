@@ -41,6 +41,8 @@ constexpr auto all_formats = std::to_array<format>({
     {".schem", "Minecraft schematic (Sponge 2, WorldEdit) of concrete, wool, terracotta", true, false, true, true},
     {".binvox", "binvox occupancy, padded to a cube", true, false, false, true},
     {".vti", "VTK image data for ParaView, all channels as cell data", false, true, false, false},
+    {".pvti", "the same in pieces of some layers each, OUT.1.vti, ...; see --pieces", false, true, false, false, false,
+     false, true},
     {".nrrd", "NRRD for 3D Slicer and teem; OUT.CHANNEL.nrrd for several", false, true, false, false},
     {".zarr", "Zarr 3 group with a compressed array for each channel, in shards of 256^3; see --levels", false, true,
      false, false, false, true},
@@ -50,7 +52,8 @@ constexpr auto all_formats = std::to_array<format>({
     {".xyz", "centres of the voxels as text: x y z and red green blue, 0 to 255", true, false, true, false},
     {".png", "shaded picture of the voxels", true, false, true, false},
     {".html", "a page that shows the voxels in a browser: turn, cut, choose values", true, true, true, false},
-    {".nvdb", "NanoVDB: a grid for each channel, of the occupied voxels alone", true, true, true, false, true},
+    {".nvdb", "NanoVDB: a grid for each channel, of the occupied voxels alone", true, true, true, false, true, false,
+     true},
 #ifdef VOXELIZE_HAS_OPENVDB
     {".vdb", "the same for OpenVDB, colours in linear light", true, true, true, false, true},
 #endif
@@ -62,6 +65,7 @@ constexpr auto all_writers = std::to_array<writer>({
     {nullptr, write_schem},
     {nullptr, write_binvox},
     {write_vti},
+    {write_pvti},
     {write_nrrd},
     {write_zarr},
     {nullptr, write_glb},

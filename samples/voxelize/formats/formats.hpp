@@ -20,12 +20,14 @@
 namespace voxelize {
 
 struct write_options {
-    int compression = 1;     // zlib level of .npz, .vti, .nrrd, .zarr, .schem: 0 stores (.schem: 1), 9 is smallest
-    bool zstd = false;       // .zarr: Zstandard instead of gzip, where has_zstd()
-    bool levels = false;     // .zarr: each channel with its mip levels, an OME-Zarr multiscale group
-    int pieces = 0;          // .pvti, .nvdb: slabs along z, a piece or a grid of each channel each; 0: the format's own
-    up_axis up = up_axis::y; // which world axis stands upright in .vox and .schem; glTF's is y
-    int threads = 0;         // 0 takes all cores. No output depends on it
+    int compression = 1; // zlib level of .npz, .vti, .nrrd, .zarr, .schem: 0 stores (.schem: 1), 9 is smallest
+    bool zstd = false;   // .zarr: Zstandard instead of gzip, where has_zstd()
+    bool levels = false; // .zarr: each channel with its mip levels, an OME-Zarr multiscale group
+    int pieces = 0;      // .pvti, .nvdb: slabs along z, each a piece or a grid of each channel; 0: as these say:
+    std::uint64_t piece_bytes = 1 << 30;         // .pvti: of values in a piece, about
+    std::uint64_t leaves_per_grid = 0xffff'ffff; // .nvdb: most bricks in a grid; the format has no more
+    up_axis up = up_axis::y;                     // which world axis stands upright in .vox and .schem; glTF's is y
+    int threads = 0;                             // 0 takes all cores. No output depends on it
     bool merge_faces = false;             // .ply, .obj, .glb: coplanar faces of equal colour become one rectangle
     bool points = false;                  // .ply holds the voxels' centres, not their outer sides
     std::uint64_t faces_per_file = 0;     // .ply, .obj, .glb: most faces in a file; 0: what the format can number
@@ -43,6 +45,7 @@ struct format {
     bool needs_cubes;             // knows one voxel size for all axes: without are_cubic() the writer refuses
     bool only_sparse = false;     // holds the voxels that are occupied and no others
     bool has_levels = false;      // obeys write_options::levels
+    bool has_pieces = false;      // obeys write_options::pieces
 };
 
 // True if voxels of this size are cubes, but for what fitting a grid loses by rounding.
@@ -65,7 +68,7 @@ std::vector<std::filesystem::path> write(const volume& v, const std::filesystem:
                                          const write_options& options = {});
 
 // The same of occupied voxels and their colours (voxel_shape.hpp), for formats that show those alone: all but .npy,
-// .npz, .vti, .nrrd, .zarr, .png, .html, .nvdb and .vdb.
+// .npz, .vti, .pvti, .nrrd, .zarr, .png, .html, .nvdb and .vdb.
 class voxel_shape;
 std::vector<std::filesystem::path> write(const voxel_shape& v, const std::filesystem::path& path,
                                          const write_options& options);

@@ -74,10 +74,15 @@ void output_file::seek(std::uint64_t at) {
     at_ = at;
 }
 
-void output_file::commit() {
+void output_file::close() {
+    if (file_ == nullptr) return;
     std::FILE* closing = file_;
     file_ = nullptr;
     if (std::fclose(closing) != 0) fail("write", errno);
+}
+
+void output_file::commit() {
+    close();
     if (temporary_.empty()) return;
     std::error_code error;
     fs::rename(temporary_, real_, error);
@@ -87,6 +92,7 @@ void output_file::commit() {
 
 std::vector<fs::path> commit_all(std::span<const std::unique_ptr<output_file>> files) {
     std::vector<fs::path> paths;
+    for (const auto& file : files) file->close();
     for (const auto& file : files) {
         file->commit();
         paths.push_back(file->target());

@@ -50,7 +50,9 @@ public:
     [[nodiscard]] std::uint64_t tell() const { return at_; }
     void seek(std::uint64_t at); // from the start; for headers that are known only at the end
 
-    // Flushes, closes and renames. To be called once, last; without it the target is left as it was.
+    // Flushes and closes: whatever the disk has to say of the bytes is said here.
+    void close();
+    // Closes and renames. To be called once, last; without it the target is left as it was.
     void commit();
 
     [[nodiscard]] const std::filesystem::path& target() const { return target_; }
@@ -65,7 +67,7 @@ private:
     std::uint64_t at_ = 0;
 };
 
-// Commits all files of one call and returns their targets; for formats that hold one channel a file.
+// Commits all files of one call, in this order and once all are closed, and returns their targets.
 std::vector<std::filesystem::path> commit_all(std::span<const std::unique_ptr<output_file>> files);
 
 } // namespace voxelize

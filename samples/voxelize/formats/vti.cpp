@@ -10,6 +10,8 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
+#include <memory>
 
 namespace voxelize {
 namespace {
@@ -23,32 +25,67 @@ std::string_view vtk_type(scalar type) {
     return names[static_cast<std::size_t>(type)];
 }
 
+// Files that are written at a time, and so open.
+constexpr std::int64_t most_pieces = 512;
+
+// A name as the value of an XML attribute.
+std::string attribute(const std::string& name) {
+    std::string text;
+    for (const char c : name) {
+        if (c == '&')
+            text += "&amp;";
+        else if (c == '<')
+            text += "&lt;";
+        else if (c == '"')
+            text += "&quot;";
+        else
+            text += c;
+    }
+    return text;
+}
+
 // Twenty digits hold any 64-bit offset, so the header keeps its length when the true offsets are filled in.
 std::string padded(std::uint64_t value) {
     std::string digits = std::to_string(value);
     return std::string(20 - digits.size(), '0') + digits;
 }
 
-std::string header_of(const volume& v, std::span<const std::uint64_t> offsets, bool compress) {
-    const auto triple = [](const std::array<double, 3>& a) {
-        return number(a[0]) + " " + number(a[1]) + " " + number(a[2]);
-    };
-    std::string whole;
-    for (const std::int64_t n : v.extent) whole += (whole.empty() ? "0 " : " 0 ") + std::to_string(n);
+std::string triple(const std::array<double, 3>& a) { return number(a[0]) + " " + number(a[1]) + " " + number(a[2]); }
+
+// The layers [first, last) of a grid.
+std::string extent_of(const volume& v, std::int64_t first, std::int64_t last) {
+    return "0 " + std::to_string(v.extent[0]) + " 0 " + std::to_string(v.extent[1]) + " " + std::to_string(first) +
+           " " + std::to_string(last);
+}
+
+// The channels' elements in both kinds of file; `placed` has what an element says of its values beside their type.
+std::string cell_data(const volume& v, const std::string& element,
+                      const std::function<std::string(std::size_t)>& placed, const std::string& indent) {
+    std::string text = v.channels.empty() ? "" : " Scalars=\"" + v.channels.front().name + "\"";
+    text += ">\n";
+    for (std::size_t i = 0; i < v.channels.size(); ++i) {
+        const channel& c = v.channels[i];
+        text.append(indent).append("<").append(element).append(" type=\"").append(vtk_type(c.type));
+        text.append("\" Name=\"").append(c.name).append("\" NumberOfComponents=\"");
+        text.append(std::to_string(c.components)).append("\"").append(placed(i)).append("/>\n");
+    }
+    return text;
+}
+
+// `v` holds the layers from `first_layer` on; its origin is that of the whole grid.
+std::string header_of(const volume& v, std::int64_t first_layer, std::span<const std::uint64_t> offsets,
+                      bool compress) {
+    const std::string whole = extent_of(v, first_layer, first_layer + v.extent[2]);
     std::string text = "<?xml version=\"1.0\"?>\n"
                        "<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"";
     if (compress) text += " compressor=\"vtkZLibDataCompressor\"";
     text += ">\n  <ImageData WholeExtent=\"" + whole + "\" Origin=\"" + triple(v.origin) + "\" Spacing=\"" +
             triple(v.voxel_size) + "\" Direction=\"1 0 0 0 1 0 0 0 1\">\n";
-    text += "    <Piece Extent=\"" + whole + "\">\n      <PointData/>\n      <CellData";
-    if (!v.channels.empty()) text += " Scalars=\"" + v.channels.front().name + "\"";
-    text += ">\n";
-    for (std::size_t i = 0; i < v.channels.size(); ++i) {
-        const channel& c = v.channels[i];
-        text += "        <DataArray type=\"" + std::string(vtk_type(c.type)) + "\" Name=\"" + c.name +
-                "\" NumberOfComponents=\"" + std::to_string(c.components) + "\" format=\"appended\" offset=\"" +
-                padded(offsets[i]) + "\"/>\n";
-    }
+    text +=
+        "    <Piece Extent=\"" + whole + "\">\n      <PointData/>\n      <CellData" +
+        cell_data(
+            v, "DataArray", [&](std::size_t i) { return " format=\"appended\" offset=\"" + padded(offsets[i]) + "\""; },
+            "        ");
     text += "      </CellData>\n    </Piece>\n  </ImageData>\n  <AppendedData encoding=\"raw\">\n   _";
     return text;
 }
@@ -90,18 +127,11 @@ void write_compressed(output_file& out, const volume& v, const channel& c, const
     out.seek(end);
 }
 
-} // namespace
-
-std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesystem::path& path,
-                                             const write_options& options) {
-    std::uint64_t total = 0;
-    for (const channel& c : v.channels) total += streamed_bytes(v, c, half_floats::widen);
-    progress_meter meter(options.progress, total);
+void write_image(output_file& out, const volume& v, std::int64_t first_layer, const write_options& options,
+                 progress_meter& meter) {
     const bool compress = options.compression > 0;
-
-    output_file out(path);
     std::vector<std::uint64_t> offsets(v.channels.size(), 0);
-    out.write(header_of(v, offsets, compress));
+    out.write(header_of(v, first_layer, offsets, compress));
     const std::uint64_t data_at = out.tell();
     for (std::size_t i = 0; i < v.channels.size(); ++i) {
         offsets[i] = out.tell() - data_at;
@@ -112,9 +142,75 @@ std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesys
     }
     out.write("\n  </AppendedData>\n</VTKFile>\n");
     out.seek(0);
-    out.write(header_of(v, offsets, compress));
+    out.write(header_of(v, first_layer, offsets, compress));
+}
+
+std::uint64_t bytes_of(const volume& v) {
+    std::uint64_t total = 0;
+    for (const channel& c : v.channels) total += streamed_bytes(v, c, half_floats::widen);
+    return total;
+}
+
+// The layers [first, last) of the grid, whose channels read those of `v`.
+volume layers_of(const volume& v, std::int64_t first, std::int64_t last) {
+    volume part = v;
+    part.extent[2] = last - first;
+    part.channels.clear();
+    for (const channel& c : v.channels) {
+        const scalar type = c.type == scalar::f16 ? scalar::f32 : c.type;
+        const std::uint64_t each =
+            streamed_bytes(v, c, half_floats::widen) / static_cast<std::uint64_t>(v.num_voxels());
+        const auto skipped = static_cast<std::uint64_t>(v.index(0, 0, first));
+        part.channels.push_back({c.name, type, c.components, {}, [&v, &c, each, skipped](std::uint64_t at, auto to) {
+                                     std::vector<std::byte> room;
+                                     const auto from = streamed_piece(v, c, half_floats::widen, (skipped + at) * each,
+                                                                      to.size(), room);
+                                     std::copy(from.begin(), from.end(), to.begin());
+                                 }});
+    }
+    return part;
+}
+
+} // namespace
+
+std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesystem::path& path,
+                                             const write_options& options) {
+    progress_meter meter(options.progress, bytes_of(v));
+    output_file out(path);
+    write_image(out, v, 0, options, meter);
     out.commit();
     return {path};
+}
+
+std::vector<std::filesystem::path> write_pvti(const volume& v, const std::filesystem::path& path,
+                                              const write_options& options) {
+    const std::int64_t layers = v.extent[2];
+    std::int64_t pieces = options.pieces;
+    if (pieces == 0)
+        pieces = static_cast<std::int64_t>((bytes_of(v) - 1) / std::max<std::uint64_t>(options.piece_bytes, 1)) + 1;
+    pieces = std::clamp<std::int64_t>(pieces, 1, std::min<std::int64_t>(layers, most_pieces));
+
+    progress_meter meter(options.progress, bytes_of(v));
+    std::vector<std::unique_ptr<output_file>> files;
+    std::string text =
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"PImageData\" version=\"1.0\" byte_order=\"LittleEndian\" "
+        "header_type=\"UInt64\">\n  <PImageData WholeExtent=\"" +
+        extent_of(v, 0, layers) + "\" GhostLevel=\"0\" Origin=\"" + triple(v.origin) + "\" Spacing=\"" +
+        triple(v.voxel_size) + "\" Direction=\"1 0 0 0 1 0 0 0 1\">\n    <PPointData/>\n    <PCellData" +
+        cell_data(
+            v, "PDataArray", [](std::size_t) { return ""; }, "      ") +
+        "    </PCellData>\n";
+    for (std::int64_t n = 0; n < pieces; ++n) {
+        const std::int64_t first = n * layers / pieces, last = (n + 1) * layers / pieces;
+        const std::filesystem::path name = path.stem().string() + "." + std::to_string(n + 1) + ".vti";
+        files.push_back(std::make_unique<output_file>(path.parent_path() / name));
+        write_image(*files.back(), layers_of(v, first, last), first, options, meter);
+        text +=
+            "    <Piece Extent=\"" + extent_of(v, first, last) + "\" Source=\"" + attribute(name.string()) + "\"/>\n";
+    }
+    files.push_back(std::make_unique<output_file>(path));
+    files.back()->write(text + "  </PImageData>\n</VTKFile>\n");
+    return commit_all(files);
 }
 
 } // namespace voxelize

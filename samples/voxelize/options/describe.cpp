@@ -317,6 +317,13 @@ void describe_output(CLI::App& app, command_line& options) {
     app.add_flag("--levels", options.write.levels,
                  "Write each value of .zarr with its mip levels, as an OME-Zarr multiscale image")
         ->group("Files");
+    app.add_option(
+           "--pieces", options.write.pieces,
+           "Slabs along z that .pvti is cut into, a file each, and .nvdb, a grid of each value each. Default: as "
+           "many as .pvti needs for pieces of 1 GiB, or of a quarter of --max-memory; one in .nvdb")
+        ->check(CLI::Range(1, 512).description(""))
+        ->option_text("N")
+        ->group("Files");
     add_choice(app, "--zarr-codec", options.write.zstd, {{"gzip", false}, {"zstd", true}},
                "How the chunks of .zarr are compressed: gzip, which every reader has, or zstd. Default: gzip")
         ->option_text("NAME")

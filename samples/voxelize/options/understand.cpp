@@ -157,10 +157,16 @@ void understand_outputs(command_line& options, const raw_options& raw) {
         needs_occupancy = needs_occupancy || found->needs_occupancy;
         shows_colors = shows_colors || found->shows_colors;
     }
-    if (options.write.levels && std::none_of(options.outputs.begin(), options.outputs.end(),
-                                             [](const auto& output) { return find_format(output)->has_levels; }))
-        throw usage_error("--levels: " + lower(options.outputs.front().extension().string()) +
-                          " has no levels; .zarr has");
+    const auto require = [&](bool given, const char* option, const char* what, const char* who, bool format::*has) {
+        if (given && std::none_of(options.outputs.begin(), options.outputs.end(),
+                                  [&](const auto& output) { return find_format(output)->*has; }))
+            throw usage_error(std::string(option) + ": " + lower(options.outputs.front().extension().string()) +
+                              " has no " + what + "; " + who);
+    };
+    require(options.write.levels, "--levels", "levels", ".zarr has", &format::has_levels);
+    require(options.write.pieces != 0, "--pieces", "pieces", ".pvti and .nvdb have", &format::has_pieces);
+    if (options.max_memory != 0)
+        options.write.piece_bytes = std::min(options.write.piece_bytes, options.max_memory / 4);
     std::vector<target>& targets = options.voxelize.targets;
     targets.clear();
     for (const std::string& name : raw.targets) {

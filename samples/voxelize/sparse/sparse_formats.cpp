@@ -17,10 +17,13 @@
 #include <voxelpipe/host_sparse.hpp>
 #include <voxelpipe/io/nanovdb.hpp>
 
+#include <algorithm>
 #include <cstring>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <string>
+#include <utility>
 
 namespace voxelize {
 namespace {
@@ -42,38 +45,117 @@ voxelpipe::grid grid_of(const volume& shape) {
     return g;
 }
 
-template <class T>
-void add_grid(nanovdb_file& file, const sparse_volume& v, const channel& c) {
+// Bricks of some layers of a volume, by their numbers in a table of their own.
+struct brick_slab {
+    std::vector<std::uint64_t> keys, offsets{0};
+    std::vector<voxelpipe::brick_mask> masks;
+    std::vector<std::pair<std::uint64_t, std::uint64_t>> runs; // from this rank on, what to add for the volume's
+
+    void add(const sparse_volume& v, std::uint64_t brick) {
+        const std::uint64_t rank = offsets.back(), from = v.offsets[brick];
+        if (runs.empty() || from - rank != runs.back().second) runs.emplace_back(rank, from - rank);
+        keys.push_back(v.keys[brick]);
+        masks.push_back(v.masks[brick]);
+        offsets.push_back(rank + v.offsets[brick + 1] - from);
+    }
+    [[nodiscard]] std::uint64_t rank_in_volume(std::uint64_t rank) const {
+        const auto after = std::upper_bound(runs.begin(), runs.end(), rank,
+                                            [](std::uint64_t r, const auto& run) { return r < run.first; });
+        return rank + std::prev(after)->second;
+    }
+    [[nodiscard]] voxelpipe::brick_table table(const sparse_volume& v) const {
+        voxelpipe::brick_table t = v.table();
+        t.keys = keys.data();
+        t.masks = masks.data();
+        t.offsets = offsets.data();
+        t.count = keys.size();
+        return t;
+    }
+};
+
+// Where slabs end, in layers of bricks: as many slabs as the options say, or as few as hold leaves_per_grid bricks
+// each.
+std::vector<std::uint64_t> slab_ends(const sparse_volume& v, const write_options& options) {
+    const auto layers = static_cast<std::uint64_t>((v.shape.extent[2] + 7) / 8);
+    std::vector<std::uint64_t> ends;
+    if (options.pieces > 0) {
+        const auto slabs = std::min(layers, static_cast<std::uint64_t>(options.pieces));
+        for (std::uint64_t n = 1; n <= slabs; ++n) ends.push_back(n * layers / slabs);
+        return ends;
+    }
+    if (v.keys.size() <= options.leaves_per_grid) return {layers};
+    std::vector<std::uint64_t> bricks(layers);
+    for (const std::uint64_t key : v.keys) ++bricks[static_cast<std::size_t>(voxelpipe::core::morton_position(key).z)];
+    std::uint64_t held = 0;
+    for (std::uint64_t z = 0; z < layers; ++z) {
+        if (held != 0 && held + bricks[z] > options.leaves_per_grid) {
+            ends.push_back(z);
+            held = 0;
+        }
+        held += bricks[z];
+    }
+    ends.push_back(layers);
+    return ends;
+}
+
+std::vector<brick_slab> cut_into_slabs(const sparse_volume& v, const std::vector<std::uint64_t>& ends) {
+    std::vector<brick_slab> slabs(ends.size());
+    for (std::uint64_t b = 0; b < v.keys.size(); ++b) {
+        const auto z = static_cast<std::uint64_t>(voxelpipe::core::morton_position(v.keys[b]).z);
+        slabs[static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), z) - ends.begin())].add(v, b);
+    }
+    return slabs;
+}
+
+// A grid of the bricks of `table`, whose ranks `rank_of` turns into those of the volume.
+template <class T, class RankOf>
+void add_grid(nanovdb_file& file, const sparse_volume& v, const channel& c, const std::string& name,
+              const voxelpipe::brick_table& table, const RankOf& rank_of) {
     T background;
     const std::uint32_t empty = empty_value(c);
     for (std::size_t at = 0; at < sizeof(T); at += sizeof(empty))
         std::memcpy(reinterpret_cast<std::byte*>(&background) + at, &empty, sizeof(empty));
     const std::byte* const data = c.data.data();
-    file.add<T>({c.name, v.table(), grid_of(v.shape), background, [data](std::uint64_t rank) {
+    file.add<T>({name, table, grid_of(v.shape), background, [data, rank_of](std::uint64_t rank) {
                      T value;
-                     std::memcpy(&value, data + rank * sizeof(T), sizeof(T));
+                     std::memcpy(&value, data + rank_of(rank) * sizeof(T), sizeof(T));
                      return value;
                  }});
+}
+
+template <class RankOf>
+void add_channel(nanovdb_file& file, const sparse_volume& v, const channel& c, const std::string& name,
+                 const voxelpipe::brick_table& table, const RankOf& rank_of, const std::filesystem::path& path) {
+    if (c.type == scalar::bit)
+        file.add<nanovdb::mask_value>({name, table, grid_of(v.shape), false, {}});
+    else if (c.type == scalar::u8 && c.components == 4)
+        add_grid<nanovdb::rgba8>(file, v, c, name, table, rank_of);
+    else if (c.type == scalar::u32 && c.components == 1)
+        add_grid<std::uint32_t>(file, v, c, name, table, rank_of);
+    else if (c.type == scalar::i32 && c.components == 1)
+        add_grid<std::int32_t>(file, v, c, name, table, rank_of);
+    else if (c.type == scalar::f32 && c.components == 1)
+        add_grid<float>(file, v, c, name, table, rank_of);
+    else if (c.type == scalar::f32 && c.components == 3)
+        add_grid<glm::vec3>(file, v, c, name, table, rank_of);
+    else
+        throw write_error(path, ".nvdb has no type for the values of channel " + c.name);
 }
 
 std::vector<std::filesystem::path> write_nvdb(const sparse_volume& v, const std::filesystem::path& path,
                                               const write_options& options) {
     nanovdb_file file;
+    const std::vector<std::uint64_t> ends = slab_ends(v, options);
+    std::vector<brick_slab> slabs;
+    if (ends.size() > 1) slabs = cut_into_slabs(v, ends);
     for (const channel& c : v.channels) {
-        if (c.type == scalar::bit)
-            file.add<nanovdb::mask_value>({c.name, v.table(), grid_of(v.shape), false, {}});
-        else if (c.type == scalar::u8 && c.components == 4)
-            add_grid<nanovdb::rgba8>(file, v, c);
-        else if (c.type == scalar::u32 && c.components == 1)
-            add_grid<std::uint32_t>(file, v, c);
-        else if (c.type == scalar::i32 && c.components == 1)
-            add_grid<std::int32_t>(file, v, c);
-        else if (c.type == scalar::f32 && c.components == 1)
-            add_grid<float>(file, v, c);
-        else if (c.type == scalar::f32 && c.components == 3)
-            add_grid<glm::vec3>(file, v, c);
-        else
-            throw write_error(path, ".nvdb has no type for the values of channel " + c.name);
+        if (slabs.empty())
+            add_channel(
+                file, v, c, c.name, v.table(), [](std::uint64_t rank) { return rank; }, path);
+        for (std::size_t n = 0; n < slabs.size(); ++n)
+            add_channel(
+                file, v, c, c.name + "." + std::to_string(n + 1), slabs[n].table(v),
+                [&slab = slabs[n]](std::uint64_t rank) { return slab.rank_in_volume(rank); }, path);
     }
     output_file out(path);
     progress_meter meter(options.progress, file.size());
@@ -194,7 +276,7 @@ std::vector<std::filesystem::path> write_sparse_png(const sparse_volume& v, cons
 
 // Formats whose writers take the channels piece by piece, so that no dense one is ever there.
 bool is_streamed(const std::string& extension) {
-    return extension == ".vti" || extension == ".nrrd" || extension == ".zarr";
+    return extension == ".vti" || extension == ".pvti" || extension == ".nrrd" || extension == ".zarr";
 }
 
 } // namespace

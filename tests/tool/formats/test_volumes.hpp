@@ -6,10 +6,16 @@
 // The value of channel c at voxel (i,j,k), component m is a function of pattern(i,j,k,c,m) alone; read_back.py has the
 // same function, so that a reader in Python is compared with values that no file carried over.
 
+#include "formats/output_file.hpp"
 #include "volume.hpp"
+
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -125,6 +131,29 @@ T read_value(const std::string& bytes, std::size_t at) {
     EXPECT_LE(at + sizeof(T), bytes.size());
     if (at + sizeof(T) <= bytes.size()) std::memcpy(&value, bytes.data() + at, sizeof(T));
     return value;
+}
+
+// Calls f in a process none of whose files may have more bytes: what a disk without room says comes from write() too.
+inline void expect_full_disk(std::uint64_t bytes, const std::function<void()>& f) {
+    const pid_t child = fork();
+    if (child == 0) {
+        std::signal(SIGXFSZ, SIG_IGN);
+        const rlimit bound{bytes, bytes};
+        setrlimit(RLIMIT_FSIZE, &bound);
+        int code = 1;
+        try {
+            f();
+        } catch (const write_error& e) {
+            code = std::string(e.what()).find("File too large") != std::string::npos ? 0 : 2;
+        } catch (...) {
+            code = 3;
+        }
+        _exit(code);
+    }
+    int status = -1;
+    waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 // An empty folder of its own for each test, removed at the end.

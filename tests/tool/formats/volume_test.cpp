@@ -1,10 +1,44 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
+#include "sparse/sparse_formats.hpp"
 #include "test_volumes.hpp"
+
+#include <voxelpipe/io/nanovdb_layout.hpp>
+
+#include <map>
+#include <tuple>
 
 using namespace voxelize;
 using namespace voxelize::testing;
+
+namespace {
+
+class Nvdb : public in_folder {
+protected:
+    // The bytes of each grid of a file behind its head, by name.
+    [[nodiscard]] static std::map<std::string, std::string> grids_of(const std::filesystem::path& path) {
+        namespace nanovdb = voxelpipe::io::nanovdb;
+        const std::string file = read_file(path);
+        const auto header = read_value<nanovdb::file_header>(file, 0);
+        std::size_t at = sizeof(header);
+        std::vector<std::pair<std::string, std::uint64_t>> entries;
+        for (int n = 0; n < header.num_grids; ++n) {
+            const auto entry = read_value<nanovdb::file_entry>(file, at);
+            at += sizeof(entry) + entry.name_size;
+            entries.emplace_back(file.substr(at - entry.name_size, entry.name_size - 1), entry.grid_size);
+        }
+        std::map<std::string, std::string> grids;
+        for (const auto& [name, size] : entries) {
+            grids[name] = file.substr(at + sizeof(nanovdb::grid_data), size - sizeof(nanovdb::grid_data));
+            at += size;
+        }
+        EXPECT_EQ(at, file.size());
+        return grids;
+    }
+};
+
+} // namespace
 
 TEST(Volume, BitsStandWhereTheWordsSay) {
     volume v = make_volume({70, 3, 2});
@@ -54,4 +88,33 @@ TEST(Volume, OccupancyMustBeThere) {
     EXPECT_EQ(v.occupancy(), nullptr);
     EXPECT_THROW((void)v.popcount(), std::logic_error);
     EXPECT_THROW((void)v.occupied(0, 0, 0), std::logic_error);
+}
+
+// A slab's grid is the grid that its layers alone would have, but for the head, which counts the grids of the file.
+TEST_F(Nvdb, ASlabIsTheGridOfItsLayers) {
+    volume v = make_occupancy({40, 30, 44}, 9);
+    for (const auto& [name, type, components] :
+         {std::tuple{"color", scalar::u8, 4}, std::tuple{"count", scalar::u32, 1},
+          std::tuple{"depth", scalar::f32, 1}}) {
+        v.add(name, type, components);
+        fill(v, v.channels.size() - 1);
+    }
+    write_options options;
+    options.pieces = 2; // of 6 layers of bricks
+    write_sparse(make_sparse(v, 1), folder_ / "slabs.nvdb", options);
+    const auto slabs = grids_of(folder_ / "slabs.nvdb");
+    ASSERT_EQ(slabs.size(), 8u);
+    options = {};
+    options.leaves_per_grid = 70; // 5 x 4 bricks a layer
+    write_sparse(make_sparse(v, 1), folder_ / "bounded.nvdb", options);
+    EXPECT_TRUE(slabs == grids_of(folder_ / "bounded.nvdb"));
+    for (int n = 0; n < 2; ++n) {
+        volume layers = v;
+        for (std::int64_t at = 0; at < v.num_voxels(); ++at)
+            if ((at / 1200 < 24) != (n == 0))
+                layers.set_bit(layers.channels[0], at % 40, at / 40 % 30, at / 1200, false);
+        write_sparse(make_sparse(layers, 1), folder_ / "alone.nvdb", {});
+        for (const auto& [name, grid] : grids_of(folder_ / "alone.nvdb"))
+            EXPECT_TRUE(grid == slabs.at(name + "." + std::to_string(n + 1))) << name << n;
+    }
 }

@@ -3,6 +3,7 @@
 
 #include "formats/dense_stream.hpp"
 #include "formats/formats.hpp"
+#include "sparse/sparse_formats.hpp"
 #include "test_volumes.hpp"
 
 #include <zlib.h>
@@ -131,6 +132,34 @@ TEST_F(Vti, BlocksEndWhereTheArrayEnds) {
         const std::string file = read_file(folder_ / "a.vti");
         EXPECT_TRUE(array_bytes(file, file.find("<DataArray")) == stream_of(v, v.channels[0])) << nx;
     }
+}
+
+TEST_F(Vti, APieceHoldsTheLayersOfItsSlab) {
+    const volume v = make_all_types();
+    write_options options;
+    options.pieces = 4;
+    const auto written = write(v, folder_ / "a.pvti", options);
+    EXPECT_EQ(written,
+              (std::vector<std::filesystem::path>{folder_ / "a.1.vti", folder_ / "a.2.vti", folder_ / "a.3.vti",
+                                                  folder_ / "a.4.vti", folder_ / "a.pvti"}));
+    EXPECT_NE(read_file(folder_ / "a.pvti").find("<Piece Extent=\"0 37 0 11 1 3\" Source=\"a.2.vti\"/>"),
+              std::string::npos);
+    EXPECT_NE(read_file(folder_ / "a.2.vti").find("WholeExtent=\"0 37 0 11 1 3\""), std::string::npos);
+    // From bricks, of which a piece has at most so many bytes.
+    const volume colored = make_colored({40, 30, 20});
+    options.pieces = 0;
+    options.piece_bytes = 40 * 30 * 5 * 7;
+    const auto pieces = write_sparse(make_sparse(colored, 1), folder_ / "b.pvti", options);
+    EXPECT_EQ(pieces.size(), 4u); // of three pieces, and of one file that names them
+}
+
+TEST_F(Vti, AFullDiskLeavesNoPiece) {
+    const volume v = make_colored({64, 64, 64});
+    write_options options;
+    options.compression = 0;
+    options.pieces = 3; // 21, 21 and 22 layers of 20,480 bytes
+    expect_full_disk(435'000, [&] { write(v, folder_ / "a.pvti", options); });
+    EXPECT_EQ(names(), std::vector<std::string>{});
 }
 
 TEST_F(Nrrd, HeaderSaysWhereTheVoxelsAre) {

@@ -62,7 +62,7 @@ volume with_targets(std::array<std::int64_t, 3> extent, std::uint32_t density) {
 }
 
 std::vector<sample_case> make_cases() {
-    const std::vector<std::string> any{".npy", ".npz", ".vti", ".nrrd", ".zarr"};
+    const std::vector<std::string> any{".npy", ".npz", ".vti", ".pvti", ".nrrd", ".zarr"};
     const std::vector<std::string> solid{".npy",    ".npz", ".vti", ".nrrd", ".zarr", ".vox", ".schem",
                                          ".binvox", ".glb", ".obj", ".ply",  ".xyz",  ".png", ".html"};
     const std::vector<std::string> meshes{".glb", ".obj", ".ply"};
@@ -93,6 +93,7 @@ std::vector<sample_case> make_cases() {
     sample_case& types = add("types", {13, 7, 5}, 2, false, true, any);
     types.v.voxel_size = {0.1, 0.25, 3};
     types.extensions.push_back(".html");
+    types.options.pieces = 3;
     sample_case& raw = add("raw", {13, 7, 5}, 2, false, true, any);
     raw.options.compression = 0;
     if (has_zstd()) add("zstd", {150, 70, 90}, 5, true, false, {".zarr"}).options.zstd = true;
@@ -106,6 +107,8 @@ std::vector<sample_case> make_cases() {
     grids.v.add("u32x1", scalar::u32);
     grids.v.add("i32x1", scalar::i32);
     for (std::size_t n = 0; n < grids.v.channels.size(); ++n) fill(grids.v, n, grids.density);
+    add("slabs", grids.v.extent, 5, false, false, {".nvdb"}).v = grids.v;
+    cases.back().options.pieces = 3;
     cases.push_back({"levels", with_targets({150, 20, 270}, 7), 7, {".zarr"}, {}});
     cases.back().v.voxel_size = {0.1, 0.25, 3};
     cases.back().options.levels = true;
