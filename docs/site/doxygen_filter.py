@@ -46,6 +46,11 @@ def main():
                 out.append(" " * column + "///< " + escaped(lines[i].strip()[3:]))
             i += 1
             continue
+        if re.match(r"^(class|struct) \w+;$", line):
+            # Declared here, defined in another header, whose group it belongs to.
+            line = ""
+            if out and re.match(r"^template <.*>$", out[-1]):
+                out[-1] = ""
         out.append(line)
         i += 1
     text = "\n".join(out)
