@@ -9,7 +9,7 @@
 
 #include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/device/call/immediate_strategy.cuh>
-#include <voxelpipe/device/optional/program_async.cuh>
+#include <voxelpipe/device/optional/program_arrays.cuh>
 
 #include <array>
 #include <cstddef>
@@ -17,7 +17,9 @@
 #include <cstring>
 #include <optional>
 #include <span>
+#include <tuple>
 #include <type_traits>
+#include <vector>
 
 namespace voxelpipe {
 namespace device {
