@@ -2,23 +2,30 @@
 // SPDX-License-Identifier: Apache-2.0
 // Out of core: a generated mesh that is never there as a whole, voxelized within a budget of memory.
 //
-//   bench_out_of_core [TRIANGLES [RESOLUTION [BUDGET_MIB [FOLDER]]]]
-//   bench_out_of_core 1000000000 16384 4096 /scratch       # 10^9 triangles into 16,384^3
+//   bench_out_of_core [TRIANGLES [RESOLUTION [BUDGET_MIB [FOLDER [SLABS]]]]]
+//   bench_out_of_core 1000000000 16384 16384 /scratch      # 10^9 triangles into 16,384^3
 //
 // The mesh is a relief over a unit square, of two triangles for each of its cells, strip by strip. Voxels go into a
 // sparse framebuffer of one bit, whose bricks are counted and dropped. Prints seconds of making the mesh, of binning
 // and of drawing, bytes that went through the disk, and peak memory. The medium's own rate is measured first: a file of
-// 1 GiB, or of as much as the bins take if that is less, written and read in the same folder.
+// 1 GiB, or of as much as the bins take if that is less, in the same folder, written until the medium has it and read
+// past the cache. The rate reached is the time that the medium alone would take for the bytes, over that of binning and
+// drawing; 80 % is aimed at. The folder needs about 42 bytes a triangle. SLABS is as many as leave a slab of mean size
+// a third of the budget's room, so that few slabs have to be cut again.
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/slabs/stream.hpp>
 
+#include <fcntl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -52,15 +59,43 @@ struct disk_rate {
     double write = 0, read = 0; // bytes a second
 };
 disk_rate measure_disk(const std::string& folder, std::uint64_t bytes) {
-    slabs::scratch_file file(folder);
+    std::string name = folder + "/voxelpipe-XXXXXX";
+    const int file = ::mkstemp(name.data());
+    if (file < 0) throw std::runtime_error("cannot make a temporary file in " + folder);
+    (void)::unlink(name.c_str());
     std::vector<std::byte> block(std::size_t{4} << 20);
     for (std::size_t i = 0; i < block.size(); ++i) block[i] = static_cast<std::byte>(i * 2654435761u >> 13);
+    const auto size = static_cast<ssize_t>(block.size());
+    const std::uint64_t blocks = (bytes + block.size() - 1) / block.size();
+    bool good = true;
     const double start = seconds();
-    for (std::uint64_t at = 0; at < bytes; at += block.size()) file.append(block);
+    for (std::uint64_t n = 0; n < blocks; ++n) good = good && ::write(file, block.data(), block.size()) == size;
+    good = good && ::fdatasync(file) == 0;
     const double written = seconds();
-    for (std::uint64_t at = 0; at < file.size(); at += block.size()) file.read(at, block);
-    return {static_cast<double>(file.size()) / (written - start),
-            static_cast<double>(file.size()) / (seconds() - written)};
+    (void)::posix_fadvise(file, 0, 0, POSIX_FADV_DONTNEED);
+    good = good && ::lseek(file, 0, SEEK_SET) == 0;
+    const double begin = seconds();
+    for (std::uint64_t n = 0; n < blocks; ++n) good = good && ::read(file, block.data(), block.size()) == size;
+    const double read = seconds();
+    (void)::close(file);
+    if (!good) throw std::runtime_error("the disk refuses " + std::to_string(bytes) + " bytes in " + folder);
+    const auto total = static_cast<double>(blocks * block.size());
+    return {total / (written - start), total / (read - begin)};
+}
+
+// Bytes that this process has written and read so far.
+struct traffic {
+    double written = 0, read = 0;
+};
+traffic traffic_so_far() {
+    traffic t;
+    std::ifstream file("/proc/self/io");
+    std::string key;
+    for (double value = 0; file >> key >> value;) {
+        if (key == "wchar:") t.written = value;
+        if (key == "rchar:") t.read = value;
+    }
+    return t;
 }
 
 } // namespace
@@ -73,15 +108,19 @@ int main(int argc, char** argv) {
     options.memory = static_cast<std::uint64_t>(number(3, 64)) << 20;
     options.folder = argc > 4 ? argv[4] : "/tmp";
     options.align = 8;
-    options.num_slabs = 64;
     options.voxel_bytes = 0.02; // of a relief's bricks, a voxel of the grid
-    const double bin_bytes = 2.0 * static_cast<double>(side * side) * sizeof(slabs::record<vp::no_varyings>);
+    const auto triangles_asked = 2.0 * static_cast<double>(side * side);
+    constexpr double slab_triangle = 304; // bytes that a slab's call takes for one
+    const double fitting = 3 * slab_triangle * triangles_asked / (0.75 * static_cast<double>(options.memory));
+    options.num_slabs = static_cast<int>(number(5, std::clamp(fitting, 64.0, 1024.0)));
+    const double bin_bytes = triangles_asked * sizeof(slabs::record<vp::no_varyings>);
     const disk_rate disk =
         measure_disk(options.folder, static_cast<std::uint64_t>(std::min(bin_bytes, double{1 << 30})) + 1);
 
     vp::cpu_backend backend;
     const vp::grid grid = vp::fit(vp::bounding_box{{0, 0, 0}, {1, 1, 1}}, {resolution, resolution, resolution});
     slabs::stream stream(backend, grid, vp::passthrough{}, options);
+    const traffic before = traffic_so_far();
     double making = 0, binning = 0, sinking = 0;
     std::vector<glm::vec3> positions;
     std::vector<glm::uvec3> triangles;
@@ -109,6 +148,9 @@ int main(int argc, char** argv) {
             sinking += seconds() - begin;
         });
     const double drawing = seconds() - start - sinking;
+    const traffic after = traffic_so_far();
+    const double written = after.written - before.written, read = after.read - before.read;
+    const double alone = written / disk.write + read / disk.read;
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
     const double n = static_cast<double>(s.counts.triangles_in);
@@ -117,8 +159,10 @@ int main(int argc, char** argv) {
     std::printf(
         "making   %9.2f s\nbinning  %9.2f s, %.1f ns a triangle\ndrawing  %9.2f s, %.1f ns a triangle, %llu slabs\n",
         making, binning, 1e9 * binning / n, drawing, 1e9 * drawing / n, static_cast<unsigned long long>(parts));
-    std::printf("bins     %9.2f GB, medium %.0f MB/s written, %.0f MB/s read\n", n * 40 / 1e9, disk.write / 1e6,
-                disk.read / 1e6);
+    std::printf("bins     %9.2f GB written, %.2f GB read; medium %.0f MB/s written, %.0f MB/s read\n", written / 1e9,
+                read / 1e9, disk.write / 1e6, disk.read / 1e6);
+    std::printf("rate     %9.2f s for the medium alone, %.0f %% of its rate reached\n", alone,
+                100 * alone / (binning + drawing));
     std::printf("voxels   %llu in %llu bricks\npeak     %.0f MiB\n", static_cast<unsigned long long>(voxels),
                 static_cast<unsigned long long>(bricks), static_cast<double>(usage.ru_maxrss) / 1024);
     return s.ok() && voxels == s.counts.voxels && s.counts.triangles_drawn == s.counts.triangles_in ? 0 : 1;
