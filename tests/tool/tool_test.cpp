@@ -36,6 +36,8 @@ TEST(Tool, WrongCommandLinesAreExplained) {
     expect({}, "INPUT is required");
     expect({model}, "--output is required");
     expect({model, "-o", folder / "o.abc"}, "must be one of .npy");
+    expect({model, "-o", folder / "o.npy", "--levels"}, "--levels: .npy has no levels");
+    expect({model, "-o", folder / "o.vti", "--pieces", "3"}, "--pieces: .vti has no pieces");
     expect({model, "-o", out, "-o", out}, "given twice");
     expect({model, "-o", out, "--target", "colour"}, "is not one of occupancy, count");
     expect({model, "-o", out, "--resolution", "0"}, "at least 1");
