@@ -185,8 +185,10 @@ TEST(ToolSparse, IsChosenWhereItHasToBeAndSaysSo) {
     result = voxelize({"-o", folder / "a.vti", "-r", "400", "-t", "depth", "--max-memory", "150"});
     EXPECT_EQ(0, result.code) << result.err;
     EXPECT_NE(std::string::npos, result.err.find("a dense one would take")) << result.err;
-    // So are shapes of the voxels, which --dense makes too large.
-    for (const char* name : {"a.glb", "a.vox"}) {
+    // So are shapes of the voxels, which --dense makes too large. A sanitizer's own memory would count.
+    const std::vector<const char*> shapes =
+        gltf_test::is_slow_build() ? std::vector<const char*>{} : std::vector{"a.glb", "a.vox"};
+    for (const char* name : shapes) {
         std::vector<std::string> arguments{"-o",         folder / name, "-r",           "400", "-t", "occupancy,color",
                                            "--coverage", "thin",        "--max-memory", "200"};
         result = voxelize(arguments);
