@@ -9,6 +9,7 @@
 #include <voxelpipe/fragment_pool.hpp>
 #include <voxelpipe/sparse.hpp>
 #include <voxelpipe/status.hpp>
+#include <voxelpipe/triangle_counts.hpp>
 
 #include <algorithm>
 #include <cstddef>
@@ -18,15 +19,6 @@
 #include <vector>
 
 namespace voxelpipe::core {
-
-inline void add_counts(counters& to, const counters& more) {
-    to.triangles_nonfinite += more.triangles_nonfinite;
-    to.triangles_too_far += more.triangles_too_far;
-    to.triangles_zero_area += more.triangles_zero_area;
-    to.triangles_outside += more.triangles_outside;
-    to.triangles_drawn += more.triangles_drawn;
-    to.fragments_discarded += more.fragments_discarded;
-}
 
 // ---- where the lists of parts go ------------------------------------------------------------------------------------
 
@@ -168,7 +160,8 @@ private:
             t.s = list_(is_whole ? whole_ : whole_.crop(b.begin, b.size),
                         [&](abuffer<Backend, Payload>&& lists, std::uint32_t first_primitive, const counters& c) {
                             t.fragments += lists.num_fragments();
-                            add_counts(t.counts, c);
+                            add_triangles(t.counts, c);
+                            t.counts.fragments_discarded += c.fragments_discarded;
                             keeps = keeps && t.fragments <= most;
                             if (keeps)
                                 pool.add(std::move(lists), first_primitive, b.begin);

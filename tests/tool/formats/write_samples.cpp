@@ -97,7 +97,7 @@ std::vector<sample_case> make_cases() {
     sample_case& raw = add("raw", {13, 7, 5}, 2, false, true, any);
     raw.options.compression = 0;
     if (has_zstd()) add("zstd", {150, 70, 90}, 5, true, false, {".zarr"}).options.zstd = true;
-    // Of the types that .nvdb has; floats first.
+    // Channels of every type that .nvdb has. Floats come first, since tinyvdb reads the first grid alone.
     sample_case& grids = add("grids", {150, 17, 40}, 5, false, false, {".nvdb"});
     grids.v.channels.clear();
     grids.v.add("f32x1", scalar::f32);

@@ -19,8 +19,8 @@ namespace voxelpipe {
 
 // Capacities of a call with programs: those of a call that draws the triangles that they make, and room for these.
 struct program_limits : workspace_limits {
-    // Of each draw: triangles that its programs make, with those that a tessellation leaves out. All of them are drawn,
-    // those that are not made outside of the grid, so many more than needed take time.
+    // Room of each draw for triangles that its programs make, with those that a tessellation leaves out. The whole room
+    // is drawn, and its unused part lies outside of the grid. A room that is much too large takes time.
     std::uint64_t triangles = 0;
     // Of each draw with a tessellation: points of its patches, (n + 1)(n + 2) / 2 of one with n^2 triangles. Three a
     // triangle are always enough.
