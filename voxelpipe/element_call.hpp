@@ -279,9 +279,7 @@ requires core::is_elements_view<View>
     if constexpr (core::check_shaders<View, VertexShader, FragmentShader>()) {
         using shader_output = core::shader_output<View, VertexShader, FragmentShader>;
         if constexpr (core::output_kind<output_type>::template fits<shader_output>()) {
-            if (const status s = validate(g); !s.ok()) return s;
-            if (const status s = core::output_kind<output_type>::validate(out, g); !s.ok()) return s;
-            if (const status s = core::validate_program_draws(draws); !s.ok()) return s;
+            if (const status s = core::validate_call(draws, g, out); !s.ok()) return s;
             core::known_coverage<Known...>::set(options);
             return backend.guard([&] {
                 return core::known_coverage<Known...>::dispatch(options.rule, [&]<coverage Rule>() {

@@ -500,6 +500,15 @@ template <class Backend, class... Targets>
     return fb.view();
 }
 
+// What every call with programs, points or lines checks first.
+template <class Mesh, class VertexShader, class FragmentShader, class Amplify, class Output>
+[[nodiscard]] status validate_call(std::span<const draw<Mesh, VertexShader, FragmentShader, Amplify>> draws,
+                                   const grid& g, const Output& out) {
+    if (const status s = validate(g); !s.ok()) return s;
+    if (const status s = output_kind<Output>::validate(out, g); !s.ok()) return s;
+    return validate_program_draws(draws);
+}
+
 // The shader of lists for an output: the lists' payload is a shader's one output, or all of them.
 template <class Output>
 struct listing {
@@ -627,9 +636,7 @@ requires core::is_amplifier<Amplify>
     if constexpr (core::check_program<Mesh, VertexShader, FragmentShader, Amplify>()) {
         using shader_output = core::program_output<Mesh, VertexShader, FragmentShader, Amplify>;
         if constexpr (core::output_kind<output_type>::template fits<shader_output>()) {
-            if (const status s = validate(g); !s.ok()) return s;
-            if (const status s = core::output_kind<output_type>::validate(out, g); !s.ok()) return s;
-            if (const status s = core::validate_program_draws(draws); !s.ok()) return s;
+            if (const status s = core::validate_call(draws, g, out); !s.ok()) return s;
             core::known_coverage<Known...>::set(options);
             return backend.guard([&] { return core::run_program<Known...>(backend, draws, g, out, options); });
         }

@@ -4,59 +4,17 @@
 // Instances, tessellation and geometry programs, points and lines on the device: the bytes of cpu_backend, for every
 // strategy, in lists and in solids, for any chunk capacity. Levels of dense grids and rays through bits too.
 
-#include "../programs/amplify_cases.hpp"
-#include "../programs/elements_cases.hpp"
 #include "../programs/field_cases.hpp"
 #include "../programs/levels_cases.hpp"
-#include "async_lists.hpp"
+#include "programs_support.hpp"
 
 #include <gtest/gtest.h>
 
-namespace programs_types { // named: nvcc warns of members of unnamed ones that the host does not use
-
-namespace vp = voxelpipe;
-
-// Copy i at place i, with or without a varying.
-struct placed {
-    VOXELPIPE_HD glm::vec3 operator()(const vp::vertex<>& v) const {
-        const auto s = static_cast<float>(v.instance);
-        return {vp::exact::fma(7.25f, s, v.position.x), vp::exact::fma(5.5f, s, v.position.y),
-                vp::exact::fma(-3.0f, s, v.position.z)};
-    }
-};
-struct spot {
-    float along;
-};
-struct placed_spot {
-    VOXELPIPE_HD auto operator()(const vp::vertex<>& v) const {
-        return vp::vertex_output{placed{}(v), spot{vp::exact::mul(static_cast<float>(v.instance), v.position.x)}};
-    }
-};
-struct shader {
-    VOXELPIPE_HD auto operator()(const vp::fragment<spot>& f) const {
-        return vp::outputs(glm::uvec4(f.instance, f.triangle, f.primitive, 1), f.varyings.along)
-            .discard_if(f.primitive % 5 == 0);
-    }
-};
-
-} // namespace programs_types
-
-namespace programs_tests { // named for the same reason
+namespace programs_tests { // named: nvcc warns of members of unnamed ones that the host does not use
 
 namespace blend = voxelpipe::blend;
 using namespace device_test;
-using namespace programs_types;
-
-using bits = vp::target<vp::bit, blend::bit_or>;
-using ids = vp::target<glm::uvec4, blend::replace>;
-using sums = vp::target<float, blend::add>;
-
-const glm::ivec3 extent{45, 39, 50};
-
-template <class T>
-vp::array_view<const T> array_of(const std::vector<T>& v) {
-    return {v.data(), v.size()};
-}
+using namespace programs_support;
 
 // The same call on both backends, with `copies` instances of a mesh; compares targets and counts.
 template <vp::coverage Rule, class... Targets, class VertexShader, class FragmentShader>
@@ -159,8 +117,6 @@ TEST(DevicePrograms, GeometryOfATessellationIsTheCpus) {
     expect_same_programs(3, 20, vp::tessellate{programs::waves{4.1f, 1.0f}} | vp::geometry{programs::prism{0.8f}});
 }
 
-constexpr vp::coverage async_rule = vp::coverage::thin;
-
 // Memory that runs out.
 struct limited_resource {
     std::uint64_t limit, used = 0, peak = 0;
@@ -206,198 +162,6 @@ TEST(DevicePrograms, DrawInPartsIfMemoryRunsOut) {
     expect_same_bytes(expected.second, found.second, "sums");
 }
 
-// ---- calls that do not wait -----------------------------------------------------------------------------------------
-
-// Two meshes through the same programs.
-template <class Backend, class FragmentShader, class Amplify>
-struct two_draws {
-    using draw_type = vp::draw<vp::mesh_view<>, programs::add_surface, FragmentShader, Amplify>;
-    vp::mesh<Backend> a, b;
-    draw_type draws[2];
-
-    two_draws(Backend& backend, const Amplify& amplify)
-        : two_draws(backend, amplify, unit::make_mesh(1, 20, extent), unit::make_mesh(2, 30, extent)) {}
-    two_draws(Backend& backend, const Amplify& amplify, const unit::small_mesh& m, const unit::small_mesh& n)
-        : a(backend, m.positions, m.triangles),
-          b(backend, n.positions, n.triangles), draws{{a, {}, amplify, {}}, {b, {}, amplify, {}}} {}
-    [[nodiscard]] std::span<const draw_type> span() const { return draws; }
-};
-// Runs call(workspace) with limits that do not suffice, then with those that read_status asks for.
-template <class Workspace, class Limits, class Bytes, class Call>
-vp::status run_until_it_fits(vp::cuda_backend& gpu, Limits limits, const Bytes& bytes, const Call& call) {
-    vp::status s;
-    for (int tries = 0; tries < 6; ++tries) {
-        const std::size_t n = bytes(limits);
-        EXPECT_GT(n, 0u);
-        const guarded_memory memory(gpu, n);
-        const Workspace workspace{const_cast<unsigned char*>(memory.memory.data()), n, limits};
-        s = call(workspace);
-        EXPECT_TRUE(s.ok()) << s.message();
-        s = vp::read_status(gpu, workspace, &limits);
-        memory.expect_untouched_behind(gpu);
-        EXPECT_TRUE(s.ok() ? tries > 0 : s.code == vp::status_code::capacity_exceeded) << s.message();
-        if (s.ok()) break;
-    }
-    return s;
-}
-
-template <class Amplify>
-void expect_same_async_programs(const Amplify& amplify) {
-    const vp::grid g = box_grid(extent).crop({3, 1, 5}, {40, 36, 41});
-    const vp::program_options options{async_rule};
-    const vp::program_limits too_few = [] {
-        vp::program_limits l;
-        static_cast<vp::workspace_limits&>(l) = {1 << 16, 1 << 13, 1 << 16, 1 << 13};
-        l.triangles = 3;
-        return l;
-    }();
-    vp::cpu_backend cpu;
-    vp::cuda_backend gpu;
-    {
-        const two_draws<vp::cpu_backend, programs::shader, Amplify> here(cpu, amplify);
-        const two_draws<vp::cuda_backend, programs::shader, Amplify> there(gpu, amplify);
-        programs::framebuffer_of<vp::cpu_backend> expected{cpu, g.extent};
-        programs::framebuffer_of<vp::cuda_backend> fb{gpu, g.extent};
-        const vp::status s = vp::voxelize<async_rule>(cpu, here.span(), g, expected, options);
-        ASSERT_TRUE(s.ok()) << s.message();
-        ASSERT_TRUE(vp::clear(gpu, fb).ok());
-        const std::vector<glm::uvec4> cleared = vp::get<0>(fb).to_host(gpu);
-        const vp::status t = run_until_it_fits<vp::program_workspace_view>(
-            gpu, too_few,
-            [&](const auto& l) { return vp::program_workspace_bytes(there.span(), g, fb.view(), options, l); },
-            [&](const auto& w) {
-                EXPECT_TRUE(unit::same_bytes(vp::get<0>(fb).to_host(gpu), cleared)); // a call that fails writes nothing
-                return vp::voxelize_async<async_rule>(gpu, there.span(), g, fb.view(), options, w);
-            });
-        expect_same_counts(s.counts, t.counts);
-        expect_same_bytes(vp::get<0>(expected).to_host(cpu), vp::get<0>(fb).to_host(gpu), "ids");
-        expect_same_bytes(vp::get<1>(expected).to_host(cpu), vp::get<1>(fb).to_host(gpu), "sums");
-        expect_same_bytes(vp::get<2>(expected).to_host(cpu), vp::get<2>(fb).to_host(gpu), "bits");
-    }
-    const two_draws<vp::cpu_backend, programs::ids_shader, Amplify> here(cpu, amplify);
-    const two_draws<vp::cuda_backend, programs::ids_shader, Amplify> there(gpu, amplify);
-    vp::abuffer<vp::cpu_backend, glm::uvec4> expected(cpu);
-    ASSERT_TRUE(vp::voxelize<async_rule>(cpu, here.span(), g, expected, options).ok());
-    vp::abuffer_view<glm::uvec4> lists;
-    vp::host_abuffer<glm::uvec4> found;
-    (void)run_until_it_fits<vp::program_workspace_view>(
-        gpu, too_few, [&](const auto& l) { return vp::program_workspace_bytes(there.span(), g, lists, options, l); },
-        [&](const auto& w) {
-            const vp::status s = vp::voxelize_async<async_rule>(gpu, there.span(), g, lists, options, w);
-            found = lists.to_host(gpu);
-            return s;
-        });
-    expect_same_on_host(expected.to_host(cpu), found);
-}
-TEST(DevicePrograms, TessellationWithoutWaitsIsTheCpus) {
-    expect_same_async_programs(vp::tessellate{programs::waves{2.3f, 1.5f}});
-}
-TEST(DevicePrograms, GeometryWithoutWaitsIsTheCpus) { expect_same_async_programs(vp::geometry{programs::prism{0.8f}}); }
-TEST(DevicePrograms, BothWithoutWaitsAreTheCpus) {
-    expect_same_async_programs(vp::tessellate{programs::waves{4.1f, 1.0f}} | vp::geometry{programs::prism{0.8f}});
-}
-// In a CUDA graph, for two poses of a mesh.
-TEST(DevicePrograms, AreReplayedWithChangedVertices) {
-    const vp::tessellate<programs::waves> amplify{{4.1f, 1.0f}};
-    const vp::grid g = box_grid(extent);
-    const unit::small_mesh poses[] = {unit::make_mesh(5, 20, extent), unit::make_mesh(6, 20, extent)};
-    using draw_type =
-        vp::draw<vp::mesh_view<>, programs::add_surface, programs::shader, vp::tessellate<programs::waves>>;
-    stream_owner owner;
-    vp::cuda_backend gpu{owner.stream};
-    vp::cuda_backend::buffer<glm::vec3> positions(gpu, array_of(poses[0].positions));
-    const vp::cuda_backend::buffer<glm::uvec3> triangles(gpu, array_of(poses[0].triangles));
-    programs::framebuffer_of<vp::cuda_backend> fb{gpu, g.extent};
-    const draw_type d{{positions.view(), triangles.view()}, {}, amplify, {}};
-    const std::span<const draw_type> draws(&d, 1);
-    vp::program_limits limits = vp::program_limits::for_triangles(1 << 14);
-    limits.fragments = 1 << 18;
-    const std::size_t bytes = vp::program_workspace_bytes(draws, g, fb.view(), {async_rule}, limits);
-    ASSERT_GT(bytes, 0u);
-    vp::cuda_backend::buffer<unsigned char> memory(gpu, bytes);
-    const vp::program_workspace_view workspace{memory.data(), bytes, limits};
-    const captured_graph graph(owner.stream, [&] {
-        return vp::voxelize_async<async_rule>(gpu, draws, g, fb.view(), {async_rule}, workspace);
-    });
-    vp::cpu_backend cpu;
-    for (const int pose : {0, 1, 0}) {
-        const std::vector<glm::vec3>& p = poses[pose].positions;
-        ASSERT_EQ(cudaMemcpyAsync(positions.data(), p.data(), p.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice,
-                                  owner.stream),
-                  cudaSuccess);
-        graph.launch(owner.stream);
-        programs::framebuffer_of<vp::cpu_backend> expected{cpu, g.extent};
-        const draw_type same{{p, poses[0].triangles}, {}, amplify, {}};
-        const vp::status s = vp::voxelize<async_rule>(cpu, std::span<const draw_type>(&same, 1), g, expected);
-        const vp::status t = vp::read_status(gpu, workspace);
-        ASSERT_TRUE(s.ok() && t.ok()) << s.message() << t.message();
-        expect_same_counts(s.counts, t.counts);
-        expect_same_bytes(vp::get<0>(expected).to_host(cpu), vp::get<0>(fb).to_host(gpu), "ids");
-        expect_same_bytes(vp::get<1>(expected).to_host(cpu), vp::get<1>(fb).to_host(gpu), "sums");
-    }
-}
-TEST(DevicePrograms, WithoutWaitsReportWhatIsWrong) {
-    const auto amplify = vp::tessellate{programs::waves{2.3f, 1.5f}};
-    const vp::grid g = box_grid(extent);
-    vp::cuda_backend gpu;
-    unit::small_mesh m = unit::make_mesh(1, 20, extent);
-    m.triangles[3].y = 1'000'000;
-    const two_draws<vp::cuda_backend, programs::shader, vp::tessellate<programs::waves>> there(gpu, amplify, m, m);
-    programs::framebuffer_of<vp::cuda_backend> fb{gpu, g.extent};
-    const vp::program_limits limits = vp::program_limits::for_triangles(1 << 14);
-    const std::size_t bytes = vp::program_workspace_bytes(there.span(), g, fb.view(), {async_rule}, limits);
-    const guarded_memory memory(gpu, bytes);
-    const vp::program_workspace_view workspace{const_cast<unsigned char*>(memory.memory.data()), bytes, limits};
-    ASSERT_TRUE(vp::voxelize_async<async_rule>(gpu, there.span(), g, fb.view(), {async_rule}, workspace).ok());
-    EXPECT_EQ(vp::read_status(gpu, workspace).code, vp::status_code::index_out_of_range);
-    vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>> constants{gpu, g.extent};
-    const vp::status s =
-        vp::voxelize<async_rule>(gpu, there.a, g, programs::add_surface{}, amplify, vp::constant(true), constants);
-    EXPECT_EQ(s.code, vp::status_code::index_out_of_range);
-    EXPECT_EQ(s.triangle, 3u);
-    EXPECT_EQ(vp::voxelize_async<async_rule>(gpu, there.span(), g, fb.view(), {async_rule}, {nullptr, 0, limits}).code,
-              vp::status_code::capacity_exceeded);
-}
-
-template <class View>
-void expect_same_async_elements(const View& here, const View& there) {
-    const vp::grid g = box_grid(extent).crop({3, 1, 5}, {40, 36, 41});
-    vp::cpu_backend cpu;
-    vp::cuda_backend gpu;
-    const vp::voxelize_options options{vp::coverage::conservative};
-    const vp::workspace_limits too_few{0, 0, 100, 0};
-    {
-        using draw_type = vp::draw<View, elements::place, elements::shader>;
-        const draw_type on_cpu[] = {{here, {}, {}}, {here, {}, {}}}, on_gpu[] = {{there, {}, {}}, {there, {}, {}}};
-        const std::span<const draw_type> draws(on_gpu);
-        vp::framebuffer<vp::cpu_backend, elements::ids, elements::sums, elements::bits> expected{cpu, g.extent};
-        vp::framebuffer<vp::cuda_backend, elements::ids, elements::sums, elements::bits> fb{gpu, g.extent};
-        const vp::status s = vp::voxelize(cpu, std::span<const draw_type>(on_cpu), g, expected, options);
-        ASSERT_TRUE(s.ok()) << s.message();
-        const vp::status t = run_until_it_fits<vp::workspace_view>(
-            gpu, too_few, [&](const auto& l) { return vp::workspace_bytes(draws, g, fb.view(), options, l); },
-            [&](const auto& w) { return vp::voxelize_async(gpu, draws, g, fb.view(), options, w); });
-        expect_same_counts(s.counts, t.counts);
-        expect_same_bytes(vp::get<0>(expected).to_host(cpu), vp::get<0>(fb).to_host(gpu), "ids");
-        expect_same_bytes(vp::get<1>(expected).to_host(cpu), vp::get<1>(fb).to_host(gpu), "sums");
-        expect_same_bytes(vp::get<2>(expected).to_host(cpu), vp::get<2>(fb).to_host(gpu), "bits");
-    }
-    using draw_type = vp::draw<View, elements::place, elements::payload_shader>;
-    const draw_type on_cpu[] = {{here, {}, {}}}, on_gpu[] = {{there, {}, {}}};
-    const std::span<const draw_type> draws(on_gpu);
-    vp::abuffer<vp::cpu_backend, elements::payload> expected(cpu);
-    ASSERT_TRUE(vp::voxelize(cpu, std::span<const draw_type>(on_cpu), g, expected, options).ok());
-    vp::abuffer_view<elements::payload> lists;
-    vp::host_abuffer<elements::payload> found;
-    (void)run_until_it_fits<vp::workspace_view>(
-        gpu, too_few, [&](const auto& l) { return vp::workspace_bytes(draws, g, lists, options, l); },
-        [&](const auto& w) {
-            const vp::status s = vp::voxelize_async(gpu, draws, g, lists, options, w);
-            found = lists.to_host(gpu);
-            return s;
-        });
-    expect_same_on_host(expected.to_host(cpu), found);
-}
 // Drawn without lists: several draws, cleared and loaded targets that are blended or counted in place.
 template <vp::coverage Rule, class... Targets, class View, class FragmentShader>
 void expect_same_constants(const View& here, const View& there, const FragmentShader& fs) {
@@ -451,15 +215,6 @@ TEST(DeviceElements, OfConstantsAreTheCpus) {
     const vp::status s =
         vp::voxelize<coverage::thin>(gpu, bad_lines, box_grid(extent), elements::place{}, vp::constant(1u), fb);
     EXPECT_EQ(s.code, vp::status_code::index_out_of_range);
-}
-
-TEST(DeviceElements, WithoutWaitsAreTheCpus) {
-    const std::vector<glm::vec3> vertices = elements::make_vertices(4, 120, extent);
-    vp::cuda_backend gpu;
-    const vp::cuda_backend::buffer<glm::vec3> there(gpu, array_of(vertices));
-    expect_same_async_elements(vp::lines_view<>{.positions = vertices, .copies = {2}},
-                               vp::lines_view<>{.positions = there.view(), .copies = {2}});
-    expect_same_async_elements(vp::points_view<>{.positions = vertices}, vp::points_view<>{.positions = there.view()});
 }
 
 TEST(DeviceElements, AreTheCpus) {

@@ -148,13 +148,11 @@ template <class Mesh, class VertexShader, class FragmentShader, class Payload>
     const status s = core::validate_draws(draws);
     if (!s.ok() || !validate(g).ok() || limits.fragments > core::max_numbered) return 0;
     if (s.counts.triangles_in == 0) return sizeof(device::empty_lists);
-    try {
+    return device::bytes_or_none([&]() -> std::size_t {
         const auto call = device::make_list_call<draw<Mesh, VertexShader, FragmentShader>, Payload>(
             draws, g, options.rule, s.counts.triangles_in, limits);
         return device::list_bytes(call, options.rule, lists);
-    } catch (const device::cuda_failure&) {
-        return 0;
-    }
+    });
 }
 
 // Puts the call on the backend's stream, sets `lists` to where its results will be, and returns. A status other than ok
@@ -171,7 +169,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (workspace.limits.fragments > core::max_numbered) return core::failure(status_code::size_overflow);
-        try {
+        return device::with_cuda_status([&]() -> status {
             if (s.counts.triangles_in == 0) {
                 if (workspace.memory == nullptr || workspace.bytes < sizeof(device::empty_lists)) {
                     s.code = status_code::capacity_exceeded;
@@ -197,10 +195,8 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                 device::list_async<core::known_coverage<Known...>, true>(call, options.rule, workspace, memory, lists,
                                                                          backend.stream);
             });
-        } catch (const device::cuda_failure& e) {
-            return device::to_status(e);
-        }
-        return s;
+            return s;
+        });
     } else {
         return {};
     }

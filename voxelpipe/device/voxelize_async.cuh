@@ -91,6 +91,16 @@ inline void take_stop(const workspace_view& workspace, pipeline_state* state, cu
                               stream));
 }
 
+// Waits for the stream and copies what a workspace begins with.
+template <class State>
+[[nodiscard]] status read_start(const void* memory, State& to, cudaStream_t stream) {
+    return with_cuda_status([&] {
+        check(cudaMemcpyAsync(&to, memory, sizeof(to), cudaMemcpyDeviceToHost, stream));
+        check(cudaStreamSynchronize(stream));
+        return status{};
+    });
+}
+
 // A call without triangles.
 template <class... Targets>
 [[nodiscard]] status clear_async(cuda_backend& backend, const framebuffer_view<Targets...>& fb,
@@ -119,12 +129,10 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
     const status s = core::validate_draws(draws);
     if (!s.ok() || !validate(g).ok() || !device::are_numbered(limits)) return 0;
     if (s.counts.triangles_in == 0) return sizeof(device::pipeline_state);
-    try {
+    return device::bytes_or_none([&]() -> std::size_t {
         return device::with_call(draws, g, fb, options, s.counts.triangles_in, limits,
                                  [](const auto& call, bool is_served) { return is_served ? call.plan_memory() : 0; });
-    } catch (const device::cuda_failure&) {
-        return 0;
-    }
+    });
 }
 
 // Puts the call on the backend's stream and returns. A status other than ok means that nothing was launched, or that a
@@ -141,7 +149,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (!device::are_numbered(workspace.limits)) return core::failure(status_code::size_overflow);
-        try {
+        return device::with_cuda_status([&]() -> status {
             if (s.counts.triangles_in == 0) return device::clear_async(backend, fb, workspace);
             const auto launch = [&](const auto& call, bool is_served) {
                 if (!is_served) {
@@ -171,10 +179,8 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                 });
             };
             device::with_call(draws, g, fb, options, s.counts.triangles_in, workspace.limits, launch);
-        } catch (const device::cuda_failure& e) {
-            return device::to_status(e);
-        }
-        return s;
+            return s;
+        });
     } else {
         return {};
     }
@@ -187,12 +193,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
 [[nodiscard]] inline status read_status(cuda_backend& backend, const workspace_view& workspace,
                                         workspace_limits* need = nullptr) {
     device::pipeline_state state{};
-    try {
-        device::check(cudaMemcpyAsync(&state, workspace.memory, sizeof(state), cudaMemcpyDeviceToHost, backend.stream));
-        device::check(cudaStreamSynchronize(backend.stream));
-    } catch (const device::cuda_failure& e) {
-        return device::to_status(e);
-    }
+    if (const status s = device::read_start(workspace.memory, state, backend.stream); !s.ok()) return s;
     if ((state.index_error & device::bad_numbers) != 0) return core::failure(status_code::bad_subset);
     if (state.index_error != 0) return core::failure(status_code::index_out_of_range, stage::coarse_raster);
     const device::capacities limits = device::to_capacities(workspace.limits);

@@ -51,6 +51,24 @@ inline void check(cudaError_t error, stage where = stage::validate) {
     }
     return s;
 }
+// The status of work(), which returns one; a CUDA error in it becomes one.
+template <class Work>
+[[nodiscard]] status with_cuda_status(const Work& work) {
+    try {
+        return work();
+    } catch (const cuda_failure& e) {
+        return to_status(e);
+    }
+}
+// The bytes that work() returns; 0 if it meets a CUDA error.
+template <class Work>
+[[nodiscard]] std::size_t bytes_or_none(const Work& work) {
+    try {
+        return work();
+    } catch (const cuda_failure&) {
+        return 0;
+    }
+}
 
 } // namespace device
 

@@ -2,10 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The outputs of asynchronous calls of programs, points and lines: framebuffer_view and abuffer_view.
+// The outputs of asynchronous calls of programs, points and lines: framebuffer_view, abuffer_view and sparse_result.
 
 #include <voxelpipe/device/abuffer_async.cuh>
+#include <voxelpipe/device/optional/sparse_async.cuh>
 #include <voxelpipe/program_call.hpp>
+
+#include <algorithm>
 
 namespace voxelpipe {
 
@@ -19,7 +22,11 @@ template <class Payload>
 [[nodiscard]] abuffer_view<Payload>& async_output(abuffer_view<Payload>& out) {
     return out;
 }
-// True for those that a call sets.
+template <class... Targets>
+[[nodiscard]] sparse_result<Targets...>& async_output(sparse_result<Targets...>& out) {
+    return out;
+}
+// True for fragment lists.
 template <class Output>
 inline constexpr bool is_lists = false;
 template <class Payload>
@@ -37,6 +44,19 @@ struct output_kind<abuffer_view<Payload>> {
         return output_check<ShaderOutput>::template fits_payload<Payload>();
     }
     [[nodiscard]] static status validate(const abuffer_view<Payload>&, const grid&) { return {}; }
+};
+template <class... Targets>
+struct output_kind<sparse_result<Targets...>> {
+    static constexpr bool is_known = true;
+    template <class ShaderOutput>
+    [[nodiscard]] static constexpr bool fits() {
+        return output_check<ShaderOutput>::template fits_targets<Targets...>();
+    }
+    [[nodiscard]] static status validate(const sparse_result<Targets...>&, const grid& g) {
+        const glm::ivec3 whole = g.whole_extent();
+        return std::max({whole.x, whole.y, whole.z}) <= device::max_index_extent ? status{}
+                                                                                 : failure(status_code::size_overflow);
+    }
 };
 
 } // namespace core

@@ -94,26 +94,25 @@ private:
 } // namespace device
 
 // Bytes that voxelize_async needs for such a call on the current device; 0 if the arguments are invalid. out: a
-// framebuffer_view or an abuffer_view.
+// framebuffer_view, an abuffer_view or a sparse_result.
 template <class Mesh, class VertexShader, class FragmentShader, class Amplify, class Output>
 requires core::is_amplifier<Amplify>
 [[nodiscard]] std::size_t
 program_workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader, Amplify>> draws, const grid& g,
                         const Output& out, const voxelize_options& options, const program_limits& limits) {
     if (!core::validate_program_draws(draws).ok() || !device::are_numbered(limits, draws.size())) return 0;
-    try {
+    return device::bytes_or_none([&] {
         device::arena plan = device::planning_arena();
         const device::async_programs<draw<Mesh, VertexShader, FragmentShader, Amplify>> programs(plan, draws, limits);
         const std::size_t bytes = workspace_bytes(programs.emitted(), g, out, options, limits);
         return bytes == 0 ? 0 : plan.used() + bytes;
-    } catch (const device::cuda_failure&) {
-        return 0;
-    }
+    });
 }
 
-// Puts a call with programs on the backend's stream and returns. out: a framebuffer_view, or an abuffer_view, which is
-// set to where its lists will be. Results are those of voxelize. A status other than ok means that nothing was
-// launched, or that a launch failed; read_status reports what the device finds out.
+// Puts a call with programs on the backend's stream and returns. out: a framebuffer_view, or an abuffer_view or a
+// sparse_result, which are set to where lists, or bricks and values, will be. Results are those of voxelize. A status
+// other than ok means that nothing was launched, or that a launch failed; read_status reports what the device finds
+// out.
 template <coverage... Known, class Mesh, class VertexShader, class FragmentShader, class Amplify, class Output>
 requires core::is_amplifier<Amplify>
 [[nodiscard]] status voxelize_async(cuda_backend& backend,
@@ -125,13 +124,17 @@ requires core::is_amplifier<Amplify>
     if constexpr (core::check_program<Mesh, VertexShader, FragmentShader, Amplify>()) {
         using shader_output = core::program_output<Mesh, VertexShader, FragmentShader, Amplify>;
         if constexpr (core::output_kind<output_type>::template fits<shader_output>()) {
-            if (const status s = validate(g); !s.ok()) return s;
-            if (const status s = core::output_kind<output_type>::validate(out, g); !s.ok()) return s;
-            if (const status s = core::validate_program_draws(draws); !s.ok()) return s;
+            if (const status s = core::validate_call(draws, g, out); !s.ok()) return s;
             if (!device::are_numbered(workspace.limits, draws.size())) return core::failure(status_code::size_overflow);
             using programs_type = device::async_programs<draw<Mesh, VertexShader, FragmentShader, Amplify>>;
-            try {
+            return device::with_cuda_status([&] {
                 const std::size_t need = program_workspace_bytes(draws, g, out, options, workspace.limits);
+                if (need == 0) { // refused by the call that draws, which says why
+                    device::arena plan = device::planning_arena();
+                    const programs_type planned(plan, draws, workspace.limits);
+                    return voxelize_async<Known...>(backend, planned.emitted(), g, out, options,
+                                                    workspace_view{nullptr, 0, workspace.limits});
+                }
                 if (workspace.memory == nullptr || workspace.bytes < need) {
                     status s = core::failure(status_code::capacity_exceeded);
                     s.required.bytes = need;
@@ -152,9 +155,7 @@ requires core::is_amplifier<Amplify>
                                                                      const_cast<std::uint32_t*>(out.primitives)},
                                          backend.stream);
                 return s;
-            } catch (const device::cuda_failure& e) {
-                return device::to_status(e);
-            }
+            });
         }
     }
     return {}; // does not compile: a static_assert has said why
@@ -166,12 +167,7 @@ requires core::is_amplifier<Amplify>
 [[nodiscard]] inline status read_status(cuda_backend& backend, const program_workspace_view& workspace,
                                         program_limits* need = nullptr) {
     device::program_state state{};
-    try {
-        device::check(cudaMemcpyAsync(&state, workspace.memory, sizeof(state), cudaMemcpyDeviceToHost, backend.stream));
-        device::check(cudaStreamSynchronize(backend.stream));
-    } catch (const device::cuda_failure& e) {
-        return device::to_status(e);
-    }
+    if (const status s = device::read_start(workspace.memory, state, backend.stream); !s.ok()) return s;
     const std::vector<std::uint64_t> counts(std::begin(state.counts), std::end(state.counts));
     if (const status s = core::check_counts(counts, state.triangles); !s.ok()) return s;
     if (state.stop != 0) {

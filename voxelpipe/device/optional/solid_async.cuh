@@ -35,12 +35,10 @@ template <class Mesh, class VertexShader, class SolidShader, class... Targets>
     const status s = core::validate_draws(draws);
     if (!s.ok() || !validate(g).ok() || !core::validate(options, g).ok() || options.repair != repair::none) return 0;
     if (s.counts.triangles_in == 0) return sizeof(device::pipeline_state);
-    try {
+    return device::bytes_or_none([&]() -> std::size_t {
         const auto call = device::make_solid_call(draws, g, fb, options, s.counts.triangles_in, limits);
         return call.entries.fits() ? call.plan_memory() : 0;
-    } catch (const device::cuda_failure&) {
-        return 0;
-    }
+    });
 }
 
 // Puts the call on the backend's stream and returns. A status other than ok means that nothing was launched, or that a
@@ -57,7 +55,7 @@ template <class Mesh, class VertexShader, class SolidShader, class... Targets>
         status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (options.repair != repair::none) return core::failure(status_code::strategy_unavailable);
-        try {
+        return device::with_cuda_status([&]() -> status {
             if (s.counts.triangles_in == 0) return device::clear_async(backend, fb, workspace);
             const auto call = device::make_solid_call(draws, g, fb, options, s.counts.triangles_in, workspace.limits);
             if (!call.entries.fits()) return core::failure(status_code::size_overflow);
@@ -76,10 +74,8 @@ template <class Mesh, class VertexShader, class SolidShader, class... Targets>
                     device::check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), backend.stream));
                 }
             });
-        } catch (const device::cuda_failure& e) {
-            return device::to_status(e);
-        }
-        return s;
+            return s;
+        });
     } else {
         return {};
     }

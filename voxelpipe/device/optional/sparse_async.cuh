@@ -72,6 +72,89 @@ namespace device {
            std::max({whole.x, whole.y, whole.z}) <= max_index_extent;
 }
 
+// A sparse result in an arena: its bricks, and values for each voxel that there is room for.
+template <class... Targets>
+struct bounded_result {
+    using values_type = core::pack<typename core::rank_map<Targets>::element*...>;
+    workspace_limits limits;
+    bounded_bricks<> bricks;
+    values_type values{};
+
+    bounded_result(const glm::ivec3& whole, const workspace_limits& l, arena& memory)
+        : limits(l), bricks(whole, to_room(l), memory) {
+        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            using map = core::rank_map<typename core::pack_element<I, Targets...>::type>;
+            get<I>(values) = memory.take<typename map::element>(map::elements(limits.voxels));
+        });
+    }
+    // When the masks are complete. read_status would take triangles that were left to the deferred pass for missing
+    // ones.
+    void publish(bool count_voxels, pipeline_state* state, cudaStream_t stream) const {
+        bricks.publish(state, to_capacities(limits), count_voxels, stream);
+        check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
+    }
+    void set(sparse_result<Targets...>& result, const grid& g) const {
+        result.counts = bricks.counts;
+        result.where = g;
+        result.view.table = {bricks.keys, bricks.masks, bricks.offsets, limits.bricks, g.extent, g.offset};
+        result.view.clear_values = result.clear_values;
+        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() { get<I>(result.view.values) = get<I>(values); });
+    }
+};
+
+// A result that is made of lists with all outputs of the shader, at most limits.fragments.
+template <class Payload, class... Targets>
+struct bounded_fold {
+    bounded_result<Targets...> made;
+    std::uint32_t* listed; // of each voxel, by rank: its number in the lists
+
+    bounded_fold(const glm::ivec3& whole, const workspace_limits& limits, arena& memory)
+        : made(whole, limits, memory), listed(memory.take<std::uint32_t>(limits.voxels + spare_ranks)) {}
+
+    // `state`: of the call that made the lists.
+    void launch(const abuffer_view<Payload>& lists, const grid& g, bool count_voxels, pipeline_state* state,
+                sparse_result<Targets...>& result, cudaStream_t stream) const {
+        const workspace_limits& limits = made.limits;
+        const bounded_bricks<>& bricks = made.bricks;
+        bricks.clear(stream);
+        const brick_voxels from{lists.voxels,
+                                static_cast<std::uint32_t>(limits.fragments),
+                                g.extent,
+                                g.offset,
+                                g.whole_extent(),
+                                {},
+                                0,
+                                &lists.counts->voxels};
+        const auto by_voxels = [&](auto* kernel, const auto&... rest) {
+            if (limits.fragments != 0)
+                launch_kernel(false, kernel, num_blocks(limits.fragments), threads_per_block, 0, stream,
+                              stage::tile_resolve, from, rest...);
+        };
+        if (bricks.index.has_nodes()) {
+            by_voxels(mark_listed_voxels<0>, bricks.index.nodes(), 7);
+            bricks.index.number_nodes(&state->sparse.nodes, stream);
+        }
+        by_voxels(mark_listed_voxels<0>, bricks.index.bricks(), 3);
+        bricks.index.number_bricks(&state->sparse.bricks, bricks.keys, stream);
+        by_voxels(mask_listed_voxels<0>, bricks.index.bricks(), bricks.masks);
+        made.publish(count_voxels, state, stream);
+        by_voxels(place_listed_voxels<0>, bricks.index.bricks(),
+                  brick_arrays{bricks.keys, bricks.masks, bricks.offsets, listed, nullptr});
+        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            using target = typename core::pack_element<I, Targets...>::type;
+            const fold_target<target> fold{
+                get<I>(result.clear_values), load_operation::clear, false, nullptr, get<I>(made.values), nullptr};
+            const std::uint64_t most = std::min(limits.voxels, limits.fragments);
+            if (most != 0)
+                launch_kernel(false, fold_voxels<I, target, Payload>, num_blocks(most), threads_per_block, 0, stream,
+                              stage::tile_resolve, fold, static_cast<const std::uint64_t*>(&bricks.counts->voxels),
+                              static_cast<const std::uint32_t*>(listed), static_cast<const std::uint32_t*>(nullptr),
+                              lists.offsets, lists.payloads);
+        });
+        made.set(result, g);
+    }
+};
+
 // One sparse call in the caller's memory. Run: launches everything; otherwise only adds up the bytes.
 template <class Coverage, bool Run, class Draw, class... Targets>
 struct bounded_call;
@@ -83,11 +166,11 @@ struct bounded_call<Coverage, Run, draw<Mesh, VertexShader, FragmentShader>, Tar
     const grid& g;
     const voxelize_options& options;
     std::uint64_t triangles;
-    workspace_limits limits;
+    workspace_view workspace; // its limits and what may stop the call
     cudaStream_t stream;
 
     void operator()(arena& memory, sparse_result<Targets...>& result) {
-        limits.expects_deferred = true; // a sparse call keeps the deferred pass
+        workspace.limits.expects_deferred = true; // a sparse call keeps the deferred pass
         if constexpr (may_follow_from_masks<FragmentShader, Targets...>)
             if (can_raster_masks(draws, g, options.rule, triangles)) {
                 by_masks(memory, result);
@@ -100,12 +183,13 @@ private:
     void by_masks(arena& memory, sparse_result<Targets...>& result) {
         auto* const state = memory.take<pipeline_state>(1);
         brick_raster<draw_type> raster(draws, g, stream, nullptr, memory);
-        const bounded_bricks<> bricks(g.whole_extent(), to_room(limits), memory);
-        auto* const counts =
-            memory.take<std::uint32_t>((is_blended_once<Targets> && ...) ? 0 : limits.voxels + spare_ranks);
-        const auto values = take_values(memory);
+        const bounded_result<Targets...> made(g.whole_extent(), workspace.limits, memory);
+        const std::uint64_t num_counts = workspace.limits.voxels + spare_ranks;
+        auto* const counts = memory.take<std::uint32_t>((is_blended_once<Targets> && ...) ? 0 : num_counts);
         if constexpr (Run) {
+            const bounded_bricks<>& bricks = made.bricks;
             check(cudaMemsetAsync(state, 0, sizeof(pipeline_state), stream));
+            take_stop(workspace, state, stream);
             check_subsets(draws, &state->index_error, stream);
             bricks.clear(stream);
             Coverage::dispatch(options.rule, [&]<coverage Rule>() {
@@ -116,23 +200,23 @@ private:
                 raster.template mark<Rule>(bricks.index.bricks(), 3, is_coarse<Rule>(raster, 3));
                 bricks.index.number_bricks(&state->sparse.bricks, bricks.keys, stream);
                 raster.template set_masks<Rule>(bricks.index.bricks(), bricks.masks, state);
-                publish(bricks, state);
+                made.publish(options.count_voxels, state, stream);
                 bool are_counted = false;
                 const auto counted = [&]() -> const std::uint32_t* {
                     if (are_counted) return counts;
                     are_counted = true;
-                    check(cudaMemsetAsync(counts, 0, (limits.voxels + spare_ranks) * sizeof(std::uint32_t), stream));
+                    check(cudaMemsetAsync(counts, 0, num_counts * sizeof(std::uint32_t), stream));
                     raster.template count_fragments<Rule>(bricks.index.bricks(), bricks.masks, bricks.offsets, counts);
                     return counts;
                 };
                 core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
                     write_mask_values<I, typename core::pack_element<I, Targets...>::type>(
-                        get<I>(values), limits.voxels,
+                        get<I>(made.values), workspace.limits.voxels,
                         reinterpret_cast<const unsigned long long*>(&bricks.counts->voxels), draws[0].fragment_shader,
                         get<I>(result.clear_values), false, counted, stream);
                 });
             });
-            set(result, bricks, values);
+            made.set(result, g);
         }
     }
     // A raster of cells would mark bricks at the border of a grid that is cut there, in which no voxel is.
@@ -150,73 +234,12 @@ private:
         auto* const state = reinterpret_cast<pipeline_state*>(memory_of(memory)); // the list's
         abuffer_view<payload> lists;
         list_async<Coverage, Run>(make_list_call<listed_type, payload>(std::span<const listed_type>(shaded), g,
-                                                                       options.rule, triangles, limits),
-                                  options.rule, {}, memory, lists, stream);
-        const bounded_bricks<> bricks(g.whole_extent(), to_room(limits), memory);
-        auto* const listed = memory.take<std::uint32_t>(limits.voxels + spare_ranks);
-        const auto values = take_values(memory);
-        if constexpr (Run) {
-            bricks.clear(stream);
-            const brick_voxels from{lists.voxels,
-                                    static_cast<std::uint32_t>(limits.fragments),
-                                    g.extent,
-                                    g.offset,
-                                    g.whole_extent(),
-                                    {},
-                                    0,
-                                    &lists.counts->voxels};
-            const auto by_voxels = [&](auto* kernel, const auto&... rest) {
-                if (limits.fragments != 0)
-                    launch_kernel(false, kernel, num_blocks(limits.fragments), threads_per_block, 0, stream,
-                                  stage::tile_resolve, from, rest...);
-            };
-            if (bricks.index.has_nodes()) {
-                by_voxels(mark_listed_voxels<0>, bricks.index.nodes(), 7);
-                bricks.index.number_nodes(&state->sparse.nodes, stream);
-            }
-            by_voxels(mark_listed_voxels<0>, bricks.index.bricks(), 3);
-            bricks.index.number_bricks(&state->sparse.bricks, bricks.keys, stream);
-            by_voxels(mask_listed_voxels<0>, bricks.index.bricks(), bricks.masks);
-            publish(bricks, state);
-            by_voxels(place_listed_voxels<0>, bricks.index.bricks(),
-                      brick_arrays{bricks.keys, bricks.masks, bricks.offsets, listed, nullptr});
-            core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-                using target = typename core::pack_element<I, Targets...>::type;
-                const fold_target<target> fold{
-                    get<I>(result.clear_values), load_operation::clear, false, nullptr, get<I>(values), nullptr};
-                const std::uint64_t most = std::min(limits.voxels, limits.fragments);
-                if (most != 0)
-                    launch_kernel(false, fold_voxels<I, target, payload>, num_blocks(most), threads_per_block, 0,
-                                  stream, stage::tile_resolve, fold,
-                                  static_cast<const std::uint64_t*>(&bricks.counts->voxels),
-                                  static_cast<const std::uint32_t*>(listed), static_cast<const std::uint32_t*>(nullptr),
-                                  lists.offsets, lists.payloads);
-            });
-            set(result, bricks, values);
-        }
+                                                                       options.rule, triangles, workspace.limits),
+                                  options.rule, workspace, memory, lists, stream);
+        const bounded_fold<payload, Targets...> fold(g.whole_extent(), workspace.limits, memory);
+        if constexpr (Run) fold.launch(lists, g, options.count_voxels, state, result, stream);
     }
     [[nodiscard]] static void* memory_of(arena memory) { return memory.take<std::byte>(1); }
-
-    // read_status would take triangles that were left to the deferred pass for missing ones.
-    void publish(const bounded_bricks<>& bricks, pipeline_state* state) const {
-        bricks.publish(state, to_capacities(limits), options.count_voxels, stream);
-        check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), stream));
-    }
-    using values_type = core::pack<typename core::rank_map<Targets>::element*...>;
-    [[nodiscard]] values_type take_values(arena& memory) const {
-        values_type values{};
-        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-            using map = core::rank_map<typename core::pack_element<I, Targets...>::type>;
-            get<I>(values) = memory.take<typename map::element>(map::elements(limits.voxels));
-        });
-        return values;
-    }
-    void set(sparse_result<Targets...>& result, const bounded_bricks<>& bricks, const values_type& values) const {
-        result.counts = bricks.counts;
-        result.view.table = {bricks.keys, bricks.masks, bricks.offsets, limits.bricks, g.extent, g.offset};
-        result.view.clear_values = result.clear_values;
-        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() { get<I>(result.view.values) = get<I>(values); });
-    }
 };
 
 template <class Draw, class... Targets>
@@ -224,8 +247,8 @@ template <class Draw, class... Targets>
                                         std::uint64_t triangles, const workspace_limits& limits) {
     arena plan;
     sparse_result<Targets...> unused;
-    bounded_call<core::known_coverage<>, false, Draw, Targets...>{draws, g, options, triangles, limits, nullptr}(
-        plan, unused);
+    bounded_call<core::known_coverage<>, false, Draw, Targets...>{draws,  g, options, triangles, {nullptr, 0, limits},
+                                                                  nullptr}(plan, unused);
     return plan.used();
 }
 
@@ -246,12 +269,10 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
     const status s = core::validate_draws(draws);
     if (!s.ok() || !validate(g).ok() || !device::are_numbered_bricks(limits, g.whole_extent())) return 0;
     if (s.counts.triangles_in == 0) return sizeof(device::empty_bricks);
-    try {
+    return device::bytes_or_none([&]() -> std::size_t {
         return device::bounded_bytes<draw<Mesh, VertexShader, FragmentShader>, Targets...>(
             draws, g, options, s.counts.triangles_in, limits);
-    } catch (const device::cuda_failure&) {
-        return 0;
-    }
+    });
 }
 
 // Puts the call on the backend's stream, sets `result` to where its bricks and values will be, and returns. A status
@@ -274,7 +295,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         if (!device::are_numbered_bricks(workspace.limits, g.whole_extent()))
             return core::failure(status_code::size_overflow);
         made.where = g;
-        try {
+        return device::with_cuda_status([&]() -> status {
             const bool is_empty = s.counts.triangles_in == 0;
             const std::size_t need = is_empty ? sizeof(device::empty_bricks)
                                               : device::bounded_bytes<draw_type, Targets...>(
@@ -296,14 +317,12 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                 device::launch_until(stage::tile_resolve, [&] {
                     device::arena memory(workspace.memory);
                     device::bounded_call<core::known_coverage<Known...>, true, draw_type, Targets...>{
-                        draws, g, options, s.counts.triangles_in, workspace.limits, backend.stream}(memory, made);
+                        draws, g, options, s.counts.triangles_in, workspace, backend.stream}(memory, made);
                 });
             }
             result = made;
-        } catch (const device::cuda_failure& e) {
-            return device::to_status(e);
-        }
-        return s;
+            return s;
+        });
     } else {
         return {};
     }
