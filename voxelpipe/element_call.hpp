@@ -3,21 +3,24 @@
 #pragma once
 
 // voxelize for points and lines, by a path of their own: each element's voxels are counted, summed and listed with
-// their shaded values (core/segment.hpp), and the fragments of all elements are sorted by voxel and stored or folded.
-// The functors run by Backend::for_each, the same on every backend.
+// their shaded values (core/segment.hpp), and the fragments of all elements are sorted by voxel and stored or folded,
+// in parts of the grid if they are too many at once. The functors run by Backend::for_each, the same on every backend.
 
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/core/segment.hpp>
 #include <voxelpipe/elements.hpp>
 #include <voxelpipe/fragment_pool.hpp>
-#include <voxelpipe/program_call.hpp>
+#include <voxelpipe/program_options.hpp>
+#include <voxelpipe/program_outputs.hpp>
+#include <voxelpipe/program_parts.hpp>
 
 #include <array>
+#include <concepts>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace voxelpipe {
@@ -180,87 +183,145 @@ struct list_voxels {
 
 } // namespace passes
 
+// The elements of a call, whose vertices are shaded once. Payload: of the lists.
+template <coverage Rule, class Backend, class View, class VertexShader, class FragmentShader, class Payload>
+class element_lists {
+    template <class T>
+    using buffer = typename Backend::template buffer<T>;
+    using draw_type = draw<View, VertexShader, FragmentShader>;
+    using elements = elements_of<View>;
+    using V = typename shaded<View, VertexShader>::varyings;
+    using pool_type = fragment_pool<Backend, Payload>;
+    static constexpr int size = elements::size;
+
+public:
+    element_lists(Backend& backend, std::span<const draw_type> draws) : backend_(backend), draws_(draws) {
+        for (std::size_t d = 0; d < draws.size(); ++d) {
+            const View& view = draws[d].mesh;
+            const std::uint64_t n = elements::count(view) * view.copies.count;
+            shaded_draw s{n, {backend, view.positions.size() * view.copies.count}, {backend, n + 1}};
+            backend.for_each(s.vertices.size(), shade_elements<typename elements::vertices_type, VertexShader, V>{
+                                                    elements::vertices(view), draws[d].vertex_shader,
+                                                    static_cast<std::uint32_t>(d), s.vertices.data()});
+            num_elements_ += n;
+            shaded_.push_back(std::move(s));
+        }
+    }
+    [[nodiscard]] std::uint64_t num_elements() const { return num_elements_; }
+
+    // As part_drawing wants it: the lists of a part of the grid. More than `most` fragments are only counted.
+    template <class Take>
+    [[nodiscard]] status list(const grid& g, std::uint64_t most, const Take& take) {
+        const std::array<std::uint64_t, index_of(element_count::size)> zeros{};
+        buffer<std::uint64_t> counts(backend_, array_view<const std::uint64_t>(zeros.data(), zeros.size()));
+        std::vector<std::uint64_t> of_draw;
+        std::uint64_t fragments = 0;
+        for (std::size_t d = 0; d < draws_.size(); ++d) {
+            shaded_draw& s = shaded_[d];
+            buffer<std::uint32_t> num_voxels(backend_, s.count + 1);
+            backend_.for_each(s.count + 1,
+                              passes::count_voxels<Rule, size, V>{snapped(d, g), num_voxels.data(), counts.data()});
+            of_draw.push_back(backend_.sum(num_voxels, s.first_of_element));
+            fragments += of_draw.back();
+        }
+        counters c = read(counts);
+        if (has_bad_index_) return failure(status_code::index_out_of_range, stage::coarse_raster);
+        if (fragments > most) {
+            take(abuffer<Backend, Payload>(backend_), 0, c, fragments);
+            return {};
+        }
+        typename pool_type::part part(backend_, fragments);
+        std::uint64_t first = 0;
+        std::uint32_t first_primitive = 0;
+        for (std::size_t d = 0; d < draws_.size(); ++d) {
+            const shaded_draw& s = shaded_[d];
+            backend_.for_each(s.count, passes::list_voxels<Rule, size, V, FragmentShader, payload_storage<Payload>>{
+                                           snapped(d, g), draws_[d].fragment_shader, static_cast<std::uint32_t>(d),
+                                           first_primitive, g.extent, g.offset, s.first_of_element.data(), first,
+                                           nullptr, part.keys.data(), part.order.data(), part.primitives.data(),
+                                           part.payloads.data(), counts.data()});
+            first += of_draw[d];
+            first_primitive += static_cast<std::uint32_t>(s.count);
+        }
+        c = read(counts);
+        take(pool_type::sort(backend_, g.extent, std::move(part), fragments - c.fragments_discarded), 0, c, fragments);
+        return {};
+    }
+
+private:
+    struct shaded_draw {
+        std::uint64_t count;
+        buffer<vertex_output<V>> vertices;
+        buffer<std::uint64_t> first_of_element;
+    };
+    [[nodiscard]] passes::snapped_elements<size, V> snapped(std::size_t d, const grid& g) const {
+        return {shaded_[d].vertices.data(),
+                elements::indices(draws_[d].mesh),
+                shaded_[d].count,
+                make_snap_transform(g),
+                {{{0, 0, 0}}, {{g.extent.x - 1, g.extent.y - 1, g.extent.z - 1}}}};
+    }
+    [[nodiscard]] counters read(const buffer<std::uint64_t>& counts) {
+        const std::vector<std::uint64_t> found = counts.to_host(backend_);
+        const auto of = [&](element_count what) { return found[index_of(what)]; };
+        has_bad_index_ = of(element_count::bad_index) != 0;
+        counters c;
+        c.triangles_nonfinite = of(element_count::nonfinite);
+        c.triangles_too_far = of(element_count::too_far);
+        c.triangles_outside = of(element_count::outside);
+        c.triangles_drawn = num_elements_ - c.triangles_dropped() - c.triangles_outside;
+        c.fragments_discarded = of(element_count::discarded);
+        return c;
+    }
+
+    Backend& backend_;
+    std::span<const draw_type> draws_;
+    std::vector<shaded_draw> shaded_;
+    std::uint64_t num_elements_ = 0;
+    bool has_bad_index_ = false;
+};
+
 template <coverage Rule, class Backend, class View, class VertexShader, class FragmentShader, class Output>
 [[nodiscard]] status run_elements(Backend& backend, std::span<const draw<View, VertexShader, FragmentShader>> draws,
-                                  const grid& g, Output& out, bool count_voxels) {
+                                  const grid& g, Output& out, const program_options& options) {
+    const bool count_voxels = options.count_voxels;
     if constexpr (requires { backend.template draw_elements<Rule>(draws, g, out, count_voxels); }) {
         // Without lists, if the backend knows how.
         if (const std::optional<status> s = backend.template draw_elements<Rule>(draws, g, out, count_voxels))
             return *s;
     }
-    using elements = elements_of<View>;
-    using V = typename shaded<View, VertexShader>::varyings;
     using output_type = std::remove_const_t<Output>;
     using payload = typename pooled<output_type, shader_output<View, VertexShader, FragmentShader>>::payload;
-    using pool_type = fragment_pool<Backend, payload>;
-    using vertices_type = typename elements::vertices_type;
-    constexpr int size = elements::size;
-    using snapped = passes::snapped_elements<size, V>;
-    const std::array<std::uint64_t, index_of(element_count::size)> zeros{};
-    typename Backend::template buffer<std::uint64_t> counts(
-        backend, array_view<const std::uint64_t>(zeros.data(), zeros.size()));
-
-    struct shaded_draw {
-        typename Backend::template buffer<vertex_output<V>> vertices;
-        typename Backend::template buffer<std::uint64_t> first_of_element;
-        snapped all;
-        std::uint64_t num_fragments;
+    element_lists<Rule, Backend, View, VertexShader, FragmentShader, payload> all(backend, draws);
+    const auto list = [&](const grid& part, std::uint64_t most, const auto& take) {
+        return all.list(part, most, take);
     };
-    std::vector<shaded_draw> shaded;
-    std::uint64_t num_elements = 0, num_fragments = 0;
-    for (std::size_t d = 0; d < draws.size(); ++d) {
-        const View& view = draws[d].mesh;
-        const std::uint64_t n = elements::count(view) * view.copies.count;
-        shaded_draw s{{backend, view.positions.size() * view.copies.count}, {backend, n + 1}, {}, 0};
-        backend.for_each(s.vertices.size(), shade_elements<vertices_type, VertexShader, V>{
-                                                elements::vertices(view), draws[d].vertex_shader,
-                                                static_cast<std::uint32_t>(d), s.vertices.data()});
-        s.all = {s.vertices.data(),
-                 elements::indices(view),
-                 n,
-                 make_snap_transform(g),
-                 {{{0, 0, 0}}, {{g.extent.x - 1, g.extent.y - 1, g.extent.z - 1}}}};
-        typename Backend::template buffer<std::uint32_t> num_voxels(backend, n + 1);
-        backend.for_each(n + 1, passes::count_voxels<Rule, size, V>{s.all, num_voxels.data(), counts.data()});
-        s.num_fragments = backend.sum(num_voxels, s.first_of_element);
-        num_elements += n;
-        num_fragments += s.num_fragments;
-        shaded.push_back(std::move(s));
+    part_store<Backend, payload, output_type> store(backend, out);
+    part_drawing<Backend, payload, decltype(store), decltype(list)> parts(
+        backend, g, store, list, fragments_within<payload>(options.list_bytes));
+    status drawn;
+    status s = parts.draw(drawn.counts);
+    drawn.counts.triangles_in = all.num_elements();
+    if (s.ok()) return store.finish(backend, g, count_voxels, drawn);
+    s.counts = {.triangles_in = all.num_elements()};
+    return s;
+}
+
+template <coverage... Known, class Backend, class View, class VertexShader, class FragmentShader, class Output>
+[[nodiscard]] status draw_elements(Backend& backend, std::span<const draw<View, VertexShader, FragmentShader>> draws,
+                                   const grid& g, Output& out, program_options options) {
+    using output_type = std::remove_const_t<Output>;
+    if constexpr (check_shaders<View, VertexShader, FragmentShader>()) {
+        if constexpr (output_kind<output_type>::template fits<shader_output<View, VertexShader, FragmentShader>>()) {
+            if (const status s = validate_call(draws, g, out); !s.ok()) return s;
+            known_coverage<Known...>::set(options);
+            return backend.guard([&] {
+                return known_coverage<Known...>::dispatch(
+                    options.rule, [&]<coverage Rule>() { return run_elements<Rule>(backend, draws, g, out, options); });
+            });
+        }
     }
-    const auto count_of = [](const std::vector<std::uint64_t>& c, element_count what) { return c[index_of(what)]; };
-    std::vector<std::uint64_t> found = counts.to_host(backend);
-    status s;
-    s.counts.triangles_in = num_elements;
-    if (count_of(found, element_count::bad_index) != 0 || num_fragments > pool_type::max_fragments) {
-        status failed = count_of(found, element_count::bad_index) != 0
-                            ? failure(status_code::index_out_of_range, stage::coarse_raster)
-                            : failure(status_code::out_of_memory, stage::abuffer_emit);
-        failed.counts = s.counts;
-        return failed;
-    }
-    typename pool_type::part part(backend, num_fragments);
-    std::uint64_t first = 0;
-    std::uint32_t first_primitive = 0;
-    for (std::size_t d = 0; d < draws.size(); ++d) {
-        const shaded_draw& of = shaded[d];
-        backend.for_each(of.all.count,
-                         passes::list_voxels<Rule, size, V, FragmentShader, payload_storage<payload>>{
-                             of.all, draws[d].fragment_shader, static_cast<std::uint32_t>(d), first_primitive, g.extent,
-                             g.offset, of.first_of_element.data(), first, nullptr, part.keys.data(), part.order.data(),
-                             part.primitives.data(), part.payloads.data(), counts.data()});
-        first += of.num_fragments;
-        first_primitive += static_cast<std::uint32_t>(of.all.count);
-    }
-    found = counts.to_host(backend);
-    shaded.clear();
-    s.counts.triangles_nonfinite = count_of(found, element_count::nonfinite);
-    s.counts.triangles_too_far = count_of(found, element_count::too_far);
-    s.counts.triangles_outside = count_of(found, element_count::outside);
-    s.counts.triangles_drawn = num_elements - s.counts.triangles_dropped() - s.counts.triangles_outside;
-    s.counts.fragments_discarded = count_of(found, element_count::discarded);
-    return store_pooled(
-        backend, g, pool_type::sort(backend, g.extent, std::move(part), num_fragments - s.counts.fragments_discarded),
-        out, count_voxels, s);
+    return {}; // does not compile: a static_assert has said why
 }
 
 } // namespace core
@@ -269,26 +330,21 @@ template <coverage Rule, class Backend, class View, class VertexShader, class Fr
 // (docs/design.md, "Points and segments"): conservative is every voxel that the closed point or segment touches, thin
 // one voxel in each layer along a segment's dominant axis, or the voxel of the point. Fragments have the element's
 // number as `triangle`, barycentrics (1 - t, t, 0), those of a point (1, 0, 0), and no normal; counts of triangles
-// count elements. A call that fails has written nothing. Waits.
+// count elements. A call that fails has written nothing, unless the memory runs out while parts of the grid are drawn
+// (program_options::list_bytes). Waits.
 template <coverage... Known, class Backend, class View, class VertexShader, class FragmentShader, class Output>
 requires core::is_elements_view<View>
 [[nodiscard]] status voxelize(Backend& backend, std::span<const draw<View, VertexShader, FragmentShader>> draws,
                               const grid& g, Output&& output, voxelize_options options = {}) {
-    auto& out = core::drawn_output(output);
-    using output_type = std::remove_cvref_t<decltype(out)>;
-    if constexpr (core::check_shaders<View, VertexShader, FragmentShader>()) {
-        using shader_output = core::shader_output<View, VertexShader, FragmentShader>;
-        if constexpr (core::output_kind<output_type>::template fits<shader_output>()) {
-            if (const status s = core::validate_call(draws, g, out); !s.ok()) return s;
-            core::known_coverage<Known...>::set(options);
-            return backend.guard([&] {
-                return core::known_coverage<Known...>::dispatch(options.rule, [&]<coverage Rule>() {
-                    return core::run_elements<Rule>(backend, draws, g, out, options.count_voxels);
-                });
-            });
-        }
-    }
-    return {}; // does not compile: a static_assert has said why
+    return core::draw_elements<Known...>(backend, draws, g, core::drawn_output(output), program_options(options));
+}
+// The same, with bounds for the lists of fragments.
+template <coverage... Known, class Backend, class View, class VertexShader, class FragmentShader, class Output,
+          std::same_as<program_options> Options>
+requires core::is_elements_view<View>
+[[nodiscard]] status voxelize(Backend& backend, std::span<const draw<View, VertexShader, FragmentShader>> draws,
+                              const grid& g, Output&& output, const Options& options) {
+    return core::draw_elements<Known...>(backend, draws, g, core::drawn_output(output), options);
 }
 
 // One view.
@@ -296,6 +352,13 @@ template <coverage... Known, class Backend, class View, class VertexShader, clas
 requires core::is_elements_view<View>
 [[nodiscard]] status voxelize(Backend& backend, const View& view, const grid& g, const VertexShader& vertex_shader,
                               const FragmentShader& fragment_shader, Output&& out, voxelize_options options = {}) {
+    return voxelize<Known...>(backend, view, g, vertex_shader, fragment_shader, out, program_options(options));
+}
+template <coverage... Known, class Backend, class View, class VertexShader, class FragmentShader, class Output,
+          std::same_as<program_options> Options>
+requires core::is_elements_view<View>
+[[nodiscard]] status voxelize(Backend& backend, const View& view, const grid& g, const VertexShader& vertex_shader,
+                              const FragmentShader& fragment_shader, Output&& out, const Options& options) {
     using draw_type = draw<View, VertexShader, FragmentShader>;
     const draw_type d{view, vertex_shader, fragment_shader};
     return voxelize<Known...>(backend, std::span<const draw_type>(&d, 1), g, out, options);

@@ -258,6 +258,13 @@ private:
     std::uint64_t total_ = 0;
 };
 
+// Fragments whose lists take `bytes` while they are sorted: voxels, offsets, primitives and payloads, the same in one
+// array of all, and two of keys and numbers for the sort. 0 bytes: there is no bound.
+template <class Payload>
+[[nodiscard]] constexpr std::uint64_t fragments_within(std::uint64_t bytes) {
+    return bytes == 0 ? ~std::uint64_t{0} : bytes / (48 + 2 * (4 + sizeof(payload_storage<Payload>)));
+}
+
 // ---- outputs --------------------------------------------------------------------------------------------------------
 
 // The payload of the lists that an output is made of.

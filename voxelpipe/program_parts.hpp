@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Fragments of a call that makes its triangles in chunks, in bounded memory. All fragments of a voxel are listed before
-// any of them is blended. If those of the whole grid are too many at once, the grid is drawn in parts, one after the
-// other, and the chunks are made again for each: the voxels of a part are exactly those of the whole.
+// Fragments of a call that makes its triangles in chunks, or of points and lines, in bounded memory. All fragments of a
+// voxel are listed before any of them is blended. If those of the whole grid are too many at once, the grid is drawn in
+// parts, one after the other, and the chunks are made again for each: the voxels of a part are exactly those of the
+// whole.
 
 #include <voxelpipe/fragment_pool.hpp>
 #include <voxelpipe/sparse.hpp>
@@ -68,7 +69,7 @@ private:
 // The output of a call. store() takes the lists of each part, in the order of their voxels; finish() comes last, and
 // returns `s` with the counts of fragments. has_written(): something of the output has been written.
 //
-// Lists, and what is made of lists, need those of all parts at once.
+// Lists are those of all parts, joined.
 template <class Backend, class Payload, class Output>
 class part_store {
 public:
@@ -116,8 +117,9 @@ private:
 };
 // ---- the parts ------------------------------------------------------------------------------------------------------
 
-// Draws a grid, in parts if need be. Store: part_store. List: calls list(grid, take), which gives the
-// lists of each chunk to take(lists, first primitive, counters) and returns a status.
+// Draws a grid, in parts if need be. Store: part_store. List: calls list(grid, most, take), which gives the lists of
+// each chunk to take(lists, first primitive, counters, fragments) and returns a status. Lists may be empty if there are
+// more than `most` fragments.
 template <class Backend, class Payload, class Store, class List>
 class part_drawing {
     using pool_type = fragment_pool<Backend, Payload>;
@@ -134,8 +136,10 @@ public:
         tried t = attempt(all, true);
         if (t.s.code == status_code::out_of_memory) t = attempt(all, false); // the lists may have taken the memory
         if (!t.s.ok()) return t.s;
+        const status s = t.is_listed ? store(std::move(t)) : draw_parts(all, t.fragments);
         counts = t.counts;
-        return t.is_listed ? store_.store(backend_, std::move(t.lists)) : draw_parts(all, t.fragments);
+        counts.fragments_discarded = discarded_;
+        return s;
     }
 
 private:
@@ -157,9 +161,10 @@ private:
         tried t{{}, {}, 0, false, abuffer<Backend, Payload>(backend_)};
         pool_type pool;
         try {
-            t.s = list_(is_whole ? whole_ : whole_.crop(b.begin, b.size),
-                        [&](abuffer<Backend, Payload>&& lists, std::uint32_t first_primitive, const counters& c) {
-                            t.fragments += lists.num_fragments();
+            t.s = list_(is_whole ? whole_ : whole_.crop(b.begin, b.size), keeps ? most : 0,
+                        [&](abuffer<Backend, Payload>&& lists, std::uint32_t first_primitive, const counters& c,
+                            std::uint64_t fragments) {
+                            t.fragments += fragments;
                             add_triangles(t.counts, c);
                             t.counts.fragments_discarded += c.fragments_discarded;
                             keeps = keeps && t.fragments <= most;
@@ -174,6 +179,10 @@ private:
             t.s = failure(status_code::out_of_memory, stage::abuffer_emit);
         }
         return t;
+    }
+    [[nodiscard]] status store(tried&& t) {
+        discarded_ += t.counts.fragments_discarded;
+        return store_.store(backend_, std::move(t.lists));
     }
     // Draws a part whose lists do not fit, in smaller ones. Their voxels follow each other in the lists' order: a part
     // is divided along y only if it has one layer, along x only if it has one row.
@@ -195,7 +204,7 @@ private:
     }
     [[nodiscard]] status draw_part(const box& b) {
         tried t = attempt(b, true);
-        if (t.is_listed && t.s.ok()) return store_.store(backend_, std::move(t.lists));
+        if (t.is_listed && t.s.ok()) return store(std::move(t));
         const bool is_full = t.s.ok() || t.s.code == status_code::out_of_memory;
         return is_full && b.size != glm::ivec3(1) ? draw_parts(b, t.fragments) : t.s;
     }
@@ -204,7 +213,7 @@ private:
     grid whole_;
     Store& store_;
     const List& list_;
-    std::uint64_t most_;
+    std::uint64_t most_, discarded_ = 0;
 };
 
 } // namespace voxelpipe::core

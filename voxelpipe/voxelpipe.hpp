@@ -17,6 +17,7 @@
 #include <voxelpipe/mesh.hpp>
 #include <voxelpipe/program.hpp>
 #include <voxelpipe/program_call.hpp>
+#include <voxelpipe/program_options.hpp>
 #include <voxelpipe/shader.hpp>
 #include <voxelpipe/solid.hpp>
 #include <voxelpipe/sparse.hpp>

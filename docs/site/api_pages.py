@@ -17,7 +17,7 @@ CPP = {
     "shaders": ("Shaders", "Vertex and fragment shaders, varyings and draws. In the paper: vertex and fragment programs.",
                 ["shader.hpp", "core/interpolate.hpp", "field.hpp"]),
     "programs": ("Programs", "Tessellation and geometry programs, between the vertex shader and the rasterizer.",
-                 ["program.hpp", "program_call.hpp", "element_call.hpp"]),
+                 ["program.hpp", "program_options.hpp", "program_call.hpp", "element_call.hpp"]),
     "framebuffers": ("Framebuffers and blends", "Render targets, how fragments meet in them, and their copies on the host. "
                      "In the paper: frame-buffer types, multiple render targets, blending modes, programmable ROP.",
                      ["framebuffer.hpp", "blend.hpp", "core/layout.hpp", "core/value_traits.hpp", "core/half.hpp", "host_target.hpp"]),

@@ -92,23 +92,23 @@ struct results {
 };
 
 template <class Backend, class View>
-results draw_all(Backend& backend, const View& view, const vp::grid& grid, vp::coverage rule) {
+results draw_all(Backend& backend, const View& view, const vp::grid& grid, const vp::program_options& options) {
     results r;
     vp::framebuffer<Backend, elements::ids, elements::sums, elements::bits> fb{backend, grid.extent};
-    vp::status s = vp::voxelize(backend, view, grid, place{}, shader{}, fb, rule);
+    vp::status s = vp::voxelize(backend, view, grid, place{}, shader{}, fb, options);
     EXPECT_TRUE(s.ok()) << s.message();
     r.counts = s.counts;
     r.ids = vp::get<0>(fb).to_host(backend);
     r.sums = vp::get<1>(fb).to_host(backend);
     r.bits = vp::get<2>(fb).to_host(backend);
     vp::abuffer<Backend, payload> lists(backend);
-    s = vp::voxelize(backend, view, grid, place{}, payload_shader{}, lists, rule);
+    s = vp::voxelize(backend, view, grid, place{}, payload_shader{}, lists, options);
     EXPECT_TRUE(s.ok()) << s.message();
     r.voxels = lists.voxels.to_host(backend);
     r.primitives = lists.primitives.to_host(backend);
     r.payloads = lists.payloads.to_host(backend);
     vp::sparse_framebuffer<Backend, elements::ids, elements::sums, elements::bits> sparse(backend, grid.extent);
-    s = vp::voxelize(backend, view, grid, place{}, shader{}, sparse, rule);
+    s = vp::voxelize(backend, view, grid, place{}, shader{}, sparse, options);
     EXPECT_TRUE(s.ok()) << s.message();
     EXPECT_EQ(s.counts, r.counts);
     r.keys = sparse.to_host(backend).keys;

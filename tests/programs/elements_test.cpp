@@ -192,6 +192,24 @@ TEST(Elements, CropsAndThreadsChangeNothing) {
 }
 
 // A voxel's number counts the elements of all instances, and draws.
+// Parts of the grid, down to a single voxel, whose lists take few bytes at once.
+TEST(Elements, BoundedListsChangeNothing) {
+    const std::vector<glm::vec3> vertices = make_vertices(6, 60, extent);
+    const vp::grid grid = unit::unit_grid(extent).crop({2, 3, 1}, {17, 12, 20});
+    backend_type backend = unit::make_backend();
+    const vp::lines_view<> lines{.positions = vertices, .copies = {2}};
+    for (const vp::coverage rule : {vp::coverage::thin, vp::coverage::conservative}) {
+        const results expected = draw_all(backend, lines, grid, rule);
+        EXPECT_GT(expected.counts.fragments_discarded, 0u);
+        for (const std::uint64_t bytes : {20'000u, 1'000u})
+            expect_same(expected, draw_all(backend, lines, grid, {rule, 1 << 20, bytes}));
+    }
+    const std::vector<glm::vec3> same(40, glm::vec3(9.5f));
+    const vp::points_view<> points{same};
+    expect_same(draw_all(backend, points, grid, vp::coverage::thin),
+                draw_all(backend, points, grid, {vp::coverage::thin, 1 << 20, 1}));
+}
+
 TEST(Elements, HaveFieldsAndOrder) {
     const std::vector<glm::vec3> vertices{{1.5f, 2.5f, 3.5f}, {9.5f, 2.5f, 3.5f}, {9.5f, 8.5f, 3.5f}};
     const vp::grid grid = unit::unit_grid(extent);

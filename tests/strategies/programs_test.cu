@@ -234,6 +234,21 @@ TEST(DeviceElements, AreTheCpus) {
                               elements::draw_all(gpu, there_points, g, rule));
     }
 }
+// Lists of a few kilobytes: parts of the grid, in less memory.
+TEST(DeviceElements, ListsAreBounded) {
+    const std::vector<glm::vec3> vertices = elements::make_vertices(8, 1500, extent);
+    const vp::grid g = box_grid(extent);
+    const auto draw = [&](limited_resource& resource, std::uint64_t list_bytes) {
+        stream_owner owner;
+        vp::cuda_backend gpu{owner.stream, resource};
+        const vp::cuda_backend::buffer<glm::vec3> there(gpu, array_of(vertices));
+        const vp::lines_view<> lines{.positions = there.view()};
+        return elements::draw_all(gpu, lines, g, {vp::coverage::thin, 1 << 20, list_bytes});
+    };
+    limited_resource all{~std::uint64_t{0}}, less{~std::uint64_t{0}};
+    elements::expect_same(draw(all, 0), draw(less, 100'000));
+    EXPECT_LT(less.peak, all.peak);
+}
 
 TEST(DeviceField, GivesItsGoldenValues) {
     vp::cuda_backend gpu;
