@@ -10,6 +10,7 @@
 #   scripts/bench.sh --solids [OPTION...]    solids into bits on the GPU
 #   scripts/bench.sh --programs [OPTION...]  programs, instances, points and lines on the GPU
 #   scripts/bench.sh --sparse [OPTION...]    sparse framebuffers on the GPU
+#   scripts/bench.sh --computed [OPTION...]  shaders that compute, by strategy, on the GPU
 #   scripts/bench.sh --tune [OPTION...]      sweeps the fine raster's policies on the GPU
 #   scripts/bench.sh --plot [FILE|FOLDER]    plots of that in build/plots, e.g. of records/h200; by default those of --scaling
 #   scripts/bench.sh --nvbench [OPTION...]   the table's cells under NVBench (its options; caches are flushed between calls)
@@ -56,7 +57,7 @@ case ${1:-} in
         "$gpu_folder/bench/gpu/bench_gpu_scaling" "${@:2}"
         plot "$results" "$results"
         ;;
-    --solids | --programs | --sparse)
+    --solids | --programs | --sparse | --computed)
         build_gpu "bench_gpu_${1#--}"
         "$gpu_folder/bench/gpu/bench_gpu_${1#--}" --out "$results" "${@:2}"
         ;;
