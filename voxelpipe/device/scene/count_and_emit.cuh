@@ -92,18 +92,58 @@ struct cell_counts {
 //   box
 //                                                             is the triangle's own
 //   emit(geometry, triangle, primitive, box, whole, offset)   stores the cells that count() counts, from offset on
+// With knows_lines = true it also tells triangles whose cells are all of a box, a line of few:
+//   bool find_line(geometry, primitive, box)                  true if the primitive is one, with its box
+//   emit_line(primitive, box, offset)                         stores them
+template <class Op>
+concept knows_lines = requires {
+    requires Op::knows_lines;
+};
+inline constexpr std::uint32_t no_primitive = ~0u;
+
+// The primitive that a thread takes: its own, `primitive`, or none. But where lines are known, on_line(box) is called
+// for the thread's own if it is one, and the threads of the block that come first take what is left: that costs far
+// more, and keeps few warps busy in this way. All threads of the block call it.
+template <class Op, class OnLine>
+[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t take_primitive(const geometry& geo, const Op& op,
+                                                                       std::uint32_t primitive, OnLine&& on_line) {
+    if constexpr (knows_lines<Op>) {
+        __shared__ std::uint32_t left[threads_per_block], num_left;
+        if (threadIdx.x == 0) num_left = 0;
+        __syncthreads();
+        if (primitive != no_primitive) {
+            core::voxel_box line{};
+            if (op.find_line(geo, primitive, line))
+                on_line(line);
+            else
+                left[atomicAdd(&num_left, 1u)] = primitive;
+        }
+        __syncthreads();
+        return threadIdx.x < num_left ? left[threadIdx.x] : no_primitive;
+    } else {
+        return primitive;
+    }
+}
+
 template <class Op>
 __device__ VOXELPIPE_INLINE void count_small(const geometry& geo, const Op& op, const cell_buffers& b,
                                              pipeline_state* state) {
     using core::triangle_class;
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    const bool valid = i < geo.num_primitives;
     triangle_class kind = triangle_class::drawn;
-    std::uint32_t n = 0;
+    std::uint32_t n = 0, of_line = 0; // cells
     bool bad = false;
     std::uint32_t discarded = 0;
+    const std::uint32_t id =
+        take_primitive(geo, op, i < geo.num_primitives ? static_cast<std::uint32_t>(i) : no_primitive,
+                       [&](const core::voxel_box& line) VOXELPIPE_INLINE_LAMBDA {
+                           of_line = 1;
+                           for (int k = 0; k < 3; ++k)
+                               of_line *= static_cast<std::uint32_t>(line.hi[k] - line.lo[k] + 1);
+                           b.counts[i] = of_line;
+                       });
+    const bool valid = id != no_primitive;
     if (valid) {
-        const auto id = static_cast<std::uint32_t>(i);
         const loaded_triangle t = geo.load(id);
         bad = !t.index_ok;
         if (!bad) {
@@ -127,12 +167,13 @@ __device__ VOXELPIPE_INLINE void count_small(const geometry& geo, const Op& op, 
                 }
             }
         }
-        b.counts[i] = n;
+        b.counts[id] = n;
     }
     if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, bad_index);
     if (op.counts_triangles) {
         const bool dropped = valid && !bad && kind != triangle_class::drawn;
-        const int drawn = __syncthreads_count(static_cast<int>(valid && !bad && !dropped));
+        const int drawn = __syncthreads_count(static_cast<int>(valid && !bad && !dropped)) +
+                          __syncthreads_count(static_cast<int>(of_line != 0));
         if (threadIdx.x == 0 && drawn != 0) atomicAdd(&state->drawn, static_cast<unsigned long long>(drawn));
         if (__syncthreads_or(static_cast<int>(dropped)) != 0) {
             const auto add = [&](triangle_class which, unsigned long long* total) {
@@ -145,7 +186,7 @@ __device__ VOXELPIPE_INLINE void count_small(const geometry& geo, const Op& op, 
             add(triangle_class::outside, &state->outside);
         }
     }
-    const unsigned long long sum = block_sum(n);
+    const unsigned long long sum = block_sum(n + of_line);
     if (threadIdx.x == 0 && sum != 0) atomicAdd(b.num_cells, sum);
     count_discarded(discarded, state);
 }
@@ -194,14 +235,20 @@ template <class Op>
 __device__ VOXELPIPE_INLINE void emit_small(const geometry& geo, const Op& op, const cell_buffers& b,
                                             const pipeline_state* state, const capacities& limits) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    if (i >= geo.num_primitives || has_failed(*state, limits) || b.counts[i] == 0) return;
-    const auto id = static_cast<std::uint32_t>(i);
+    if (has_failed(*state, limits)) return; // all threads
+    const bool has_cells = i < geo.num_primitives && b.counts[i] != 0;
+    const std::uint32_t id = take_primitive(geo, op, has_cells ? static_cast<std::uint32_t>(i) : no_primitive,
+                                            [&](const core::voxel_box& line) VOXELPIPE_INLINE_LAMBDA {
+                                                if constexpr (knows_lines<Op>)
+                                                    op.emit_line(static_cast<std::uint32_t>(i), line, b.offsets[i]);
+                                            });
+    if (id == no_primitive) return;
     const loaded_triangle t = geo.load(id);
     core::voxel_box reach{};
     (void)core::classify<Op::rule>(t.a, t.b, t.c, geo.snap.fraction, geo.whole_box(), reach);
     const core::voxel_box box = op.cells(reach);
     if (!is_small(box, Op::small_columns)) return;
-    op.emit(geo, t, id, box, true, b.offsets[i]);
+    op.emit(geo, t, id, box, true, b.offsets[id]);
 }
 
 // counts[i] is decremented to what remains of primitive i. A primitive's records take their offsets in any order: the
