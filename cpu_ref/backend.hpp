@@ -138,6 +138,12 @@ public:
                                           sparse_framebuffer<cpu_backend, Targets...>& out,
                                           const solid_options& options, std::uint64_t triangles_in) {
         return guarded(triangles_in, [&](const cpu::execution& how) {
+            if constexpr (core::is_constant<cpu::solid_shader_of<Draw>>)
+                if (core::makes_tiles(draws, options, out))
+                    return cpu::run_solid(
+                        how, draws, g, glm::ivec3(0), options, [&](const auto& sweep, const status& result) {
+                            return cpu::draw_solid_tiles(how, *this, sweep, draws, g, options, out, result);
+                        });
             const grid aligned = cpu::tile_aligned(g);
             const auto finish = [&](auto& sweep, const status& result) {
                 return cpu::draw_sparse_solid(how, *this, sweep, draws, g, options, out, result);

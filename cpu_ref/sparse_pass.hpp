@@ -13,6 +13,7 @@
 // Triangles are a source (surface_source), and so are solids (sparse_solid.hpp).
 
 #include <cpu_ref/sparse_tile.hpp>
+#include <voxelpipe/kept_tiles.hpp>
 
 #include <algorithm>
 #include <atomic>
@@ -153,11 +154,22 @@ inline void append_bits(std::uint32_t* to, std::uint64_t first, const std::uint3
     }
 }
 
-// Lists of consecutive stretches of tiles become the arrays of the result; each list is freed once it is copied.
+// Tiles of the framebuffer that stay: what bricks with these keys, list by list, have not taken.
+template <class Backend, class... Targets>
+[[nodiscard]] core::kept_tiles<Backend> find_kept_tiles(Backend& backend,
+                                                        const sparse_framebuffer<Backend, Targets...>& fb,
+                                                        const std::vector<std::vector<std::uint64_t>>& lists) {
+    std::vector<std::uint64_t> keys;
+    for (const auto& l : lists) keys.insert(keys.end(), l.begin(), l.end());
+    return core::keep_tiles(backend, fb.contents().tiles, keys.data(), keys.size());
+}
+
+// Lists of consecutive stretches of tiles become the arrays of the result, which has room for `num_tiles` values more;
+// each list is freed once it is copied.
 template <class Backend, class... Targets>
 [[nodiscard]] sparse_contents<Backend, Targets...>
 join_lists(const execution& how, Backend& backend, const sparse_plan<Targets...>& plan,
-           std::vector<std::unique_ptr<brick_list<Targets...>>>& lists) {
+           std::vector<std::unique_ptr<brick_list<Targets...>>>& lists, std::uint64_t num_tiles) {
     using contents = sparse_contents<Backend, Targets...>;
     struct place {
         std::uint64_t brick, voxel;
@@ -180,9 +192,10 @@ join_lists(const execution& how, Backend& backend, const sparse_plan<Targets...>
         const auto& t = get<I>(plan.targets);
         if (!t.enabled) return;
         get<I>(out.values) =
-            typename contents::template buffer<typename map::element>(backend, map::elements(total.voxel));
+            typename contents::template buffer<typename map::element>(backend, map::elements(total.voxel + num_tiles));
         if (t.keeps_sums)
-            get<I>(out.sums) = typename contents::template buffer<core::kept_sum<target>>(backend, total.voxel);
+            get<I>(out.sums) =
+                typename contents::template buffer<core::kept_sum<target>>(backend, total.voxel + num_tiles);
         if constexpr (map::is_bit) { // lists share words
             std::fill_n(get<I>(out.values).data(), get<I>(out.values).size(), 0u);
             for (std::size_t i = 0; i < lists.size(); ++i)
@@ -239,6 +252,8 @@ template <class Backend, class Source, class... Targets>
     const core::voxel_box drawn = part_of_aligned(g);
     const glm::ivec3 corner = tile_aligned(g).offset / tile_size;
     std::atomic<std::uint64_t> bricks{0}, voxels{0};
+    const bool has_tiles = plan.keeps_voxels && fb.num_tiles() != 0;
+    std::vector<std::vector<std::uint64_t>> keys(has_tiles ? lists.size() : 0); // of bricks
     {
         const stopwatch watch(how.times, &stage_times::fine_raster);
         progress_meter meter(how, tiles.size());
@@ -254,17 +269,23 @@ template <class Backend, class Source, class... Targets>
                 mine.begin(lowest(box) - low);
                 if (tile.first_brick != tile.last_brick)
                     mine.take_over(fb.contents(), tile.first_brick, tile.last_brick);
+                if (tile.source != sparse_tile::none && has_tiles) mine.take_over_tiles(fb.contents(), tile.key);
                 if (tile.source != sparse_tile::none)
                     source.draw(tile.source, box, keeps_sums, of_source[worker].get(), mine);
                 mine.pack_bricks(tile.key);
                 meter.advance();
             }
             const std::uint64_t b = bricks += mine.found.keys.size(), v = voxels += mine.found.num_voxels;
+            if (has_tiles) keys[l] = mine.found.keys;
             // Beyond the limits only the need is counted.
             if (b <= fb.limits().bricks && v <= fb.limits().voxels)
                 lists[l] = std::make_unique<brick_list<Targets...>>(mine.found);
         });
     }
+    core::kept_tiles<Backend> kept(backend);
+    if (has_tiles) kept = find_kept_tiles(backend, fb, keys);
+    bricks += kept.size();
+    voxels += kept.size();
     if (bricks > fb.limits().bricks || voxels > fb.limits().voxels) {
         status failed = core::failure(status_code::capacity_exceeded, stage::fine_raster);
         failed.counts.triangles_in = result.counts.triangles_in;
@@ -284,7 +305,9 @@ template <class Backend, class Source, class... Targets>
     scratch.clear();
     const stopwatch watch(how.times, &stage_times::tile_resolve);
     how.enter(stage::tile_resolve);
-    fb.take(join_lists(how, backend, plan, lists), g);
+    sparse_contents<Backend, Targets...> made = join_lists(how, backend, plan, lists, kept.size());
+    core::store_kept_tiles(backend, fb, kept, made);
+    fb.take(std::move(made), g);
     return result;
 }
 

@@ -4,12 +4,15 @@
 
 // Solids into sparse framebuffers: the rows of a solid, tile by tile, as a source of fragments for sparse_pass.hpp. One
 // sweep over all rows finds the tiles that have voxels and counts; a tile is then drawn from the crossings of its beam,
-// those before it included. Beside the result, memory is in proportion to the crossings and the tiles.
+// those before it included. Beside the result, memory is in proportion to the crossings and the tiles. Calls that make
+// tiles (solid_bricks.hpp) need the rows alone, as runs.
 
 #include <cpu_ref/solid.hpp>
 #include <cpu_ref/sparse_pass.hpp>
+#include <voxelpipe/solid_bricks.hpp>
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -172,6 +175,95 @@ private:
     std::vector<solid_tile> tiles_;
     bool all_same_ = false;
 };
+
+// The rows of one thread as runs of voxels that lie in any body.
+class run_sink final : public row_sink {
+public:
+    // `g`: the grid that is swept.
+    explicit run_sink(const grid& g) : offset_(g.offset), touched_((static_cast<std::size_t>(g.extent.x) + 31) / 32) {}
+    void add(const row_of_body& r) override {
+        for (std::size_t i = r.first_word; i <= r.last_word; ++i) {
+            touched_[i] |= r.mask[i];
+            counts.fragments += static_cast<unsigned>(std::popcount(r.mask[i]));
+        }
+        first_ = std::min(first_, r.first_word);
+        last_ = std::max(last_, r.last_word);
+    }
+    void end_row(int y, int z) override {
+        const std::size_t before = bounds.size();
+        bool is_in = false;
+        const auto begin = static_cast<std::uint32_t>(offset_.x);
+        for (std::size_t i = first_; i <= last_ && i < touched_.size(); ++i) {
+            const std::uint32_t word = touched_[i];
+            touched_[i] = 0;
+            counts.voxels += static_cast<unsigned>(std::popcount(word));
+            // A bit where a run begins or ends.
+            for (std::uint32_t ends = word ^ (word << 1 | (is_in ? 1u : 0u)); ends != 0; ends &= ends - 1)
+                bounds.push_back(begin + static_cast<std::uint32_t>(i) * 32 +
+                                 static_cast<std::uint32_t>(std::countr_zero(ends)));
+            is_in = (word >> 31) != 0;
+        }
+        if (is_in) bounds.push_back(begin + static_cast<std::uint32_t>(last_ + 1) * 32);
+        first_ = touched_.size();
+        last_ = 0;
+        if (bounds.size() == before) return;
+        places.push_back(core::morton_key(0, y + offset_.y, z + offset_.z));
+        ends.push_back(bounds.size());
+    }
+
+    std::vector<std::uint64_t> places, ends; // of rows; where their bounds end
+    std::vector<std::uint32_t> bounds;
+    counters counts{};
+
+private:
+    glm::ivec3 offset_;
+    std::vector<std::uint32_t> touched_;
+    std::size_t first_ = touched_.size(), last_ = 0; // words that may be touched
+};
+
+// A call that makes_tiles. `sweep` is over g.
+template <class Backend, class Crossing, class Draw, class... Targets>
+[[nodiscard]] status draw_solid_tiles(const execution& how, Backend& backend, const solid_sweep<Crossing>& sweep,
+                                      std::span<const Draw> draws, const grid& g, const solid_options& options,
+                                      sparse_framebuffer<Backend, Targets...>& fb, status result) {
+    how.enter(stage::fine_raster);
+    const auto workers = std::max<std::size_t>(1, std::min<std::size_t>(how.threads, sweep.num_beams()));
+    std::vector<std::unique_ptr<row_scratch>> scratch;
+    std::vector<std::unique_ptr<run_sink>> sinks;
+    for (std::size_t w = 0; w < workers; ++w) {
+        scratch.push_back(sweep.make_scratch());
+        sinks.push_back(std::make_unique<run_sink>(g));
+    }
+    sweep_all(how, sweep, sinks, scratch, result);
+    std::size_t rows = 0, bounds = 0;
+    for (const auto& s : sinks) {
+        rows += s->places.size();
+        bounds += s->bounds.size();
+        result.counts.fragments += s->counts.fragments;
+        result.counts.voxels += s->counts.voxels;
+    }
+    if (!options.count_voxels) result.counts.voxels = 0;
+    const stopwatch watch(how.times, &stage_times::tile_resolve);
+    how.enter(stage::tile_resolve);
+    core::found_rows<Backend> found(backend);
+    found.places = typename Backend::template buffer<std::uint64_t>(backend, rows);
+    found.runs.first = typename Backend::template buffer<std::uint64_t>(backend, rows + 1);
+    found.runs.bounds = typename Backend::template buffer<std::uint32_t>(backend, bounds);
+    std::size_t row = 0, bound = 0;
+    for (auto& s : sinks) {
+        std::copy(s->places.begin(), s->places.end(), found.places.data() + row);
+        std::copy(s->bounds.begin(), s->bounds.end(), found.runs.bounds.data() + bound);
+        std::uint64_t begin = 0;
+        for (const std::uint64_t end : s->ends) {
+            found.runs.first.data()[row++] = bound + begin;
+            begin = end;
+        }
+        bound += s->bounds.size();
+        s.reset();
+    }
+    found.runs.first.data()[row] = bound;
+    return core::store_solid_rows(backend, draws, g, std::move(found), result, fb);
+}
 
 // `sweep` is over tile_aligned(g).
 template <class Backend, class Crossing, class Draw, class... Targets>

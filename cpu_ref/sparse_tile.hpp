@@ -120,6 +120,23 @@ public:
         }
     }
 
+    // The same for tiles of earlier contents that reach into this one.
+    template <class Contents>
+    void take_over_tiles(const Contents& from, std::uint64_t tile_key) {
+        const std::uint64_t first = tile_key * tile_bricks;
+        for (unsigned b = 0; b < tile_bricks; ++b) {
+            const std::uint64_t tile = core::find_tile(from.tiles.data(), from.tiles.size(), first + b);
+            if (tile == from.tiles.size()) continue;
+            in_tile_ |= std::uint64_t{1} << b;
+            for (unsigned w = 0; w < 8; ++w) existed_[8 * b + w] = ~std::uint64_t{0};
+            for_each_cell(b, [&]<std::size_t I>(std::size_t cell) {
+                using map = core::rank_map<target<I>>;
+                if (get<I>(plan_.targets).load != load_operation::clear)
+                    store<I>(cell, map::load(get<I>(from.values).data(), from.num_voxels + tile));
+            });
+        }
+    }
+
     // Before a constant shader's fragments are counted a voxel.
     void count_repeats() {
         if (constant.repeats == nullptr) constant.repeats = std::make_unique<std::uint32_t[]>(tile_voxels);
@@ -140,12 +157,17 @@ public:
         cells_.clear();
         for (unsigned b = 0; b < tile_bricks; ++b) {
             brick_mask mask;
-            std::uint64_t any = 0;
+            std::uint64_t any = 0, any_drawn = 0;
             for (unsigned w = 0; w < 8; ++w) {
                 mask.words[w] = drawn_[8 * b + w] | existed_[8 * b + w];
                 any |= mask.words[w];
+                any_drawn |= drawn_[8 * b + w];
             }
             if (any == 0) continue;
+            if (any_drawn == 0 && (in_tile_ >> b & 1u) != 0) { // stays in its tile
+                for_each_cell(b, [&]<std::size_t I>(std::size_t cell) { store<I>(cell, start<I>()); });
+                continue;
+            }
             found.keys.push_back(tile_key * tile_bricks + b);
             found.masks.push_back(mask);
             for (unsigned w = 0; w < 8; ++w)
@@ -158,11 +180,23 @@ public:
         found.num_voxels += cells_.size();
         drawn_.fill(0);
         if (plan_.keeps_voxels) existed_.fill(0);
+        in_tile_ = 0;
     }
 
 private:
     template <std::size_t I>
     using target = typename core::pack_element<I, Targets...>::type;
+
+    // Calls f.operator()<I>(cell) for the voxels of a brick and the targets that are enabled.
+    template <class F>
+    void for_each_cell(unsigned brick, const F& f) {
+        for (unsigned i = 0; i < 512; ++i) {
+            const std::size_t cell = cell_of(8 * brick + i / 64, i % 64);
+            core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+                if (get<I>(plan_.targets).enabled) f.template operator()<I>(cell);
+            });
+        }
+    }
 
     // Marks the voxels that keep a fragment: `touched` has tile_rows rows of bits.
     void mark(const std::uint32_t* touched) {
@@ -255,6 +289,7 @@ private:
     core::pack<memory<Targets>...> memory_;
     glm::ivec3 lead_{0};
     tile_mask drawn_{}, existed_{}; // that keep a fragment of this call, and that did before
+    std::uint64_t in_tile_ = 0;     // bricks that tiles have so far
     std::vector<place> cells_;      // of the voxels that exist, in Morton order
 };
 

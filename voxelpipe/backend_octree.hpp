@@ -93,6 +93,66 @@ struct count_parents {
         is_first[i] = i < count && (i == 0 || keys[i] >> 3 != keys[i - 1] >> 3) ? 1 : 0;
     }
 };
+// 1 for tiles of a level; the last count is 0.
+struct count_tiles {
+    brick_table table;
+    int level;
+    std::uint32_t* is_of_level;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        is_of_level[i] = i < table.num_tiles && table.tiles[i].level() == level ? 1 : 0;
+    }
+};
+// A level's nodes, as arrays that someone owns.
+struct octree_level {
+    std::uint64_t* keys;
+    std::uint8_t* masks;
+    std::uint64_t* first;
+};
+struct const_octree_level {
+    const std::uint64_t* keys;
+    const std::uint8_t* masks;
+    const std::uint64_t* first;
+};
+// The tiles of a level as nodes.
+struct list_tiles {
+    brick_table table;
+    int level;
+    std::uint64_t first_rank;   // of tiles
+    const std::uint64_t* place; // of each tile among those of the level
+    octree_level to;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (table.tiles[i].level() != level) return;
+        to.keys[place[i]] = table.tiles[i].first() >> (3 * level);
+        to.masks[place[i]] = 0;
+        to.first[place[i]] = first_rank + i;
+    }
+};
+// Two lists of a level's nodes, each by its keys, into one.
+struct merge_nodes {
+    const_octree_level one, other;
+    std::uint64_t num_one, num_other;
+    octree_level to;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const bool is_one = i < num_one;
+        const const_octree_level& from = is_one ? one : other;
+        const std::uint64_t n = is_one ? i : i - num_one, key = from.keys[n];
+        const std::uint64_t* const keys = is_one ? other.keys : one.keys;
+        std::uint64_t first = 0, last = is_one ? num_other : num_one; // no key is in both
+        while (first < last) {
+            const std::uint64_t middle = first + (last - first) / 2;
+            if (keys[middle] < key)
+                first = middle + 1;
+            else
+                last = middle;
+        }
+        to.keys[n + first] = key;
+        to.masks[n + first] = from.masks[n];
+        to.first[n + first] = from.first[n];
+    }
+};
 // The parents, each by its first child.
 struct make_parents {
     const std::uint64_t* keys;
@@ -123,25 +183,23 @@ public:
     template <class T>
     using buffer = typename Backend::template buffer<T>;
 
-    // Of bricks in memory of the backend, up to the least root that holds the whole grid; no level where no voxel
-    // exists. Fewer than 2^32 - 1 bricks; throws std::length_error otherwise, and what a buffer throws. Waits once a
-    // level.
+    // Of bricks and tiles in memory of the backend, up to the least root that holds the whole grid; no level where no
+    // voxel exists. Fewer than 2^32 - 1 bricks; throws std::length_error otherwise, and what a buffer throws. Waits
+    // once a level.
     backend_octree(Backend& backend, const brick_table& table, const glm::ivec3& whole_extent) {
         if (table.count >= max_bricks) throw std::length_error("voxelpipe: an octree takes fewer than 2^32 - 1 bricks");
-        if (table.count != 0) build(backend, table, whole_extent);
+        if (table.count != 0 || table.num_tiles != 0) build(backend, table, whole_extent);
     }
     // Of what the framebuffer holds now.
     template <class... Targets>
     backend_octree(Backend& backend, const sparse_framebuffer<Backend, Targets...>& fb)
-        : backend_octree(backend, fb.view().table, fb.where().whole_extent()) {
-        num_voxels_ = fb.num_voxels();
-    }
+        : backend_octree(backend, fb.view().table, fb.where().whole_extent()) {}
 
     // Levels above the voxels; 0 if there are none.
     [[nodiscard]] int num_levels() const { return static_cast<int>(masks_.size()); }
-    // A level, from 0 on; level 0 of a framebuffer or of bricks that the constructor read.
+    // A level, from 0 on; level 0 as octree's.
     [[nodiscard]] std::uint64_t num_nodes(int level) const {
-        return level == 0 ? num_voxels_ : masks_[static_cast<std::size_t>(level) - 1].size();
+        return level == 0 ? num_values_ : masks_[static_cast<std::size_t>(level) - 1].size();
     }
     // Bytes that the nodes take.
     [[nodiscard]] std::uint64_t num_bytes() const {
@@ -170,7 +228,7 @@ public:
     // Copies everything, then waits.
     [[nodiscard]] octree to_host(Backend& backend) const {
         octree tree;
-        tree.num_voxels_ = num_voxels_;
+        tree.num_values_ = num_values_;
         for (std::size_t l = 0; l < masks_.size(); ++l)
             tree.levels_.push_back({masks_[l].to_host(backend), first_[l].to_host(backend)});
         return tree;
@@ -183,9 +241,46 @@ private:
         masks_.emplace_back(backend, static_cast<std::size_t>(nodes));
         first_.emplace_back(backend, static_cast<std::size_t>(nodes));
     }
+    // Nodes of a level with their keys.
+    struct keyed_nodes {
+        buffer<std::uint64_t> keys;
+        buffer<std::uint8_t> masks;
+        buffer<std::uint64_t> first;
+
+        keyed_nodes(Backend& backend, std::uint64_t n)
+            : keys(backend, static_cast<std::size_t>(n)), masks(backend, static_cast<std::size_t>(n)),
+              first(backend, static_cast<std::size_t>(n)) {}
+        [[nodiscard]] core::octree_level arrays() { return {keys.data(), masks.data(), first.data()}; }
+    };
+    // Makes the last level that level's nodes and the tiles of as many bricks a side; `keys` are those of the level.
+    void merge_tiles(Backend& backend, const brick_table& table, int log2_bricks, const std::uint64_t*& keys,
+                     buffer<std::uint64_t>& kept_keys, std::uint64_t& count) {
+        if (table.num_tiles == 0) return;
+        const auto all = static_cast<std::size_t>(table.num_tiles);
+        buffer<std::uint32_t> is_of_level(backend, all + 1);
+        buffer<std::uint64_t> place(backend, all + 1);
+        backend.for_each(all + 1, core::count_tiles{table, log2_bricks, is_of_level.data()});
+        const std::uint64_t tiles = backend.sum(is_of_level, place);
+        if (tiles == 0) return;
+        keyed_nodes of_tiles(backend, tiles), merged(backend, count + tiles);
+        backend.for_each(
+            all, core::list_tiles{table, log2_bricks, num_values_ - table.num_tiles, place.data(), of_tiles.arrays()});
+        backend.for_each(count + tiles,
+                         core::merge_nodes{{keys, masks_.back().data(), first_.back().data()},
+                                           {of_tiles.keys.data(), of_tiles.masks.data(), of_tiles.first.data()},
+                                           count,
+                                           tiles,
+                                           merged.arrays()});
+        masks_.back() = std::move(merged.masks);
+        first_.back() = std::move(merged.first);
+        kept_keys = std::move(merged.keys);
+        keys = kept_keys.data();
+        count += tiles;
+    }
     void build(Backend& backend, const brick_table& table, const glm::ivec3& whole_extent) {
         const auto bricks = static_cast<std::size_t>(table.count);
-        num_voxels_ = backend.read(backend_view<const std::uint64_t>{table.offsets + bricks, 1})[0];
+        num_values_ = table.num_tiles;
+        if (bricks != 0) num_values_ += backend.read(backend_view<const std::uint64_t>{table.offsets + bricks, 1})[0];
         buffer<std::uint32_t> counts(backend, bricks + 1);
         {
             buffer<std::uint32_t> words(backend, bricks + 1);
@@ -204,6 +299,7 @@ private:
         buffer<std::uint64_t> below(backend, std::size_t{0});
         const std::uint64_t* keys = table.keys;
         std::uint64_t count = bricks;
+        merge_tiles(backend, table, 0, keys, below, count);
         for (int l = 4; l <= core::octree_depth(whole_extent); ++l) {
             const auto n = static_cast<std::size_t>(count);
             if (counts.size() != n + 1) counts = buffer<std::uint32_t>(backend, n + 1);
@@ -217,12 +313,13 @@ private:
             below = std::move(above);
             keys = below.data();
             count = parents;
+            merge_tiles(backend, table, l - 3, keys, below, count);
         }
     }
 
     std::vector<buffer<std::uint8_t>> masks_;
     std::vector<buffer<std::uint64_t>> first_;
-    std::uint64_t num_voxels_ = 0;
+    std::uint64_t num_values_ = 0;
 };
 template <class Backend, class... Targets>
 backend_octree(Backend&, const sparse_framebuffer<Backend, Targets...>&) -> backend_octree<Backend>;
@@ -251,7 +348,7 @@ template <std::size_t I, class Reducer, class Backend, class... Targets>
 [[nodiscard]] auto reduce_levels(Backend& backend, const backend_octree<Backend>& tree,
                                  const sparse_framebuffer<Backend, Targets...>& fb, const Reducer& reducer) {
     const auto& arrays = fb.contents();
-    if (fb.num_voxels() != tree.num_nodes(0) || (fb.num_voxels() != 0 && get<I>(arrays.values).size() == 0))
+    if (fb.num_values() != tree.num_nodes(0) || (fb.num_values() != 0 && get<I>(arrays.values).size() == 0))
         throw std::invalid_argument(
             "voxelpipe::reduce_levels: the octree is of other voxels, or the target is disabled");
     if constexpr (core::sums_terms<Reducer>) {

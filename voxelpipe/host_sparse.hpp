@@ -61,6 +61,16 @@ template <class Target>
 
 } // namespace core
 
+// Calls f(glm::ivec3 voxel, std::uint64_t rank) for the voxels of a tile of a host table, in Morton order: one rank for
+// all. Voxels are numbered from the corner of the part.
+template <class F>
+void for_each_voxel_in_tile(const brick_table& table, std::uint64_t tile, F&& f) {
+    const brick_tile t = table.tiles[tile];
+    const glm::ivec3 origin = t.origin() - table.offset;
+    const std::uint64_t rank = table.num_in_bricks() + tile;
+    for (std::uint64_t i = 0; i < t.num_voxels(); ++i) f(origin + core::morton_position(i), rank);
+}
+
 // Calls f(glm::ivec3 voxel, std::uint64_t rank) for each voxel that exists in a brick of a host table, in Morton order.
 // Voxels are numbered from the corner of the part.
 template <class F>
@@ -70,6 +80,17 @@ void for_each_voxel_in(const brick_table& table, std::uint64_t brick, F&& f) {
     for (unsigned w = 0; w < 8; ++w)
         for (std::uint64_t word = table.masks[brick].words[w]; word != 0; word &= word - 1)
             f(origin + core::morton_position(64 * w + static_cast<unsigned>(std::countr_zero(word))), rank++);
+}
+
+// Calls brick(number) and tile(number) for those of a host table, in the Morton order of their voxels.
+template <class Brick, class Tile>
+void for_each_brick_and_tile(const brick_table& table, Brick&& brick, Tile&& tile) {
+    std::uint64_t t = 0;
+    for (std::uint64_t b = 0; b < table.count; ++b) {
+        for (; t < table.num_tiles && table.tiles[t].first() < table.keys[b]; ++t) tile(t);
+        brick(b);
+    }
+    for (; t < table.num_tiles; ++t) tile(t);
 }
 
 // A copy of a sparse framebuffer in host memory; to be had from sparse_framebuffer::to_host.
@@ -83,6 +104,7 @@ public:
     std::vector<std::uint64_t> keys;    // the arrays of brick_table
     std::vector<brick_mask> masks;      // voxels that exist, per brick
     std::vector<std::uint64_t> offsets; // rank of each brick's first voxel, and the number of all
+    std::vector<brick_tile> tiles;      // cubes of bricks of one value, whose ranks follow
     core::pack<std::vector<typename core::rank_map<Targets>::element>...> values; // by rank; none of a disabled target
     core::pack<std::vector<core::kept_sum<Targets>>...> sums;                     // by rank, where they were kept
     core::pack<typename Targets::value_type...> clear_values{};                   // what absent voxels read as
@@ -90,10 +112,15 @@ public:
 
     // Refers to the arrays.
     [[nodiscard]] brick_table table() const {
-        return {keys.data(), masks.data(), offsets.data(), keys.size(), where.extent, where.offset};
+        return {keys.data(),  masks.data(), offsets.data(), keys.size(),
+                where.extent, where.offset, tiles.data(),   tiles.size()};
     }
-    [[nodiscard]] std::uint64_t num_bricks() const { return keys.size(); }          // Bricks with a voxel.
-    [[nodiscard]] std::uint64_t num_voxels() const { return table().num_voxels(); } // Voxels that exist.
+    [[nodiscard]] std::uint64_t num_bricks() const { return keys.size(); } // Bricks with a voxel.
+    [[nodiscard]] std::uint64_t num_tiles() const { return tiles.size(); } // Cubes of full bricks, of solids.
+    // Voxels that exist, those of tiles among them.
+    [[nodiscard]] std::uint64_t num_voxels() const { return table().num_voxels(); }
+    // Values of a target: one for each voxel that exists in a brick, and one for each tile.
+    [[nodiscard]] std::uint64_t num_values() const { return (offsets.empty() ? 0 : offsets.back()) + tiles.size(); }
     // Whether a voxel exists, numbered from the corner of the part; false outside.
     [[nodiscard]] bool contains(const glm::ivec3& voxel) const { return table().find(voxel) != brick_table::none; }
 
@@ -127,11 +154,26 @@ public:
     };
     [[nodiscard]] brick_range bricks() const { return brick_range(*this); } // All bricks.
 
-    // Calls f(glm::ivec3 voxel, std::uint64_t rank) for every voxel that exists, in Morton order.
+    // One tile: where it lies, its voxels a side, and the rank of its value.
+    struct tile_entry {
+        glm::ivec3 origin; // its first voxel, from the corner of the part
+        int side;
+        std::uint64_t rank;
+    };
+    // Tile i in Morton order, 0 <= i < num_tiles().
+    [[nodiscard]] tile_entry tile(std::uint64_t i) const {
+        VOXELPIPE_EXPECTS(i < num_tiles());
+        return {tiles[i].origin() - where.offset, tiles[i].side(), (offsets.empty() ? 0 : offsets.back()) + i};
+    }
+
+    // Calls f(glm::ivec3 voxel, std::uint64_t rank) for every voxel that exists, in Morton order. Those of a tile have
+    // the tile's rank.
     template <class F>
     void for_each_voxel(F&& f) const {
         const brick_table t = table();
-        for (std::uint64_t b = 0; b < t.count; ++b) for_each_voxel_in(t, b, f);
+        for_each_brick_and_tile(
+            t, [&](std::uint64_t b) { for_each_voxel_in(t, b, f); },
+            [&](std::uint64_t i) { for_each_voxel_in_tile(t, i, f); });
     }
 
     // One target: vp::get<I>(host). Refers to the host_sparse.
@@ -145,7 +187,7 @@ public:
 
         // The value of a voxel that exists. The target is not disabled.
         [[nodiscard]] value_type operator[](std::uint64_t rank) const {
-            VOXELPIPE_EXPECTS(rank < owner_.num_voxels());
+            VOXELPIPE_EXPECTS(rank < owner_.num_values());
             return core::rank_map<target>::load(get<I>(owner_.values).data(), rank);
         }
         // The value of any voxel of the part: the clear value, where it does not exist.
@@ -154,7 +196,7 @@ public:
             return rank == brick_table::none ? get<I>(owner_.clear_values) : (*this)[rank];
         }
         // False if the framebuffer was made without the target.
-        [[nodiscard]] bool enabled() const { return owner_.num_voxels() == 0 || !get<I>(owner_.values).empty(); }
+        [[nodiscard]] bool enabled() const { return owner_.num_values() == 0 || !get<I>(owner_.values).empty(); }
 
         // The dense target: the same elements as a dense framebuffer's. Throws std::length_error where it cannot be
         // addressed.
@@ -181,6 +223,13 @@ public:
                 for (int y = begin.y; y < end.y; ++y)
                     for (int x = begin.x; x < end.x; ++x) region.store(x, y, z, get<I>(owner_.clear_values));
             const brick_table t = owner_.table();
+            for (std::uint64_t i = 0; i < t.num_tiles; ++i) {
+                const tile_entry tile = owner_.tile(i);
+                const glm::ivec3 low = glm::max(tile.origin, begin), high = glm::min(tile.origin + tile.side, end);
+                for (int z = low.z; z < high.z; ++z)
+                    for (int y = low.y; y < high.y; ++y)
+                        for (int x = low.x; x < high.x; ++x) region.store(x, y, z, (*this)[tile.rank]);
+            }
             const auto visit = [&](std::uint64_t b) {
                 for_each_voxel_in(t, b, [&](const glm::ivec3& v, std::uint64_t rank) {
                     if (v.x >= begin.x && v.y >= begin.y && v.z >= begin.z && v.x < end.x && v.y < end.y && v.z < end.z)
@@ -212,11 +261,11 @@ template <std::size_t I, class... Targets>
     return typename host_sparse<Targets...>::template target_reference<I>(h);
 }
 
-// Whether two hold the same bits: bricks, voxels and the values of all targets. Where they lie in space and what absent
-// voxels read as is not compared. Values that are structs need an operator==.
+// Whether two hold the same bits: bricks, tiles, voxels and the values of all targets. Where they lie in space and what
+// absent voxels read as is not compared. Values that are structs need an operator==.
 template <class... Targets>
 [[nodiscard]] bool same_contents(const host_sparse<Targets...>& a, const host_sparse<Targets...>& b) {
-    bool same = a.keys == b.keys && a.masks == b.masks && a.offsets == b.offsets;
+    bool same = a.keys == b.keys && a.masks == b.masks && a.offsets == b.offsets && a.tiles == b.tiles;
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
         const auto &x = get<I>(a.values), &y = get<I>(b.values);
         same = same && x.size() == y.size();
@@ -227,6 +276,7 @@ template <class... Targets>
 
 // Joins the results of two parts of one grid: crops, whose borders may run through bricks. Both have the same targets
 // enabled and no voxel in common; throws std::invalid_argument otherwise. The result's part is the box around both.
+// Tiles stay as they are: those that meet at a border are not joined.
 template <class... Targets>
 [[nodiscard]] host_sparse<Targets...> merge(const host_sparse<Targets...>& a, const host_sparse<Targets...>& b) {
     if (a.where.uncropped() != b.where.uncropped())
@@ -236,15 +286,15 @@ template <class... Targets>
     const glm::ivec3 low = glm::min(a.where.offset, b.where.offset),
                      high = glm::max(a.where.offset + a.where.extent, b.where.offset + b.where.extent);
     out.where = a.where.uncropped().crop(low, high - low);
-    const std::uint64_t voxels = a.num_voxels() + b.num_voxels();
+    const std::uint64_t values = a.num_values() + b.num_values();
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
         using target = typename core::pack_element<I, Targets...>::type;
-        if (a.num_voxels() != 0 && b.num_voxels() != 0 &&
+        if (a.num_values() != 0 && b.num_values() != 0 &&
             (get<I>(a.values).empty() != get<I>(b.values).empty() || get<I>(a.sums).empty() != get<I>(b.sums).empty()))
             throw std::invalid_argument("voxelpipe::merge: the parts have different targets");
         if (!get<I>(a.values).empty() || !get<I>(b.values).empty())
-            get<I>(out.values).resize(core::rank_map<target>::elements(voxels));
-        if (!get<I>(a.sums).empty() || !get<I>(b.sums).empty()) get<I>(out.sums).resize(voxels);
+            get<I>(out.values).resize(core::rank_map<target>::elements(values));
+        if (!get<I>(a.sums).empty() || !get<I>(b.sums).empty()) get<I>(out.sums).resize(values);
     });
     std::uint64_t rank = 0;
     const auto copy = [&](const host_sparse<Targets...>& from, std::uint64_t first, std::uint64_t to) {
@@ -278,6 +328,14 @@ template <class... Targets>
         j += from_b ? 1 : 0;
     }
     if (!out.keys.empty()) out.offsets.push_back(rank);
+    for (std::size_t i = 0, j = 0; i < a.tiles.size() || j < b.tiles.size();) {
+        const bool from_a = j == b.tiles.size() || (i < a.tiles.size() && a.tiles[i].bits < b.tiles[j].bits);
+        const host_sparse<Targets...>& from = from_a ? a : b;
+        std::size_t& tile = from_a ? i : j;
+        out.tiles.push_back(from.tiles[tile]);
+        copy(from, from.num_values() - from.tiles.size() + tile, rank++);
+        ++tile;
+    }
     return out;
 }
 

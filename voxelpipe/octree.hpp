@@ -38,7 +38,8 @@ namespace core {
 } // namespace core
 
 // Owns its nodes: 9 bytes each. Level l of 1 .. num_levels() has nodes of 2^l voxels a side, the last one the root
-// alone; level 0 are the voxels. Places count in the whole grid.
+// alone; level 0 are the voxels. Places count in the whole grid. A tile is one node without children, and nothing below
+// it is there.
 class octree {
 public:
     octree() = default;
@@ -49,9 +50,9 @@ public:
 
     // Levels above the voxels; 0 if there are none.
     [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); }
-    // A level, from 0 on.
+    // A level, from 0 on. Level 0 counts values: the voxels in bricks, and the tiles, whose ranks follow.
     [[nodiscard]] std::uint64_t num_nodes(int level) const {
-        return level == 0 ? num_voxels_ : levels_[static_cast<std::size_t>(level) - 1].masks.size();
+        return level == 0 ? num_values_ : levels_[static_cast<std::size_t>(level) - 1].masks.size();
     }
     // Bytes that the nodes take.
     [[nodiscard]] std::uint64_t num_bytes() const {
@@ -59,7 +60,8 @@ public:
         for (const auto& l : levels_) count += l.masks.size();
         return count * (sizeof(std::uint8_t) + sizeof(std::uint64_t));
     }
-    // Bit c of a node's mask: its child of Morton number c exists. first: the number of the first that does.
+    // Bit c of a node's mask: its child of Morton number c exists. first: the number of the first that does. The mask
+    // of a tile is 0, and its first the rank of its value.
     [[nodiscard]] std::span<const std::uint8_t> masks(int level) const {
         return levels_[static_cast<std::size_t>(level) - 1].masks;
     }
@@ -83,7 +85,8 @@ public:
         return view().first_hit(origin, direction, limit);
     }
 
-    // Calls f(glm::ivec3 place, n) for every node of a level, in order; the node's first voxel is place << level.
+    // Calls f(glm::ivec3 place, n) for every node of a level, in order; the node's first voxel is place << level. Not
+    // for what lies in tiles above that level.
     template <class F>
     void for_each_node(int level, F&& f) const {
         if (num_levels() != 0) visit(num_levels(), 0, 0, level, f);
@@ -114,12 +117,18 @@ private:
             visit(at - 1, child++, key << 3 | static_cast<unsigned>(std::countr_zero(mask)), level, f);
     }
 
+    // Adds the node of a tile.
+    static void add_tile(nodes& level, std::uint64_t rank) {
+        level.masks.push_back(0);
+        level.first.push_back(rank);
+    }
     void build(const brick_table& table, const glm::ivec3& whole_extent) {
-        num_voxels_ = table.num_voxels();
-        if (table.count == 0) return;
+        num_values_ = table.num_values();
+        if (num_values_ == 0) return;
         levels_.resize(static_cast<std::size_t>(core::octree_depth(whole_extent)));
+        std::vector<std::uint64_t> keys, above; // of the nodes of a level
         // A brick is a node of level 3. Its mask has a word for each child and a byte for each grandchild.
-        for (std::uint64_t b = 0; b < table.count; ++b) {
+        const auto add_brick = [&](std::uint64_t b) {
             std::uint64_t rank = table.offsets[b];
             unsigned words = 0;
             levels_[2].first.push_back(levels_[1].masks.size());
@@ -140,24 +149,42 @@ private:
                 levels_[1].masks.push_back(static_cast<std::uint8_t>(bytes));
             }
             levels_[2].masks.push_back(static_cast<std::uint8_t>(words));
-        }
-        std::vector<std::uint64_t> keys(table.keys, table.keys + table.count), above;
-        for (std::size_t l = 3; l < levels_.size(); ++l) {
+            keys.push_back(table.keys[b]);
+        };
+        for_each_brick_and_tile(table, add_brick, [&](std::uint64_t t) {
+            if (table.tiles[t].level() != 0) return;
+            add_tile(levels_[2], table.num_in_bricks() + t);
+            keys.push_back(table.tiles[t].first());
+        });
+        for (int l = 3; l < num_levels(); ++l) {
+            nodes& level = levels_[static_cast<std::size_t>(l)];
             above.clear();
-            for (std::uint64_t i = 0; i < keys.size(); ++i) {
-                if (above.empty() || above.back() != keys[i] >> 3) {
-                    above.push_back(keys[i] >> 3);
-                    levels_[l].masks.push_back(0);
-                    levels_[l].first.push_back(i);
+            std::uint64_t t = 0;
+            // The level's tiles before a key.
+            const auto add_tiles = [&](std::uint64_t key) {
+                for (; t < table.num_tiles && table.tiles[t].first() >> (3 * (l - 2)) < key; ++t) {
+                    if (table.tiles[t].level() != l - 2) continue;
+                    above.push_back(table.tiles[t].first() >> (3 * (l - 2)));
+                    add_tile(level, table.num_in_bricks() + t);
                 }
-                levels_[l].masks.back() |= static_cast<std::uint8_t>(1u << (keys[i] & 7u));
+            };
+            for (std::uint64_t i = 0; i < keys.size(); ++i) {
+                const std::uint64_t parent = keys[i] >> 3;
+                if (i == 0 || keys[i - 1] >> 3 != parent) {
+                    add_tiles(parent);
+                    above.push_back(parent);
+                    level.masks.push_back(0);
+                    level.first.push_back(i);
+                }
+                level.masks.back() |= static_cast<std::uint8_t>(1u << (keys[i] & 7u));
             }
+            add_tiles(~std::uint64_t{0});
             keys.swap(above);
         }
     }
 
     std::vector<nodes> levels_;
-    std::uint64_t num_voxels_ = 0;
+    std::uint64_t num_values_ = 0;
 };
 
 // The values of a target on every level of an octree: at(level)[node], levels from 1 on.
@@ -179,7 +206,7 @@ private:
 // doubles.
 template <std::size_t I, class Reducer, class... Targets>
 [[nodiscard]] auto reduce_levels(const octree& tree, const host_sparse<Targets...>& host, const Reducer& reducer) {
-    if (host.num_voxels() != tree.num_nodes(0) || !get<I>(host).enabled())
+    if (host.num_values() != tree.num_nodes(0) || !get<I>(host).enabled())
         throw std::invalid_argument(
             "voxelpipe::reduce_levels: the octree is of other voxels, or the target is disabled");
     if constexpr (core::sums_terms<Reducer>) {

@@ -105,6 +105,7 @@ struct sum_octree_nodes {
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         node sum;
         const std::uint64_t begin = first[i], end = begin + count_ones(masks[i]);
+        if (masks[i] == 0) sum = of_tile(begin);
         for (std::uint64_t c = begin; c < end; ++c) {
             const node child = level == 1 ? voxels.of_voxel(c) : below[c];
             for (int k = 0; k < parts::count; ++k) sum.sums[k].add(child.sums[k]);
@@ -122,6 +123,18 @@ struct sum_octree_nodes {
                 component = format::end(sum.sums[k]);
         }
         values[i] = value;
+    }
+
+private:
+    // The sum of 8^level times the value with this rank.
+    [[nodiscard]] VOXELPIPE_HD node of_tile(std::uint64_t rank) const {
+        node sum = voxels.of_voxel(rank);
+        for (int twice = 0; twice < 3 * level; ++twice) {
+            const node half = sum;
+            for (int k = 0; k < parts::count; ++k) sum.sums[k].add(half.sums[k]);
+            sum.count += half.count;
+        }
+        return sum;
     }
 };
 
@@ -142,6 +155,15 @@ struct fold_octree_nodes {
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         value children[8];
         const auto n = static_cast<std::size_t>(count_ones(masks[i]));
+        if (n == 0) { // a tile: eight equal children, level by level
+            value v = value(rank_map<Target>::load(voxels, first[i]));
+            for (int l = 0; l < level; ++l) {
+                for (value& child : children) child = v;
+                v = fold_of<Reducer, value>::fold(reducer, std::span<const value>(children, 8));
+            }
+            values[i] = v;
+            return;
+        }
         for (std::size_t c = 0; c < n; ++c)
             children[c] = level == 1 ? value(rank_map<Target>::load(voxels, first[i] + c)) : below[first[i] + c];
         values[i] = fold_of<Reducer, value>::fold(reducer, std::span<const value>(children, n));

@@ -23,8 +23,8 @@ namespace voxelpipe {
 // The most that a call may make of a sparse framebuffer; a call that needs more changes nothing and returns
 // capacity_exceeded, with the numbers that it needs in status::required.
 struct sparse_limits {
-    std::uint64_t bricks = std::numeric_limits<std::uint64_t>::max(); // of 8 x 8 x 8 voxels
-    std::uint64_t voxels = std::numeric_limits<std::uint64_t>::max(); // that exist
+    std::uint64_t bricks = std::numeric_limits<std::uint64_t>::max(); // of 8 x 8 x 8 voxels, and tiles
+    std::uint64_t voxels = std::numeric_limits<std::uint64_t>::max(); // that exist in bricks, and one a tile
 };
 
 // What calls are to do with one target.
@@ -45,16 +45,25 @@ struct sparse_contents {
 
     // Empty.
     explicit sparse_contents(Backend& backend)
-        : keys(backend, 0), masks(backend, 0), offsets(backend, 0),
+        : keys(backend, 0), masks(backend, 0), offsets(backend, 0), tiles(backend, 0),
           values(core::make_pack(buffer<typename core::rank_map<Targets>::element>(backend, 0)...)),
           sums(core::make_pack(buffer<core::kept_sum<Targets>>(backend, 0)...)) {}
 
     buffer<std::uint64_t> keys;    // Morton keys of bricks, ascending
     buffer<brick_mask> masks;      // one per brick
     buffer<std::uint64_t> offsets; // one more than bricks; empty where there are none
-    std::uint64_t num_voxels = 0;  // that exist
+    buffer<brick_tile> tiles;      // ascending
+    std::uint64_t num_voxels = 0;  // that exist in bricks
+    std::uint64_t tile_voxels = 0; // in tiles
     core::pack<buffer<typename core::rank_map<Targets>::element>...> values; // empty for disabled targets
     core::pack<buffer<core::kept_sum<Targets>>...> sums;                     // empty where they are not kept
+
+    // Ranks: a value of each target.
+    [[nodiscard]] std::uint64_t num_values() const { return num_voxels + tiles.size(); }
+    // Names the arrays.
+    [[nodiscard]] brick_table table(const glm::ivec3& extent, const glm::ivec3& offset) const {
+        return {keys.data(), masks.data(), offsets.data(), keys.size(), extent, offset, tiles.data(), tiles.size()};
+    }
 };
 
 // Reads a sparse framebuffer where it lies: in device code, or on the host for a backend that runs there.
@@ -77,6 +86,8 @@ struct sparse_view {
 // after one that failed it is as it was. New arrays are made before the old ones go.
 // A call that clears all targets leaves the voxels that keep a fragment. Where a target loads, or is off, the voxels
 // that exist stay, and new ones start from the clear value.
+// The inside of a solid whose shader is constant becomes tiles (voxelize_solid). A later call that loads makes bricks
+// of the parts of tiles that it draws in.
 template <class Backend, class... Targets>
 class sparse_framebuffer {
     static_assert(sizeof...(Targets) >= 1, "voxelpipe: a framebuffer needs at least one render target");
@@ -102,11 +113,15 @@ public:
     // The grid of the last call; only its extent means something before the first.
     [[nodiscard]] const grid& where() const { return where_; }
     [[nodiscard]] std::uint64_t num_bricks() const { return contents_.keys.size(); } // Bricks with a voxel.
-    [[nodiscard]] std::uint64_t num_voxels() const { return contents_.num_voxels; }  // Voxels that exist.
-    // Bytes that bricks, values and kept sums take.
+    [[nodiscard]] std::uint64_t num_tiles() const { return contents_.tiles.size(); } // Cubes of full bricks, of solids.
+    // Voxels that exist, those of tiles among them.
+    [[nodiscard]] std::uint64_t num_voxels() const { return contents_.num_voxels + contents_.tile_voxels; }
+    // Values of a target: one for each voxel that exists in a brick, and one for each tile.
+    [[nodiscard]] std::uint64_t num_values() const { return contents_.num_values(); }
+    // Bytes that bricks, tiles, values and kept sums take.
     [[nodiscard]] std::uint64_t num_bytes() const {
         std::uint64_t bytes = num_bricks() * (sizeof(std::uint64_t) + sizeof(brick_mask)) +
-                              contents_.offsets.size() * sizeof(std::uint64_t);
+                              contents_.offsets.size() * sizeof(std::uint64_t) + num_tiles() * sizeof(brick_tile);
         core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
             using target = typename core::pack_element<I, Targets...>::type;
             bytes += get<I>(contents_.values).size() * sizeof(typename core::rank_map<target>::element) +
@@ -129,10 +144,7 @@ public:
 
     // Valid until the next call.
     [[nodiscard]] sparse_view<Targets...> view() const {
-        sparse_view<Targets...> v{{contents_.keys.data(), contents_.masks.data(), contents_.offsets.data(),
-                                   num_bricks(), where_.extent, where_.offset},
-                                  {},
-                                  background_};
+        sparse_view<Targets...> v{contents_.table(where_.extent, where_.offset), {}, background_};
         core::for_each_index<sizeof...(Targets)>(
             [&]<std::size_t I>() { get<I>(v.values) = get<I>(contents_.values).data(); });
         return v;
@@ -223,6 +235,7 @@ private:
         h.keys = contents_.keys.to_host(backend);
         h.masks = contents_.masks.to_host(backend);
         h.offsets = contents_.offsets.to_host(backend);
+        h.tiles = contents_.tiles.to_host(backend);
         h.clear_values = background_;
         h.where = where_;
         return h;
@@ -316,8 +329,11 @@ template <coverage... Known, class Backend, core::triangle_mesh Mesh, class Vert
     }
 }
 
-// Draws the inside of meshes into a sparse framebuffer: as into a framebuffer, with the same counts. Every voxel inside
-// exists, so that memory is in proportion to the volume.
+// Draws the inside of meshes into a sparse framebuffer: as into a framebuffer, with the same counts. Where the shader
+// is vp::constant, all targets are cleared, no sums are kept and a voxel's value is the same however many bodies it
+// lies in (bodies::call, a single draw, or blends that a repetition does not change), bricks that are wholly inside
+// become tiles: the largest cubes of 8^n of them, aligned with the whole grid. Memory and time are in proportion to the
+// surface then. Otherwise every voxel inside is kept: in proportion to the volume.
 template <class Backend, class Mesh, class VertexShader, class SolidShader, class... Targets>
 [[nodiscard]] status voxelize_solid(Backend& backend, std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
                                     const grid& g, sparse_framebuffer<Backend, Targets...>& fb,

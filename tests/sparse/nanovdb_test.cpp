@@ -5,6 +5,7 @@
 
 #include "api_model.hpp"
 
+#include <algorithm>
 #include <voxelpipe/io/nanovdb.hpp>
 
 #include <gtest/gtest.h>
@@ -179,6 +180,77 @@ TEST(NanovdbFiles, AreReadByNanovdbVoxelByVoxel) {
     EXPECT_EQ(mask.grid<nanovdb::ValueMask>()->activeVoxelCount(), h.num_voxels());
     EXPECT_GT(mask.grid<nanovdb::ValueMask>()->tree().nodeCount(2), 2u);
     std::remove(path.c_str());
+}
+
+// Tiles are active values of lower nodes, of upper ones and of the root; beside them there are leaves.
+TEST(NanovdbFiles, HaveTilesAsActiveValues) {
+    using target = vp::target<float, blend::replace>;
+    vp::host_sparse<target> h;
+    h.where.extent = h.where.whole = glm::ivec3(1 << 15);
+    vp::get<0>(h.clear_values) = -1.0f;
+    const auto key = [](int x, int y, int z) { return vp::core::morton_key(x / 8, y / 8, z / 8); };
+    // By key: bricks at 8 and 40, tiles of 8, 16, 64, 128, 256, 4096 and 8192 voxels a side.
+    h.keys = {key(8, 0, 0), key(40, 0, 8)};
+    h.masks.resize(2);
+    h.masks[0].words[0] = 5;
+    h.masks[1].words[7] = 1;
+    h.offsets = {0, 2, 3};
+    h.tiles = {vp::brick_tile::of(key(0, 0, 0), 0),       vp::brick_tile::of(key(16, 16, 0), 1),
+               vp::brick_tile::of(key(64, 0, 64), 3),     vp::brick_tile::of(key(128, 0, 0), 4),
+               vp::brick_tile::of(key(0, 256, 0), 5),     vp::brick_tile::of(key(4096, 0, 0), 9),
+               vp::brick_tile::of(key(8192, 8192, 0), 10)};
+    ASSERT_TRUE(std::is_sorted(h.tiles.begin(), h.tiles.end(), [](auto a, auto b) { return a.bits < b.bits; }));
+    for (std::uint64_t i = 0; i < h.num_values(); ++i) vp::get<0>(h.values).push_back(static_cast<float>(i) + 1);
+    vp::io::nanovdb_file file;
+    file.add_target<0>("weight", h);
+    file.add_mask("occupancy", h);
+    std::ostringstream out;
+    file.write(out);
+    EXPECT_EQ(out.str().size(), file.size());
+    const std::string path = write_file("tiles.nvdb", out.str());
+    auto handle = nanovdb::io::readGrid(path, std::string("weight"));
+    auto occupancy = nanovdb::io::readGrid(path, std::string("occupancy"));
+    std::remove(path.c_str());
+    const auto* grid = handle.grid<float>();
+    const auto* mask = occupancy.grid<nanovdb::ValueMask>();
+    ASSERT_TRUE(grid != nullptr && mask != nullptr);
+    EXPECT_TRUE(nanovdb::isValid(*grid, true, true));
+    EXPECT_EQ(grid->activeVoxelCount(), h.num_voxels());
+    EXPECT_EQ(mask->activeVoxelCount(), h.num_voxels());
+    EXPECT_EQ(grid->tree().activeTileCount(1), 1u + 8 + 512); // of 8 voxels a side
+    EXPECT_EQ(grid->tree().activeTileCount(2), 1u + 8);
+    EXPECT_EQ(grid->tree().activeTileCount(3), 1u + 8);
+    auto accessor = grid->getAccessor();
+    int wrong = 0;
+    const auto look = [&](const glm::ivec3& p) {
+        const nanovdb::Coord at(p.x, p.y, p.z);
+        wrong += accessor.getValue(at) == vp::get<0>(h)(p.x, p.y, p.z) ? 0 : 1;
+        // Not by an accessor, for which tiles of the root are never active in NanoVDB 32.4.
+        wrong += grid->tree().isActive(at) == h.contains(p) && mask->tree().isActive(at) == h.contains(p) ? 0 : 1;
+    };
+    for (std::uint64_t i = 0; i < h.num_tiles(); ++i) {
+        const auto tile = h.tile(i);
+        for (int c = 0; c < 27; ++c) { // within, at the corners, and beyond them
+            glm::ivec3 p;
+            for (int a = 0, n = c; a < 3; ++a, n /= 3)
+                p[a] = tile.origin[a] + (n % 3 == 0 ? -1 : n % 3 == 1 ? tile.side - 1 : tile.side);
+            look(p);
+            look(glm::max(p - 1, glm::ivec3(0)));
+        }
+    }
+    for (int z = 0; z < 72; ++z)
+        for (int y = 0; y < 40; ++y)
+            for (int x = 0; x < 80; ++x) look({x, y, z});
+    EXPECT_EQ(wrong, 0);
+    EXPECT_EQ(grid->tree().bbox().min(), nanovdb::Coord(0, 0, 0));
+    EXPECT_EQ(grid->tree().bbox().max(), nanovdb::Coord(16383, 16383, 8191));
+    const auto& root = grid->tree().root();
+    const float average = root.average(), deviation = root.stdDeviation();
+    EXPECT_EQ(root.minimum(), 1.0f);
+    EXPECT_EQ(root.maximum(), 10.0f);
+    nanovdb::gridStats(*handle.grid<float>(), nanovdb::StatsMode::All);
+    EXPECT_NEAR(root.average(), average, 1e-5);
+    EXPECT_NEAR(root.stdDeviation(), deviation, 1e-4);
 }
 #else
 TEST(NanovdbFiles, AreReadByNanovdbVoxelByVoxel) { GTEST_SKIP() << "no libnanovdb-dev"; }

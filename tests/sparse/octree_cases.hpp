@@ -71,7 +71,7 @@ template <class Backend, class Framebuffer, class Host>
     EXPECT_TRUE(tree.to_host(backend) == expected);
     EXPECT_EQ(tree.num_levels(), expected.num_levels());
     EXPECT_EQ(tree.num_bytes(), expected.num_bytes());
-    EXPECT_EQ(tree.num_nodes(0), host.num_voxels());
+    EXPECT_EQ(tree.num_nodes(0), host.num_values());
 
     const vp::backend_octree_dag<Backend> dag(backend, tree);
     const vp::octree_dag expected_dag(expected);

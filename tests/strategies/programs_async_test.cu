@@ -277,13 +277,8 @@ TEST(DevicePrograms, WithoutWaitsReportWhatIsWrong) {
     EXPECT_EQ(s.triangle, 3u);
     EXPECT_EQ(vp::voxelize_async<async_rule>(gpu, there.span(), g, fb.view(), {async_rule}, {nullptr, 0, limits}).code,
               vp::status_code::capacity_exceeded);
-    // Bricks of a grid that their index cannot number, and limits that cannot be: nothing is launched.
+    // Limits that cannot be: nothing is launched.
     vp::sparse_result<programs::ids, programs::sums, programs::bits> bricks;
-    vp::grid large = g;
-    large.extent = {1 << 17, 8, 8};
-    EXPECT_EQ(vp::program_workspace_bytes(there.span(), large, bricks, {async_rule}, limits), 0u);
-    EXPECT_EQ(vp::voxelize_async<async_rule>(gpu, there.span(), large, bricks, {async_rule}, workspace).code,
-              vp::status_code::size_overflow);
     vp::program_workspace_view too_many = workspace;
     too_many.limits.nodes = std::uint64_t{1} << 40;
     EXPECT_EQ(vp::voxelize_async<async_rule>(gpu, there.span(), g, bricks, {async_rule}, too_many).code,

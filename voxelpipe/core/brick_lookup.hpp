@@ -3,7 +3,8 @@
 #pragma once
 
 // Finds bricks by a hash of their keys, in one or two reads instead of the log2(bricks) of brick_table::find_brick.
-// Slots hold numbers of bricks, by linear probing; at least half of them are free. Host and device read them alike.
+// Tiles are bisected. Slots hold numbers of bricks, by linear probing; at least half of them are free. Host and device
+// read them alike.
 
 #include <voxelpipe/core/brick_table.hpp>
 
@@ -42,8 +43,9 @@ struct brick_lookup {
     // As brick_table::find.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t find(const brick_table& table, const glm::ivec3& voxel) const {
         if (!table.is_in_part(voxel)) return brick_table::none;
-        const std::uint64_t key = core::morton_key(voxel + table.offset);
-        return table.rank_of(find_brick(table, key / core::sparse_brick_voxels), key);
+        const std::uint64_t key = core::morton_key(voxel + table.offset), of_brick = key / core::sparse_brick_voxels;
+        const std::uint64_t brick = find_brick(table, of_brick);
+        return brick == brick_table::none ? table.rank_of_tile(of_brick) : table.rank_of(brick, key);
     }
 };
 

@@ -3,10 +3,12 @@
 #pragma once
 
 // Bricks of 8^3 voxels, sorted by Morton key, each with a bit for every voxel that exists. A voxel's rank is its number
-// among all voxels that exist, in the Morton order of voxels: the place of its values. The table names memory that
+// among them, in the Morton order of voxels: the place of its values. Cubes of bricks whose voxels all exist and have
+// one value may be tiles instead; tile t has the t-th rank behind those of the voxels. The table names memory that
 // someone else owns; host and device read it alike.
 
 #include <voxelpipe/core/bits.hpp>
+#include <voxelpipe/core/brick_tile.hpp>
 #include <voxelpipe/core/morton.hpp>
 
 #include <bit>
@@ -65,9 +67,19 @@ struct brick_table {
     std::uint64_t count = 0;                // bricks
     glm::ivec3 extent{0};                   // voxels of the part
     glm::ivec3 offset{0};                   // of the part in the whole grid
+    const brick_tile* tiles = nullptr;      // ascending; none has a brick of `keys`, or reaches out of the part
+    std::uint64_t num_tiles = 0;
 
-    // Voxels that exist in all bricks.
-    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_voxels() const { return count == 0 ? 0 : offsets[count]; }
+    // Voxels that exist in bricks: the ranks below those of the tiles.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_in_bricks() const { return count == 0 ? 0 : offsets[count]; }
+    // Voxels that exist, those of tiles among them, which are added up.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_voxels() const {
+        std::uint64_t n = num_in_bricks();
+        for (std::uint64_t t = 0; t < num_tiles; ++t) n += tiles[t].num_voxels();
+        return n;
+    }
+    // Ranks: values of a target.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_values() const { return num_in_bricks() + num_tiles; }
 
     // The number of the brick with this key, by bisection; `none` where it does not exist.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t find_brick(std::uint64_t key) const {
@@ -82,11 +94,17 @@ struct brick_table {
         return first < count && keys[first] == key ? first : none;
     }
 
-    // The rank of a voxel of the part; `none` where it does not exist or lies outside.
+    // The rank of the tile that has the brick with this key; `none` where none has it.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t rank_of_tile(std::uint64_t key) const {
+        const std::uint64_t t = num_tiles == 0 ? 0 : core::find_tile(tiles, num_tiles, key);
+        return t == num_tiles ? none : num_in_bricks() + t;
+    }
+    // The rank of a voxel of the part, or of its tile; `none` where it does not exist or lies outside.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t find(const glm::ivec3& voxel) const {
         if (!is_in_part(voxel)) return none;
-        const std::uint64_t key = core::morton_key(voxel + offset);
-        return rank_of(find_brick(key / core::sparse_brick_voxels), key);
+        const std::uint64_t key = core::morton_key(voxel + offset), of_brick = key / core::sparse_brick_voxels;
+        const std::uint64_t brick = find_brick(of_brick);
+        return brick == none ? rank_of_tile(of_brick) : rank_of(brick, key);
     }
     // Whether (x, y, z) is a voxel of the part, whether it exists or not.
     [[nodiscard]] VOXELPIPE_HD bool is_in_part(const glm::ivec3& voxel) const {

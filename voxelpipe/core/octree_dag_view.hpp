@@ -28,6 +28,7 @@ struct octree_dag_view {
             const auto c = static_cast<unsigned>((voxel.x >> (l - 1) & 1) | (voxel.y >> (l - 1) & 1) << 1 |
                                                  (voxel.z >> (l - 1) & 1) << 2);
             const unsigned mask = masks[l - 1][n];
+            if (mask == 0) return true; // a tile
             if ((mask >> c & 1u) == 0) return false;
             if (l == 1) return true;
             n = children[l - 1][first[l - 1][n] + core::count_ones(mask & ((1u << c) - 1))];

@@ -4,7 +4,8 @@
 
 // An octree over the voxels of a sparse grid, as host and device read it: level l has nodes of 2^l voxels a side in the
 // Morton order of their positions, each with a mask of its children and the number of the first of them in the level
-// below; level 0 are the voxels themselves, numbered by rank. And the first voxel that a ray meets.
+// below; level 0 are the voxels themselves, numbered by rank. A node without children is a tile: all its voxels exist
+// and have its rank, which stands in place of the first child. And the first voxel that a ray meets.
 
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/core/exact.hpp>
@@ -18,7 +19,7 @@ struct voxel_hit {
     bool found = false;      // false: none within the limit
     double distance = 0;     // along the ray, in lengths of its direction
     glm::ivec3 voxel{0};     // in the numbers of the whole grid
-    std::uint64_t rank = 0;  // of the voxel
+    std::uint64_t rank = 0;  // of the voxel, or of its tile
     int axis = 0;            // of the side through which the ray enters the voxel
     bool from_above = false; // through the upper side
 };
@@ -29,7 +30,7 @@ struct octree_view {
 
     int num_levels = 0;                       // the root is level num_levels; there is none where no voxel exists
     const std::uint8_t* masks[max_levels]{};  // of level l at [l - 1]; bit c: the child with Morton number c exists
-    const std::uint64_t* first[max_levels]{}; // number of the first child that exists
+    const std::uint64_t* first[max_levels]{}; // number of the first child that exists; of a tile, its rank
 
     // The number of child c, 0 to 7, of node n of a level; the child exists.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t child(int level, std::uint64_t n, unsigned c) const {
@@ -75,17 +76,26 @@ struct octree_view {
         int level = num_levels;
         path[level] = 0;
         while (true) {
+            bool is_full = level == 0;
+            std::uint64_t rank = path[0];
             while (level > 0) {
-                const unsigned c = child_of(cell, level);
-                if ((masks[level - 1][path[level]] >> c & 1u) == 0) break;
+                const unsigned c = child_of(cell, level), mask = masks[level - 1][path[level]];
+                if (mask == 0) {
+                    is_full = true;
+                    rank = first[level - 1][path[level]];
+                    break;
+                }
+                if ((mask >> c & 1u) == 0) break;
                 path[level - 1] = child(level, path[level], c);
                 --level;
+                is_full = level == 0;
+                rank = path[level];
             }
-            if (level == 0) {
+            if (is_full) {
                 hit.found = true;
                 hit.distance = t;
                 hit.voxel = {cell[0], cell[1], cell[2]};
-                hit.rank = path[0];
+                hit.rank = rank;
                 hit.axis = axis;
                 hit.from_above = direction[axis] < 0;
                 return hit;

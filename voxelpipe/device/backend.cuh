@@ -289,6 +289,12 @@ private:
         });
     }
 
+    // A solid call that counts its rows, then write(call, sorted entries, its memory, state). Defined in
+    // device/optional/solid.cuh.
+    template <class Call, class Draw, class Write>
+    [[nodiscard]] status sweep_solid(std::span<const Draw> draws, const grid& g, const solid_options& options,
+                                     std::uint64_t triangles_in, const Write& write);
+
     device::call_history framebuffer_history_{{true, false, true}}, list_history_{{true, false, true}},
         solid_history_{{true, false, true}};
     device::call_workspace workspace_;

@@ -144,14 +144,26 @@ nanovdb::file_entry nanovdb_file::typed_grid<T>::prepare() {
     lower_.assign(plan_.lower.keys.size(), {});
     upper_.assign(plan_.upper.keys.size(), {});
     all_ = {};
+    const auto add_tile = [this](nanovdb::statistics<T>& s, std::uint64_t tile) {
+        const brick_tile t = from_.table.tiles[tile];
+        s.add_cube(nanovdb::tile_value(from_, tile), t.origin(), t.side());
+    };
+    const auto add_tiles = [&](nanovdb::statistics<T>& s, const nanovdb::level& nodes, std::uint64_t number) {
+        for (std::uint64_t i = nodes.first_tile[number]; i < nodes.first_tile[number + 1]; ++i)
+            add_tile(s, nodes.tiles[i]);
+    };
     for (std::size_t u = 0; u < upper_.size(); ++u) {
         for (std::uint64_t l = plan_.upper.first[u]; l < plan_.upper.first[u + 1]; ++l) {
             for (std::uint64_t b = plan_.lower.first[l]; b < plan_.lower.first[l + 1]; ++b)
                 lower_[l].add(nanovdb::leaf_statistics(from_, b));
+            add_tiles(lower_[l], plan_.lower, l);
             upper_[u].add(lower_[l]);
         }
+        add_tiles(upper_[u], plan_.upper, u);
         all_.add(upper_[u]);
     }
+    for (std::uint64_t t = 0; t < from_.table.num_tiles; ++t)
+        if (from_.table.tiles[t].level() >= nanovdb::root_tiles) add_tile(all_, t);
     nanovdb::file_entry e{};
     e.grid_size = e.file_size = plan_.size;
     e.name_hash = nanovdb::hash_of(from_.name);
@@ -166,6 +178,7 @@ nanovdb::file_entry nanovdb_file::typed_grid<T>::prepare() {
     e.node_count[1] = static_cast<std::uint32_t>(lower_.size());
     e.node_count[2] = static_cast<std::uint32_t>(upper_.size());
     e.node_count[3] = 1;
+    for (int i = 0; i < 3; ++i) e.tile_count[i] = static_cast<std::uint32_t>(plan_.num_tiles[i]);
     e.version = nanovdb::version;
     return e;
 }
@@ -190,31 +203,36 @@ std::vector<std::byte> nanovdb_file::typed_grid<T>::head() const {
     g.meaning = value_type<T>::meaning;
     g.type = value_type<T>::type;
     tree_data t{};
-    if (from_.table.count != 0) {
-        t.node_offset[0] = plan_.first_leaf - sizeof(grid_data);
-        t.node_offset[1] = plan_.first_lower - sizeof(grid_data);
-        t.node_offset[2] = plan_.first_upper - sizeof(grid_data);
-    }
+    if (from_.table.count != 0) t.node_offset[0] = plan_.first_leaf - sizeof(grid_data);
+    if (!lower_.empty()) t.node_offset[1] = plan_.first_lower - sizeof(grid_data);
+    if (!upper_.empty()) t.node_offset[2] = plan_.first_upper - sizeof(grid_data);
     t.node_offset[3] = plan_.root - sizeof(grid_data);
     t.node_count[0] = static_cast<std::uint32_t>(from_.table.count);
     t.node_count[1] = static_cast<std::uint32_t>(lower_.size());
     t.node_count[2] = static_cast<std::uint32_t>(upper_.size());
+    for (int i = 0; i < 3; ++i) t.tile_count[i] = static_cast<std::uint32_t>(plan_.num_tiles[i]);
     t.num_voxels = from_.table.num_voxels();
     root_type root;
     std::memset(static_cast<void*>(&root), 0, sizeof(root)); // padding too
     root.voxels = all_.voxels;
-    root.table_size = static_cast<std::uint32_t>(upper_.size());
+    root.table_size = static_cast<std::uint32_t>(plan_.root_children.size());
     root.background = from_.background;
     all_.write_to(root);
     std::memcpy(bytes.data() + sizeof(g), &t, sizeof(t));
     std::memcpy(bytes.data() + plan_.root, &root, sizeof(root));
-    for (std::size_t i = 0; i < upper_.size(); ++i) {
+    for (std::size_t i = 0; i < plan_.root_children.size(); ++i) {
         typename root_type::tile tile;
         std::memset(static_cast<void*>(&tile), 0, sizeof(tile));
-        const std::uint64_t u = plan_.root_order[i];
-        tile.key = grid_plan<T>::tile_key(plan_.upper.keys[u]);
-        tile.child = static_cast<std::int64_t>(plan_.first_upper + u * sizeof(internal_node<T, 5>) - plan_.root);
-        tile.value = from_.background;
+        const auto& child = plan_.root_children[i];
+        tile.key = child.key;
+        if (child.is_tile) {
+            tile.state = 1; // active
+            tile.value = tile_value(from_, child.number);
+        } else {
+            tile.child =
+                static_cast<std::int64_t>(plan_.first_upper + child.number * sizeof(internal_node<T, 5>) - plan_.root);
+            tile.value = from_.background;
+        }
         std::memcpy(bytes.data() + plan_.root + sizeof(root) + i * sizeof(tile), &tile, sizeof(tile));
     }
     std::memcpy(bytes.data(), &g, sizeof(g));
@@ -238,7 +256,7 @@ void nanovdb_file::typed_grid<T>::write(const byte_sink& sink) const {
         for (std::size_t u = 0; u < upper_.size(); ++u) {
             const std::uint64_t here = plan_.first_upper + u * sizeof(upper_node);
             fill_internal<5>(
-                upper_[u], from_.background, plan_.lower.keys.data(), plan_.upper.first[u], plan_.upper.first[u + 1],
+                upper_[u], from_, plan_.upper, u, plan_.lower.keys.data(), upper_tiles,
                 [&](std::uint64_t l) { return from_to(here, plan_.first_lower + l * sizeof(lower_node)); }, *node);
             sink(node.get(), sizeof(upper_node));
         }
@@ -248,7 +266,7 @@ void nanovdb_file::typed_grid<T>::write(const byte_sink& sink) const {
         for (std::size_t l = 0; l < lower_.size(); ++l) {
             const std::uint64_t here = plan_.first_lower + l * sizeof(lower_node);
             fill_internal<4>(
-                lower_[l], from_.background, from_.table.keys, plan_.lower.first[l], plan_.lower.first[l + 1],
+                lower_[l], from_, plan_.lower, l, from_.table.keys, lower_tiles,
                 [&](std::uint64_t b) { return from_to(here, plan_.first_leaf + b * sizeof(leaf_node<T>)); }, *node);
             sink(node.get(), sizeof(lower_node));
         }

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Leaves and nodes of a NanoVDB file, made from bricks: a leaf is a brick, with z fastest instead of Morton order.
+// Leaves and nodes of a NanoVDB file, made from bricks and tiles: a leaf is a brick, with z fastest instead of Morton
+// order; a tile becomes active values of the node that its size asks for.
 
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/grid.hpp>
@@ -114,19 +115,43 @@ void fill_leaf(const source<T>& from, std::uint64_t brick, leaf_node<T>& leaf) {
 // ---- the nodes above
 // --------------------------------------------------------------------------------------------------
 
-// Nodes of one level: their Morton keys, and the first child of each among the level below, and one more.
+// Levels of tiles that are values of lower nodes, of upper ones and of the root.
+inline constexpr int lower_tiles = 0, upper_tiles = 4, root_tiles = 9;
+
+// The value of a tile; true where the grid has no values.
+template <class T>
+[[nodiscard]] stored_value<T> tile_value(const source<T>& from, std::uint64_t tile) {
+    if constexpr (std::is_same_v<T, mask_value>)
+        return true;
+    else
+        return from.value(from.table.num_in_bricks() + tile);
+}
+
+// Nodes of one level: their Morton keys, the first child of each among the level below, and one more, and the numbers
+// of the tiles that are their values, with the first of each node among those, and one more.
 struct level {
-    std::vector<std::uint64_t> keys, first;
+    std::vector<std::uint64_t> keys, first, tiles, first_tile;
 };
-[[nodiscard]] inline level parents_of(const std::uint64_t* keys, std::uint64_t count, int shift) {
+// Parents of nodes with these keys, and of the tiles of levels [low, high). A tile's key in this level is that of its
+// first brick without the lowest `tile_shift` bits.
+[[nodiscard]] inline level parents_of(const std::uint64_t* keys, std::uint64_t count, int shift,
+                                      const brick_table& table, int low, int high, int tile_shift) {
     level l;
-    for (std::uint64_t i = 0; i < count; ++i) {
-        if (!l.keys.empty() && l.keys.back() == keys[i] >> shift) continue;
-        l.keys.push_back(keys[i] >> shift);
+    std::uint64_t t = 0, i = 0;
+    const auto next_tile = [&] {
+        while (t < table.num_tiles && (table.tiles[t].level() < low || table.tiles[t].level() >= high)) ++t;
+        return t < table.num_tiles ? table.tiles[t].first() >> tile_shift : ~std::uint64_t{0};
+    };
+    while (true) {
+        const std::uint64_t of_tile = next_tile(), of_node = i < count ? keys[i] >> shift : ~std::uint64_t{0};
+        const std::uint64_t key = std::min(of_tile, of_node);
         l.first.push_back(i);
+        l.first_tile.push_back(l.tiles.size());
+        if (key == ~std::uint64_t{0}) return l;
+        l.keys.push_back(key);
+        while (i < count && keys[i] >> shift == key) ++i;
+        while (next_tile() == key) l.tiles.push_back(t++);
     }
-    l.first.push_back(count);
-    return l;
 }
 
 // Offsets of the parts of a grid, in bytes from its start.
@@ -135,41 +160,75 @@ struct grid_plan {
     using lower_node = internal_node<T, 4>;
     using upper_node = internal_node<T, 5>;
     level lower, upper;
-    std::vector<std::uint64_t> root_order; // upper nodes by the keys of root tiles
+    // Children of the root by their keys there: upper nodes, or tiles, whole or in part.
+    struct root_child {
+        std::uint64_t key, number;
+        bool is_tile;
+    };
+    std::vector<root_child> root_children;
+    std::uint64_t num_tiles[3]{}; // values of lower nodes, of upper ones and of the root
     std::uint64_t root, first_upper, first_lower, first_leaf, size;
 
     explicit grid_plan(const brick_table& table)
-        : lower(parents_of(table.keys, table.count, 12)), upper(parents_of(lower.keys.data(), lower.keys.size(), 15)) {
+        : lower(parents_of(table.keys, table.count, 12, table, lower_tiles, upper_tiles, 12)),
+          upper(parents_of(lower.keys.data(), lower.keys.size(), 15, table, upper_tiles, root_tiles, 27)) {
+        for (std::uint64_t i = 0; i < upper.keys.size(); ++i)
+            root_children.push_back({root_key(upper.keys[i]), i, false});
+        for (std::uint64_t t = 0; t < table.num_tiles; ++t) {
+            const int level = table.tiles[t].level();
+            const int base = level < upper_tiles ? lower_tiles : level < root_tiles ? upper_tiles : root_tiles;
+            const std::uint64_t cells = std::uint64_t{1} << (3 * (level - base));
+            num_tiles[base == lower_tiles ? 0 : base == upper_tiles ? 1 : 2] += cells;
+            if (base != root_tiles) continue;
+            for (std::uint64_t n = 0; n < cells; ++n)
+                root_children.push_back({root_key((table.tiles[t].first() >> 27) + n), t, true});
+        }
+        std::sort(root_children.begin(), root_children.end(),
+                  [](const root_child& a, const root_child& b) { return a.key < b.key; });
         root = sizeof(grid_data) + sizeof(tree_data);
-        first_upper = root + sizeof(root_data<T>) + upper.keys.size() * sizeof(typename root_data<T>::tile);
+        first_upper = root + sizeof(root_data<T>) + root_children.size() * sizeof(typename root_data<T>::tile);
         first_lower = first_upper + upper.keys.size() * sizeof(upper_node);
         first_leaf = first_lower + lower.keys.size() * sizeof(lower_node);
         size = first_leaf + table.count * sizeof(leaf_node<T>);
-        for (std::uint64_t i = 0; i < upper.keys.size(); ++i) root_order.push_back(i);
-        std::sort(root_order.begin(), root_order.end(),
-                  [&](std::uint64_t a, std::uint64_t b) { return tile_key(upper.keys[a]) < tile_key(upper.keys[b]); });
     }
-    [[nodiscard]] static std::uint64_t tile_key(std::uint64_t key) {
+    // The key in the root of the upper node with this Morton key.
+    [[nodiscard]] static std::uint64_t root_key(std::uint64_t key) {
         const glm::ivec3 p = core::morton_position(key);
         return static_cast<std::uint64_t>(p.x) << 42 | static_cast<std::uint64_t>(p.y) << 21 |
                static_cast<std::uint64_t>(p.z);
     }
 };
 
-// A node whose children are [first, last) of the level below, child i at `child(i)` bytes from the node.
+// The place in a node's table of the child with this Morton key.
+template <int Log2Size>
+[[nodiscard]] std::size_t place_in_node(std::uint64_t key) {
+    const glm::ivec3 p = core::morton_position(key & ((std::uint64_t{1} << (3 * Log2Size)) - 1));
+    return static_cast<std::size_t>((p.x << (2 * Log2Size)) | (p.y << Log2Size) | p.z);
+}
+
+// Node `number` of a level, whose children have `keys`, child i at `child(i)` bytes from the node. Tiles of log2_bricks
+// are one value of the node.
 template <int Log2Size, class T, class Child>
-void fill_internal(const statistics<T>& s, const stored_value<T>& background, const std::uint64_t* keys,
-                   std::uint64_t first, std::uint64_t last, const Child& child, internal_node<T, Log2Size>& node) {
+void fill_internal(const statistics<T>& s, const source<T>& from, const level& nodes, std::uint64_t number,
+                   const std::uint64_t* keys, int log2_bricks, const Child& child, internal_node<T, Log2Size>& node) {
     std::memset(static_cast<void*>(&node), 0, sizeof(node));
     node.voxels = s.voxels;
     node.flags = 2; // has voxels
     s.write_to(node);
-    for (auto& e : node.table) e.value = background;
-    for (std::uint64_t i = first; i < last; ++i) {
-        const glm::ivec3 p = core::morton_position(keys[i] & (internal_node<T, Log2Size>::num_children - 1));
-        const auto n = static_cast<std::size_t>((p.x << (2 * Log2Size)) | (p.y << Log2Size) | p.z);
+    for (auto& e : node.table) e.value = from.background;
+    for (std::uint64_t i = nodes.first[number]; i < nodes.first[number + 1]; ++i) {
+        const std::size_t n = place_in_node<Log2Size>(keys[i]);
         node.child_mask[n / 64] |= std::uint64_t{1} << (n % 64);
         node.table[n].child = child(i);
+    }
+    for (std::uint64_t i = nodes.first_tile[number]; i < nodes.first_tile[number + 1]; ++i) {
+        const brick_tile tile = from.table.tiles[nodes.tiles[i]];
+        const stored_value<T> value = tile_value(from, nodes.tiles[i]);
+        for (std::uint64_t key = tile.first() >> (3 * log2_bricks); key < tile.end() >> (3 * log2_bricks); ++key) {
+            const std::size_t n = place_in_node<Log2Size>(key);
+            node.value_mask[n / 64] |= std::uint64_t{1} << (n % 64);
+            node.table[n].value = value;
+        }
     }
 }
 

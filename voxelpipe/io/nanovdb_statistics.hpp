@@ -61,6 +61,21 @@ struct statistics {
         }
         ++count;
     }
+    // A cube of `side` voxels a side from `origin` on, all of which have this value.
+    void add_cube(const stored& v, const glm::ivec3& origin, int side) {
+        statistics cube;
+        cube.add(v);
+        const double n = static_cast<double>(side) * side * side;
+        cube.count =
+            static_cast<std::uint64_t>(side) * static_cast<std::uint64_t>(side) * static_cast<std::uint64_t>(side);
+        cube.sum *= n;
+        cube.squares *= n;
+        for (int a = 0; a < 3; ++a) {
+            cube.voxels.low[a] = origin[a];
+            cube.voxels.high[a] = origin[a] + side - 1;
+        }
+        add(cube);
+    }
     void add(const statistics& other) {
         if (other.count == 0) return;
         if (count == 0 || other.low < low) {

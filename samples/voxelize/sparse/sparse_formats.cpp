@@ -146,6 +146,7 @@ std::vector<std::filesystem::path> write_nvdb(const sparse_volume& v, const std:
                                               const write_options& options) {
     nanovdb_file file;
     const std::vector<std::uint64_t> ends = slab_ends(v, options);
+    if (ends.size() > 1 && !v.tiles.empty()) return write_nvdb(open_tiles(v), path, options);
     std::vector<brick_slab> slabs;
     if (ends.size() > 1) slabs = cut_into_slabs(v, ends);
     for (const channel& c : v.channels) {
@@ -305,6 +306,7 @@ std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const st
 #ifdef VOXELIZE_HAS_OPENVDB
     if (extension == ".vdb") return write_vdb(v, path, options);
 #endif
+    if (!v.tiles.empty()) return write_sparse(open_tiles(v), path, options); // the others name every voxel
     if (extension == ".npz") return write_sparse_npz(v, path, options);
     if (extension == ".npy") return write_sparse_npy(v, path, options);
     if (extension == ".png") return write_sparse_png(v, path, options);

@@ -221,7 +221,7 @@ private:
         return true;
     }
 
-    // The solid's bricks, and the values of the surface where that lies in them.
+    // The solid's bricks and tiles, and the values of the surface where that lies in them: in bricks.
     [[nodiscard]] sparse_volume draw_solid(sparse_volume&& surface_of) {
         // What is outside follows from the whole grid: a flood is drawn there, with the padding.
         const bool is_flood = this->request_.solid->rule == solid_rule::exterior;
@@ -245,6 +245,7 @@ private:
         sparse_volume result;
         result.shape = surface_of.shape;
         take_bricks(result, framebuffer);
+        if (!surface_of.keys.empty() && !result.tiles.empty()) result = open_tiles(result, &surface_of.keys);
         if (is_flood)
             keep_part(result, this->uploaded_->relative_grid().offset, this->uploaded_->relative_grid().extent);
         this->warn_of_solid(result.num_voxels(), surface_of.num_voxels());
@@ -268,6 +269,7 @@ private:
         result.keys = list(from.keys);
         result.masks = list(from.masks);
         result.offsets = list(from.offsets);
+        result.tiles = list(from.tiles);
     }
     template <std::size_t I, class Framebuffer>
     [[nodiscard]] static const auto* values_of(const Framebuffer& framebuffer) {
@@ -279,9 +281,9 @@ private:
     void resolve(sparse_volume& result, target id, const Value& value) {
         const target_info& info = info_of(id);
         channel c{std::string(info.name), info.type, info.components, {}};
-        const auto voxels = static_cast<std::size_t>(result.num_voxels());
-        c.data.resize(voxels * sizeof(T));
-        memory_access<Backend>::read(this->backend_, reinterpret_cast<T*>(c.data.data()), voxels, value,
+        const auto values = static_cast<std::size_t>(result.num_values());
+        c.data.resize(values * sizeof(T));
+        memory_access<Backend>::read(this->backend_, reinterpret_cast<T*>(c.data.data()), values, value,
                                      thread_count(this->request_.threads));
         result.channels.push_back(std::move(c));
     }

@@ -31,6 +31,7 @@ rgba8 fill_color_of(const channel& colors, const solid_request& request) {
 } // namespace
 
 void keep_part(sparse_volume& v, const glm::ivec3& offset, const glm::ivec3& extent) {
+    if (!v.tiles.empty()) v = open_tiles(v); // some may reach out of the box
     const voxelpipe::brick_table table = v.table();
     std::size_t kept = 0;
     std::uint64_t rank = 0;
@@ -71,7 +72,7 @@ void add_filled(sparse_volume& solid, sparse_volume& surface, std::string_view n
         std::memcpy(inside.data(), color.data(), 4);
     }
     channel to{from.name, from.type, from.components, {}};
-    to.data.resize(static_cast<std::size_t>(solid.num_voxels()) * bytes);
+    to.data.resize(static_cast<std::size_t>(solid.num_values()) * bytes);
     std::byte* at = to.data.data();
     std::size_t s = 0; // bricks of the surface, in step with those of the solid
     for (std::size_t b = 0; b < solid.keys.size(); ++b) {
@@ -89,6 +90,7 @@ void add_filled(sparse_volume& solid, sparse_volume& surface, std::string_view n
             rank += static_cast<unsigned>(std::popcount(touched));
         }
     }
+    for (std::size_t t = 0; t < solid.tiles.size(); ++t, at += bytes) std::memcpy(at, inside.data(), bytes);
     solid.channels.push_back(std::move(to));
 }
 

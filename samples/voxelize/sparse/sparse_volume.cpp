@@ -142,6 +142,72 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
     return result;
 }
 
+sparse_volume open_tiles(const sparse_volume& v, const std::vector<std::uint64_t>* keys) {
+    struct source {
+        std::uint64_t rank, count;
+        bool repeats; // one value for all
+    };
+    std::vector<source> from, from_tiles;
+    sparse_volume result;
+    result.shape = v.shape;
+    std::uint64_t rank = 0;
+    const voxelpipe::brick_table table = v.table();
+    const auto add_brick = [&](std::uint64_t key, const voxelpipe::brick_mask& mask, const source& values) {
+        result.keys.push_back(key);
+        result.masks.push_back(mask);
+        result.offsets.push_back(rank);
+        rank += values.count;
+        from.push_back(values);
+    };
+    voxelpipe::brick_mask full;
+    std::fill(std::begin(full.words), std::end(full.words), ~std::uint64_t{0});
+    voxelpipe::for_each_brick_and_tile(
+        table,
+        [&](std::uint64_t b) {
+            const std::uint64_t first = table.offsets[b];
+            add_brick(table.keys[b], table.masks[b], {first, table.offsets[b + 1] - first, false});
+        },
+        [&](std::uint64_t t) {
+            const voxelpipe::brick_tile tile = table.tiles[t];
+            const std::uint64_t value = table.num_in_bricks() + t;
+            std::uint64_t key = tile.first();
+            auto next = keys == nullptr ? std::vector<std::uint64_t>::const_iterator{}
+                                        : std::lower_bound(keys->begin(), keys->end(), key);
+            while (key < tile.end()) {
+                std::uint64_t end = key; // what stays a tile, up to here
+                if (keys != nullptr) end = next == keys->end() ? tile.end() : std::min(*next, tile.end());
+                while (key < end) {
+                    const int level = voxelpipe::core::level_of_tile(key, end);
+                    result.tiles.push_back(voxelpipe::brick_tile::of(key, level));
+                    from_tiles.push_back({value, 1, true});
+                    key = result.tiles.back().end();
+                }
+                if (key == tile.end()) break;
+                add_brick(key++, full, {value, voxelpipe::core::sparse_brick_voxels, true});
+                if (keys != nullptr) ++next;
+            }
+        });
+    if (!result.keys.empty()) result.offsets.push_back(rank);
+    from.insert(from.end(), from_tiles.begin(), from_tiles.end());
+    for (const channel& c : v.channels) {
+        channel to{c.name, c.type, c.components, {}};
+        const std::size_t size = c.type == scalar::bit ? 0 : size_of(c.type) * static_cast<std::size_t>(c.components);
+        to.data.resize(static_cast<std::size_t>(result.num_values()) * size);
+        std::byte* at = to.data.data();
+        for (const source& s : from) {
+            if (size == 0) break; // every voxel here has it
+            const std::byte* const values = c.data.data() + s.rank * size;
+            for (std::uint64_t i = 0; i < s.count; i += s.repeats ? 1 : s.count) {
+                const std::size_t bytes = static_cast<std::size_t>(s.repeats ? 1 : s.count) * size;
+                std::memcpy(at, values, bytes);
+                at += bytes;
+            }
+        }
+        result.channels.push_back(std::move(to));
+    }
+    return result;
+}
+
 sparse_volume find_bricks(const volume& v, int threads) {
     const channel& bits = *v.occupancy();
     const std::int64_t bricks_x = (v.extent[0] + 7) / 8, bricks_y = (v.extent[1] + 7) / 8;

@@ -3,7 +3,8 @@
 #pragma once
 
 // A volume of which only the voxels exist that something was drawn in: the library's bricks of 8^3, and for each
-// channel one value a voxel, in the Morton order of the voxels.
+// channel one value a voxel, in the Morton order of the voxels. The inside of a solid may be tiles, whose one value
+// each follows.
 
 #include "../volume.hpp"
 
@@ -25,6 +26,7 @@ struct sparse_volume {
     std::vector<std::uint64_t> keys;
     std::vector<voxelpipe::brick_mask> masks;
     std::vector<std::uint64_t> offsets;
+    std::vector<voxelpipe::brick_tile> tiles;
     // The channel "occupancy", which every voxel here has, holds no data.
     std::vector<channel> channels;
 
@@ -35,12 +37,16 @@ struct sparse_volume {
                 offsets.data(),
                 keys.size(),
                 glm::ivec3(shape.extent[0], shape.extent[1], shape.extent[2]),
-                glm::ivec3(0)};
+                glm::ivec3(0),
+                tiles.data(),
+                tiles.size()};
     }
     [[nodiscard]] std::uint64_t num_voxels() const { return table().num_voxels(); }
+    // Values of a channel: one a voxel in a brick, then one a tile.
+    [[nodiscard]] std::uint64_t num_values() const { return table().num_values(); }
     [[nodiscard]] std::uint64_t num_bytes() const {
         std::uint64_t bytes = keys.size() * (sizeof(std::uint64_t) + sizeof(voxelpipe::brick_mask)) +
-                              offsets.size() * sizeof(std::uint64_t);
+                              offsets.size() * sizeof(std::uint64_t) + tiles.size() * sizeof(voxelpipe::brick_tile);
         for (const channel& c : channels) bytes += c.data.size();
         return bytes;
     }
@@ -60,6 +66,10 @@ struct sparse_volume {
 
 // One volume of parts of one grid that share no brick; they have the same channels, which are freed one by one.
 [[nodiscard]] sparse_volume join_slabs(std::vector<sparse_volume>&& parts);
+
+// The same volume, in which those of `keys`, ascending, that lie in tiles are bricks; without keys, all bricks of
+// tiles.
+[[nodiscard]] sparse_volume open_tiles(const sparse_volume& v, const std::vector<std::uint64_t>* keys = nullptr);
 
 // The bricks of the occupied voxels of a dense volume, which has the channel "occupancy"; without channels.
 [[nodiscard]] sparse_volume find_bricks(const volume& v, int threads);

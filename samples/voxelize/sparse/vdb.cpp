@@ -90,6 +90,11 @@ openvdb::GridBase::Ptr make_grid(const sparse_volume& v, const std::string& name
             leaf->setValueOn(leaf->coordToOffset(at), value(rank));
         });
     }
+    for (std::uint64_t t = 0; t < table.num_tiles; ++t) {
+        const glm::ivec3 low = table.tiles[t].origin(), high = low + (table.tiles[t].side() - 1);
+        grid->tree().sparseFill(openvdb::CoordBBox(low.x, low.y, low.z, high.x, high.y, high.z),
+                                value(table.num_in_bricks() + t), true);
+    }
     const auto& [x, y, z] = v.shape.voxel_size;
     const auto& [ox, oy, oz] = v.shape.origin;
     const auto transform = openvdb::math::Transform::createLinearTransform();

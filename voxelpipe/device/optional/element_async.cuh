@@ -24,7 +24,7 @@ template <class... Targets, class ShaderOutput>
 struct element_output<framebuffer_view<Targets...>, ShaderOutput> {
     using payload = typename core::outputs_payload<ShaderOutput>::type;
     element_output(const grid&, const workspace_limits&, arena&) {}
-    [[nodiscard]] static bool has_room(const grid&, const workspace_limits& l) {
+    [[nodiscard]] static bool has_room(const workspace_limits& l) {
         return l.fragments < core::max_numbered;
     }
     template <class Call>
@@ -37,7 +37,7 @@ template <class Payload, class ShaderOutput>
 struct element_output<abuffer_view<Payload>, ShaderOutput> {
     using payload = Payload;
     element_output(const grid&, const workspace_limits&, arena&) {}
-    [[nodiscard]] static bool has_room(const grid&, const workspace_limits& l) {
+    [[nodiscard]] static bool has_room(const workspace_limits& l) {
         return l.fragments < core::max_numbered;
     }
     template <class Call>
@@ -53,8 +53,8 @@ struct element_output<sparse_result<Targets...>, ShaderOutput> {
 
     element_output(const grid& g, const workspace_limits& limits, arena& memory)
         : fold(g.whole_extent(), limits, memory) {}
-    [[nodiscard]] static bool has_room(const grid& g, const workspace_limits& l) {
-        return l.fragments < core::max_numbered && are_numbered_bricks(l, g.whole_extent());
+    [[nodiscard]] static bool has_room(const workspace_limits& l) {
+        return l.fragments < core::max_numbered && are_numbered_bricks(l);
     }
     template <class Call>
     void store(const Call& call, const grid& g, const voxelize_options& options, sparse_result<Targets...>& result,
@@ -80,7 +80,7 @@ template <class View, class VertexShader, class FragmentShader, class Output>
                                         const workspace_limits& limits) {
     using memory_type = element_memory<View, VertexShader, FragmentShader, Output>;
     if (!validate(g).ok() || !core::validate_program_draws(draws).ok() ||
-        !memory_type::output_type::has_room(g, limits))
+        !memory_type::output_type::has_room(limits))
         return 0;
     return bytes_or_none([&] {
         arena plan;
@@ -98,7 +98,7 @@ template <coverage... Known, class View, class VertexShader, class FragmentShade
         if constexpr (core::output_kind<output_type>::template fits<shader_output>()) {
             using memory_type = element_memory<View, VertexShader, FragmentShader, output_type>;
             if (const status s = core::validate_call(draws, g, out); !s.ok()) return s;
-            if (!memory_type::output_type::has_room(g, workspace.limits))
+            if (!memory_type::output_type::has_room(workspace.limits))
                 return core::failure(status_code::size_overflow);
             return with_cuda_status([&] {
                 status s;

@@ -44,19 +44,16 @@ status cuda_backend::run_solid(std::span<const draw<Mesh, VertexShader, SolidSha
     });
 }
 
-template <class Mesh, class VertexShader, class SolidShader, class Payload>
-status cuda_backend::run_solid(std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
-                               abuffer<cuda_backend, Payload>& lists, const solid_options& options,
-                               std::uint64_t triangles_in) {
-    using call_type = device::solid_lists<draw<Mesh, VertexShader, SolidShader>, payload_storage<Payload>>;
-    abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
-    const status s = device::with_cones(*this, draws, g, options, triangles_in, [&](const device::solid_cones& cones) {
+template <class Call, class Draw, class Write>
+status cuda_backend::sweep_solid(std::span<const Draw> draws, const grid& g, const solid_options& options,
+                                 std::uint64_t triangles_in, const Write& write) {
+    return device::with_cones(*this, draws, g, options, triangles_in, [&](const device::solid_cones& cones) {
         const auto triangles = static_cast<std::uint32_t>(triangles_in + cones.num_triangles);
         return device::attempt(
             solid_history_, {triangles_in, g.extent, g.offset, coverage::conservative}, device::max_listed_entries,
             times, stream,
             [&](device::attempt_guess& guess, device::pipeline_state& state, device::stage_clock* clock) {
-                call_type call{{draws, g, options, triangles, guess.limits, cones.parts}};
+                Call call{{{draws, g, options, triangles, guess.limits, cones.parts}}};
                 call.entries.clock = clock;
                 if (!call.entries.fits()) throw std::bad_alloc();
                 device::arena carved(workspace_.prepare(call.plan_memory(), *this, use_pinned_memory, use_graphs));
@@ -66,18 +63,29 @@ status cuda_backend::run_solid(std::span<const draw<Mesh, VertexShader, SolidSha
                     state = workspace_.run(clock, std::nullopt, sizeof(device::pipeline_state), stream,
                                            [&](cudaStream_t on) { sorted = call.launch(memory, on); });
                 });
-                if (device::has_failed(state, guess.limits)) return false;
-                if (call.has_overlong_row(state)) throw std::bad_alloc();
-                device::list_arrays<Payload> arrays(*this, state.voxels, state.fragments);
-                if (state.fragments != 0)
-                    call.write(
-                        sorted, memory, state,
-                        {arrays.voxels.data(), arrays.offsets.data(), arrays.primitives.data(), arrays.payloads.data()},
-                        stream);
-                arrays.move_into(made, state.voxels, state.fragments);
+                if (!device::has_failed(state, guess.limits)) write(call, sorted, memory, state);
                 return false;
             });
     });
+}
+
+template <class Mesh, class VertexShader, class SolidShader, class Payload>
+status cuda_backend::run_solid(std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
+                               abuffer<cuda_backend, Payload>& lists, const solid_options& options,
+                               std::uint64_t triangles_in) {
+    using call_type = device::solid_lists<draw<Mesh, VertexShader, SolidShader>, payload_storage<Payload>>;
+    abuffer<cuda_backend, Payload> made(*this); // so that a call that fails leaves `lists` as they were
+    const auto write = [&](const call_type& call, const device::crossing_list& sorted, const auto& memory,
+                           const device::pipeline_state& state) {
+        if (call.has_overlong_row(state)) throw std::bad_alloc();
+        device::list_arrays<Payload> arrays(*this, state.voxels, state.fragments);
+        if (state.fragments != 0)
+            call.write(sorted, memory, state,
+                       {arrays.voxels.data(), arrays.offsets.data(), arrays.primitives.data(), arrays.payloads.data()},
+                       stream);
+        arrays.move_into(made, state.voxels, state.fragments);
+    };
+    const status s = sweep_solid<call_type>(draws, g, options, triangles_in, write);
     if (s.ok()) {
         made.extent = g.extent;
         lists = std::move(made);

@@ -8,9 +8,11 @@
 // beside the result, memory is in proportion to the fragments, at most 2^32 - 2 voxels.
 
 #include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/device/base/for_each.cuh>
 #include <voxelpipe/device/sparse/brick_build.cuh>
 #include <voxelpipe/device/sparse/brick_masks.cuh>
 #include <voxelpipe/device/sparse/voxel_fold.cuh>
+#include <voxelpipe/kept_tiles.hpp>
 #include <voxelpipe/sparse.hpp>
 
 #include <cstddef>
@@ -42,15 +44,15 @@ template <class Payload, class... Targets>
                                 sparse_framebuffer<cuda_backend, Targets...>& fb) {
     using contents = sparse_contents<cuda_backend, Targets...>;
     const bool keeps = core::keeps_voxels(fb);
-    const std::uint64_t kept = keeps ? fb.num_voxels() : 0;
-    if (lists.num_voxels() + kept > core::max_numbered || (keeps && fb.num_bricks() > core::max_numbered / 8))
-        return core::failure(status_code::size_overflow);
     const contents& before = fb.contents();
+    const std::uint64_t kept = keeps ? before.num_voxels : 0;
+    if (lists.num_voxels() + kept + fb.num_tiles() > core::max_numbered ||
+        (keeps && fb.num_bricks() > core::max_numbered / 8))
+        return core::failure(status_code::size_overflow);
     brick_table table;
-    if (keeps)
-        table = {
-            before.keys.data(), before.masks.data(), before.offsets.data(), before.keys.size(), g.extent, g.offset};
+    if (keeps) table = before.table(g.extent, g.offset);
     contents made(backend);
+    core::kept_tiles<cuda_backend> tiles(backend);
     device_buffer<std::uint32_t> listed(backend, std::size_t{0}), existing(backend, std::size_t{0});
     status limited;
     struct beyond_limits {};
@@ -64,10 +66,11 @@ template <class Payload, class... Targets>
         return arrays();
     };
     const auto allocate_voxels = [&](std::uint64_t bricks, std::uint64_t voxels) {
-        if (bricks > fb.limits().bricks || voxels > fb.limits().voxels) {
+        if (table.num_tiles != 0) tiles = core::keep_tiles(backend, before.tiles, made.keys.data(), bricks);
+        if (bricks + tiles.size() > fb.limits().bricks || voxels + tiles.size() > fb.limits().voxels) {
             limited = core::failure(status_code::capacity_exceeded, stage::tile_resolve);
-            limited.required.bricks = bricks;
-            limited.required.voxels = voxels;
+            limited.required.bricks = bricks + tiles.size();
+            limited.required.voxels = voxels + tiles.size();
             throw beyond_limits{};
         }
         made.num_voxels = voxels;
@@ -88,10 +91,15 @@ template <class Payload, class... Targets>
         using target = typename core::pack_element<I, Targets...>::type;
         using map = core::rank_map<target>;
         const auto& t = get<I>(fb.targets());
-        if (!t.enabled || made.num_voxels == 0) return;
+        const std::uint64_t num_values = made.num_voxels + tiles.size();
+        if (!t.enabled || num_values == 0) return;
         auto& values = get<I>(made.values);
-        values = device_buffer<typename map::element>(backend, map::elements(made.num_voxels));
-        if (t.keeps_sums) get<I>(made.sums) = device_buffer<core::kept_sum<target>>(backend, made.num_voxels);
+        values = device_buffer<typename map::element>(backend, map::elements(num_values));
+        if constexpr (map::is_bit)
+            if (tiles.size() != 0) // no kernel writes words of tiles as a whole
+                check(cudaMemsetAsync(values.data(), 0, values.size() * sizeof(std::uint32_t), backend.stream));
+        if (t.keeps_sums) get<I>(made.sums) = device_buffer<core::kept_sum<target>>(backend, num_values);
+        if (made.num_voxels == 0) return;
         const fold_target<target> fold{get<I>(background),           t.load,        t.keeps_sums,
                                        get<I>(before.values).data(), values.data(), get<I>(made.sums).data()};
         launch_kernel(false, fold_voxels<I, target, Payload>, num_blocks(made.num_voxels), threads_per_block, 0,
@@ -100,6 +108,7 @@ template <class Payload, class... Targets>
                       static_cast<const std::uint32_t*>(listed.data()),
                       static_cast<const std::uint32_t*>(existing.data()), lists.offsets.data(), lists.payloads.data());
     });
+    core::store_kept_tiles(backend, fb, tiles, made);
     check(cudaStreamSynchronize(backend.stream), stage::tile_resolve);
     fb.take(std::move(made), g);
     return {};

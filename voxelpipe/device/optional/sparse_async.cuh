@@ -66,10 +66,9 @@ namespace device {
 
 [[nodiscard]] inline brick_room to_room(const workspace_limits& l) { return {l.nodes, l.bricks, l.voxels}; }
 // Bricks are numbered with 32 bits, and so are the words of their nodes.
-[[nodiscard]] inline bool are_numbered_bricks(const workspace_limits& l, const glm::ivec3& whole) {
+[[nodiscard]] inline bool are_numbered_bricks(const workspace_limits& l) {
     return l.bricks <= core::max_numbered - spare_cells && l.nodes < std::uint64_t{1} << 25 &&
-           l.fragments <= core::max_numbered && l.voxels < std::uint64_t{1} << 40 &&
-           std::max({whole.x, whole.y, whole.z}) <= max_index_extent;
+           l.fragments <= core::max_numbered && l.voxels < std::uint64_t{1} << 40;
 }
 
 // A sparse result in an arena: its bricks, and values for each voxel that there is room for.
@@ -130,10 +129,9 @@ struct bounded_fold {
                 launch_kernel(false, kernel, num_blocks(limits.fragments), threads_per_block, 0, stream,
                               stage::tile_resolve, from, rest...);
         };
-        if (bricks.index.has_nodes()) {
-            by_voxels(mark_listed_voxels<0>, bricks.index.nodes(), 7);
-            bricks.index.number_nodes(&state->sparse.nodes, stream);
-        }
+        bricks.index.mark_above(
+            [&](const index_level& level, int log2_cell) { by_voxels(mark_listed_voxels<0>, level, log2_cell); },
+            &state->sparse.nodes, stream);
         by_voxels(mark_listed_voxels<0>, bricks.index.bricks(), 3);
         bricks.index.number_bricks(&state->sparse.bricks, bricks.keys, stream);
         by_voxels(mask_listed_voxels<0>, bricks.index.bricks(), bricks.masks);
@@ -193,10 +191,11 @@ private:
             check_subsets(draws, &state->index_error, stream);
             bricks.clear(stream);
             Coverage::dispatch(options.rule, [&]<coverage Rule>() {
-                if (bricks.index.has_nodes()) {
-                    raster.template mark<Rule>(bricks.index.nodes(), 7, is_coarse<Rule>(raster, 7));
-                    bricks.index.number_nodes(&state->sparse.nodes, stream);
-                }
+                bricks.index.mark_above(
+                    [&](const index_level& level, int log2_cell) {
+                        raster.template mark<Rule>(level, log2_cell, is_coarse<Rule>(raster, log2_cell));
+                    },
+                    &state->sparse.nodes, stream);
                 raster.template mark<Rule>(bricks.index.bricks(), 3, is_coarse<Rule>(raster, 3));
                 bricks.index.number_bricks(&state->sparse.bricks, bricks.keys, stream);
                 raster.template set_masks<Rule>(bricks.index.bricks(), bricks.masks, state);
@@ -260,14 +259,13 @@ struct empty_bricks {
 
 } // namespace device
 
-// Bytes that voxelize_async needs for such a call on the current device; 0 if the arguments are invalid, or the grid is
-// part of one of more than 65,536 voxels a side.
+// Bytes that voxelize_async needs for such a call on the current device; 0 if the arguments are invalid.
 template <class Mesh, class VertexShader, class FragmentShader, class... Targets>
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws,
                                           const grid& g, const sparse_result<Targets...>&,
                                           const voxelize_options& options, const workspace_limits& limits) {
     const status s = core::validate_draws(draws);
-    if (!s.ok() || !validate(g).ok() || !device::are_numbered_bricks(limits, g.whole_extent())) return 0;
+    if (!s.ok() || !validate(g).ok() || !device::are_numbered_bricks(limits)) return 0;
     if (s.counts.triangles_in == 0) return sizeof(device::empty_bricks);
     return device::bytes_or_none([&]() -> std::size_t {
         return device::bounded_bytes<draw<Mesh, VertexShader, FragmentShader>, Targets...>(
@@ -277,8 +275,7 @@ template <class Mesh, class VertexShader, class FragmentShader, class... Targets
 
 // Puts the call on the backend's stream, sets `result` to where its bricks and values will be, and returns. A status
 // other than ok means that nothing was launched, or that a launch failed; read_status reports what the device finds
-// out. size_overflow: limits beyond what is numbered, or a grid of more than 65,536 voxels a side. A coverage may be
-// given between angle brackets, as for voxelize.
+// out. size_overflow: limits beyond what is numbered. A coverage may be given between angle brackets, as for voxelize.
 template <coverage... Known, class Mesh, class VertexShader, class FragmentShader, class... Targets>
 [[nodiscard]] status
 voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
@@ -292,8 +289,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         if (const status s = validate(g); !s.ok()) return s;
         status s = core::validate_draws(draws);
         if (!s.ok()) return s;
-        if (!device::are_numbered_bricks(workspace.limits, g.whole_extent()))
-            return core::failure(status_code::size_overflow);
+        if (!device::are_numbered_bricks(workspace.limits)) return core::failure(status_code::size_overflow);
         made.where = g;
         return device::with_cuda_status([&]() -> status {
             const bool is_empty = s.counts.triangles_in == 0;

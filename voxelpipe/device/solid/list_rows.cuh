@@ -120,8 +120,9 @@ __global__ void end_offsets_kernel(const __grid_constant__ solid_list_arrays<Pay
     to.offsets[num_voxels] = num_fragments;
 }
 
-template <class Draw, class Payload>
-struct solid_lists {
+// A call whose rows are counted before they are written.
+template <class Draw>
+struct counted_rows {
     using entries_type = solid_entries<Draw>;
     entries_type entries;
 
@@ -152,18 +153,37 @@ struct solid_lists {
         r.count_voxels = true;
         return r;
     }
-    // Sorted entries and counted rows: state->voxels and state->fragments are what the lists will have.
-    [[nodiscard]] crossing_list launch(const memory& m, cudaStream_t stream) const {
-        const auto& limits = entries.plan.limits;
-        const auto capacity = static_cast<std::uint32_t>(limits.fragments);
+
+protected:
+    // Sorted entries, and counts that are zero.
+    [[nodiscard]] crossing_list sort(const memory& m, cudaStream_t stream) const {
+        const auto capacity = entries.plan.limits.fragments;
         const crossing_list sorted = entries.launch(m.entries, m.state, stream);
         check(cudaMemsetAsync(m.counts.voxels, 0, capacity * sizeof(std::uint32_t), stream), stage::abuffer_emit);
         check(cudaMemsetAsync(m.counts.fragments, 0, capacity * sizeof(std::uint32_t), stream), stage::abuffer_emit);
-        sweep(sorted, m, {}, 0, entries.shaders(m.entries, stream), stream);
+        return sorted;
+    }
+    void sum(const memory& m, cudaStream_t stream) const {
+        const auto capacity = static_cast<std::uint32_t>(entries.plan.limits.fragments);
         sum_counts(m.counts.voxels, m.counts.first_voxel, capacity, m.storage, m.storage_bytes, stage::abuffer_emit,
                    stream);
         sum_counts(m.counts.fragments, m.counts.first_fragment, capacity, m.storage, m.storage_bytes,
                    stage::abuffer_emit, stream);
+    }
+};
+
+template <class Draw, class Payload>
+struct solid_lists : counted_rows<Draw> {
+    using typename counted_rows<Draw>::entries_type;
+    using typename counted_rows<Draw>::memory;
+    using counted_rows<Draw>::entries;
+    using counted_rows<Draw>::rules;
+
+    // Sorted entries and counted rows: state->voxels and state->fragments are what the lists will have.
+    [[nodiscard]] crossing_list launch(const memory& m, cudaStream_t stream) const {
+        const crossing_list sorted = this->sort(m, stream);
+        sweep(sorted, m, {}, 0, entries.shaders(m.entries, stream), stream);
+        this->sum(m, stream);
         end_stage(entries.clock, &stage_times::tile_resolve);
         return sorted;
     }

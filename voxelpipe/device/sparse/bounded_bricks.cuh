@@ -32,65 +32,66 @@ inline constexpr std::uint64_t spare_cells = 64;
 // Voxels of a failed call have the ranks of one brick.
 inline constexpr std::uint64_t spare_ranks = core::sparse_brick_voxels;
 
-// The index of brick_index.cuh in an arena.
+// The index of brick_index.cuh in an arena. There are at most as many groups as nodes.
 template <int = 0> // so that programs that do not call it compile no kernels
 class bounded_index {
 public:
     bounded_index(const glm::ivec3& whole, const brick_room& room, arena& memory)
-        : num_top_(static_cast<std::uint32_t>(num_top_words(whole, has_nodes_))), room_(room),
-          top_(memory.take<index_word>(num_top_)) {
-        num_words_ = num_top_;
-        words_ = top_;
-        if (has_nodes_) {
-            num_words_ = static_cast<std::uint32_t>((room.nodes + spare_cells) << index_level::log2_node_words);
-            words_ = memory.take<index_word>(num_words_);
-            node_keys_ = memory.take<std::uint64_t>(room.nodes + spare_cells);
+        : size_(index_size_of(whole)), room_(room), unused_total_(memory.take<unsigned long long>(1)) {
+        std::uint32_t most = 0;
+        for (int l = size_.levels - 1; l >= 0; --l) {
+            num_words_[l] = static_cast<std::uint32_t>(
+                l + 1 == size_.levels ? size_.top_words : (room.nodes + spare_cells) << index_level::log2_node_words);
+            words_[l] = memory.take<index_word>(num_words_[l]);
+            if (l != 0) keys_[l] = memory.take<std::uint64_t>(room.nodes + spare_cells);
+            most = std::max(most, num_words_[l]);
         }
-        const std::uint32_t most = std::max(num_top_, num_words_);
         counts_ = memory.take<std::uint32_t>(most);
         before_ = memory.take<unsigned long long>(most);
         storage_ = memory.take<std::byte>(cell_scan_bytes(most));
     }
-    [[nodiscard]] bool has_nodes() const { return has_nodes_; }
-    [[nodiscard]] index_level nodes() const { return {nullptr, top_}; }
-    [[nodiscard]] index_level bricks() const { return {has_nodes_ ? top_ : nullptr, words_}; }
+    [[nodiscard]] index_level bricks() const { return {words_[1], words_[0], words_[2]}; }
 
     // Before anything is marked.
     void clear(cudaStream_t stream) const {
-        check(cudaMemsetAsync(top_, 0, num_top_ * sizeof(index_word), stream));
-        if (has_nodes_) check(cudaMemsetAsync(words_, 0, num_words_ * sizeof(index_word), stream));
+        for (int l = 0; l < size_.levels; ++l)
+            check(cudaMemsetAsync(words_[l], 0, num_words_[l] * sizeof(index_word), stream));
     }
-    // After the nodes have been marked. *total becomes their number.
-    void number_nodes(unsigned long long* total, cudaStream_t stream) const {
-        number(top_, num_top_, room_.nodes, total, stream);
-        launch_kernel(false, list_keys<0>, num_blocks(num_top_), threads_per_block, 0, stream, stage::tile_sort,
-                      static_cast<const index_word*>(top_), num_top_, static_cast<const std::uint64_t*>(nullptr),
-                      room_.nodes, node_keys_);
+    // Calls mark(index_level, log2 of its cells' voxels) for the levels above the bricks. *nodes becomes the number of
+    // nodes, or is left as it is.
+    template <class Mark>
+    void mark_above(const Mark& mark, unsigned long long* nodes, cudaStream_t stream) const {
+        for (int l = size_.levels - 1; l > 0; --l) {
+            mark(index_level{nullptr, words_[l], l == 1 ? words_[2] : nullptr}, brick_index<>::log2_cell_of(l));
+            number(l, room_.nodes, l == 1 ? nodes : unused_total_, keys_[l], stream);
+        }
     }
     // After the bricks have been marked. *total becomes their number; their keys are written in order.
     void number_bricks(unsigned long long* total, std::uint64_t* keys, cudaStream_t stream) const {
-        number(words_, num_words_, room_.bricks, total, stream);
-        launch_kernel(false, list_keys<0>, num_blocks(num_words_), threads_per_block, 0, stream, stage::tile_sort,
-                      static_cast<const index_word*>(words_), num_words_, static_cast<const std::uint64_t*>(node_keys_),
-                      room_.bricks, keys);
+        number(0, room_.bricks, total, keys, stream);
     }
 
 private:
-    void number(index_word* words, std::uint32_t n, std::uint64_t most, unsigned long long* total,
-                cudaStream_t stream) const {
+    void number(int l, std::uint64_t most, unsigned long long* total, std::uint64_t* keys, cudaStream_t stream) const {
         constexpr stage where = stage::tile_sort;
+        index_word* const words = words_[l];
+        const std::uint32_t n = num_words_[l];
         launch_kernel(false, count_word_bits<0>, num_blocks(n), threads_per_block, 0, stream, where,
                       static_cast<const index_word*>(words), n, counts_);
         sum_counts(counts_, before_, n, storage_, cell_scan_bytes(n), where, stream);
         launch_kernel(false, number_words<0>, num_blocks(n), threads_per_block, 0, stream, where, words, n,
                       static_cast<const unsigned long long*>(before_), static_cast<std::uint32_t>(most), total);
+        launch_kernel(false, list_keys<0>, num_blocks(n), threads_per_block, 0, stream, where,
+                      static_cast<const index_word*>(words), n,
+                      static_cast<const std::uint64_t*>(l + 1 < size_.levels ? keys_[l + 1] : nullptr), most, keys);
     }
 
-    bool has_nodes_ = false;
-    std::uint32_t num_top_, num_words_ = 0;
+    index_size size_;
     brick_room room_;
-    index_word *top_, *words_ = nullptr;
-    std::uint64_t* node_keys_ = nullptr;
+    std::uint32_t num_words_[3]{};
+    index_word* words_[3]{};   // of bricks, nodes, groups
+    std::uint64_t* keys_[3]{}; // of nodes and groups
+    unsigned long long* unused_total_;
     std::uint32_t* counts_;
     unsigned long long* before_;
     std::byte* storage_;

@@ -29,13 +29,11 @@ namespace voxelpipe::device {
 template <class FragmentShader, class... Targets>
 inline constexpr bool may_follow_from_masks = core::is_constant<FragmentShader> && (follows_from_count<Targets> && ...);
 
-// Whether the rasters of masks serve the draws: one constant, in a grid that the index holds.
+// Whether the rasters of masks serve the draws: one constant.
 template <class Draw>
 [[nodiscard]] bool can_raster_masks(std::span<const Draw> draws, const grid& g, coverage rule,
                                     std::uint64_t triangles_in) {
-    const glm::ivec3 whole = g.whole_extent();
-    return core::arms_of(rule) == core::arm_set::none && std::max({whole.x, whole.y, whole.z}) <= max_index_extent &&
-           draws.size() <= tuning::max_raster_draws &&
+    return core::arms_of(rule) == core::arm_set::none && draws.size() <= tuning::max_raster_draws &&
            is_rastered(triangles_in, core::make_snap_transform(g).fraction, g.extent,
                        rule == coverage::thin ? split_pieces<coverage::thin>::max_work_items(g.extent)
                                               : split_pieces<coverage::conservative>::max_work_items(g.extent)) &&
@@ -100,10 +98,9 @@ public:
 
     template <coverage Rule>
     [[nodiscard]] status run(framebuffer& fb, bool count_voxels, std::uint64_t triangles_in) {
-        if (index_.has_nodes()) {
-            raster_.template mark<Rule>(index_.nodes(), 7, raster_.template is_coarse<Rule>(7));
-            index_.make_words();
-        }
+        index_.mark_above([&](const index_level& level, int log2_cell) {
+            raster_.template mark<Rule>(level, log2_cell, raster_.template is_coarse<Rule>(log2_cell));
+        });
         raster_.template mark<Rule>(index_.bricks(), 3, raster_.template is_coarse<Rule>(3));
         const std::uint64_t bricks = index_.make_numbers();
         end_stage(clock_, &stage_times::tile_sort);
