@@ -6,6 +6,8 @@
 
 #include <voxelpipe/io/nanovdb_layout.hpp>
 
+#include <algorithm>
+#include <cstring>
 #include <map>
 #include <tuple>
 
@@ -117,4 +119,75 @@ TEST_F(Nvdb, ASlabIsTheGridOfItsLayers) {
         for (const auto& [name, grid] : grids_of(folder_ / "alone.nvdb"))
             EXPECT_TRUE(grid == slabs.at(name + "." + std::to_string(n + 1))) << name << n;
     }
+}
+
+namespace {
+
+// A brick, tiles of 8 and of 16 voxels a side, and a number for each.
+sparse_volume volume_with_tiles() {
+    sparse_volume v;
+    v.shape.extent = {40, 32, 32};
+    v.shape.voxel_size = {1, 1, 1};
+    const auto key = [](int x, int y, int z) { return voxelpipe::core::morton_key(x, y, z); };
+    v.tiles = {voxelpipe::brick_tile::of(key(1, 0, 0), 0), voxelpipe::brick_tile::of(key(2, 0, 0), 1)};
+    v.keys = {key(0, 2, 0)};
+    v.masks.resize(1);
+    v.masks[0].words[3] = 0x8001;
+    v.offsets = {0, 2};
+    channel numbers{"count", scalar::u32, 1, {}};
+    for (std::uint32_t n = 1; n <= 4; ++n)
+        for (int byte = 0; byte < 4; ++byte) numbers.data.push_back(static_cast<std::byte>(byte == 0 ? n : 0));
+    v.channels = {{"occupancy", scalar::bit, 1, {}}, numbers};
+    return v;
+}
+std::uint32_t value_at(const sparse_volume& v, const glm::ivec3& p) {
+    const std::uint64_t rank = v.table().find(p);
+    std::uint32_t value = 0;
+    if (rank != voxelpipe::brick_table::none) std::memcpy(&value, v.channels[1].data.data() + 4 * rank, 4);
+    return value;
+}
+
+} // namespace
+
+TEST_F(Nvdb, TilesAreOpenedWhereBricksAreAskedFor) {
+    const sparse_volume v = volume_with_tiles(), all = open_tiles(v);
+    EXPECT_TRUE(all.tiles.empty());
+    EXPECT_EQ(all.keys.size(), 1u + 1 + 8);
+    EXPECT_TRUE(std::is_sorted(all.keys.begin(), all.keys.end()));
+    EXPECT_EQ(all.num_voxels(), 2u + 9 * 512);
+    const auto key = [](int x, int y, int z) { return voxelpipe::core::morton_key(x, y, z); };
+    const std::vector<std::uint64_t> touched{key(0, 0, 0), key(3, 0, 0), key(0, 2, 0), key(2, 1, 1)};
+    const sparse_volume some = open_tiles(v, &touched);
+    EXPECT_EQ(some.keys.size(), 3u);
+    EXPECT_EQ(some.tiles.size(), 1u + 6);
+    EXPECT_EQ(some.num_voxels(), v.num_voxels());
+    EXPECT_EQ(some.channels[1].data.size(), 4 * some.num_values());
+    int wrong = 0, filled = 0;
+    for (int z = 0; z < 32; ++z)
+        for (int y = 0; y < 32; ++y)
+            for (int x = 0; x < 40; ++x) {
+                const std::uint32_t is = value_at(v, {x, y, z});
+                filled += is != 0 ? 1 : 0;
+                wrong += value_at(all, {x, y, z}) == is && value_at(some, {x, y, z}) == is ? 0 : 1;
+            }
+    EXPECT_EQ(wrong, 0);
+    EXPECT_EQ(static_cast<std::uint64_t>(filled), v.num_voxels());
+    // Formats that name every voxel are those of the open volume; .nvdb keeps tiles, unless it is cut into slabs.
+    for (const char* name : {"a.npz", "a.nrrd"}) {
+        write_sparse(v, folder_ / name, {});
+        const std::string bytes = read_file(folder_ / name);
+        write_sparse(all, folder_ / name, {});
+        EXPECT_TRUE(bytes == read_file(folder_ / name)) << name;
+    }
+    write_options slabs;
+    slabs.pieces = 2;
+    write_sparse(v, folder_ / "slabs.nvdb", slabs);
+    const std::string cut = read_file(folder_ / "slabs.nvdb");
+    write_sparse(all, folder_ / "slabs.nvdb", slabs);
+    EXPECT_TRUE(cut == read_file(folder_ / "slabs.nvdb"));
+    write_sparse(v, folder_ / "tiles.nvdb", {});
+    write_sparse(all, folder_ / "open.nvdb", {});
+    EXPECT_EQ(std::filesystem::file_size(folder_ / "open.nvdb") - std::filesystem::file_size(folder_ / "tiles.nvdb"),
+              9 * (sizeof(voxelpipe::io::nanovdb::leaf_node<std::uint32_t>) +
+                   sizeof(voxelpipe::io::nanovdb::leaf_node<voxelpipe::io::nanovdb::mask_value>)));
 }
