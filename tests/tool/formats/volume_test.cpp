@@ -156,7 +156,7 @@ TEST_F(Nvdb, TilesAreOpenedWhereBricksAreAskedFor) {
     EXPECT_TRUE(std::is_sorted(all.keys.begin(), all.keys.end()));
     EXPECT_EQ(all.num_voxels(), 2u + 9 * 512);
     const auto key = [](int x, int y, int z) { return voxelpipe::core::morton_key(x, y, z); };
-    const std::vector<std::uint64_t> touched{key(0, 0, 0), key(3, 0, 0), key(0, 2, 0), key(2, 1, 1)};
+    const std::vector<std::uint64_t> touched{key(0, 0, 0), key(3, 0, 0), key(2, 1, 1), key(0, 2, 0)};
     const sparse_volume some = open_tiles(v, &touched);
     EXPECT_EQ(some.keys.size(), 3u);
     EXPECT_EQ(some.tiles.size(), 1u + 6);
@@ -173,7 +173,7 @@ TEST_F(Nvdb, TilesAreOpenedWhereBricksAreAskedFor) {
     EXPECT_EQ(wrong, 0);
     EXPECT_EQ(static_cast<std::uint64_t>(filled), v.num_voxels());
     // Formats that name every voxel are those of the open volume; .nvdb keeps tiles, unless it is cut into slabs.
-    for (const char* name : {"a.npz", "a.nrrd"}) {
+    for (const char* name : {"a.npz", "a.vti"}) {
         write_sparse(v, folder_ / name, {});
         const std::string bytes = read_file(folder_ / name);
         write_sparse(all, folder_ / name, {});
