@@ -29,6 +29,8 @@ namespace voxelpipe {
 // `progress` then gets reports of all calls.
 class cpu_backend {
 public:
+    static constexpr bool runs_on_host = true; // its calls may be given memory of the host as it is
+
     // Host memory, uninitialised, aligned to 64 bytes. The constructor throws std::bad_alloc.
     template <class T>
     class buffer {

@@ -5,28 +5,34 @@
 //   bench_out_of_core [TRIANGLES [RESOLUTION [BUDGET_MIB [FOLDER [SLABS]]]]]
 //   bench_out_of_core 1000000000 16384 16384 /scratch      # 10^9 triangles into 16,384^3
 //
-// The mesh is a relief over a unit square, of two triangles for each of its cells, strip by strip. Voxels go into a
-// sparse framebuffer of one bit, whose bricks are counted and dropped. Prints seconds of making the mesh, of binning
-// and of drawing, bytes that went through the disk, and peak memory. The medium's own rate is measured first: a file of
-// 1 GiB, or of as much as the bins take if that is less, in the same folder, written until the medium has it and read
-// past the cache. The rate reached is the time that the medium alone would take for the bytes, over that of binning and
-// drawing; 80 % is aimed at. The folder needs about 42 bytes a triangle. SLABS is as many as leave a slab of mean size
-// a third of the budget's room, so that few slabs have to be cut again.
+// The mesh is a relief over a unit square, of two triangles for each of its cells, some strips at a time. Voxels go
+// into a sparse framebuffer of one bit, whose bricks are counted, added to a checksum that no cut of the grid changes,
+// and dropped. Prints seconds of making the mesh, of binning and of drawing, bytes that went through files, those of
+// them that the system wrote to the medium and read from it meanwhile, and peak memory. The medium's own rate is
+// measured first: a file of 1 GiB, or of as much as the bins take if that is less, in the same folder, written until
+// the medium has it and read past the cache. The rate reached is the time that the medium alone would take for the
+// bytes, over that of binning and drawing; 80 % is aimed at. The folder needs about 42 bytes a triangle. SLABS is as
+// many as leave a slab of mean size a third of the budget's room, so that few slabs have to be cut again.
 #include <cpu_ref/backend.hpp>
+#include <voxelpipe/core/threads.hpp>
 #include <voxelpipe/slabs/stream.hpp>
 
 #include <fcntl.h>
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <fstream>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace {
@@ -36,23 +42,45 @@ namespace slabs = voxelpipe::slabs;
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-// Row `row` of a relief of n x n cells: 2 n triangles.
-void make_strip(std::uint64_t n, std::uint64_t row, std::vector<glm::vec3>& positions,
-                std::vector<glm::uvec3>& triangles) {
-    positions.clear();
-    triangles.clear();
-    for (std::uint64_t j = row; j <= row + 1; ++j)
+// Rows [first, last) of a relief of n x n cells, 2 n triangles each; by all cores.
+void make_strips(std::uint64_t n, std::uint64_t first, std::uint64_t last, std::vector<glm::vec3>& positions,
+                 std::vector<glm::uvec3>& triangles) {
+    const std::uint64_t rows = last - first, up = n + 1;
+    positions.resize((rows + 1) * up);
+    triangles.resize(2 * n * rows);
+    vp::core::parallel_for(std::max(1u, std::thread::hardware_concurrency()), rows + 1, [&](unsigned, std::size_t row) {
         for (std::uint64_t i = 0; i <= n; ++i) {
             const double x = static_cast<double>(i) / static_cast<double>(n),
-                         y = static_cast<double>(j) / static_cast<double>(n);
+                         y = static_cast<double>(first + row) / static_cast<double>(n);
             const double waves = 0.5 + 0.25 * std::sin(9 * x + 4 * y) + 0.12 * std::sin(31 * y - 17 * x);
-            positions.emplace_back(x, y, waves + 0.02 * std::sin(240 * x) * std::cos(220 * y));
+            positions[row * up + i] = {x, y, waves + 0.02 * std::sin(240 * x) * std::cos(220 * y)};
         }
-    const auto up = static_cast<unsigned>(n + 1);
-    for (unsigned i = 0; i + 1 < up; ++i) {
-        triangles.emplace_back(i, i + 1, i + up);
-        triangles.emplace_back(i + 1, i + up + 1, i + up);
-    }
+        for (std::uint64_t i = 0; row < rows && i < n; ++i) {
+            const auto at = static_cast<unsigned>(row * up + i), above = static_cast<unsigned>(at + up);
+            triangles[2 * (row * n + i)] = {at, at + 1, above};
+            triangles[2 * (row * n + i) + 1] = {at + 1, above + 1, above};
+        }
+    });
+}
+
+// A sum over bricks, whichever slabs they come in.
+template <class Bits>
+std::uint64_t checksum(const Bits& part) {
+    const vp::brick_table table = part.view().table;
+    std::atomic<std::uint64_t> sum = 0;
+    constexpr std::uint64_t block = 4096;
+    vp::core::parallel_for(std::max(1u, std::thread::hardware_concurrency()), (table.count + block - 1) / block,
+                           [&](unsigned, std::size_t b) {
+                               std::uint64_t of_block = 0;
+                               for (std::uint64_t i = b * block; i < std::min(table.count, (b + 1) * block); ++i) {
+                                   std::uint64_t h = table.keys[i] * 0x9e3779b97f4a7c15u;
+                                   for (const std::uint64_t word : table.masks[i].words)
+                                       h = (h ^ (h >> 29) ^ word) * 0xbf58476d1ce4e5b9u;
+                                   of_block += h ^ (h >> 32);
+                               }
+                               sum += of_block;
+                           });
+    return sum;
 }
 
 struct disk_rate {
@@ -83,9 +111,9 @@ disk_rate measure_disk(const std::string& folder, std::uint64_t bytes) {
     return {total / (written - start), total / (read - begin)};
 }
 
-// Bytes that this process has written and read so far.
+// Bytes that this process has written and read so far: through files, and to and from the medium.
 struct traffic {
-    double written = 0, read = 0;
+    double written = 0, read = 0, medium_written = 0, medium_read = 0;
 };
 traffic traffic_so_far() {
     traffic t;
@@ -94,13 +122,18 @@ traffic traffic_so_far() {
     for (double value = 0; file >> key >> value;) {
         if (key == "wchar:") t.written = value;
         if (key == "rchar:") t.read = value;
+        if (key == "write_bytes:") t.medium_written = value;
+        if (key == "read_bytes:") t.medium_read = value;
     }
     return t;
 }
 
-} // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
+#ifdef M_MMAP_THRESHOLD
+    // Large arrays go back to the system when they are freed. By default glibc keeps more and more of them for itself,
+    // by thread, which the peak would show.
+    (void)mallopt(M_MMAP_THRESHOLD, 128 << 10);
+#endif
     const auto number = [&](int i, double otherwise) { return argc > i ? std::atof(argv[i]) : otherwise; };
     const auto side = static_cast<std::uint64_t>(std::sqrt(number(1, 1e6) / 2));
     const int resolution = static_cast<int>(number(2, 1024));
@@ -124,16 +157,17 @@ int main(int argc, char** argv) {
     double making = 0, binning = 0, sinking = 0;
     std::vector<glm::vec3> positions;
     std::vector<glm::uvec3> triangles;
-    for (std::uint64_t row = 0; row < side; ++row) {
+    const std::uint64_t rows = std::max<std::uint64_t>(1, (1 << 20) / (2 * side)); // a million triangles at a time
+    for (std::uint64_t row = 0; row < side; row += rows) {
         const double start = seconds();
-        make_strip(side, row, positions, triangles);
+        make_strips(side, row, std::min(side, row + rows), positions, triangles);
         const double made = seconds();
         stream.add({positions, triangles}).or_throw();
         making += made - start;
         binning += seconds() - made;
     }
     using bits = vp::sparse_framebuffer<vp::cpu_backend, vp::target<vp::bit, vp::blend::bit_or>>;
-    std::uint64_t bricks = 0, voxels = 0, parts = 0;
+    std::uint64_t bricks = 0, voxels = 0, parts = 0, sum = 0;
     const double start = seconds();
     const vp::status s = stream.draw(
         vp::constant(true),
@@ -145,6 +179,7 @@ int main(int argc, char** argv) {
             ++parts;
             bricks += part.num_bricks();
             voxels += part.num_voxels();
+            sum += checksum(part);
             sinking += seconds() - begin;
         });
     const double drawing = seconds() - start - sinking;
@@ -161,9 +196,23 @@ int main(int argc, char** argv) {
         making, binning, 1e9 * binning / n, drawing, 1e9 * drawing / n, static_cast<unsigned long long>(parts));
     std::printf("bins     %9.2f GB written, %.2f GB read; medium %.0f MB/s written, %.0f MB/s read\n", written / 1e9,
                 read / 1e9, disk.write / 1e6, disk.read / 1e6);
-    std::printf("rate     %9.2f s for the medium alone, %.0f %% of its rate reached\n", alone,
-                100 * alone / (binning + drawing));
-    std::printf("voxels   %llu in %llu bricks\npeak     %.0f MiB\n", static_cast<unsigned long long>(voxels),
-                static_cast<unsigned long long>(bricks), static_cast<double>(usage.ru_maxrss) / 1024);
+    std::printf("         %9.2f GB written to the medium until then, %.2f GB read from it\n",
+                (after.medium_written - before.medium_written) / 1e9, (after.medium_read - before.medium_read) / 1e9);
+    std::printf("rate     %9.2f s for the medium alone, %.0f %% of its rate reached, by %u cores\n", alone,
+                100 * alone / (binning + drawing), std::thread::hardware_concurrency());
+    std::printf("voxels   %llu in %llu bricks, checksum %016llx\npeak     %.0f MiB\n",
+                static_cast<unsigned long long>(voxels), static_cast<unsigned long long>(bricks),
+                static_cast<unsigned long long>(sum), static_cast<double>(usage.ru_maxrss) / 1024);
     return s.ok() && voxels == s.counts.voxels && s.counts.triangles_drawn == s.counts.triangles_in ? 0 : 1;
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+    try {
+        return run(argc, argv);
+    } catch (const std::exception& e) { // such as a folder that is not there, or is full
+        std::fprintf(stderr, "bench_out_of_core: %s\n", e.what());
+        return 1;
+    }
 }

@@ -3,80 +3,106 @@
 #pragma once
 
 // Triangles on their way to slabs. A record is a triangle by itself: positions and varyings as the vertex shader gave
-// them, and its number in the whole mesh. A bin is a list of records that only grows; beyond a budget its records lie
-// in a temporary file. Needs POSIX files.
-
-#include <voxelpipe/shader.hpp>
-
-#include <glm/vec3.hpp>
+// them, and its number in the whole mesh. A bin is a list of records that only grows; beyond a budget its records go to
+// a temporary file, on threads of their own, while more records come. Needs POSIX files.
 
 #include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <deque>
+#include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <system_error>
+#include <thread>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace voxelpipe::slabs {
 
-// A temporary file without a name: it is gone when the object is, or the process. Moves, and does not copy. Members
-// throw std::system_error, such as for a full disk.
+// A temporary file without a name: it is gone when the object is, or the process. Its bytes are written by any threads,
+// in any order; readers wait for those that are on their way. Members throw std::system_error, such as for a full disk.
 class scratch_file {
 public:
     // A new, empty file in a folder that is there.
     explicit scratch_file(const std::string& folder) {
         std::string name = folder + "/voxelpipe-XXXXXX";
         file_ = ::mkstemp(name.data());
-        if (file_ < 0) fail("cannot make a temporary file in " + folder);
+        if (file_ < 0) fail(errno, "cannot make a temporary file in " + folder);
         (void)::unlink(name.c_str());
     }
-    scratch_file(scratch_file&& other) noexcept
-        : file_(std::exchange(other.file_, -1)), size_(std::exchange(other.size_, 0)) {}
-    scratch_file& operator=(scratch_file&& other) noexcept {
-        std::swap(file_, other.file_);
-        std::swap(size_, other.size_);
-        return *this;
-    }
-    ~scratch_file() {
-        if (file_ >= 0) ::close(file_);
-    }
+    scratch_file(const scratch_file&) = delete;
+    scratch_file& operator=(const scratch_file&) = delete;
+    ~scratch_file() { ::close(file_); }
 
-    [[nodiscard]] std::uint64_t size() const { return size_; } // bytes
-    // Writes bytes at the end.
-    void append(std::span<const std::byte> bytes) {
-        while (!bytes.empty()) {
-            const ssize_t n = ::pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(size_));
-            if (n < 0 && errno == EINTR) continue;
-            if (n <= 0) fail("cannot write a temporary file");
-            size_ += static_cast<std::uint64_t>(n);
-            bytes = bytes.subspan(static_cast<std::size_t>(n));
-        }
+    [[nodiscard]] std::uint64_t size() const { return size_; } // bytes, those on their way too
+    // Room for bytes at the end, for one write(); returns where. By one thread at a time.
+    [[nodiscard]] std::uint64_t extend(std::uint64_t bytes) {
+        coming_.fetch_add(1);
+        return std::exchange(size_, size_ + bytes);
     }
-    // Fills `bytes` from the file's bytes at `offset` on; all of them have been written.
+    // Fills room that extend() gave, with its bytes. By any thread; never throws, readers do.
+    void write(std::uint64_t offset, const std::vector<std::span<const std::byte>>& parts) noexcept {
+        for (std::span<const std::byte> bytes : parts)
+            while (!bytes.empty()) {
+                const ssize_t n = ::pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+                if (n < 0 && errno == EINTR) continue;
+                if (n <= 0) error_ = n < 0 && errno != 0 ? errno : EIO;
+                if (n <= 0) break;
+                offset += static_cast<std::uint64_t>(n);
+                bytes = bytes.subspan(static_cast<std::size_t>(n));
+            }
+        coming_.fetch_sub(1);
+        coming_.notify_all();
+    }
+    // Fills `bytes` from the file's bytes at `offset` on; room for all of them has been made.
     void read(std::uint64_t offset, std::span<std::byte> bytes) const {
+        for (int n = coming_.load(); n != 0; n = coming_.load()) coming_.wait(n);
+        check();
         while (!bytes.empty()) {
             const ssize_t n = ::pread(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
             if (n < 0 && errno == EINTR) continue;
-            if (n <= 0) fail("cannot read a temporary file");
+            if (n <= 0) fail(n < 0 ? errno : EIO, "cannot read a temporary file");
             offset += static_cast<std::uint64_t>(n);
             bytes = bytes.subspan(static_cast<std::size_t>(n));
         }
     }
+    // Throws what went wrong with writing so far.
+    void check() const {
+        if (const int e = error_.load(); e != 0) fail(e, "cannot write a temporary file");
+    }
 
 private:
-    [[noreturn]] static void fail(const std::string& what) {
-        throw std::system_error(errno != 0 ? errno : EIO, std::generic_category(), "voxelpipe::slabs: " + what);
+    [[noreturn]] static void fail(int error, const std::string& what) {
+        throw std::system_error(error, std::generic_category(), "voxelpipe::slabs: " + what);
     }
     int file_ = -1;
     std::uint64_t size_ = 0;
+    std::atomic<int> coming_ = 0; // writes that have room and have not ended
+    std::atomic<int> error_ = 0;  // of a write
+};
+
+// Records that leave the memory of a bin, and where they go.
+template <class Record>
+struct spilled_records {
+    std::shared_ptr<scratch_file> file;
+    std::uint64_t offset = 0, memory = 0; // bytes
+    std::vector<std::vector<Record>> blocks;
+
+    void write() const noexcept {
+        std::vector<std::span<const std::byte>> parts;
+        for (const auto& b : blocks) parts.push_back(std::as_bytes(std::span(b)));
+        file->write(offset, parts);
+    }
 };
 
 // Records in the order in which they came. Those in a file precede those in memory.
@@ -85,36 +111,56 @@ class bin {
     static_assert(std::is_trivially_copyable_v<Record>, "voxelpipe: varyings must be trivially copyable");
 
 public:
-    [[nodiscard]] std::uint64_t size() const { return in_file() + in_memory_; }
+    [[nodiscard]] std::uint64_t size() const { return in_file() + in_memory(); }
     // Records in the file, and in memory.
-    [[nodiscard]] std::uint64_t in_file() const { return file_.empty() ? 0 : file_[0].size() / sizeof(Record); }
+    [[nodiscard]] std::uint64_t in_file() const { return file_ == nullptr ? 0 : file_->size() / sizeof(Record); }
     // Records in memory.
     [[nodiscard]] std::uint64_t in_memory() const { return in_memory_; }
-
-    // block: records that memory is taken for at a time. Returns whether it was taken.
-    bool push(const Record& r, std::size_t block) {
-        const bool grows = blocks_.empty() || blocks_.back().size() == blocks_.back().capacity();
-        if (grows) {
-            blocks_.emplace_back();
-            blocks_.back().reserve(block);
-        }
-        blocks_.back().push_back(r);
-        ++in_memory_;
-        return grows;
-    }
     // Bytes that records in memory take, with those that are reserved.
-    [[nodiscard]] std::uint64_t memory_bytes() const {
-        std::uint64_t bytes = 0;
-        for (const auto& b : blocks_) bytes += b.capacity() * sizeof(Record);
-        return bytes;
+    [[nodiscard]] std::uint64_t memory_bytes() const { return blocks_.size() * block_ * sizeof(Record); }
+
+    // Appends. block: records that memory is taken for at a time, always the same. Returns the bytes of memory taken.
+    std::uint64_t push(std::span<const Record> records, std::size_t block) {
+        const std::uint64_t before = blocks_.size();
+        block_ = block;
+        in_memory_ += records.size();
+        while (!records.empty()) {
+            if (blocks_.empty() || blocks_.back().size() == block_) {
+                blocks_.emplace_back();
+                blocks_.back().reserve(block_);
+            }
+            const std::size_t n = std::min(records.size(), block_ - blocks_.back().size());
+            blocks_.back().insert(blocks_.back().end(), records.begin(),
+                                  records.begin() + static_cast<std::ptrdiff_t>(n));
+            records = records.subspan(n);
+        }
+        return (blocks_.size() - before) * block_ * sizeof(Record);
     }
-    // Moves the records in memory to the file.
-    void spill(const std::string& folder) {
-        if (in_memory_ == 0) return;
-        if (file_.empty()) file_.emplace_back(folder);
-        for (const auto& b : blocks_) file_[0].append(std::as_bytes(std::span(b)));
+    // Takes the records in memory out, for its file.
+    [[nodiscard]] spilled_records<Record> spill(const std::string& folder) {
+        if (file_ == nullptr) file_ = std::make_shared<scratch_file>(folder);
+        file_->check();
+        const std::uint64_t bytes = memory_bytes();
+        spilled_records<Record> out{file_, file_->extend(in_memory_ * sizeof(Record)), bytes, std::move(blocks_)};
         blocks_.clear();
         in_memory_ = 0;
+        return out;
+    }
+    // Copies the records from `first` on; there are so many.
+    void copy(std::uint64_t first, std::span<Record> to) const {
+        if (const std::uint64_t filed = in_file(); first < filed) {
+            const auto n = static_cast<std::size_t>(std::min<std::uint64_t>(to.size(), filed - first));
+            file_->read(first * sizeof(Record), std::as_writable_bytes(to.first(n)));
+            first += n;
+            to = to.subspan(n);
+        }
+        for (first -= in_file(); !to.empty();) {
+            const std::vector<Record>& from = blocks_[static_cast<std::size_t>(first / block_)];
+            const auto at = static_cast<std::size_t>(first % block_), n = std::min(to.size(), from.size() - at);
+            std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(at), n, to.begin());
+            first += n;
+            to = to.subspan(n);
+        }
     }
     // Calls f(std::span<const Record>) with all records, in order.
     template <class F>
@@ -124,19 +170,21 @@ public:
                             most = std::max<std::uint64_t>(1, (std::uint64_t{4} << 20) / sizeof(Record));
         for (std::uint64_t first = 0; first < total; first += most) {
             read.resize(static_cast<std::size_t>(std::min(most, total - first)));
-            file_[0].read(first * sizeof(Record), std::as_writable_bytes(std::span(read)));
+            file_->read(first * sizeof(Record), std::as_writable_bytes(std::span(read)));
             f(std::span<const Record>(read));
         }
         for (const auto& b : blocks_) f(std::span<const Record>(b));
     }
 
 private:
-    std::vector<std::vector<Record>> blocks_;
-    std::vector<scratch_file> file_; // none or one
+    std::vector<std::vector<Record>> blocks_; // all full but the last
+    std::shared_ptr<scratch_file> file_;      // none, or what has left memory
     std::uint64_t in_memory_ = 0;
+    std::size_t block_ = 1;
 };
 
-// Keeps the memory of several bins below a budget: beyond it, the largest goes to its file.
+// Keeps the memory of several bins below a budget: beyond three quarters of it, the largest goes to its file. Threads
+// write while more records come; these wait once the budget is full of what is on its way.
 template <class Record>
 class bin_memory {
 public:
@@ -145,22 +193,80 @@ public:
         : budget_(budget), folder_(std::move(folder)),
           block_(static_cast<std::size_t>(std::clamp<std::uint64_t>(
               budget / sizeof(Record) / (4 * std::max<std::size_t>(1, num_bins)), 16, 65536))) {}
+    bin_memory(const bin_memory&) = delete;
+    bin_memory& operator=(const bin_memory&) = delete;
+    // What is on its way is written.
+    ~bin_memory() {
+        {
+            const std::lock_guard lock(mutex_);
+            ends_ = true;
+        }
+        comes_.notify_all();
+    }
 
-    // Appends to bin i of the bins that share this budget.
+    // Appends to bin i of the bins that share this budget. Throws std::bad_alloc, and std::system_error of files.
     void push(std::vector<bin<Record>>& bins, std::size_t i, const Record& r) {
-        if (!bins[i].push(r, block_)) return;
-        used_ += block_ * sizeof(Record);
-        if (used_ <= budget_) return;
-        auto& largest = *std::max_element(
-            bins.begin(), bins.end(), [](const auto& a, const auto& b) { return a.memory_bytes() < b.memory_bytes(); });
-        used_ -= largest.memory_bytes();
-        largest.spill(folder_);
+        if (const std::uint64_t taken = append(bins[i], std::span(&r, 1)); taken != 0) settle(bins, taken);
+    }
+    // The same in two parts: several threads append to different bins, then one accounts for all the memory taken.
+    [[nodiscard]] std::uint64_t append(bin<Record>& to, std::span<const Record> records) const {
+        return to.push(records, block_);
+    }
+    void settle(std::vector<bin<Record>>& bins, std::uint64_t taken) {
+        held_ += taken;
+        while (held_ > budget_ / 4 * 3) {
+            auto& largest = *std::max_element(bins.begin(), bins.end(), [](const auto& a, const auto& b) {
+                return a.memory_bytes() < b.memory_bytes();
+            });
+            if (largest.in_memory() == 0) return;
+            held_ -= largest.memory_bytes();
+            send(largest.spill(folder_));
+        }
     }
 
 private:
-    std::uint64_t budget_, used_ = 0;
+    // To a thread that writes; waits for room.
+    void send(spilled_records<Record> records) {
+        constexpr std::size_t most_writers = 2;
+        if (writers_.size() < most_writers) {
+            try {
+                writers_.emplace_back([this] { serve(); });
+            } catch (const std::system_error&) {
+            }
+        }
+        if (writers_.empty()) return records.write(); // the machine grants no thread
+        std::unique_lock lock(mutex_);
+        on_their_way_ += records.memory;
+        queue_.push_back(std::move(records));
+        comes_.notify_one();
+        goes_.wait(lock, [&] { return held_ + on_their_way_ <= budget_ || on_their_way_ == 0; });
+    }
+    void serve() {
+        std::unique_lock lock(mutex_);
+        for (;;) {
+            comes_.wait(lock, [&] { return ends_ || !queue_.empty(); });
+            if (queue_.empty()) return;
+            spilled_records<Record> next = std::move(queue_.front());
+            queue_.pop_front();
+            lock.unlock();
+            next.write();
+            const std::uint64_t written = next.memory;
+            next = {};
+            lock.lock();
+            on_their_way_ -= written;
+            goes_.notify_all();
+        }
+    }
+
+    std::uint64_t budget_, held_ = 0; // bytes; held by the bins
     std::string folder_;
     std::size_t block_;
+    std::mutex mutex_; // of what follows
+    std::condition_variable comes_, goes_;
+    std::deque<spilled_records<Record>> queue_;
+    std::uint64_t on_their_way_ = 0; // bytes
+    bool ends_ = false;
+    std::vector<std::jthread> writers_; // last: they end before the rest does
 };
 
 } // namespace voxelpipe::slabs

@@ -7,6 +7,7 @@
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <exception>
 #include <functional>
@@ -52,6 +53,16 @@ public:
 private:
     cudaStream_t stream_ = nullptr;
 };
+
+// Waits for a signal. Waking a thread that sleeps takes a good part of the time of a short call, so a thread looks for
+// the signal for a while before it sleeps.
+inline void wait_for(std::binary_semaphore& signal) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::microseconds(100);
+    do {
+        if (signal.try_acquire()) return;
+    } while (std::chrono::steady_clock::now() < until);
+    signal.acquire();
+}
 
 } // namespace detail
 
@@ -113,7 +124,7 @@ public:
             members_[i]->start.release();
         }
         for (std::size_t i = 0; i < (is_parallel_ ? std::min<std::size_t>(1, count) : count); ++i) run(i);
-        for (std::size_t i = 1; is_parallel_ && i < count; ++i) members_[i]->done.acquire();
+        for (std::size_t i = 1; is_parallel_ && i < count; ++i) detail::wait_for(members_[i]->done);
         for (std::size_t i = 0; i < count; ++i)
             if (members_[i]->thrown) std::rethrow_exception(members_[i]->thrown);
     }
@@ -131,7 +142,7 @@ private:
     };
     static void serve(member& m) {
         for (;;) {
-            m.start.acquire();
+            detail::wait_for(m.start);
             if (!m.work) return;
             m.work();
             m.done.release();

@@ -6,17 +6,19 @@
 // shader gave them, and its number in the whole mesh. Records are made of meshes in host memory, and become the mesh of
 // a slab.
 
+#include <voxelpipe/core/threads.hpp>
 #include <voxelpipe/slabs/plan.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <glm/vec3.hpp>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
 #include <type_traits>
-#include <vector>
+#include <utility>
 
 namespace voxelpipe::slabs {
 
@@ -65,57 +67,83 @@ struct renumber_list {
     VOXELPIPE_HD void operator()(std::uint64_t i) const { primitives[i] = numbers[primitives[i]]; }
 };
 
-template <class Varyings>
-struct slab_mesh {
-    using view = mesh_view<Varyings>;
-    using vertex_shader = stored_vertices<Varyings>;
-};
-template <class Varyings>
-requires(std::is_empty_v<Varyings>) struct slab_mesh<Varyings> {
-    using view = mesh_view<>;
-    using vertex_shader = passthrough;
-};
-
 } // namespace detail
 
-// Shades the vertices of a chunk and calls visit(record, reach) for each triangle that may touch the grid, in order.
-// Adds all triangles to `counts`. Triangle i has the number first_number + i, or + part.numbers[i] of a subset.
-template <class Varyings, class... Attributes, class VertexShader, class Visit>
-[[nodiscard]] status for_each_record(const mesh_view<Attributes...>& chunk, const VertexShader& shader, const grid& g,
-                                     coverage rule, bool is_solid, std::uint64_t first_number, counters& counts,
-                                     Visit&& visit) {
-    using plain = voxelpipe::draw<mesh_view<Attributes...>, VertexShader, constant_output<bool>>;
-    const plain d{chunk, shader, {}};
-    if (const status s = core::validate_draws(std::span<const plain>(&d, 1)); !s.ok()) return s;
-    if (chunk.copies.count != 1) return core::failure(status_code::bad_subset);
-    const auto num_vertices = static_cast<std::uint32_t>(chunk.positions.size());
-    std::vector<vertex_output<Varyings>> vertices(num_vertices);
-    for (std::uint32_t i = 0; i < num_vertices; ++i) {
-        const auto result = shader(core::fetch_vertex(chunk, i, 0, 0));
-        vertices[i] = core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result);
+// The triangles of a chunk as records. Shades its vertices when it is made; refers to the chunk.
+template <class Varyings, class Mesh>
+class chunk_records {
+public:
+    // Triangle i has the number first_number + i, or + part.numbers[i] of a subset.
+    template <class VertexShader>
+    chunk_records(const Mesh& chunk, const VertexShader& shader, const grid& g, coverage rule, bool is_solid,
+                  std::uint64_t first_number, unsigned threads = 1)
+        : chunk_(chunk), snap_(core::make_snap_transform(g)), extent_(g.extent), rule_(rule), is_solid_(is_solid),
+          first_number_(first_number) {
+        using plain = voxelpipe::draw<Mesh, VertexShader, constant_output<bool>>;
+        const plain d{chunk, shader, {}};
+        valid_ = core::validate_draws(std::span<const plain>(&d, 1));
+        if (valid_.ok() && chunk.copies.count != 1) valid_ = core::failure(status_code::bad_subset);
+        if (!valid_.ok()) return;
+        constexpr std::size_t block = 16384;
+        vertices_ = core::raw_array<vertex_output<Varyings>>(chunk.positions.size());
+        core::parallel_for(threads, (vertices_.size() + block - 1) / block, [&](unsigned, std::size_t b) {
+            for (std::size_t i = b * block; i < std::min(vertices_.size(), (b + 1) * block); ++i) {
+                const auto result = shader(core::fetch_vertex(chunk, static_cast<std::uint32_t>(i), 0, 0));
+                vertices_[i] = core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result);
+            }
+        });
     }
-    const core::snap_transform snap = core::make_snap_transform(g);
-    for (std::size_t i = 0; i < chunk.triangles.size(); ++i) {
-        const glm::uvec3 t = chunk.triangles[i];
-        if (t.x >= num_vertices || t.y >= num_vertices || t.z >= num_vertices) {
-            status s = core::failure(status_code::index_out_of_range);
-            s.draw = 0;
-            s.triangle = static_cast<std::uint32_t>(i);
-            return s;
+    // Whether the chunk can be drawn.
+    [[nodiscard]] const status& valid() const { return valid_; }
+
+    // Calls visit(record, reach) for each of the triangles [first, last) that may touch the grid, in order, and adds
+    // all of them to `counts`. Fails at an index that names no vertex. Several threads may visit parts.
+    template <class Visit>
+    [[nodiscard]] status visit(std::size_t first, std::size_t last, counters& counts, Visit&& visit) const {
+        for (std::size_t i = first; i < last; ++i) {
+            const glm::uvec3 t = chunk_.triangles[i];
+            if (t.x >= vertices_.size() || t.y >= vertices_.size() || t.z >= vertices_.size()) {
+                status s = core::failure(status_code::index_out_of_range);
+                s.draw = 0;
+                s.triangle = static_cast<std::uint32_t>(i);
+                return s;
+            }
+            const std::uint64_t number = first_number_ + (chunk_.part.whole != 0 ? chunk_.part.numbers[i] : i);
+            if (number >= std::numeric_limits<std::uint32_t>::max())
+                return core::failure(status_code::too_many_triangles);
+            record<Varyings> r;
+            for (int k = 0; k < 3; ++k) {
+                const vertex_output<Varyings>& v = vertices_[t[k]];
+                r.positions[k] = v.position;
+                if constexpr (!std::is_empty_v<Varyings>) r.varyings[k] = v.varyings;
+            }
+            r.number = static_cast<std::uint32_t>(number);
+            const classified c =
+                classify(snap_, extent_, rule_, r.positions[0], r.positions[1], r.positions[2], is_solid_);
+            core::count_class(counts, c.kind);
+            if (c.kind == core::triangle_class::drawn) visit(std::as_const(r), c.reach);
         }
-        const std::uint64_t number = first_number + (chunk.part.whole != 0 ? chunk.part.numbers[i] : i);
-        if (number >= std::numeric_limits<std::uint32_t>::max()) return core::failure(status_code::too_many_triangles);
-        record<Varyings> r;
-        for (int k = 0; k < 3; ++k) {
-            r.positions[k] = vertices[t[k]].position;
-            if constexpr (!std::is_empty_v<Varyings>) r.varyings[k] = vertices[t[k]].varyings;
-        }
-        r.number = static_cast<std::uint32_t>(number);
-        const classified c = classify(snap, g.extent, rule, r.positions[0], r.positions[1], r.positions[2], is_solid);
-        core::count_class(counts, c.kind);
-        if (c.kind == core::triangle_class::drawn) visit(r, c.reach);
+        return {};
     }
-    return {};
+
+private:
+    const Mesh& chunk_;
+    core::snap_transform snap_;
+    glm::ivec3 extent_;
+    coverage rule_;
+    bool is_solid_;
+    std::uint64_t first_number_;
+    status valid_;
+    core::raw_array<vertex_output<Varyings>> vertices_;
+};
+
+// All triangles of a chunk; see chunk_records.
+template <class Varyings, class Mesh, class VertexShader, class Visit>
+[[nodiscard]] status for_each_record(const Mesh& chunk, const VertexShader& shader, const grid& g, coverage rule,
+                                     bool is_solid, std::uint64_t first_number, counters& counts, Visit&& visit) {
+    const chunk_records<Varyings, Mesh> records(chunk, shader, g, rule, is_solid, first_number);
+    if (!records.valid().ok()) return records.valid();
+    return records.visit(0, chunk.triangles.size(), counts, visit);
 }
 
 } // namespace voxelpipe::slabs

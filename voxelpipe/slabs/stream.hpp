@@ -10,23 +10,28 @@
 //   while (read(chunk)) stream.add(chunk).or_throw();               // each a mesh_view in host memory
 //   stream.draw(fragment_shader, make_framebuffer, sink).or_throw();
 //
-// The vertex shader runs on the host, once a vertex of a chunk; vertex::index counts in the chunk. The fragment shader
+// The vertex shader runs on the host, once a vertex of a chunk, on several threads where the chunk is large (16384
+// triangles and more); vertex::index counts in the chunk. The fragment shader
 // sees what it sees in the whole call: triangle and primitive are numbers in the whole mesh.
 
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/plan.hpp>
 #include <voxelpipe/slabs/records.hpp>
+#include <voxelpipe/slabs/route.hpp>
+#include <voxelpipe/slabs/slab_arrays.hpp>
 #include <voxelpipe/solid.hpp>
 #include <voxelpipe/sparse.hpp>
 #include <voxelpipe/voxelize.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <future>
-#include <limits>
+#include <memory>
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -46,6 +51,7 @@ struct stream_options {
     // voxel is what the targets take.
     double triangle_bytes = 0, voxel_bytes = 0;
     bool is_solid = false; // for draw_solid: triangles beside the grid along x count too
+    unsigned threads = 0;  // of the host, that shade, bin and read; 0: all cores. Results do not depend on it
 };
 
 // What a sink gets beside a slab's framebuffer or lists.
@@ -87,7 +93,9 @@ public:
 
     // The grid may be a crop. Throws std::invalid_argument for one that is not valid.
     record_stream(Backend& backend, const grid& g, stream_options options)
-        : backend_(backend), grid_(g), options_(std::move(options)), memory_(options_.memory / 4, 1, options_.folder) {
+        : backend_(backend), grid_(g), options_(std::move(options)),
+          threads_(options_.threads != 0 ? options_.threads : std::max(1u, std::thread::hardware_concurrency())),
+          router_(threads_, options_.memory / 16) {
         if (const status s = validate(g); !s.ok()) throw std::invalid_argument("voxelpipe::slabs: " + s.message());
         cut_into(equal_layers(g, 2, std::max(1, options_.num_slabs), options_.align));
     }
@@ -95,18 +103,18 @@ public:
     // Slabs to begin with, in place of equal ones; before the first triangle.
     void cut_into(const plan& p) {
         pending_.clear();
-        axis_ = p.axis;
+        axis_ = slabs_.axis = p.axis;
         for (std::size_t i = 0; i < p.slabs.size(); ++i) {
             if (p.slabs[i].size() == 0) continue;
             pending_.push_back({p.crop(grid_, i), {}, {}});
         }
         bins_ = std::vector<bin<record_type>>(pending_.size());
-        memory_ = bin_memory<record_type>(options_.memory / 4, bins_.size(), options_.folder);
-        // The slab of each layer.
-        slab_of_.assign(static_cast<std::size_t>(grid_.extent[axis_]), 0);
+        memory_ = std::make_unique<bin_memory<record_type>>(options_.memory / 4, bins_.size(), options_.folder);
+        slabs_.of_layer.assign(static_cast<std::size_t>(grid_.extent[axis_]), 0);
         for (std::size_t i = 0; i < pending_.size(); ++i) {
             const int begin = pending_[i].where.offset[axis_] - grid_.offset[axis_];
-            std::fill_n(slab_of_.begin() + begin, pending_[i].where.extent[axis_], static_cast<std::uint32_t>(i));
+            std::fill_n(slabs_.of_layer.begin() + begin, pending_[i].where.extent[axis_],
+                        static_cast<std::uint32_t>(i));
         }
     }
 
@@ -117,10 +125,16 @@ public:
     [[nodiscard]] counters& counts() { return counts_; }
     // Records come by ascending number. reach: see classify(). Throws std::bad_alloc, and std::system_error of files.
     void push(const record_type& r, const core::voxel_box& reach) {
-        const auto first = slab_of_[static_cast<std::size_t>(reach.lo[axis_])],
-                   last = slab_of_[static_cast<std::size_t>(reach.hi[axis_])];
-        for (std::uint32_t i = first; i <= last; ++i) memory_.push(bins_, i, r);
+        const auto [first, last] = slabs_(reach);
+        for (std::uint32_t i = first; i <= last; ++i) memory_->push(bins_, i, r);
     }
+    // The `count` triangles of a chunk, which are added to the counts: a chunk_records. Throws as push().
+    template <class Chunk>
+    [[nodiscard]] status push_all(const Chunk& chunk, std::size_t count) {
+        return router_.route(chunk, count, slabs_, bins_, *memory_, counts_);
+    }
+    // Threads that work on the host.
+    [[nodiscard]] unsigned threads() const { return threads_; }
 
     // Draws slab by slab. make(glm::ivec3 extent) gives what is drawn into, a framebuffer, A-buffer or sparse
     // framebuffer; sink(const slab&, that) gets it afterwards, by ascending voxels along the axis of the slabs. A slab
@@ -145,10 +159,11 @@ public:
     }
 
 private:
+    using arrays = detail::slab_arrays<Varyings>;
     struct pending_slab {
         grid where;
         bin<record_type> triangles;
-        std::future<std::vector<record_type>> loading; // begun while another slab is drawn
+        std::future<arrays> loading; // begun while another slab is drawn
     };
     using mesh_types = detail::slab_mesh<Varyings>;
 
@@ -169,10 +184,10 @@ private:
             s.voxels_before = all.counts.voxels;
             s.fragments_before = all.counts.fragments;
             try {
-                const std::vector<record_type> records = next.loading.valid() ? next.loading.get() : load(next);
+                arrays triangles = next.loading.valid() ? next.loading.get() : arrays(next.triangles, threads_);
                 begin_loading(cost);
                 output out = make(s.where.extent);
-                s.drawn = draw_one<IsSolid>(records, shader, s.where, out, call);
+                s.drawn = draw_one<IsSolid>(std::move(triangles), shader, s.where, out, call);
                 if (s.drawn.ok()) {
                     add_drawn(all, s.drawn);
                     sink(std::as_const(s), out);
@@ -193,46 +208,33 @@ private:
     }
 
     template <bool IsSolid, class Shader, class Output, class Call>
-    [[nodiscard]] status draw_one(const std::vector<record_type>& records, const Shader& shader, const grid& g,
-                                  Output& out, const Call& call) {
-        const std::size_t n = records.size();
-        std::vector<glm::vec3> positions(3 * n);
-        std::vector<glm::uvec3> triangles(n);
-        std::vector<std::uint32_t> numbers(n);
-        for (std::size_t i = 0; i < n; ++i) {
-            for (std::size_t k = 0; k < 3; ++k) positions[3 * i + k] = records[i].positions[k];
-            const auto first = static_cast<std::uint32_t>(3 * i);
-            triangles[i] = {first, first + 1, first + 2};
-            numbers[i] = records[i].number;
-        }
-        const auto run = [&](auto&& mesh) {
-            using view = typename mesh_types::view;
-            const typename Backend::template buffer<std::uint32_t> in_backend(backend_,
-                                                                              array_view<const std::uint32_t>(numbers));
+    [[nodiscard]] status draw_one(arrays triangles, const Shader& shader, const grid& g, Output& out,
+                                  const Call& call) {
+        const auto run = [&](const typename mesh_types::view& mesh, const std::uint32_t* numbers) {
             const auto one_draw = [&](const auto& numbered) {
-                using draw_type =
-                    voxelpipe::draw<view, typename mesh_types::vertex_shader, std::remove_cvref_t<decltype(numbered)>>;
-                const draw_type d{mesh.view(), {}, numbered};
+                using draw_type = voxelpipe::draw<typename mesh_types::view, typename mesh_types::vertex_shader,
+                                                  std::remove_cvref_t<decltype(numbered)>>;
+                const draw_type d{mesh, {}, numbered};
                 return call(std::span<const draw_type>(&d, 1), g, out);
             };
             status s;
             if constexpr (core::is_constant<Shader> || IsSolid)
                 s = one_draw(shader);
             else
-                s = one_draw(detail::numbered_shader<Shader>{shader, in_backend.data()});
+                s = one_draw(detail::numbered_shader<Shader>{shader, numbers});
             if constexpr (detail::is_abuffer<Output> && !IsSolid)
                 if (s.ok())
-                    backend_.for_each(out.primitives.size(),
-                                      detail::renumber_list{out.primitives.data(), in_backend.data()});
+                    backend_.for_each(out.primitives.size(), detail::renumber_list{out.primitives.data(), numbers});
             return s;
         };
-        if constexpr (std::is_empty_v<Varyings>) {
-            return run(mesh<Backend>{backend_, positions, triangles});
+        if constexpr (requires { Backend::runs_on_host; }) {
+            return run(mesh_types::view_of(triangles), triangles.numbers.data());
         } else {
-            std::vector<Varyings> varyings(3 * n);
-            for (std::size_t i = 0; i < n; ++i)
-                for (std::size_t k = 0; k < 3; ++k) varyings[3 * i + k] = records[i].varyings[k];
-            return run(mesh<Backend, Varyings>{backend_, positions, triangles, varyings});
+            const typename Backend::template buffer<std::uint32_t> numbers(
+                backend_, array_view<const std::uint32_t>(triangles.numbers));
+            const auto mesh = mesh_types::copy(backend_, triangles);
+            triangles = {};
+            return run(mesh.view(), numbers.data());
         }
     }
 
@@ -245,7 +247,8 @@ private:
         }
     };
     [[nodiscard]] static costs costs_of(const stream_options& options, double voxel_bytes) {
-        // The record twice, while the next slab's are read, and as a mesh: positions, varyings, indices, number.
+        // Twice a mesh of positions, varyings, indices and number, since the next slab's is read meanwhile, and a copy
+        // of both for backends with a memory of their own.
         constexpr double mesh =
             3 * sizeof(glm::vec3) + sizeof(glm::uvec3) + 4 + (std::is_empty_v<Varyings> ? 0.0 : 3.0 * sizeof(Varyings));
         // Snapped positions, varyings and tile pairs of cpu_backend.
@@ -255,19 +258,13 @@ private:
                 0.75 * static_cast<double>(options.memory)};
     }
 
-    [[nodiscard]] static std::vector<record_type> load(const pending_slab& s) {
-        std::vector<record_type> records;
-        records.reserve(s.triangles.size());
-        s.triangles.for_each_block(
-            [&](std::span<const record_type> block) { records.insert(records.end(), block.begin(), block.end()); });
-        return records;
-    }
     // Reads the slab behind the first one from its file, if it will be drawn as it is.
     void begin_loading(const costs& cost) {
         if (pending_.size() < 2) return;
         pending_slab& next = pending_[1];
         if (next.loading.valid() || next.triangles.in_file() == 0 || cost.of(next) > cost.limit) return;
-        next.loading = std::async(std::launch::async, [&next] { return load(next); });
+        next.loading = std::async(
+            std::launch::async, [&next, threads = std::min(4u, threads_)] { return arrays(next.triangles, threads); });
     }
 
     // Replaces the first slab by parts whose costs are at most `limit`, two at least. False if it cannot be cut.
@@ -329,10 +326,12 @@ private:
     int axis_ = 2;
     bool lists_ = false;
     counters counts_;
+    unsigned threads_;
+    detail::slab_table slabs_;
+    detail::chunk_router<record_type> router_;
     std::deque<pending_slab> pending_;
     std::vector<bin<record_type>> bins_; // of the pending slabs, until they are drawn
-    std::vector<std::uint32_t> slab_of_; // by layer
-    bin_memory<record_type> memory_;
+    std::unique_ptr<bin_memory<record_type>> memory_;
 };
 
 namespace detail {
@@ -354,9 +353,9 @@ public:
     // Adds triangles of host memory; they are numbered on from those before. Fails for an index that names no vertex,
     // for more than 2^32 - 1 triangles, and for instances. What was added before a failure stays.
     [[nodiscard]] status add(const Mesh& chunk) {
-        const status s =
-            for_each_record<varyings>(chunk, shader_, this->where(), rule_, is_solid_, num_triangles_, this->counts(),
-                                      [&](const auto& r, const core::voxel_box& reach) { this->push(r, reach); });
+        const chunk_records<varyings, Mesh> records(chunk, shader_, this->where(), rule_, is_solid_, num_triangles_,
+                                                    this->threads());
+        const status s = records.valid().ok() ? this->push_all(records, chunk.triangles.size()) : records.valid();
         if (s.ok()) num_triangles_ += chunk.part.whole != 0 ? chunk.part.whole : chunk.triangles.size();
         return s;
     }

@@ -1,0 +1,147 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Bins that several threads fill, and that go to files meanwhile, have the records of one thread in its order.
+
+#include "slab_scene.hpp"
+
+#include <voxelpipe/slabs/route.hpp>
+
+#include <sys/resource.h>
+
+#include <csignal>
+#include <cstring>
+#include <system_error>
+
+namespace {
+
+using namespace slab_scene;
+using record_type = slabs::record<varyings>;
+using mesh_type = vp::mesh_view<glm::vec3>;
+
+// Larger than what one thread takes, small triangles all over the grid and beyond it.
+colored_mesh make_large() {
+    colored_mesh m;
+    unit::splitmix64 random(3);
+    for (std::uint32_t i = 0; i < 50'000; ++i) {
+        const glm::vec3 first(random.uniform(-4, 40), random.uniform(-4, 36), random.uniform(-4, 46));
+        for (int k = 0; k < 3; ++k) {
+            m.positions.push_back(first +
+                                  glm::vec3(random.uniform(-3, 3), random.uniform(-3, 3), random.uniform(-3, 3)));
+            m.colors.emplace_back(random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1));
+        }
+        m.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+    }
+    return m;
+}
+
+struct filled {
+    vp::status status;
+    vp::counters counts;
+    std::vector<slabs::bin<record_type>> bins{5};
+    std::uint64_t in_files = 0;
+
+    filled(const colored_mesh& m, unsigned threads) {
+        const vp::grid grid = unit::unit_grid(extent);
+        slabs::detail::slab_table table;
+        for (int z = 0; z < extent.z; ++z) table.of_layer.push_back(static_cast<std::uint32_t>(z / 9));
+        slabs::bin_memory<record_type> memory(400'000, bins.size(), ::testing::TempDir());
+        slabs::detail::chunk_router<record_type> router(threads, 64 << 20);
+        const mesh_type chunk = m.with_colors();
+        const slabs::chunk_records<varyings, mesh_type> records(chunk, moved{}, grid, vp::coverage::conservative, false,
+                                                                7, threads);
+        status = router.route(records, chunk.triangles.size(), table, bins, memory, counts);
+        for (const auto& b : bins) in_files += b.in_file();
+    }
+    [[nodiscard]] std::vector<record_type> records(std::size_t i) const {
+        std::vector<record_type> all;
+        bins[i].for_each_block([&](std::span<const record_type> b) { all.insert(all.end(), b.begin(), b.end()); });
+        return all;
+    }
+};
+
+void expect_same(const filled& a, const filled& b) {
+    EXPECT_EQ(a.status.code, b.status.code);
+    EXPECT_EQ(a.status.triangle, b.status.triangle);
+    EXPECT_EQ(a.counts, b.counts);
+    EXPECT_GT(a.in_files, 0u);
+    EXPECT_GT(b.in_files, 0u);
+    for (std::size_t i = 0; i < a.bins.size(); ++i) {
+        const std::vector<record_type> x = a.records(i), y = b.records(i);
+        ASSERT_EQ(x.size(), y.size());
+        EXPECT_EQ(x.size(), b.bins[i].size());
+        EXPECT_EQ(std::memcmp(x.data(), y.data(), x.size() * sizeof(record_type)), 0) << "bin " << i;
+        // Any part of it.
+        std::vector<record_type> part(x.size() - x.size() / 3);
+        b.bins[i].copy(x.size() / 3, part);
+        EXPECT_EQ(std::memcmp(x.data() + x.size() / 3, part.data(), part.size() * sizeof(record_type)), 0);
+    }
+}
+
+TEST(Bins, ThreadsFillThemAsOneThreadDoes) {
+    colored_mesh m = make_large();
+    const filled one(m, 1);
+    EXPECT_TRUE(one.status.ok());
+    EXPECT_EQ(one.counts.triangles_in, m.triangles.size());
+    expect_same(one, filled(m, 4));
+    // Triangles behind a bad index are in no bin.
+    m.triangles[20'001].y = 150'000;
+    const filled bad(m, 1);
+    EXPECT_EQ(bad.status.code, vp::status_code::index_out_of_range);
+    EXPECT_EQ(bad.status.triangle, 20'001u);
+    EXPECT_EQ(bad.counts.triangles_in, 20'001u);
+    expect_same(bad, filled(m, 4));
+}
+
+TEST(Bins, LargeChunksGiveTheSlabsOfOneCall) {
+    const colored_mesh m = make_large();
+    backend_type backend = unit::make_backend(2);
+    const vp::grid grid = unit::unit_grid(extent);
+    using numbers = vp::framebuffer<backend_type, vp::target<std::uint32_t, vp::blend::replace>>;
+    const auto number = [](const auto& f) { return vp::outputs(f.primitive); };
+    numbers expected{backend, extent};
+    const vp::status whole = vp::voxelize(backend, m.with_colors(), grid, moved{}, number, expected);
+    slabs::stream_options how;
+    how.num_slabs = 3;
+    how.threads = 4;
+    slabs::stream<backend_type, moved, mesh_type> stream(backend, grid, {}, how);
+    stream.add(m.with_colors()).or_throw();
+    const auto voxels = vp::get<0>(expected).to_host(backend);
+    std::size_t seen = 0;
+    const vp::status s = stream.draw(
+        number,
+        [&](glm::ivec3 size) {
+            return numbers{backend, size};
+        },
+        [&](const slabs::slab&, const numbers& part) {
+            const auto of_part = vp::get<0>(part).to_host(backend);
+            ASSERT_LE(seen + of_part.size(), voxels.size());
+            EXPECT_TRUE(std::equal(of_part.begin(), of_part.end(), voxels.begin() + static_cast<std::ptrdiff_t>(seen)));
+            seen += of_part.size();
+        });
+    EXPECT_EQ(s.counts, whole.counts);
+    EXPECT_EQ(seen, voxels.size());
+}
+
+TEST(Bins, AFullMediumIsReported) {
+    rlimit before{};
+    ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+    const auto signal = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit little{100'000, before.rlim_max};
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &little), 0);
+    std::string what;
+    try {
+        std::vector<slabs::bin<record_type>> bins(1);
+        slabs::bin_memory<record_type> memory(20'000, 1, ::testing::TempDir());
+        for (int i = 0; i < 5000; ++i) memory.push(bins, 0, {});
+        bins[0].for_each_block([](auto) {});
+    } catch (const std::system_error& e) {
+        what = e.what();
+        EXPECT_EQ(e.code().value(), EFBIG);
+    }
+    (void)setrlimit(RLIMIT_FSIZE, &before);
+    (void)std::signal(SIGXFSZ, signal);
+    EXPECT_NE(what.find("cannot write a temporary file"), std::string::npos) << what;
+}
+
+} // namespace
