@@ -129,10 +129,10 @@ traffic traffic_so_far() {
 }
 
 int run(int argc, char** argv) {
-#ifdef M_MMAP_THRESHOLD
-    // Large arrays go back to the system when they are freed. By default glibc keeps more and more of them for itself,
-    // by thread, which the peak would show.
-    (void)mallopt(M_MMAP_THRESHOLD, 128 << 10);
+#ifdef M_ARENA_MAX
+    // Memory that one thread frees serves the others. By default glibc keeps some for each thread, which the peak
+    // shows.
+    (void)mallopt(M_ARENA_MAX, 1);
 #endif
     const auto number = [&](int i, double otherwise) { return argc > i ? std::atof(argv[i]) : otherwise; };
     const auto side = static_cast<std::uint64_t>(std::sqrt(number(1, 1e6) / 2));
