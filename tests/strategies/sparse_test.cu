@@ -629,6 +629,90 @@ TEST(DeviceSparse, TilesAreTheCpus) {
     EXPECT_GT(r.on_host.num_tiles(), 0u);
 }
 
+// Solids in memory of the caller: too little room first, then a graph that is replayed with moved vertices. Shaded, the
+// bytes are those of a sparse framebuffer; constant, the voxels are.
+TEST(DeviceSparse, SolidsInMemoryOfTheCaller) {
+    const glm::ivec3 extent{45, 34, 37};
+    const vp::grid grid = unit::unit_grid(extent);
+    const unit::small_mesh mesh = unit::make_mesh(6, 12, extent), other = unit::make_mesh(7, 9, extent);
+    for (const vp::solid_options& o :
+         {vp::solid_options{}, vp::solid_options{.bodies = vp::bodies::draw, .extent = vp::solid_extent::outer}}) {
+        const device_test::stream_owner stream;
+        vp::cuda_backend be{stream.stream};
+        const vp::mesh<vp::cuda_backend> a(be, mesh.positions, mesh.triangles), b(be, other.positions, other.triangles);
+        const auto run = [&](auto& p, const auto& shade, bool is_same) {
+            using shader_type = std::remove_cvref_t<decltype(shade)>;
+            using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, shader_type>;
+            const std::vector<draw_type> draws{{a.view(), {}, shade}, {b.view(), {}, shade}};
+            const std::span<const draw_type> all(draws);
+            typename result_of<std::remove_cvref_t<decltype(p.on_device)>>::type result;
+            const auto expect_same = [&](const glm::vec3& by, const vp::status& s) {
+                ASSERT_TRUE(s.ok()) << s.message();
+                unit::small_mesh first = mesh;
+                for (glm::vec3& v : first.positions) v += by;
+                const std::vector<draw_type> here{{first.view(), {}, shade}, {other.view(), {}, shade}};
+                const vp::status expected = vp::voxelize_solid(p.host, here, grid, p.on_host, o);
+                ASSERT_TRUE(expected.ok()) << expected.message();
+                EXPECT_EQ(s.counts, expected.counts);
+                EXPECT_EQ(s.solid, expected.solid);
+                const auto x = result.to_host(be);
+                const auto y = p.on_host.to_host(p.host);
+                EXPECT_GT(y.num_voxels(), 500u);
+                EXPECT_EQ(x.num_voxels(), y.num_voxels());
+                if (is_same) {
+                    EXPECT_TRUE(vp::same_contents(x, y));
+                }
+                EXPECT_TRUE(unit::same_bytes(vp::get<0>(x).to_dense().elements, vp::get<0>(y).to_dense().elements));
+                EXPECT_TRUE(unit::same_bytes(vp::get<3>(x).to_dense().elements, vp::get<3>(y).to_dense().elements));
+            };
+            vp::workspace_limits limits{}, need{};
+            limits.bricks = limits.voxels = 1;
+            for (int tries = 0;; ++tries) {
+                ASSERT_LT(tries, 8);
+                const std::size_t bytes = vp::solid_workspace_bytes(all, grid, result, o, limits);
+                ASSERT_GT(bytes, 0u);
+                const device_test::guarded_memory memory(be, bytes);
+                const vp::workspace_view workspace{const_cast<unsigned char*>(memory.memory.data()), bytes, limits};
+                EXPECT_EQ(vp::voxelize_solid_async(be, all, grid, result, o, {workspace.memory, bytes - 1, limits})
+                              .required.bytes,
+                          bytes);
+                ASSERT_TRUE(vp::voxelize_solid_async(be, all, grid, result, o, workspace).ok());
+                const vp::status s = vp::read_status(be, workspace, &need);
+                memory.expect_untouched_behind(be);
+                if (s.ok()) {
+                    EXPECT_GT(tries, 1);
+                    expect_same(glm::vec3(0), s);
+                    break;
+                }
+                ASSERT_EQ(s.code, vp::status_code::capacity_exceeded) << s.message();
+                EXPECT_EQ(result.to_host(be).num_voxels(), 0u);
+                limits = need;
+            }
+            limits.bricks += 200;
+            limits.voxels += 20000;
+            limits.fragments *= 2;
+            const std::size_t bytes = vp::solid_workspace_bytes(all, grid, result, o, limits);
+            vp::cuda_backend::buffer<std::byte> memory(be, bytes);
+            const vp::workspace_view workspace{memory.data(), bytes, limits};
+            const device_test::captured_graph graph(
+                be.stream, [&] { return vp::voxelize_solid_async(be, all, grid, result, o, workspace); });
+            for (const glm::vec3& by : {glm::vec3(3, -2, 1), glm::vec3(0)}) {
+                unit::small_mesh moved = mesh;
+                for (glm::vec3& v : moved.positions) v += by;
+                ASSERT_EQ(cudaMemcpyAsync(const_cast<glm::vec3*>(a.view().positions.data()), moved.positions.data(),
+                                          moved.positions.size() * sizeof(glm::vec3), cudaMemcpyDefault, be.stream),
+                          cudaSuccess);
+                graph.launch(be.stream);
+                expect_same(by, vp::read_status(be, workspace));
+            }
+        };
+        pair p(extent);
+        run(p, solid_shader{}, true);
+        constant_pair q(extent);
+        run(q, constant_shader, false);
+    }
+}
+
 // Slabs of several GPUs (slabs/devices.cuh), joined: of surfaces and of solids.
 TEST(DeviceSparse, SlabsOfSeveralGpusAreTheCpus) {
     const glm::ivec3 extent{45, 34, 37};

@@ -257,6 +257,35 @@ struct empty_bricks {
     sparse_counts counts;
 };
 
+// The end of a call that asks for `need` bytes, or for sizeof(empty_bricks) without triangles: what is launched, by
+// launch(arena, result) where there are triangles, and the result of that. `made`: a result with its clear values
+// alone.
+template <class Launch, class... Targets>
+[[nodiscard]] status launch_bounded(cuda_backend& backend, const grid& g, const workspace_view& workspace,
+                                    std::size_t need, status s, sparse_result<Targets...>& made, const Launch& launch) {
+    if (workspace.memory == nullptr || workspace.bytes < need) {
+        s.code = status_code::capacity_exceeded;
+        s.required.fragments = workspace.limits.fragments;
+        s.required.bytes = need;
+        return s;
+    }
+    made.where = g;
+    if (s.counts.triangles_in == 0) {
+        auto* const empty = static_cast<empty_bricks*>(workspace.memory);
+        check(cudaMemsetAsync(empty, 0, sizeof(empty_bricks), backend.stream));
+        made.counts = &empty->counts;
+        made.view.table.extent = g.extent;
+        made.view.table.offset = g.offset;
+        made.view.clear_values = made.clear_values;
+    } else {
+        launch_until(stage::tile_resolve, [&] {
+            arena memory(workspace.memory);
+            launch(memory, made);
+        });
+    }
+    return s;
+}
+
 } // namespace device
 
 // Bytes that voxelize_async needs for such a call on the current device; 0 if the arguments are invalid.
@@ -287,37 +316,21 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         made.clear_values = result.clear_values;
         result = made;
         if (const status s = validate(g); !s.ok()) return s;
-        status s = core::validate_draws(draws);
+        const status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (!device::are_numbered_bricks(workspace.limits)) return core::failure(status_code::size_overflow);
-        made.where = g;
         return device::with_cuda_status([&]() -> status {
             const bool is_empty = s.counts.triangles_in == 0;
             const std::size_t need = is_empty ? sizeof(device::empty_bricks)
                                               : device::bounded_bytes<draw_type, Targets...>(
                                                     draws, g, options, s.counts.triangles_in, workspace.limits);
-            if (workspace.memory == nullptr || workspace.bytes < need) {
-                s.code = status_code::capacity_exceeded;
-                s.required.fragments = workspace.limits.fragments;
-                s.required.bytes = need;
-                return s;
-            }
-            if (is_empty) {
-                auto* const empty = static_cast<device::empty_bricks*>(workspace.memory);
-                device::check(cudaMemsetAsync(empty, 0, sizeof(device::empty_bricks), backend.stream));
-                made.counts = &empty->counts;
-                made.view.table.extent = g.extent;
-                made.view.table.offset = g.offset;
-                made.view.clear_values = made.clear_values;
-            } else {
-                device::launch_until(stage::tile_resolve, [&] {
-                    device::arena memory(workspace.memory);
-                    device::bounded_call<core::known_coverage<Known...>, true, draw_type, Targets...>{
-                        draws, g, options, s.counts.triangles_in, workspace, backend.stream}(memory, made);
-                });
-            }
-            result = made;
-            return s;
+            const auto launch = [&](device::arena& memory, sparse_result<Targets...>& to) {
+                device::bounded_call<core::known_coverage<Known...>, true, draw_type, Targets...>{
+                    draws, g, options, s.counts.triangles_in, workspace, backend.stream}(memory, to);
+            };
+            const status launched = device::launch_bounded(backend, g, workspace, need, s, made, launch);
+            if (launched.ok()) result = made;
+            return launched;
         });
     } else {
         return {};

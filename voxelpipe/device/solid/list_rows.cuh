@@ -34,7 +34,14 @@ struct solid_list_arrays {
     std::uint64_t *voxels, *offsets;
     std::uint32_t* primitives;
     Payload* payloads;
+    std::uint64_t max_voxels = ~std::uint64_t{0}, max_fragments = ~std::uint64_t{0}; // beyond them nothing is written
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE bool hold(const pipeline_state& s, const capacities& limits) const {
+        return !has_failed(s, limits) && s.voxels <= max_voxels && s.fragments <= max_fragments;
+    }
 };
+// In place of the number of entries, where the host does not know it.
+inline constexpr std::uint64_t all_entries = ~std::uint64_t{0};
 
 template <class SolidShader, class Payload>
 __global__ __launch_bounds__(threads_per_block) void list_rows_kernel(
@@ -45,11 +52,11 @@ __global__ __launch_bounds__(threads_per_block) void list_rows_kernel(
     __shared__ sweep_memory memory[threads_per_block / 32];
     await_stream();
     const bool is_counting = to.voxels == nullptr;
-    if (is_counting && has_failed(*state, limits)) return;
+    if (is_counting ? has_failed(*state, limits) : !to.hold(*state, limits)) return;
     const int lane = static_cast<int>(threadIdx.x % 32);
     const unsigned before = (1u << lane) - 1;
     sweep_totals totals;
-    const std::uint64_t num = is_counting ? state->list_fragments : num_entries;
+    const std::uint64_t num = is_counting || num_entries == all_entries ? state->list_fragments : num_entries;
     for_each_row(list, rules, memory[warp_in_block()], num, [&](const row_sweep& sweep) {
         const auto y = static_cast<int>(sweep.row % static_cast<std::uint64_t>(rules.grid.extent.y)),
                    z = static_cast<int>(sweep.row / static_cast<std::uint64_t>(rules.grid.extent.y));
@@ -189,6 +196,11 @@ struct solid_lists : counted_rows<Draw> {
     }
     // True if a row has 2^32 fragments or more.
     [[nodiscard]] static bool has_overlong_row(const pipeline_state& on_host) { return on_host.next_item != 0; }
+    // As write(), within the arrays' capacities, without knowing what there is.
+    void write_within(const crossing_list& sorted, const memory& m, const solid_list_arrays<Payload>& to,
+                      cudaStream_t stream) const {
+        sweep(sorted, m, to, all_entries, body_shaders_of(m), stream);
+    }
     void write(const crossing_list& sorted, const memory& m, const pipeline_state& on_host,
                const solid_list_arrays<Payload>& to, cudaStream_t stream) const {
         if (entries.clock != nullptr) entries.clock->start(); // leaves the wait and the allocations out
