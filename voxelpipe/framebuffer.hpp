@@ -170,6 +170,19 @@ public:
         [[nodiscard]] std::vector<typename target_type::element_type> to_host(Backend& backend) const {
             return get<I>(owner_.storage_).to_host(backend);
         }
+        // The same into memory of the caller's, which may be page-locked: a program that reads often needs no new
+        // pages. Throws std::invalid_argument if `to` has not as many elements as the target.
+        void to_host(Backend& backend, array_view<typename target_type::element_type> to) const {
+            const auto& from = get<I>(owner_.storage_);
+            if (to.size() != from.size())
+                throw std::invalid_argument("voxelpipe: memory for another number of elements than the target has");
+            // A row of a box has less than 2 GB.
+            constexpr std::size_t most = (std::size_t{1} << 28) / sizeof(typename target_type::element_type) + 1;
+            for (std::size_t first = 0; first < to.size(); first += most) {
+                const std::size_t n = to.size() - first < most ? to.size() - first : most;
+                from.read_box(backend, core::element_box{first, n, 1, 1, n, n}, to.data() + first);
+            }
+        }
         // The same, addressed by voxel.
         [[nodiscard]] host_target<target_type> to_host_target(Backend& backend) const {
             return {to_host(backend), owner_.view_.extent};

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <stdexcept>
 #include <vector>
 
@@ -74,6 +75,18 @@ TYPED_TEST(Regions, HoldTheVoxelsOfTheWhole) {
     vp::for_each_voxel(empty, [](glm::ivec3, std::uint32_t) { FAIL(); });
     EXPECT_THROW((void)vp::get<0>(fb).to_host_region(backend, {70, 0, 0}, {2, 1, 1}), std::out_of_range);
     EXPECT_THROW((void)vp::get<2>(fb).to_host_region(backend, {-1, 0, 0}, {2, 1, 1}), std::out_of_range);
+    const auto check = [&](const auto& target) { // into memory that is there
+        const auto whole = target.to_host(backend);
+        auto kept = whole;
+        std::memset(kept.data(), 0xa5, kept.size() * sizeof(kept[0]));
+        target.to_host(backend, kept);
+        EXPECT_TRUE(unit::same_bytes(kept, whole));
+        kept.pop_back();
+        EXPECT_THROW(target.to_host(backend, kept), std::invalid_argument);
+    };
+    check(vp::get<0>(fb));
+    check(vp::get<1>(fb));
+    check(vp::get<2>(fb));
 }
 
 TEST(Occupied, AreTheVoxelsThatTheCallCounts) {

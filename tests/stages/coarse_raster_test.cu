@@ -95,6 +95,10 @@ TEST(CoarseRaster, PairsAndWorkItemsAreTheCpus) {
         compare_tiles<vp::coverage::thin>(s, log2_size);
         compare_tiles<vp::coverage::conservative>(s, log2_size);
     }
+    // Many of these have a part outside the grid, on either side of a line of tiles too.
+    stages cut(mixed_triangles(2000, 60.0f, 72), box_grid({33, 60, 21}), vp::constant(true));
+    compare_tiles<vp::coverage::conservative>(cut, 3);
+    compare_tiles<vp::coverage::thin>(cut, 4);
 }
 
 } // namespace

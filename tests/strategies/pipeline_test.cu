@@ -266,6 +266,10 @@ TEST(Pipeline, MemoryIsCopiedBothWays) {
     check(vp::get<0>(sums).to_host_target(be), vp::get<0>(sums).to_host_region(be, begin, size));
     check(vp::get<0>(words).to_host_target(be), vp::get<0>(words).to_host_region(be, begin, size));
     EXPECT_EQ(vp::bounds(be, mesh.view().positions), vp::bounds(m.positions));
+    const std::vector<float> whole = vp::get<0>(sums).to_host(be);
+    std::vector<float> kept(whole.size(), -1.0f);
+    vp::get<0>(sums).to_host(be, kept);
+    EXPECT_EQ(kept, whole);
 
     std::vector<float> source(std::size_t{1} << 22, 1.0f);
     ASSERT_EQ(cudaHostRegister(source.data(), source.size() * sizeof(float), 0), cudaSuccess);
