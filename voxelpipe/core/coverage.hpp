@@ -36,10 +36,10 @@ struct stepped_floor {
 };
 
 // Narrows [lo, hi] to the x with a*x + b*y + c >= 0 for all three half-planes. The result is an interval, so a short
-// row is narrowed from its ends; a long one is solved by division.
+// row is narrowed from its ends; a long one is solved by division. Overloads as edge has them.
 template <class Int>
-VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row(const half_plane<Int> (&h)[3], Int y, std::int64_t& lo,
-                                                        std::int64_t& hi) {
+VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row_of(const half_plane<Int> (&h)[3], Int y, std::int64_t& lo,
+                                                           std::int64_t& hi) {
     const Int r[3] = {h[0].b * y + h[0].c, h[1].b * y + h[1].c, h[2].b * y + h[2].c};
     if (hi - lo >= 6) {
         Int first = lo, last = hi;
@@ -70,6 +70,14 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row(const half_plane<Int> (&
     };
     while (lo <= hi && !inside(lo)) ++lo;
     while (lo < hi && !inside(hi)) --hi;
+}
+VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row(const half_plane<std::int64_t> (&h)[3], std::int64_t y,
+                                                        std::int64_t& lo, std::int64_t& hi) {
+    narrow_row_of(h, y, lo, hi);
+}
+VOXELPIPE_HD VOXELPIPE_DEVICE_NOINLINE constexpr void narrow_row(const half_plane<int128> (&h)[3], int128 y,
+                                                                 std::int64_t& lo, std::int64_t& hi) {
+    narrow_row_of(h, y, lo, hi);
 }
 
 // Calls emit(u, v, w_first, w_last) for every column with covered voxels inside `clip` (x y z, in voxels of the setup's
@@ -155,8 +163,9 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_span(const triangle_setup<
                      t.origin[2] + static_cast<std::int64_t>(w1));
             };
             VOXELPIPE_CALLS_ANY_END
-            if (Rule == span_rule::conservative && hi[2] - lo[2] < 4) {
-                // Few voxels deep: testing each end against the plane costs less than two divisions.
+            if (Rule == span_rule::conservative && sizeof(Int) == sizeof(std::int64_t) && hi[2] - lo[2] < 4) {
+                // Few voxels deep: testing each end against the plane costs less than two divisions. Triangles that
+                // need 128 bits are too few for code of their own.
                 for (std::int64_t u = u_lo; u <= u_hi; ++u) {
                     const auto inside = [&](Int w) VOXELPIPE_INLINE_LAMBDA {
                         const Int depth = nw * w;

@@ -156,13 +156,23 @@ struct triangle_setup : triangle_frame<Int> {
     Int plane_low, plane_high;    // ceil and floor of plane . p0 / 2^F; thin: both floor(2 * plane . p0 / 2^F)
 };
 
-// The half-plane left of p -> q (sign = 1) or right of it (sign = -1), both in one projection.
+// The half-plane left of p -> q (sign = 1) or right of it (sign = -1), both in one projection. An overload for each
+// width: few triangles need 128 bits, and their code out of line makes kernels quicker to compile.
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD constexpr half_plane<Int> edge(Int px, Int py, Int qx, Int qy, int sign, int fraction) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr half_plane<Int> edge_of(Int px, Int py, Int qx, Int qy, int sign,
+                                                                              int fraction) {
     const Int a = sign > 0 ? py - qy : qy - py;
     const Int b = sign > 0 ? qx - px : px - qx;
     const Int c = exact::floor_shift<Int>(-(a * px + b * py), fraction) + positive_part(a) + positive_part(b);
     return {a, b, c};
+}
+[[nodiscard]] VOXELPIPE_HD constexpr half_plane<std::int64_t> edge(std::int64_t px, std::int64_t py, std::int64_t qx,
+                                                                   std::int64_t qy, int sign, int fraction) {
+    return edge_of(px, py, qx, qy, sign, fraction);
+}
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_DEVICE_NOINLINE constexpr half_plane<int128>
+edge(int128 px, int128 py, int128 qx, int128 qy, int sign, int fraction) {
+    return edge_of(px, py, qx, qy, sign, fraction);
 }
 
 // The three half-planes of the triangle's projection on axes (x, y); `area` is its doubled signed area. A projection

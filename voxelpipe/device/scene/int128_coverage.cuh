@@ -23,19 +23,34 @@ struct wide_triangle {
     glm::vec3 normal;
 };
 
+// Receives spans in order, keeps those from number `skip` on, as many as a batch has.
+struct span_batch {
+    wide_span (&out)[tuning::wide_batch];
+    int skip, seen = 0, size = 0;
+
+    __device__ void add(std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
+        if (seen++ < skip || size == tuning::wide_batch) return;
+        out[size++] = {static_cast<int>(u), static_cast<int>(v), static_cast<int>(w0), static_cast<int>(w1), {}};
+    }
+    // Call once, at the end. A loop and not part of add(), of which the compiler makes copies.
+    template <class Int>
+    __device__ int finish(const core::triangle_frame<Int>& t) {
+#pragma unroll 1
+        for (int i = 0; i < size; ++i) out[i].barycentric = core::barycentric(t, out[i].u, out[i].v);
+        return size;
+    }
+};
+
 // Writes the spans within `box` from number `skip` on. Returns how many; fewer than wide_batch at the end.
 template <core::span_rule Rule>
 __device__ __noinline__ int wide_spans(core::snapped_position a, core::snapped_position b, core::snapped_position c,
                                        int fraction, const core::voxel_box& box, int skip,
                                        wide_span (&out)[tuning::wide_batch]) {
     const auto t = core::setup_triangle<Rule, int128>(a, b, c, fraction);
-    int i = 0, n = 0;
-    core::for_each_span<Rule>(t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
-        if (i++ < skip || n == tuning::wide_batch) return;
-        out[n++] = {static_cast<int>(u), static_cast<int>(v), static_cast<int>(w0), static_cast<int>(w1),
-                    core::barycentric(t, u, v)};
-    });
-    return n;
+    span_batch batch{out, skip};
+    core::for_each_span<Rule>(
+        t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) { batch.add(u, v, w0, w1); });
+    return batch.finish(t);
 }
 
 template <class Factors>
@@ -51,24 +66,18 @@ __device__ __noinline__ glm::vec3 wide_barycentric(Position a, Position b, Posit
     return core::barycentric(core::make_frame<int128>(a, b, c, fraction), u, v);
 }
 
-// As wide_spans and set_up_wide, for coverage by arms and triangles of any size.
-template <class Position>
-__device__ __noinline__ int arm_spans(Position a, Position b, Position c, int fraction, core::arm_set arms,
-                                      const core::voxel_box& box, int skip, wide_span (&out)[tuning::wide_batch]) {
-    int i = 0, n = 0;
-    const auto run = [&](const auto& t) {
-        core::for_each_arm_span(t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) {
-            if (i++ < skip || n == tuning::wide_batch) return;
-            out[n++] = {static_cast<int>(u), static_cast<int>(v), static_cast<int>(w0), static_cast<int>(w1),
-                        core::barycentric(t, u, v)};
-        });
-    };
-    if (core::fits_narrow(a, b, c, fraction))
-        run(core::setup_arms<std::int64_t>(a, b, c, fraction, arms));
-    else
-        run(core::setup_arms<int128>(a, b, c, fraction, arms));
-    return n;
+// As wide_spans, for coverage by arms; Int as core::setup_arms has it.
+template <class Int>
+__device__ __noinline__ int arm_spans(core::snapped_position a, core::snapped_position b, core::snapped_position c,
+                                      int fraction, core::arm_set arms, const core::voxel_box& box, int skip,
+                                      wide_span (&out)[tuning::wide_batch]) {
+    const auto t = core::setup_arms<Int>(a, b, c, fraction, arms);
+    span_batch batch{out, skip};
+    core::for_each_arm_span(
+        t, box, [&](std::int64_t u, std::int64_t v, std::int64_t w0, std::int64_t w1) { batch.add(u, v, w0, w1); });
+    return batch.finish(t);
 }
+// As set_up_wide, for triangles of any size.
 template <class Factors>
 __device__ __noinline__ wide_triangle set_up_either_width(core::snapped_position a, core::snapped_position b,
                                                           core::snapped_position c, int fraction, Factors factors) {
@@ -81,7 +90,9 @@ __device__ void for_each_arm_span(core::snapped_position a, core::snapped_positi
                                   int fraction, core::arm_set arms, const core::voxel_box& box, Visit&& visit) {
     wide_span spans[tuning::wide_batch];
     for (int skip = 0;; skip += tuning::wide_batch) {
-        const int n = arm_spans(a, b, c, fraction, arms, box, skip, spans);
+        const int n = core::fits_narrow(a, b, c, fraction)
+                          ? arm_spans<std::int64_t>(a, b, c, fraction, arms, box, skip, spans)
+                          : arm_spans<int128>(a, b, c, fraction, arms, box, skip, spans);
         for (int i = 0; i < n; ++i) visit(spans[i]);
         if (n < tuning::wide_batch) break;
     }
