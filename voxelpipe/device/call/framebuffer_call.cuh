@@ -178,17 +178,25 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         for (const draw_type& d : draws) most = std::max<std::size_t>(most, d.mesh.num_triangles());
         return most;
     }
-    // The same of a pass over some instances (raster_each_draw).
+    // Triangles of a pass over some instances: fewer if the work items of so many could not be numbered.
+    [[nodiscard]] std::uint64_t pass_triangles() const {
+        std::uint64_t most = tuning::max_pass_triangles;
+        while (most > tuning::min_pass_triangles &&
+               !is_listable(most, core::make_snap_transform(plan.g).fraction, plan.g.extent))
+            most /= 2;
+        return most;
+    }
+    // As max_triangles, of a pass (raster_each_draw).
     [[nodiscard]] std::size_t max_pass_triangles() const {
         std::size_t most = 0;
         for (const draw_type& d : draws)
-            most = std::max<std::size_t>(most, d.mesh.triangles.size() * instances_of_pass(d.mesh));
+            most = std::max<std::size_t>(most, d.mesh.triangles.size() * instances_of_pass(d.mesh, pass_triangles()));
         return most;
     }
     [[nodiscard]] std::size_t max_pass_vertices() const {
         std::size_t most = 0;
         for (const draw_type& d : draws)
-            most = std::max<std::size_t>(most, d.mesh.positions.size() * instances_of_pass(d.mesh));
+            most = std::max<std::size_t>(most, d.mesh.positions.size() * instances_of_pass(d.mesh, pass_triangles()));
         return most;
     }
     // The raster shades vertices itself if that costs no more than reading them: once per corner instead of once per
@@ -205,8 +213,8 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     template <class Raster>
     void raster_draws(const vertex_positions& positions, pipeline_state* state, cudaStream_t stream,
                       const Raster& raster) const {
-        raster_each_draw<shades_in_raster, true>(draws, core::make_snap_transform(plan.g), positions, state, clock,
-                                                 stream, raster);
+        raster_each_draw<shades_in_raster>(draws, core::make_snap_transform(plan.g), positions, state, clock, stream,
+                                           raster, pass_triangles());
     }
     template <class Source>
     [[nodiscard]] raster_input<Source> raster_input_of(const draw_type& d, const Source& source) const {

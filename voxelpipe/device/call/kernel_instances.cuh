@@ -16,9 +16,9 @@
 // In namespace voxelpipe::device, up to the calls. Vertex shades by a kernel, for the library's vertex shaders.
 #define VOXELPIPE_VERTEX_SHADES(HOW)                                                                                   \
     HOW void vertex_shade(const mesh_view<>&, const passthrough&, const core::snap_transform&, std::uint32_t,          \
-                          const vertex_positions&, no_varyings*, cudaStream_t, std::uint32_t);                         \
+                          const vertex_positions&, no_varyings*, cudaStream_t, std::uint32_t, bool);                   \
     HOW void vertex_shade(const mesh_view<>&, const transform&, const core::snap_transform&, std::uint32_t,            \
-                          const vertex_positions&, no_varyings*, cudaStream_t, std::uint32_t);                         \
+                          const vertex_positions&, no_varyings*, cudaStream_t, std::uint32_t, bool);                   \
     HOW void write_arguments(draw_geometry*, const argument_chunk<draw_geometry, 3072 / sizeof(draw_geometry)>&, int,  \
                              cudaStream_t);
 

@@ -74,7 +74,8 @@ struct stored_source {
         return p.fits_int32 != 0;
     }
     [[nodiscard]] __device__ core::snapped_position position(std::uint32_t vertex) const {
-        return geometry.positions.exact[vertex];
+        const device::int32_position p = geometry.positions.int32[vertex];
+        return p.fits_int32 != 0 ? core::snapped_position{p.q[0], p.q[1], p.q[2]} : geometry.positions.exact[vertex];
     }
     [[nodiscard]] __device__ VOXELPIPE_INLINE glm::uvec3 triangle(std::uint32_t i) const {
         return geometry.triangles[i];
