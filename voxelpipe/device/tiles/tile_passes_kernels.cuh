@@ -57,14 +57,8 @@ VOXELPIPE_DEFINES_KERNELS void tile_split(const std::uint32_t* keys, const split
     check(cudaGetLastError(), stage::tile_split);
 }
 
-template <class State>
-__global__ void restart_items_kernel(State* state) {
-    state->next_item = 0;
-}
-
 VOXELPIPE_DEFINES_KERNELS void restart_items(pipeline_state* state, cudaStream_t stream) {
-    restart_items_kernel<<<1, 1, 0, stream>>>(state);
-    check(cudaGetLastError(), stage::fine_raster);
+    check(cudaMemsetAsync(&state->next_item, 0, sizeof(state->next_item), stream), stage::fine_raster);
 }
 
 template <coverage Rule>
