@@ -6,6 +6,7 @@
 // octree.hpp, bit for bit. Its passes are functors for Backend::for_each, so that a program that does not use it
 // compiles none.
 
+#include <voxelpipe/core/morton_parents.hpp>
 #include <voxelpipe/octree.hpp>
 #include <voxelpipe/sparse.hpp>
 
@@ -83,16 +84,6 @@ struct make_brick_nodes {
     }
 };
 
-// 1 for nodes that are the first of their parent; the last count is 0.
-struct count_parents {
-    const std::uint64_t* keys;
-    std::uint64_t count;
-    std::uint32_t* is_first;
-
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        is_first[i] = i < count && (i == 0 || keys[i] >> 3 != keys[i - 1] >> 3) ? 1 : 0;
-    }
-};
 // 1 for tiles of a level; the last count is 0.
 struct count_tiles {
     brick_table table;

@@ -7,6 +7,7 @@
 // in proportion to the runs, however long they are. Places count in the whole grid.
 
 #include <voxelpipe/core/morton.hpp>
+#include <voxelpipe/core/morton_parents.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -65,16 +66,6 @@ struct gather_rows {
             return;
         }
         for (std::uint64_t k = 0; k < n; ++k) bounds[first[i] + k] = from.bounds[from.first[row] + k];
-    }
-};
-// 1 for rows that are the first of their parent; the last count is 0.
-struct count_row_parents {
-    const std::uint64_t* keys;
-    std::uint64_t count;
-    std::uint32_t* is_first;
-
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        is_first[i] = i < count && (i == 0 || keys[i] >> 3 != keys[i - 1] >> 3) ? 1 : 0;
     }
 };
 // Numbers of parents, their keys and their first children, and one more.
@@ -266,7 +257,7 @@ template <class Backend>
     const auto n = static_cast<std::size_t>(level.size());
     typename Backend::template buffer<std::uint32_t> is_first(backend, n + 1);
     level.parent = typename Backend::template buffer<std::uint64_t>(backend, n + 1);
-    backend.for_each(n + 1, count_row_parents{level.keys.data(), n, is_first.data()});
+    backend.for_each(n + 1, count_parents{level.keys.data(), n, is_first.data()});
     const auto parents = static_cast<std::size_t>(backend.sum(is_first, level.parent));
     row_level<Backend> above(backend);
     above.keys = typename Backend::template buffer<std::uint64_t>(backend, parents);
