@@ -10,6 +10,7 @@
 #include "parallel.hpp"
 #include "placement.hpp"
 #include "resolve.hpp"
+#include "show_stages.hpp"
 #include "solid_options.hpp"
 #include "surface.hpp"
 #include "uploaded_scene.hpp"
@@ -18,10 +19,8 @@
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <algorithm>
-#include <atomic>
 #include <bitset>
 #include <chrono>
-#include <cstring>
 #include <memory>
 #include <span>
 #include <string>
@@ -31,24 +30,6 @@
 #include <vector>
 
 namespace voxelize {
-
-// Puts the library's stages, without those named in `absent`, in the place of their sum, "voxelize". `rest`: what the
-// sum holds beside them; empty where that is nothing to show.
-inline void show_stages(voxelize_stats& stats, const vp::stage_times& times, std::span<const std::string_view> absent,
-                        const std::string& rest) {
-    std::vector<std::pair<std::string, double>> stages;
-    for (auto& [name, time] : stats.milliseconds) {
-        if (name != "voxelize") {
-            stages.emplace_back(name, time);
-            continue;
-        }
-        for (const auto& [stage, field] : vp::stage_time_fields)
-            if (std::find(absent.begin(), absent.end(), stage) == absent.end())
-                stages.emplace_back(stage, times.*field);
-        if (!rest.empty()) stages.emplace_back(rest, std::max(0.0, time - vp::sum_of(times)));
-    }
-    stats.milliseconds = std::move(stages);
-}
 
 template <class Backend>
 class pipeline {
@@ -312,82 +293,16 @@ protected: // sparse_pipeline draws the same into bricks
         return *kept;
     }
 
-    void draw_bits(volume& result, const voxelpipe::grid& part, int begin) {
-        std::bitset<2> enabled;
-        enabled[0] = keeps_bits_ || !counts_fragments();
-        enabled[1] = counts_fragments();
-        bits_framebuffer& framebuffer = framebuffer_for(bits_framebuffer_, part.extent, enabled);
-        draw_reporting(uploaded_->bits_draws(), part, framebuffer);
-        const stage_timer timer{*this, "resolve"};
-        if (keeps_bits_) copy<0>(result, bits_name_, framebuffer, begin);
-        if (counts_fragments()) copy<1>(result, target::count, framebuffer, begin);
-    }
+    void draw_bits(volume& result, const voxelpipe::grid& part, int begin);
 
-    void draw_surface(volume& result, const voxelpipe::grid& part, int begin) {
-        if (draws_lines_) surface_framebuffer_.reset(); // it loads its targets
-        const std::bitset<num_targets> enabled = enabled_targets();
-        surface_framebuffer& framebuffer = framebuffer_for(surface_framebuffer_, part.extent, enabled);
-        if (enabled[triangle]) vp::get<triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
-        draw_reporting(uploaded_->draws(), part, framebuffer);
-        draw_lines(uploaded_->line_draws(), part, framebuffer, enabled);
-        const stage_timer timer{*this, "resolve"};
-        if (keeps_bits_) copy<occupancy>(result, bits_name_, framebuffer, begin);
-        if (counts_fragments()) copy<count>(result, target::count, framebuffer, begin);
-        if (wants(target::color))
-            resolve<glm::u8vec4>(
-                result, target::color, part.extent, begin,
-                mean_color{elements_of<color_sum>(framebuffer), elements_of<count>(framebuffer), uploaded_->tables()});
-        if (wants(target::color_max)) copy<color_max>(result, target::color_max, framebuffer, begin);
-        if (wants(target::color_replace)) copy<color_last>(result, target::color_replace, framebuffer, begin);
-        if (wants(target::normal))
-            resolve<glm::vec3>(result, target::normal, part.extent, begin,
-                               unit_normal{elements_of<normal_sum>(framebuffer)});
-        if (wants(target::triangle)) copy<triangle>(result, target::triangle, framebuffer, begin);
-        if (wants(target::material))
-            resolve<std::int32_t>(result, target::material, part.extent, begin,
-                                  material_of_triangle{elements_of<triangle>(framebuffer), uploaded_->draw_table(),
-                                                       uploaded_->num_draws()});
-        if (wants(target::depth)) copy<depth>(result, target::depth, framebuffer, begin);
-    }
+    void draw_surface(volume& result, const voxelpipe::grid& part, int begin);
 
     // ---- color-outer: the whole of the grid is known
     // -----------------------------------------------------------------
 
-    [[nodiscard]] std::vector<std::uint8_t> outer_sides(const volume& result) {
-        const stage_timer timer{*this, "outside"};
-        const auto& draws = uploaded_->draws();
-        for (std::size_t i = 0; i < draws.size(); ++i)
-            outer_draws_.push_back(
-                {draws[i].mesh, draws[i].vertex_shader, {draws[i].fragment_shader, uploaded_->double_sided()[i] != 0}});
-        for (const auto& d : uploaded_->line_draws())
-            outer_line_draws_.push_back({d.mesh, d.vertex_shader, {{d.fragment_shader.of_triangles}}});
-        return sides_that_see(result, *result.find(bits_name_), request_.threads);
-    }
+    [[nodiscard]] std::vector<std::uint8_t> outer_sides(const volume& result);
 
-    void draw_outer(volume& result, const voxelpipe::grid& part, int begin, const std::vector<std::uint8_t>& sides) {
-        const std::size_t layer = static_cast<std::size_t>(part.extent.x) * static_cast<std::size_t>(part.extent.y);
-        const buffer<std::uint8_t> of_slab{backend_,
-                                           std::span{sides}.subspan(layer * static_cast<std::size_t>(begin),
-                                                                    layer * static_cast<std::size_t>(part.extent.z))};
-        for (outer_draw& draw : outer_draws_) {
-            draw.fragment_shader.sides = of_slab.data();
-            draw.fragment_shader.first = part.offset;
-            draw.fragment_shader.extent = part.extent;
-        }
-        std::bitset<1> all;
-        all.set();
-        for (outer_line_draw& draw : outer_line_draws_) {
-            draw.fragment_shader.of_triangles.sides = of_slab.data();
-            draw.fragment_shader.of_triangles.first = part.offset;
-            draw.fragment_shader.of_triangles.extent = part.extent;
-        }
-        if (draws_lines_) outer_framebuffer_.reset();
-        outer_framebuffer& framebuffer = framebuffer_for(outer_framebuffer_, part.extent, all);
-        draw_reporting(outer_draws_, part, framebuffer);
-        draw_lines(outer_line_draws_, part, framebuffer, all);
-        const stage_timer timer{*this, "resolve"};
-        resolve<glm::u8vec4>(result, target::color_outer, part.extent, begin, outer_color{elements_of<0>(framebuffer)});
-    }
+    void draw_outer(volume& result, const voxelpipe::grid& part, int begin, const std::vector<std::uint8_t>& sides);
 
     // ---- solids ----------------------------------------------------------------------------------------------------
 
@@ -401,95 +316,23 @@ protected: // sparse_pipeline draws the same into bricks
         return wants(target::occupancy) ? info_of(target::occupancy).name : std::string_view(inside_name_);
     }
 
-    void add_solid_counts(const vp::status& status, const voxelpipe::grid& part) {
-        check(status, request_);
-        if (!draws_surface_) {
-            stats_.triangles_dropped = status.counts.triangles_dropped();
-            add_counts(status);
-        }
-        solid_counts& counts = stats_.solid ? *stats_.solid : stats_.solid.emplace();
-        counts.rows += static_cast<std::uint64_t>(part.extent.y) * static_cast<std::uint64_t>(part.extent.z);
-        counts.open_rows += status.solid.open_rows;
-        counts.crossings += status.solid.crossings;
-        counts.max_winding = std::max(counts.max_winding, status.solid.max_winding);
-        counts.hole_edges = status.solid.hole_edges;
-        counts.holes = status.solid.holes;
-        counts.closed_holes = status.solid.cones;
-    }
+    void add_solid_counts(const vp::status& status, const voxelpipe::grid& part);
 
     // What is outside follows from the whole grid: a flood is drawn there, with the padding.
-    void draw_solid(volume& result, const voxelpipe::grid& slab, int begin) {
-        const bool is_flood = request_.solid->rule == solid_rule::exterior;
-        const voxelpipe::grid part = is_flood ? slab.uncropped() : slab;
-        std::bitset<2> enabled;
-        enabled[0] = true;
-        enabled[1] = counts_bodies();
-        bits_framebuffer& framebuffer = framebuffer_for(solid_framebuffer_, part.extent, enabled);
-        vp::status status;
-        {
-            const stage_timer timer{*this, "voxelize"};
-            status = vp::voxelize_solid(backend_, uploaded_->bits_draws(), part, framebuffer,
-                                        solid_options_of(*request_.solid));
-        }
-        add_solid_counts(status, part);
-        report_(1.0);
-        const stage_timer timer{*this, "resolve"};
-        if (part.extent == slab.extent) {
-            copy<0>(result, inside_name(), framebuffer, begin);
-        } else {
-            const auto* const words = elements_of<0>(framebuffer);
-            std::vector<std::uint32_t> bits(bits_map::elements(part.extent));
-            memory_access<Backend>::read(backend_, bits.data(), bits.size(), as_it_is<std::uint32_t>{words},
-                                         thread_count(request_.threads));
-            copy_part(result, *result.find(inside_name()), bits, {part.extent.x, part.extent.y, part.extent.z},
-                      {slab.offset.x, slab.offset.y, slab.offset.z});
-        }
-        if (counts_bodies()) copy<1>(result, target::count, framebuffer, begin);
-    }
+    void draw_solid(volume& result, const voxelpipe::grid& slab, int begin);
 
     // The volume's other values, once all bits are there.
-    void finish_solid(volume& result) {
-        const stage_timer timer{*this, "fill"};
-        const channel& solid = *result.find(inside_name());
-        warn_of_solid(static_cast<std::uint64_t>(result.popcount(solid)),
-                      draws_surface_ ? static_cast<std::uint64_t>(result.popcount(*result.find(bits_name_))) : 0);
-        if (wants(target::count) && !counts_bodies()) count_bits(result, solid, request_.threads);
-        if (draws_surface_) fill_inside(result, solid, *result.find(bits_name_), *request_.solid, request_.threads);
-    }
+    void finish_solid(volume& result);
     // `voxels`: of the solid; `surface`: those of them that a triangle touches.
-    void warn_of_solid(std::uint64_t voxels, std::uint64_t surface) {
-        stats_.voxels = voxels;
-        if (request_.solid->rule == solid_rule::exterior && voxels != 0 && voxels == surface)
-            stats_.warnings.push_back(
-                "--solid exterior finds nothing enclosed: all its voxels are the surface's. If the flood "
-                "leaked through gaps, --closing R closes those of about 2 R voxels");
-        if (std::string warning = open_warning(*request_.solid, *stats_.solid); !warning.empty())
-            stats_.warnings.push_back(std::move(warning));
-    }
+    void warn_of_solid(std::uint64_t voxels, std::uint64_t surface);
 
     // Counts the covered voxels whose resolved normal is 0.
-    void count_cancelled_normals(const volume& result) {
-        const stage_timer timer{*this, "resolve"};
-        const auto* const normals = reinterpret_cast<const glm::vec3*>(result.find("normal")->data.data());
-        const auto voxels = static_cast<std::size_t>(result.num_voxels());
-        constexpr std::size_t block = 1 << 20;
-        std::atomic<std::uint64_t> with_normal{0};
-        parallel_for((voxels + block - 1) / block, thread_count(request_.threads), [&](std::size_t b) {
-            std::uint64_t found = 0;
-            for (std::size_t i = b * block; i < std::min(voxels, (b + 1) * block); ++i)
-                found += normals[i] != glm::vec3(0) ? 1 : 0;
-            with_normal += found;
-        });
-        report_cancelled_normals(stats_.voxels - with_normal);
-    }
+    void count_cancelled_normals(const volume& result);
 
     void report_cancelled_normals(std::uint64_t count) {
         stats_.normals_cancelled = count;
-        if (stats_.normals_cancelled != 0)
-            stats_.warnings.push_back("the normals of " + std::to_string(stats_.normals_cancelled) + " of " +
-                                      std::to_string(stats_.voxels) +
-                                      " voxels cancel out (two sides of a thin wall in one voxel, or triangles without "
-                                      "area, lines and points); --target normal is 0 there");
+        if (std::string warning = cancelled_warning(stats_); !warning.empty())
+            stats_.warnings.push_back(std::move(warning));
     }
 
     // Elements of a target, in the backend's memory.
@@ -567,3 +410,6 @@ protected: // sparse_pipeline draws the same into bricks
 };
 
 } // namespace voxelize
+
+#include "pipeline_solid.hpp"   // IWYU pragma: export
+#include "pipeline_surface.hpp" // IWYU pragma: export

@@ -10,8 +10,11 @@
 
 #include <algorithm>
 #include <array>
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <memory>
+#include <system_error>
 
 namespace voxelize {
 namespace {
@@ -171,6 +174,23 @@ volume layers_of(const volume& v, std::int64_t first, std::int64_t last) {
     return part;
 }
 
+// The name of piece n, from 1.
+std::string piece_name(const std::filesystem::path& path, std::int64_t n) {
+    return path.stem().string() + "." + std::to_string(n) + ".vti";
+}
+
+// How many pieces a file at this path names that was written here; 0 without one.
+std::int64_t pieces_before(const std::filesystem::path& path) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) return 0;
+    std::ifstream file(path, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    std::int64_t n = 0;
+    while (n < most_pieces && text.find("Source=\"" + attribute(piece_name(path, n + 1)) + '"') != std::string::npos)
+        ++n;
+    return n;
+}
+
 } // namespace
 
 std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesystem::path& path,
@@ -190,6 +210,7 @@ std::vector<std::filesystem::path> write_pvti(const volume& v, const std::filesy
         pieces = static_cast<std::int64_t>((bytes_of(v) - 1) / std::max<std::uint64_t>(options.piece_bytes, 1)) + 1;
     pieces = std::clamp<std::int64_t>(pieces, 1, std::min<std::int64_t>(layers, most_pieces));
 
+    const std::int64_t before = pieces_before(path);
     progress_meter meter(options.progress, bytes_of(v));
     std::vector<std::unique_ptr<output_file>> files;
     std::string text =
@@ -202,15 +223,20 @@ std::vector<std::filesystem::path> write_pvti(const volume& v, const std::filesy
         "    </PCellData>\n";
     for (std::int64_t n = 0; n < pieces; ++n) {
         const std::int64_t first = n * layers / pieces, last = (n + 1) * layers / pieces;
-        const std::filesystem::path name = path.stem().string() + "." + std::to_string(n + 1) + ".vti";
+        const std::string name = piece_name(path, n + 1);
         files.push_back(std::make_unique<output_file>(path.parent_path() / name));
         write_image(*files.back(), layers_of(v, first, last), first, options, meter);
-        text +=
-            "    <Piece Extent=\"" + extent_of(v, first, last) + "\" Source=\"" + attribute(name.string()) + "\"/>\n";
+        text += "    <Piece Extent=\"" + extent_of(v, first, last) + "\" Source=\"" + attribute(name) + "\"/>\n";
     }
     files.push_back(std::make_unique<output_file>(path));
     files.back()->write(text + "  </PImageData>\n</VTKFile>\n");
-    return commit_all(files);
+    std::vector<std::filesystem::path> targets = commit_all(files);
+    // Pieces of the file that this one replaces, which nothing names any more.
+    for (std::int64_t n = pieces; n < before; ++n) {
+        std::error_code ignored;
+        std::filesystem::remove(path.parent_path() / piece_name(path, n + 1), ignored);
+    }
+    return targets;
 }
 
 } // namespace voxelize

@@ -8,6 +8,8 @@
 
 #include <zlib.h>
 
+#include <fstream>
+
 using namespace voxelize;
 using namespace voxelize::testing;
 
@@ -151,6 +153,18 @@ TEST_F(Vti, APieceHoldsTheLayersOfItsSlab) {
     options.piece_bytes = 40 * 30 * 5 * 7;
     const auto pieces = write_sparse(make_sparse(colored, 1), folder_ / "b.pvti", options);
     EXPECT_EQ(pieces.size(), 4u); // of three pieces, and of one file that names them
+}
+
+// A file that replaces one of more pieces takes those away that nothing names any more, and no others.
+TEST_F(Vti, PiecesOfTheFileBeforeDoNotStay) {
+    const volume v = make_all_types();
+    std::ofstream(folder_ / "a.4.vti") << "not named by any .pvti";
+    write_options options;
+    options.pieces = 3;
+    write(v, folder_ / "a.pvti", options);
+    options.pieces = 1;
+    write(v, folder_ / "a.pvti", options);
+    EXPECT_EQ(names(), (std::vector<std::string>{"a.1.vti", "a.4.vti", "a.pvti"}));
 }
 
 TEST_F(Vti, AFullDiskLeavesNoPiece) {
