@@ -92,19 +92,6 @@ const char* name_of(exit_code code) {
     return "internal_error";
 }
 
-// What makes two runs the same work on a model: every option that can change a byte, and the model's size and time.
-std::string work_of(const command_line& options, const listed_model& model) {
-    content arguments;
-    for (const std::string& argument : options.arguments) arguments.add(argument.c_str(), argument.size() + 1);
-    std::error_code error;
-    const std::uintmax_t size = fs::file_size(model.input, error);
-    const auto time = fs::last_write_time(model.input, error).time_since_epoch().count();
-    std::array<char, 64> text{};
-    std::snprintf(text.data(), text.size(), "%08x-%jx-%llx", arguments.crc, size,
-                  static_cast<unsigned long long>(time));
-    return text.data();
-}
-
 json record_of(const listed_model& model, const std::string& work) {
     return {{"input", model.input.string()}, {"name", model.name}, {"work", work}};
 }
@@ -295,6 +282,18 @@ private:
 
 } // namespace
 
+std::string work_of(const command_line& options, const fs::path& model) {
+    content arguments;
+    for (const std::string& argument : options.arguments) arguments.add(argument.c_str(), argument.size() + 1);
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(model, error);
+    const auto time = fs::last_write_time(model, error).time_since_epoch().count();
+    std::array<char, 64> text{};
+    std::snprintf(text.data(), text.size(), "%08x-%jx-%llx", arguments.crc, size,
+                  static_cast<unsigned long long>(time));
+    return text.data();
+}
+
 std::vector<listed_model> read_list(std::istream& list) {
     std::vector<listed_model> models;
     std::unordered_set<std::string> stems;
@@ -371,7 +370,7 @@ int run_batch(const command_line& options) {
         if (i % static_cast<std::size_t>(options.batch.world_size) != static_cast<std::size_t>(options.batch.rank))
             continue;
         ++mine;
-        std::string work = work_of(options, models[i]);
+        std::string work = work_of(options, models[i].input);
         if (finished.has(models[i].name, work)) {
             ++skipped;
             continue;

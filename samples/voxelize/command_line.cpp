@@ -4,6 +4,7 @@
 
 #include "options/help.hpp"
 #include "options/raw_options.hpp"
+#include "slab_run.hpp"
 
 #include <CLI/CLI.hpp>
 
@@ -109,6 +110,12 @@ command_line parse_command_line(int argc, const char* const* argv) {
         throw usage_error("--zarr-codec zstd: this program was built without libzstd");
     if (options.voxelize.backend == backend_choice::cpu && options.voxelize.devices != 1)
         throw usage_error("--devices says how many GPUs draw; it does not go with --backend cpu");
+    if (const std::string needs = options.by_slabs ? why_not_by_slabs(options) : std::string(); !needs.empty())
+        throw usage_error((options.batch.world_size > 1
+                               ? std::to_string(options.batch.world_size) +
+                                     " processes share one model by slabs (--list shares many models), which needs "
+                               : std::string("--resume needs ")) +
+                          needs);
     return options;
 }
 

@@ -19,10 +19,10 @@ namespace voxelize {
 
 enum class stats_format : std::uint8_t { none, text, json };
 
-// Many models in one run (batch.hpp).
+// Many models in one run (batch.hpp), or one by several processes (slab_run.hpp).
 struct batch_request {
     std::filesystem::path list; // a file with a model a line, "-" for standard input; empty: there is one model
-    int rank = 0;               // this process takes the models whose number is RANK modulo WORLD_SIZE
+    int rank = 0;               // this process takes the models, or the slabs, whose number is RANK modulo WORLD_SIZE
     int world_size = 1;
     int jobs = 1; // models at a time
 };
@@ -39,6 +39,7 @@ struct command_line {
     // target leave them out, so that one output does not change the content or the names of another.
     std::vector<target> implied;
     storage_choice storage = storage_choice::automatic;
+    bool by_slabs = false;             // one model, drawn and written slab by slab
     write_options write;               // all but its progress
     std::uint64_t max_memory = 0;      // bytes, resident; 0: what the machine has
     std::vector<std::string> warnings; // of what makes sense, but hardly what was meant; one line each

@@ -14,7 +14,9 @@
 // Unsupported parts of a file: where geometry would be lost (required extensions that are not known, Draco or meshopt
 // compression in a build without the library) the load fails and says so; otherwise scene::warnings names it.
 
+#include "affine.hpp"
 #include "model_error.hpp"
+#include "position_cache.hpp"
 #include "scene.hpp"
 
 #include <cstddef>
@@ -78,5 +80,24 @@ using gltf_file_reader =
 [[nodiscard]] scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_file = {},
                               const gltf_limits& limits = {}, const gltf_options& options = {},
                               const load_hooks& hooks = {});
+
+// A scene that can be read in parts: primitives of triangles, all with one transform, whose indices and positions (as
+// floats) lie in the file itself.
+struct gltf_parts {
+    struct part {
+        position_layout vertices;
+        std::uint64_t first_index = 0, num_triangles = 0; // byte, triangles
+        std::size_t index_bytes = 0;                      // of one; 0: vertices count up
+    };
+    std::vector<part> parts; // in the order in which load_gltf() gives their instances
+    affine to_world;
+    std::vector<std::string> warnings;
+};
+
+// The file's scene as such parts, without reading their bytes. None if it is not made of them: with lines, strips,
+// skins, morph targets, compression, positions that are no floats, buffers in other files, materials whose alpha cuts
+// fragments off (MASK, BLEND), an animation, or several transforms. None, too, for a file that load_gltf() refuses.
+[[nodiscard]] std::optional<gltf_parts> find_parts(const std::filesystem::path& file, const gltf_limits& limits = {},
+                                                   const gltf_options& options = {});
 
 } // namespace voxelize

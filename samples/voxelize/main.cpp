@@ -29,9 +29,10 @@ void print(const command_line& options, const run_report& report) {
         std::ostream& stream = options.stats == stats_format::json ? std::cerr : std::cout;
         const glm::ivec3 extent = report.request.grid.extent;
         for (const std::filesystem::path& file : report.files) stream << "wrote " << file.string() << '\n';
-        stream << report.stats.voxels << " of " << extent.x << " x " << extent.y << " x " << extent.z
-               << " voxels are covered\n";
-        if (report.is_sparse)
+        if (!report.files.empty())
+            stream << report.stats.voxels << " of " << extent.x << " x " << extent.y << " x " << extent.z
+                   << " voxels are covered\n";
+        if (report.is_sparse && report.bricks != 0)
             stream << "they lie in " << report.bricks << " bricks of 8 x 8 x 8, "
                    << memory::mebibytes(static_cast<double>(report.brick_bytes)) << " with their values\n";
     }

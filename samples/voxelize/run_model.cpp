@@ -6,6 +6,7 @@
 #include "cuda_device.hpp"
 #include "model_file.hpp"
 #include "picture_levels.hpp"
+#include "slab_run.hpp"
 #include "sparse/sparse_formats.hpp"
 #include "sparse/sparse_voxelizer.hpp"
 #include "sparse/streamed_model.hpp"
@@ -71,13 +72,28 @@ std::filesystem::path folder_of(const std::filesystem::path& file) {
 }
 
 // The corners of a model's box in place of its triangles, for messages about it.
-scene outline_of(const std::filesystem::path& file, const bounding_box& box, double scale) {
+scene outline_of(const std::filesystem::path& file, const bounding_box& box, const affine& to_world) {
     scene model;
     primitive& part = model.primitives.emplace_back();
     part.name = file.filename().string();
     part.positions = {glm::vec3(box.low), glm::vec3(box.high)};
-    model.instances.push_back({0, affine::scaling(scale)});
+    model.instances.push_back({0, to_world});
     return model;
+}
+
+// Draws and writes the slabs of this process.
+void run_slabs(const command_line& options, slab_source&& source, run_report& report) {
+    report.is_sparse = true;
+    const slab_outcome outcome = run_by_slabs(options, std::move(source), report);
+    report.warnings.insert(report.warnings.end(), report.stats.warnings.begin(), report.stats.warnings.end());
+    if (outcome.finished && report.stats.voxels == 0)
+        report.warnings.push_back(why_empty(report.stats, report.request.coverage));
+    if (options.quiet) return;
+    std::cerr << "voxelize: drew " << outcome.drawn << " of " << outcome.slabs << " slabs";
+    if (options.batch.world_size > 1)
+        std::cerr << " as process " << options.batch.rank << " of " << options.batch.world_size;
+    if (outcome.left != 0) std::cerr << "; " << outcome.left << " are not there yet";
+    std::cerr << '\n';
 }
 
 // Does the work; every failure is an exception.
@@ -91,13 +107,18 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     report.request.cuda = start_cuda(options);
     load_options load = options.load;
     load.picture_hook = picture_reducer{options.grid, options.voxelize};
-    std::optional<stl_file> stream = streamed_input(options);
-    bounding_box bounds;
-    if (stream) bounds = stream->bounds();
-    scene model = stream ? outline_of(options.input, bounds, load.scale) : load_model(options.input, load);
+    const std::unique_ptr<triangle_stream> stream = streamed_input(options);
+    affine to_world;
+    triangle_stream::boxes boxes;
+    if (stream) {
+        to_world = load.scale == 1 ? stream->to_world() : affine::scaling(load.scale).after(stream->to_world());
+        boxes = stream->bounds(to_world);
+    }
+    scene model = stream ? outline_of(options.input, boxes.own, to_world) : load_model(options.input, load);
     report.warnings = options.warnings;
+    if (stream) model.warnings = stream->warnings();
     report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
-    report.vertices = stream ? 3 * stream->num_triangles() : model.vertex_count();
+    report.vertices = stream ? stream->num_vertices() : model.vertex_count();
     for (const material& m : model.materials) report.materials.push_back(m.name);
     report.stats.milliseconds.emplace_back("read", milliseconds_since(start));
     start = clock::now();
@@ -113,11 +134,7 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     if (elements > UINT32_MAX)
         refuse("there are " + std::to_string(elements) + " triangles, lines and points, more than the " +
                std::to_string(UINT32_MAX) + " that can be numbered");
-    if (!stream) bounds = bounds_of(model, options.voxelize.threads);
-    if (stream && !bounds.empty) {
-        const affine to_world = affine::scaling(load.scale);
-        bounds = {to_world(bounds.low), to_world(bounds.high), false};
-    }
+    const bounding_box bounds = stream ? boxes.placed : bounds_of(model, options.voxelize.threads);
     if (bounds.empty) refuse("nothing to voxelize has a corner at a finite position");
     report.request.grid = place_grid(options.grid, bounds);
     report.request.padding = options.grid.padding;
@@ -125,6 +142,18 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
         report.warnings.push_back(std::move(warning));
     report.stats.milliseconds.emplace_back("place", milliseconds_since(start));
 
+    const stream_place place{to_world, folder_of(options.outputs.front()), [&](const std::string& how) {
+                                 if (!options.quiet) std::cerr << "voxelize: " << how << '\n';
+                             }};
+    if (options.by_slabs) {
+        bar.start("voxelizing slab by slab");
+        report.request.progress = [&bar](double done) { bar.show(done); };
+        run_slabs(options, {std::move(model), stream.get(), place}, report);
+        bar.clear();
+        report.peak_memory = memory::peak();
+        add_rest(report, milliseconds_since(begin));
+        return;
+    }
     const storage_decision storage =
         stream ? storage_decision{true, ""} : choose_storage(options.storage, report.request, options.outputs);
     const glm::ivec3 extent = report.request.grid.extent;
@@ -136,10 +165,7 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     volume voxels;
     sparse_volume bricks;
     if (stream)
-        bricks = run_streamed_voxelizer(*stream, load.scale, report.request, folder_of(options.outputs.front()),
-                                        report.stats, [&](const std::string& how) {
-                                            if (!options.quiet) std::cerr << "voxelize: " << how << '\n';
-                                        });
+        bricks = run_streamed_voxelizer(*stream, place, report.request, report.stats);
     else if (storage.sparse)
         bricks = run_sparse_voxelizer(std::move(model), report.request, report.stats);
     else

@@ -5,10 +5,9 @@
 #include "model_error.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
+#include <span>
 #include <system_error>
-#include <utility>
 #include <vector>
 
 namespace voxelize {
@@ -18,22 +17,21 @@ constexpr std::uint64_t stl_head = 84, stl_triangle = 50; // bytes
 
 } // namespace
 
-std::optional<stl_file> stl_file::open(const std::filesystem::path& path) {
+std::unique_ptr<stl_file> stl_file::open(const std::filesystem::path& path) {
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(path, error);
-    if (error || bytes < stl_head) return std::nullopt;
-    stl_file result;
-    result.file_.open(path, std::ios::binary);
+    if (error || bytes < stl_head) return nullptr;
+    auto result = std::make_unique<stl_file>();
+    result->file_.open(path, std::ios::binary);
     std::uint32_t count = 0;
-    result.file_.seekg(stl_head - sizeof(count));
-    if (!result.file_.read(reinterpret_cast<char*>(&count), sizeof(count))) return std::nullopt;
-    if (bytes != stl_head + stl_triangle * count) return std::nullopt;
-    result.num_triangles_ = count;
+    result->file_.seekg(stl_head - sizeof(count));
+    if (!result->file_.read(reinterpret_cast<char*>(&count), sizeof(count))) return nullptr;
+    if (bytes != stl_head + stl_triangle * count) return nullptr;
+    result->num_triangles_ = count;
     return result;
 }
 
-void stl_file::for_each_block(
-    const std::function<void(std::span<const glm::vec3> corners, std::uint64_t first)>& visit) {
+void stl_file::for_each_block(const visitor& visit) {
     constexpr std::uint64_t block = 16384; // triangles
     std::vector<char> raw;
     std::vector<glm::vec3> corners;
@@ -50,15 +48,6 @@ void stl_file::for_each_block(
                         3 * sizeof(glm::vec3));
         visit(corners, first);
     }
-}
-
-bounding_box stl_file::bounds() {
-    bounding_box box;
-    for_each_block([&](std::span<const glm::vec3> corners, std::uint64_t) {
-        for (const glm::vec3& p : corners)
-            if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)) box.include({p, p, false});
-    });
-    return box;
 }
 
 } // namespace voxelize

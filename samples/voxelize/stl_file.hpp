@@ -4,30 +4,22 @@
 // A binary STL file, read block by block: for models that do not fit into memory. Colours, which some programs put into
 // it, are not read.
 
-#include "placement.hpp"
-
-#include <glm/vec3.hpp>
+#include "triangle_stream.hpp"
 
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <functional>
-#include <optional>
-#include <span>
+#include <memory>
 
 namespace voxelize {
 
-class stl_file {
+class stl_file : public triangle_stream {
 public:
     // The file at PATH, if it is one: 84 bytes, the last four of which count the triangles of 50 bytes that follow.
-    [[nodiscard]] static std::optional<stl_file> open(const std::filesystem::path& path);
+    [[nodiscard]] static std::unique_ptr<stl_file> open(const std::filesystem::path& path);
 
-    [[nodiscard]] std::uint64_t num_triangles() const { return num_triangles_; }
-    // Calls visit(corners, number of the first triangle) with all triangles in order, three corners each, some
-    // thousands at a time. Throws model_error where the file ends before them.
-    void for_each_block(const std::function<void(std::span<const glm::vec3> corners, std::uint64_t first)>& visit);
-    // The box around all finite corners.
-    [[nodiscard]] bounding_box bounds();
+    [[nodiscard]] std::uint64_t num_triangles() const override { return num_triangles_; }
+    void for_each_block(const visitor& visit) override;
 
 private:
     std::ifstream file_;

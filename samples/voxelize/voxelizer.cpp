@@ -175,6 +175,13 @@ std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage)
     return text + "the model lies outside the grid";
 }
 
+std::string cancelled_warning(const voxelize_stats& stats) {
+    if (stats.normals_cancelled == 0) return "";
+    return "the normals of " + std::to_string(stats.normals_cancelled) + " of " + std::to_string(stats.voxels) +
+           " voxels cancel out (two sides of a thin wall in one voxel, or triangles without area, lines and points); "
+           "--target normal is 0 there";
+}
+
 volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
     require_volume(request);
     try {

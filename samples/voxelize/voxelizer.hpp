@@ -97,6 +97,9 @@ struct backend_error : std::runtime_error {
 // Why no voxel is covered, one line; for stats that count none.
 [[nodiscard]] std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage);
 
+// One line on normals that cancel; empty where none do.
+[[nodiscard]] std::string cancelled_warning(const voxelize_stats& stats);
+
 // Bytes of the volume that a request gives.
 [[nodiscard]] double volume_bytes(const voxelize_request& request);
 

@@ -17,6 +17,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 
 using namespace tool_test;
@@ -315,6 +316,120 @@ TEST(Memory, MeshesThatDoNotFitAreStreamed) {
     // Colours are not streamed: the need is named.
     const outcome colors = voxelize("colors.npz", {"--max-memory", "90", "-t", "color"});
     EXPECT_EQ(3, colors.code) << colors.err;
+}
+
+// The same relief with shared vertices, whose colours and whose faces' flags are passed over. corners(n): what
+// face n says that it has.
+void write_ply(
+    const fs::path& file, int side, const std::function<int(int)>& corners = [](int) { return 3; }) {
+    std::ofstream out(file, std::ios::binary);
+    out << "ply\nformat binary_little_endian 1.0\ncomment of a test\nelement vertex " << (side + 1) * (side + 1)
+        << "\nproperty uchar red\nproperty double x\nproperty float y\nproperty float z\nelement face "
+        << 2 * side * side << "\nproperty uchar flag\nproperty list uchar int vertex_indices\nend_header\n";
+    const auto put = [&](const auto& value) { out.write(reinterpret_cast<const char*>(&value), sizeof(value)); };
+    const auto at = [&](int i) { return static_cast<float>(i) / static_cast<float>(side); };
+    for (int y = 0; y <= side; ++y)
+        for (int x = 0; x <= side; ++x) {
+            put(std::uint8_t{77});
+            put(double{at(x)});
+            put(y * side + x == 4711 ? std::numeric_limits<float>::quiet_NaN() : at(y));
+            put(0.4f + 0.3f * std::sin(9 * at(x) + 4 * at(y)));
+        }
+    for (int n = 0; n < 2 * side * side; ++n) {
+        const int x = n / 2 % side, y = n / 2 / side, a = y * (side + 1) + x, b = a + side + 1;
+        put(std::uint8_t{1});
+        put(static_cast<std::uint8_t>(corners(n)));
+        for (const int v : {n % 2 == 0 ? a : a + 1, n % 2 == 0 ? a + 1 : b + 1, b}) put(std::int32_t{v});
+    }
+}
+
+TEST(Memory, BinaryPlyThatDoesNotFitIsStreamed) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    write_ply(folder / "m.ply", 480);
+    const auto voxelize = [&](const std::string& out, const std::vector<std::string>& how) {
+        std::vector<std::string> arguments{
+            folder / "m.ply", "-o", folder / out, "-r", "150", "-j", "2", "-t", "occupancy,count,normal,triangle,depth",
+            "--stats=json"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        return run(folder, arguments);
+    };
+    const outcome tight = voxelize("tight.npz", {"--max-memory", "90"});
+    ASSERT_EQ(0, tight.code) << tight.err;
+    EXPECT_NE(std::string::npos, tight.err.find("460800 triangles do not fit")) << tight.err;
+    const json b = json::parse(tight.out);
+    EXPECT_GE(90, static_cast<double>(b["peak_memory_bytes"].get<std::uint64_t>()) / (1 << 20));
+#if VOXELPIPE_TOOL_HAS_ASSIMP
+    const outcome free = voxelize("free.npz", {"--sparse"});
+    ASSERT_EQ(0, free.code) << free.err;
+    EXPECT_TRUE(read_file(folder / "free.npz") == read_file(folder / "tight.npz"));
+    const json a = json::parse(free.out);
+    for (const char* const name : {"triangles", "triangles_dropped", "fragments", "voxels"})
+        EXPECT_EQ(a.value(name, -1), b.value(name, -1)) << name;
+#endif
+    // Solids by a rule, too; an open one is warned of as a whole.
+    const std::vector<std::string> solid{"--solid", "nonzero", "--solid-extent", "centre"};
+    std::vector<std::string> in_little = solid;
+    in_little.insert(in_little.end(), {"--max-memory", "90"});
+    const outcome filled = voxelize("filled.npz", in_little);
+    ASSERT_EQ(0, filled.code) << filled.err;
+    EXPECT_NE(std::string::npos, filled.err.find("460800 triangles do not fit")) << filled.err;
+#if VOXELPIPE_TOOL_HAS_ASSIMP
+    std::vector<std::string> in_much = solid;
+    in_much.emplace_back("--sparse");
+    const outcome whole = voxelize("whole.npz", in_much);
+    ASSERT_EQ(0, whole.code) << whole.err;
+    EXPECT_TRUE(read_file(folder / "filled.npz") == read_file(folder / "whole.npz"));
+    EXPECT_EQ(json::parse(filled.out)["solid"], json::parse(whole.out)["solid"]);
+#endif
+    // Slab by slab, without holding the bricks of all.
+    const outcome slabs = voxelize("slabs.zarr", {"--max-memory", "90", "--resume"});
+    EXPECT_EQ(0, slabs.code) << slabs.err;
+    EXPECT_EQ(json::parse(slabs.out).value("voxels", -1), b.value("voxels", -2));
+    // A face that lies about its corners is found while it is read.
+    write_ply(folder / "m.ply", 480, [](int n) { return n == 300'000 ? 4 : 3; });
+    const outcome bad = voxelize("bad.npz", {"--max-memory", "90"});
+    EXPECT_EQ(2, bad.code);
+    EXPECT_NE(std::string::npos, bad.err.find("face 300000 is no triangle")) << bad.err;
+}
+
+// Two primitives, one of them without indices, under a node that turns, mirrors and stretches them.
+TEST(Memory, PlainGlbThatDoesNotFitIsStreamed) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    builder file;
+    add_sheet(file, 700);
+    const int alone = file.accessor(std::vector<float>{0, 0, 0.1f, 1, 0, 0.2f, 0, 1, 0.3f}, "VEC3");
+    file.root["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", alone}}}});
+    file.append("nodes", {{"mesh", 0}, {"matrix", {0, 0, 2, 0, 1, 0, 0, 0, 0, -1.5, 0, 0, 7, 8, 9, 1}}});
+    file.write_glb(folder / "m.glb");
+    const auto voxelize = [&](const std::string& out, const std::vector<std::string>& how) {
+        std::vector<std::string> arguments{folder / "m.glb",
+                                           "-o",
+                                           folder / out,
+                                           "-r",
+                                           "150",
+                                           "-j",
+                                           "2",
+                                           "--scale",
+                                           "0.5",
+                                           "-t",
+                                           "occupancy,count,normal,triangle,depth",
+                                           "--stats=json"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        return run(folder, arguments);
+    };
+    const outcome tight = voxelize("tight.npz", {"--max-memory", "60"});
+    ASSERT_EQ(0, tight.code) << tight.err;
+    EXPECT_NE(std::string::npos, tight.err.find("980001 triangles do not fit")) << tight.err;
+    const json b = json::parse(tight.out);
+    EXPECT_GE(60, static_cast<double>(b["peak_memory_bytes"].get<std::uint64_t>()) / (1 << 20));
+    const outcome free = voxelize("free.npz", {"--sparse", "--backend", "cpu"});
+    ASSERT_EQ(0, free.code) << free.err;
+    EXPECT_TRUE(read_file(folder / "free.npz") == read_file(folder / "tight.npz"));
+    const json a = json::parse(free.out);
+    for (const char* const name : {"triangles", "triangles_dropped", "fragments", "voxels"})
+        EXPECT_EQ(a.value(name, -1), b.value(name, -1)) << name;
 }
 
 TEST(Memory, FilesThatClaimWhatTheyDoNotHoldEndWithTwo) {

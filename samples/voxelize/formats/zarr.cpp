@@ -29,27 +29,32 @@ public:
         : v_(v), c_(c), file_(array_layout({v.extent[2], v.extent[1], v.extent[0]}), array_values(c, options.levels),
                               folder, options) {}
 
-    [[nodiscard]] std::int64_t num_chunks() const {
-        return array_layout::product(file_.layout().shards) * array_layout::product(file_.layout().per_shard);
+    [[nodiscard]] std::int64_t num_shards() const { return array_layout::product(file_.layout().shards); }
+    // Of a layer of shards.
+    [[nodiscard]] std::int64_t shards_of_slab() const { return file_.layout().shards[1] * file_.layout().shards[2]; }
+    // Chunks of so many shards.
+    [[nodiscard]] std::int64_t chunks_of(std::int64_t shards) const {
+        return shards * array_layout::product(file_.layout().per_shard);
     }
-    // Calls advance() after each chunk.
+    // The shards [first, last). Calls advance() after each chunk.
     template <class Advance>
-    void write(int threads, const Advance& advance) {
-        const std::int64_t each = array_layout::product(file_.layout().per_shard);
+    void write(std::int64_t first, std::int64_t last, int threads, const Advance& advance) {
+        const std::int64_t each = chunks_of(1);
         ordered_for(
-            static_cast<std::size_t>(num_chunks()), threads,
+            static_cast<std::size_t>(chunks_of(last - first)), threads,
             [&](std::size_t n) {
-                return chunk_bytes(
-                    file_.layout().corner(static_cast<std::int64_t>(n) / each, static_cast<std::int64_t>(n) % each));
+                const auto chunk = static_cast<std::int64_t>(n);
+                return chunk_bytes(file_.layout().corner(first + chunk / each, chunk % each));
             },
             [&](std::size_t n, const std::vector<std::byte>& bytes) {
                 const auto chunk = static_cast<std::int64_t>(n);
-                file_.add(chunk / each, chunk % each, bytes);
+                file_.add(first + chunk / each, chunk % each, bytes);
                 if ((chunk + 1) % each == 0) file_.end_shard();
                 advance();
             });
-        file_.finish();
     }
+    // The description, once all shards are there.
+    void describe() const { file_.finish(); }
 
 private:
     // A chunk as its shard holds it. Beyond the array it is filled up.
@@ -75,15 +80,28 @@ private:
     array_file file_;
 };
 
+[[noreturn]] void fail_rename(const fs::path& target, const std::error_code& error) {
+    throw write_error(target, "rename: " + error.message());
+}
+
+fs::path beside(const fs::path& target, const char* what, int n) {
+    return target.parent_path() / (target.filename().string() + what + std::to_string(n));
+}
+
+void require_group(const fs::path& target) {
+    std::error_code error;
+    if (fs::exists(target, error) && !fs::exists(target / "zarr.json", error))
+        throw write_error(target, "it exists and is no Zarr group");
+}
+
 // A new folder beside the target, removed unless it takes the target's place.
 class output_folder {
 public:
     explicit output_folder(const fs::path& target) : target_(target) {
         std::error_code error;
-        if (fs::exists(target, error) && !fs::exists(target / "zarr.json", error))
-            throw write_error(target, "it exists and is no Zarr group");
+        require_group(target);
         for (int n = 0; n < 1000; ++n) {
-            part_ = beside(".part", n);
+            part_ = beside(target_, ".part", n);
             if (fs::create_directory(part_, error)) return;
             if (error) throw write_error(target, "make a folder: " + error.message());
         }
@@ -97,23 +115,11 @@ public:
     }
     [[nodiscard]] const fs::path& path() const { return part_; }
     void commit() {
-        std::error_code error;
-        fs::path old;
-        if (fs::exists(target_, error)) {
-            for (int n = 0; old.empty() || fs::exists(old, error); ++n) old = beside(".old", n);
-            fs::rename(target_, old, error);
-            if (error) throw write_error(target_, "rename: " + error.message());
-        }
-        fs::rename(part_, target_, error);
-        if (error) throw write_error(target_, "rename: " + error.message());
+        replace_zarr(part_, target_);
         part_.clear();
-        if (!old.empty()) fs::remove_all(old, error);
     }
 
 private:
-    [[nodiscard]] fs::path beside(const char* what, int n) const {
-        return target_.parent_path() / (target_.filename().string() + what + std::to_string(n));
-    }
     fs::path target_, part_;
 };
 
@@ -127,6 +133,12 @@ std::string group_description(const volume& v) {
            list(v.origin) + ", \"voxel_size\": " + list(v.voxel_size) + "}}\n}\n";
 }
 
+void write_description(const fs::path& group, const std::string& text) {
+    output_file json(group / "zarr.json");
+    json.write(text);
+    json.commit();
+}
+
 } // namespace
 
 bool has_zstd() {
@@ -137,11 +149,56 @@ bool has_zstd() {
 #endif
 }
 
-std::vector<fs::path> write_zarr(const volume& v, const fs::path& path, const write_options& options) {
+fs::path zarr_target(const fs::path& path) {
     fs::path target = path;
     if (target.filename().empty()) target = target.parent_path(); // "out.zarr/"
     std::error_code ignored;
     if (fs::is_symlink(target, ignored)) target = fs::weakly_canonical(target, ignored); // kept, as by other writers
+    return target;
+}
+
+void replace_zarr(const fs::path& folder, const fs::path& target) {
+    std::error_code error;
+    require_group(target);
+    fs::path old;
+    if (fs::exists(target, error)) {
+        for (int n = 0; old.empty() || fs::exists(old, error); ++n) old = beside(target, ".old", n);
+        fs::rename(target, old, error);
+        if (error) fail_rename(target, error);
+    }
+    fs::rename(folder, target, error);
+    if (error) fail_rename(target, error);
+    if (!old.empty()) fs::remove_all(old, error);
+}
+
+void write_zarr_slab(const volume& v, const fs::path& folder, std::int64_t slab, const write_options& options) {
+    try {
+        for (const channel& c : v.channels) {
+            fs::create_directories(folder / c.name);
+            channel_writer array(v, c, folder / c.name, options);
+            const std::int64_t each = array.shards_of_slab();
+            progress_meter meter(options.progress, static_cast<std::uint64_t>(array.chunks_of(each)));
+            array.write(slab * each, (slab + 1) * each, thread_count(options.threads), [&] { meter.advance(1); });
+        }
+    } catch (const fs::filesystem_error& error) {
+        throw write_error(folder, error.code().message());
+    }
+}
+
+void describe_zarr(const volume& v, const fs::path& folder, const write_options& options) {
+    try {
+        for (const channel& c : v.channels) {
+            fs::create_directories(folder / c.name);
+            channel_writer(v, c, folder / c.name, options).describe();
+        }
+    } catch (const fs::filesystem_error& error) {
+        throw write_error(folder, error.code().message());
+    }
+    write_description(folder, group_description(v));
+}
+
+std::vector<fs::path> write_zarr(const volume& v, const fs::path& path, const write_options& options) {
+    const fs::path target = zarr_target(path);
     output_folder folder(target);
     try {
         std::vector<std::unique_ptr<channel_writer>> arrays;
@@ -150,24 +207,20 @@ std::vector<fs::path> write_zarr(const volume& v, const fs::path& path, const wr
             const fs::path group = folder.path() / c.name;
             fs::create_directories(options.levels ? group / "0" : group);
             arrays.push_back(std::make_unique<channel_writer>(v, c, options.levels ? group / "0" : group, options));
-            steps += static_cast<std::uint64_t>(arrays.back()->num_chunks());
+            steps += static_cast<std::uint64_t>(arrays.back()->chunks_of(arrays.back()->num_shards()));
             if (options.levels) steps += num_level_blocks(v);
         }
         progress_meter meter(options.progress, steps);
         const auto advance = [&] { meter.advance(1); };
-        const auto describe = [](const fs::path& group, const std::string& text) {
-            output_file json(group / "zarr.json");
-            json.write(text);
-            json.commit();
-        };
         for (std::size_t n = 0; n < arrays.size(); ++n) {
-            arrays[n]->write(thread_count(options.threads), advance);
+            arrays[n]->write(0, arrays[n]->num_shards(), thread_count(options.threads), advance);
+            arrays[n]->describe();
             if (!options.levels) continue;
             const channel& c = v.channels[n];
             write_zarr_levels(v, c, folder.path() / c.name, options, advance);
-            describe(folder.path() / c.name, multiscale_description(v, c));
+            write_description(folder.path() / c.name, multiscale_description(v, c));
         }
-        describe(folder.path(), group_description(v));
+        write_description(folder.path(), group_description(v));
     } catch (const fs::filesystem_error& error) {
         throw write_error(target, error.code().message());
     }

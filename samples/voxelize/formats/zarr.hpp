@@ -14,4 +14,19 @@ namespace voxelize {
 std::vector<std::filesystem::path> write_zarr(const volume& v, const std::filesystem::path& path,
                                               const write_options& options);
 
+// The same group slab by slab, in any order and by any number of processes, into a folder that takes the target's place
+// at the end. A slab is a layer of shards, of zarr_slab_layers voxels along z. Without --levels.
+
+inline constexpr std::int64_t zarr_slab_layers = 256;
+
+// What a path means: without a slash at its end, and where a link leads.
+[[nodiscard]] std::filesystem::path zarr_target(const std::filesystem::path& path);
+// Of a volume of which the slab's voxels are known. Each file appears whole or not at all.
+void write_zarr_slab(const volume& v, const std::filesystem::path& folder, std::int64_t slab,
+                     const write_options& options);
+// What makes a group of the folder: the volume's shape and channels, without values.
+void describe_zarr(const volume& v, const std::filesystem::path& folder, const write_options& options);
+// Renames the folder; a target that is there is replaced if it is a Zarr group.
+void replace_zarr(const std::filesystem::path& folder, const std::filesystem::path& target);
+
 } // namespace voxelize

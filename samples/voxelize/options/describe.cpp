@@ -65,18 +65,23 @@ void describe_batch(CLI::App& app, command_line& options) {
                            ->option_text("FILE")
                            ->group("Many models");
     auto* const size = app.add_option("--world-size", options.batch.world_size,
-                                      "How many processes share the list. Default: 1, or as mpiexec and srun say")
+                                      "How many processes share the list, or the slabs of one model. Default: 1, or as "
+                                      "mpiexec says, with --list as srun says too")
                            ->check(CLI::Range(1, 1 << 30).description(""))
-                           ->needs(list)
                            ->option_text("W")
                            ->group("Many models");
     app.add_option("--rank", options.batch.rank,
-                   "The number of this one, from 0: it takes the models RANK, RANK + W, RANK + 2 W, ...")
+                   "The number of this one, from 0: it takes the models or slabs RANK, RANK + W, RANK + 2 W, ...")
         ->check(CLI::Range(0, 1 << 30).description(""))
-        ->needs(list)
         ->needs(size)
         ->option_text("R")
         ->group("Many models");
+    app.add_flag(
+           "--resume", options.by_slabs,
+           "One model slab by slab into a .zarr: a run that was stopped goes on where it was when the same command "
+           "is given again, see LARGE MODELS")
+        ->excludes(list)
+        ->group("Machine");
     app.add_option("--jobs", options.batch.jobs,
                    "Models at a time, which share --max-memory and the machine's cores. Default: 1")
         ->check(CLI::Range(1, 1024).description(""))

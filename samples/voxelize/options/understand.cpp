@@ -38,13 +38,18 @@ void understand_batch(command_line& options, bool has_world) {
     batch_request& batch = options.batch;
     if (batch.list.empty() && options.input.empty()) throw usage_error("INPUT is required");
     if (options.outputs.empty()) throw usage_error("--output is required");
+    const auto check_rank = [&] {
+        if (batch.rank >= batch.world_size)
+            throw usage_error("--rank is below --world-size: " + std::to_string(batch.rank) + " of " +
+                              std::to_string(batch.world_size));
+    };
     if (batch.list.empty()) {
-        // Each process would do the whole work, and write the same files.
-        const int processes = from_environment({"PMI_SIZE", "OMPI_COMM_WORLD_SIZE"}).value_or(1);
-        if (processes > 1)
-            throw usage_error("mpiexec has started " + std::to_string(processes) +
-                              " processes, and one model is drawn by one: --list shares many models among them, and a "
-                              "program with voxelpipe/slabs/mpi.hpp shares one");
+        if (!has_world) { // srun starts one process for a model, too, and says so in the same way
+            batch.world_size = from_environment({"PMI_SIZE", "OMPI_COMM_WORLD_SIZE"}).value_or(1);
+            batch.rank = from_environment({"PMI_RANK", "OMPI_COMM_WORLD_RANK"}).value_or(0);
+        }
+        check_rank();
+        options.by_slabs = options.by_slabs || batch.world_size > 1;
         return;
     }
     if (!options.input.empty()) throw usage_error("INPUT and --list do not go together");
@@ -57,9 +62,7 @@ void understand_batch(command_line& options, bool has_world) {
         batch.world_size = from_environment({"PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "SLURM_NTASKS"}).value_or(1);
         batch.rank = from_environment({"PMI_RANK", "OMPI_COMM_WORLD_RANK", "SLURM_PROCID"}).value_or(0);
     }
-    if (batch.rank >= batch.world_size)
-        throw usage_error("--rank is below --world-size: " + std::to_string(batch.rank) + " of " +
-                          std::to_string(batch.world_size));
+    check_rank();
 }
 
 void understand_solid(command_line& options, const raw_options& raw) {

@@ -7,25 +7,47 @@
 // of a run that holds the model.
 
 #include "../command_line.hpp"
-#include "../stl_file.hpp"
+#include "../triangle_stream.hpp"
 #include "../voxelizer.hpp"
 #include "sparse_volume.hpp"
 
+#include <voxelpipe/slabs/plan.hpp>
+
+#include <cstddef>
 #include <filesystem>
 #include <functional>
-#include <optional>
+#include <memory>
+#include <span>
 #include <string>
 
 namespace voxelize {
 
-// The command's input as a stream, where it has to be one: a binary STL file that takes more memory than there is, for
-// targets that need no colours, on the CPU. None: the model is loaded.
-[[nodiscard]] std::optional<stl_file> streamed_input(const command_line& options);
+// The command's input as a stream, where it has to be one: a file that open_stream() knows and that takes more memory
+// than there is, for targets that need no colours and solids without repairs, on the CPU. Null: the model is loaded.
+[[nodiscard]] std::unique_ptr<triangle_stream> streamed_input(const command_line& options);
 
-// scale: of all lengths. folder: for temporary files. say: is told once in how many slabs the model is drawn. Throws as
-// run_voxelizer does, model_error for a file that ends early, and write_error for a folder that is full.
-[[nodiscard]] sparse_volume run_streamed_voxelizer(stl_file& model, double scale, const voxelize_request& request,
-                                                   const std::filesystem::path& folder, voxelize_stats& stats,
-                                                   const std::function<void(const std::string&)>& say);
+// What a streamed model is drawn with.
+struct stream_place {
+    affine to_world;                             // of the stream's corners, with --scale
+    std::filesystem::path folder;                // for temporary files
+    std::function<void(const std::string&)> say; // is told once in how many slabs the model is drawn
+};
+
+// Draws layers of the request's grid: ranges that ascend and do not overlap. sink(i, bricks) gets them one after the
+// other. Counts are those of all ranges. Throws as run_voxelizer does, model_error for a file that is damaged, and
+// write_error for a folder that is full.
+void draw_streamed(triangle_stream& model, const stream_place& place, const voxelize_request& request,
+                   std::span<const voxelpipe::slabs::layer_range> ranges, voxelize_stats& stats,
+                   const std::function<void(std::size_t, sparse_volume&&)>& sink);
+
+// The whole grid.
+[[nodiscard]] sparse_volume run_streamed_voxelizer(triangle_stream& model, const stream_place& place,
+                                                   const voxelize_request& request, voxelize_stats& stats);
+
+// Adds the counts and times of a part, but not its warnings.
+void add_part(voxelize_stats& all, const voxelize_stats& part);
+
+// Adds what the sums of all parts give reason to warn of.
+void warn_of_parts(voxelize_stats& stats, const voxelize_request& request);
 
 } // namespace voxelize

@@ -1,0 +1,217 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "slab_run.hpp"
+
+#include "batch.hpp"
+#include "formats/output_file.hpp"
+#include "formats/zarr.hpp"
+#include "memory.hpp"
+#include "sparse/sparse_voxelizer.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <new>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+namespace voxelize {
+namespace {
+
+namespace fs = std::filesystem;
+namespace slabs = voxelpipe::slabs;
+using json = nlohmann::ordered_json;
+
+// Counts that a mark keeps.
+constexpr std::pair<const char*, std::uint64_t voxelize_stats::*> kept_counts[] = {
+    {"voxels", &voxelize_stats::voxels},
+    {"fragments", &voxelize_stats::fragments},
+    {"fragments_discarded", &voxelize_stats::fragments_discarded},
+    {"triangles_drawn", &voxelize_stats::triangles_drawn},
+    {"normals_cancelled", &voxelize_stats::normals_cancelled}};
+
+// The lock of a folder, which the system takes back from a process that ends in whatever way.
+class folder_lock {
+public:
+    explicit folder_lock(const fs::path& folder)
+        : file_(::open((folder / "lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666)) {
+        if (file_ >= 0) (void)::flock(file_, LOCK_EX);
+    }
+    folder_lock(const folder_lock&) = delete;
+    folder_lock& operator=(const folder_lock&) = delete;
+    ~folder_lock() {
+        if (file_ >= 0) ::close(file_);
+    }
+
+private:
+    int file_;
+};
+
+// The folder of the slabs of one output.
+class slab_folder {
+public:
+    slab_folder(const fs::path& output, const std::string& work)
+        : target_(zarr_target(output)), path_(target_.string() + "." + work + ".slabs") {
+        std::error_code error;
+        if (fs::exists(target_, error) && !fs::exists(target_ / "zarr.json", error))
+            throw write_error(target_, "it exists and is no Zarr group");
+        if (fs::exists(path_, error)) {
+            const folder_lock lock(path_);
+            // Its slabs became the output, and the process ended before it could remove the rest.
+            if (!fs::exists(data(), error)) fs::remove_all(path_, error);
+        }
+        fs::create_directories(data(), error);
+        if (error) throw write_error(path_, "make a folder: " + error.message());
+    }
+    [[nodiscard]] fs::path data() const { return path_ / "data"; }
+    [[nodiscard]] bool has(std::int64_t slab) const {
+        std::error_code error;
+        return fs::exists(mark_of(slab), error);
+    }
+    void mark(std::int64_t slab, const voxelize_stats& counts) const {
+        json line;
+        for (const auto& [name, count] : kept_counts) line[name] = counts.*count;
+        output_file file(mark_of(slab));
+        file.write(line.dump() + "\n");
+        file.commit();
+    }
+    // If all of them are there: makes the output of them, and returns their counts in `all`. False if another process
+    // does.
+    [[nodiscard]] bool finish(std::int64_t slabs, const volume& shape, const write_options& how, voxelize_stats& all) {
+        const folder_lock lock(path_);
+        std::error_code error;
+        if (!fs::exists(data(), error)) return false;
+        for (std::int64_t s = 0; s < slabs; ++s) {
+            std::ifstream file(mark_of(s));
+            const json line = json::parse(file, nullptr, false);
+            if (!line.is_object()) throw write_error(mark_of(s), "it holds no counts; remove it");
+            for (const auto& [name, count] : kept_counts) all.*count += line.value(name, std::uint64_t{0});
+        }
+        describe_zarr(shape, data(), how);
+        replace_zarr(data(), target_);
+        fs::remove_all(path_, error);
+        return true;
+    }
+    [[nodiscard]] const fs::path& target() const { return target_; }
+
+private:
+    [[nodiscard]] fs::path mark_of(std::int64_t slab) const { return path_ / ("done." + std::to_string(slab)); }
+
+    fs::path target_, path_;
+};
+
+// Shape and channels of the output, without values.
+volume shape_of(const voxelize_request& request, std::size_t num_targets) {
+    volume v;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto a = static_cast<glm::length_t>(axis);
+        v.extent[axis] = request.grid.extent[a];
+        v.origin[axis] = request.grid.part_origin()[a];
+        v.voxel_size[axis] = request.grid.voxel_size[a];
+    }
+    for (std::size_t t = 0; t < num_targets; ++t) {
+        const target_info& info = info_of(request.targets[t]);
+        v.channels.push_back({std::string(info.name), info.type, info.components, {}});
+    }
+    return v;
+}
+
+// The bricks of a slab that a loaded model reaches.
+sparse_volume draw_loaded(const scene& model, const voxelize_request& request, const slabs::layer_range& layers,
+                          voxelize_stats& stats) {
+    const int padding = request.padding;
+    const voxelpipe::grid& whole = request.grid;
+    const int begin = std::max(layers.begin, padding), end = std::min(layers.end, whole.extent.z - padding);
+    scene copy = begin < end ? model : scene{}; // drawing takes its arrays
+    voxelize_request part = request;
+    part.grid = whole.crop({padding, padding, std::min(begin, end)},
+                           {whole.extent.x - 2 * padding, whole.extent.y - 2 * padding, std::max(1, end - begin)});
+    return draw_sparse(copy, part, whole, stats);
+}
+
+} // namespace
+
+std::string why_not_by_slabs(const command_line& options) {
+    const voxelize_request& request = options.voxelize;
+    const auto wants = [&](target id) {
+        return std::find(request.targets.begin(), request.targets.end(), id) != request.targets.end();
+    };
+    if (options.outputs.size() != 1 || lower_extension(zarr_target(options.outputs[0])) != ".zarr")
+        return "one output, a .zarr";
+    if (options.write.levels) return "a .zarr without --levels, whose blocks reach over slabs";
+    if (options.storage == storage_choice::dense || request.backend == backend_choice::cuda || request.devices != 1 ||
+        request.strategy != voxelpipe::strategy::automatic)
+        return "the CPU and bricks: no --dense, --backend cuda, --devices or --strategy";
+    if (wants(target::color_outer)) return "no --target color-outer, which sees the whole grid at once";
+    const bool has_colors = wants(target::color) || wants(target::color_max) || wants(target::color_replace);
+    if (request.solid && has_colors && !request.solid->fill_color)
+        return "--fill-color '#rrggbb' where a solid has colours, since their mean is that of the whole grid";
+    return "";
+}
+
+slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run_report& report) {
+    const voxelize_request& request = report.request;
+    slab_folder folder(options.outputs[0], work_of(options, options.input));
+    write_options how = options.write;
+    slab_outcome outcome;
+    const auto layers = static_cast<std::int64_t>(request.grid.extent.z);
+    outcome.slabs = (layers + zarr_slab_layers - 1) / zarr_slab_layers;
+    const std::size_t num_targets = request.targets.size() - options.implied.size();
+
+    std::vector<std::int64_t> mine;
+    std::vector<slabs::layer_range> ranges;
+    for (std::int64_t s = options.batch.rank; s < outcome.slabs; s += options.batch.world_size) {
+        if (folder.has(s)) continue;
+        mine.push_back(s);
+        ranges.push_back(
+            {static_cast<int>(s * zarr_slab_layers), static_cast<int>(std::min(layers, (s + 1) * zarr_slab_layers))});
+    }
+    voxelize_stats before;
+    const auto write = [&](std::size_t i, sparse_volume&& bricks, const voxelize_stats& until) {
+        bricks.channels.resize(num_targets);
+        write_zarr_slab(as_dense(bricks, bricks.channels), folder.data(), mine[i], how);
+        voxelize_stats counts;
+        for (const auto& [name, count] : kept_counts) counts.*count = until.*count - before.*count;
+        before = until;
+        folder.mark(mine[i], counts);
+        ++outcome.drawn;
+    };
+    voxelize_stats& stats = report.stats;
+    if (source.stream != nullptr && !ranges.empty()) {
+        draw_streamed(*source.stream, source.place, request, ranges, stats,
+                      [&](std::size_t i, sparse_volume&& bricks) { write(i, std::move(bricks), stats); });
+    } else {
+        stats.triangles = source.model.triangle_count();
+        try {
+            for (std::size_t i = 0; i < ranges.size(); ++i) {
+                voxelize_stats part;
+                sparse_volume bricks = draw_loaded(source.model, request, ranges[i], part);
+                add_part(stats, part);
+                stats.backend = part.backend;
+                stats.threads = part.threads;
+                stats.triangles_dropped = part.triangles_dropped;
+                ++stats.slabs;
+                write(i, std::move(bricks), stats);
+            }
+            warn_of_parts(stats, request);
+        } catch (const std::bad_alloc&) {
+            throw memory_error(memory::shortage(memory::fewer_voxels_hint));
+        }
+    }
+    for (std::int64_t s = 0; s < outcome.slabs; ++s) outcome.left += folder.has(s) ? 0 : 1;
+    if (outcome.left != 0) return outcome;
+    voxelize_stats all;
+    if (!folder.finish(outcome.slabs, shape_of(request, num_targets), how, all)) return outcome;
+    outcome.finished = true;
+    for (const auto& [name, count] : kept_counts) stats.*count = all.*count;
+    report.files.push_back(folder.target());
+    return outcome;
+}
+
+} // namespace voxelize

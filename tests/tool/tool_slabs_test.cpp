@@ -1,0 +1,168 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// One model drawn and written slab by slab: by several processes, and by one that is stopped and run again. The folder
+// is that of a run which does it at once, byte for byte.
+#include "tool_test.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+using namespace tool_test;
+namespace fs = std::filesystem;
+
+namespace {
+
+// A closed tower that turns as it rises, with a colour: three slabs of 256 layers at 12 x 12 x 600 voxels.
+void write_tower(const fs::path& path) {
+    constexpr int sides = 8, floors = 60;
+    std::vector<float> positions;
+    std::vector<std::uint32_t> indices;
+    for (int f = 0; f <= floors; ++f)
+        for (int s = 0; s < sides; ++s) {
+            const double a = 6.283185307179586 * s / sides + 0.05 * f;
+            positions.insert(positions.end(), {static_cast<float>(5 + 5 * std::cos(a)),
+                                               static_cast<float>(5 + 5 * std::sin(a)), static_cast<float>(10 * f)});
+        }
+    const auto at = [](int f, int s) { return static_cast<std::uint32_t>(f * sides + s % sides); };
+    for (int s = 0; s < sides; ++s)
+        for (int f = 0; f < floors; ++f)
+            indices.insert(indices.end(),
+                           {at(f, s), at(f, s + 1), at(f + 1, s), at(f, s + 1), at(f + 1, s + 1), at(f + 1, s)});
+    for (int s = 1; s + 1 < sides; ++s) {
+        indices.insert(indices.end(), {at(0, 0), at(0, s + 1), at(0, s)});
+        indices.insert(indices.end(), {at(floors, 0), at(floors, s), at(floors, s + 1)});
+    }
+    builder file;
+    const int index_accessor = file.accessor(indices, "SCALAR");
+    json& primitive = file.mesh({{"POSITION", file.accessor(positions, "VEC3")}});
+    primitive["indices"] = index_accessor;
+    primitive["material"] = 0;
+    file.root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorFactor", {0.8, 0.3, 0.1, 1}}}}}};
+    file.write_glb(path);
+}
+
+// Every file below a folder, by its path in it.
+std::map<std::string, std::string> files_of(const fs::path& folder) {
+    std::map<std::string, std::string> files;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
+        if (entry.is_regular_file()) files[fs::relative(entry.path(), folder).string()] = read_file(entry.path());
+    return files;
+}
+
+struct tower {
+    scratch_folder folder;
+    std::vector<std::string> how;
+
+    explicit tower(std::vector<std::string> how_) : how(std::move(how_)) { write_tower(folder / "m.glb"); }
+    [[nodiscard]] outcome draw(const std::string& out, const std::vector<std::string>& more) const {
+        std::vector<std::string> arguments{folder / "m.glb", "-o", folder / out, "-r", "600", "-j", "2"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run(folder, arguments);
+    }
+    // The folders of slabs that are there.
+    [[nodiscard]] std::vector<fs::path> unfinished() const {
+        std::vector<fs::path> found;
+        for (const fs::directory_entry& entry : fs::directory_iterator(folder.path()))
+            if (entry.path().extension() == ".slabs") found.push_back(entry.path());
+        return found;
+    }
+};
+
+void expect_same_group(const tower& t, const std::string& a, const std::string& b) {
+    const auto x = files_of(t.folder / a), y = files_of(t.folder / b);
+    EXPECT_GT(x.size(), 4u);
+    EXPECT_TRUE(x == y) << x.size() << " and " << y.size() << " files";
+}
+
+TEST(ToolSlabs, ProcessesShareOneModel) {
+    const tower t({"-t", "occupancy,count,normal,color", "--sparse", "--padding", "2"});
+    ASSERT_EQ(0, t.draw("whole.zarr", {}).code);
+    for (const char* const rank : {"1", "2", "0"}) {
+        const outcome part = t.draw("parts.zarr", {"--world-size", "3", "--rank", rank});
+        EXPECT_EQ(0, part.code) << part.err;
+        EXPECT_NE(part.err.find(std::string("drew 1 of 3 slabs as process ") + rank + " of 3"), std::string::npos)
+            << part.err;
+        EXPECT_EQ(fs::exists(t.folder / "parts.zarr"), *rank == '0'); // the last one
+        EXPECT_EQ(part.out.find("voxels are covered") != std::string::npos, *rank == '0');
+    }
+    EXPECT_TRUE(t.unfinished().empty());
+    expect_same_group(t, "whole.zarr", "parts.zarr");
+}
+
+#ifdef VOXELPIPE_MPIEXEC
+// Processes at once, as mpiexec starts them.
+TEST(ToolSlabs, RanksOfMpiexecShareOneModel) {
+    const tower t({"-t", "occupancy,count", "--sparse"});
+    ASSERT_EQ(0, t.draw("whole.zarr", {}).code);
+    const std::string command = std::string(VOXELPIPE_MPIEXEC " -n 3 " VOXELPIPE_VOXELIZE " ") + (t.folder / "m.glb") +
+                                " -o " + (t.folder / "ranks.zarr") + " -r 600 -j 1 -t occupancy,count > " +
+                                (t.folder / "log") + " 2>&1";
+    EXPECT_EQ(0, std::system(command.c_str())) << read_file(t.folder / "log");
+    EXPECT_TRUE(t.unfinished().empty());
+    expect_same_group(t, "whole.zarr", "ranks.zarr");
+}
+#endif
+
+TEST(ToolSlabs, AStoppedRunGoesOn) {
+    const tower t({"-t", "occupancy,triangle,depth", "--sparse"});
+    const outcome whole = t.draw("whole.zarr", {"--stats=json"});
+    ASSERT_EQ(0, whole.code);
+    ASSERT_EQ(0, t.draw("m.zarr", {"--world-size", "2", "--rank", "0"}).code); // slabs 0 and 2
+    ASSERT_EQ(t.unfinished().size(), 1u);
+    // Killed while it wrote slab 1: files of it are there, but no mark.
+    const fs::path data = t.unfinished()[0] / "data";
+    fs::create_directories(data / "occupancy" / "c" / "1" / "0");
+    std::ofstream(data / "occupancy" / "c" / "1" / "0" / "0") << "a part";
+    const outcome rest = t.draw("m.zarr", {"--resume", "--stats=json"});
+    EXPECT_EQ(0, rest.code) << rest.err;
+    EXPECT_NE(rest.err.find("drew 1 of 3 slabs"), std::string::npos) << rest.err;
+    EXPECT_TRUE(t.unfinished().empty());
+    expect_same_group(t, "whole.zarr", "m.zarr");
+    const json a = json::parse(whole.out), b = json::parse(rest.out);
+    for (const char* const name : {"voxels", "fragments"}) EXPECT_EQ(a.value(name, -1), b.value(name, -2)) << name;
+    // Other options are other work; what is there before is replaced when the new one is whole.
+    const outcome other = t.draw("m.zarr", {"--resume", "--coverage", "thin"});
+    EXPECT_NE(other.err.find("drew 3 of 3 slabs"), std::string::npos) << other.err;
+    EXPECT_FALSE(files_of(t.folder / "whole.zarr") == files_of(t.folder / "m.zarr"));
+}
+
+TEST(ToolSlabs, SolidsAndTheirHoles) {
+    const tower t(
+        {"-t", "occupancy,color", "--solid", "nonzero", "--close-holes", "--fill-color", "#d9a066", "--sparse"});
+    ASSERT_EQ(0, t.draw("whole.zarr", {}).code);
+    const outcome parts = t.draw("parts.zarr", {"--resume"});
+    EXPECT_EQ(0, parts.code) << parts.err;
+    expect_same_group(t, "whole.zarr", "parts.zarr");
+    const tower flood({"--solid", "exterior", "--sparse"});
+    ASSERT_EQ(0, flood.draw("whole.zarr", {}).code);
+    EXPECT_EQ(0, flood.draw("parts.zarr", {"--resume"}).code);
+    expect_same_group(flood, "whole.zarr", "parts.zarr");
+}
+
+TEST(ToolSlabs, SaysWhatCannotBeDoneBySlabs) {
+    const tower t({});
+    const auto error = [&](const std::string& out, const std::vector<std::string>& more) {
+        std::vector<std::string> all{"--resume"};
+        all.insert(all.end(), more.begin(), more.end());
+        const outcome result = t.draw(out, all);
+        EXPECT_EQ(result.code, 1);
+        return result.err;
+    };
+    EXPECT_NE(error("m.npz", {}).find("--resume needs one output, a .zarr"), std::string::npos);
+    EXPECT_NE(error("m.zarr", {"--levels"}).find("without --levels"), std::string::npos);
+    EXPECT_NE(error("m.zarr", {"-t", "color-outer"}).find("no --target color-outer"), std::string::npos);
+    EXPECT_NE(error("m.zarr", {"--dense"}).find("no --dense"), std::string::npos);
+    EXPECT_NE(error("m.zarr", {"--solid", "nonzero", "-t", "color"}).find("--fill-color"), std::string::npos);
+}
+
+} // namespace
