@@ -349,7 +349,7 @@ TEST(Memory, BinaryPlyThatDoesNotFitIsStreamed) {
     write_ply(folder / "m.ply", 480);
     const auto voxelize = [&](const std::string& out, const std::vector<std::string>& how) {
         std::vector<std::string> arguments{
-            folder / "m.ply", "-o", folder / out, "-r", "150", "-j", "2", "-t", "occupancy,count,normal,triangle,depth",
+            folder / "m.ply", "-o", folder / out, "-r", "80", "-j", "2", "-t", "occupancy,count,normal,triangle,depth",
             "--stats=json"};
         arguments.insert(arguments.end(), how.begin(), how.end());
         return run(folder, arguments);
@@ -408,7 +408,7 @@ TEST(Memory, PlainGlbThatDoesNotFitIsStreamed) {
                                            "-o",
                                            folder / out,
                                            "-r",
-                                           "150",
+                                           "80",
                                            "-j",
                                            "2",
                                            "--scale",
