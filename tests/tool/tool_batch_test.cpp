@@ -197,6 +197,7 @@ TEST(ToolBatch, ChecksItsOptions) {
     EXPECT_NE(error({"-o", "x.npy"}).find("INPUT is required"), std::string::npos);
     EXPECT_NE(error({"m.obj", "--list", "l", "-o", "{name}.npy"}).find("do not go together"), std::string::npos);
     EXPECT_NE(error({"--list", "l", "-o", "x.npy"}).find("needs {name}"), std::string::npos);
+    EXPECT_NE(error({"--list", "l", "-o", "{name}.zarr", "--resume"}).find("for one model"), std::string::npos);
     EXPECT_NE(error({"--list", "l", "-o", "{name}.npy", "--rank", "2", "--world-size", "2"}).find("below --world-size"),
               std::string::npos);
     EXPECT_NE(error({"m.obj", "-o", "x.npy", "--jobs", "2"}).find("--list"), std::string::npos);

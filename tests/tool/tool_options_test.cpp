@@ -27,6 +27,7 @@ std::set<std::string> all_options() {
             "--world-size W",
             "--rank R",
             "--jobs J",
+            "--resume",
             "-r,--resolution N|NXxNYxNZ",
             "--padding N",
             "-s,--voxel-size S[,SY,SZ]",

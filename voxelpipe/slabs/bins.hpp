@@ -95,9 +95,10 @@ private:
 template <class Record>
 struct spilled_records {
     std::shared_ptr<scratch_file> file;
-    std::uint64_t offset = 0, memory = 0; // bytes
-    std::vector<std::vector<Record>> blocks;
+    std::uint64_t offset = 0, memory = 0;    // bytes: where in the file, and what the blocks take
+    std::vector<std::vector<Record>> blocks; // in order
 
+    // To the file; see scratch_file::write.
     void write() const noexcept {
         std::vector<std::span<const std::byte>> parts;
         for (const auto& b : blocks) parts.push_back(std::as_bytes(std::span(b)));
@@ -208,10 +209,11 @@ public:
     void push(std::vector<bin<Record>>& bins, std::size_t i, const Record& r) {
         if (const std::uint64_t taken = append(bins[i], std::span(&r, 1)); taken != 0) settle(bins, taken);
     }
-    // The same in two parts: several threads append to different bins, then one accounts for all the memory taken.
+    // The same in two parts. First several threads append to different bins, and get the bytes of memory taken.
     [[nodiscard]] std::uint64_t append(bin<Record>& to, std::span<const Record> records) const {
         return to.push(records, block_);
     }
+    // Then one accounts for all of them, and brings the bins below the budget.
     void settle(std::vector<bin<Record>>& bins, std::uint64_t taken) {
         held_ += taken;
         while (held_ > budget_ / 4 * 3) {

@@ -53,6 +53,7 @@ void understand_batch(command_line& options, bool has_world) {
         return;
     }
     if (!options.input.empty()) throw usage_error("INPUT and --list do not go together");
+    if (options.by_slabs) throw usage_error("--resume is for one model; --list goes on by its manifest");
     for (const std::filesystem::path& output : options.outputs)
         if (output.string().find("{name}") == std::string::npos)
             throw usage_error("with --list every -o needs {name}, so that each model has files of its own: \"" +
