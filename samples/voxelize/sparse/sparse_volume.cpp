@@ -111,9 +111,16 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
     for (std::size_t p = 0; p < parts.size(); ++p)
         for (std::size_t b = 0; b < parts[p].keys.size(); ++b)
             places.push_back({parts[p].keys[b], static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(b)});
-    std::sort(places.begin(), places.end(), [](const place& a, const place& b) { return a.key < b.key; });
+    std::vector<place> tiles; // by number in their part
+    for (std::size_t p = 0; p < parts.size(); ++p)
+        for (std::size_t t = 0; t < parts[p].tiles.size(); ++t)
+            tiles.push_back({parts[p].tiles[t].bits, static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(t)});
+    const auto by_key = [](const place& a, const place& b) { return a.key < b.key; };
+    std::sort(places.begin(), places.end(), by_key);
+    std::sort(tiles.begin(), tiles.end(), by_key);
     sparse_volume result;
     result.shape = parts.front().shape;
+    for (const place& at : tiles) result.tiles.push_back({at.key});
     std::uint64_t rank = 0;
     for (const place& at : places) {
         result.keys.push_back(at.key);
@@ -126,7 +133,7 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
         const channel& like = parts.front().channels[c];
         channel to{like.name, like.type, like.components, {}};
         const std::size_t size = size_of(to.type) * static_cast<std::size_t>(to.components);
-        to.data.resize(static_cast<std::size_t>(rank) * size);
+        to.data.resize(static_cast<std::size_t>(rank + tiles.size()) * size);
         std::byte* out = to.data.data();
         for (const place& at : places) {
             if (size == 0) break; // of bits: every voxel here has them
@@ -135,6 +142,13 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
             std::memcpy(out, from.channels[c].data.data() + first * size,
                         static_cast<std::size_t>(last - first) * size);
             out += (last - first) * size;
+        }
+        for (const place& at : tiles) {
+            if (size == 0) break;
+            const sparse_volume& from = parts[at.part];
+            const std::uint64_t value = (from.offsets.empty() ? 0 : from.offsets.back()) + at.brick;
+            std::memcpy(out, from.channels[c].data.data() + value * size, size);
+            out += size;
         }
         for (sparse_volume& from : parts) from.channels[c].data = channel_bytes();
         result.channels.push_back(std::move(to));
