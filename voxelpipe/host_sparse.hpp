@@ -156,9 +156,9 @@ public:
 
     // One tile: where it lies, its voxels a side, and the rank of its value.
     struct tile_entry {
-        glm::ivec3 origin; // its first voxel, from the corner of the part
-        int side;
-        std::uint64_t rank;
+        glm::ivec3 origin;  // its first voxel, from the corner of the part
+        int side;           // voxels
+        std::uint64_t rank; // of its value, in the values of each target
     };
     // Tile i in Morton order, 0 <= i < num_tiles().
     [[nodiscard]] tile_entry tile(std::uint64_t i) const {

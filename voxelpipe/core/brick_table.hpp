@@ -68,7 +68,7 @@ struct brick_table {
     glm::ivec3 extent{0};                   // voxels of the part
     glm::ivec3 offset{0};                   // of the part in the whole grid
     const brick_tile* tiles = nullptr;      // ascending; none has a brick of `keys`, or reaches out of the part
-    std::uint64_t num_tiles = 0;
+    std::uint64_t num_tiles = 0;            // length of `tiles`
 
     // Voxels that exist in bricks: the ranks below those of the tiles.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_in_bricks() const { return count == 0 ? 0 : offsets[count]; }

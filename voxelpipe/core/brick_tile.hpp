@@ -14,8 +14,9 @@
 
 namespace voxelpipe {
 
+// A cube of 8^level bricks, all full and of one value, aligned to its size. One word.
 struct brick_tile {
-    static constexpr int level_bits = 5;
+    static constexpr int level_bits = 5; // of `bits`, the lowest
 
     std::uint64_t bits = 0; // the first brick's key, then the level
 

@@ -94,7 +94,7 @@ private:
 // Records that leave the memory of a bin, and where they go.
 template <class Record>
 struct spilled_records {
-    std::shared_ptr<scratch_file> file;
+    std::shared_ptr<scratch_file> file;      // shared with the bin that gave the records away
     std::uint64_t offset = 0, memory = 0;    // bytes: where in the file, and what the blocks take
     std::vector<std::vector<Record>> blocks; // in order
 

@@ -29,11 +29,13 @@ struct record {
     std::uint32_t number;   // of the triangle in the whole mesh
     Varyings varyings[3];   // of its vertices
 };
+#if !defined(DOXYGEN) // which takes it for a second record
 template <class Varyings>
 requires(std::is_empty_v<Varyings>) struct record<Varyings> {
     glm::vec3 positions[3];
     std::uint32_t number;
 };
+#endif
 
 namespace detail {
 

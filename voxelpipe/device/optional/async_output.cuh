@@ -8,7 +8,6 @@
 #include <voxelpipe/device/optional/sparse_async.cuh>
 #include <voxelpipe/program_outputs.hpp>
 
-
 namespace voxelpipe {
 
 namespace device {

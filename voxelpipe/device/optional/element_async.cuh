@@ -24,9 +24,7 @@ template <class... Targets, class ShaderOutput>
 struct element_output<framebuffer_view<Targets...>, ShaderOutput> {
     using payload = typename core::outputs_payload<ShaderOutput>::type;
     element_output(const grid&, const workspace_limits&, arena&) {}
-    [[nodiscard]] static bool has_room(const workspace_limits& l) {
-        return l.fragments < core::max_numbered;
-    }
+    [[nodiscard]] static bool has_room(const workspace_limits& l) { return l.fragments < core::max_numbered; }
     template <class Call>
     void store(const Call& call, const grid&, const voxelize_options&, const framebuffer_view<Targets...>& fb,
                cudaStream_t stream) const {
@@ -37,9 +35,7 @@ template <class Payload, class ShaderOutput>
 struct element_output<abuffer_view<Payload>, ShaderOutput> {
     using payload = Payload;
     element_output(const grid&, const workspace_limits&, arena&) {}
-    [[nodiscard]] static bool has_room(const workspace_limits& l) {
-        return l.fragments < core::max_numbered;
-    }
+    [[nodiscard]] static bool has_room(const workspace_limits& l) { return l.fragments < core::max_numbered; }
     template <class Call>
     void store(const Call& call, const grid&, const voxelize_options&, abuffer_view<Payload>& lists,
                cudaStream_t) const {
@@ -79,8 +75,7 @@ template <class View, class VertexShader, class FragmentShader, class Output>
 [[nodiscard]] std::size_t element_bytes(std::span<const draw<View, VertexShader, FragmentShader>> draws, const grid& g,
                                         const workspace_limits& limits) {
     using memory_type = element_memory<View, VertexShader, FragmentShader, Output>;
-    if (!validate(g).ok() || !core::validate_program_draws(draws).ok() ||
-        !memory_type::output_type::has_room(limits))
+    if (!validate(g).ok() || !core::validate_program_draws(draws).ok() || !memory_type::output_type::has_room(limits))
         return 0;
     return bytes_or_none([&] {
         arena plan;
@@ -98,8 +93,7 @@ template <coverage... Known, class View, class VertexShader, class FragmentShade
         if constexpr (core::output_kind<output_type>::template fits<shader_output>()) {
             using memory_type = element_memory<View, VertexShader, FragmentShader, output_type>;
             if (const status s = core::validate_call(draws, g, out); !s.ok()) return s;
-            if (!memory_type::output_type::has_room(workspace.limits))
-                return core::failure(status_code::size_overflow);
+            if (!memory_type::output_type::has_room(workspace.limits)) return core::failure(status_code::size_overflow);
             return with_cuda_status([&] {
                 status s;
                 const std::size_t need =
