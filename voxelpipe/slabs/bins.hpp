@@ -101,7 +101,7 @@ struct spilled_records {
     // To the file; see scratch_file::write.
     void write() const noexcept {
         std::vector<std::span<const std::byte>> parts;
-        for (const auto& b : blocks) parts.push_back(std::as_bytes(std::span(b)));
+        for (const auto& b : blocks) parts.push_back(std::as_bytes(std::span<const Record>(b)));
         file->write(offset, parts);
     }
 };
@@ -171,7 +171,7 @@ public:
                             most = std::max<std::uint64_t>(1, (std::uint64_t{4} << 20) / sizeof(Record));
         for (std::uint64_t first = 0; first < total; first += most) {
             read.resize(static_cast<std::size_t>(std::min(most, total - first)));
-            file_->read(first * sizeof(Record), std::as_writable_bytes(std::span(read)));
+            file_->read(first * sizeof(Record), std::as_writable_bytes(std::span<Record>(read)));
             f(std::span<const Record>(read));
         }
         for (const auto& b : blocks_) f(std::span<const Record>(b));
@@ -207,7 +207,8 @@ public:
 
     // Appends to bin i of the bins that share this budget. Throws std::bad_alloc, and std::system_error of files.
     void push(std::vector<bin<Record>>& bins, std::size_t i, const Record& r) {
-        if (const std::uint64_t taken = append(bins[i], std::span(&r, 1)); taken != 0) settle(bins, taken);
+        if (const std::uint64_t taken = append(bins[i], std::span<const Record>(&r, 1)); taken != 0)
+            settle(bins, taken);
     }
     // The same in two parts. First several threads append to different bins, and get the bytes of memory taken.
     [[nodiscard]] std::uint64_t append(bin<Record>& to, std::span<const Record> records) const {

@@ -114,7 +114,7 @@ private:
         // Those that reach a slab.
         [[nodiscard]] std::span<const Record> of(std::size_t slab) const {
             const std::size_t first = slab == 0 ? 0 : ends[slab - 1];
-            return std::span(sorted).subspan(first, ends[slab] - first);
+            return std::span<const Record>(sorted).subspan(first, ends[slab] - first);
         }
     };
 

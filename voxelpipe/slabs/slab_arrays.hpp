@@ -40,7 +40,7 @@ struct slab_arrays {
             const std::size_t first = b * block;
             std::vector<record<Varyings>>& records = read[worker];
             records.resize(std::min(block, count - first));
-            from.copy(first, std::span(records));
+            from.copy(first, std::span<record<Varyings>>(records));
             for (std::size_t i = 0; i < records.size(); ++i) put(first + i, records[i]);
         });
     }
