@@ -135,9 +135,9 @@ private:
 
 struct cell {
     std::string program, strategy;
-    vp::counters counts;
+    vp::counters counts{};
     double ms = 0, target_bytes = 0, fragment_bytes = 0;
-    vp::stage_times stages; // of one more call
+    vp::stage_times stages{}; // of one more call
     bool differs = false;
 };
 
