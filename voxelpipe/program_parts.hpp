@@ -136,8 +136,8 @@ public:
         tried t = attempt(all, true);
         if (t.s.code == status_code::out_of_memory) t = attempt(all, false); // the lists may have taken the memory
         if (!t.s.ok()) return t.s;
-        const status s = t.is_listed ? store(std::move(t)) : draw_parts(all, t.fragments);
         counts = t.counts;
+        const status s = t.is_listed ? store(std::move(t)) : draw_parts(all, t.fragments);
         counts.fragments_discarded = discarded_;
         return s;
     }

@@ -12,10 +12,10 @@
 #include <voxelpipe/sparse.hpp>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
 #include <stdexcept>
 #include <type_traits>
@@ -44,9 +44,15 @@ template <class Draw, class Backend, class... Targets>
         });
         if (keeps_sums || keeps_voxels(fb)) return false;
         if (options.bodies == bodies::call || draws.size() == 1) return true;
-        const auto& values = draws[0].fragment_shader.values;
+        // Value by value, since between values there may be padding.
+        const auto bytes = [](const auto& v) { return std::bit_cast<std::array<std::byte, sizeof(v)>>(v); };
         return !repeats && std::all_of(draws.begin(), draws.end(), [&](const Draw& d) {
-            return std::memcmp(&d.fragment_shader.values, &values, sizeof(values)) == 0;
+            bool equal = true;
+            for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+                equal = equal && bytes(voxelpipe::get<I>(d.fragment_shader.values)) ==
+                                     bytes(voxelpipe::get<I>(draws[0].fragment_shader.values));
+            });
+            return equal;
         });
     } else {
         return false;
