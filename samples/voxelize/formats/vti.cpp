@@ -231,7 +231,7 @@ std::vector<std::filesystem::path> write_pvti(const volume& v, const std::filesy
     files.push_back(std::make_unique<output_file>(path));
     files.back()->write(text + "  </PImageData>\n</VTKFile>\n");
     std::vector<std::filesystem::path> targets = commit_all(files);
-    // Pieces of the file that this one replaces, which nothing names any more.
+    // The old file's pieces that the new file does not name.
     for (std::int64_t n = pieces; n < before; ++n) {
         std::error_code ignored;
         std::filesystem::remove(path.parent_path() / piece_name(path, n + 1), ignored);

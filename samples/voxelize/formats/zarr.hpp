@@ -21,7 +21,7 @@ inline constexpr std::int64_t zarr_slab_layers = 256;
 
 // What a path means: without a slash at its end, and where a link leads.
 [[nodiscard]] std::filesystem::path zarr_target(const std::filesystem::path& path);
-// Of a volume of which the slab's voxels are known. Each file appears whole or not at all.
+// Writes a slab of a volume. Each file appears whole or not at all.
 void write_zarr_slab(const volume& v, const std::filesystem::path& folder, std::int64_t slab,
                      const write_options& options);
 // What makes a group of the folder: the volume's shape and channels, without values.

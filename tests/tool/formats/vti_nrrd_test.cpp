@@ -155,7 +155,7 @@ TEST_F(Vti, APieceHoldsTheLayersOfItsSlab) {
     EXPECT_EQ(pieces.size(), 4u); // of three pieces, and of one file that names them
 }
 
-// A file that replaces one of more pieces takes those away that nothing names any more, and no others.
+// A new file takes away the pieces of the old one that it does not name, and no other files.
 TEST_F(Vti, PiecesOfTheFileBeforeDoNotStay) {
     const volume v = make_all_types();
     std::ofstream(folder_ / "a.4.vti") << "not named by any .pvti";
