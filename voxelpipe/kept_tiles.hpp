@@ -15,12 +15,13 @@
 
 namespace voxelpipe::core {
 
-// The tiles between bricks that were taken out: item i is what follows the begin of tile i, or behind all tiles, what
-// follows a brick. Counted where `counts` is not null, with a 0 behind the last item.
+// The tiles between bricks that were taken out: call i is for what follows the begin of tile i, or behind all tiles,
+// for what follows a brick. They have places in the order of where they begin. Counted where `counts` is not null, with
+// a 0 behind the last place.
 struct list_kept_tiles {
-    const brick_tile* tiles;
+    const brick_tile* tiles; // ascending; brick_tile::none() behind the last
     std::uint64_t num_tiles;
-    const std::uint64_t* keys; // of all bricks, ascending
+    const std::uint64_t* keys; // of all bricks, ascending; ~0 behind the last
     std::uint64_t count;
     std::uint32_t* counts = nullptr;
     const std::uint64_t* first = nullptr;
@@ -30,6 +31,7 @@ struct list_kept_tiles {
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         std::uint32_t made = 0;
         std::uint64_t tile = i, begin = 0, next = 0; // next: the first brick from `begin` on
+        std::uint64_t place = i;
         if (i < num_tiles) {
             begin = tiles[i].first();
             std::uint64_t last = count;
@@ -40,27 +42,30 @@ struct list_kept_tiles {
                 else
                     last = middle;
             }
+            place = i + next;
         } else if (i < num_tiles + count) {
-            next = i - num_tiles + 1;
-            tile = find_tile(tiles, num_tiles, keys[next - 1]);
-            begin = keys[next - 1] + 1;
+            const std::uint64_t brick = i - num_tiles, behind = num_tiles_up_to(tiles, num_tiles, keys[brick]);
+            next = brick + 1;
+            tile = behind != 0 && keys[brick] < tiles[behind - 1].end() ? behind - 1 : num_tiles;
+            begin = keys[brick] + 1;
+            place = brick + behind;
         } else {
             tile = num_tiles;
         }
-        if (tile < num_tiles) {
+        if (tile < num_tiles && tiles[tile].bits != brick_tile::none().bits) {
             std::uint64_t end = tiles[tile].end();
             if (next < count && keys[next] < end) end = keys[next];
             while (begin < end) {
                 const int level = level_of_tile(begin, end);
                 if (counts == nullptr) {
-                    bits[first[i] + made] = brick_tile::of(begin, level).bits;
-                    sources[first[i] + made] = static_cast<std::uint32_t>(tile);
+                    bits[first[place] + made] = brick_tile::of(begin, level).bits;
+                    sources[first[place] + made] = static_cast<std::uint32_t>(tile);
                 }
                 ++made;
                 begin += std::uint64_t{1} << (3 * level);
             }
         }
-        if (counts != nullptr) counts[i] = made;
+        if (counts != nullptr) counts[place] = made;
     }
 };
 
@@ -107,7 +112,6 @@ template <class Backend>
     list.bits = kept.bits.data();
     list.sources = kept.sources.data();
     backend.for_each(items, list);
-    backend.sort_by_key(kept.bits, kept.sources, 64);
     backend.for_each(items + 1, count_taken_bricks{tiles.data(), tiles.size(), keys, count, counts.data()});
     kept.num_taken = backend.sum(counts, first);
     return kept;
@@ -143,7 +147,7 @@ struct keep_tile_values {
             map::store(values, first + i, value_of(i));
         }
     }
-    [[nodiscard]] std::uint64_t num_calls() const {
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t num_calls() const {
         return map::is_bit ? (first + count + 31) / 32 - first / 32 : count;
     }
 

@@ -75,7 +75,8 @@ struct brick_table {
     // Voxels that exist, those of tiles among them, which are added up.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_voxels() const {
         std::uint64_t n = num_in_bricks();
-        for (std::uint64_t t = 0; t < num_tiles; ++t) n += tiles[t].num_voxels();
+        for (std::uint64_t t = 0; t < num_tiles && tiles[t].bits != brick_tile::none().bits; ++t)
+            n += tiles[t].num_voxels();
         return n;
     }
     // Ranks: values of a target.

@@ -43,16 +43,17 @@ struct brick_tile {
         const glm::ivec3 brick = core::morton_position(first());
         return {brick.x * 8, brick.y * 8, brick.z * 8};
     }
+    // Behind the last tile of an array that has room for more: it has the key of no brick, and sorts to the end.
+    [[nodiscard]] VOXELPIPE_HD static constexpr brick_tile none() { return of(~std::uint64_t{0} >> level_bits, 0); }
     friend constexpr bool operator==(const brick_tile&, const brick_tile&) = default;
 };
 
 namespace core {
 
-// The number of the tile that has the brick with this key, by bisection of `count` tiles in order; `count` if there is
-// none.
-[[nodiscard]] VOXELPIPE_HD inline std::uint64_t find_tile(const brick_tile* tiles, std::uint64_t count,
-                                                          std::uint64_t key) {
-    std::uint64_t first = 0, last = count; // tiles that begin behind the key follow `first`
+// How many of `count` tiles in order begin at this key or before, by bisection.
+[[nodiscard]] VOXELPIPE_HD inline std::uint64_t num_tiles_up_to(const brick_tile* tiles, std::uint64_t count,
+                                                                std::uint64_t key) {
+    std::uint64_t first = 0, last = count;
     while (first < last) {
         const std::uint64_t middle = first + (last - first) / 2;
         if (tiles[middle].first() <= key)
@@ -60,6 +61,12 @@ namespace core {
         else
             last = middle;
     }
+    return first;
+}
+// The number of the tile that has the brick with this key; `count` if there is none.
+[[nodiscard]] VOXELPIPE_HD inline std::uint64_t find_tile(const brick_tile* tiles, std::uint64_t count,
+                                                          std::uint64_t key) {
+    const std::uint64_t first = num_tiles_up_to(tiles, count, key);
     return first != 0 && key < tiles[first - 1].end() ? first - 1 : count;
 }
 
