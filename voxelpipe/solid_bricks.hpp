@@ -30,33 +30,56 @@ inline constexpr bool ignores_repeats =
     std::is_same_v<Blend, blend::replace> || std::is_same_v<Blend, blend::min> || std::is_same_v<Blend, blend::max> ||
     std::is_same_v<Blend, blend::bit_and> || std::is_same_v<Blend, blend::bit_or>;
 
+// Whether a solid call whose shader is constant gives all voxels one value. is_drawn(I): target I takes fragments.
+template <class... Targets, class Draw, class IsDrawn>
+[[nodiscard]] bool has_one_value(std::span<const Draw> draws, const solid_options& options, const IsDrawn& is_drawn) {
+    if (options.bodies == bodies::call || draws.size() == 1) return true;
+    bool repeats = false;
+    for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+        using blend_type = typename pack_element<I, Targets...>::type::blend_type;
+        repeats = repeats || (is_drawn(I) && !ignores_repeats<blend_type>);
+    });
+    // Value by value, since between values there may be padding.
+    const auto bytes = [](const auto& v) { return std::bit_cast<std::array<std::byte, sizeof(v)>>(v); };
+    return !repeats && std::all_of(draws.begin(), draws.end(), [&](const Draw& d) {
+        bool equal = true;
+        for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            equal = equal && bytes(voxelpipe::get<I>(d.fragment_shader.values)) ==
+                                 bytes(voxelpipe::get<I>(draws[0].fragment_shader.values));
+        });
+        return equal;
+    });
+}
 // Whether a solid call makes tiles: one constant decides every voxel, and nothing that existed stays.
 template <class Draw, class Backend, class... Targets>
 [[nodiscard]] bool makes_tiles(std::span<const Draw> draws, const solid_options& options,
                                const sparse_framebuffer<Backend, Targets...>& fb) {
     if constexpr (is_constant<std::remove_cvref_t<decltype(draws[0].fragment_shader)>>) {
-        bool keeps_sums = false, repeats = false;
+        bool keeps_sums = false;
+        std::array<bool, sizeof...(Targets)> is_drawn{};
         for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
             const auto& t = voxelpipe::get<I>(fb.targets());
             keeps_sums = keeps_sums || t.keeps_sums;
-            using blend_type = typename pack_element<I, Targets...>::type::blend_type;
-            repeats = repeats || (t.load != load_operation::off && !ignores_repeats<blend_type>);
+            is_drawn[I] = t.load != load_operation::off;
         });
-        if (keeps_sums || keeps_voxels(fb)) return false;
-        if (options.bodies == bodies::call || draws.size() == 1) return true;
-        // Value by value, since between values there may be padding.
-        const auto bytes = [](const auto& v) { return std::bit_cast<std::array<std::byte, sizeof(v)>>(v); };
-        return !repeats && std::all_of(draws.begin(), draws.end(), [&](const Draw& d) {
-            bool equal = true;
-            for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-                equal = equal && bytes(voxelpipe::get<I>(d.fragment_shader.values)) ==
-                                     bytes(voxelpipe::get<I>(draws[0].fragment_shader.values));
-            });
-            return equal;
-        });
+        return !keeps_sums && !keeps_voxels(fb) &&
+               has_one_value<Targets...>(draws, options, [&](std::size_t i) { return is_drawn[i]; });
     } else {
         return false;
     }
+}
+// The value of target I in the voxels of such a call. background: what they start from.
+template <std::size_t I, class Target, class SolidShader>
+[[nodiscard]] typename Target::value_type solid_value(const SolidShader& shader, load_operation load,
+                                                      const typename Target::value_type& background) {
+    using traits = typename Target::traits;
+    if (load == load_operation::off) return background;
+    auto folded = traits::begin(background);
+    if constexpr (std::is_same_v<typename Target::blend_type, blend::count>)
+        traits::apply(folded, typename Target::value_type{});
+    else
+        traits::apply(folded, voxelpipe::get<I>(shader.values));
+    return typename Target::value_type(traits::end(folded));
 }
 
 // The first row of voxels of each row of bricks, and one more, by way of the rows in between.
@@ -234,18 +257,9 @@ template <class Backend, class Draw, class... Targets>
     const auto background = fb.next_background();
     for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
         using target = typename pack_element<I, Targets...>::type;
-        using traits = typename target::traits;
         const auto& t = voxelpipe::get<I>(fb.targets());
         if (!t.enabled) return;
-        typename target::value_type value = voxelpipe::get<I>(background);
-        if (t.load != load_operation::off) {
-            auto folded = traits::begin(value);
-            if constexpr (std::is_same_v<typename target::blend_type, blend::count>)
-                traits::apply(folded, typename target::value_type{});
-            else
-                traits::apply(folded, voxelpipe::get<I>(draws[0].fragment_shader.values));
-            value = typename target::value_type(traits::end(folded));
-        }
+        const auto value = solid_value<I, target>(draws[0].fragment_shader, t.load, voxelpipe::get<I>(background));
         const std::size_t n = rank_map<target>::elements(values);
         auto& to = voxelpipe::get<I>(made.values);
         to = typename Backend::template buffer<typename rank_map<target>::element>(backend, n);

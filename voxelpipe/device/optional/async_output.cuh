@@ -50,7 +50,9 @@ struct output_kind<sparse_result<Targets...>> {
     [[nodiscard]] static constexpr bool fits() {
         return output_check<ShaderOutput>::template fits_targets<Targets...>();
     }
-    [[nodiscard]] static status validate(const sparse_result<Targets...>&, const grid&) { return {}; }
+    [[nodiscard]] static status validate(const sparse_result<Targets...>& out, const grid& g) {
+        return validate_start(out, g);
+    }
 };
 
 } // namespace core

@@ -17,14 +17,16 @@
 namespace voxelpipe {
 namespace device {
 
-// What a call makes of the lists of all fragments. Payload: of the lists. has_room(limits): they are numbered.
+// What a call makes of the lists of all fragments. Payload: of the lists. has_room(out, limits): they are numbered.
 template <class Output, class ShaderOutput>
 struct element_output;
 template <class... Targets, class ShaderOutput>
 struct element_output<framebuffer_view<Targets...>, ShaderOutput> {
     using payload = typename core::outputs_payload<ShaderOutput>::type;
-    element_output(const grid&, const workspace_limits&, arena&) {}
-    [[nodiscard]] static bool has_room(const workspace_limits& l) { return l.fragments < core::max_numbered; }
+    element_output(const framebuffer_view<Targets...>&, const grid&, const workspace_limits&, arena&) {}
+    [[nodiscard]] static bool has_room(const framebuffer_view<Targets...>&, const workspace_limits& l) {
+        return l.fragments < core::max_numbered;
+    }
     template <class Call>
     void store(const Call& call, const grid&, const voxelize_options&, const framebuffer_view<Targets...>& fb,
                cudaStream_t stream) const {
@@ -34,8 +36,10 @@ struct element_output<framebuffer_view<Targets...>, ShaderOutput> {
 template <class Payload, class ShaderOutput>
 struct element_output<abuffer_view<Payload>, ShaderOutput> {
     using payload = Payload;
-    element_output(const grid&, const workspace_limits&, arena&) {}
-    [[nodiscard]] static bool has_room(const workspace_limits& l) { return l.fragments < core::max_numbered; }
+    element_output(const abuffer_view<Payload>&, const grid&, const workspace_limits&, arena&) {}
+    [[nodiscard]] static bool has_room(const abuffer_view<Payload>&, const workspace_limits& l) {
+        return l.fragments < core::max_numbered;
+    }
     template <class Call>
     void store(const Call& call, const grid&, const voxelize_options&, abuffer_view<Payload>& lists,
                cudaStream_t) const {
@@ -47,10 +51,11 @@ struct element_output<sparse_result<Targets...>, ShaderOutput> {
     using payload = typename core::outputs_payload<ShaderOutput>::type;
     bounded_fold<payload, Targets...> fold;
 
-    element_output(const grid& g, const workspace_limits& limits, arena& memory)
-        : fold(g.whole_extent(), limits, memory) {}
-    [[nodiscard]] static bool has_room(const workspace_limits& l) {
-        return l.fragments < core::max_numbered && are_numbered_bricks(l);
+    element_output(const sparse_result<Targets...>& result, const grid& g, const workspace_limits& limits,
+                   arena& memory)
+        : fold(g.whole_extent(), limits, result, memory) {}
+    [[nodiscard]] static bool has_room(const sparse_result<Targets...>& result, const workspace_limits& l) {
+        return l.fragments < core::max_numbered && are_numbered_bricks(l, result);
     }
     template <class Call>
     void store(const Call& call, const grid& g, const voxelize_options& options, sparse_result<Targets...>& result,
@@ -67,19 +72,21 @@ struct element_memory {
     async_elements<View, VertexShader, FragmentShader, typename output_type::payload> lists;
     output_type output;
 
-    element_memory(std::span<const draw_type> draws, const grid& g, const workspace_limits& limits, arena& memory)
-        : lists(memory, draws, g, limits.fragments), output(g, limits, memory) {}
+    element_memory(std::span<const draw_type> draws, const grid& g, const Output& out, const workspace_limits& limits,
+                   arena& memory)
+        : lists(memory, draws, g, limits.fragments), output(out, g, limits, memory) {}
 };
 
 template <class View, class VertexShader, class FragmentShader, class Output>
 [[nodiscard]] std::size_t element_bytes(std::span<const draw<View, VertexShader, FragmentShader>> draws, const grid& g,
-                                        const workspace_limits& limits) {
+                                        const Output& out, const workspace_limits& limits) {
     using memory_type = element_memory<View, VertexShader, FragmentShader, Output>;
-    if (!validate(g).ok() || !core::validate_program_draws(draws).ok() || !memory_type::output_type::has_room(limits))
+    if (!validate(g).ok() || !core::validate_program_draws(draws).ok() ||
+        !memory_type::output_type::has_room(out, limits))
         return 0;
     return bytes_or_none([&] {
         arena plan;
-        (void)memory_type(draws, g, limits, plan);
+        (void)memory_type(draws, g, out, limits, plan);
         return plan.used();
     });
 }
@@ -93,11 +100,12 @@ template <coverage... Known, class View, class VertexShader, class FragmentShade
         if constexpr (core::output_kind<output_type>::template fits<shader_output>()) {
             using memory_type = element_memory<View, VertexShader, FragmentShader, output_type>;
             if (const status s = core::validate_call(draws, g, out); !s.ok()) return s;
-            if (!memory_type::output_type::has_room(workspace.limits)) return core::failure(status_code::size_overflow);
+            if (!memory_type::output_type::has_room(out, workspace.limits))
+                return core::failure(status_code::size_overflow);
             return with_cuda_status([&] {
                 status s;
                 const std::size_t need =
-                    element_bytes<View, VertexShader, FragmentShader, output_type>(draws, g, workspace.limits);
+                    element_bytes<View, VertexShader, FragmentShader, output_type>(draws, g, out, workspace.limits);
                 if (workspace.memory == nullptr || workspace.bytes < need) {
                     s = core::failure(status_code::capacity_exceeded);
                     s.required = {0, workspace.limits.fragments, need};
@@ -105,7 +113,7 @@ template <coverage... Known, class View, class VertexShader, class FragmentShade
                 }
                 core::known_coverage<Known...>::set(options);
                 arena memory(workspace.memory);
-                const memory_type call(draws, g, workspace.limits, memory);
+                const memory_type call(draws, g, out, workspace.limits, memory);
                 core::known_coverage<Known...>::dispatch(options.rule, [&]<coverage Rule>() {
                     call.lists.template launch<Rule>(options.count_voxels, backend.stream);
                 });
@@ -124,23 +132,24 @@ template <coverage... Known, class View, class VertexShader, class FragmentShade
 template <class View, class VertexShader, class FragmentShader, class... Targets>
 requires core::is_elements_view<View>
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<View, VertexShader, FragmentShader>> draws,
-                                          const grid& g, const framebuffer_view<Targets...>&, const voxelize_options&,
-                                          const workspace_limits& limits) {
-    return device::element_bytes<View, VertexShader, FragmentShader, framebuffer_view<Targets...>>(draws, g, limits);
+                                          const grid& g, const framebuffer_view<Targets...>& out,
+                                          const voxelize_options&, const workspace_limits& limits) {
+    return device::element_bytes<View, VertexShader, FragmentShader, framebuffer_view<Targets...>>(draws, g, out,
+                                                                                                   limits);
 }
 template <class View, class VertexShader, class FragmentShader, class Payload>
 requires core::is_elements_view<View>
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<View, VertexShader, FragmentShader>> draws,
-                                          const grid& g, const abuffer_view<Payload>&, const voxelize_options&,
+                                          const grid& g, const abuffer_view<Payload>& out, const voxelize_options&,
                                           const workspace_limits& limits) {
-    return device::element_bytes<View, VertexShader, FragmentShader, abuffer_view<Payload>>(draws, g, limits);
+    return device::element_bytes<View, VertexShader, FragmentShader, abuffer_view<Payload>>(draws, g, out, limits);
 }
 template <class View, class VertexShader, class FragmentShader, class... Targets>
 requires core::is_elements_view<View>
 [[nodiscard]] std::size_t workspace_bytes(std::span<const draw<View, VertexShader, FragmentShader>> draws,
-                                          const grid& g, const sparse_result<Targets...>&, const voxelize_options&,
+                                          const grid& g, const sparse_result<Targets...>& out, const voxelize_options&,
                                           const workspace_limits& limits) {
-    return device::element_bytes<View, VertexShader, FragmentShader, sparse_result<Targets...>>(draws, g, limits);
+    return device::element_bytes<View, VertexShader, FragmentShader, sparse_result<Targets...>>(draws, g, out, limits);
 }
 
 // Puts a call of points or lines on the backend's stream and returns. Results are those of voxelize; `lists` and

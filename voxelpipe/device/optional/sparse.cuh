@@ -81,7 +81,7 @@ template <class Payload, class... Targets>
     try {
         build_bricks(backend,
                      {lists.voxels.data(), static_cast<std::uint32_t>(lists.num_voxels()), g.extent, g.offset,
-                      g.whole_extent(), table, static_cast<std::uint32_t>(kept)},
+                      g.whole_extent(), table},
                      allocate_bricks, allocate_voxels);
     } catch (const beyond_limits&) {
         return limited;

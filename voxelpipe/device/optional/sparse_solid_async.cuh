@@ -4,13 +4,16 @@
 
 // voxelize_solid_async into bricks: never waits, never allocates; a CUDA graph can capture it. Of the workspace's
 // limits, `fragments` must hold the crossings, as for framebuffers (solid_async.cuh), and `bricks`, `voxels` and
-// `nodes` the result. The voxels inside are listed, so memory is in proportion to `voxels`, times the draws for
-// bodies::draw. Made dense the result is that of voxelize_solid; its insides are bricks, not tiles, and otherwise its
-// bytes are the same.
+// `nodes` the result, whose bytes are those of voxelize_solid. Where that makes tiles, memory is in proportion to the
+// crossings and the result. Otherwise the voxels inside are listed: in proportion to `voxels`, times the draws for
+// bodies::draw. A call that goes on (sparse_result::start) lists them always.
 
+#include <voxelpipe/device/optional/bounded_solid_bricks.cuh>
 #include <voxelpipe/device/optional/solid_async.cuh>
 #include <voxelpipe/device/optional/sparse_async.cuh>
 #include <voxelpipe/device/solid/list_rows.cuh>
+#include <voxelpipe/device/solid/run_rows.cuh>
+#include <voxelpipe/solid_bricks.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -23,9 +26,10 @@ namespace device {
 
 template <class Payload>
 __global__ void publish_solid_lists(const __grid_constant__ solid_list_arrays<Payload> to, const pipeline_state* state,
-                                    capacities limits, list_counts* counts) {
+                                    capacities limits, list_counts* counts, pipeline_state* of_bricks) {
     if (!to.hold(*state, limits)) {
         *counts = {};
+        of_bricks->index_error = stopped;
         return;
     }
     *counts = {state->voxels, state->fragments};
@@ -33,32 +37,96 @@ __global__ void publish_solid_lists(const __grid_constant__ solid_list_arrays<Pa
 }
 // What the bricks need becomes part of the call's state. Lists that were too short left no bricks to count.
 template <int = 0> // compiled where it is called
-__global__ void join_solid_state(pipeline_state* state, const pipeline_state* of_bricks, const sparse_counts* made,
-                                 bool count_voxels) {
+__global__ void join_solid_state(pipeline_state* state, const pipeline_state* of_bricks, bool count_voxels) {
     const unsigned long long voxels = state->voxels;
     state->sparse = of_bricks->sparse;
     if (voxels > state->sparse.voxels) state->sparse.voxels = voxels;
-    state->voxels = count_voxels ? made->voxels : 0;
+    state->voxels = count_voxels ? of_bricks->voxels : 0;
     state->deferred = {}; // read_status would take them for triangles that are missing
 }
 
-// One call in the caller's memory. Run: launches everything; otherwise only adds up the bytes.
-template <bool Run, class Draw, class... Targets>
+// A value for each voxel in bricks and each tile.
+struct count_result_values {
+    const sparse_counts* made;
+    unsigned long long* values;
+    __device__ void operator()(std::uint64_t) const { *values = made->voxels + made->tiles; }
+};
+
+// One call in the caller's memory.
+template <class Draw, class... Targets>
 struct bounded_solid;
-template <bool Run, class Mesh, class VertexShader, class SolidShader, class... Targets>
-struct bounded_solid<Run, draw<Mesh, VertexShader, SolidShader>, Targets...> {
-    std::span<const draw<Mesh, VertexShader, SolidShader>> draws;
+template <class Mesh, class VertexShader, class SolidShader, class... Targets>
+struct bounded_solid<draw<Mesh, VertexShader, SolidShader>, Targets...> {
+    using draw_type = draw<Mesh, VertexShader, SolidShader>;
+    using payload = typename outputs_payload<core::solid_output<SolidShader>>::type;
+
+    std::span<const draw_type> draws;
     const grid& g;
     const solid_options& options;
     std::uint64_t triangles;
-    workspace_limits limits;
+    workspace_view workspace; // its limits
     cudaStream_t stream;
 
-    // False if the crossings cannot be numbered.
+    // Run: launches everything; otherwise only adds up the bytes. False if the crossings or the result cannot be
+    // numbered.
+    template <bool Run>
     [[nodiscard]] bool operator()(arena& memory, sparse_result<Targets...>& result) const {
+        if (!are_numbered_bricks(workspace.limits, result)) return false;
+        if (triangles == 0) {
+            keep_bricks<payload, Run>(memory, g, true, workspace, result, stream);
+            return true;
+        }
+        if constexpr (core::is_constant<SolidShader>)
+            if (makes_tiles(result)) return by_rows<Run>(memory, result);
+        return workspace.limits.voxels < core::max_numbered && by_lists<Run>(memory, result);
+    }
+
+private:
+    // As core::makes_tiles. Only the device knows whether anything exists where `result` goes on, so voxels stay then.
+    [[nodiscard]] bool makes_tiles(const sparse_result<Targets...>& result) const {
+        return !result.keeps_voxels() && core::has_one_value<Targets...>(draws, options, [&](std::size_t i) {
+            return result.loads[i] != load_operation::off;
+        });
+    }
+    // Bricks and tiles of the rows' runs, and one value.
+    template <bool Run>
+    [[nodiscard]] bool by_rows(arena& memory, sparse_result<Targets...>& result) const {
+        workspace_limits limits = workspace.limits;
+        limits.expects_deferred = limits.orders_long_voxels = true; // of the solid's passes, which are all launched
+        const capacities room{0, 0, limits.fragments, limits.fragment_records};
+        const solid_runs<draw_type> call{{{draws, g, options, static_cast<std::uint32_t>(triangles), room}}};
+        if (!call.entries.fits() || limits.fragments >= core::max_numbered / 2) return false;
+        const auto m = call.take(memory); // its state comes first
+        bounded_result<bounded_arrays<>, Targets...> made({to_room(limits), memory}, limits, memory);
+        auto* const num_values = memory.take<unsigned long long>(1);
+        bounded_solid_bricks<> bricks(g, limits.fragments, to_room(limits), stream, memory);
+        if constexpr (Run) {
+            zero_memory(m.state, sizeof(pipeline_state), stream);
+            const crossing_list sorted = call.launch(m, stream);
+            bricks.clear();
+            call.total(m, bricks.totals(), stream);
+            call.write_within(sorted, m, bricks.found(), stream);
+            made.bricks.clear(stream);
+            bricks.launch(made.bricks);
+            made.publish(m.state, bricks.num_tiles(), options.count_voxels ? &m.state->voxels : nullptr, stream);
+            bricks.end_tiles(made.bricks.counts);
+            for_each(1, count_result_values{made.bricks.counts, num_values}, stage::tile_resolve, stream);
+            const auto background = result.next_background();
+            core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+                using target = typename core::pack_element<I, Targets...>::type;
+                const auto value =
+                    core::solid_value<I, target>(draws[0].fragment_shader, result.loads[I], get<I>(background));
+                fill_mask_values<target>(get<I>(made.values), limits.voxels, num_values, value, stream);
+            });
+            made.set(result, g, bricks.tiles(), limits.bricks);
+        }
+        return true;
+    }
+    template <bool Run>
+    [[nodiscard]] bool by_lists(arena& memory, sparse_result<Targets...>& result) const {
         using shader = payload_shader<SolidShader>;
-        using payload = typename outputs_payload<core::solid_output<SolidShader>>::type;
         using listed_type = draw<Mesh, VertexShader, shader>;
+        const workspace_limits& limits = workspace.limits;
         std::vector<listed_type> listed;
         for (const auto& d : draws) listed.push_back({d.mesh, d.vertex_shader, {d.fragment_shader}});
         const capacities room{0, 0, limits.fragments, limits.fragment_records};
@@ -77,37 +145,22 @@ struct bounded_solid<Run, draw<Mesh, VertexShader, SolidShader>, Targets...> {
         auto* const of_bricks = memory.take<pipeline_state>(1);
         workspace_limits of_fold = limits;
         of_fold.fragments = limits.voxels;
-        const bounded_fold<payload, Targets...> fold(g.whole_extent(), of_fold, memory);
+        const bounded_fold<payload, Targets...> fold(g.whole_extent(), of_fold, result, memory);
         if constexpr (Run) {
             zero_memory(m.state, sizeof(pipeline_state), stream);
             zero_memory(of_bricks, sizeof(pipeline_state), stream);
             const crossing_list sorted = call.launch(m, stream);
             launch_kernel(false, publish_solid_lists<payload>, 1u, 1u, 0, stream, stage::abuffer_emit, to,
-                          static_cast<const pipeline_state*>(m.state), room, counts);
+                          static_cast<const pipeline_state*>(m.state), room, counts, of_bricks);
             call.write_within(sorted, m, to, stream);
             const abuffer_view<payload> lists{counts, to.voxels, to.offsets, to.primitives, to.payloads, g.extent};
             fold.launch(lists, g, true, of_bricks, result, stream);
             launch_kernel(false, join_solid_state<0>, 1u, 1u, 0, stream, stage::tile_resolve, m.state,
-                          static_cast<const pipeline_state*>(of_bricks), result.counts, options.count_voxels);
+                          static_cast<const pipeline_state*>(of_bricks), options.count_voxels);
         }
         return true;
     }
 };
-
-// 0 if the crossings cannot be numbered.
-template <class... Targets, class Draw>
-[[nodiscard]] std::size_t bounded_solid_bytes(std::span<const Draw> draws, const grid& g, const solid_options& options,
-                                              std::uint64_t triangles, const workspace_limits& limits) {
-    arena plan;
-    sparse_result<Targets...> unused;
-    return bounded_solid<false, Draw, Targets...>{draws, g, options, triangles, limits, nullptr}(plan, unused)
-               ? plan.used()
-               : 0;
-}
-// Whether the lists of a solid, and its bricks, can be numbered.
-[[nodiscard]] inline bool are_numbered_solids(const workspace_limits& l) {
-    return are_numbered_bricks(l) && l.voxels < core::max_numbered;
-}
 
 } // namespace device
 
@@ -115,50 +168,37 @@ template <class... Targets, class Draw>
 // call repairs the mesh, which takes waits.
 template <class Mesh, class VertexShader, class SolidShader, class... Targets>
 [[nodiscard]] std::size_t solid_workspace_bytes(std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
-                                                const grid& g, const sparse_result<Targets...>&,
+                                                const grid& g, const sparse_result<Targets...>& result,
                                                 const solid_options& options, const workspace_limits& limits) {
+    using call_type = device::bounded_solid<draw<Mesh, VertexShader, SolidShader>, Targets...>;
     const status s = core::validate_draws(draws);
     if (!s.ok() || !validate(g).ok() || !core::validate(options, g).ok() || options.repair != repair::none ||
-        !device::are_numbered_solids(limits))
+        !core::validate_start(result, g).ok())
         return 0;
-    if (s.counts.triangles_in == 0) return sizeof(device::empty_bricks);
-    return device::bytes_or_none([&]() -> std::size_t {
-        return device::bounded_solid_bytes<Targets...>(draws, g, options, s.counts.triangles_in, limits);
+    return device::bytes_or_none([&] {
+        return device::bounded_bytes(
+            result, call_type{draws, g, options, s.counts.triangles_in, {nullptr, 0, limits}, nullptr});
     });
 }
 
 // Puts the call on the backend's stream, sets `result` to where its bricks and values will be, and returns. A status
 // other than ok means that nothing was launched, or that a launch failed; read_status reports what the device finds
-// out. strategy_unavailable: the call repairs the mesh. size_overflow: limits beyond what is numbered.
+// out. strategy_unavailable: the call repairs the mesh. Other errors are those of voxelize_async.
 template <class Mesh, class VertexShader, class SolidShader, class... Targets>
 [[nodiscard]] status
 voxelize_solid_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
                      sparse_result<Targets...>& result, const solid_options& options, const workspace_view& workspace) {
     if constexpr (core::solid_fits_targets<Mesh, VertexShader, SolidShader, Targets...>()) {
-        sparse_result<Targets...> made;
-        made.clear_values = result.clear_values;
-        result = made;
+        using call_type = device::bounded_solid<draw<Mesh, VertexShader, SolidShader>, Targets...>;
+        device::forget_made(result);
         if (const status s = validate(g); !s.ok()) return s;
         if (const status s = core::validate(options, g); !s.ok()) return s;
+        if (const status s = core::validate_start(result, g); !s.ok()) return s;
         const status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (options.repair != repair::none) return core::failure(status_code::strategy_unavailable);
-        if (!device::are_numbered_solids(workspace.limits)) return core::failure(status_code::size_overflow);
-        return device::with_cuda_status([&]() -> status {
-            const std::uint64_t triangles = s.counts.triangles_in;
-            const std::size_t need =
-                triangles == 0
-                    ? sizeof(device::empty_bricks)
-                    : device::bounded_solid_bytes<Targets...>(draws, g, options, triangles, workspace.limits);
-            if (need == 0) return core::failure(status_code::size_overflow);
-            const auto launch = [&](device::arena& memory, sparse_result<Targets...>& to) {
-                (void)device::bounded_solid<true, draw<Mesh, VertexShader, SolidShader>, Targets...>{
-                    draws, g, options, triangles, workspace.limits, backend.stream}(memory, to);
-            };
-            const status launched = device::launch_bounded(backend, g, workspace, need, s, made, launch);
-            if (launched.ok()) result = made;
-            return launched;
-        });
+        return device::launch_bounded(workspace, s, result,
+                                      call_type{draws, g, options, s.counts.triangles_in, workspace, backend.stream});
     } else {
         return {};
     }

@@ -13,7 +13,8 @@
 
 namespace voxelpipe::device {
 
-// Rows and their bounds, as core::found_rows has them; null where rows are counted.
+// Rows and their bounds, as core::found_rows has them; null where rows are counted. With all_entries the number of
+// bounds behind the last row is not written, and num_rows and num_bounds are not read.
 struct run_arrays {
     std::uint64_t *places, *first;
     std::uint32_t* bounds;
@@ -42,12 +43,13 @@ __global__ __launch_bounds__(threads_per_block) void run_rows_kernel(const __gri
     __shared__ sweep_memory memory[threads_per_block / 32];
     await_stream();
     const bool is_counting = to.first == nullptr;
-    if (is_counting && has_failed(*state, limits)) return;
-    if (!is_counting && blockIdx.x == 0 && threadIdx.x == 0) to.first[to.num_rows] = to.num_bounds;
+    if (has_failed(*state, limits)) return;
+    if (!is_counting && num_entries != all_entries && blockIdx.x == 0 && threadIdx.x == 0)
+        to.first[to.num_rows] = to.num_bounds;
     const int lane = static_cast<int>(threadIdx.x % 32);
     const unsigned before = (1u << lane) - 1;
     sweep_totals totals;
-    const std::uint64_t num = is_counting ? state->list_fragments : num_entries;
+    const std::uint64_t num = is_counting || num_entries == all_entries ? state->list_fragments : num_entries;
     for_each_row(list, rules, memory[warp_in_block()], num, [&](const row_sweep& sweep) {
         const auto reach = sweep.find_reach();
         if (lane == 0) totals.open_rows += reach.num_open;
@@ -118,11 +120,17 @@ struct solid_runs : counted_rows<Draw> {
         end_stage(this->entries.clock, &stage_times::tile_resolve);
         return sorted;
     }
+    void total(const memory& m, run_totals* to, cudaStream_t stream) const {
+        const auto capacity = static_cast<std::uint32_t>(this->entries.plan.limits.fragments);
+        if (capacity == 0)
+            check(cudaMemsetAsync(to, 0, sizeof(*to), stream), stage::tile_resolve);
+        else
+            launch_kernel(false, total_runs<0>, 1u, 1u, 0, stream, stage::tile_resolve, m.counts, capacity, to);
+    }
     // Waits.
     [[nodiscard]] run_totals totals(const memory& m, const stream_memory& on) const {
         device_buffer<run_totals> there(on, std::size_t{1});
-        launch_kernel(false, total_runs<0>, 1u, 1u, 0, on.stream, stage::tile_resolve, m.counts,
-                      static_cast<std::uint32_t>(this->entries.plan.limits.fragments), there.data());
+        total(m, there.data(), on.stream);
         run_totals here{};
         check(cudaMemcpyAsync(&here, there.data(), sizeof(here), cudaMemcpyDeviceToHost, on.stream));
         check(cudaStreamSynchronize(on.stream), stage::tile_resolve);
@@ -131,6 +139,10 @@ struct solid_runs : counted_rows<Draw> {
     void write(const crossing_list& sorted, const memory& m, const pipeline_state& on_host, const run_arrays& to,
                cudaStream_t stream) const {
         sweep(sorted, m, to, on_host.list_fragments, stream);
+    }
+    // As write(), without knowing what there is. `to` has room for the runs of as many entries as the list has.
+    void write_within(const crossing_list& sorted, const memory& m, const run_arrays& to, cudaStream_t stream) const {
+        sweep(sorted, m, to, all_entries, stream);
     }
 
 private:

@@ -16,9 +16,10 @@
 
 namespace voxelpipe {
 
-// How many bricks of 8^3 voxels and how many voxels a sparse call has made: both 0 if it failed.
+// How many bricks of 8^3 voxels a sparse call has made, how many voxels exist in them, and how many tiles there are:
+// all 0 if it failed.
 struct sparse_counts {
-    std::uint64_t bricks, voxels;
+    std::uint64_t bricks, voxels, tiles;
 };
 
 namespace device {
@@ -97,61 +98,86 @@ private:
     std::byte* storage_;
 };
 
-// Publishes the counts, and notes what the call needs. Keys behind the last are ~0, which no brick has, so that the
-// whole array can be bisected. Without room, no key is left and every rank is that of an empty result.
+// What a result has, on the device.
+struct bounded_totals {
+    const unsigned long long *bricks, *voxels;
+    const unsigned long long* tiles; // null: none
+    const unsigned long long* drawn; // voxels that the call draws in; null: not counted
+};
+// Publishes the counts, and notes what the call needs: tiles are bricks, and voxels, of their own. Without room, no key
+// is left and every rank is that of an empty result.
 template <int = 0> // compiled where it is called
-__global__ void publish_bricks(pipeline_state* state, capacities limits, brick_room room, bool count_voxels,
-                               const mask_totals* totals, sparse_counts* counts, std::uint64_t* keys,
-                               std::uint64_t* offsets) {
+__global__ void publish_bricks(pipeline_state* state, capacities limits, brick_room room, bounded_totals totals,
+                               sparse_counts* counts, std::uint64_t* keys, std::uint64_t* offsets) {
     const std::uint64_t thread = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     const std::uint64_t threads = std::uint64_t{gridDim.x} * blockDim.x;
-    const unsigned long long bricks = state->sparse.bricks, voxels = totals->voxels;
-    const bool failed =
-        has_failed(*state, limits) || state->sparse.nodes > room.nodes || bricks > room.bricks || voxels > room.voxels;
+    const unsigned long long bricks = *totals.bricks, voxels = *totals.voxels,
+                             tiles = totals.tiles == nullptr ? 0 : *totals.tiles;
+    const bool failed = has_failed(*state, limits) || state->sparse.nodes > room.nodes ||
+                        bricks + tiles > room.bricks || voxels + tiles > room.voxels;
     if (thread == 0) {
-        *counts = {failed ? 0 : bricks, failed ? 0 : voxels};
-        state->sparse.voxels = voxels; // nobody here reads these two
-        state->voxels = count_voxels && !failed ? voxels : 0;
+        *counts = failed ? sparse_counts{0, 0, 0} : sparse_counts{bricks, voxels, tiles};
+        state->sparse.bricks = bricks + tiles; // nobody here reads these three
+        state->sparse.voxels = voxels + tiles;
+        state->voxels = totals.drawn != nullptr && !failed ? *totals.drawn : 0;
     }
-    for (std::uint64_t i = thread; i < room.bricks; i += threads)
-        if (failed || i >= bricks) keys[i] = ~std::uint64_t{0};
     if (!failed) return;
+    for (std::uint64_t i = thread; i < room.bricks; i += threads) keys[i] = ~std::uint64_t{0};
     for (std::uint64_t i = thread; i <= room.bricks + spare_cells; i += threads) offsets[i] = 0;
 }
 
 // The arrays of a result.
 template <int = 0>
-struct bounded_bricks {
+struct bounded_arrays {
     brick_room room;
     mask_totals* totals;
+    unsigned long long* num_bricks;
     sparse_counts* counts;
-    bounded_index<> index;
-    std::uint64_t* keys;
+    std::uint64_t* keys;    // ~0, which no brick has, behind the last: so the whole array can be bisected
     brick_mask* masks;      // and spare ones, which are empty
     std::uint64_t* offsets; // one more than masks
     std::uint32_t* of_masks;
     std::byte* storage;
 
-    bounded_bricks(const glm::ivec3& whole, const brick_room& r, arena& memory)
-        : room(r), totals(memory.take<mask_totals>(1)), counts(memory.take<sparse_counts>(1)), index(whole, r, memory),
-          keys(memory.take<std::uint64_t>(r.bricks)), masks(memory.take<brick_mask>(num_masks())),
-          offsets(memory.take<std::uint64_t>(num_masks() + 1)), of_masks(memory.take<std::uint32_t>(num_masks())),
+    bounded_arrays(const brick_room& r, arena& memory)
+        : room(r), totals(memory.take<mask_totals>(1)), num_bricks(memory.take<unsigned long long>(1)),
+          counts(memory.take<sparse_counts>(1)), keys(memory.take<std::uint64_t>(r.bricks)),
+          masks(memory.take<brick_mask>(num_masks())), offsets(memory.take<std::uint64_t>(num_masks() + 1)),
+          of_masks(memory.take<std::uint32_t>(num_masks())),
           storage(memory.take<std::byte>(cell_scan_bytes(num_masks()))) {}
     [[nodiscard]] std::uint32_t num_masks() const { return static_cast<std::uint32_t>(room.bricks + spare_cells); }
+
+    // Before anything is written.
+    void clear(cudaStream_t stream) const {
+        check(cudaMemsetAsync(totals, 0, sizeof(mask_totals), stream));
+        check(cudaMemsetAsync(keys, 0xff, room.bricks * sizeof(std::uint64_t), stream));
+        check(cudaMemsetAsync(masks, 0, num_masks() * sizeof(brick_mask), stream));
+    }
+    // When the masks are complete. tiles: how many there are, on the device, or null. drawn: how many voxels are drawn
+    // in; null if they are not counted.
+    void publish(pipeline_state* state, const capacities& limits, const unsigned long long* tiles,
+                 const unsigned long long* drawn, cudaStream_t stream) const {
+        constexpr stage where = stage::fine_raster;
+        rank_bricks(masks, num_masks(), of_masks, offsets, totals, storage, where, stream);
+        launch_kernel(false, publish_bricks<0>, fill_device(num_masks()), threads_per_block, 0, stream, where, state,
+                      limits, room, bounded_totals{num_bricks, &totals->voxels, tiles, drawn}, counts, keys, offsets);
+    }
+};
+// The same with an index of the bricks.
+template <int = 0>
+struct bounded_bricks : bounded_arrays<> {
+    bounded_index<> index;
+
+    bounded_bricks(const glm::ivec3& whole, const brick_room& r, arena& memory)
+        : bounded_arrays<>(r, memory), index(whole, r, memory) {}
 
     // Before anything is marked.
     void clear(cudaStream_t stream) const {
         index.clear(stream);
-        check(cudaMemsetAsync(totals, 0, sizeof(mask_totals), stream));
-        check(cudaMemsetAsync(masks, 0, num_masks() * sizeof(brick_mask), stream));
+        bounded_arrays<>::clear(stream);
     }
-    // When the masks are complete.
-    void publish(pipeline_state* state, const capacities& limits, bool count_voxels, cudaStream_t stream) const {
-        constexpr stage where = stage::fine_raster;
-        rank_bricks(masks, num_masks(), of_masks, offsets, totals, storage, where, stream);
-        launch_kernel(false, publish_bricks<0>, fill_device(num_masks()), threads_per_block, 0, stream, where, state,
-                      limits, room, count_voxels, static_cast<const mask_totals*>(totals), counts, keys, offsets);
-    }
+    // After the bricks have been marked.
+    void number(cudaStream_t stream) const { index.number_bricks(num_bricks, keys, stream); }
 };
 
 } // namespace device

@@ -28,8 +28,7 @@ struct brick_voxels {
     const std::uint64_t* listed;          // linear numbers in the part of the grid
     std::uint32_t num_listed;             // how many, or at most
     glm::ivec3 extent, offset, whole;     // of the part; of the grid
-    brick_table kept;                     // bricks that stay
-    std::uint32_t num_kept;               // their voxels; tiles have the ranks behind
+    brick_table kept;                     // bricks that stay, and those of tiles that are drawn in
     const std::uint64_t* count = nullptr; // on the device: how many are listed, if the host does not know
 
     [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint64_t size() const {
@@ -66,7 +65,7 @@ __global__ void mark_listed_voxels(const brick_voxels from, index_level level, i
 template <int = 0> // compiled where it is called
 __global__ void mark_kept_bricks(const brick_table table, index_level level, int shift) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    if (i >= table.count) return;
+    if (i >= table.count || table.keys[i] == brick_table::none) return; // the table may have room; so below
     const std::uint64_t key = table.keys[i] >> (3 * (shift - core::log2_sparse_brick));
     level.set(key, 1ull << (key & 63u));
 }
@@ -83,7 +82,7 @@ __global__ void mask_listed_voxels(const brick_voxels from, index_level bricks, 
 template <int = 0> // compiled where it is called
 __global__ void mask_kept_voxels(const brick_table table, index_level bricks, brick_mask* masks) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    if (i >= table.count * 8) return;
+    if (i >= table.count * 8 || table.keys[i / 8] == brick_table::none) return;
     const std::uint64_t word = table.masks[i / 8].words[i % 8];
     if (word == 0) return;
     brick_mask& mask = masks[bricks.number_of(table.keys[i / 8])];
@@ -101,7 +100,7 @@ __global__ void place_listed_voxels(const brick_voxels from, index_level bricks,
 template <int = 0> // compiled where it is called
 __global__ void place_kept_voxels(const brick_table table, index_level bricks, const brick_arrays to) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    if (i >= table.count * 8) return;
+    if (i >= table.count * 8 || table.keys[i / 8] == brick_table::none) return;
     const auto w = static_cast<unsigned>(i % 8);
     std::uint64_t word = table.masks[i / 8].words[w];
     if (word == 0) return;
@@ -125,13 +124,13 @@ __global__ void mask_bricks_of_tiles(const brick_table table, const std::uint64_
 }
 template <int = 0> // compiled where it is called
 __global__ void place_voxels_of_tiles(const brick_table table, const std::uint64_t* keys, std::uint64_t bricks,
-                                      std::uint64_t first_rank, const std::uint64_t* offsets, std::uint32_t* existing) {
+                                      const std::uint64_t* offsets, std::uint32_t* existing) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i >= bricks) return;
     const std::uint64_t tile = core::find_tile(table.tiles, table.num_tiles, keys[i]);
     if (tile == table.num_tiles) return;
     for (unsigned v = 0; v < core::sparse_brick_voxels; ++v)
-        existing[offsets[i] + v] = static_cast<std::uint32_t>(first_rank + tile);
+        existing[offsets[i] + v] = static_cast<std::uint32_t>(table.num_in_bricks() + tile);
 }
 
 // allocate_bricks(bricks) gives the first three arrays, allocate_voxels(bricks, voxels) all; either may throw. Waits.
@@ -149,7 +148,7 @@ void build_bricks_by_index(const stream_memory& memory, const brick_voxels& from
             launch_kernel(false, kept_kernel, num_blocks(kept_threads), threads, 0, stream, where, from.kept, rest...);
     };
     brick_index<> index(memory, from.whole);
-    const std::uint64_t kept = from.num_kept == 0 ? 0 : from.kept.count;
+    const std::uint64_t kept = from.kept.count;
     const auto mark = [&](const index_level& level, int log2_cell) {
         by_voxels(mark_listed_voxels<0>, mark_kept_bricks<0>, kept, level, log2_cell);
     };
@@ -177,8 +176,7 @@ void build_bricks_by_index(const stream_memory& memory, const brick_voxels& from
     check(cudaMemsetAsync(to.listed, 0xff, on_host.voxels * sizeof(std::uint32_t), stream), where);
     check(cudaMemsetAsync(to.existing, 0xff, on_host.voxels * sizeof(std::uint32_t), stream), where);
     by_voxels(place_listed_voxels<0>, place_kept_voxels<0>, kept * 8, index.bricks(), to);
-    by_bricks(place_voxels_of_tiles<0>, static_cast<std::uint64_t>(from.num_kept),
-              static_cast<const std::uint64_t*>(to.offsets), to.existing);
+    by_bricks(place_voxels_of_tiles<0>, static_cast<const std::uint64_t*>(to.offsets), to.existing);
     check(cudaStreamSynchronize(stream), where);
 }
 
@@ -186,7 +184,7 @@ void build_bricks_by_index(const stream_memory& memory, const brick_voxels& from
 template <class AllocateBricks, class AllocateVoxels>
 void build_bricks(const stream_memory& memory, const brick_voxels& from, const AllocateBricks& allocate_bricks,
                   const AllocateVoxels& allocate_voxels) {
-    if (from.num_listed == 0 && from.num_kept == 0) {
+    if (from.num_listed == 0 && from.kept.count == 0) {
         (void)allocate_bricks(0);
         (void)allocate_voxels(0, 0);
     } else {

@@ -56,6 +56,20 @@ __global__ void fold_bit_counts(word* values, const unsigned long long* voxels, 
     }
 }
 
+// Writes one value of a target for the voxels, at most `capacity`, as many as *voxels on the device.
+template <class Target>
+void fill_mask_values(typename core::rank_map<Target>::element* values, std::uint64_t capacity,
+                      const unsigned long long* voxels, const typename Target::value_type& value, cudaStream_t stream) {
+    using map = core::rank_map<Target>;
+    const auto launch = [&](auto* kernel, const auto& written) {
+        launch_kernel(false, kernel, fill_device(map::elements(capacity)), threads_per_block, 0, stream,
+                      stage::tile_resolve, values, voxels, written);
+    };
+    if constexpr (map::is_bit)
+        launch(fill_bits<0>, value ? ~word{0} : word{0});
+    else
+        launch(fill_values<typename Target::value_type>, value);
+}
 // Writes target I of the voxels, at most `capacity`, as many as *voxels on the device. start: what they begin with;
 // is_off: and keep. counted(): the numbers of fragments by rank, if they are needed.
 template <std::size_t I, class Target, class FragmentShader, class Counted>
@@ -70,10 +84,7 @@ void write_mask_values(typename core::rank_map<Target>::element* values, std::ui
                       stage::tile_resolve, values, voxels, arguments...);
     };
     const auto fill = [&](const value_type& value) {
-        if constexpr (map::is_bit)
-            launch(fill_bits<0>, value ? ~word{0} : word{0});
-        else
-            launch(fill_values<value_type>, value);
+        fill_mask_values<Target>(values, capacity, voxels, value, stream);
     };
     value_type drawn{};
     if constexpr (!std::is_same_v<typename Target::blend_type, blend::count>) drawn = get<I>(shader.values);
