@@ -5,6 +5,7 @@
 // Tiles of a sparse framebuffer that stay in a call which loads, on any backend: what the call draws in has become
 // bricks, and the rest of each tile is the largest cubes of bricks again.
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/core/brick_tile.hpp>
 #include <voxelpipe/sparse.hpp>
 
@@ -34,14 +35,7 @@ struct list_kept_tiles {
         std::uint64_t place = i;
         if (i < num_tiles) {
             begin = tiles[i].first();
-            std::uint64_t last = count;
-            while (next < last) {
-                const std::uint64_t middle = next + (last - next) / 2;
-                if (keys[middle] < begin)
-                    next = middle + 1;
-                else
-                    last = middle;
-            }
+            next = count_below(keys, count, begin);
             place = i + next;
         } else if (i < num_tiles + count) {
             const std::uint64_t brick = i - num_tiles, behind = num_tiles_up_to(tiles, num_tiles, keys[brick]);

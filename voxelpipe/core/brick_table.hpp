@@ -7,6 +7,7 @@
 // one value may be tiles instead; tile t has the t-th rank behind those of the voxels. The table names memory that
 // someone else owns; host and device read it alike.
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/core/bits.hpp>
 #include <voxelpipe/core/brick_tile.hpp>
 #include <voxelpipe/core/morton.hpp>
@@ -84,15 +85,8 @@ struct brick_table {
 
     // The number of the brick with this key, by bisection; `none` where it does not exist.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t find_brick(std::uint64_t key) const {
-        std::uint64_t first = 0, last = count;
-        while (first < last) {
-            const std::uint64_t middle = first + (last - first) / 2;
-            if (keys[middle] < key)
-                first = middle + 1;
-            else
-                last = middle;
-        }
-        return first < count && keys[first] == key ? first : none;
+        const std::uint64_t brick = core::count_below(keys, count, key);
+        return brick < count && keys[brick] == key ? brick : none;
     }
 
     // The rank of the tile that has the brick with this key; `none` where none has it.

@@ -5,6 +5,7 @@
 // A tile: a cube of 8^level bricks in which every voxel exists and all have one value. Its bricks are consecutive in
 // Morton order, so a tile is the key of its first brick and a level, in one word; words ascend as the keys do.
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/core/morton.hpp>
 
 #include <glm/vec3.hpp>
@@ -53,15 +54,7 @@ namespace core {
 // How many of `count` tiles in order begin at this key or before, by bisection.
 [[nodiscard]] VOXELPIPE_HD inline std::uint64_t num_tiles_up_to(const brick_tile* tiles, std::uint64_t count,
                                                                 std::uint64_t key) {
-    std::uint64_t first = 0, last = count;
-    while (first < last) {
-        const std::uint64_t middle = first + (last - first) / 2;
-        if (tiles[middle].first() <= key)
-            first = middle + 1;
-        else
-            last = middle;
-    }
-    return first;
+    return bisect(count, [=](std::uint64_t i) { return tiles[i].first() <= key; });
 }
 // The number of the tile that has the brick with this key; `count` if there is none.
 [[nodiscard]] VOXELPIPE_HD inline std::uint64_t find_tile(const brick_tile* tiles, std::uint64_t count,
