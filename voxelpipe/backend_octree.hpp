@@ -6,10 +6,12 @@
 // octree.hpp, bit for bit. Its passes are functors for Backend::for_each, so that a program that does not use it
 // compiles none.
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/core/morton_parents.hpp>
 #include <voxelpipe/octree.hpp>
 #include <voxelpipe/sparse.hpp>
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
@@ -45,18 +47,32 @@ struct count_brick_nodes {
     }
 };
 
+// Masks of a level's nodes as they are made, a byte each, the first of a word lowest.
+struct mask_bytes {
+    std::uint64_t* words;
+    std::uint64_t count; // nodes
+
+    // Of node n. With that of the last node, the rest of its word becomes 0.
+    VOXELPIPE_HD void store(std::uint64_t n, unsigned mask) const {
+        auto* const bytes = reinterpret_cast<std::uint8_t*>(words);
+        bytes[n] = static_cast<std::uint8_t>(mask);
+        if (n + 1 == count)
+            while (++n % 8 != 0) bytes[n] = 0;
+    }
+};
+static_assert(std::endian::native == std::endian::little, "voxelpipe: bytes of words are written as little-endian");
+
 // Levels 1 to 3, a call for each word of the bricks' masks: a node of level 2.
 struct make_brick_nodes {
     brick_table table;
     const std::uint64_t *first_word, *first_byte; // of each brick
-    std::uint8_t* masks[3];
-    std::uint64_t* first[3];
+    mask_bytes masks[3];
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         const std::uint64_t b = i >> 3;
         const auto w = static_cast<unsigned>(i & 7u);
         const brick_mask& mask = table.masks[b];
-        std::uint64_t node = first_word[b], leaf = first_byte[b], rank = table.offsets[b];
+        std::uint64_t node = first_word[b], leaf = first_byte[b];
         unsigned words = 0;
         for (unsigned k = 0; k < 8; ++k) {
             const std::uint64_t word = mask.words[k];
@@ -64,22 +80,14 @@ struct make_brick_nodes {
             if (k >= w) continue;
             node += word != 0 ? 1 : 0;
             leaf += count_ones(bytes_in_use(word));
-            rank += count_ones(word);
         }
-        if (w == 0) {
-            masks[2][b] = static_cast<std::uint8_t>(words);
-            first[2][b] = first_word[b];
-        }
+        if (w == 0) masks[2].store(b, words);
         const std::uint64_t word = mask.words[w];
         if (word == 0) return;
-        masks[1][node] = static_cast<std::uint8_t>(bytes_in_use(word));
-        first[1][node] = leaf;
+        masks[1].store(node, bytes_in_use(word));
         for (unsigned k = 0; k < 8; ++k) {
-            const auto byte = static_cast<std::uint8_t>(word >> (8 * k));
-            if (byte == 0) continue;
-            masks[0][leaf] = byte;
-            first[0][leaf++] = rank;
-            rank += count_ones(byte);
+            const unsigned byte = static_cast<unsigned>(word >> (8 * k)) & 255u;
+            if (byte != 0) masks[0].store(leaf++, byte);
         }
     }
 };
@@ -94,54 +102,43 @@ struct count_tiles {
         is_of_level[i] = i < table.num_tiles && table.tiles[i].level() == level ? 1 : 0;
     }
 };
-// A level's nodes, as arrays that someone owns.
-struct octree_level {
-    std::uint64_t* keys;
-    std::uint8_t* masks;
-    std::uint64_t* first;
-};
-struct const_octree_level {
-    const std::uint64_t* keys;
-    const std::uint8_t* masks;
-    const std::uint64_t* first;
-};
-// The tiles of a level as nodes.
+// The tiles of a level: keys of its nodes, and ranks.
 struct list_tiles {
     brick_table table;
     int level;
     std::uint64_t first_rank;   // of tiles
     const std::uint64_t* place; // of each tile among those of the level
-    octree_level to;
+    std::uint64_t* keys;
+    octree_tile* tiles;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         if (table.tiles[i].level() != level) return;
-        to.keys[place[i]] = table.tiles[i].first() >> (3 * level);
-        to.masks[place[i]] = 0;
-        to.first[place[i]] = first_rank + i;
+        keys[place[i]] = table.tiles[i].first() >> (3 * level);
+        tiles[place[i]].rank = first_rank + i;
     }
 };
-// Two lists of a level's nodes, each by its keys, into one.
+// A level's nodes that have children and its tiles, each by their keys, in one list. A call for each of both.
 struct merge_nodes {
-    const_octree_level one, other;
-    std::uint64_t num_one, num_other;
-    octree_level to;
+    const std::uint64_t* node_keys;
+    const std::uint8_t* node_masks;
+    std::uint64_t num_nodes;
+    const std::uint64_t* tile_keys;
+    std::uint64_t num_tiles;
+    std::uint64_t* keys;
+    mask_bytes masks;
+    octree_tile* tiles;
 
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const bool is_one = i < num_one;
-        const const_octree_level& from = is_one ? one : other;
-        const std::uint64_t n = is_one ? i : i - num_one, key = from.keys[n];
-        const std::uint64_t* const keys = is_one ? other.keys : one.keys;
-        std::uint64_t first = 0, last = is_one ? num_other : num_one; // no key is in both
-        while (first < last) {
-            const std::uint64_t middle = first + (last - first) / 2;
-            if (keys[middle] < key)
-                first = middle + 1;
-            else
-                last = middle;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const { // no key is in both
+        if (i < num_nodes) {
+            const std::uint64_t key = node_keys[i], at = i + count_below(tile_keys, num_tiles, key);
+            keys[at] = key;
+            masks.store(at, node_masks[i]);
+        } else {
+            const std::uint64_t t = i - num_nodes, key = tile_keys[t], at = t + count_below(node_keys, num_nodes, key);
+            keys[at] = key;
+            masks.store(at, 0);
+            tiles[t].node = at;
         }
-        to.keys[n + first] = key;
-        to.masks[n + first] = from.masks[n];
-        to.first[n + first] = from.first[n];
     }
 };
 // The parents, each by its first child.
@@ -151,22 +148,73 @@ struct make_parents {
     const std::uint32_t* is_first;
     const std::uint64_t* parent;
     std::uint64_t* parent_keys;
-    std::uint8_t* masks;
-    std::uint64_t* first;
+    mask_bytes masks;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         if (is_first[i] == 0) return;
         unsigned mask = 0;
         for (std::uint64_t c = i; c < count && keys[c] >> 3 == keys[i] >> 3; ++c) mask |= 1u << (keys[c] & 7u);
         parent_keys[parent[i]] = keys[i] >> 3;
-        masks[parent[i]] = static_cast<std::uint8_t>(mask);
-        first[parent[i]] = i;
+        masks.store(parent[i], mask);
+    }
+};
+
+// The blocks of all levels, one level after the other.
+struct octree_blocks {
+    int num_levels = 0;
+    std::uint64_t begin[octree_view::max_levels + 1]{};    // the first block of a level, and of all the number
+    const std::uint64_t* masks[octree_view::max_levels]{}; // of a level, as octree_level_view's
+    std::uint64_t num_words[octree_view::max_levels]{};    // of masks
+
+    [[nodiscard]] VOXELPIPE_HD int level_of(std::uint64_t block) const {
+        int l = 0;
+        while (block >= begin[l + 1]) ++l;
+        return l;
+    }
+    // Calls f(w, children before word w of the block) for the words that a level has; returns the block's children.
+    template <class F>
+    VOXELPIPE_HD unsigned for_each_word(int l, std::uint64_t block, const F& f) const {
+        const std::uint64_t first = (block - begin[l]) * 8;
+        unsigned children = 0;
+        for (unsigned w = 0; w < 8 && first + w < num_words[l]; ++w) {
+            f(w, children);
+            children += count_ones(masks[l][first + w]);
+        }
+        return children;
+    }
+};
+// Children of the nodes of each block; the last count is 0.
+struct count_children {
+    octree_blocks blocks;
+    std::uint32_t* counts;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        counts[i] = i == blocks.begin[blocks.num_levels]
+                        ? 0
+                        : blocks.for_each_word(blocks.level_of(i), i, [](unsigned, unsigned) {});
+    }
+};
+// The blocks, from sums over those of all levels.
+struct make_blocks {
+    octree_blocks blocks;
+    const std::uint64_t* sums;
+    std::uint64_t below[octree_view::max_levels]; // children of all lower levels
+    octree_block* to;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const int l = blocks.level_of(i);
+        octree_block block;
+        block.before = sums[i] - below[l];
+        blocks.for_each_word(l, i, [&block](unsigned w, unsigned children) {
+            if (w != 0) block.set_part(w, children);
+        });
+        to[i] = block;
     }
 };
 
 } // namespace core
 
-// Owns its nodes, 9 bytes each, in memory of Backend. Levels as octree's.
+// Owns its nodes in memory of Backend, in as many bytes as octree's. Levels as octree's.
 template <class Backend>
 class backend_octree {
 public:
@@ -176,8 +224,9 @@ public:
 
     // Of bricks and tiles in memory of the backend, up to the least root that holds the whole grid; no level where no
     // voxel exists. Fewer than 2^32 - 1 bricks; throws std::length_error otherwise, and what a buffer throws. Waits
-    // once a level.
-    backend_octree(Backend& backend, const brick_table& table, const glm::ivec3& whole_extent) {
+    // once a level, and once.
+    backend_octree(Backend& backend, const brick_table& table, const glm::ivec3& whole_extent)
+        : blocks_(backend, std::size_t{0}) {
         if (table.count >= max_bricks) throw std::length_error("voxelpipe: an octree takes fewer than 2^32 - 1 bricks");
         if (table.count != 0 || table.num_tiles != 0) build(backend, table, whole_extent);
     }
@@ -187,130 +236,155 @@ public:
         : backend_octree(backend, fb.view().table, fb.where().whole_extent()) {}
 
     // Levels above the voxels; 0 if there are none.
-    [[nodiscard]] int num_levels() const { return static_cast<int>(masks_.size()); }
+    [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); }
     // A level, from 0 on; level 0 as octree's.
     [[nodiscard]] std::uint64_t num_nodes(int level) const {
-        return level == 0 ? num_values_ : masks_[static_cast<std::size_t>(level) - 1].size();
+        return level == 0 ? num_values_ : levels_[static_cast<std::size_t>(level) - 1].count;
     }
     // Bytes that the nodes take.
     [[nodiscard]] std::uint64_t num_bytes() const {
-        std::uint64_t count = 0;
-        for (const auto& m : masks_) count += m.size();
-        return count * (sizeof(std::uint8_t) + sizeof(std::uint64_t));
+        std::uint64_t bytes = 0;
+        for (const nodes& l : levels_)
+            bytes += l.masks.size() * sizeof(std::uint64_t) + l.tiles.size() * sizeof(octree_tile);
+        return bytes + blocks_.size() * sizeof(octree_block);
     }
-    // As octree's, in memory of the backend.
-    [[nodiscard]] const buffer<std::uint8_t>& masks(int level) const {
-        return masks_[static_cast<std::size_t>(level) - 1];
-    }
-    // As octree's, in memory of the backend.
-    [[nodiscard]] const buffer<std::uint64_t>& first(int level) const {
-        return first_[static_cast<std::size_t>(level) - 1];
+    // The nodes of a level, 1 to num_levels(). Refers to the octree; for code that runs on the backend.
+    [[nodiscard]] octree_level_view level(int level) const {
+        const nodes& l = levels_[static_cast<std::size_t>(level) - 1];
+        return {l.masks.data(), blocks_.data() + l.first_block, l.tiles.data(), l.tiles.size()};
     }
     // Refers to the octree; for code that runs on the backend, rays among it.
     [[nodiscard]] octree_view view() const {
         octree_view v;
         v.num_levels = num_levels();
-        for (std::size_t l = 0; l < masks_.size(); ++l) {
-            v.masks[l] = masks_[l].data();
-            v.first[l] = first_[l].data();
-        }
+        for (int l = 1; l <= v.num_levels; ++l) v.levels[l - 1] = level(l);
         return v;
     }
     // Copies everything, then waits.
     [[nodiscard]] octree to_host(Backend& backend) const {
         octree tree;
         tree.num_values_ = num_values_;
-        for (std::size_t l = 0; l < masks_.size(); ++l)
-            tree.levels_.push_back({masks_[l].to_host(backend), first_[l].to_host(backend)});
+        const std::vector<octree_block> blocks = blocks_.to_host(backend);
+        for (std::size_t l = 0; l < levels_.size(); ++l) {
+            const nodes& from = levels_[l];
+            const auto first = blocks.begin() + static_cast<std::ptrdiff_t>(from.first_block);
+            const auto count = static_cast<std::ptrdiff_t>(octree_level_view::num_blocks(from.count));
+            tree.levels_.push_back({from.masks.to_host(backend),
+                                    {first, first + count},
+                                    from.tiles.to_host(backend),
+                                    from.count,
+                                    num_children(l)});
+        }
         return tree;
     }
 
 private:
     static constexpr std::uint64_t max_bricks = 0xffffffffu;
 
-    void add_level(Backend& backend, std::uint64_t nodes) {
-        masks_.emplace_back(backend, static_cast<std::size_t>(nodes));
-        first_.emplace_back(backend, static_cast<std::size_t>(nodes));
-    }
-    // Nodes of a level with their keys.
-    struct keyed_nodes {
-        buffer<std::uint64_t> keys;
-        buffer<std::uint8_t> masks;
-        buffer<std::uint64_t> first;
+    struct nodes { // as octree_level_view
+        buffer<std::uint64_t> masks;
+        buffer<octree_tile> tiles;
+        std::uint64_t count = 0;
+        std::uint64_t first_block = 0; // in blocks_
 
-        keyed_nodes(Backend& backend, std::uint64_t n)
-            : keys(backend, static_cast<std::size_t>(n)), masks(backend, static_cast<std::size_t>(n)),
-              first(backend, static_cast<std::size_t>(n)) {}
-        [[nodiscard]] core::octree_level arrays() { return {keys.data(), masks.data(), first.data()}; }
+        nodes(Backend& backend, std::uint64_t n)
+            : masks(backend, static_cast<std::size_t>(octree_level_view::num_words(n))), tiles(backend, std::size_t{0}),
+              count(n) {}
+        [[nodiscard]] core::mask_bytes bytes() { return {masks.data(), count}; }
     };
-    // Makes the last level that level's nodes and the tiles of as many bricks a side; `keys` are those of the level.
+
+    // Of all nodes of levels_[l].
+    [[nodiscard]] std::uint64_t num_children(std::size_t l) const {
+        return l == 0 ? num_in_bricks_ : levels_[l - 1].count;
+    }
+    // Adds to the last level the tiles of as many bricks a side; `keys` are those of the level.
     void merge_tiles(Backend& backend, const brick_table& table, int log2_bricks, const std::uint64_t*& keys,
-                     buffer<std::uint64_t>& kept_keys, std::uint64_t& count) {
+                     buffer<std::uint64_t>& kept_keys) {
         if (table.num_tiles == 0) return;
         const auto all = static_cast<std::size_t>(table.num_tiles);
         buffer<std::uint32_t> is_of_level(backend, all + 1);
         buffer<std::uint64_t> place(backend, all + 1);
         backend.for_each(all + 1, core::count_tiles{table, log2_bricks, is_of_level.data()});
-        const std::uint64_t tiles = backend.sum(is_of_level, place);
+        const auto tiles = static_cast<std::size_t>(backend.sum(is_of_level, place));
         if (tiles == 0) return;
-        keyed_nodes of_tiles(backend, tiles), merged(backend, count + tiles);
-        backend.for_each(
-            all, core::list_tiles{table, log2_bricks, num_values_ - table.num_tiles, place.data(), of_tiles.arrays()});
-        backend.for_each(count + tiles,
-                         core::merge_nodes{{keys, masks_.back().data(), first_.back().data()},
-                                           {of_tiles.keys.data(), of_tiles.masks.data(), of_tiles.first.data()},
-                                           count,
-                                           tiles,
-                                           merged.arrays()});
-        masks_.back() = std::move(merged.masks);
-        first_.back() = std::move(merged.first);
-        kept_keys = std::move(merged.keys);
+        nodes& level = levels_.back();
+        nodes merged(backend, level.count + tiles);
+        merged.tiles = buffer<octree_tile>(backend, tiles);
+        buffer<std::uint64_t> tile_keys(backend, tiles), all_keys(backend, static_cast<std::size_t>(merged.count));
+        backend.for_each(all, core::list_tiles{table, log2_bricks, num_in_bricks_, place.data(), tile_keys.data(),
+                                               merged.tiles.data()});
+        backend.for_each(merged.count,
+                         core::merge_nodes{keys, reinterpret_cast<const std::uint8_t*>(level.masks.data()), level.count,
+                                           tile_keys.data(), tiles, all_keys.data(), merged.bytes(),
+                                           merged.tiles.data()});
+        level = std::move(merged);
+        kept_keys = std::move(all_keys);
         keys = kept_keys.data();
-        count += tiles;
     }
     void build(Backend& backend, const brick_table& table, const glm::ivec3& whole_extent) {
         const auto bricks = static_cast<std::size_t>(table.count);
-        num_values_ = table.num_tiles;
-        if (bricks != 0) num_values_ += backend.read(backend_view<const std::uint64_t>{table.offsets + bricks, 1})[0];
+        if (bricks != 0) num_in_bricks_ = backend.read(backend_view<const std::uint64_t>{table.offsets + bricks, 1})[0];
+        num_values_ = num_in_bricks_ + table.num_tiles;
         buffer<std::uint32_t> counts(backend, bricks + 1);
         {
             buffer<std::uint32_t> words(backend, bricks + 1);
             buffer<std::uint64_t> first_word(backend, bricks + 1), first_byte(backend, bricks + 1);
             backend.for_each(bricks + 1, core::count_brick_nodes{table, words.data(), counts.data()});
-            add_level(backend, backend.sum(counts, first_byte));
-            add_level(backend, backend.sum(words, first_word));
-            add_level(backend, bricks);
+            levels_.emplace_back(backend, backend.sum(counts, first_byte));
+            levels_.emplace_back(backend, backend.sum(words, first_word));
+            levels_.emplace_back(backend, table.count);
             backend.for_each(table.count * 8,
                              core::make_brick_nodes{table,
                                                     first_word.data(),
                                                     first_byte.data(),
-                                                    {masks_[0].data(), masks_[1].data(), masks_[2].data()},
-                                                    {first_[0].data(), first_[1].data(), first_[2].data()}});
+                                                    {levels_[0].bytes(), levels_[1].bytes(), levels_[2].bytes()}});
         }
         buffer<std::uint64_t> below(backend, std::size_t{0});
         const std::uint64_t* keys = table.keys;
-        std::uint64_t count = bricks;
-        merge_tiles(backend, table, 0, keys, below, count);
+        merge_tiles(backend, table, 0, keys, below);
         for (int l = 4; l <= core::octree_depth(whole_extent); ++l) {
+            const std::uint64_t count = levels_.back().count;
             const auto n = static_cast<std::size_t>(count);
             if (counts.size() != n + 1) counts = buffer<std::uint32_t>(backend, n + 1);
             buffer<std::uint64_t> parent(backend, n + 1);
             backend.for_each(n + 1, core::count_parents{keys, count, counts.data()});
             const std::uint64_t parents = backend.sum(counts, parent);
             buffer<std::uint64_t> above(backend, static_cast<std::size_t>(parents));
-            add_level(backend, parents);
-            backend.for_each(count, core::make_parents{keys, count, counts.data(), parent.data(), above.data(),
-                                                       masks_.back().data(), first_.back().data()});
+            nodes& level = levels_.emplace_back(backend, parents);
+            backend.for_each(
+                count, core::make_parents{keys, count, counts.data(), parent.data(), above.data(), level.bytes()});
             below = std::move(above);
             keys = below.data();
-            count = parents;
-            merge_tiles(backend, table, l - 3, keys, below, count);
+            merge_tiles(backend, table, l - 3, keys, below);
         }
+        make_blocks(backend);
+    }
+    void make_blocks(Backend& backend) {
+        core::octree_blocks of;
+        core::make_blocks make{};
+        for (std::size_t l = 0; l < levels_.size(); ++l) {
+            levels_[l].first_block = of.begin[l];
+            of.begin[l + 1] = of.begin[l] + octree_level_view::num_blocks(levels_[l].count);
+            of.masks[l] = levels_[l].masks.data();
+            of.num_words[l] = levels_[l].masks.size();
+            make.below[l] = l == 0 ? 0 : make.below[l - 1] + num_children(l - 1);
+        }
+        of.num_levels = num_levels();
+        const auto all = static_cast<std::size_t>(of.begin[levels_.size()]);
+        buffer<std::uint32_t> counts(backend, all + 1);
+        buffer<std::uint64_t> sums(backend, all + 1);
+        backend.for_each(all + 1, core::count_children{of, counts.data()});
+        backend.sum(counts, sums);
+        blocks_ = buffer<octree_block>(backend, all);
+        make.blocks = of;
+        make.sums = sums.data();
+        make.to = blocks_.data();
+        backend.for_each(all, make);
     }
 
-    std::vector<buffer<std::uint8_t>> masks_;
-    std::vector<buffer<std::uint64_t>> first_;
-    std::uint64_t num_values_ = 0;
+    std::vector<nodes> levels_;
+    buffer<octree_block> blocks_; // of all levels, one after the other
+    std::uint64_t num_values_ = 0, num_in_bricks_ = 0;
 };
 template <class Backend, class... Targets>
 backend_octree(Backend&, const sparse_framebuffer<Backend, Targets...>&) -> backend_octree<Backend>;
@@ -352,8 +426,8 @@ template <std::size_t I, class Reducer, class Backend, class... Targets>
         for (int l = 1; l <= tree.num_levels(); ++l) {
             auto& values = levels.add(backend, tree.num_nodes(l));
             typename Backend::template buffer<node> here(backend, values.size());
-            backend.for_each(values.size(), sum_nodes{voxels, l, tree.masks(l).data(), tree.first(l).data(),
-                                                      below.data(), here.data(), values.data()});
+            backend.for_each(values.size(),
+                             sum_nodes{voxels, l, tree.level(l), below.data(), here.data(), values.data()});
             below = std::move(here);
         }
         return levels;
@@ -362,9 +436,8 @@ template <std::size_t I, class Reducer, class Backend, class... Targets>
         backend_octree_levels<Backend, typename fold_nodes::value> levels;
         for (int l = 1; l <= tree.num_levels(); ++l) {
             auto& values = levels.add(backend, tree.num_nodes(l));
-            backend.for_each(values.size(), fold_nodes{reducer, get<I>(arrays.values).data(), l, tree.masks(l).data(),
-                                                       tree.first(l).data(), l == 1 ? nullptr : levels.at(l - 1).data(),
-                                                       values.data()});
+            backend.for_each(values.size(), fold_nodes{reducer, get<I>(arrays.values).data(), l, tree.level(l),
+                                                       l == 1 ? nullptr : levels.at(l - 1).data(), values.data()});
         }
         return levels;
     }

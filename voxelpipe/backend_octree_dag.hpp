@@ -23,8 +23,7 @@ namespace core {
 // The nodes of a level of an octree, each with what its children have become. As one number, the mask is on top and the
 // children follow, the first one first, `width` bits each and 0 where there is none.
 struct dag_level {
-    const std::uint8_t* masks;
-    const std::uint64_t* first;
+    octree_level_view nodes;
     const std::uint32_t* below; // null on level 1
     int width;                  // 0 on level 1
 
@@ -38,17 +37,18 @@ struct dag_level {
             else if (at < 0 && at > -64)
                 bits |= value >> -at;
         };
-        const unsigned mask = masks[n], children = count_ones(mask);
-        for (unsigned c = 0; c < children && width != 0; ++c)
-            add(below[first[n] + c], (7 - static_cast<int>(c)) * width);
+        const unsigned mask = nodes.mask(n), children = width == 0 ? 0 : count_ones(mask);
+        const std::uint64_t first = nodes.first_child(n);
+        for (unsigned c = 0; c < children; ++c) add(below[first + c], (7 - static_cast<int>(c)) * width);
         add(mask, 8 * width);
         return bits;
     }
     [[nodiscard]] VOXELPIPE_HD bool are_equal(std::uint64_t a, std::uint64_t b) const {
-        if (masks[a] != masks[b]) return false;
-        const unsigned children = width == 0 ? 0 : count_ones(masks[a]);
+        if (nodes.mask(a) != nodes.mask(b)) return false;
+        const unsigned children = width == 0 ? 0 : count_ones(nodes.mask(a));
+        const std::uint64_t first_a = nodes.first_child(a), first_b = nodes.first_child(b);
         for (unsigned c = 0; c < children; ++c)
-            if (below[first[a] + c] != below[first[b] + c]) return false;
+            if (below[first_a + c] != below[first_b + c]) return false;
         return true;
     }
 };
@@ -91,7 +91,7 @@ struct number_dag_nodes {
         const auto number = static_cast<std::uint32_t>(before[i] + is_first[i] - 1);
         becomes[nodes[i]] = number;
         if (is_first[i] == 0) return;
-        masks[number] = level.masks[nodes[i]];
+        masks[number] = static_cast<std::uint8_t>(level.nodes.mask(nodes[i]));
         if (children == nullptr) return;
         children[number] = count_ones(masks[number]);
         source[number] = nodes[i];
@@ -106,8 +106,9 @@ struct list_dag_children {
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         const std::uint64_t at = offsets[i];
         first[i] = static_cast<std::uint32_t>(at);
-        const std::uint64_t from = level.first[source[i]];
-        for (unsigned c = 0; c < count_ones(level.masks[source[i]]); ++c) children[at + c] = level.below[from + c];
+        const std::uint64_t from = level.nodes.first_child(source[i]);
+        const unsigned count = count_ones(level.nodes.mask(source[i]));
+        for (unsigned c = 0; c < count; ++c) children[at + c] = level.below[from + c];
     }
 };
 struct set_count {
@@ -115,11 +116,18 @@ struct set_count {
     VOXELPIPE_HD void operator()(std::uint64_t) const { *count = 0; }
 };
 
+// As dag_nodes, in memory of Backend.
+template <class Backend>
+struct backend_dag_nodes {
+    typename Backend::template buffer<std::uint8_t> masks;
+    typename Backend::template buffer<std::uint32_t> first, children;
+};
+
 } // namespace core
 
 // Owns its nodes, in memory of Backend. Levels as octree_dag's.
 template <class Backend>
-class backend_octree_dag {
+class backend_octree_dag : public core::dag_levels<core::backend_dag_nodes<Backend>> {
 public:
     // Memory of the backend.
     template <class T>
@@ -132,50 +140,26 @@ public:
         for (int l = 1; l <= tree.num_levels(); ++l) below = add_level(backend, tree, l, below);
     }
 
-    [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); } // As the octree's.
-    // A level, from 1 on; the last one has the root.
-    [[nodiscard]] std::uint64_t num_nodes(int level) const {
-        return levels_[static_cast<std::size_t>(level) - 1].masks.size();
-    }
-    // A byte a node, and four for each child and for the place of a node's children; level 1 has neither.
-    [[nodiscard]] std::uint64_t num_bytes() const {
-        std::uint64_t bytes = 0;
-        for (const auto& l : levels_)
-            bytes += l.masks.size() + (l.first.size() + l.children.size()) * sizeof(std::uint32_t);
-        return bytes;
-    }
-    // Refers to the graph; for code that runs on the backend.
-    [[nodiscard]] octree_dag_view view() const {
-        octree_dag_view v;
-        v.num_levels = num_levels();
-        for (std::size_t l = 0; l < levels_.size(); ++l) {
-            v.masks[l] = levels_[l].masks.data();
-            v.first[l] = levels_[l].first.data();
-            v.children[l] = levels_[l].children.data();
-        }
-        return v;
-    }
     // Copies everything, then waits.
     [[nodiscard]] octree_dag to_host(Backend& backend) const {
         octree_dag dag;
-        for (const level& l : levels_)
+        for (const level_type& l : levels_)
             dag.levels_.push_back({l.masks.to_host(backend), l.first.to_host(backend), l.children.to_host(backend)});
         return dag;
     }
 
 private:
-    struct level {
-        buffer<std::uint8_t> masks;
-        buffer<std::uint32_t> first, children;
-    };
+    using level_type = core::backend_dag_nodes<Backend>;
+    using levels = core::dag_levels<level_type>;
+    using levels::levels_;
 
     // Returns what each node of the octree's level has become.
     buffer<std::uint32_t> add_level(Backend& backend, const backend_octree<Backend>& tree, int l,
                                     const buffer<std::uint32_t>& below) {
         const auto n = static_cast<std::size_t>(tree.num_nodes(l));
         if (n >= 0xffffffffu) throw std::length_error("voxelpipe: a graph takes levels of fewer than 2^32 - 1 nodes");
-        const int width = l == 1 ? 0 : static_cast<int>(std::bit_width(num_nodes(l - 1)));
-        const core::dag_level nodes{tree.masks(l).data(), tree.first(l).data(), below.data(), width};
+        const int width = l == 1 ? 0 : static_cast<int>(std::bit_width(this->num_nodes(l - 1)));
+        const core::dag_level nodes{tree.level(l), below.data(), width};
         buffer<std::uint32_t> sorted(backend, n);
         {
             buffer<std::uint64_t> keys(backend, n);
@@ -190,7 +174,7 @@ private:
         backend.for_each(n + 1, core::count_dag_nodes{nodes, n, sorted.data(), is_first.data()});
         const auto made = static_cast<std::size_t>(backend.sum(is_first, before));
         const std::size_t inner = l == 1 ? 0 : made;
-        level out{{backend, made}, {backend, inner}, {backend, std::size_t{0}}};
+        level_type out{{backend, made}, {backend, inner}, {backend, std::size_t{0}}};
         buffer<std::uint32_t> children(backend, l == 1 ? 0 : made + 1), source(backend, inner);
         backend.for_each(n, core::number_dag_nodes{nodes, sorted.data(), is_first.data(), before.data(), becomes.data(),
                                                    out.masks.data(), l == 1 ? nullptr : children.data(),
@@ -205,8 +189,6 @@ private:
         levels_.push_back(std::move(out));
         return becomes;
     }
-
-    std::vector<level> levels_;
 };
 
 } // namespace voxelpipe

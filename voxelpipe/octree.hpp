@@ -37,9 +37,9 @@ namespace core {
 
 } // namespace core
 
-// Owns its nodes: 9 bytes each. Level l of 1 .. num_levels() has nodes of 2^l voxels a side, the last one the root
-// alone; level 0 are the voxels. Places count in the whole grid. A tile is one node without children, and nothing below
-// it is there.
+// Owns its nodes: a byte each, 16 more for 64 nodes, and 16 for a tile. Level l of 1 .. num_levels() has nodes of 2^l
+// voxels a side, the last one the root alone; level 0 are the voxels. Places count in the whole grid. A tile is one
+// node without children, and nothing below it is there.
 class octree {
 public:
     octree() = default;
@@ -52,31 +52,26 @@ public:
     [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); }
     // A level, from 0 on. Level 0 counts values: the voxels in bricks, and the tiles, whose ranks follow.
     [[nodiscard]] std::uint64_t num_nodes(int level) const {
-        return level == 0 ? num_values_ : levels_[static_cast<std::size_t>(level) - 1].masks.size();
+        return level == 0 ? num_values_ : levels_[static_cast<std::size_t>(level) - 1].count;
     }
     // Bytes that the nodes take.
     [[nodiscard]] std::uint64_t num_bytes() const {
-        std::uint64_t count = 0;
-        for (const auto& l : levels_) count += l.masks.size();
-        return count * (sizeof(std::uint8_t) + sizeof(std::uint64_t));
+        std::uint64_t bytes = 0;
+        for (const nodes& l : levels_)
+            bytes += l.masks.size() * sizeof(std::uint64_t) + l.blocks.size() * sizeof(octree_block) +
+                     l.tiles.size() * sizeof(octree_tile);
+        return bytes;
     }
-    // Bit c of a node's mask: its child of Morton number c exists. first: the number of the first that does. The mask
-    // of a tile is 0, and its first the rank of its value.
-    [[nodiscard]] std::span<const std::uint8_t> masks(int level) const {
-        return levels_[static_cast<std::size_t>(level) - 1].masks;
-    }
-    // For each node of a level, 1 to num_levels(), the number of its first child on the level below.
-    [[nodiscard]] std::span<const std::uint64_t> first(int level) const {
-        return levels_[static_cast<std::size_t>(level) - 1].first;
+    // The nodes of a level, 1 to num_levels(). Refers to the octree.
+    [[nodiscard]] octree_level_view level(int level) const {
+        const nodes& l = levels_[static_cast<std::size_t>(level) - 1];
+        return {l.masks.data(), l.blocks.data(), l.tiles.data(), l.tiles.size()};
     }
     // Refers to the octree.
     [[nodiscard]] octree_view view() const {
         octree_view v;
         v.num_levels = num_levels();
-        for (std::size_t l = 0; l < levels_.size(); ++l) {
-            v.masks[l] = levels_[l].masks.data();
-            v.first[l] = levels_[l].first.data();
-        }
+        for (int l = 1; l <= v.num_levels; ++l) v.levels[l - 1] = level(l);
         return v;
     }
     // See octree_view.
@@ -99,9 +94,25 @@ private:
     template <class Backend>
     friend class backend_octree;
 
-    struct nodes {
-        std::vector<std::uint8_t> masks;
-        std::vector<std::uint64_t> first;
+    struct nodes { // as octree_level_view
+        std::vector<std::uint64_t> masks;
+        std::vector<octree_block> blocks;
+        std::vector<octree_tile> tiles;
+        std::uint64_t count = 0, num_children = 0; // of nodes, and of their children
+
+        void add(unsigned mask) {
+            if (count % 64 == 0)
+                blocks.push_back({num_children, 0});
+            else if (count % 8 == 0)
+                blocks.back().set_part(static_cast<unsigned>(count / 8 % 8), num_children - blocks.back().before);
+            if (count % 8 == 0) masks.push_back(0);
+            masks.back() |= std::uint64_t{mask} << (count++ % 8 * 8);
+            num_children += static_cast<unsigned>(std::popcount(mask));
+        }
+        void add_tile(std::uint64_t rank) {
+            tiles.push_back({count, rank});
+            add(0);
+        }
         friend bool operator==(const nodes&, const nodes&) = default;
     };
 
@@ -111,17 +122,12 @@ private:
             f(core::morton_position(key), n);
             return;
         }
-        const nodes& l = levels_[static_cast<std::size_t>(at) - 1];
-        std::uint64_t child = l.first[n];
-        for (unsigned mask = l.masks[n]; mask != 0; mask &= mask - 1)
+        const octree_level_view nodes_of = this->level(at);
+        std::uint64_t child = nodes_of.first_child(n);
+        for (unsigned mask = nodes_of.mask(n); mask != 0; mask &= mask - 1)
             visit(at - 1, child++, key << 3 | static_cast<unsigned>(std::countr_zero(mask)), level, f);
     }
 
-    // Adds the node of a tile.
-    static void add_tile(nodes& level, std::uint64_t rank) {
-        level.masks.push_back(0);
-        level.first.push_back(rank);
-    }
     void build(const brick_table& table, const glm::ivec3& whole_extent) {
         num_values_ = table.num_values();
         if (num_values_ == 0) return;
@@ -129,31 +135,26 @@ private:
         std::vector<std::uint64_t> keys, above; // of the nodes of a level
         // A brick is a node of level 3. Its mask has a word for each child and a byte for each grandchild.
         const auto add_brick = [&](std::uint64_t b) {
-            std::uint64_t rank = table.offsets[b];
             unsigned words = 0;
-            levels_[2].first.push_back(levels_[1].masks.size());
             for (unsigned w = 0; w < 8; ++w) {
                 const std::uint64_t word = table.masks[b].words[w];
                 if (word == 0) continue;
                 words |= 1u << w;
                 unsigned bytes = 0;
-                levels_[1].first.push_back(levels_[0].masks.size());
                 for (unsigned i = 0; i < 8; ++i) {
-                    const auto byte = static_cast<std::uint8_t>(word >> (8 * i));
+                    const unsigned byte = static_cast<unsigned>(word >> (8 * i)) & 255u;
                     if (byte == 0) continue;
                     bytes |= 1u << i;
-                    levels_[0].masks.push_back(byte);
-                    levels_[0].first.push_back(rank);
-                    rank += static_cast<unsigned>(std::popcount(byte));
+                    levels_[0].add(byte);
                 }
-                levels_[1].masks.push_back(static_cast<std::uint8_t>(bytes));
+                levels_[1].add(bytes);
             }
-            levels_[2].masks.push_back(static_cast<std::uint8_t>(words));
+            levels_[2].add(words);
             keys.push_back(table.keys[b]);
         };
         for_each_brick_and_tile(table, add_brick, [&](std::uint64_t t) {
             if (table.tiles[t].level() != 0) return;
-            add_tile(levels_[2], table.num_in_bricks() + t);
+            levels_[2].add_tile(table.num_in_bricks() + t);
             keys.push_back(table.tiles[t].first());
         });
         for (int l = 3; l < num_levels(); ++l) {
@@ -165,18 +166,16 @@ private:
                 for (; t < table.num_tiles && table.tiles[t].first() >> (3 * (l - 2)) < key; ++t) {
                     if (table.tiles[t].level() != l - 2) continue;
                     above.push_back(table.tiles[t].first() >> (3 * (l - 2)));
-                    add_tile(level, table.num_in_bricks() + t);
+                    level.add_tile(table.num_in_bricks() + t);
                 }
             };
-            for (std::uint64_t i = 0; i < keys.size(); ++i) {
+            for (std::uint64_t i = 0; i < keys.size();) {
                 const std::uint64_t parent = keys[i] >> 3;
-                if (i == 0 || keys[i - 1] >> 3 != parent) {
-                    add_tiles(parent);
-                    above.push_back(parent);
-                    level.masks.push_back(0);
-                    level.first.push_back(i);
-                }
-                level.masks.back() |= static_cast<std::uint8_t>(1u << (keys[i] & 7u));
+                unsigned mask = 0;
+                for (; i < keys.size() && keys[i] >> 3 == parent; ++i) mask |= 1u << (keys[i] & 7u);
+                add_tiles(parent);
+                above.push_back(parent);
+                level.add(mask);
             }
             add_tiles(~std::uint64_t{0});
             keys.swap(above);
@@ -219,8 +218,7 @@ template <std::size_t I, class Reducer, class... Targets>
             auto& values = levels.add();
             values.resize(tree.num_nodes(l));
             here.resize(values.size());
-            const sum_nodes sum{voxels,       l,           tree.masks(l).data(), tree.first(l).data(),
-                                below.data(), here.data(), values.data()};
+            const sum_nodes sum{voxels, l, tree.level(l), below.data(), here.data(), values.data()};
             for (std::uint64_t i = 0; i < values.size(); ++i) sum(i);
             below.swap(here);
         }
@@ -231,13 +229,9 @@ template <std::size_t I, class Reducer, class... Targets>
         for (int l = 1; l <= tree.num_levels(); ++l) {
             auto& values = levels.add();
             values.resize(tree.num_nodes(l));
-            const fold_nodes fold{reducer,
-                                  get<I>(host.values).data(),
-                                  l,
-                                  tree.masks(l).data(),
-                                  tree.first(l).data(),
-                                  l == 1 ? nullptr : levels.at(l - 1).data(),
-                                  values.data()};
+            const fold_nodes fold{
+                reducer,      get<I>(host.values).data(), l, tree.level(l), l == 1 ? nullptr : levels.at(l - 1).data(),
+                values.data()};
             for (std::uint64_t i = 0; i < values.size(); ++i) fold(i);
         }
         return levels;

@@ -22,16 +22,19 @@ namespace voxelpipe {
 template <class Backend>
 class backend_octree_dag;
 
-// An octree whose equal parts are there once: a directed acyclic graph. On the host; owns its nodes.
-class octree_dag {
-public:
-    octree_dag() = default;
-    // Merges equal nodes, from the voxels up.
-    explicit octree_dag(const octree& tree) {
-        std::vector<std::uint32_t> below; // what each node of the level below has become
-        for (int l = 1; l <= tree.num_levels(); ++l) below = add_level(tree, l, below);
-    }
+namespace core {
 
+// The nodes of a level of a graph on the host, as octree_dag_view has them.
+struct dag_nodes {
+    std::vector<std::uint8_t> masks;
+    std::vector<std::uint32_t> first, children;
+    friend bool operator==(const dag_nodes&, const dag_nodes&) = default;
+};
+
+// The levels of a graph, wherever they are. Nodes has arrays as dag_nodes.
+template <class Nodes>
+class dag_levels {
+public:
     [[nodiscard]] int num_levels() const { return static_cast<int>(levels_.size()); } // As the octree's.
     // A level, from 1 on; the last one has the root.
     [[nodiscard]] std::uint64_t num_nodes(int level) const {
@@ -40,11 +43,11 @@ public:
     // A byte a node, and four for each child and for the place of a node's children; level 1 has neither.
     [[nodiscard]] std::uint64_t num_bytes() const {
         std::uint64_t bytes = 0;
-        for (const auto& l : levels_)
+        for (const Nodes& l : levels_)
             bytes += l.masks.size() + (l.first.size() + l.children.size()) * sizeof(std::uint32_t);
         return bytes;
     }
-    // Refers to the graph.
+    // Refers to the graph; for code that runs where it lies.
     [[nodiscard]] octree_dag_view view() const {
         octree_dag_view v;
         v.num_levels = num_levels();
@@ -55,6 +58,24 @@ public:
         }
         return v;
     }
+    friend bool operator==(const dag_levels&, const dag_levels&) = default;
+
+protected:
+    std::vector<Nodes> levels_;
+};
+
+} // namespace core
+
+// An octree whose equal parts are there once: a directed acyclic graph. On the host; owns its nodes.
+class octree_dag : public core::dag_levels<core::dag_nodes> {
+public:
+    octree_dag() = default;
+    // Merges equal nodes, from the voxels up.
+    explicit octree_dag(const octree& tree) {
+        std::vector<std::uint32_t> below; // what each node of the level below has become
+        for (int l = 1; l <= tree.num_levels(); ++l) below = add_level(tree, l, below);
+    }
+
     // True if a voxel exists, in the numbers of the whole grid; false outside.
     [[nodiscard]] bool contains(const glm::ivec3& voxel) const { return view().contains(voxel); }
     // Whether two have the same nodes in the same order.
@@ -64,27 +85,22 @@ private:
     template <class Backend>
     friend class backend_octree_dag;
 
-    struct level {
-        std::vector<std::uint8_t> masks;
-        std::vector<std::uint32_t> first, children;
-        friend bool operator==(const level&, const level&) = default;
-    };
     using node = std::array<std::uint32_t, 9>; // the mask, and the children from the first on
 
     std::vector<std::uint32_t> add_level(const octree& tree, int l, const std::vector<std::uint32_t>& below) {
-        const auto masks = tree.masks(l);
-        const auto first = tree.first(l);
-        std::vector<node> nodes(masks.size(), node{});
+        const octree_level_view of_tree = tree.level(l);
+        std::vector<node> nodes(static_cast<std::size_t>(tree.num_nodes(l)), node{});
+        std::size_t child = 0;
         for (std::size_t i = 0; i < nodes.size(); ++i) {
-            nodes[i][0] = masks[i];
+            nodes[i][0] = of_tree.mask(i);
             if (l == 1) continue;
-            const auto children = static_cast<unsigned>(std::popcount(masks[i]));
-            for (unsigned c = 0; c < children; ++c) nodes[i][c + 1] = below[first[i] + c];
+            const auto children = static_cast<unsigned>(std::popcount(nodes[i][0]));
+            for (unsigned c = 1; c <= children; ++c) nodes[i][c] = below[child++];
         }
         std::vector<std::uint32_t> order(nodes.size()), number(nodes.size());
         std::iota(order.begin(), order.end(), 0u);
         std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return nodes[a] < nodes[b]; });
-        level& out = levels_.emplace_back();
+        core::dag_nodes& out = levels_.emplace_back();
         for (std::size_t i = 0; i < order.size(); ++i) {
             const node& here = nodes[order[i]];
             if (i == 0 || here != nodes[order[i - 1]]) {
@@ -99,8 +115,6 @@ private:
         }
         return number;
     }
-
-    std::vector<level> levels_;
 };
 
 } // namespace voxelpipe

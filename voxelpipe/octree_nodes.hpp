@@ -6,6 +6,7 @@
 // node, on any backend.
 
 #include <voxelpipe/core/brick_table.hpp>
+#include <voxelpipe/core/octree_view.hpp>
 #include <voxelpipe/core/pack.hpp>
 #include <voxelpipe/host_sparse.hpp>
 #include <voxelpipe/reducers.hpp>
@@ -96,16 +97,16 @@ struct sum_octree_nodes {
 
     terms voxels;
     int level;
-    const std::uint8_t* masks;
-    const std::uint64_t* first;
+    octree_level_view level_nodes;
     const node* below; // not read on level 1
     node* nodes;
     typename terms::result* values;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         node sum;
-        const std::uint64_t begin = first[i], end = begin + count_ones(masks[i]);
-        if (masks[i] == 0) sum = of_tile(begin);
+        const unsigned mask = level_nodes.mask(i);
+        const std::uint64_t begin = level_nodes.first_child(i), end = begin + count_ones(mask);
+        if (mask == 0) sum = of_tile(level_nodes.rank_of_tile(i));
         for (std::uint64_t c = begin; c < end; ++c) {
             const node child = level == 1 ? voxels.of_voxel(c) : below[c];
             for (int k = 0; k < parts::count; ++k) sum.sums[k].add(child.sums[k]);
@@ -147,16 +148,15 @@ struct fold_octree_nodes {
     Reducer reducer;
     const typename rank_map<Target>::element* voxels;
     int level;
-    const std::uint8_t* masks;
-    const std::uint64_t* first;
+    octree_level_view level_nodes;
     const value* below; // not read on level 1
     value* values;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         value children[8];
-        const auto n = static_cast<std::size_t>(count_ones(masks[i]));
+        const auto n = static_cast<std::size_t>(count_ones(level_nodes.mask(i)));
         if (n == 0) { // a tile: eight equal children, level by level
-            value v = value(rank_map<Target>::load(voxels, first[i]));
+            value v = value(rank_map<Target>::load(voxels, level_nodes.rank_of_tile(i)));
             for (int l = 0; l < level; ++l) {
                 for (value& child : children) child = v;
                 v = fold_of<Reducer, value>::fold(reducer, std::span<const value>(children, 8));
@@ -164,8 +164,9 @@ struct fold_octree_nodes {
             values[i] = v;
             return;
         }
+        const std::uint64_t first = level_nodes.first_child(i);
         for (std::size_t c = 0; c < n; ++c)
-            children[c] = level == 1 ? value(rank_map<Target>::load(voxels, first[i] + c)) : below[first[i] + c];
+            children[c] = level == 1 ? value(rank_map<Target>::load(voxels, first + c)) : below[first + c];
         values[i] = fold_of<Reducer, value>::fold(reducer, std::span<const value>(children, n));
     }
 };

@@ -3,10 +3,13 @@
 #pragma once
 
 // An octree over the voxels of a sparse grid, as host and device read it: level l has nodes of 2^l voxels a side in the
-// Morton order of their positions, each with a mask of its children and the number of the first of them in the level
-// below; level 0 are the voxels themselves, numbered by rank. A node without children is a tile: all its voxels exist
-// and have its rank, which stands in place of the first child. And the first voxel that a ray meets.
+// Morton order of their positions, each with a mask of its children; level 0 are the voxels themselves, numbered by
+// rank. The children of a level follow each other in its order, so the number of a node's first child is the number of
+// bits in all masks before. A directory of 16 bytes for 64 nodes makes that one count of a word (Vigna 2008, rank9). A
+// node without children is a tile: all its voxels exist and have one rank, which is listed. And the first voxel that a
+// ray meets.
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/core/exact.hpp>
 
@@ -24,18 +27,71 @@ struct voxel_hit {
     bool from_above = false; // through the upper side
 };
 
+// A tile among the nodes of a level.
+struct octree_tile {
+    std::uint64_t node = 0; // its number
+    std::uint64_t rank = 0; // of its value
+    friend bool operator==(const octree_tile&, const octree_tile&) = default;
+};
+
+// The children of the nodes before a block of 64, and before each of its words of eight masks.
+struct alignas(16) octree_block {
+    static constexpr int log2_nodes = 6; // of a block
+    static constexpr int part_bits = 9;  // a block has up to 512 children
+
+    std::uint64_t before = 0; // children before the block
+    std::uint64_t parts = 0;  // 9 bits each: children in the block before words 1 to 7, that of word 1 lowest
+
+    // The children before word w of the block, 0 to 7.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t before_word(unsigned w) const {
+        return before + (parts >> (part_bits * ((w - 1) & 7u)) & 511u); // of word 0: the highest bit, which is 0
+    }
+    // Says that so many children of the block lie before word w, 1 to 7. Once for each.
+    VOXELPIPE_HD void set_part(unsigned w, std::uint64_t children) { parts |= children << (part_bits * (w - 1)); }
+    friend bool operator==(const octree_block&, const octree_block&) = default;
+};
+
+// Reads a level of an octree in host or device memory; does not own it.
+struct octree_level_view {
+    const std::uint64_t* masks = nullptr; // a byte a node, the first of eight lowest; bytes without a node are 0
+    const octree_block* blocks = nullptr; // one for 64 nodes
+    const octree_tile* tiles = nullptr;   // by node
+    std::uint64_t num_tiles = 0;          // length of `tiles`
+
+    // Bit c: the child of node n with Morton number c exists. 0: the node is a tile.
+    [[nodiscard]] VOXELPIPE_HD unsigned mask(std::uint64_t n) const {
+        return static_cast<unsigned>(masks[n >> 3] >> low_bit(n)) & 255u;
+    }
+    // The number of child c, 0 to 7, of node n, on the level below; the child exists.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t child(std::uint64_t n, unsigned c) const {
+        const octree_block block = blocks[n >> octree_block::log2_nodes];
+        const std::uint64_t word = n >> 3, below = (std::uint64_t{1} << (low_bit(n) + c)) - 1;
+        return block.before_word(static_cast<unsigned>(word & 7u)) + core::count_ones(masks[word] & below);
+    }
+    // The number of the first child of node n that exists; the others follow.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t first_child(std::uint64_t n) const { return child(n, 0); }
+    // The rank of the value of node n, which is a tile.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t rank_of_tile(std::uint64_t n) const {
+        return tiles[core::bisect(num_tiles, [this, n](std::uint64_t i) { return tiles[i].node < n; })].rank;
+    }
+
+    // Words of the masks of so many nodes.
+    [[nodiscard]] VOXELPIPE_HD static constexpr std::uint64_t num_words(std::uint64_t nodes) { return (nodes + 7) / 8; }
+    // Blocks of so many nodes.
+    [[nodiscard]] VOXELPIPE_HD static constexpr std::uint64_t num_blocks(std::uint64_t nodes) {
+        return (nodes + 63) / 64;
+    }
+
+private:
+    [[nodiscard]] VOXELPIPE_HD static unsigned low_bit(std::uint64_t n) { return static_cast<unsigned>(n & 7u) * 8; }
+};
+
 // Reads an octree in host or device memory; does not own it.
 struct octree_view {
     static constexpr int max_levels = 21; // enough for 2^20 voxels an axis
 
-    int num_levels = 0;                       // the root is level num_levels; there is none where no voxel exists
-    const std::uint8_t* masks[max_levels]{};  // of level l at [l - 1]; bit c: the child with Morton number c exists
-    const std::uint64_t* first[max_levels]{}; // number of the first child that exists; of a tile, its rank
-
-    // The number of child c, 0 to 7, of node n of a level; the child exists.
-    [[nodiscard]] VOXELPIPE_HD std::uint64_t child(int level, std::uint64_t n, unsigned c) const {
-        return first[level - 1][n] + core::count_ones(masks[level - 1][n] & ((1u << c) - 1));
-    }
+    int num_levels = 0;                     // the root is level num_levels; there is none where no voxel exists
+    octree_level_view levels[max_levels]{}; // level l at [l - 1]
 
     // The first voxel along origin + t * direction, 0 <= t <= limit, in continuous voxel coordinates of the whole grid,
     // in which voxel (i, j, k) is the box from (i, j, k) to (i + 1, j + 1, k + 1). A ray that starts within a voxel
@@ -79,14 +135,15 @@ struct octree_view {
             bool is_full = level == 0;
             std::uint64_t rank = path[0];
             while (level > 0) {
-                const unsigned c = child_of(cell, level), mask = masks[level - 1][path[level]];
+                const octree_level_view& nodes = levels[level - 1];
+                const unsigned c = child_of(cell, level), mask = nodes.mask(path[level]);
                 if (mask == 0) {
                     is_full = true;
-                    rank = first[level - 1][path[level]];
+                    rank = nodes.rank_of_tile(path[level]);
                     break;
                 }
                 if ((mask >> c & 1u) == 0) break;
-                path[level - 1] = child(level, path[level], c);
+                path[level - 1] = nodes.child(path[level], c);
                 --level;
                 is_full = level == 0;
                 rank = path[level];
