@@ -3,7 +3,7 @@
 #pragma once
 
 // A sparse framebuffer's contents in host memory: found by voxel, walked brick by brick or voxel by voxel, made dense
-// as a whole or in part, and merged with those of other parts of the same grid.
+// as a whole or in part.
 
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/core/index_iterator.hpp>
@@ -13,11 +13,9 @@
 
 #include <glm/common.hpp>
 
-#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
@@ -109,6 +107,7 @@ public:
     core::pack<std::vector<core::kept_sum<Targets>>...> sums;                     // by rank, where they were kept
     core::pack<typename Targets::value_type...> clear_values{};                   // what absent voxels read as
     grid where;                                                                   // of the last call
+    bool is_tiled = false; // every full brick is in a tile, as a solid of one constant leaves them
 
     // Refers to the arrays.
     [[nodiscard]] brick_table table() const {
@@ -272,79 +271,6 @@ template <class... Targets>
         for (std::size_t i = 0; same && i < x.size(); ++i) same = core::is_same_value(x[i], y[i]);
     });
     return same;
-}
-
-// Joins the results of two parts of one grid: crops, whose borders may run through bricks. Both have the same targets
-// enabled and no voxel in common; throws std::invalid_argument otherwise. The result's part is the box around both.
-// Tiles stay as they are: those that meet at a border are not joined.
-template <class... Targets>
-[[nodiscard]] host_sparse<Targets...> merge(const host_sparse<Targets...>& a, const host_sparse<Targets...>& b) {
-    if (a.where.uncropped() != b.where.uncropped())
-        throw std::invalid_argument("voxelpipe::merge: the parts are not of one grid");
-    host_sparse<Targets...> out;
-    out.clear_values = a.clear_values;
-    const glm::ivec3 low = glm::min(a.where.offset, b.where.offset),
-                     high = glm::max(a.where.offset + a.where.extent, b.where.offset + b.where.extent);
-    out.where = a.where.uncropped().crop(low, high - low);
-    const std::uint64_t values = a.num_values() + b.num_values();
-    core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-        using target = typename core::pack_element<I, Targets...>::type;
-        if (a.num_values() != 0 && b.num_values() != 0 &&
-            (get<I>(a.values).empty() != get<I>(b.values).empty() || get<I>(a.sums).empty() != get<I>(b.sums).empty()))
-            throw std::invalid_argument("voxelpipe::merge: the parts have different targets");
-        if (!get<I>(a.values).empty() || !get<I>(b.values).empty())
-            get<I>(out.values).resize(core::rank_map<target>::elements(values));
-        if (!get<I>(a.sums).empty() || !get<I>(b.sums).empty()) get<I>(out.sums).resize(values);
-    });
-    std::uint64_t rank = 0;
-    const auto copy = [&](const host_sparse<Targets...>& from, std::uint64_t first, std::uint64_t to) {
-        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-            using map = core::rank_map<typename core::pack_element<I, Targets...>::type>;
-            if (!get<I>(out.values).empty())
-                map::store(get<I>(out.values).data(), to, map::load(get<I>(from.values).data(), first));
-            if (!get<I>(out.sums).empty()) get<I>(out.sums)[to] = get<I>(from.sums)[first];
-        });
-    };
-    for (std::size_t i = 0, j = 0; i < a.keys.size() || j < b.keys.size();) {
-        const bool from_a = j == b.keys.size() || (i < a.keys.size() && a.keys[i] <= b.keys[j]);
-        const bool from_b = i == a.keys.size() || (j < b.keys.size() && b.keys[j] <= a.keys[i]);
-        brick_mask mask;
-        out.keys.push_back(from_a ? a.keys[i] : b.keys[j]);
-        out.offsets.push_back(rank);
-        std::uint64_t next_a = from_a ? a.offsets[i] : 0, next_b = from_b ? b.offsets[j] : 0;
-        for (int w = 0; w < 8; ++w) {
-            const std::uint64_t in_a = from_a ? a.masks[i].words[w] : 0, in_b = from_b ? b.masks[j].words[w] : 0;
-            if ((in_a & in_b) != 0) throw std::invalid_argument("voxelpipe::merge: a voxel is in both parts");
-            mask.words[w] = in_a | in_b;
-            for (std::uint64_t word = mask.words[w]; word != 0; word &= word - 1) {
-                if ((in_a & word & (0 - word)) != 0)
-                    copy(a, next_a++, rank++);
-                else
-                    copy(b, next_b++, rank++);
-            }
-        }
-        out.masks.push_back(mask);
-        i += from_a ? 1 : 0;
-        j += from_b ? 1 : 0;
-    }
-    if (!out.keys.empty()) out.offsets.push_back(rank);
-    for (std::size_t i = 0, j = 0; i < a.tiles.size() || j < b.tiles.size();) {
-        const bool from_a = j == b.tiles.size() || (i < a.tiles.size() && a.tiles[i].bits < b.tiles[j].bits);
-        const host_sparse<Targets...>& from = from_a ? a : b;
-        std::size_t& tile = from_a ? i : j;
-        out.tiles.push_back(from.tiles[tile]);
-        copy(from, from.num_values() - from.tiles.size() + tile, rank++);
-        ++tile;
-    }
-    return out;
-}
-
-// The same for any number of parts, at least one; each voxel is copied about log2(parts) times.
-template <class... Targets>
-[[nodiscard]] host_sparse<Targets...> merge(std::span<const host_sparse<Targets...>> parts) {
-    if (parts.empty()) throw std::invalid_argument("voxelpipe::merge: no parts");
-    if (parts.size() == 1) return parts[0];
-    return merge(merge(parts.first(parts.size() / 2)), merge(parts.subspan(parts.size() / 2)));
 }
 
 } // namespace voxelpipe

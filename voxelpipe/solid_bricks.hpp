@@ -254,6 +254,7 @@ template <class Backend, class Draw, class... Targets>
         limited.required.voxels = values;
         return limited;
     }
+    made.is_tiled = true;
     const auto background = fb.next_background();
     for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
         using target = typename pack_element<I, Targets...>::type;

@@ -10,6 +10,7 @@
 #include <voxelpipe/core/brick_lookup.hpp>
 #include <voxelpipe/host_sparse.hpp>
 #include <voxelpipe/solid.hpp>
+#include <voxelpipe/sparse_merge.hpp>
 
 #include <bitset>
 #include <cstddef>
@@ -55,6 +56,7 @@ struct sparse_contents {
     buffer<brick_tile> tiles;      // ascending
     std::uint64_t num_voxels = 0;  // that exist in bricks
     std::uint64_t tile_voxels = 0; // in tiles
+    bool is_tiled = false;         // as host_sparse's
     core::pack<buffer<typename core::rank_map<Targets>::element>...> values; // empty for disabled targets
     core::pack<buffer<core::kept_sum<Targets>>...> sums;                     // empty where they are not kept
 
@@ -238,6 +240,7 @@ private:
         h.tiles = contents_.tiles.to_host(backend);
         h.clear_values = background_;
         h.where = where_;
+        h.is_tiled = contents_.is_tiled;
         return h;
     }
 

@@ -24,7 +24,7 @@ CPP = {
     "abuffers": ("A-buffers", "Every fragment of every voxel. In the paper: A-buffer and bucketing.", ["abuffer.hpp"]),
     "solids": ("Solids", "The inside of meshes.", ["solid.hpp", "core/crossing.hpp"]),
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
-               ["sparse.hpp", "host_sparse.hpp", "core/brick_table.hpp", "core/brick_tile.hpp", "core/brick_lookup.hpp", "octree.hpp", "core/octree_view.hpp",
+               ["sparse.hpp", "host_sparse.hpp", "sparse_merge.hpp", "core/brick_table.hpp", "core/brick_tile.hpp", "core/brick_lookup.hpp", "octree.hpp", "core/octree_view.hpp",
                 "reducers.hpp", "octree_dag.hpp", "backend_octree.hpp", "backend_octree_dag.hpp", "core/octree_dag_view.hpp", "io/nanovdb.hpp"]),
     "levels": ("Levels and rays of dense grids", "Coarser levels of targets, levels of light for cone tracing, rays through bits.",
                ["dense_levels.hpp", "direction_mips.hpp", "dense_bits.hpp", "core/cell_walk.hpp"]),

@@ -5,6 +5,7 @@
 // rule, extent, choice of bodies and repair, shaded and constant, cleared and loaded, whole grids and crops.
 
 #include "api_model.hpp"
+#include "merge_cases.hpp"
 #include "triangles.hpp"
 
 #include <voxelpipe/backend_octree_dag.hpp>
@@ -298,7 +299,7 @@ TEST(SparseSolids, InsidesAreTiles) {
     ASSERT_TRUE(draw_box(backend, box, below, a, 7));
     ASSERT_TRUE(draw_box(backend, box, above, b, 7));
     const auto joined = vp::merge(b.to_host(backend), a.to_host(backend));
-    EXPECT_EQ(joined.num_tiles(), a.num_tiles() + b.num_tiles());
+    EXPECT_TRUE(vp::same_contents(joined, h));
     expect_voxels(joined, extent, [&](const glm::ivec3& v) { return inside(v) ? 7u : 0u; });
     // By hash.
     const vp::brick_slots slots(backend, fb);
@@ -317,6 +318,12 @@ TEST(SparseSolids, InsidesAreTiles) {
     EXPECT_EQ(s.required.bricks, fb.num_bricks() + fb.num_tiles());
     EXPECT_EQ(s.required.voxels, fb.num_values());
     EXPECT_EQ(small.num_voxels(), 0u);
+}
+
+TEST(SparseSolids, MergedSlabsHaveTheTilesOfTheWhole) {
+    backend_type backend = unit::make_backend(2);
+    merge_cases::slabs_are_the_whole(backend, 1);
+    merge_cases::other_tiles_stay(backend);
 }
 
 // An octree has a tile as one node: the same voxels, values and rays as those of the bricks that it stands for.

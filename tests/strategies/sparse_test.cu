@@ -4,6 +4,7 @@
 // Sparse framebuffers on the device: the bytes of cpu_backend, for every blend, clear and load and off, kept sums,
 // crops, several draws, and grids beyond 32-bit cells.
 
+#include "../sparse/merge_cases.hpp"
 #include "../sparse/octree_cases.hpp"
 #include "api_model.hpp"
 #include "async_lists.hpp"
@@ -479,6 +480,12 @@ TEST(DeviceSparse, TilesAreTheCpus) {
     EXPECT_GT(r.on_host.num_tiles(), 0u);
 }
 
+TEST(DeviceSparse, MergedSlabsHaveTheTilesOfTheWhole) {
+    vp::cuda_backend backend;
+    merge_cases::slabs_are_the_whole(backend, 5); // 1, 7, 3 and 3 slabs
+    merge_cases::other_tiles_stay(backend);
+}
+
 // Solids in memory of the caller: too little room first, then a graph that is replayed with moved vertices. Shaded and
 // constant, with tiles, the bytes are those of a sparse framebuffer.
 TEST(DeviceSparse, SolidsInMemoryOfTheCaller) {
@@ -511,6 +518,7 @@ TEST(DeviceSparse, SolidsInMemoryOfTheCaller) {
                 EXPECT_GT(y.num_voxels(), 500u);
                 EXPECT_EQ(x.num_voxels(), y.num_voxels());
                 EXPECT_TRUE(vp::same_contents(x, y));
+                EXPECT_EQ(x.is_tiled, y.is_tiled);
             };
             vp::workspace_limits limits{}, need{};
             limits.bricks = limits.voxels = 1;

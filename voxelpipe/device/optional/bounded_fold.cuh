@@ -59,6 +59,7 @@ struct bounded_result {
     void set(sparse_result<Targets...>& result, const grid& g, const brick_tile* tiles, std::uint64_t num_tiles) const {
         result.counts = bricks.counts;
         result.where = g;
+        result.is_tiled = false;
         result.view.table = {bricks.keys, bricks.masks, bricks.offsets, limits.bricks,
                              g.extent,    g.offset,     tiles,          num_tiles};
         result.view.clear_values = result.next_background();

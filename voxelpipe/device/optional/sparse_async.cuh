@@ -158,6 +158,7 @@ void forget_made(sparse_result<Targets...>& result) {
     result.counts = nullptr;
     result.view = {};
     result.where = {};
+    result.is_tiled = false;
 }
 
 } // namespace device

@@ -42,7 +42,8 @@ struct sparse_result {
     // For device code. Its table has room: behind the last brick its keys are ~0, which no voxel has, and behind the
     // last tile it has brick_tile::none().
     sparse_view<Targets...> view{};
-    grid where; // of the call
+    grid where;            // of the call
+    bool is_tiled = false; // as host_sparse's; set by the call
 
     // Makes the next call go on from what an earlier one left: every target loads. It must be given another workspace.
     void load(const sparse_result& earlier) {
@@ -74,6 +75,7 @@ struct sparse_result {
     [[nodiscard]] host_sparse<Targets...> to_host(cuda_backend& backend) const {
         host_sparse<Targets...> h;
         h.where = where;
+        h.is_tiled = is_tiled;
         h.clear_values = counts == nullptr ? next_background() : view.clear_values;
         if (counts == nullptr) return h;
         const auto copy = [&](auto& to, const auto* from, std::uint64_t count) {

@@ -119,6 +119,7 @@ private:
                 fill_mask_values<target>(get<I>(made.values), limits.voxels, num_values, value, stream);
             });
             made.set(result, g, bricks.tiles(), limits.bricks);
+            result.is_tiled = true;
         }
         return true;
     }
