@@ -6,6 +6,7 @@
 #include "test_volumes.hpp"
 
 #include <formats/formats.hpp>
+#include <sparse/sparse_formats.hpp>
 #include <srgb.hpp>
 
 #include <openvdb/io/File.h>
@@ -102,6 +103,79 @@ TEST_F(Vdb, HoldsEveryChannelWhereThereAreVoxels) {
         return openvdb::Vec3s(value_at<float>(v, "normal", i, 0, 3), value_at<float>(v, "normal", i, 1, 3),
                               value_at<float>(v, "normal", i, 2, 3));
     });
+}
+
+// A brick, and tiles of 128, 8 and 16 voxels a side, each with values of its own; and the dense volume of them.
+std::pair<sparse_volume, volume> with_tiles() {
+    using voxelpipe::brick_tile;
+    using voxelpipe::core::morton_key;
+    std::pair<sparse_volume, volume> both;
+    auto& [v, dense] = both;
+    v.shape.extent = dense.extent = {160, 128, 128};
+    v.shape.origin = dense.origin = {-3, 0.5, 10};
+    v.shape.voxel_size = dense.voxel_size = {0.5, 0.25, 2};
+    v.tiles = {brick_tile::of(morton_key(0, 0, 0), 4), brick_tile::of(morton_key(17, 0, 0), 0),
+               brick_tile::of(morton_key(18, 2, 0), 1)};
+    v.keys = {morton_key(16, 1, 3)};
+    v.masks.resize(1);
+    v.masks[0].words[0] = 0x11;
+    v.masks[0].words[7] = std::uint64_t{1} << 63;
+    v.offsets = {0, 3};
+    const auto count_of = [](std::size_t rank) { return static_cast<std::uint32_t>(rank * rank + 1); };
+    const auto color_of = [](std::size_t rank) { return static_cast<std::uint32_t>(0xff804020U + 3 * rank); };
+    v.channels = {{"occupancy", scalar::bit, 1, {}}, {"color", scalar::u8, 4, {}}, {"count", scalar::u32, 1, {}}};
+    v.channels[1].data.resize(4 * v.num_values());
+    v.channels[2].data.resize(4 * v.num_values());
+    for (std::size_t rank = 0; rank < v.num_values(); ++rank) {
+        store(v.channels[1].data.data() + 4 * rank, color_of(rank));
+        store(v.channels[2].data.data() + 4 * rank, count_of(rank));
+    }
+    dense.add("occupancy", scalar::bit);
+    dense.add("color", scalar::u8, 4);
+    dense.add("count", scalar::u32);
+    const auto fill_box = [&dense = dense, &count_of, &color_of](const glm::ivec3& low, int side, std::size_t rank) {
+        for (int z = low.z; z < low.z + side; ++z)
+            for (int y = low.y; y < low.y + side; ++y)
+                for (int x = low.x; x < low.x + side; ++x) {
+                    const auto at = 4 * static_cast<std::size_t>(dense.index(x, y, z));
+                    dense.set_bit(*dense.find("occupancy"), x, y, z);
+                    store(dense.find("color")->data.data() + at, color_of(rank));
+                    store(dense.find("count")->data.data() + at, count_of(rank));
+                }
+    };
+    fill_box({128, 8, 24}, 1, 0); // bits 0, 4 and 511 of the brick
+    fill_box({128, 8, 25}, 1, 1);
+    fill_box({135, 15, 31}, 1, 2);
+    fill_box({0, 0, 0}, 128, 3);
+    fill_box({136, 0, 0}, 8, 4);
+    fill_box({144, 16, 0}, 16, 5);
+    return both;
+}
+
+TEST_F(Vdb, TilesOfSolidsAreTheVoxelsOfTheDenseGrid) {
+    const auto both = with_tiles();
+    const sparse_volume& v = both.first;
+    const volume& dense = both.second;
+    ASSERT_EQ(static_cast<std::int64_t>(v.num_voxels()), dense.popcount(*dense.occupancy()));
+    write_sparse(v, folder_ / "a.vdb", {});
+    const grids found = read(folder_ / "a.vdb");
+    EXPECT_EQ(3U, found.size());
+    const color_tables tables = make_color_tables();
+    expect_values<openvdb::MaskGrid>(found, "occupancy", dense, [](std::size_t) { return true; });
+    expect_values<openvdb::Vec3SGrid>(found, "color", dense, [&](std::size_t i) {
+        const auto byte = [&](std::size_t c) { return value_at<std::uint8_t>(dense, "color", i, c, 4); };
+        return openvdb::Vec3s(tables.linear[byte(0)], tables.linear[byte(1)], tables.linear[byte(2)]);
+    });
+    expect_values<openvdb::Int32Grid>(found, "count", dense, [&](std::size_t i) {
+        return static_cast<std::int32_t>(value_at<std::uint32_t>(dense, "count", i));
+    });
+    // In the file they are tiles too: one of 128, and 1 + 8 of 8 voxels a side. The brick is the leaf.
+    for (const auto& [name, grid] : found) {
+        EXPECT_EQ(1U, grid->baseTree().leafCount()) << name;
+        EXPECT_EQ(10U, grid->baseTree().activeTileCount()) << name;
+        EXPECT_EQ(v.num_voxels(), grid->activeVoxelCount()) << name;
+    }
+    EXPECT_GT(100'000U, std::filesystem::file_size(folder_ / "a.vdb"));
 }
 
 TEST_F(Vdb, CountsBeyond31BitsTake64) {
