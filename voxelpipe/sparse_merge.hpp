@@ -51,21 +51,21 @@ struct tile_source {
     std::uint64_t rank;
 };
 
-// Makes one of eight siblings with the same values, again and again. In the order of the tiles, before and after.
-template <class... Targets>
-[[nodiscard]] std::vector<tile_source<Targets...>> join_siblings(std::vector<tile_source<Targets...>> tiles) {
+// Makes one of eight siblings with the same values, again and again. Source has a `tile`; is_same(source, source): of
+// the values. In the order of the tiles, before and after.
+template <class Source, class IsSame>
+[[nodiscard]] std::vector<Source> join_siblings(std::vector<Source> tiles, const IsSame& is_same) {
     std::size_t count = 0; // of the tiles that are done
     // The last eight are all children of a tile: of one level and without a gap.
     const auto end_in_siblings = [&] {
         if (count < 8) return false;
-        const auto& first = tiles[count - 8];
+        const Source& first = tiles[count - 8];
         const int level = first.tile.level();
         const std::uint64_t size = std::uint64_t{1} << (3 * level);
         if ((first.tile.first() & (8 * size - 1)) != 0 || tiles[count - 1].tile.end() - first.tile.first() != 8 * size)
             return false;
-        return std::all_of(tiles.data() + count - 8, tiles.data() + count, [&](const tile_source<Targets...>& t) {
-            return t.tile.level() == level && have_same_values(*first.from, first.rank, *t.from, t.rank);
-        });
+        return std::all_of(tiles.data() + count - 8, tiles.data() + count,
+                           [&](const Source& t) { return t.tile.level() == level && is_same(first, t); });
     };
     for (std::size_t i = 0; i < tiles.size(); ++i) {
         tiles[count++] = tiles[i];
@@ -158,8 +158,11 @@ template <class... Targets>
         for (std::size_t t = 0; t < part->tiles.size(); ++t)
             tiles.push_back({part->tiles[t], part, part->num_values() - part->tiles.size() + t});
     std::sort(tiles.begin(), tiles.end(), [](const auto& x, const auto& y) { return x.tile.bits < y.tile.bits; });
-    tiles = core::join_siblings(std::move(tiles));
-    for (const core::tile_source<Targets...>& t : tiles) {
+    using source = core::tile_source<Targets...>;
+    tiles = core::join_siblings(std::move(tiles), [](const source& x, const source& y) {
+        return core::have_same_values(*x.from, x.rank, *y.from, y.rank);
+    });
+    for (const source& t : tiles) {
         out.tiles.push_back(t.tile);
         copy(*t.from, t.rank);
     }

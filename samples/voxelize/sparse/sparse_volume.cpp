@@ -7,6 +7,7 @@
 
 #include <voxelpipe/core/brick_lookup.hpp>
 #include <voxelpipe/host_sparse.hpp>
+#include <voxelpipe/sparse_merge.hpp>
 
 #include <algorithm>
 #include <bit>
@@ -111,16 +112,34 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
     for (std::size_t p = 0; p < parts.size(); ++p)
         for (std::size_t b = 0; b < parts[p].keys.size(); ++b)
             places.push_back({parts[p].keys[b], static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(b)});
-    std::vector<place> tiles; // by number in their part
+    struct tile_place {
+        voxelpipe::brick_tile tile;
+        std::size_t part;
+        std::uint64_t rank;
+    };
+    std::vector<tile_place> tiles;
     for (std::size_t p = 0; p < parts.size(); ++p)
         for (std::size_t t = 0; t < parts[p].tiles.size(); ++t)
-            tiles.push_back({parts[p].tiles[t].bits, static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(t)});
-    const auto by_key = [](const place& a, const place& b) { return a.key < b.key; };
-    std::sort(places.begin(), places.end(), by_key);
-    std::sort(tiles.begin(), tiles.end(), by_key);
+            tiles.push_back({parts[p].tiles[t], p, parts[p].table().num_in_bricks() + t});
+    std::sort(places.begin(), places.end(), [](const place& a, const place& b) { return a.key < b.key; });
+    std::sort(tiles.begin(), tiles.end(),
+              [](const tile_place& a, const tile_place& b) { return a.tile.bits < b.tile.bits; });
+    const auto value_of = [&](const tile_place& at, std::size_t c, std::size_t size) {
+        return parts[at.part].channels[c].data.data() + at.rank * size;
+    };
+    const auto size_of_channel = [](const channel& c) {
+        return size_of(c.type) * static_cast<std::size_t>(c.components);
+    };
+    tiles = voxelpipe::core::join_siblings(std::move(tiles), [&](const tile_place& a, const tile_place& b) {
+        for (std::size_t c = 0; c < parts.front().channels.size(); ++c) {
+            const std::size_t size = size_of_channel(parts.front().channels[c]);
+            if (size != 0 && std::memcmp(value_of(a, c, size), value_of(b, c, size), size) != 0) return false;
+        }
+        return true;
+    });
     sparse_volume result;
     result.shape = parts.front().shape;
-    for (const place& at : tiles) result.tiles.push_back({at.key});
+    for (const tile_place& at : tiles) result.tiles.push_back(at.tile);
     std::uint64_t rank = 0;
     for (const place& at : places) {
         result.keys.push_back(at.key);
@@ -132,7 +151,7 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
     for (std::size_t c = 0; c < parts.front().channels.size(); ++c) {
         const channel& like = parts.front().channels[c];
         channel to{like.name, like.type, like.components, {}};
-        const std::size_t size = size_of(to.type) * static_cast<std::size_t>(to.components);
+        const std::size_t size = size_of_channel(to);
         to.data.resize(static_cast<std::size_t>(rank + tiles.size()) * size);
         std::byte* out = to.data.data();
         for (const place& at : places) {
@@ -143,11 +162,9 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
                         static_cast<std::size_t>(last - first) * size);
             out += (last - first) * size;
         }
-        for (const place& at : tiles) {
+        for (const tile_place& at : tiles) {
             if (size == 0) break;
-            const sparse_volume& from = parts[at.part];
-            const std::uint64_t value = (from.offsets.empty() ? 0 : from.offsets.back()) + at.brick;
-            std::memcpy(out, from.channels[c].data.data() + value * size, size);
+            std::memcpy(out, value_of(at, c, size), size);
             out += size;
         }
         for (sparse_volume& from : parts) from.channels[c].data = channel_bytes();

@@ -64,7 +64,8 @@ struct sparse_volume {
 // to the channels.
 [[nodiscard]] volume as_dense(const sparse_volume& v, std::span<const channel> channels);
 
-// One volume of parts of one grid that share no brick; they have the same channels, which are freed one by one.
+// One volume of parts of one grid that share no brick; they have the same channels, which are freed one by one. Tiles
+// that meet are joined as those of a whole are.
 [[nodiscard]] sparse_volume join_slabs(std::vector<sparse_volume>&& parts);
 
 // The same volume, in which those of `keys`, ascending, that lie in tiles are bricks; without keys, all bricks of

@@ -149,6 +149,37 @@ std::uint32_t value_at(const sparse_volume& v, const glm::ivec3& p) {
 
 } // namespace
 
+// Four tiles below and four above become one where their values are the same.
+TEST_F(Nvdb, TilesOfSlabsAreThoseOfTheWhole) {
+    const auto half = [](int z, std::uint32_t value) {
+        sparse_volume v;
+        v.shape.extent = {16, 16, 16};
+        v.shape.voxel_size = {1, 1, 1};
+        channel numbers{"count", scalar::u32, 1, {}};
+        numbers.data.resize(16);
+        for (int i = 0; i < 4; ++i) {
+            v.tiles.push_back(voxelpipe::brick_tile::of(voxelpipe::core::morton_key(i & 1, i >> 1, z), 0));
+            store(numbers.data.data() + 4 * i, value);
+        }
+        v.channels = {{"occupancy", scalar::bit, 1, {}}, numbers};
+        return v;
+    };
+    const auto joined = [&](std::uint32_t above) {
+        std::vector<sparse_volume> parts;
+        parts.push_back(half(1, above));
+        parts.push_back(half(0, 70));
+        return join_slabs(std::move(parts));
+    };
+    const sparse_volume same = joined(70), other = joined(71);
+    ASSERT_EQ(same.tiles.size(), 1u);
+    EXPECT_EQ(same.tiles[0], voxelpipe::brick_tile::of(0, 1));
+    EXPECT_EQ(same.channels[1].data.size(), 4u);
+    EXPECT_EQ(value_at(same, {3, 4, 5}), 70u);
+    ASSERT_EQ(other.tiles.size(), 8u);
+    EXPECT_EQ(value_at(other, {15, 15, 7}), 70u);
+    EXPECT_EQ(value_at(other, {0, 0, 8}), 71u);
+}
+
 TEST_F(Nvdb, TilesAreOpenedWhereBricksAreAskedFor) {
     const sparse_volume v = volume_with_tiles(), all = open_tiles(v);
     EXPECT_TRUE(all.tiles.empty());
