@@ -127,8 +127,7 @@ void compare_passes(stages<marked>& s) {
     const device::capacities limits{20000, 20000, 0, 0};
     stage_memory m(s.gpu, {});
     const stages<marked>::scene_memory buffers(m.memory, s.on_device());
-    const device::tile_memory tiles(m.memory, vp::core::tile_grid(s.g.extent, policy.log2_tile_size), s.num_triangles(),
-                                    limits,
+    const device::tile_memory tiles(m.memory, vp::core::tile_grid(s.g.extent, policy.log2_tile_size), limits,
                                     std::max(device::max_image_words<policy.log2_tile_size, view_type>(),
                                              device::max_image_words<policy.log2_tile_size, extremes::view_type>()),
                                     16);

@@ -76,7 +76,8 @@ inline constexpr int max_bricks = 64;               // that wait in a warp
 inline constexpr int count_emit_min_blocks = 3; // blocks of its kernels
 // Most columns of cells of a triangle that one thread takes; a warp takes a larger one. Tiles, and voxels.
 inline constexpr std::int64_t small_tile_columns = 16, small_fragment_columns = 256;
-inline constexpr int wide_batch = 8; // spans of the 128-bit path at a time
+inline constexpr unsigned coarse_triangles = 4; // of a thread, which the coarse raster takes together
+inline constexpr int wide_batch = 8;            // spans of the 128-bit path at a time
 
 // ---- clears and last passes (device/targets/) -----------------------------------------------------------------------
 

@@ -5,7 +5,7 @@
 // The counters and flags of a call in progress (pipeline_state) and the capacities of its arrays. Both decide whether a
 // call may write to its targets (has_failed).
 
-#include <voxelpipe/core/triangle_setup.hpp>
+#include <voxelpipe/core/primitive.hpp>
 
 #include <cstdint>
 
@@ -51,6 +51,16 @@ struct pipeline_state {
     struct {
         unsigned long long nodes, bricks, voxels;
     } sparse; // what a sparse call in the caller's memory needs
+
+    // Where triangles of this kind are counted.
+    [[nodiscard]] VOXELPIPE_HD unsigned long long* counter_of(core::triangle_class kind) {
+        using core::triangle_class;
+        return kind == triangle_class::nonfinite   ? &nonfinite
+               : kind == triangle_class::too_far   ? &too_far
+               : kind == triangle_class::zero_area ? &zero_area
+               : kind == triangle_class::outside   ? &outside
+                                                   : &drawn;
+    }
 
     // For capacities::longest_ordered: 0 if the windows order all voxels, 1 if a block can take the longest that they
     // leave.

@@ -37,7 +37,7 @@ struct tiled_strategy {
         constexpr int log2_size = Call::policy.log2_tile_size;
         const auto& limits = c.plan.limits;
         if constexpr (has_tiles)
-            tiles.emplace(memory, core::tile_grid(c.plan.g.extent, log2_size), c.plan.num_primitives, limits,
+            tiles.emplace(memory, core::tile_grid(c.plan.g.extent, log2_size), limits,
                           max_image_words<log2_size, framebuffer_type>(),
                           tuning::default_pairs_per_item(limits.tile_pairs));
         if constexpr (groups::has_ordered) {

@@ -92,37 +92,23 @@ struct cell_counts {
 //   box
 //                                                             is the triangle's own
 //   emit(geometry, triangle, primitive, box, whole, offset)   stores the cells that count() counts, from offset on
-// With knows_lines = true it also tells triangles whose cells are all of a box, a line of few:
-//   bool find_line(geometry, primitive, box)                  true if the primitive is one, with its box
-//   emit_line(primitive, box, offset)                         stores them
-template <class Op>
-concept knows_lines = requires {
-    requires Op::knows_lines;
-};
-inline constexpr std::uint32_t no_primitive = ~0u;
-
-// The primitive that a thread takes: its own, `primitive`, or none. But where lines are known, on_line(box) is called
-// for the thread's own if it is one, and the threads of the block that come first take what is left: that costs far
-// more, and keeps few warps busy in this way. All threads of the block call it.
-template <class Op, class OnLine>
-[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t take_primitive(const geometry& geo, const Op& op,
-                                                                       std::uint32_t primitive, OnLine&& on_line) {
-    if constexpr (knows_lines<Op>) {
-        __shared__ std::uint32_t left[threads_per_block], num_left;
-        if (threadIdx.x == 0) num_left = 0;
-        __syncthreads();
-        if (primitive != no_primitive) {
-            core::voxel_box line{};
-            if (op.find_line(geo, primitive, line))
-                on_line(line);
-            else
-                left[atomicAdd(&num_left, 1u)] = primitive;
-        }
-        __syncthreads();
-        return threadIdx.x < num_left ? left[threadIdx.x] : no_primitive;
-    } else {
-        return primitive;
+// Inclusive prefix sum of `value` over the lanes of a warp.
+[[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t lane_prefix(std::uint32_t value) {
+    for (unsigned step = 1; step < 32; step *= 2) {
+        const std::uint32_t other = __shfl_up_sync(0xffffffffu, value, step);
+        if (threadIdx.x % 32 >= step) value += other;
     }
+    return value;
+}
+
+// Appends the records of a large triangle whose box of cells is `box`.
+__device__ inline void record_chunks(const geometry& geo, const loaded_triangle& t, std::uint32_t id,
+                                     const core::voxel_box& box, const cell_buffers& b) {
+    const chunk_grid chunks(box, core::dominant_axis(t.a, t.b, t.c, geo.snap.fraction));
+    const auto records = static_cast<unsigned long long>(chunks.records());
+    const unsigned long long first = atomicAdd(b.num_records, records);
+    for (unsigned long long r = 0; r < records && first + r < b.record_capacity; ++r)
+        b.records[first + r] = {id, static_cast<std::uint32_t>(r)};
 }
 
 template <class Op>
@@ -131,18 +117,11 @@ __device__ VOXELPIPE_INLINE void count_small(const geometry& geo, const Op& op, 
     using core::triangle_class;
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     triangle_class kind = triangle_class::drawn;
-    std::uint32_t n = 0, of_line = 0; // cells
+    std::uint32_t n = 0; // cells
     bool bad = false;
     std::uint32_t discarded = 0;
-    const std::uint32_t id =
-        take_primitive(geo, op, i < geo.num_primitives ? static_cast<std::uint32_t>(i) : no_primitive,
-                       [&](const core::voxel_box& line) VOXELPIPE_INLINE_LAMBDA {
-                           of_line = 1;
-                           for (int k = 0; k < 3; ++k)
-                               of_line *= static_cast<std::uint32_t>(line.hi[k] - line.lo[k] + 1);
-                           b.counts[i] = of_line;
-                       });
-    const bool valid = id != no_primitive;
+    const bool valid = i < geo.num_primitives;
+    const auto id = static_cast<std::uint32_t>(i);
     if (valid) {
         const loaded_triangle t = geo.load(id);
         bad = !t.index_ok;
@@ -159,11 +138,7 @@ __device__ VOXELPIPE_INLINE void count_small(const geometry& geo, const Op& op, 
                     n = cells.kept;
                     discarded = cells.discarded;
                 } else {
-                    const chunk_grid chunks(box, core::dominant_axis(t.a, t.b, t.c, geo.snap.fraction));
-                    const auto records = static_cast<unsigned long long>(chunks.records());
-                    const unsigned long long first = atomicAdd(b.num_records, records);
-                    for (unsigned long long r = 0; r < records && first + r < b.record_capacity; ++r)
-                        b.records[first + r] = {id, static_cast<std::uint32_t>(r)};
+                    record_chunks(geo, t, id, box, b);
                 }
             }
         }
@@ -172,8 +147,7 @@ __device__ VOXELPIPE_INLINE void count_small(const geometry& geo, const Op& op, 
     if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, bad_index);
     if (op.counts_triangles) {
         const bool dropped = valid && !bad && kind != triangle_class::drawn;
-        const int drawn = __syncthreads_count(static_cast<int>(valid && !bad && !dropped)) +
-                          __syncthreads_count(static_cast<int>(of_line != 0));
+        const int drawn = __syncthreads_count(static_cast<int>(valid && !bad && !dropped));
         if (threadIdx.x == 0 && drawn != 0) atomicAdd(&state->drawn, static_cast<unsigned long long>(drawn));
         if (__syncthreads_or(static_cast<int>(dropped)) != 0) {
             const auto add = [&](triangle_class which, unsigned long long* total) {
@@ -186,7 +160,7 @@ __device__ VOXELPIPE_INLINE void count_small(const geometry& geo, const Op& op, 
             add(triangle_class::outside, &state->outside);
         }
     }
-    const unsigned long long sum = block_sum(n + of_line);
+    const unsigned long long sum = block_sum(n);
     if (threadIdx.x == 0 && sum != 0) atomicAdd(b.num_cells, sum);
     count_discarded(discarded, state);
 }
@@ -235,14 +209,9 @@ template <class Op>
 __device__ VOXELPIPE_INLINE void emit_small(const geometry& geo, const Op& op, const cell_buffers& b,
                                             const pipeline_state* state, const capacities& limits) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    if (has_failed(*state, limits)) return; // all threads
-    const bool has_cells = i < geo.num_primitives && b.counts[i] != 0;
-    const std::uint32_t id = take_primitive(geo, op, has_cells ? static_cast<std::uint32_t>(i) : no_primitive,
-                                            [&](const core::voxel_box& line) VOXELPIPE_INLINE_LAMBDA {
-                                                if constexpr (knows_lines<Op>)
-                                                    op.emit_line(static_cast<std::uint32_t>(i), line, b.offsets[i]);
-                                            });
-    if (id == no_primitive) return;
+    if (has_failed(*state, limits)) return;
+    if (i >= geo.num_primitives || b.counts[i] == 0) return;
+    const auto id = static_cast<std::uint32_t>(i);
     const loaded_triangle t = geo.load(id);
     core::voxel_box reach{};
     (void)core::classify<Op::rule>(t.a, t.b, t.c, geo.snap.fraction, geo.whole_box(), reach);
@@ -262,11 +231,7 @@ __device__ VOXELPIPE_INLINE void emit_large(const geometry& geo, const Op& op, c
                         std::uint32_t n = 0;
                         if (valid) n = op.count(geo, t, id, box, false).kept;
                         const unsigned lane = threadIdx.x % 32;
-                        std::uint32_t before = n; // inclusive prefix sum over the lanes
-                        for (unsigned step = 1; step < 32; step *= 2) {
-                            const std::uint32_t other = __shfl_up_sync(0xffffffffu, before, step);
-                            if (lane >= step) before += other;
-                        }
+                        const std::uint32_t before = lane_prefix(n);
                         const std::uint32_t sum = __shfl_sync(0xffffffffu, before, 31);
                         if (sum == 0) return;
                         std::uint32_t left = 0;

@@ -4,9 +4,8 @@
 
 // Operations that cub does: the sort of (cell, primitive) pairs by cell, the prefix sum of counts, the selection of
 // each voxel's first fragment. Only scene/cub_sort_kernels.cuh includes cub's headers. The sort is stable and looks at
-// just the key bits in use, so each tile's triangles come by ascending primitive (paper section 4, tile sort). Only the
-// device knows the number of pairs: the whole capacity is sorted, with keys in the unused end that come last. Key:
-// std::uint32_t or std::uint64_t.
+// just the key bits in use (paper section 4, tile sort). Only the device knows the number of pairs: the whole capacity
+// is sorted, with keys in the unused end that come last. Key: std::uint32_t or std::uint64_t.
 
 #include <voxelpipe/device/base/kernel_library.cuh>
 #include <voxelpipe/device/scene/scene.cuh>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Coarse raster: triangles -> (tile, primitive) pairs, by ascending primitive. Counts triangles, and the reasons why
-// others are dropped (paper section 4, coarse raster). A tile is a voxel of a coarser grid, so the same exact coverage
+// Coarse raster: triangles -> (tile, primitive) pairs, in any order. Counts triangles, and the reasons why others are
+// dropped (paper section 4, coarse raster). A tile is a voxel of a coarser grid, so the same exact coverage
 // decides.
 
 #include <voxelpipe/device/scene/count_and_emit.cuh>
@@ -17,41 +17,39 @@ template <coverage Rule>
 struct tile_cells {
     static constexpr coverage rule = Rule;
     static constexpr std::int64_t small_columns = tuning::small_tile_columns;
-    static constexpr bool knows_lines = Rule == coverage::conservative; // a thin triangle leaves tiles out
     core::tile_grid tiles;
     std::uint32_t* keys;       // tile numbers
     std::uint32_t* primitives; // as long as keys
-    bool counts_triangles = true;
-
     [[nodiscard]] __device__ core::voxel_box cells(const core::voxel_box& reach) const {
         return core::coarsen(reach, tiles.log2_size);
     }
-    // True if the triangle's bounding box is one tile wide along two axes, so that it meets all tiles of the box, and
-    // if 32 bits tell. Then `box` is the part within the grid, not empty. Most triangles of a fine mesh are such.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool find_line(const geometry& geo, std::uint32_t primitive,
-                                                             core::voxel_box& box) const {
-        if (geo.arms != core::arm_set::none) return false; // they leave tiles out
-        const draw_geometry& d = geo.draw(geo.find_draw(primitive));
-        const glm::uvec3 index = d.triangles[primitive - d.first_primitive];
-        if (index.x >= d.num_vertices || index.y >= d.num_vertices || index.z >= d.num_vertices) return false;
+    // The number of tiles if the triangle's bounding box is one tile wide along two axes, so that it meets all tiles of
+    // the box, and if 32 bits tell; otherwise 0. `lo`, `hi`: the part of the box within the grid, not empty. Most
+    // triangles of a fine mesh are such. Not for thin coverage and arms, which leave tiles out.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t find_line(const geometry& geo, const draw_geometry& d,
+                                                                      const glm::uvec3& index, glm::ivec3& lo,
+                                                                      glm::ivec3& hi) const {
+        if (index.x >= d.num_vertices || index.y >= d.num_vertices || index.z >= d.num_vertices) return 0;
         const int32_triangle t = load_int32(raster_input<stored_source>{{d}, 0, geo.snap.fraction, geo.extent}, index);
-        if (!t.fits_int32 || t.is_outside<Rule>(geo.extent)) return false;
-        std::int64_t longest = 0, others = 0;
+        if (!t.fits_int32 || t.is_outside<Rule>(geo.extent)) return 0;
+        std::int32_t longest = 0, others = 0;
+        std::uint32_t n = 1;
         for (int k = 0; k < 3; ++k) {
-            const std::int32_t last = (k == 0 ? geo.extent.x : k == 1 ? geo.extent.y : geo.extent.z) - 1;
-            const std::int32_t length = (t.hi[k] >> tiles.log2_size) - (t.lo[k] >> tiles.log2_size);
+            const std::int32_t last = geo.extent[k] - 1,
+                               length = (t.hi[k] >> tiles.log2_size) - (t.lo[k] >> tiles.log2_size);
             others += length < longest ? length : longest;
             longest = length < longest ? longest : length;
-            box.lo[k] = (t.lo[k] < 0 ? 0 : t.lo[k]) >> tiles.log2_size;
-            box.hi[k] = (t.hi[k] < last ? t.hi[k] : last) >> tiles.log2_size;
+            lo[k] = (t.lo[k] < 0 ? 0 : t.lo[k]) >> tiles.log2_size;
+            hi[k] = (t.hi[k] < last ? t.hi[k] : last) >> tiles.log2_size;
+            n *= static_cast<std::uint32_t>(hi[k] - lo[k] + 1);
         }
-        return others == 0 && longest < small_columns;
+        return others == 0 && longest < small_columns ? n : 0;
     }
-    __device__ VOXELPIPE_INLINE void emit_line(std::uint32_t primitive, const core::voxel_box& box,
+    __device__ VOXELPIPE_INLINE void emit_line(std::uint32_t primitive, const glm::ivec3& lo, const glm::ivec3& hi,
                                                unsigned long long at) const {
-        for (std::int64_t z = box.lo[2]; z <= box.hi[2]; ++z)
-            for (std::int64_t y = box.lo[1]; y <= box.hi[1]; ++y)
-                for (std::int64_t x = box.lo[0]; x <= box.hi[0]; ++x, ++at) {
+        for (int z = lo.z; z <= hi.z; ++z)
+            for (int y = lo.y; y <= hi.y; ++y)
+                for (int x = lo.x; x <= hi.x; ++x, ++at) {
                     keys[at] = static_cast<std::uint32_t>(tiles.index(x, y, z));
                     primitives[at] = primitive;
                 }
@@ -104,5 +102,137 @@ private:
         return n;
     }
 };
+
+// Takes room for the `value` pairs of each thread from *num; returns where the thread's begin, or no_room for the whole
+// block. All threads of the block call it, once.
+inline constexpr unsigned long long no_room = ~0ull;
+[[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long take_room(std::uint32_t value, unsigned long long* num,
+                                                                       unsigned long long capacity) {
+    __shared__ std::uint32_t warp_sums[threads_per_block / 32];
+    __shared__ unsigned long long first;
+    const unsigned warp = threadIdx.x / 32;
+    std::uint32_t before = lane_prefix(value);
+    if (threadIdx.x % 32 == 31) warp_sums[warp] = before;
+    __syncthreads();
+    std::uint32_t all = 0;
+    for (unsigned w = 0; w < threads_per_block / 32; ++w) {
+        before += w < warp ? warp_sums[w] : 0;
+        all += warp_sums[w];
+    }
+    if (threadIdx.x == 0) {
+        const unsigned long long at = all == 0 ? 0 : atomicAdd(num, static_cast<unsigned long long>(all));
+        first = at + all > capacity ? no_room : at;
+    }
+    __syncthreads();
+    return first == no_room ? no_room : first + before - value;
+}
+
+// The triangles of a block that are no lines of tiles. They cost far more, so the threads share them out.
+struct left_triangles {
+    static constexpr unsigned each = tuning::coarse_triangles, max = each * threads_per_block;
+    std::uint32_t ids[max], counts[max]; // of tiles
+    unsigned num;
+    unsigned kinds[5]; // by triangle_class
+};
+
+// The first of two kernels: appends the pairs of small triangles, several of a thread's at a time, and records the
+// large ones.
+template <coverage Rule>
+__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void append_small_kernel(
+    const __grid_constant__ geometry geo, const __grid_constant__ tile_cells<Rule> op,
+    const __grid_constant__ cell_buffers b, pipeline_state* state, const __grid_constant__ capacities limits) {
+    using core::triangle_class;
+    constexpr unsigned each = left_triangles::each;
+    __shared__ left_triangles left;
+    if (threadIdx.x < 5) left.kinds[threadIdx.x] = 0;
+    if (threadIdx.x == 0) left.num = 0;
+    __syncthreads();
+    const std::uint64_t first = std::uint64_t{blockIdx.x} * left_triangles::max;
+    std::uint32_t pairs = 0, tiles_of[each];
+    glm::ivec3 lo[each], hi[each];
+#pragma unroll
+    for (unsigned k = 0; k < each; ++k) {
+        const std::uint64_t i = first + k * threads_per_block + threadIdx.x;
+        tiles_of[k] = 0;
+        if (i >= geo.num_primitives) continue;
+        const auto id = static_cast<std::uint32_t>(i);
+        if (Rule == coverage::conservative && geo.arms == core::arm_set::none) {
+            const draw_geometry& d = geo.draw(geo.find_draw(id));
+            tiles_of[k] = op.find_line(geo, d, d.triangles[id - d.first_primitive], lo[k], hi[k]);
+        }
+        if (tiles_of[k] == 0) left.ids[atomicAdd(&left.num, 1u)] = id;
+        pairs += tiles_of[k];
+    }
+    __syncthreads();
+    for (unsigned at = threadIdx.x; at < left.num; at += threads_per_block) {
+        const std::uint32_t id = left.ids[at];
+        const loaded_triangle t = geo.load(id);
+        std::uint32_t n = 0;
+        if (!t.index_ok) {
+            atomicOr(&state->index_error, bad_index);
+        } else {
+            core::voxel_box reach{};
+            triangle_class kind = core::classify<Rule>(t.a, t.b, t.c, geo.snap.fraction, geo.whole_box(), reach);
+            if ((Rule == coverage::thin || geo.arms != core::arm_set::none) && kind == triangle_class::drawn &&
+                core::has_zero_area(t.a, t.b, t.c))
+                kind = triangle_class::zero_area;
+            atomicAdd(&left.kinds[static_cast<int>(kind)], 1u);
+            if (kind == triangle_class::drawn) {
+                const core::voxel_box box = op.cells(reach);
+                if (is_small(box, op.small_columns))
+                    n = op.count(geo, t, id, box, true).kept;
+                else
+                    record_chunks(geo, t, id, box, b);
+            }
+        }
+        left.counts[at] = n;
+        pairs += n;
+    }
+    unsigned long long at = take_room(pairs, b.num_cells, limits.tile_pairs); // its barriers complete left.kinds
+    if (threadIdx.x < 5) {
+        unsigned num = left.kinds[threadIdx.x];
+        if (threadIdx.x == static_cast<unsigned>(triangle_class::drawn)) {
+            const std::uint64_t rest = geo.num_primitives - first;
+            num += static_cast<unsigned>(rest < left_triangles::max ? rest : left_triangles::max) - left.num;
+        }
+        if (num != 0)
+            atomicAdd(state->counter_of(static_cast<triangle_class>(threadIdx.x)),
+                      static_cast<unsigned long long>(num));
+    }
+    if (at == no_room) return;
+#pragma unroll
+    for (unsigned k = 0; k < each; ++k) {
+        if (tiles_of[k] == 0) continue;
+        op.emit_line(static_cast<std::uint32_t>(first + k * threads_per_block + threadIdx.x), lo[k], hi[k], at);
+        at += tiles_of[k];
+    }
+    for (unsigned i = threadIdx.x; i < left.num; i += threads_per_block) {
+        if (left.counts[i] == 0) continue;
+        const loaded_triangle t = geo.load(left.ids[i]);
+        core::voxel_box reach{};
+        (void)core::classify<Rule>(t.a, t.b, t.c, geo.snap.fraction, geo.whole_box(), reach);
+        op.emit(geo, t, left.ids[i], op.cells(reach), true, at);
+        at += left.counts[i];
+    }
+}
+
+// The second: a warp takes room for the pairs of a record.
+template <coverage Rule>
+__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void append_large_kernel(
+    const __grid_constant__ geometry geo, const __grid_constant__ tile_cells<Rule> op,
+    const __grid_constant__ cell_buffers b, pipeline_state* state, const __grid_constant__ capacities limits) {
+    if (state->index_error != 0) return;
+    for_each_record(geo, op, b,
+                    [&](std::uint32_t id, const loaded_triangle& t, bool valid, const core::voxel_box& box) {
+                        const std::uint32_t n = valid ? op.count(geo, t, id, box, false).kept : 0;
+                        const std::uint32_t before = lane_prefix(n);
+                        unsigned long long first = 0;
+                        if (threadIdx.x % 32 == 31 && before != 0)
+                            first = atomicAdd(b.num_cells, static_cast<unsigned long long>(before));
+                        first = __shfl_sync(0xffffffffu, first, 31);
+                        if (n != 0 && first + before <= limits.tile_pairs)
+                            op.emit(geo, t, id, box, false, first + before - n);
+                    });
+}
 
 } // namespace voxelpipe::device

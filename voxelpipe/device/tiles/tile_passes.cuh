@@ -13,7 +13,6 @@
 #include <voxelpipe/device/tiles/tile_resolve.cuh>
 #include <voxelpipe/device/tiles/tile_split.cuh>
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -49,29 +48,30 @@ template <int Log2Size, class Framebuffer>
 // Uses limits.tile_pairs and limits.tile_records.
 struct tile_memory {
     core::tile_grid tiles;
-    cell_buffers cells;
+    cell_buffers cells{};
     std::uint32_t *keys[2], *primitives[2];
     split_buffers split{};
     word* images;
-    int bits; // of a tile's number
-    void* storage;
+    int bits;      // of a tile's number
+    void* storage; // of the sort
     std::size_t storage_bytes;
 
     // image_words: max_image_words of the fine passes to come.
-    tile_memory(arena& memory, const core::tile_grid& tiles_, std::uint32_t num_primitives, const capacities& limits,
-                int image_words, std::uint32_t pairs_per_item)
-        : tiles(tiles_), cells(take_cell_buffers(memory, num_primitives, limits.tile_records)),
-          bits(key_bits(tiles_.count())) {
+    tile_memory(arena& memory, const core::tile_grid& tiles_, const capacities& limits, int image_words,
+                std::uint32_t pairs_per_item)
+        : tiles(tiles_), bits(key_bits(tiles_.count())) {
         for (int i = 0; i < 2; ++i) {
             keys[i] = memory.take<std::uint32_t>(limits.tile_pairs);
             primitives[i] = memory.take<std::uint32_t>(limits.tile_pairs);
         }
+        cells.records = memory.take<chunk_record>(limits.tile_records);
+        cells.record_capacity = limits.tile_records;
         const std::uint64_t num_images = max_images(limits.tile_pairs, pairs_per_item);
         split.pairs_per_item = pairs_per_item;
         split.items = memory.take<work_item>(max_items(limits.tile_pairs, tiles.count(), pairs_per_item));
         split.splits = memory.take<split_tile>(num_images);
         images = memory.take<word>(num_images * static_cast<std::uint64_t>(image_words));
-        storage_bytes = std::max(sort_bytes<std::uint32_t>(limits.tile_pairs, bits), cell_scan_bytes(num_primitives));
+        storage_bytes = sort_bytes<std::uint32_t>(limits.tile_pairs, bits);
         storage = memory.take<std::byte>(storage_bytes);
     }
 };

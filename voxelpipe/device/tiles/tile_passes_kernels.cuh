@@ -68,8 +68,13 @@ tile_work coarse_pass(const geometry& geo, const tile_memory& m, pipeline_state*
     cells.num_records = &state->tile_records;
     cells.num_cells = &state->tile_pairs;
     const tile_cells<Rule> op{m.tiles, m.keys[0], m.primitives[0]};
-    count_cells(geo, op, cells, state, m.storage, m.storage_bytes, stage::coarse_raster, stream);
-    emit_cells(geo, op, cells, state, limits, stage::coarse_raster, stream);
+    const auto blocks =
+        static_cast<unsigned>((std::uint64_t{geo.num_primitives} + left_triangles::max - 1) / left_triangles::max);
+    append_small_kernel<Rule><<<blocks, threads_per_block, 0, stream>>>(geo, op, cells, state, limits);
+    check(cudaGetLastError(), stage::coarse_raster);
+    append_large_kernel<Rule>
+        <<<fill_device(cells.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, cells, state, limits);
+    check(cudaGetLastError(), stage::coarse_raster);
     end_stage(clock, &stage_times::coarse_raster);
     fill_end(m.keys[0], m.primitives[0], cells.num_cells, limits.tile_pairs, state, limits, stream);
     const int at = sort_by_cell(m.keys, m.primitives, limits.tile_pairs, m.bits, m.storage, m.storage_bytes,
