@@ -101,8 +101,9 @@ TEST(FineRaster, FoldsTheCpusFragments) {
 using extremes = vp::framebuffer<vp::cuda_backend, vp::target<double, blend::max>, vp::target<glm::u8vec4, blend::min>>;
 using extreme_values = any_values<vp::target<double, blend::max>, vp::target<glm::u8vec4, blend::min>>;
 
+// are_full: work items have many fragments; otherwise tiles have many work items.
 template <vp::coverage Rule>
-void compare_passes(stages<marked>& s) {
+void compare_passes(stages<marked>& s, bool are_full = false) {
     // As separate calls: marks, other targets by another shader, and the marks once more onto the stored values.
     marked_targets<vp::cuda_backend> marks{s.gpu, s.g.extent}, d_marks{s.gpu, s.g.extent};
     extremes bounds{s.gpu, s.g.extent}, d_bounds{s.gpu, s.g.extent};
@@ -124,13 +125,13 @@ void compare_passes(stages<marked>& s) {
 
     // The same passes after one coarse pass.
     using view_type = marked_targets<vp::cuda_backend>::view_type;
-    const device::capacities limits{20000, 20000, 0, 0};
+    const device::capacities limits{are_full ? 60000u : 20000u, 20000, 0, 0};
     stage_memory m(s.gpu, {});
     const stages<marked>::scene_memory buffers(m.memory, s.on_device());
     const device::tile_memory tiles(m.memory, vp::core::tile_grid(s.g.extent, policy.log2_tile_size), limits,
                                     std::max(device::max_image_words<policy.log2_tile_size, view_type>(),
                                              device::max_image_words<policy.log2_tile_size, extremes::view_type>()),
-                                    16);
+                                    are_full ? 512 : 16);
     ASSERT_LT(m.memory.used(), m.block.size());
     cudaStream_t const stream = s.gpu.stream;
     // snippet: two passes
@@ -150,7 +151,10 @@ void compare_passes(stages<marked>& s) {
     const device::pipeline_state end = m.end(s.gpu);
 
     ASSERT_FALSE(device::has_failed(end, limits));
-    EXPECT_GT(end.num_splits, 10u);
+    if (are_full)
+        EXPECT_GT(end.fragments, std::uint64_t{end.num_items} * vp::tuning::queue_capacity);
+    else
+        EXPECT_GT(end.num_splits, 10u);
     expect_same_counts(counted, device::to_status(end).counts);
     expect_same_bytes(vp::get<0>(marks).to_host(s.gpu), vp::get<0>(d_marks).to_host(s.gpu), "sums");
     expect_same_bytes(vp::get<1>(marks).to_host(s.gpu), vp::get<1>(d_marks).to_host(s.gpu), "bits");
@@ -164,6 +168,12 @@ TEST(FineRaster, SeveralPassesMayShareOneCoarsePass) {
     stages s(mixed_triangles(6000, 60.0f, 74), box_grid({60, 47, 71}), marked{});
     compare_passes<vp::coverage::thin>(s);
     compare_passes<vp::coverage::conservative>(s);
+}
+
+// Work items of more fragments than a block's queue holds.
+TEST(FineRaster, DrawsFullTilesInRounds) {
+    stages s(long_triangles(glm::ivec3(16), 2000, 76), box_grid({16, 16, 16}), marked{});
+    compare_passes<vp::coverage::conservative>(s, true);
 }
 
 } // namespace

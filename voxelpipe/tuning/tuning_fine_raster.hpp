@@ -60,10 +60,10 @@ inline constexpr std::array fine_raster_table{
     return fine_raster_table[last_not_above(fine_raster_table, capability)];
 }
 
-// Targets that together need more than this are drawn in several fine passes over the same tiles: 8^3 voxels of 150
-// bytes are 75 KB, which a block can have on every architecture in addition to a batch of triangles.
-inline constexpr int max_bits_per_voxel = 150 * 8;
-inline constexpr int batch_bytes = 22 * 1024; // of shared memory, at 256 threads a block
+// Targets that together need more than this are drawn in several fine passes over the same tiles: 8^3 voxels of 130
+// bytes are 65 KB, which a block can have on every architecture in addition to a batch of triangles.
+inline constexpr int max_bits_per_voxel = 130 * 8;
+inline constexpr int batch_bytes = 34 * 1024; // of shared memory, at 256 threads a block
 static_assert(max_bits_per_voxel / 8 * 512 <= portable_shared_per_block() - batch_bytes);
 
 struct fine_raster_selector {

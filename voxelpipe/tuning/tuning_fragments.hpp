@@ -59,7 +59,7 @@ inline constexpr int fold_bytes = 8 * 1024;             // of shared memory, for
 // ---- fine raster and tile resolve (device/tiles/) -------------------------------------------------------------------
 
 inline constexpr int unit_columns = 32;      // approximate columns of a unit of a larger triangle
-inline constexpr int queue_capacity = 4096;  // fragments of small triangles that wait in a block
+inline constexpr int queue_capacity = 2048;  // fragments of small triangles that wait in a block
 inline constexpr int max_queue_cells = 1024; // most voxels of a bounding box within the tile whose fragments are queued
 inline constexpr int resolve_bytes = 16 * 1024; // of shared memory for partial cells, one target after the other
 // Most pairs of a work item: makes enough items for the device, and few images of split tiles.

@@ -144,7 +144,7 @@ struct bit_blend {
         if constexpr (clears) {
             if (!value && (*w & mask) != 0) atomicAnd(w, ~mask);
         } else if constexpr (sets) {
-            if (value && (*w & mask) == 0) atomicOr(w, mask); // most fragments find their bit set
+            if (value && (*w & mask) != mask) atomicOr(w, mask); // most fragments find their bits set
         } else {
             if (value) atomicXor(w, mask);
         }

@@ -4,13 +4,13 @@
 
 // Fine raster: persistent blocks take work items (a tile and a run of its triangles), hold the tile in shared memory,
 // shade and blend atomically, and store it, or leave an image of it if the tile is split (paper section 4, fine
-// raster). Small triangles put their fragments in a queue, from which every thread shades one at a time; larger ones
-// are divided into units of about equal cost, one per thread. So one triangle that fills the tile and a thousand in one
-// voxel keep the block equally busy.
+// raster). Triangles put their fragments in a queue, from which every thread shades one at a time, in rounds if it is
+// full; what 32 bits do not serve is divided into units of about equal cost, one per thread. So one triangle that fills
+// the tile and a thousand in one voxel keep the block equally busy.
 
-#include <voxelpipe/device/raster/small_triangles.cuh>
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/tiles/tile_image.cuh>
+#include <voxelpipe/device/tiles/tile_part.cuh>
 #include <voxelpipe/device/tiles/tile_split.cuh>
 #include <voxelpipe/tuning/tuning_fine_raster.hpp>
 #include <voxelpipe/tuning/tuning_fragments.hpp>
@@ -78,134 +78,157 @@ __device__ void block_prefix(int value, int* sums) {
     __syncthreads();
 }
 
-// ---- small triangles ------------------------------------------------------------------------------------------------
-
-// A triangle's bounding box, and its part within a tile.
-template <coverage Rule>
-struct small_part {
-    raster_input<stored_source> in;
-    int32_triangle t;
-    core::small_box box; // the part
-    bool is_small;
-
-    __device__ VOXELPIPE_INLINE small_part(const geometry& geo, const core::voxel_box& tile, std::uint32_t id)
-        : in{{geo.draw(geo.find_draw(id))}, 0, geo.snap.fraction, geo.extent} {
-        const draw_geometry& d = in.source.geometry;
-        t = load_int32(in, d.triangles[id - d.first_primitive]);
-        is_small =
-            t.fits_int32 && geo.arms == core::arm_set::none && t.longest_side() <= core::small_voxels(in.fraction);
-        box = t.part(geo.extent);
-        int cells = 1;
-        for (int k = 0; k < 3; ++k) {
-            const int lo = static_cast<int>(tile.lo[k]) - t.lo[k], hi = static_cast<int>(tile.hi[k]) - t.lo[k];
-            if (lo > box.lo[k]) box.lo[k] = lo;
-            if (hi < box.hi[k]) box.hi[k] = hi;
-            cells *= box.hi[k] - box.lo[k] + 1;
-        }
-        is_small = is_small && cells <= tuning::max_queue_cells;
-    }
-
-    // Calls row(x, y, z, bits) for the rows of fragments in the tile.
-    template <class Row>
-    __device__ VOXELPIPE_INLINE void rows(const core::voxel_box& tile, Row&& row) const {
-        if constexpr (Rule == coverage::thin) {
-            struct sink {
-                const core::voxel_box& tile;
-                Row& to;
-                // The columns are the tile's, but a thin fragment's depth may lie outside.
-                __device__ VOXELPIPE_INLINE void row(int x, int y, int z, word bits) {
-                    if (x >= tile.lo[0] && x <= tile.hi[0] && y >= tile.lo[1] && y <= tile.hi[1] && z >= tile.lo[2] &&
-                        z <= tile.hi[2])
-                        to(x, y, z, bits);
-                }
-                [[nodiscard]] __device__ VOXELPIPE_INLINE static glm::ivec3 position(int x, int y, int z) {
-                    return {x, y, z};
-                }
-                __device__ VOXELPIPE_INLINE void emit(const glm::ivec3& at, bool wanted) {
-                    if (wanted) row(at.x, at.y, at.z, 1u);
-                }
-            } within{tile, row};
-            struct kept_in_thread {
-                word words[core::small_max_voxels];
-                __device__ VOXELPIPE_INLINE void set(int i, word w) { words[i] = w; }
-                [[nodiscard]] __device__ VOXELPIPE_INLINE word get(int i) const { return words[i]; }
-            } kept;
-            (void)raster_thin(in, t.relative(in.fraction), t.lo, box, 0, 1, kept,
-                              within); // triangles of zero area are in no tile
-        } else {
-            if (box.empty()) return;
-            const core::small_conservative s(t.relative(in.fraction), in.fraction);
-            const auto emit = [&](int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
-                if (bits != 0) row(t.lo[0] + box.lo[0], t.lo[1] + y, t.lo[2] + z, bits);
-            };
-            if (box.hi[0] - box.lo[0] < 8)
-                s.template rows<false>(box, emit);
-            else
-                s.long_rows(box, emit);
-        }
-    }
-};
-
 // ---- all triangles of a work item -----------------------------------------------------------------------------------
 
-// Shared memory of a block, for a batch of as many triangles as it has threads.
-template <int Threads>
+// Shared memory of a block, for a batch of as many triangles as it has threads, up to 256. ByRows: there is no queue.
+template <int Threads, bool ByRows>
 struct batch_memory {
+    static constexpr int size = Threads < 256 ? Threads : 256, capacity = ByRows ? 1 : tuning::queue_capacity;
     int sums[Threads];
-    std::uint32_t ids[Threads];
-    unit_list lists[Threads];
-    std::uint32_t
-        fragments[tuning::queue_capacity]; // voxel of the tile, 15 bits, and the triangle's index in the batch
-    std::uint8_t in_units[Threads];        // 1: the triangle's fragments come from its units
-    int num_fragments;
+    std::uint32_t ids[size];
+    tile_setup setups[ByRows ? 1 : size];
+    unit_list lists[size];
+    // Voxel of the tile, 15 bits, and the triangle's index in the batch; or no_fragment.
+    std::uint32_t fragments[capacity];
+    std::uint16_t by_lanes[size]; // triangles that group_lanes lanes draw
+    int num_fragments, num_by_lanes;
 };
-static_assert(sizeof(batch_memory<256>) + 1024 <= tuning::batch_bytes);
+static_assert(sizeof(batch_memory<256, false>) + 1024 <= tuning::batch_bytes);
+inline constexpr std::uint32_t no_fragment = ~0u;
+
+// Appends the rows of a triangle to a batch's queue. If one does not fit, it and all behind it are left for a further
+// round, in which the same rows come again.
+template <int Threads>
+struct queue_writer {
+    static constexpr bool splits_long_rows = false; // for raster_lanes
+    batch_memory<Threads, false>& m;
+    std::uint32_t first; // number of the tile's first voxel, modulo 2^32, and the triangle's index
+    int log2_size;
+    int queued = 0; // rows of all rounds
+    int row_number = 0;
+    bool is_full = false;
+
+    __device__ VOXELPIPE_INLINE void begin_round(const core::voxel_box& tile, std::uint32_t index) {
+        const std::int64_t before = ((tile.lo[2] << log2_size) + tile.lo[1]) * (1 << log2_size) + tile.lo[0];
+        first = (index << 15) - static_cast<std::uint32_t>(before);
+        row_number = 0;
+        is_full = false;
+    }
+    __device__ VOXELPIPE_INLINE void row(int x, int y, int z, word bits) {
+        if (bits == 0 || is_full || row_number++ < queued) return;
+        int at = atomicAdd(&m.num_fragments, __popc(bits));
+        if (at + __popc(bits) > m.capacity) {
+            is_full = true;
+            for (; at < m.capacity; ++at) m.fragments[at] = no_fragment;
+            return;
+        }
+        const std::uint32_t from = first + static_cast<std::uint32_t>((((z << log2_size) + y) << log2_size) + x);
+        for (; bits != 0; bits &= bits - 1)
+            m.fragments[at++] = from + static_cast<std::uint32_t>(__ffs(static_cast<int>(bits)) - 1);
+        ++queued;
+    }
+};
+
+// Passes each row on at once.
+template <class VisitRow>
+struct row_passer {
+    static constexpr bool splits_long_rows = false;
+    static constexpr bool is_full = false;
+    const VisitRow& visit_row;
+    int first, log2_size;
+    std::uint32_t primitive;
+    int queued = 0;
+
+    __device__ VOXELPIPE_INLINE void begin_round(const core::voxel_box& tile, std::uint32_t primitive_) {
+        first = static_cast<int>(((tile.lo[2] << log2_size) + tile.lo[1]) * (1 << log2_size) + tile.lo[0]);
+        primitive = primitive_;
+    }
+    __device__ VOXELPIPE_INLINE void row(int x, int y, int z, word bits) {
+        if (bits != 0) visit_row((((z << log2_size) + y) << log2_size) + x - first, primitive, bits);
+    }
+};
 
 // Calls visit(i, primitive, output) for every fragment of the item's triangles in the tile; i is the voxel's number in
-// the tile. All threads of the block call it.
-template <coverage Rule, int Log2Size, int Threads, class Scene, class Visit>
+// the tile. Constant shaders: visit_row(i, primitive, bits) for most rows along x instead. All threads of the block
+// call it.
+template <coverage Rule, bool ByRows, int Log2Size, int Threads, class Scene, class Visit, class VisitRow>
 __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, const std::uint32_t* primitives,
-                                  std::uint32_t count, Visit&& visit) {
-    __shared__ batch_memory<Threads> m;
-    constexpr int size = 1 << Log2Size;
+                                  std::uint32_t count, Visit&& visit, const VisitRow& visit_row) {
+    __shared__ batch_memory<Threads, ByRows> m;
+    using part_type = tile_part<Rule, Log2Size>;
+    constexpr int size = 1 << Log2Size, groups = Threads / tuning::group_lanes;
+    constexpr unsigned batch = batch_memory<Threads, ByRows>::size;
     const int fraction = s.geo.snap.fraction;
     const int x0 = static_cast<int>(tile.lo[0]), y0 = static_cast<int>(tile.lo[1]), z0 = static_cast<int>(tile.lo[2]);
     const auto voxel_of = [&](int x, int y, int z) { return ((z - z0) * size + (y - y0)) * size + (x - x0); };
-    for (std::uint32_t first = 0; first < count; first += Threads) {
+    for (std::uint32_t first = 0; first < count; first += batch) {
         const std::uint32_t mine = first + threadIdx.x;
-        if (threadIdx.x == 0) m.num_fragments = 0;
+        if (threadIdx.x == 0) m.num_fragments = m.num_by_lanes = 0;
         __syncthreads();
+        const bool are_few = Rule == coverage::conservative && count - first <= groups;
+        bool is_waiting = threadIdx.x < batch && mine < count; // for a round of the thread's triangle
         int units = 0;
-        if (mine < count) {
-            const std::uint32_t id = primitives[mine];
-            const small_part<Rule> part(s.geo, tile, id);
-            bool whole = part.is_small; // all of its fragments are in the queue
-            if (whole)
-                part.rows(tile, [&](int x, int y, int z, word bits) VOXELPIPE_INLINE_LAMBDA {
-                    const auto from = static_cast<std::uint32_t>(voxel_of(x, y, z)) | threadIdx.x << 15;
-                    int at = atomicAdd(&m.num_fragments, __popc(bits));
-                    for (; bits != 0 && at < tuning::queue_capacity; bits &= bits - 1)
-                        m.fragments[at++] = from + static_cast<std::uint32_t>(__ffs(static_cast<int>(bits)) - 1);
-                    whole = whole && bits == 0;
-                });
-            m.ids[threadIdx.x] = id;
-            m.in_units[threadIdx.x] = static_cast<std::uint8_t>(!whole);
-            if (!whole) {
-                const loaded_triangle t = s.geo.load(id);
-                core::voxel_box reach{};
-                (void)core::classify<Rule>(t.a, t.b, t.c, fraction, tile, reach);
-                if (!reach.empty()) m.lists[threadIdx.x] = unit_list::make(t, fraction, tile, reach, units);
+        auto of_thread = [&] {
+            if constexpr (ByRows)
+                return row_passer<VisitRow>{visit_row, 0, Log2Size, 0};
+            else
+                return queue_writer<Threads>{m, 0, Log2Size};
+        }();
+        auto of_lane = of_thread;
+        int group = static_cast<int>(threadIdx.x) / tuning::group_lanes; // the next triangle of the lanes, in by_lanes
+        for (bool is_first = true;; is_first = false) {
+            if (is_waiting) {
+                const std::uint32_t id = primitives[mine];
+                const part_type part(s.geo, tile, id);
+                is_waiting = part.cover == part_cover::by_thread && !are_few;
+                if constexpr (!ByRows)
+                    if (is_first && part.cover != part_cover::by_units) part.set_up(tile, m.setups[threadIdx.x]);
+                if (is_waiting) {
+                    of_thread.begin_round(tile, ByRows ? id : threadIdx.x);
+                    part.rows(tile, [&](int x, int y, int z, word bits)
+                                        VOXELPIPE_INLINE_LAMBDA { of_thread.row(x, y, z, bits); });
+                    is_waiting = of_thread.is_full;
+                } else if (part.cover != part_cover::by_units) {
+                    m.by_lanes[atomicAdd(&m.num_by_lanes, 1)] = static_cast<std::uint16_t>(threadIdx.x);
+                } else {
+                    const loaded_triangle t = s.geo.load(id);
+                    core::voxel_box reach{};
+                    (void)core::classify<Rule>(t.a, t.b, t.c, fraction, tile, reach);
+                    if (!reach.empty()) m.lists[threadIdx.x] = unit_list::make(t, fraction, tile, reach, units);
+                }
+                m.ids[threadIdx.x] = id;
             }
-        }
-        block_prefix<Threads>(units, m.sums); // also makes all queued fragments visible
-        const int waiting = m.num_fragments < tuning::queue_capacity ? m.num_fragments : tuning::queue_capacity;
-        for (int f = static_cast<int>(threadIdx.x); f < waiting; f += Threads) {
-            const std::uint32_t packed = m.fragments[f];
-            if (m.in_units[packed >> 15] != 0) continue;
-            const std::uint32_t triangle = m.ids[packed >> 15];
-            const auto i = static_cast<int>(packed & 0x7fffu);
-            visit(i, triangle,
-                  shade_small_fragment<true>(s, triangle, x0 + i % size, y0 + i / size % size, z0 + i / (size * size)));
+            if (is_first)
+                block_prefix<Threads>(units, m.sums);
+            else
+                __syncthreads();
+            if constexpr (Rule == coverage::conservative) {
+                const unsigned lanes = ((1u << tuning::group_lanes) - 1)
+                                       << threadIdx.x % 32 / tuning::group_lanes * tuning::group_lanes;
+                while (group < m.num_by_lanes) {
+                    const std::uint32_t index = m.by_lanes[group];
+                    const part_type part(s.geo, tile, m.ids[index]);
+                    of_lane.begin_round(tile, ByRows ? m.ids[index] : index);
+                    raster_lanes(part.coverage_of_box(), part.origin, part.box, of_lane);
+                    if (__any_sync(lanes, of_lane.is_full)) break;
+                    of_lane.queued = 0;
+                    group += groups;
+                }
+                __syncthreads();
+            }
+            if constexpr (ByRows) break;
+            const int waiting = m.num_fragments < m.capacity ? m.num_fragments : m.capacity;
+            for (int f = static_cast<int>(threadIdx.x); f < waiting; f += Threads) {
+                const std::uint32_t packed = m.fragments[f];
+                if (packed == no_fragment) continue;
+                const std::uint32_t triangle = m.ids[packed >> 15];
+                const auto i = static_cast<int>(packed & 0x7fffu);
+                const int x = i % size, y = i / size % size, z = i / (size * size);
+                visit(i, triangle, shade_in_tile(s, m.setups[packed >> 15], triangle, x, y, z, x0 + x, y0 + y, z0 + z));
+            }
+            if (__syncthreads_or(static_cast<int>(is_waiting || group < m.num_by_lanes)) == 0) break;
+            if (threadIdx.x == 0) m.num_fragments = 0;
+            __syncthreads();
         }
         const int all = m.sums[Threads - 1];
         for (int u = static_cast<int>(threadIdx.x); u < all; u += Threads) {
@@ -245,6 +268,7 @@ __global__ __launch_bounds__(Threads, MinBlocks) void fine_raster_kernel(const _
                                                                          pipeline_state* state, capacities limits) {
     extern __shared__ __align__(16) word tile_words[];
     __shared__ unsigned int next;
+    constexpr bool by_rows = core::is_constant<decltype(Scene::shading::fragment_shader)> && Image::has_only_bits;
     if (has_failed(*state, limits)) return;
     const unsigned num_items = state->num_items;
     std::uint64_t fragments = 0, discarded = 0, touched = 0;
@@ -257,15 +281,21 @@ __global__ __launch_bounds__(Threads, MinBlocks) void fine_raster_kernel(const _
         Image::clear(tile_words);
         __syncthreads();
         const core::voxel_box box = core::tile_box(in.tiles, item.tile, s.geo.extent);
-        for_each_fragment<Rule, Image::log2_size, Threads>(s, box, in.primitives + item.first, item.count,
-                                                           [&](int i, std::uint32_t id, const auto& out) {
-                                                               if (!out.keep) {
-                                                                   ++discarded;
-                                                                   return;
-                                                               }
-                                                               ++fragments;
-                                                               Image::blend(tile_words, i, id, out.values, in.track);
-                                                           });
+        for_each_fragment<Rule, by_rows, Image::log2_size, Threads>(
+            s, box, in.primitives + item.first, item.count,
+            [&](int i, std::uint32_t id, const auto& out) {
+                if (!out.keep) {
+                    ++discarded;
+                    return;
+                }
+                ++fragments;
+                Image::blend(tile_words, i, id, out.values, in.track);
+            },
+            [&](int i, std::uint32_t id, word bits) {
+                fragments += static_cast<unsigned>(__popc(bits));
+                const auto out = s.draw(s.geo.find_draw(id)).fragment_shader(fragment<typename Scene::varyings>{});
+                Image::blend_row(tile_words, i, bits, out.values, in.track);
+            });
         __syncthreads();
         if (item.image == no_image) {
             touched += store_tile<Image>(s, fb, box, tile_words, in.track);

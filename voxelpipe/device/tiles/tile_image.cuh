@@ -30,6 +30,7 @@ struct tile_image {
     static constexpr bool has_winner = ((method_of<target<I>>() == blend_method::winner) || ...);
     static constexpr bool has_atomic = ((method_of<target<I>>() == blend_method::atomic) || ...);
     static constexpr bool has_bits = ((method_of<target<I>>() == blend_method::bits) || ...);
+    static constexpr bool has_only_bits = has_bits && !has_atomic && !has_winner;
     static constexpr int winner_at = (words_of(bits_per_voxel<target<I>>()) + ...);
     static constexpr int touched_at = winner_at + (has_winner ? voxels : 0);
     static constexpr int words = touched_at + voxels / 32;
@@ -82,10 +83,26 @@ struct tile_image {
                 bit_blend<typename t::blend_type>::accumulate(plane + (i >> 5), mask, voxelpipe::get<K>(values));
         });
         if constexpr (has_winner) atomicMax(tile + winner_at + i, primitive + 1);
-        if (track) {
-            word* const touched = tile + touched_at + (i >> 5);
-            if ((*touched & mask) == 0) atomicOr(touched, mask);
-        }
+        if (track) touch(tile, i >> 5, mask);
+    }
+
+    // Blends equal fragments into a row of voxels from i on, a bit for each, all in one word. Targets of bits only.
+    template <class Values>
+    __device__ VOXELPIPE_INLINE static void blend_row(word* tile, int i, word bits, const Values& values, bool track) {
+        const word mask = bits << (i & 31);
+        for_each_target([&]<std::size_t K>() {
+            using t = target<K>;
+            if constexpr (has_only_bits)
+                bit_blend<typename t::blend_type>::accumulate(tile + offset<K>() + (i >> 5), mask,
+                                                              voxelpipe::get<K>(values));
+        });
+        if (track) touch(tile, i >> 5, mask);
+    }
+
+private:
+    __device__ VOXELPIPE_INLINE static void touch(word* tile, int at, word mask) {
+        word* const touched = tile + touched_at + at;
+        if ((*touched & mask) != mask) atomicOr(touched, mask);
     }
 };
 

@@ -165,7 +165,7 @@ void draw_tiles(const Scene& s, const Framebuffer& fb, const fine_raster_input& 
                 pipeline_state* state, const capacities& limits, int blocks_per_sm, cudaStream_t stream,
                 stage_clock* clock = nullptr) {
     const auto kernel = fine_raster_kernel<Rule, Image, Threads, MinBlocks, Scene, Framebuffer>;
-    if (Image::bytes > 16 * 1024) // 48 KB need no attribute, but static shared memory counts too
+    if (Image::bytes > 8 * 1024) // 48 KB need no attribute, but static shared memory counts too
         check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(Image::bytes)),
               stage::fine_raster);
     int blocks = 0;
