@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Shaders that compute, on a GPU: five programs x scene x grid, conservative, by each strategy that serves them,
-// forced. All strategies must leave the same bytes; those of the first are kept and compared. Beside each time stand
-// the floor (fragments once written and read, the grid cleared) and the sum of a constant by the 2011 program. Prints a
-// table of medians; --out writes it as CSV too.
+// forced; and two of a constant, in tiles and as they are drawn otherwise. All strategies must leave the same bytes;
+// those of the first are kept and compared. Beside each time stand the floor (fragments once written and read, the grid
+// cleared) and the sum of a constant by the 2011 program. Prints a table of medians; --out writes it as CSV too.
 
 #include "../published_gpu_figures.hpp"
 #include "device_record.hpp"
@@ -24,6 +24,7 @@
 #include <cstdio>
 #include <iostream>
 #include <string>
+#include <tuple>
 #include <type_traits>
 #include <vector>
 
@@ -135,6 +136,7 @@ private:
 
 struct cell {
     std::string program, strategy;
+    double published_ms = 0; // of the 2011 program; 0 if it has no figure
     vp::counters counts{};
     double ms = 0, target_bytes = 0, fragment_bytes = 0;
     vp::stage_times stages{}; // of one more call
@@ -152,9 +154,17 @@ struct runner {
     [[nodiscard]] bool wants(const std::vector<std::string>& names, const std::string& name) const {
         return names.empty() || std::find(names.begin(), names.end(), name) != names.end();
     }
-    [[nodiscard]] std::size_t voxels() const {
-        const glm::ivec3& n = grid.extent;
-        return static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) * static_cast<std::size_t>(n.z);
+    // Elements of target K's memory.
+    template <std::size_t K, class... Targets>
+    [[nodiscard]] std::size_t elements() const {
+        using type = std::tuple_element_t<K, std::tuple<Targets...>>;
+        return static_cast<std::size_t>(type::map::elements(grid.extent));
+    }
+    // Zeros for a scene without published figures.
+    [[nodiscard]] published_gpu_scene published() const {
+        for (const auto& p : published_gpu_scenes)
+            if (p.scene == mesh.name && p.resolution == grid.extent.x) return p;
+        return {};
     }
     [[nodiscard]] vp::mesh_view<> view(vp::cuda_backend& backend) const {
         vp::mesh_view<> v{{mesh.positions.data(), mesh.positions.size()},
@@ -192,12 +202,13 @@ struct runner {
         }
     }
 
-    // A framebuffer of linear targets by every strategy that shades.
+    // A framebuffer of linear targets or of bits by two strategies, `first` and tiled.
     template <class... Targets, class VertexShader, class FragmentShader>
-    void framebuffer(const std::string& program, const VertexShader& vertex, const FragmentShader& fragment) {
+    void framebuffer(const std::string& program, const VertexShader& vertex, const FragmentShader& fragment,
+                     double published_ms, vp::strategy first = vp::strategy::sorted_reduce) {
         if (!wants(how.programs, program)) return;
         kept_words kept[sizeof...(Targets)];
-        for (const vp::strategy strategy : {vp::strategy::sorted_reduce, vp::strategy::tiled}) {
+        for (const vp::strategy strategy : {first, vp::strategy::tiled}) {
             if (!wants(how.strategies, to_string(strategy))) continue;
             guarded(program, [&] {
                 vp::cuda_backend backend(session.stream());
@@ -205,15 +216,18 @@ struct runner {
                 vp::framebuffer<vp::cuda_backend, Targets...> fb(backend, grid.extent);
                 if (how.tracks) fb.track_changes(backend);
                 const vp::mesh_view<> v = view(backend);
-                cell c{program, to_string(strategy)};
-                c.target_bytes =
-                    static_cast<double>(voxels()) * static_cast<double>((sizeof(typename Targets::value_type) + ...));
+                cell c{program, to_string(strategy), published_ms};
+                vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
+                    const auto t = vp::get<K>(fb).view();
+                    c.target_bytes += static_cast<double>(elements<K, Targets...>() * sizeof(*t.elements));
+                });
                 c.fragment_bytes = 16;
-                time(c, backend, [&] { return vp::voxelize(backend, v, grid, vertex, fragment, fb); });
+                time(c, backend,
+                     [&] { return vp::voxelize<vp::coverage::conservative>(backend, v, grid, vertex, fragment, fb); });
                 if (!how.compares) return;
                 vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
                     const auto t = vp::get<K>(fb).view();
-                    if (!kept[K].agree(session, t.elements, voxels() * sizeof(*t.elements)))
+                    if (!kept[K].agree(session, t.elements, elements<K, Targets...>() * sizeof(*t.elements)))
                         cells.back().differs = true;
                 });
             });
@@ -226,18 +240,14 @@ struct runner {
             vp::cuda_backend backend(session.stream());
             vp::abuffer<vp::cuda_backend, float> lists(backend);
             const vp::mesh_view<> v = view(backend);
-            cell c{"abuffer_height", "lists"};
+            cell c{"abuffer_height", "lists", published().original_float};
             c.fragment_bytes = 24; // voxel, primitive and payload
-            time(c, backend, [&] { return vp::voxelize(backend, v, grid, pass_height{}, give_height{}, lists); });
+            time(c, backend, [&] {
+                return vp::voxelize<vp::coverage::conservative>(backend, v, grid, pass_height{}, give_height{}, lists);
+            });
         });
     }
 };
-
-double published_float(const std::string& scene, int n) {
-    for (const auto& p : published_gpu_scenes)
-        if (p.scene == scene && p.resolution == n) return p.original_float;
-    return 0;
-}
 
 int run(const options& how, const std::string& command) {
     gpu::session session;
@@ -251,7 +261,7 @@ int run(const options& how, const std::string& command) {
     const gpu::device_array<glm::vec4> texture(texels.size());
     gpu::check(cudaMemcpy(texture.data(), texels.data(), texture.bytes(), cudaMemcpyHostToDevice), "texture");
 
-    table rows({"scene", "resolution", "program", "strategy", "fragments", "ms", "floor_ms", "ms/floor", "sum_2011_ms",
+    table rows({"scene", "resolution", "program", "strategy", "fragments", "ms", "floor_ms", "ms/floor", "2011_ms",
                 "2011/ours", "vertex_ms", "coarse_ms", "tile_sort_ms", "split_ms", "clear_ms", "fine_ms", "resolve_ms",
                 "emit_ms"});
     std::vector<std::string> notes;
@@ -264,24 +274,30 @@ int run(const options& how, const std::string& command) {
             const vp::grid grid = vp::fit(data.positions, glm::ivec3(n));
             std::vector<cell> cells;
             runner r{session, how, mesh, grid, cells, notes};
-            r.framebuffer<target<float, vp::blend::add>>("float_add_varying", pass_height{}, give_height{});
-            r.framebuffer<target<float, vp::blend::max>>("float_max_computed", pass_height{}, give_wave{});
+            const published_gpu_scene published = r.published();
+            const double sum = published.original_float;
+            r.framebuffer<target<vp::bit, vp::blend::bit_or>>("constant_bit", vp::passthrough{}, vp::constant(true),
+                                                              published.original_bit, vp::strategy::occupancy_mask);
+            r.framebuffer<target<float, vp::blend::add>>("constant_sum", vp::passthrough{}, vp::constant(1.0f), sum,
+                                                         vp::strategy::immediate);
+            r.framebuffer<target<float, vp::blend::add>>("float_add_varying", pass_height{}, give_height{}, sum);
+            r.framebuffer<target<float, vp::blend::max>>("float_max_computed", pass_height{}, give_wave{}, sum);
             r.framebuffer<target<glm::vec4, vp::blend::add>, count>("texture_mean", pass_place{},
-                                                                    give_texel{texture.data()});
-            r.framebuffer<target<glm::vec3, vp::blend::add>, count>("normal_mean", vp::passthrough{}, give_normal{});
+                                                                    give_texel{texture.data()}, sum);
+            r.framebuffer<target<glm::vec3, vp::blend::add>, count>("normal_mean", vp::passthrough{}, give_normal{},
+                                                                    sum);
             r.lists();
             watch.read();
             for (const cell& c : cells) {
                 const double floor = gpu::memset_ms(session, static_cast<std::uint64_t>(c.target_bytes)) +
                                      c.fragment_bytes * static_cast<double>(c.counts.fragments) / bandwidth * 1e3;
-                const double published = published_float(data.name, n);
                 const vp::stage_times& t = c.stages;
                 const auto ms = [](double v) { return v > 0 ? significant(v) : std::string{}; };
                 rows.add_row({data.name, std::to_string(n), c.program, c.strategy, std::to_string(c.counts.fragments),
                               significant(c.ms), significant(floor), significant(c.ms / floor),
-                              published > 0 ? plain(published) : "", ms(published / c.ms), ms(t.vertex_shade),
-                              ms(t.coarse_raster), ms(t.tile_sort), ms(t.tile_split), ms(t.clear), ms(t.fine_raster),
-                              ms(t.tile_resolve), ms(t.abuffer_emit)});
+                              c.published_ms > 0 ? plain(c.published_ms) : "", ms(c.published_ms / c.ms),
+                              ms(t.vertex_shade), ms(t.coarse_raster), ms(t.tile_sort), ms(t.tile_split), ms(t.clear),
+                              ms(t.fine_raster), ms(t.tile_resolve), ms(t.abuffer_emit)});
                 if (!c.differs) continue;
                 differ = true;
                 notes.push_back("**differs**: " + data.name + " " + std::to_string(n) + " " + c.program + " " +
@@ -290,16 +306,16 @@ int run(const options& how, const std::string& command) {
             }
         }
     }
-    std::string text = "# Shaders that compute\n\n" + gpu::describe_device(watch) +
-                       "- commit: " + describe_machine().commit + "\n- date: " + describe_machine().date + "\n" +
-                       "- clocks over the run: " + watch.range() +
-                       "\n- device copy, read and write: " + significant(bandwidth * 1e-12) + " TB/s\n- command: `" +
-                       command + "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
-                       " calls, CUDA events around the whole call, clear and wait included, mesh on the device\n"
-                       "- each strategy forced; its targets compared word by word with the first one's\n"
-                       "- floor: each fragment's pair once written and read, the targets cleared\n"
-                       "- 2011: quoted, its sum of a constant on an NVIDIA H200\n"
-                       "- stages: of one more call, with events between them\n";
+    std::string text =
+        "# Shaders that compute\n\n" + gpu::describe_device(watch) + "- commit: " + describe_machine().commit +
+        "\n- date: " + describe_machine().date + "\n" + "- clocks over the run: " + watch.range() +
+        "\n- device copy, read and write: " + significant(bandwidth * 1e-12) + " TB/s\n- command: `" + command +
+        "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
+        " calls, CUDA events around the whole call, clear and wait included, mesh on the device\n"
+        "- each strategy forced; its targets compared word by word with the first one's\n"
+        "- floor: each fragment's pair once written and read, the targets cleared\n"
+        "- 2011: quoted from an NVIDIA H200, its bits of a constant (constant_bit) or sum of a constant\n"
+        "- stages: of one more call, with events between them\n";
     for (const std::string& note : notes) text += "- " + note + "\n";
     text += "\n" + rows.markdown();
     std::cout << text;
@@ -319,9 +335,10 @@ int main(int argc, char** argv) {
     app.add_option("--mesh", how.names, "A scene, a generated mesh or a file; may be repeated. Default: five scenes");
     app.add_option("--resolution", how.resolutions, "Voxels a side; may be repeated")->capture_default_str();
     app.add_option("--program", how.programs,
-                   "float_add_varying, float_max_computed, texture_mean, normal_mean or "
+                   "constant_bit, constant_sum, float_add_varying, float_max_computed, texture_mean, normal_mean or "
                    "abuffer_height; may be repeated. Default: all");
-    app.add_option("--strategy", how.strategies, "sorted_reduce, tiled or lists; may be repeated. Default: all");
+    app.add_option("--strategy", how.strategies,
+                   "occupancy_mask, immediate, sorted_reduce, tiled or lists; may be repeated. Default: all");
     app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
     app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
     app.add_flag("!--no-comparison", how.compares, "Leave out the comparison of strategies");
