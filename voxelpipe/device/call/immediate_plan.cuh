@@ -28,14 +28,6 @@ template <std::size_t K, class Target, class Draw>
     }
 }
 
-template <class... Targets>
-[[nodiscard]] bool all_in_use(const framebuffer_view<Targets...>& fb) {
-    bool all = true;
-    core::for_each_index<sizeof...(Targets)>(
-        [&]<std::size_t K>() { all = all && voxelpipe::get<K>(fb.targets).load != load_operation::off; });
-    return all;
-}
-
 // Fills in how a call of constant shaders does without tiles; plan.modes must be new. A target is counted only if
 // blending in place would not give its blend's bits, or if no other target can report how many voxels are touched.
 // Assigns members one by one, because the bytes, padding included, are part of a graph's key.
@@ -62,6 +54,7 @@ void plan_immediate(std::span<const Draw> draws, const framebuffer_view<Targets.
             telling_bits = static_cast<int>(K);
         if (may_count && countable < 0) countable = static_cast<int>(K);
         if (map::is_bit && map::elements(fb.extent) >> 30 != 0) plan.modes.of[K] = immediate_mode::blend_far;
+        if (t.load == load_operation::off) plan.modes.of[K] = immediate_mode::off;
         if (in_place) return;
         if (may_count)
             plan.modes.of[K] = immediate_mode::count;

@@ -83,20 +83,13 @@ private:
         };
         if constexpr (is_mask_itself<framebuffer_type>) {
             const auto& t = voxelpipe::get<0>(plan.fb.targets);
-            if (plan.targets.modes.of[0] == immediate_mode::blend && t.load != load_operation::off &&
-                voxelpipe::get<0>(d.fragment_shader.values)) {
+            if (plan.targets.modes.of[0] == immediate_mode::blend && voxelpipe::get<0>(d.fragment_shader.values)) {
                 draw_into(mask_output{t.elements, plan.g.extent, call.num_source_vertices(d.mesh), state, true});
                 return;
             }
         }
         const framebuffer_output<framebuffer_type, values_type> output{plan.fb, d.fragment_shader.values,
                                                                        plan.targets.modes, marks};
-        if constexpr (has_only_values<framebuffer_type>) {
-            if (plan.targets.only_blends() && all_in_use(plan.fb)) {
-                draw_into(blended_output<framebuffer_type, values_type>{output});
-                return;
-            }
-        }
         draw_into(output);
     }
 };

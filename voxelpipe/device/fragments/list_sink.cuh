@@ -271,7 +271,6 @@ struct list_output {
     static constexpr bool defers = true;
     static constexpr bool can_skip_deferred_pass = true; // no target is written if triangles are missing
     static constexpr bool only_sets = false;
-    static constexpr bool only_blends = false;
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return false; }
 
     std::uint32_t* voxels; // by fragment

@@ -64,7 +64,7 @@ struct direct_elements {
         ++tally.fragments;
         core::for_each_index<targets_of<Framebuffer>::count>([&]<std::size_t K>() {
             const auto& t = voxelpipe::get<K>(fb.targets);
-            if (t.load != load_operation::off)
+            if (modes.of[K] != immediate_mode::off)
                 tally.touched += blend_row(t, x, y, z, 1u, voxelpipe::get<K>(values), modes.of[K]);
         });
     }

@@ -53,12 +53,13 @@ struct blending_sink : sink_base<Call> {
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
         mine.fragments += static_cast<unsigned>(__popc(mask));
-        each_target([&]<std::size_t K>(const auto& t, immediate_mode mode) VOXELPIPE_INLINE_LAMBDA {
-            if constexpr (Call::output::only_blends)
-                add_row(t, x0, y, z, mask, value_of<K>());
-            else
-                mine.touched += blend_row(t, x0, y, z, mask, value_of<K>(), mode);
-        });
+        each_target([&]<std::size_t K, class Target>(const target_view<Target>& t, immediate_mode mode)
+                        VOXELPIPE_INLINE_LAMBDA {
+                            if constexpr (has_value_rows<Target>)
+                                if (mode == immediate_mode::blend) [[likely]]
+                                    return add_row(t, x0, y, z, mask, value_of<K>());
+                            mine.touched += blend_row(t, x0, y, z, mask, value_of<K>(), mode);
+                        });
     }
     __device__ VOXELPIPE_INLINE void row_by_all(unsigned, int x0, int y, int z, word mask) {
         const word own = mask & bits_of_lane();
@@ -89,12 +90,13 @@ struct blending_sink : sink_base<Call> {
     // Voxels as in blend_cube.
     __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word voxels) {
         mine.fragments += static_cast<unsigned>(__popc(voxels));
-        each_target([&]<std::size_t K>(const auto& t, immediate_mode mode) VOXELPIPE_INLINE_LAMBDA {
-            if constexpr (Call::output::only_blends)
-                add_cube(t, x, y, z, voxels, value_of<K>());
-            else
-                mine.touched += blend_cube(t, x, y, z, voxels, value_of<K>(), mode);
-        });
+        each_target([&]<std::size_t K, class Target>(const target_view<Target>& t, immediate_mode mode)
+                        VOXELPIPE_INLINE_LAMBDA {
+                            if constexpr (has_value_rows<Target>)
+                                if (mode == immediate_mode::blend) [[likely]]
+                                    return add_cube(t, x, y, z, voxels, value_of<K>());
+                            mine.touched += blend_cube(t, x, y, z, voxels, value_of<K>(), mode);
+                        });
     }
     // Counts voxels that are drawn by other means.
     __device__ VOXELPIPE_INLINE void count(word voxels) { mine.fragments += static_cast<unsigned>(__popc(voxels)); }
@@ -151,10 +153,10 @@ private:
     __device__ VOXELPIPE_INLINE void each_target(F&& f) const {
         core::for_each_index<targets_of<decltype(this->call.out.fb)>::count>([&]<std::size_t K>() {
             const auto& t = voxelpipe::get<K>(this->call.out.fb.targets);
-            if constexpr (Call::output::only_sets || Call::output::only_blends)
+            if constexpr (Call::output::only_sets)
                 f.template operator()<K>(t, immediate_mode::blend);
-            else if (t.load != load_operation::off)
-                f.template operator()<K>(t, this->call.out.modes.of[K]);
+            else if (const immediate_mode mode = this->call.out.modes.of[K]; mode != immediate_mode::off)
+                f.template operator()<K>(t, mode);
         });
     }
 };
@@ -173,9 +175,8 @@ struct framebuffer_output {
     static constexpr bool defers = has_only_bits<Framebuffer>; // otherwise raster/block_pass.cuh draws
     // Targets are written while triangles are drawn, so no triangle may be missing at the end.
     static constexpr bool can_skip_deferred_pass = false;
-    // Facts for the compiler: all targets are in use, and all values are true, or the mode of all is to blend.
+    // A fact for the compiler: all targets are in use, their mode is to blend, and all values are true.
     static constexpr bool only_sets = false;
-    static constexpr bool only_blends = false;
     Framebuffer fb;
     Values values;
     immediate_modes<targets_of<Framebuffer>::count> modes;
@@ -184,20 +185,6 @@ struct framebuffer_output {
     __device__ VOXELPIPE_INLINE static void prepare(std::uint64_t, std::uint64_t) {} // work for a later kernel
     // True if check_indices has run; otherwise the sink checks all indices.
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return true; }
-};
-
-// All targets have rows of values.
-template <class Framebuffer>
-inline constexpr bool has_only_values = false;
-template <class... Targets>
-inline constexpr bool has_only_values<framebuffer_view<Targets...>> = (has_value_rows<Targets> && ...);
-template <class Framebuffer, class Values>
-struct blended_output : framebuffer_output<Framebuffer, Values> {
-    template <class Call>
-    using sink = blending_sink<Call>;
-    template <class Call>
-    using deferred_sink = sink<Call>;
-    static constexpr bool only_blends = true;
 };
 
 } // namespace voxelpipe::device

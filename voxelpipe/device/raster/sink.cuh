@@ -58,7 +58,7 @@ concept fragment_sink = requires(Sink sink, const glm::uvec3& indices, std::uint
 // compile-time members:
 //   defers                  the first pass leaves larger triangles to the deferred pass; otherwise block_pass.cuh
 //   can_skip_deferred_pass  the deferred pass may be left out: a call that misses triangles writes no target
-//   only_sets, only_blends  all targets are in use, and all values are true, or all targets are blended in position
+//   only_sets               all targets are in use, blended in place, and all values are true
 template <coverage Rule, class Source, class Output>
 struct raster_call {
     static constexpr coverage rule = Rule;

@@ -32,11 +32,6 @@ struct immediate_plan {
     [[nodiscard]] bool counts(std::size_t k) const { return modes.of[k] == immediate_mode::count; }
     [[nodiscard]] bool any_counted() const { return first_counted() >= 0; }
     [[nodiscard]] bool has_last_pass() const { return any_counted() || bits_of >= 0; }
-    [[nodiscard]] bool only_blends() const {
-        for (const immediate_mode mode : modes.of)
-            if (mode != immediate_mode::blend) return false;
-        return true;
-    }
     [[nodiscard]] int first_counted() const {
         for (std::size_t k = 0; k < N; ++k)
             if (counts(k)) return static_cast<int>(k);

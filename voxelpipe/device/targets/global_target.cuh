@@ -237,10 +237,9 @@ __device__ VOXELPIPE_INLINE unsigned blend_slim(const target_view<Target>& t, in
     return touched;
 }
 
-// ---- targets of values, all blended in place ------------------------------------------------------------------------
+// ---- targets of values, blended in place ----------------------------------------------------------------------------
 
-// True if values of a row along x are neighbours in memory. The functions below are for calls whose modes are all blend
-// (blended_output).
+// True if values of a row along x are neighbours in memory. The functions below are for the mode blend.
 template <class Target>
 inline constexpr bool has_value_rows = !Target::map::is_bit && !Target::map::bricks && is_immediate<Target>();
 

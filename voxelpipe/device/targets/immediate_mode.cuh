@@ -23,7 +23,8 @@ enum class immediate_mode : std::uint32_t {
     blend,       // in place; a target of bits in rows has fewer than 2^30 words
     blend_far,   // in place, with any number of words
     count_first, // in place, and counts voxels without earlier fragments; needs tells_first
-    count        // the target holds each voxel's number of fragments
+    count,       // the target holds each voxel's number of fragments
+    off          // the target is not written
 };
 template <std::size_t N>
 struct immediate_modes {
