@@ -18,6 +18,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <iostream>
@@ -34,6 +35,7 @@ struct options {
     std::string scenes = VOXELPIPE_SCENES_DIR, out;
     std::vector<std::string> names;
     std::vector<int> resolutions{512, 1024, 2048};
+    std::vector<std::string> cells{"bit", "float_add", "abuffer"};
     gpu::repetition repeat;
     double triangle_bytes = slabs::device_options{}.triangle_bytes;
 };
@@ -209,6 +211,7 @@ int run(const options& how, const std::string& command) {
     for (const std::string& name : how.names.empty() ? available_scenes(how.scenes, notes) : how.names) {
         const mesh_data data = find_mesh(how.scenes, name);
         const auto measure = [&]<class Output>(std::type_identity<Output>, const char* kind, int n, auto shader) {
+            if (std::find(how.cells.begin(), how.cells.end(), kind) == how.cells.end()) return;
             try {
                 trim_pools(one);
                 cell<Output, decltype(shader)> c(how, one, data, n, shader);
@@ -265,6 +268,9 @@ int main(int argc, char** argv) {
     app.add_option("--scenes", how.scenes, "Folder of the benchmark scenes (.vpm or .vpz)")->capture_default_str();
     app.add_option("--mesh", how.names, "A scene, a generated mesh or a file; may be repeated. Default: five scenes");
     app.add_option("--resolution", how.resolutions, "Voxels a side; may be repeated")->capture_default_str();
+    app.add_option("--cell", how.cells, "What is drawn: bit, float_add or abuffer; may be repeated")
+        ->check(CLI::IsMember({"bit", "float_add", "abuffer"}))
+        ->capture_default_str();
     app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
     app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
     app.add_option("--triangle-bytes", how.triangle_bytes, "What a triangle costs when the grid is cut")
