@@ -4,8 +4,8 @@
 
 #include "batch.hpp"
 #include "formats/output_file.hpp"
-#include "formats/zarr.hpp"
 #include "memory.hpp"
+#include "slab_output.hpp"
 #include "sparse/sparse_voxelizer.hpp"
 
 #include <nlohmann/json.hpp>
@@ -16,6 +16,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <memory>
 #include <new>
 #include <system_error>
 #include <utility>
@@ -56,20 +57,19 @@ private:
 // The folder of the slabs of one output.
 class slab_folder {
 public:
-    slab_folder(const fs::path& output, const std::string& work)
-        : target_(zarr_target(output)), path_(target_.string() + "." + work + ".slabs") {
+    slab_folder(const slab_output& output, const std::string& work)
+        : output_(output), path_(output.target().string() + "." + work + ".slabs") {
         std::error_code error;
-        if (fs::exists(target_, error) && !fs::exists(target_ / "zarr.json", error))
-            throw write_error(target_, "it exists and is no Zarr group");
+        output_.check_target();
         if (fs::exists(path_, error)) {
             const folder_lock lock(path_);
             // Its slabs became the output, and the process ended before it could remove the rest.
-            if (!fs::exists(data(), error)) fs::remove_all(path_, error);
+            if (!has_data() && has_marks()) fs::remove_all(path_, error);
         }
-        fs::create_directories(data(), error);
+        fs::create_directories(path_ / "data", error);
         if (error) throw write_error(path_, "make a folder: " + error.message());
     }
-    [[nodiscard]] fs::path data() const { return path_ / "data"; }
+    [[nodiscard]] const fs::path& path() const { return path_; }
     [[nodiscard]] bool has(std::int64_t slab) const {
         std::error_code error;
         return fs::exists(mark_of(slab), error);
@@ -81,29 +81,39 @@ public:
         file.write(line.dump() + "\n");
         file.commit();
     }
-    // If all of them are there: makes the output of them, and returns their counts in `all`. False if another process
-    // does.
-    [[nodiscard]] bool finish(std::int64_t slabs, const volume& shape, const write_options& how, voxelize_stats& all) {
+    // If all of them are there: makes the output of them, returns their counts in `all`, and its files. None if another
+    // process does.
+    [[nodiscard]] std::vector<fs::path> finish(voxelize_stats& all) {
         const folder_lock lock(path_);
         std::error_code error;
-        if (!fs::exists(data(), error)) return false;
-        for (std::int64_t s = 0; s < slabs; ++s) {
+        if (!has_data()) return {};
+        for (std::int64_t s = 0; s < output_.num_slabs(); ++s) {
             std::ifstream file(mark_of(s));
             const json line = json::parse(file, nullptr, false);
             if (!line.is_object()) throw write_error(mark_of(s), "it holds no counts; remove it");
             for (const auto& [name, count] : kept_counts) all.*count += line.value(name, std::uint64_t{0});
         }
-        describe_zarr(shape, data(), how);
-        replace_zarr(data(), target_);
+        std::vector<fs::path> files = output_.finish(path_);
         fs::remove_all(path_, error);
-        return true;
+        return files;
     }
-    [[nodiscard]] const fs::path& target() const { return target_; }
 
 private:
     [[nodiscard]] fs::path mark_of(std::int64_t slab) const { return path_ / ("done." + std::to_string(slab)); }
+    [[nodiscard]] bool has_data() const {
+        std::error_code error;
+        return fs::exists(path_ / "data", error);
+    }
+    // Of any slab: a folder without is one that another process is making.
+    [[nodiscard]] bool has_marks() const {
+        std::error_code error;
+        for (const fs::directory_entry& entry : fs::directory_iterator(path_, error))
+            if (entry.path().stem() == "done") return true;
+        return false;
+    }
 
-    fs::path target_, path_;
+    const slab_output& output_;
+    fs::path path_;
 };
 
 // Shape and channels of the output, without values.
@@ -142,9 +152,7 @@ std::string why_not_by_slabs(const command_line& options) {
     const auto wants = [&](target id) {
         return std::find(request.targets.begin(), request.targets.end(), id) != request.targets.end();
     };
-    if (options.outputs.size() != 1 || lower_extension(zarr_target(options.outputs[0])) != ".zarr")
-        return "one output, a .zarr";
-    if (options.write.levels) return "a .zarr without --levels, whose blocks reach over slabs";
+    if (options.outputs.size() != 1 || !has_slab_output(options.outputs[0])) return "one output, a .zarr or .pvti";
     if (options.storage == storage_choice::dense || request.backend == backend_choice::cuda || request.devices != 1 ||
         request.strategy != voxelpipe::strategy::automatic)
         return "the CPU and bricks: no --dense, --backend cuda, --devices or --strategy";
@@ -157,25 +165,24 @@ std::string why_not_by_slabs(const command_line& options) {
 
 slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run_report& report) {
     const voxelize_request& request = report.request;
-    slab_folder folder(options.outputs[0], work_of(options, options.input));
-    write_options how = options.write;
-    slab_outcome outcome;
-    const auto layers = static_cast<std::int64_t>(request.grid.extent.z);
-    outcome.slabs = (layers + zarr_slab_layers - 1) / zarr_slab_layers;
     const std::size_t num_targets = request.targets.size() - options.implied.size();
+    const std::unique_ptr<slab_output> output =
+        make_slab_output(options.outputs[0], shape_of(request, num_targets), options.write);
+    slab_folder folder(*output, work_of(options, options.input));
+    slab_outcome outcome;
+    outcome.slabs = output->num_slabs();
 
     std::vector<std::int64_t> mine;
     std::vector<slabs::layer_range> ranges;
     for (std::int64_t s = options.batch.rank; s < outcome.slabs; s += options.batch.world_size) {
         if (folder.has(s)) continue;
         mine.push_back(s);
-        ranges.push_back(
-            {static_cast<int>(s * zarr_slab_layers), static_cast<int>(std::min(layers, (s + 1) * zarr_slab_layers))});
+        ranges.push_back(output->layers(s));
     }
     voxelize_stats before;
     const auto write = [&](std::size_t i, sparse_volume&& bricks, const voxelize_stats& until) {
         bricks.channels.resize(num_targets);
-        write_zarr_slab(as_dense(bricks, bricks.channels), folder.data(), mine[i], how);
+        output->write(folder.path(), mine[i], as_dense(bricks, bricks.channels));
         voxelize_stats counts;
         for (const auto& [name, count] : kept_counts) counts.*count = until.*count - before.*count;
         before = until;
@@ -207,10 +214,11 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
     for (std::int64_t s = 0; s < outcome.slabs; ++s) outcome.left += folder.has(s) ? 0 : 1;
     if (outcome.left != 0) return outcome;
     voxelize_stats all;
-    if (!folder.finish(outcome.slabs, shape_of(request, num_targets), how, all)) return outcome;
+    std::vector<fs::path> files = folder.finish(all);
+    if (files.empty()) return outcome;
     outcome.finished = true;
     for (const auto& [name, count] : kept_counts) stats.*count = all.*count;
-    report.files.push_back(folder.target());
+    report.files.insert(report.files.end(), files.begin(), files.end());
     return outcome;
 }
 

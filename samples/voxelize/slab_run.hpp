@@ -4,9 +4,9 @@
 
 // One model whose result is drawn and written slab by slab: by one process that may be stopped and run again, or by
 // several that share the slabs, on one machine or on any that see one folder. Slabs lie in a folder beside the output,
-// OUT.zarr.WORK.slabs, with a mark for each that is whole; WORK says which model and options they are of. A process
-// draws those of its slabs that have no mark. The one after which none is left makes the output of the folder. So
-// nothing passes between the processes but files.
+// OUT.zarr.WORK.slabs (OUT.pvti.PIECES.WORK.slabs), with a mark for each that is whole; WORK says which model and
+// options they are of. A process draws those of its slabs that have no mark. The one after which none is left makes the
+// output of the folder. So nothing passes between the processes but files.
 
 #include "command_line.hpp"
 #include "report.hpp"

@@ -54,8 +54,9 @@ struct outcome {
     std::string err;
 };
 
-// Neither stream is a terminal. ADDRESS_SPACE bounds that of the program, in bytes; 0: it has no bound.
-inline outcome run(const scratch_folder& folder, const std::vector<std::string>& arguments,
+// Starts the program, with its streams in stdout.txt and stderr.txt of the folder. The caller waits for it.
+// ADDRESS_SPACE bounds that of the program, in bytes; 0: it has no bound.
+inline pid_t start(const scratch_folder& folder, const std::vector<std::string>& arguments,
                    std::uint64_t address_space = 0) {
     const char* const elsewhere = std::getenv("VOXELPIPE_VOXELIZE"); // for tests moved to another machine
     std::vector<std::string> all{elsewhere != nullptr ? elsewhere : VOXELPIPE_VOXELIZE};
@@ -74,9 +75,21 @@ inline outcome run(const scratch_folder& folder, const std::vector<std::string>&
         execv(argv[0], argv.data());
         _exit(127);
     }
+    return child;
+}
+
+// Waits for a program that was started.
+inline outcome wait_for(const scratch_folder& folder, pid_t child) {
     int status = 0;
     waitpid(child, &status, 0);
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_file(out), read_file(err)};
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_file(folder / "stdout.txt"),
+            read_file(folder / "stderr.txt")};
+}
+
+// Neither stream is a terminal. ADDRESS_SPACE as above.
+inline outcome run(const scratch_folder& folder, const std::vector<std::string>& arguments,
+                   std::uint64_t address_space = 0) {
+    return wait_for(folder, start(folder, arguments, address_space));
 }
 
 // An array of a .npy file, version 1.0, C order.

@@ -6,13 +6,16 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -21,9 +24,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// A closed tower that turns as it rises, with a colour: three slabs of 256 layers at 12 x 12 x 600 voxels.
-void write_tower(const fs::path& path) {
-    constexpr int sides = 8, floors = 60;
+// A closed tower that turns as it rises, with a colour: with 60 floors, three slabs of 256 layers at 12 x 12 x 600
+// voxels.
+void write_tower(const fs::path& path, int floors) {
+    constexpr int sides = 8;
     std::vector<float> positions;
     std::vector<std::uint32_t> indices;
     for (int f = 0; f <= floors; ++f)
@@ -61,13 +65,20 @@ std::map<std::string, std::string> files_of(const fs::path& folder) {
 struct tower {
     scratch_folder folder;
     std::vector<std::string> how;
+    int floors;
 
-    explicit tower(std::vector<std::string> how_) : how(std::move(how_)) { write_tower(folder / "m.glb"); }
-    [[nodiscard]] outcome draw(const std::string& out, const std::vector<std::string>& more) const {
-        std::vector<std::string> arguments{folder / "m.glb", "-o", folder / out, "-r", "600", "-j", "2"};
+    explicit tower(std::vector<std::string> how_, int floors_ = 60) : how(std::move(how_)), floors(floors_) {
+        write_tower(folder / "m.glb", floors);
+    }
+    [[nodiscard]] pid_t begin(const std::string& out, const std::vector<std::string>& more) const {
+        std::vector<std::string> arguments{
+            folder / "m.glb", "-o", folder / out, "-r", std::to_string(10 * floors), "-j", "2"};
         arguments.insert(arguments.end(), how.begin(), how.end());
         arguments.insert(arguments.end(), more.begin(), more.end());
-        return run(folder, arguments);
+        return start(folder, arguments);
+    }
+    [[nodiscard]] outcome draw(const std::string& out, const std::vector<std::string>& more) const {
+        return wait_for(folder, begin(out, more));
     }
     // The folders of slabs that are there.
     [[nodiscard]] std::vector<fs::path> unfinished() const {
@@ -119,10 +130,11 @@ TEST(ToolSlabs, AStoppedRunGoesOn) {
     ASSERT_EQ(0, whole.code);
     ASSERT_EQ(0, t.draw("m.zarr", {"--world-size", "2", "--rank", "0"}).code); // slabs 0 and 2
     ASSERT_EQ(t.unfinished().size(), 1u);
-    // Killed while it wrote slab 1: files of it are there, but no mark.
+    // Killed while it wrote slab 1: files of it are there, one of them in part, but no mark.
     const fs::path data = t.unfinished()[0] / "data";
     fs::create_directories(data / "occupancy" / "c" / "1" / "0");
     std::ofstream(data / "occupancy" / "c" / "1" / "0" / "0") << "a part";
+    std::ofstream(data / "occupancy" / "c" / "1" / "0" / "0.part0") << "another";
     const outcome rest = t.draw("m.zarr", {"--resume", "--stats=json"});
     EXPECT_EQ(0, rest.code) << rest.err;
     EXPECT_NE(rest.err.find("drew 1 of 3 slabs"), std::string::npos) << rest.err;
@@ -134,6 +146,74 @@ TEST(ToolSlabs, AStoppedRunGoesOn) {
     const outcome other = t.draw("m.zarr", {"--resume", "--coverage", "thin"});
     EXPECT_NE(other.err.find("drew 3 of 3 slabs"), std::string::npos) << other.err;
     EXPECT_FALSE(files_of(t.folder / "whole.zarr") == files_of(t.folder / "m.zarr"));
+}
+
+// kill -9 in the middle, twice. What is left is no output and no Zarr group; the run that goes on gives the same files.
+TEST(ToolSlabs, AKilledRunGoesOn) {
+    const tower t({"-t", "occupancy,color", "--sparse", "--padding", "2"}, 1024); // 40 slabs
+    ASSERT_EQ(0, t.draw("whole.zarr", {}).code);
+    const auto marks = [&] {
+        int count = 0;
+        for (const fs::path& folder : t.unfinished())
+            for (int s = 0; s < 40; ++s) count += fs::exists(folder / ("done." + std::to_string(s))) ? 1 : 0;
+        return count;
+    };
+    int done = 0;
+    for (const int least : {1, 8}) {
+        const pid_t child = t.begin("m.zarr", {"--resume"});
+        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+        while (marks() < least && std::chrono::steady_clock::now() < end)
+            std::this_thread::sleep_for(std::chrono::microseconds(200));
+        kill(child, SIGKILL);
+        const outcome killed = wait_for(t.folder, child);
+        ASSERT_EQ(128 + SIGKILL, killed.code) << killed.err; // it did not end before
+        done = marks();
+        ASSERT_GE(done, least);
+        ASSERT_LT(done, 40);
+        EXPECT_FALSE(fs::exists(t.folder / "m.zarr"));
+        ASSERT_EQ(t.unfinished().size(), 1u);
+        for (const auto& [name, content] : files_of(t.unfinished()[0]))
+            EXPECT_NE(fs::path(name).filename(), "zarr.json");
+    }
+    const outcome rest = t.draw("m.zarr", {"--resume"});
+    EXPECT_EQ(0, rest.code) << rest.err;
+    EXPECT_NE(rest.err.find("drew " + std::to_string(40 - done) + " of 40 slabs"), std::string::npos) << rest.err;
+    EXPECT_TRUE(t.unfinished().empty());
+    expect_same_group(t, "whole.zarr", "m.zarr");
+}
+
+// Blocks of levels reach over slabs.
+TEST(ToolSlabs, Levels) {
+    const tower t({"-t", "occupancy,color,normal,material", "--levels", "--sparse"});
+    ASSERT_EQ(0, t.draw("whole.zarr", {}).code);
+    for (const char* const rank : {"2", "1", "0"})
+        EXPECT_EQ(0, t.draw("parts.zarr", {"--world-size", "3", "--rank", rank}).code);
+    EXPECT_TRUE(t.unfinished().empty());
+    expect_same_group(t, "whole.zarr", "parts.zarr");
+    EXPECT_TRUE(fs::exists(t.folder / "parts.zarr/color/4/zarr.json")); // 600 layers, down to 38
+}
+
+// Pieces whose borders lie within bricks.
+TEST(ToolSlabs, PiecesOfPvti) {
+    const tower t({"-t", "occupancy,count,normal", "--sparse", "--padding", "3"});
+    fs::create_directories(t.folder / "whole");
+    fs::create_directories(t.folder / "parts");
+    ASSERT_EQ(0, t.draw("whole/m.pvti", {"--pieces", "5"}).code);
+    ASSERT_EQ(0, t.draw("parts/m.pvti", {"--pieces", "7"}).code); // whose pieces 6 and 7 go
+    for (const char* const rank : {"1", "0"}) {
+        const outcome part = t.draw("parts/m.pvti", {"--pieces", "5", "--world-size", "2", "--rank", rank});
+        EXPECT_EQ(0, part.code) << part.err;
+        EXPECT_NE(part.err.find(*rank == '1' ? "drew 2 of 5 slabs" : "drew 3 of 5 slabs"), std::string::npos)
+            << part.err;
+    }
+    const auto whole = files_of(t.folder / "whole"), parts = files_of(t.folder / "parts");
+    EXPECT_EQ(whole.size(), 6u);
+    EXPECT_TRUE(whole == parts) << parts.size() << " files";
+    // Until the last piece is there, what was there before stays.
+    ASSERT_EQ(0, t.draw("parts/m.pvti", {"--pieces", "2", "--world-size", "2", "--rank", "1"}).code);
+    EXPECT_EQ(read_file(t.folder / "whole/m.pvti"), read_file(t.folder / "parts/m.pvti"));
+    EXPECT_EQ(0, t.draw("parts/m.pvti", {"--pieces", "2", "--world-size", "2", "--rank", "0"}).code);
+    EXPECT_EQ(files_of(t.folder / "parts").size(), 3u);
 }
 
 TEST(ToolSlabs, SolidsAndTheirHoles) {
@@ -158,8 +238,7 @@ TEST(ToolSlabs, SaysWhatCannotBeDoneBySlabs) {
         EXPECT_EQ(result.code, 1);
         return result.err;
     };
-    EXPECT_NE(error("m.npz", {}).find("--resume needs one output, a .zarr"), std::string::npos);
-    EXPECT_NE(error("m.zarr", {"--levels"}).find("without --levels"), std::string::npos);
+    EXPECT_NE(error("m.npz", {}).find("--resume needs one output, a .zarr or .pvti"), std::string::npos);
     EXPECT_NE(error("m.zarr", {"-t", "color-outer"}).find("no --target color-outer"), std::string::npos);
     EXPECT_NE(error("m.zarr", {"--dense"}).find("no --dense"), std::string::npos);
     EXPECT_NE(error("m.zarr", {"--solid", "nonzero", "-t", "color"}).find("--fill-color"), std::string::npos);

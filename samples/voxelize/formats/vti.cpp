@@ -174,11 +174,6 @@ volume layers_of(const volume& v, std::int64_t first, std::int64_t last) {
     return part;
 }
 
-// The name of piece n, from 1.
-std::string piece_name(const std::filesystem::path& path, std::int64_t n) {
-    return path.stem().string() + "." + std::to_string(n) + ".vti";
-}
-
 // How many pieces a file at this path names that was written here; 0 without one.
 std::int64_t pieces_before(const std::filesystem::path& path) {
     std::error_code error;
@@ -186,9 +181,36 @@ std::int64_t pieces_before(const std::filesystem::path& path) {
     std::ifstream file(path, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(file), {}};
     std::int64_t n = 0;
-    while (n < most_pieces && text.find("Source=\"" + attribute(piece_name(path, n + 1)) + '"') != std::string::npos)
+    while (n < most_pieces &&
+           text.find("Source=\"" + attribute(pvti_piece_path(path, n).filename().string()) + '"') != std::string::npos)
         ++n;
     return n;
+}
+
+// The text of a .pvti.
+std::string index_of(const volume& v, const std::filesystem::path& path, std::int64_t pieces) {
+    std::string text =
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"PImageData\" version=\"1.0\" byte_order=\"LittleEndian\" "
+        "header_type=\"UInt64\">\n  <PImageData WholeExtent=\"" +
+        extent_of(v, 0, v.extent[2]) + "\" GhostLevel=\"0\" Origin=\"" + triple(v.origin) + "\" Spacing=\"" +
+        triple(v.voxel_size) + "\" Direction=\"1 0 0 0 1 0 0 0 1\">\n    <PPointData/>\n    <PCellData" +
+        cell_data(
+            v, "PDataArray", [](std::size_t) { return ""; }, "      ") +
+        "    </PCellData>\n";
+    for (std::int64_t n = 0; n < pieces; ++n) {
+        const auto [first, last] = pvti_piece_layers(v, n, pieces);
+        text += "    <Piece Extent=\"" + extent_of(v, first, last) + "\" Source=\"" +
+                attribute(pvti_piece_path(path, n).filename().string()) + "\"/>\n";
+    }
+    return text + "  </PImageData>\n</VTKFile>\n";
+}
+
+// Removes the pieces from `pieces` on of those that a file at this path named `before`.
+void remove_old_pieces(const std::filesystem::path& path, std::int64_t pieces, std::int64_t before) {
+    for (std::int64_t n = pieces; n < before; ++n) {
+        std::error_code ignored;
+        std::filesystem::remove(pvti_piece_path(path, n), ignored);
+    }
 }
 
 } // namespace
@@ -202,40 +224,53 @@ std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesys
     return {path};
 }
 
-std::vector<std::filesystem::path> write_pvti(const volume& v, const std::filesystem::path& path,
-                                              const write_options& options) {
-    const std::int64_t layers = v.extent[2];
+std::int64_t num_pvti_pieces(const volume& v, const write_options& options) {
     std::int64_t pieces = options.pieces;
     if (pieces == 0)
         pieces = static_cast<std::int64_t>((bytes_of(v) - 1) / std::max<std::uint64_t>(options.piece_bytes, 1)) + 1;
-    pieces = std::clamp<std::int64_t>(pieces, 1, std::min<std::int64_t>(layers, most_pieces));
+    return std::clamp<std::int64_t>(pieces, 1, std::min<std::int64_t>(v.extent[2], most_pieces));
+}
 
+std::pair<std::int64_t, std::int64_t> pvti_piece_layers(const volume& v, std::int64_t piece, std::int64_t pieces) {
+    return {piece * v.extent[2] / pieces, (piece + 1) * v.extent[2] / pieces};
+}
+
+std::filesystem::path pvti_piece_path(const std::filesystem::path& path, std::int64_t piece) {
+    return path.parent_path() / (path.stem().string() + "." + std::to_string(piece + 1) + ".vti");
+}
+
+void write_pvti_piece(const volume& v, const std::filesystem::path& file, std::int64_t piece, std::int64_t pieces,
+                      const write_options& options) {
+    const auto [first, last] = pvti_piece_layers(v, piece, pieces);
+    const volume part = layers_of(v, first, last);
+    progress_meter meter(options.progress, bytes_of(part));
+    output_file out(file);
+    write_image(out, part, first, options, meter);
+    out.commit();
+}
+
+void write_pvti_index(const volume& v, const std::filesystem::path& path, std::int64_t pieces) {
     const std::int64_t before = pieces_before(path);
+    output_file out(path);
+    out.write(index_of(v, path, pieces));
+    out.commit();
+    remove_old_pieces(path, pieces, before);
+}
+
+std::vector<std::filesystem::path> write_pvti(const volume& v, const std::filesystem::path& path,
+                                              const write_options& options) {
+    const std::int64_t pieces = num_pvti_pieces(v, options), before = pieces_before(path);
     progress_meter meter(options.progress, bytes_of(v));
     std::vector<std::unique_ptr<output_file>> files;
-    std::string text =
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"PImageData\" version=\"1.0\" byte_order=\"LittleEndian\" "
-        "header_type=\"UInt64\">\n  <PImageData WholeExtent=\"" +
-        extent_of(v, 0, layers) + "\" GhostLevel=\"0\" Origin=\"" + triple(v.origin) + "\" Spacing=\"" +
-        triple(v.voxel_size) + "\" Direction=\"1 0 0 0 1 0 0 0 1\">\n    <PPointData/>\n    <PCellData" +
-        cell_data(
-            v, "PDataArray", [](std::size_t) { return ""; }, "      ") +
-        "    </PCellData>\n";
     for (std::int64_t n = 0; n < pieces; ++n) {
-        const std::int64_t first = n * layers / pieces, last = (n + 1) * layers / pieces;
-        const std::string name = piece_name(path, n + 1);
-        files.push_back(std::make_unique<output_file>(path.parent_path() / name));
+        const auto [first, last] = pvti_piece_layers(v, n, pieces);
+        files.push_back(std::make_unique<output_file>(pvti_piece_path(path, n)));
         write_image(*files.back(), layers_of(v, first, last), first, options, meter);
-        text += "    <Piece Extent=\"" + extent_of(v, first, last) + "\" Source=\"" + attribute(name) + "\"/>\n";
     }
     files.push_back(std::make_unique<output_file>(path));
-    files.back()->write(text + "  </PImageData>\n</VTKFile>\n");
+    files.back()->write(index_of(v, path, pieces));
     std::vector<std::filesystem::path> targets = commit_all(files);
-    // The old file's pieces that the new file does not name.
-    for (std::int64_t n = pieces; n < before; ++n) {
-        std::error_code ignored;
-        std::filesystem::remove(path.parent_path() / piece_name(path, n + 1), ignored);
-    }
+    remove_old_pieces(path, pieces, before);
     return targets;
 }
 

@@ -8,6 +8,11 @@
 
 #include "formats.hpp"
 
+#include <cstdint>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
 namespace voxelize {
 
 std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesystem::path& path,
@@ -17,5 +22,20 @@ std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesys
 // many as options.piece_bytes asks for, 512 at most. The .pvti gets its name last.
 std::vector<std::filesystem::path> write_pvti(const volume& v, const std::filesystem::path& path,
                                               const write_options& options);
+
+// The same piece by piece, in any order and by any number of processes. Only its shape and channels are asked for of a
+// volume, but the values of its piece where that is written. Pieces count from 0 here.
+
+// How many pieces write_pvti() makes.
+[[nodiscard]] std::int64_t num_pvti_pieces(const volume& v, const write_options& options);
+// The layers [first, last) of a piece.
+[[nodiscard]] std::pair<std::int64_t, std::int64_t> pvti_piece_layers(const volume& v, std::int64_t piece,
+                                                                      std::int64_t pieces);
+// Where the piece of a .pvti lies.
+[[nodiscard]] std::filesystem::path pvti_piece_path(const std::filesystem::path& path, std::int64_t piece);
+void write_pvti_piece(const volume& v, const std::filesystem::path& file, std::int64_t piece, std::int64_t pieces,
+                      const write_options& options);
+// The .pvti, once all pieces are there. Removes those of a .pvti of more pieces that was there.
+void write_pvti_index(const volume& v, const std::filesystem::path& path, std::int64_t pieces);
 
 } // namespace voxelize

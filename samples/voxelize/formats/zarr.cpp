@@ -139,6 +139,16 @@ void write_description(const fs::path& group, const std::string& text) {
     json.commit();
 }
 
+// Where a channel's own array lies in its group.
+fs::path array_of(const fs::path& folder, const channel& c, const write_options& options) {
+    return options.levels ? folder / c.name / "0" : folder / c.name;
+}
+
+// A slab's part of the levels of a channel.
+fs::path level_file(const fs::path& levels, const channel& c, std::int64_t slab) {
+    return levels / (c.name + "." + std::to_string(slab));
+}
+
 } // namespace
 
 bool has_zstd() {
@@ -171,25 +181,36 @@ void replace_zarr(const fs::path& folder, const fs::path& target) {
     if (!old.empty()) fs::remove_all(old, error);
 }
 
-void write_zarr_slab(const volume& v, const fs::path& folder, std::int64_t slab, const write_options& options) {
+void write_zarr_slab(const volume& v, const fs::path& folder, const fs::path& levels, std::int64_t slab,
+                     const write_options& options) {
     try {
         for (const channel& c : v.channels) {
-            fs::create_directories(folder / c.name);
-            channel_writer array(v, c, folder / c.name, options);
+            const fs::path array_folder = array_of(folder, c, options);
+            fs::create_directories(array_folder);
+            channel_writer array(v, c, array_folder, options);
             const std::int64_t each = array.shards_of_slab();
             progress_meter meter(options.progress, static_cast<std::uint64_t>(array.chunks_of(each)));
             array.write(slab * each, (slab + 1) * each, thread_count(options.threads), [&] { meter.advance(1); });
+            if (!options.levels) continue;
+            fs::create_directories(levels);
+            write_slab_levels(v, c, level_file(levels, c, slab), slab * zarr_slab_layers,
+                              std::min<std::int64_t>(v.extent[2], (slab + 1) * zarr_slab_layers), options);
         }
     } catch (const fs::filesystem_error& error) {
         throw write_error(folder, error.code().message());
     }
 }
 
-void describe_zarr(const volume& v, const fs::path& folder, const write_options& options) {
+void finish_zarr_slabs(const volume& v, const fs::path& folder, const fs::path& levels, const write_options& options) {
     try {
         for (const channel& c : v.channels) {
-            fs::create_directories(folder / c.name);
-            channel_writer(v, c, folder / c.name, options).describe();
+            fs::create_directories(array_of(folder, c, options));
+            channel_writer(v, c, array_of(folder, c, options), options).describe();
+            if (!options.levels) continue;
+            join_slab_levels(
+                v, c, folder / c.name, zarr_slab_layers, [&](std::int64_t slab) { return level_file(levels, c, slab); },
+                options);
+            write_description(folder / c.name, multiscale_description(v, c));
         }
     } catch (const fs::filesystem_error& error) {
         throw write_error(folder, error.code().message());
@@ -204,9 +225,9 @@ std::vector<fs::path> write_zarr(const volume& v, const fs::path& path, const wr
         std::vector<std::unique_ptr<channel_writer>> arrays;
         std::uint64_t steps = 0;
         for (const channel& c : v.channels) {
-            const fs::path group = folder.path() / c.name;
-            fs::create_directories(options.levels ? group / "0" : group);
-            arrays.push_back(std::make_unique<channel_writer>(v, c, options.levels ? group / "0" : group, options));
+            const fs::path array_folder = array_of(folder.path(), c, options);
+            fs::create_directories(array_folder);
+            arrays.push_back(std::make_unique<channel_writer>(v, c, array_folder, options));
             steps += static_cast<std::uint64_t>(arrays.back()->chunks_of(arrays.back()->num_shards()));
             if (options.levels) steps += num_level_blocks(v);
         }

@@ -15,17 +15,19 @@ std::vector<std::filesystem::path> write_zarr(const volume& v, const std::filesy
                                               const write_options& options);
 
 // The same group slab by slab, in any order and by any number of processes, into a folder that takes the target's place
-// at the end. A slab is a layer of shards, of zarr_slab_layers voxels along z. Without --levels.
+// at the end. A slab is a layer of shards, of zarr_slab_layers voxels along z. With levels a slab's part of them lies
+// in a file a channel in a folder of its own, until the group is made of all slabs.
 
 inline constexpr std::int64_t zarr_slab_layers = 256;
 
 // What a path means: without a slash at its end, and where a link leads.
 [[nodiscard]] std::filesystem::path zarr_target(const std::filesystem::path& path);
 // Writes a slab of a volume. Each file appears whole or not at all.
-void write_zarr_slab(const volume& v, const std::filesystem::path& folder, std::int64_t slab,
-                     const write_options& options);
-// What makes a group of the folder: the volume's shape and channels, without values.
-void describe_zarr(const volume& v, const std::filesystem::path& folder, const write_options& options);
+void write_zarr_slab(const volume& v, const std::filesystem::path& folder, const std::filesystem::path& levels,
+                     std::int64_t slab, const write_options& options);
+// Makes a group of the folder, once all slabs are there. The volume has shape and channels, without values.
+void finish_zarr_slabs(const volume& v, const std::filesystem::path& folder, const std::filesystem::path& levels,
+                       const write_options& options);
 // Renames the folder; a target that is there is replaced if it is a Zarr group.
 void replace_zarr(const std::filesystem::path& folder, const std::filesystem::path& target);
 

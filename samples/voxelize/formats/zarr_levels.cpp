@@ -3,310 +3,139 @@
 
 #include "zarr_levels.hpp"
 
-#include "dense_stream.hpp"
+#include "output_file.hpp"
 #include "text.hpp"
-#include "zarr_array.hpp"
+#include "zarr_level_arrays.hpp"
 
 #include "../parallel.hpp"
-#include "../resolve.hpp"
-#include "../srgb.hpp"
-#include "../targets.hpp"
-
-#include <cpu_ref/backend.hpp>
-#include <voxelpipe/dense_levels.hpp>
-
-#include <glm/gtc/type_precision.hpp>
-#include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstring>
-#include <type_traits>
-#include <utility>
+#include <fstream>
+#include <memory>
+#include <span>
 #include <vector>
 
 namespace voxelize {
 namespace {
 
 namespace fs = std::filesystem;
-namespace reduce = voxelpipe::reduce;
 
-constexpr int block_side = 128; // of level 0; half of it is a chunk
-constexpr int most_levels = 7;  // so that a block is a voxel of the last one
-static_assert(block_side == 2 * chunk_side && block_side >> most_levels == 1);
-
-// ---- what becomes of a target's values: `stored` in the arrays, load()ed for the reducer, whose results are store()d
-
-template <class T, class Reducer>
-struct plain_rule {
-    using stored = T;
-    using reducer = Reducer;
-    [[nodiscard]] static T load(const T& value) { return value; }
-    [[nodiscard]] static T store(const T& value) { return value; }
-};
-struct normal_rule { // the unit vector of the sum
-    using stored = glm::vec3;
-    using reducer = reduce::sum;
-    [[nodiscard]] static glm::vec3 load(const glm::vec3& value) { return value; }
-    [[nodiscard]] static glm::vec3 store(const glm::vec3& sum) { return unit_normal{&sum}(0); }
-};
-struct color_rule { // the mean in linear light, by alpha; of alpha the plain mean
-    using stored = glm::u8vec4;
-    using reducer = reduce::mean_of_voxels;
-    static constexpr double one = 0xffffff; // full light: 24 bits, and 8 of alpha
-
-    [[nodiscard]] static const color_tables& tables() {
-        static const color_tables made = make_color_tables();
-        return made;
-    }
-    [[nodiscard]] static glm::u32vec4 load(const stored& color) {
-        glm::u32vec4 light(0, 0, 0, color.a);
-        for (int c = 0; c < 3; ++c)
-            light[c] = static_cast<std::uint32_t>(std::lround(double{tables().linear[color[c]]} * one)) * color.a;
-        return light;
-    }
-    [[nodiscard]] static stored store(const glm::dvec4& mean) {
-        if (mean.a == 0) return stored(0);
-        stored color;
-        for (int c = 0; c < 3; ++c) color[c] = encode_srgb(tables(), static_cast<float>(mean[c] / mean.a / one));
-        color.a = static_cast<std::uint8_t>(std::lround(mean.a));
-        return color;
-    }
-};
-
-// Calls f with the rule of a channel.
-template <class F>
-void with_rule(const channel& c, const F& f) {
-    const std::optional<target> id = target_named(c.name);
-    if (!id || info_of(*id).type != c.type || info_of(*id).components != c.components)
-        throw write_error(c.name, "no levels are known for the values of this channel");
-    switch (*id) {
-    case target::occupancy:
-        return f(plain_rule<std::uint8_t, reduce::bit_or>{});
-    case target::count:
-        return f(plain_rule<std::uint32_t, reduce::max>{});
-    case target::color:
-    case target::color_replace:
-    case target::color_outer:
-        return f(color_rule{});
-    case target::color_max:
-        return f(plain_rule<glm::u8vec4, reduce::max>{});
-    case target::normal:
-        return f(normal_rule{});
-    case target::material:
-        return f(plain_rule<std::int32_t, reduce::majority>{});
-    case target::triangle:
-        return f(plain_rule<std::int32_t, reduce::max>{});
-    case target::depth:
-        return f(plain_rule<float, reduce::min>{});
-    }
+// Makes the levels of blocks by all threads; take(n, levels) gets those of block n, one after the other.
+template <class Take>
+void make_levels(const level_arrays& arrays, const volume& v, const channel& c, const std::vector<zyx>& blocks,
+                 const write_options& options, const Take& take) {
+    if (arrays.size() == 0) return;
+    ordered_for(
+        blocks.size(), thread_count(options.threads), [&](std::size_t n) { return arrays.make(v, c, blocks[n]); },
+        take);
 }
 
-// ---- blocks
-
-// The voxels of a block for reduce_levels. A voxel exists if its value is not that of an empty one.
-template <class Rule>
-struct block_voxels {
-    using stored = typename Rule::stored;
-    const std::byte* values;
-    const std::byte* empty;
-
-    [[nodiscard]] auto operator()(const glm::ivec3& v) const {
-        using loaded = decltype(Rule::load(stored{}));
-        const std::byte* const at =
-            values + static_cast<std::size_t>((v.z * block_side + v.y) * block_side + v.x) * sizeof(stored);
-        const bool exists = std::memcmp(at, empty, sizeof(stored)) != 0;
-        stored value;
-        std::memcpy(&value, at, sizeof(stored));
-        return voxelpipe::level_voxel<loaded>{exists, exists ? Rule::load(value) : loaded{}, 1};
-    }
-};
-
-// Blocks by their numbers along z, y, x, those of 8, 64, ... one after the other: a chunk and a shard of each level is
-// filled before the next.
-std::vector<zyx> blocks_of(const volume& v) {
-    std::vector<std::pair<std::uint64_t, zyx>> keyed;
-    const auto count = [&](std::size_t a) { return (v.extent[a] + block_side - 1) / block_side; };
-    for (std::int64_t z = 0; z < count(2); ++z)
-        for (std::int64_t y = 0; y < count(1); ++y)
-            for (std::int64_t x = 0; x < count(0); ++x)
-                keyed.push_back(
-                    {voxelpipe::core::morton_key(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)),
-                     {z, y, x}});
-    std::sort(keyed.begin(), keyed.end());
-    std::vector<zyx> blocks;
-    blocks.reserve(keyed.size());
-    for (const auto& [key, block] : keyed) blocks.push_back(block);
-    return blocks;
+void make_level_folders(const volume& v, const fs::path& folder) {
+    for (int l = 1; l <= num_zarr_levels(v); ++l) fs::create_directories(folder / std::to_string(l));
 }
 
-// The bytes of a block; voxels beyond the grid are empty.
-std::vector<std::byte> read_block(const volume& v, const channel& c, const array_values& values, const zyx& block) {
-    const std::size_t each = values.voxel_bytes();
-    std::vector<std::byte> bytes(static_cast<std::size_t>(block_side) * block_side * block_side * each), room;
-    values.clear(bytes);
-    const auto count = [&](std::size_t a) { // along z, y, x
-        return std::min<std::int64_t>(block_side, v.extent[2 - a] - block[a] * block_side);
-    };
-    for (std::int64_t z = 0; z < count(0); ++z)
-        for (std::int64_t y = 0; y < count(1); ++y) {
-            const auto voxel = static_cast<std::uint64_t>(
-                v.index(block[2] * block_side, block[1] * block_side + y, block[0] * block_side + z));
-            const auto row =
-                streamed_piece(v, c, half_floats::keep, voxel * each, static_cast<std::size_t>(count(2)) * each, room);
-            std::memcpy(bytes.data() + static_cast<std::size_t>(z * block_side + y) * block_side * each, row.data(),
-                        row.size());
-        }
-    return bytes;
+// ---- slabs
+
+// A file of the levels of a slab's blocks: the blocks' bytes, each level's behind its length, then for each block in
+// the order of level_blocks() the place of the first byte.
+constexpr std::uint64_t empty_block = ~std::uint64_t{0};
+
+std::uint64_t read_number(std::ifstream& file) {
+    std::uint64_t value = 0;
+    file.read(reinterpret_cast<char*>(&value), sizeof(value));
+    return value;
 }
 
-// The values of a block in each level from 1 on, as stored; nothing if the block is empty.
-template <class Rule>
-std::vector<std::vector<std::byte>> reduced(const std::vector<std::byte>& block, const array_values& values,
-                                            int levels) {
-    using stored = typename Rule::stored;
-    if (values.are_empty(block)) return {};
-    stored empty;
-    values.clear(std::as_writable_bytes(std::span(&empty, 1)));
-    voxelpipe::cpu_backend backend(1); // blocks are shared among the threads
-    const block_voxels<Rule> voxels{block.data(), reinterpret_cast<const std::byte*>(&empty)};
-    const auto made = voxelpipe::reduce_levels(backend, glm::ivec3(block_side), voxels, typename Rule::reducer{});
-    std::vector<std::vector<std::byte>> all;
-    for (int l = 0; l < levels; ++l) {
-        const auto at = static_cast<std::size_t>(l);
-        const std::size_t count = made.values[at].size();
-        std::vector<std::byte> bytes(count * sizeof(stored));
-        for (std::size_t i = 0; i < count; ++i) {
-            const stored value = made.exists[at].data()[i] != 0 ? Rule::store(made.values[at].data()[i]) : empty;
-            std::memcpy(bytes.data() + i * sizeof(stored), &value, sizeof(stored));
-        }
-        all.push_back(std::move(bytes));
-    }
-    return all;
-}
-
-// ---- arrays
-
-// An array of a level, filled block by block in the order of blocks_of().
-class level_writer {
+// Reads such a file, block by block.
+class slab_levels {
 public:
-    level_writer(int level, const volume& v, const array_values& values, const fs::path& folder,
-                 const write_options& options)
-        : side_(block_side >> level), file_(layout_of(level, v), values, folder, options),
-          chunk_(static_cast<std::size_t>(chunk_side * chunk_side * chunk_side) * values.voxel_bytes()) {
-        values.clear(chunk_);
+    slab_levels(const fs::path& path, std::size_t num_blocks) : path_(path), file_(path, std::ios::binary) {
+        file_.seekg(-static_cast<std::streamoff>(num_blocks * sizeof(std::uint64_t)), std::ios::end);
+        places_.resize(num_blocks);
+        file_.read(reinterpret_cast<char*>(places_.data()),
+                   static_cast<std::streamsize>(num_blocks * sizeof(std::uint64_t)));
+        check();
     }
-    [[nodiscard]] const array_file& file() const { return file_; }
-
-    // A whole chunk, packed.
-    void add_chunk(const zyx& block, std::span<const std::byte> packed) {
-        go_to(block);
-        file_.add(shard_, within_, packed);
-    }
-    // A part of a chunk.
-    void add_part(const zyx& block, std::span<const std::byte> bytes) {
-        go_to(block);
-        const std::size_t each = file_.values().voxel_bytes(), row = static_cast<std::size_t>(side_) * each;
-        const auto begin = [&](std::size_t a) { return block[a] * side_ % chunk_side; };
-        for (std::int64_t z = 0; z < side_; ++z)
-            for (std::int64_t y = 0; y < side_; ++y) {
-                const std::int64_t at = ((begin(0) + z) * chunk_side + begin(1) + y) * chunk_side + begin(2);
-                std::memcpy(chunk_.data() + static_cast<std::size_t>(at) * each,
-                            bytes.data() + static_cast<std::size_t>(z * side_ + y) * row, row);
-            }
-        has_part_ = true;
-    }
-    void finish() {
-        end_chunk();
-        file_.end_shard();
-        file_.finish();
+    // The next block of the slab.
+    [[nodiscard]] block_levels next(std::size_t levels) {
+        const std::uint64_t place = places_.at(at_++);
+        block_levels made;
+        if (place == empty_block) return made;
+        file_.seekg(static_cast<std::streamoff>(place));
+        for (std::size_t l = 0; l < levels; ++l) {
+            made.emplace_back(static_cast<std::size_t>(read_number(file_)));
+            file_.read(reinterpret_cast<char*>(made.back().data()), static_cast<std::streamsize>(made.back().size()));
+        }
+        check();
+        return made;
     }
 
 private:
-    static array_layout layout_of(int level, const volume& v) {
-        zyx extent{};
-        for (std::size_t a = 0; a < 3; ++a) extent[a] = ((v.extent[2 - a] - 1) >> level) + 1;
-        return array_layout(extent);
-    }
-    // Ends the chunk and the shard before, where the block lies in others.
-    void go_to(const zyx& block) {
-        const array_layout& layout = file_.layout();
-        zyx shard{}, within{};
-        for (std::size_t a = 0; a < 3; ++a) {
-            const std::int64_t chunk = block[a] * side_ / chunk_side;
-            shard[a] = chunk / layout.per_shard[a];
-            within[a] = chunk % layout.per_shard[a];
-        }
-        const std::int64_t s = array_layout::number(shard, layout.shards),
-                           w = array_layout::number(within, layout.per_shard);
-        if (s == shard_ && w == within_) return;
-        end_chunk();
-        if (s != shard_) file_.end_shard();
-        shard_ = s;
-        within_ = w;
-    }
-    void end_chunk() {
-        if (!has_part_) return;
-        file_.add(shard_, within_, file_.pack(chunk_));
-        file_.values().clear(chunk_);
-        has_part_ = false;
+    void check() const {
+        if (!file_) throw write_error(path_, "it ends too soon; remove it, and the slab's mark");
     }
 
-    std::int64_t side_; // of a block
-    array_file file_;
-    std::vector<std::byte> chunk_;
-    bool has_part_ = false;
-    std::int64_t shard_ = -1, within_ = -1;
+    fs::path path_;
+    std::ifstream file_;
+    std::vector<std::uint64_t> places_;
+    std::size_t at_ = 0;
 };
 
 } // namespace
 
-int num_zarr_levels(const volume& v) {
-    const std::int64_t longest = *std::max_element(v.extent.begin(), v.extent.end());
-    int levels = 0;
-    while (levels < most_levels && ((longest - 1) >> levels) + 1 > chunk_side) ++levels;
-    return levels;
-}
-
 std::uint64_t num_level_blocks(const volume& v) {
-    if (num_zarr_levels(v) == 0) return 0;
-    std::uint64_t count = 1;
-    for (const std::int64_t n : v.extent) count *= static_cast<std::uint64_t>((n + block_side - 1) / block_side);
-    return count;
+    return num_zarr_levels(v) == 0 ? 0 : static_cast<std::uint64_t>(array_layout::product(num_level_blocks_along(v)));
 }
 
 void write_zarr_levels(const volume& v, const channel& c, const fs::path& folder, const write_options& options,
                        const std::function<void()>& advance) {
-    const int levels = num_zarr_levels(v);
-    const array_values values(c, true);
-    std::vector<std::unique_ptr<level_writer>> writers;
-    for (int l = 1; l <= levels; ++l) {
-        const fs::path to = folder / std::to_string(l);
-        fs::create_directory(to);
-        writers.push_back(std::make_unique<level_writer>(l, v, values, to, options));
-    }
-    with_rule(c, [&]<class Rule>(Rule) {
-        if (levels == 0) return;
-        const std::vector<zyx> blocks = blocks_of(v);
-        ordered_for(
-            blocks.size(), thread_count(options.threads),
-            [&](std::size_t n) {
-                auto made = reduced<Rule>(read_block(v, c, values, blocks[n]), values, levels);
-                if (!made.empty()) made[0] = writers[0]->file().pack(std::move(made[0]));
-                return made;
-            },
-            [&](std::size_t n, const std::vector<std::vector<std::byte>>& made) {
-                for (std::size_t l = 0; l < made.size(); ++l) {
-                    if (l == 0)
-                        writers[l]->add_chunk(blocks[n], made[l]);
-                    else
-                        writers[l]->add_part(blocks[n], made[l]);
-                }
-                advance();
-            });
+    make_level_folders(v, folder);
+    level_arrays arrays(v, c, folder, options);
+    const std::vector<zyx> blocks = level_blocks(v, 0, num_level_blocks_along(v)[0]);
+    make_levels(arrays, v, c, blocks, options, [&](std::size_t n, const block_levels& made) {
+        arrays.add(blocks[n], made);
+        advance();
     });
-    for (const auto& writer : writers) writer->finish();
+    arrays.finish();
+}
+
+void write_slab_levels(const volume& v, const channel& c, const fs::path& file, std::int64_t first_layer,
+                       std::int64_t last_layer, const write_options& options) {
+    const level_arrays arrays(v, c, {}, options); // writes none
+    const std::vector<zyx> blocks =
+        level_blocks(v, first_layer / level_block_side, (last_layer + level_block_side - 1) / level_block_side);
+    std::vector<std::uint64_t> places(blocks.size(), empty_block);
+    output_file out(file);
+    make_levels(arrays, v, c, blocks, options, [&](std::size_t n, const block_levels& made) {
+        if (made.empty()) return;
+        places[n] = out.tell();
+        for (const std::vector<std::byte>& level : made) {
+            out.write_value(std::uint64_t{level.size()});
+            out.write(level);
+        }
+    });
+    out.write(std::as_bytes(std::span(places)));
+    out.commit();
+}
+
+void join_slab_levels(const volume& v, const channel& c, const fs::path& folder, std::int64_t slab_layers,
+                      const std::function<fs::path(std::int64_t slab)>& file, const write_options& options) {
+    make_level_folders(v, folder);
+    level_arrays arrays(v, c, folder, options);
+    if (arrays.size() != 0) {
+        const std::int64_t each = slab_layers / level_block_side, layers = num_level_blocks_along(v)[0];
+        std::vector<std::unique_ptr<slab_levels>> slabs;
+        for (std::int64_t first = 0; first < layers; first += each)
+            slabs.push_back(
+                std::make_unique<slab_levels>(file(static_cast<std::int64_t>(slabs.size())),
+                                              level_blocks(v, first, std::min(layers, first + each)).size()));
+        // Each slab's blocks come in the order of its file.
+        for (const zyx& block : level_blocks(v, 0, layers))
+            arrays.add(block, slabs[static_cast<std::size_t>(block[0] / each)]->next(arrays.size()));
+    }
+    arrays.finish();
 }
 
 std::string multiscale_description(const volume& v, const channel& c) {

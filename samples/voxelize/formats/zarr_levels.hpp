@@ -28,6 +28,15 @@ namespace voxelize {
 void write_zarr_levels(const volume& v, const channel& c, const std::filesystem::path& folder,
                        const write_options& options, const std::function<void()>& advance);
 
+// The same slab by slab: what the blocks between two layers make of all levels goes into a file, and the arrays are
+// made of the files of all slabs, byte for byte. Slabs have slab_layers layers, a multiple of 128; `v` holds the values
+// of its slab in the one, and its shape is enough in the other.
+void write_slab_levels(const volume& v, const channel& c, const std::filesystem::path& file, std::int64_t first_layer,
+                       std::int64_t last_layer, const write_options& options);
+void join_slab_levels(const volume& v, const channel& c, const std::filesystem::path& folder, std::int64_t slab_layers,
+                      const std::function<std::filesystem::path(std::int64_t slab)>& file,
+                      const write_options& options);
+
 // The description of the group that holds the arrays.
 [[nodiscard]] std::string multiscale_description(const volume& v, const channel& c);
 

@@ -76,10 +76,10 @@ void describe_batch(CLI::App& app, command_line& options) {
         ->needs(size)
         ->option_text("R")
         ->group("Many models");
-    app.add_flag(
-           "--resume", options.by_slabs,
-           "One model slab by slab into a .zarr: a run that was stopped goes on where it was when the same command "
-           "is given again, see LARGE MODELS")
+    app.add_flag("--resume", options.by_slabs,
+                 "One model slab by slab into a .zarr or .pvti: a run that was stopped goes on where it was when the "
+                 "same command "
+                 "is given again, see LARGE MODELS")
         ->group("Machine");
     app.add_option("--jobs", options.batch.jobs,
                    "Models at a time, which share --max-memory and the machine's cores. Default: 1")
