@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -26,6 +28,10 @@ std::size_t bytes_of(const std::string& type) {
     return type == "double" || type == "float64" ? 8 : 0;
 }
 
+// The vertex properties that are colours for a loader, by their names there. Only the first four are read here.
+constexpr std::string_view color_names[] = {"red", "green", "blue", "alpha"};
+constexpr std::string_view other_color_names[] = {"r", "g", "b", "diffuse_red", "diffuse_green", "diffuse_blue"};
+
 // A number without sign, or one that is not negative.
 std::uint64_t number_at(const char* from, std::size_t bytes) {
     std::uint64_t value = 0;
@@ -35,7 +41,7 @@ std::uint64_t number_at(const char* from, std::size_t bytes) {
 
 } // namespace
 
-std::unique_ptr<ply_file> ply_file::open(const std::filesystem::path& path, std::uint64_t room) {
+std::unique_ptr<ply_file> ply_file::open(const std::filesystem::path& path, std::uint64_t room, bool colors) {
     constexpr std::uint64_t longest_header = 1 << 16;
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(path, error);
@@ -43,7 +49,9 @@ std::unique_ptr<ply_file> ply_file::open(const std::filesystem::path& path, std:
     layout f;
     std::ifstream file(path, std::ios::binary);
     std::string line, element;
-    bool is_ply = false, is_binary = false, has_axis[3]{}, has_list = false;
+    bool is_ply = false, is_binary = false, has_axis[3]{}, has_list = false, has_color[4]{};
+    std::string color_type;
+    color_layout found_colors;
     while (file.good() && static_cast<std::uint64_t>(file.tellg()) < longest_header && std::getline(file, line)) {
         if (!line.empty() && line.back() == '\r') line.pop_back();
         std::istringstream words(line);
@@ -55,6 +63,9 @@ std::unique_ptr<ply_file> ply_file::open(const std::filesystem::path& path, std:
         if (key == "format") {
             words >> type;
             is_binary = type == "binary_little_endian";
+        } else if (key == "comment") {
+            words >> type;
+            if (colors && type == "TextureFile") return nullptr;
         } else if (key == "element") {
             std::uint64_t count = 0;
             words >> name >> count;
@@ -88,6 +99,18 @@ std::unique_ptr<ply_file> ply_file::open(const std::filesystem::path& path, std:
                     f.vertices.place[a] = f.vertices.stride;
                     f.vertices.is_double[a] = size == 8;
                 }
+            if (element == "vertex" && colors) {
+                for (std::size_t c = 0; c < 4; ++c) {
+                    if (name != color_names[c]) continue;
+                    if (has_color[c] || (!color_type.empty() && type != color_type)) return nullptr;
+                    color_type = type;
+                    has_color[c] = true;
+                    found_colors.place[c] = f.vertices.stride;
+                }
+                if (std::find(std::begin(other_color_names), std::end(other_color_names), name) !=
+                    std::end(other_color_names))
+                    return nullptr;
+            }
             (element == "vertex" ? f.vertices.stride : f.face_bytes) += size;
         }
     }
@@ -97,26 +120,50 @@ std::unique_ptr<ply_file> ply_file::open(const std::filesystem::path& path, std:
     if (f.vertices.count > bytes || f.num_faces > bytes) return nullptr;
     f.first_face = f.vertices.first + f.vertices.count * f.vertices.stride;
     if (bytes != f.first_face + f.num_faces * f.face_bytes) return nullptr;
+    if (!color_type.empty()) {
+        const bool is_byte = color_type == "uchar" || color_type == "uint8";
+        if (!has_color[0] || !has_color[1] || !has_color[2] ||
+            (!is_byte && color_type != "float" && color_type != "float32"))
+            return nullptr;
+        found_colors.first = f.vertices.first;
+        found_colors.count = f.vertices.count;
+        found_colors.stride = f.vertices.stride;
+        found_colors.has_alpha = has_color[3];
+        found_colors.is_encoded = true;
+        found_colors.type = is_byte ? color_layout::component::byte : color_layout::component::float32;
+        f.colors = found_colors;
+    }
     return std::make_unique<ply_file>(path, f, room);
+}
+
+ply_file::ply_file(const std::filesystem::path& path, const layout& header, std::uint64_t room)
+    : header_(header), file_(path), vertices_(header.vertices, header.colors ? room / 2 : room) {
+    add_only_part(path, header.num_faces);
+    if (header.colors) colors_.emplace(*header.colors, room / 2);
 }
 
 void ply_file::for_each_block(const visitor& visit) {
     std::vector<char> faces;
     std::vector<glm::vec3> corners;
+    std::vector<glm::vec4> colors;
     for (std::uint64_t first = 0; first < header_.num_faces; first += block_faces) {
         const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(block_faces, header_.num_faces - first));
         faces.resize(count * header_.face_bytes);
         corners.clear();
+        colors.clear();
         file_.read(header_.first_face + first * header_.face_bytes, faces);
         for (std::size_t i = 0; i < count; ++i) {
             const char* const list = faces.data() + i * header_.face_bytes + header_.list;
             if (number_at(list, header_.length_bytes) != 3)
                 throw model_error("face " + std::to_string(first + i) + " is no triangle: polygons are not streamed");
-            for (std::size_t k = 0; k < 3; ++k)
-                corners.push_back(vertices_.at(
-                    number_at(list + header_.length_bytes + k * header_.index_bytes, header_.index_bytes), file_));
+            for (std::size_t k = 0; k < 3; ++k) {
+                const std::uint64_t index =
+                    number_at(list + header_.length_bytes + k * header_.index_bytes, header_.index_bytes);
+                corners.push_back(vertices_.at(index, file_));
+                if (colors_) colors.push_back(colors_->at(index, file_));
+            }
         }
-        visit(corners, first);
+        visit({0, first, corners, colors});
     }
 }
 

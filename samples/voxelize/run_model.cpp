@@ -71,13 +71,18 @@ std::filesystem::path folder_of(const std::filesystem::path& file) {
     return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
-// The corners of a model's box in place of its triangles, for messages about it.
-scene outline_of(const std::filesystem::path& file, const bounding_box& box, const affine& to_world) {
+// The corners of each part's box in place of its triangles, for messages about the model.
+scene outline_of(const triangle_stream& stream, const triangle_stream::boxes& boxes) {
     scene model;
-    primitive& part = model.primitives.emplace_back();
-    part.name = file.filename().string();
-    part.positions = {glm::vec3(box.low), glm::vec3(box.high)};
-    model.instances.push_back({0, to_world});
+    model.materials = stream.materials();
+    model.warnings = stream.warnings();
+    for (std::size_t i = 0; i < stream.parts().size(); ++i) {
+        model.instances.push_back({static_cast<std::uint32_t>(i), stream.parts()[i].to_world});
+        primitive& part = model.primitives.emplace_back();
+        part.name = stream.parts()[i].name;
+        part.material = stream.parts()[i].material;
+        if (!boxes.own[i].empty) part.positions = {glm::vec3(boxes.own[i].low), glm::vec3(boxes.own[i].high)};
+    }
     return model;
 }
 
@@ -108,15 +113,10 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     load_options load = options.load;
     load.picture_hook = picture_reducer{options.grid, options.voxelize};
     const std::unique_ptr<triangle_stream> stream = streamed_input(options);
-    affine to_world;
     triangle_stream::boxes boxes;
-    if (stream) {
-        to_world = load.scale == 1 ? stream->to_world() : affine::scaling(load.scale).after(stream->to_world());
-        boxes = stream->bounds(to_world);
-    }
-    scene model = stream ? outline_of(options.input, boxes.own, to_world) : load_model(options.input, load);
+    if (stream) boxes = stream->bounds();
+    scene model = stream ? outline_of(*stream, boxes) : load_model(options.input, load);
     report.warnings = options.warnings;
-    if (stream) model.warnings = stream->warnings();
     report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
     report.vertices = stream ? stream->num_vertices() : model.vertex_count();
     for (const material& m : model.materials) report.materials.push_back(m.name);
@@ -142,7 +142,7 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
         report.warnings.push_back(std::move(warning));
     report.stats.milliseconds.emplace_back("place", milliseconds_since(start));
 
-    const stream_place place{to_world, folder_of(options.outputs.front()), [&](const std::string& how) {
+    const stream_place place{folder_of(options.outputs.front()), [&](const std::string& how) {
                                  if (!options.quiet) std::cerr << "voxelize: " << how << '\n';
                              }};
     if (options.by_slabs) {

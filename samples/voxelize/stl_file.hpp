@@ -1,12 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A binary STL file, read block by block: for models that do not fit into memory. Colours, which some programs put into
-// it, are not read.
+// A binary STL file, read block by block: for models that do not fit into memory. The colours that some programs put
+// into it are not read.
 
 #include "triangle_stream.hpp"
 
-#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -16,14 +15,18 @@ namespace voxelize {
 class stl_file : public triangle_stream {
 public:
     // The file at PATH, if it is one: 84 bytes, the last four of which count the triangles of 50 bytes that follow.
-    [[nodiscard]] static std::unique_ptr<stl_file> open(const std::filesystem::path& path);
+    // Where COLORS are asked for, it has to have none, which is looked for in all of it.
+    [[nodiscard]] static std::unique_ptr<stl_file> open(const std::filesystem::path& path, bool colors);
 
-    [[nodiscard]] std::uint64_t num_triangles() const override { return num_triangles_; }
     void for_each_block(const visitor& visit) override;
 
 private:
+    // Calls visit(number of the first, bytes) for the facets in order, some thousands at a time.
+    template <class Visit>
+    void for_each_raw_block(const Visit& visit);
+    [[nodiscard]] bool is_colored();
+
     std::ifstream file_;
-    std::uint64_t num_triangles_ = 0;
 };
 
 } // namespace voxelize

@@ -3,7 +3,8 @@
 #include "triangle_stream.hpp"
 
 #include "assimp/file_name.hpp"
-#include "glb_file.hpp"
+#include "gltf_stream.hpp"
+#include "model_error.hpp"
 #include "ply_file.hpp"
 #include "stl_file.hpp"
 
@@ -11,26 +12,45 @@
 
 namespace voxelize {
 
-triangle_stream::boxes triangle_stream::bounds(const affine& place) {
+void triangle_stream::scale_lengths(double factor) {
+    if (factor == 1) return;
+    for (part& p : parts_) {
+        p.to_world = affine::scaling(factor).after(p.to_world);
+        if (!p.to_world.is_finite()) throw model_error("--scale is too large for the model");
+    }
+}
+
+triangle_stream::boxes triangle_stream::bounds() {
     boxes found;
-    for_each_block([&](std::span<const glm::vec3> corners, std::uint64_t) {
-        for (const glm::vec3& p : corners) {
+    found.own.resize(parts_.size());
+    for_each_block([&](const block& b) {
+        const affine& place = parts_[b.part].to_world;
+        bounding_box& own = found.own[b.part];
+        for (const glm::vec3& p : b.corners) {
             if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) continue;
             const glm::dvec3 placed = place(glm::dvec3(p));
-            found.own.include({p, p, false});
+            own.include({p, p, false});
             found.placed.include({placed, placed, false});
         }
     });
     return found;
 }
 
+void triangle_stream::add_only_part(const std::filesystem::path& file, std::uint64_t num_triangles) {
+    materials_.emplace_back();
+    if (num_triangles != 0) parts_.push_back({file.filename().string(), {}, 0, 0, num_triangles});
+}
+
 std::unique_ptr<triangle_stream> open_stream(const std::filesystem::path& file, std::uint64_t room,
                                              const load_options& options) {
     const std::string extension = assimp::lower_extension(file);
-    if (extension == ".stl") return stl_file::open(file);
-    if (extension == ".ply") return ply_file::open(file, room);
-    if (extension == ".glb") return glb_file::open(file, room, options.limits, options.gltf);
-    return nullptr;
+    std::unique_ptr<triangle_stream> stream;
+    if (extension == ".stl") stream = stl_file::open(file, options.gltf.colors);
+    if (extension == ".ply") stream = ply_file::open(file, room, options.gltf.colors);
+    if (extension == ".glb" || extension == ".gltf")
+        stream = gltf_stream::open(file, room, options.limits, options.gltf);
+    if (stream) stream->scale_lengths(options.scale);
+    return stream;
 }
 
 } // namespace voxelize

@@ -6,9 +6,12 @@
 #include "affine.hpp"
 #include "model_file.hpp"
 #include "placement.hpp"
+#include "scene.hpp"
 
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -21,34 +24,65 @@ namespace voxelize {
 
 class triangle_stream {
 public:
-    // Three corners a triangle, and the number of the first.
-    using visitor = std::function<void(std::span<const glm::vec3> corners, std::uint64_t first)>;
+    // What one instance of a primitive is in a scene: triangles with one transform and one material, numbered one after
+    // the other.
+    struct part {
+        std::string name;
+        affine to_world;
+        std::uint32_t material = 0;                        // of materials()
+        std::uint64_t first_number = 0, num_triangles = 0; // at least one
+    };
+    // Triangles of one part.
+    struct block {
+        std::size_t part = 0;
+        std::uint64_t first_number = 0;     // of the first triangle, among all of the stream
+        std::span<const glm::vec3> corners; // three a triangle, as the file has them
+        std::span<const glm::vec4> colors;  // of the corners, linear; empty: white
+    };
+    using visitor = std::function<void(const block&)>;
 
     triangle_stream() = default;
     triangle_stream(const triangle_stream&) = delete;
     triangle_stream& operator=(const triangle_stream&) = delete;
     virtual ~triangle_stream() = default;
 
-    [[nodiscard]] virtual std::uint64_t num_triangles() const = 0;
-    // Vertices of the file; three a triangle where it shares none.
+    // In the order of the scene's instances.
+    [[nodiscard]] const std::vector<part>& parts() const { return parts_; }
+    [[nodiscard]] std::uint64_t num_triangles() const {
+        return parts_.empty() ? 0 : parts_.back().first_number + parts_.back().num_triangles;
+    }
+    // Vertices of the file, once for each part that names them; three a triangle where it shares none.
     [[nodiscard]] virtual std::uint64_t num_vertices() const { return 3 * num_triangles(); }
     // Bytes that a run takes, at least, which holds the model.
     [[nodiscard]] virtual double held_bytes() const { return 300 * static_cast<double>(num_triangles()); }
-    // Of all of them.
-    [[nodiscard]] virtual affine to_world() const { return {}; }
+    // Those of the scene, without textures.
+    [[nodiscard]] const std::vector<material>& materials() const { return materials_; }
+    // True if any vertex has a colour of its own.
+    [[nodiscard]] virtual bool has_colors() const { return false; }
     // What was left out or put right; one line each.
     [[nodiscard]] virtual std::vector<std::string> warnings() const { return {}; }
     // Calls visit with all triangles in order, some thousands at a time. Throws model_error where the file is damaged.
     virtual void for_each_block(const visitor& visit) = 0;
-    // The boxes around all finite corners, as they are and by a transform.
+
+    // Multiplies all lengths, about the world's origin. Throws model_error where a transform is not finite then.
+    void scale_lengths(double factor);
+    // The boxes around all finite corners: of each part in its own coordinates, and of all in the world.
     struct boxes {
-        bounding_box own, placed;
+        std::vector<bounding_box> own;
+        bounding_box placed;
     };
-    [[nodiscard]] boxes bounds(const affine& place);
+    [[nodiscard]] boxes bounds();
+
+protected:
+    // One part, with the material that a scene has without any.
+    void add_only_part(const std::filesystem::path& file, std::uint64_t num_triangles);
+
+    std::vector<part> parts_;
+    std::vector<material> materials_;
 };
 
-// The file as a stream, where it is of a kind that can be read so (stl_file.hpp, ply_file.hpp, glb_file.hpp); otherwise
-// null. room: bytes that the stream may hold.
+// The file as a stream, where it is of a kind that can be read so (stl_file.hpp, ply_file.hpp, gltf_stream.hpp);
+// otherwise null. room: bytes that the stream may hold.
 [[nodiscard]] std::unique_ptr<triangle_stream> open_stream(const std::filesystem::path& file, std::uint64_t room,
                                                            const load_options& options);
 

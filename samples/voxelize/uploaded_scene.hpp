@@ -122,7 +122,7 @@ private:
             shader.place.places = place;
             return shader;
         };
-        const auto count = [&](const run& r, std::size_t elements) {
+        const auto count = [&](const run& r, std::uint64_t elements) {
             numbered.push_back({number, primitives_[r.primitive].material});
             place += r.instances.size();
             number += r.instances.size() * elements;
@@ -138,7 +138,7 @@ private:
             draws_.push_back({mesh, shader_of(part), part.fragment_shader});
             bits_draws_.push_back({mesh, {place}, vp::constant(true, 1U)});
             double_sided_.push_back(part.double_sided ? 1 : 0);
-            count(r, triangles.size());
+            count(r, part.whole != 0 ? part.whole : triangles.size());
         }
         const auto first_line = static_cast<std::uint32_t>(number);
         for (const run& r : line_runs) {

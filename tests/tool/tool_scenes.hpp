@@ -35,6 +35,26 @@ inline int add_textured_material(builder& file, std::uint32_t width, std::uint32
     return file.append("materials", entry);
 }
 
+// A wavy sheet of SIDE^2 quads with one of its vertices at the origin, as mesh 0; no node shows it.
+inline void add_sheet(builder& file, int side) {
+    std::vector<float> positions;
+    std::vector<std::uint32_t> indices;
+    for (int y = 0; y <= side; ++y)
+        for (int x = 0; x <= side; ++x)
+            positions.insert(positions.end(),
+                             {static_cast<float>(x) / static_cast<float>(side),
+                              static_cast<float>(y) / static_cast<float>(side), static_cast<float>(x * y % 7) / 20});
+    for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x) {
+            const auto at = static_cast<std::uint32_t>(y * (side + 1) + x),
+                       up = at + static_cast<std::uint32_t>(side) + 1;
+            indices.insert(indices.end(), {at, at + 1, up + 1, at, up + 1, up});
+        }
+    const int index_accessor = file.accessor(indices, "SCALAR");
+    file.mesh({{"POSITION", file.accessor(positions, "VEC3")}})["indices"] = index_accessor;
+    file.root["nodes"] = json::array();
+}
+
 // The surface of the cube from (0, 0, 0) to (1, 1, 1), 12 triangles that face outwards, moved and scaled by its node.
 inline void add_cube(builder& file, const std::vector<double>& translation, double scale, int material) {
     std::vector<float> positions;

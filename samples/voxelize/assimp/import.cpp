@@ -4,6 +4,7 @@
 
 #include "../gltf/text.hpp"
 #include "file_name.hpp"
+#include "linear_color.hpp"
 
 #include <assimp/IOStream.hpp>
 #include <assimp/IOSystem.hpp>
@@ -114,14 +115,6 @@ private:
 // ---- Materials
 // -------------------------------------------------------------------------------------------------------
 
-// Colours of these formats are what a screen shows; ours are linear light.
-float to_linear(float encoded) {
-    if (!(encoded > 0)) return 0;
-    if (encoded >= 1) return 1;
-    return encoded <= 0.04045F ? encoded / 12.92F
-                               : static_cast<float>(std::pow((static_cast<double>(encoded) + 0.055) / 1.055, 2.4));
-}
-
 wrap_mode wrap_of(aiTextureMapMode mode) {
     if (mode == aiTextureMapMode_Mirror) return wrap_mode::mirrored_repeat;
     return mode == aiTextureMapMode_Wrap ? wrap_mode::repeat : wrap_mode::clamp_to_edge;
@@ -153,7 +146,7 @@ void add_material(model& result, const aiMaterial& source, const aiScene& scene)
         if (texture.is_there() && color.r == 0 && color.g == 0 && color.b == 0) color = aiColor4D(1, 1, 1, color.a);
         float opacity = 1;
         if (source.Get(AI_MATKEY_OPACITY, opacity) != aiReturn_SUCCESS || !(opacity >= 0 && opacity <= 1)) opacity = 1;
-        entry.base_color = {to_linear(color.r), to_linear(color.g), to_linear(color.b), opacity};
+        entry.base_color = {linear_of(color.r), linear_of(color.g), linear_of(color.b), opacity};
         if (opacity < 1) entry.alpha = alpha_mode::blend;
     }
     int two_sided = 0;
@@ -226,7 +219,7 @@ primitive read_mesh(const aiMesh& source, std::size_t index, const model& result
         for (unsigned i = 0; i < source.mNumVertices; ++i) {
             const aiColor4D& c = source.mColors[0][i];
             const float alpha = c.a >= 0 && c.a <= 1 ? c.a : 1;
-            part.colors.emplace_back(to_linear(c.r), to_linear(c.g), to_linear(c.b), alpha);
+            part.colors.emplace_back(linear_of(c.r), linear_of(c.g), linear_of(c.b), alpha);
         }
     }
     return part;

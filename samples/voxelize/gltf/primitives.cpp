@@ -68,6 +68,10 @@ std::vector<glm::uvec2> unrolled_lines(int mode, const std::vector<std::uint32_t
 
 namespace {
 
+std::string place_of(std::size_t mesh, std::size_t part) {
+    return "meshes[" + std::to_string(mesh) + "].primitives[" + std::to_string(part) + "]";
+}
+
 gltf_error out_of_range(const std::string& where, std::uint32_t index, std::size_t place, std::size_t vertices) {
     return gltf_error(where + ": index " + std::to_string(index) + " at place " + std::to_string(place) +
                       " is out of range, there are " + std::to_string(vertices) + " vertices");
@@ -79,6 +83,17 @@ void check_position_type(const tinygltf::Accessor& accessor, const std::string& 
 }
 
 } // namespace
+
+std::string name_of(const tinygltf::Model& model, std::size_t mesh, std::size_t part) {
+    const std::string& name = model.meshes[mesh].name;
+    return name.empty() ? place_of(mesh, part) : printable(name);
+}
+
+material default_material() {
+    material made;
+    made.name = "default";
+    return made;
+}
 
 void primitive_reader::show(const shown_mesh& shown, std::size_t part) {
     const tinygltf::Primitive& source = model_.meshes[shown.mesh].primitives[part];
@@ -105,7 +120,7 @@ void primitive_reader::show(const shown_mesh& shown, std::size_t part) {
 primitive_reader::read_part primitive_reader::read(const shown_mesh& shown, std::size_t part, bool posed) {
     const std::size_t mesh = shown.mesh;
     const tinygltf::Primitive& source = model_.meshes[mesh].primitives[part];
-    const std::string where = "meshes[" + std::to_string(mesh) + "].primitives[" + std::to_string(part) + "]";
+    const std::string where = place_of(mesh, part);
     const auto position = source.attributes.find("POSITION");
     if (position == source.attributes.end()) {
         ++counted_["primitive(s) without POSITION are left out"];
@@ -127,7 +142,7 @@ primitive_reader::read_part primitive_reader::read(const shown_mesh& shown, std:
     }
 
     primitive result;
-    result.name = model_.meshes[mesh].name.empty() ? where : printable(model_.meshes[mesh].name);
+    result.name = name_of(model_, mesh, part);
     result.material = material_index(source);
     read_part known;
     if (posed)
@@ -377,10 +392,7 @@ void primitive_reader::read_colors(primitive& result, const tinygltf::Primitive&
 
 std::uint32_t primitive_reader::material_index(const tinygltf::Primitive& source) {
     if (source.material >= 0) return static_cast<std::uint32_t>(source.material);
-    if (scene_.materials.size() == model_.materials.size()) {
-        scene_.materials.emplace_back();
-        scene_.materials.back().name = "default";
-    }
+    if (scene_.materials.size() == model_.materials.size()) scene_.materials.push_back(default_material());
     return static_cast<std::uint32_t>(model_.materials.size());
 }
 

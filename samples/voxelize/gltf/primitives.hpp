@@ -40,6 +40,12 @@ namespace voxelize::gltf {
 [[nodiscard]] std::vector<glm::uvec2> unrolled_lines(int mode, const std::vector<std::uint32_t>& indices,
                                                      std::uint64_t count);
 
+// What messages call primitive PART of a mesh: the mesh's name, or where it stands in the file.
+[[nodiscard]] std::string name_of(const tinygltf::Model& model, std::size_t mesh, std::size_t part);
+
+// The material of primitives that name none.
+[[nodiscard]] material default_material();
+
 class primitive_reader {
 public:
     primitive_reader(const tinygltf::Model& model, const accessor_reader& accessors, material_reader& materials,

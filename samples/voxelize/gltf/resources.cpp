@@ -68,7 +68,8 @@ std::filesystem::path local_path(const std::string& uri) {
 } // namespace
 
 resources::resources(const checked_document& document, std::span<const std::byte> binary, bool has_binary,
-                     const gltf_file_reader& read_file, budget& memory, leniency& tolerance)
+                     const gltf_file_reader& read_file, budget& memory, leniency& tolerance,
+                     const file_mapper& map_file)
     : document_{document}, read_file_{read_file}, memory_{memory} {
     owned_.reserve(document.buffers.size());
     for (std::size_t index = 0; index < document.buffers.size(); ++index) {
@@ -76,12 +77,17 @@ resources::resources(const checked_document& document, std::span<const std::byte
         std::span<const std::byte> bytes;
         if (source.uri) {
             try {
-                owned_.push_back(fetch(*source.uri));
+                if (map_file && !source.uri->starts_with("data:")) {
+                    bytes = map_file(local_path(*source.uri));
+                    memory_.grant_input(bytes.size());
+                } else {
+                    owned_.push_back(fetch(*source.uri));
+                    bytes = owned_.back();
+                }
             } catch (const gltf_error& error) {
                 throw gltf_error("buffers[" + std::to_string(index) + "].uri " + in_quotes(*source.uri) + ": " +
                                  error.what());
             }
-            bytes = owned_.back();
         } else if (index == 0 && has_binary) {
             bytes = binary;
         } else {

@@ -12,6 +12,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -19,12 +21,17 @@
 
 namespace voxelize::gltf {
 
+// Gives the bytes of a file that a .gltf names, as a mapping that outlives the resources; the path is as
+// gltf_file_reader has it.
+using file_mapper = std::function<std::span<const std::byte>(const std::filesystem::path& relative)>;
+
 class resources {
 public:
     // Loads every buffer; a buffer that is missing or shorter than declared is a gltf_error (up to 3 bytes of padding
     // may be missing in lenient loading). BINARY is a view into the caller's bytes and must outlive this; DOCUMENT too.
+    // With MAP_FILE buffers in files are not copied.
     resources(const checked_document& document, std::span<const std::byte> binary, bool has_binary,
-              const gltf_file_reader& read_file, budget& memory, leniency& tolerance);
+              const gltf_file_reader& read_file, budget& memory, leniency& tolerance, const file_mapper& map_file = {});
 
     // Bytes of buffer INDEX, byte_length of them as declared; throws gltf_error for a placeholder without data.
     [[nodiscard]] std::span<const std::byte> buffer(std::size_t index) const;

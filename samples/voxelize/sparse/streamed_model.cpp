@@ -17,6 +17,7 @@
 #include <chrono>
 #include <new>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -24,56 +25,109 @@ namespace voxelize {
 namespace {
 
 namespace slabs = voxelpipe::slabs;
-using corner_record = slabs::record<vp::no_varyings>; // positions as the file has them
+struct vertex_color {
+    glm::vec4 color;
+};
+// Positions as the file has them, with the colours of the vertices or without.
+template <class Varyings>
+using corner_record = slabs::record<Varyings>;
 
-constexpr double draw_bytes =
-    220; // for each triangle of a slab, at least: record, scene, snapped vertices, pairs with tiles
+// For each triangle of a slab, at least: record, scene, snapped vertices, pairs with tiles.
+template <class Varyings>
+constexpr double draw_bytes = std::is_empty_v<Varyings> ? 220 : 220 + 2 * 3 * sizeof(vertex_color);
 constexpr int brick = 8;
+
+template <class Varyings>
+corner_record<Varyings> record_of(const triangle_stream::block& from, std::size_t triangle) {
+    const std::size_t i = 3 * triangle;
+    const auto number = static_cast<std::uint32_t>(from.first_number + triangle);
+    if constexpr (std::is_empty_v<Varyings>) {
+        return {{from.corners[i], from.corners[i + 1], from.corners[i + 2]}, number};
+    } else {
+        const auto color = [&](std::size_t corner) {
+            return vertex_color{from.colors.empty() ? glm::vec4(1) : from.colors[i + corner]};
+        };
+        return {{from.corners[i], from.corners[i + 1], from.corners[i + 2]}, number, {color(0), color(1), color(2)}};
+    }
+}
 
 // The corners as the pipeline places them, in the request's grid.
 class corner_placer {
 public:
-    corner_placer(const voxelize_request& request, const affine& to_world)
-        : place_(to_world, reference_point(request.grid)),
-          rule_(request.solid ? voxelpipe::coverage::conservative : request.coverage),
+    corner_placer(const voxelize_request& request, const triangle_stream& model)
+        : rule_(request.solid ? voxelpipe::coverage::conservative : request.coverage),
           is_solid_(request.solid.has_value()) {
+        for (const triangle_stream::part& p : model.parts())
+            places_.emplace_back(p.to_world, reference_point(request.grid));
         grid_ = request.grid;
         grid_.origin -= reference_point(request.grid);
         snap_ = vp::core::make_snap_transform(grid_);
     }
-    [[nodiscard]] slabs::classified operator()(const glm::vec3* corners) const {
-        return slabs::classify(snap_, grid_.extent, rule_, place_(corners[0]), place_(corners[1]), place_(corners[2]),
+    [[nodiscard]] slabs::classified operator()(std::size_t part, const glm::vec3* corners) const {
+        const placed_vertex_shader& place = places_[part];
+        return slabs::classify(snap_, grid_.extent, rule_, place(corners[0]), place(corners[1]), place(corners[2]),
                                is_solid_);
     }
 
 private:
-    placed_vertex_shader place_;
+    std::vector<placed_vertex_shader> places_; // by part
     voxelpipe::coverage rule_;
     bool is_solid_; // triangles beside the grid along x count too
     voxelpipe::grid grid_;
     vp::core::snap_transform snap_{};
 };
 
-// A slab's triangles as a scene of one primitive, which knows their numbers.
-scene scene_of(const slabs::bin<corner_record>& triangles, std::uint64_t whole, const affine& to_world) {
-    scene model;
-    model.materials.emplace_back();
-    primitive& part = model.primitives.emplace_back();
-    const auto count = static_cast<std::size_t>(triangles.size());
-    part.positions.reserve(3 * count);
-    part.triangles.reserve(count);
-    part.numbers.reserve(count);
-    part.whole = whole;
-    triangles.for_each_block([&](std::span<const corner_record> block) {
-        for (const corner_record& r : block) {
+// How many triangles of a part are in a slab.
+struct part_count {
+    std::size_t part;
+    std::size_t triangles;
+};
+
+// A slab that is drawn at once: layers of one range.
+template <class Varyings>
+struct streamed_slab {
+    slabs::layer_range layers;
+    std::size_t range = 0;
+    slabs::bin<corner_record<Varyings>> triangles;
+    std::vector<part_count> parts; // of its triangles, in their order
+};
+
+// A slab's triangles as a scene of the parts that are there. A primitive's triangles have the numbers of the whole
+// model: `whole` counts those of parts that are left out before it, too. Consumes the triangles.
+template <class Varyings>
+scene scene_of(streamed_slab<Varyings>&& slab, const triangle_stream& model) {
+    scene made;
+    made.materials = model.materials();
+    std::uint64_t before = 0; // triangles of the model before the primitive's `whole`
+    for (const part_count& count : slab.parts) {
+        const triangle_stream::part& source = model.parts()[count.part];
+        const std::uint64_t end = source.first_number + source.num_triangles;
+        made.instances.push_back({static_cast<std::uint32_t>(made.primitives.size()), source.to_world});
+        primitive& part = made.primitives.emplace_back();
+        part.material = source.material;
+        part.whole = end - std::exchange(before, end);
+        part.positions.reserve(3 * count.triangles);
+        part.triangles.reserve(count.triangles);
+        part.numbers.reserve(count.triangles);
+        if constexpr (!std::is_empty_v<Varyings>) part.colors.reserve(3 * count.triangles);
+    }
+    std::size_t at = 0; // the primitive
+    slab.triangles.for_each_block([&](std::span<const corner_record<Varyings>> block) {
+        for (const corner_record<Varyings>& r : block) {
+            while (made.primitives[at].triangles.size() == slab.parts[at].triangles) ++at;
+            primitive& part = made.primitives[at];
+            const triangle_stream::part& source = model.parts()[slab.parts[at].part];
             const auto first = static_cast<std::uint32_t>(part.positions.size());
             part.positions.insert(part.positions.end(), r.positions, r.positions + 3);
             part.triangles.emplace_back(first, first + 1, first + 2);
-            part.numbers.push_back(r.number);
+            const std::uint64_t skipped = source.first_number + source.num_triangles - part.whole;
+            part.numbers.push_back(static_cast<std::uint32_t>(r.number - skipped));
+            if constexpr (!std::is_empty_v<Varyings>)
+                for (const vertex_color& c : r.varyings) part.colors.push_back(c.color);
         }
     });
-    model.instances.push_back({0, to_world});
-    return model;
+    slab.triangles = {};
+    return made;
 }
 
 } // namespace
@@ -86,11 +140,14 @@ std::unique_ptr<triangle_stream> streamed_input(const command_line& options) {
     const bool is_drawn_here = request.backend != backend_choice::cuda &&
                                request.strategy == voxelpipe::strategy::automatic && is_by_rule &&
                                options.storage != storage_choice::dense;
-    const bool has_targets = std::all_of(request.targets.begin(), request.targets.end(), [](target t) {
-        return t == target::occupancy || t == target::count || t == target::normal || t == target::triangle ||
-               t == target::depth;
-    });
-    if (!is_drawn_here || !has_targets) return nullptr;
+    const auto wants = [&](const auto& is_wanted) {
+        return std::any_of(request.targets.begin(), request.targets.end(), is_wanted);
+    };
+    // Both see the whole grid at once.
+    const bool sees_whole_grid = wants([](target t) { return t == target::color_outer; }) ||
+                                 (request.solid && !request.solid->fill_color &&
+                                  wants([](target t) { return info_of(t).name.starts_with("color"); }));
+    if (!is_drawn_here || sees_whole_grid) return nullptr;
     std::unique_ptr<triangle_stream> file = open_stream(options.input, memory::room() / 8, options.load);
     if (file && file->held_bytes() <= static_cast<double>(memory::room())) return nullptr;
     return file;
@@ -131,30 +188,56 @@ void warn_of_parts(voxelize_stats& stats, const voxelize_request& request) {
 
 namespace {
 
-// A slab that is drawn at once: layers of one range.
-struct streamed_slab {
-    slabs::layer_range layers;
-    std::size_t range;
-    slabs::bin<corner_record> triangles;
-};
-
 // The slabs of a plan, cut at the borders of the ranges.
-std::vector<streamed_slab> slabs_within(const slabs::plan& plan, std::span<const slabs::layer_range> ranges) {
-    std::vector<streamed_slab> parts;
+template <class Varyings>
+std::vector<streamed_slab<Varyings>> slabs_within(const slabs::plan& plan, std::span<const slabs::layer_range> ranges) {
+    std::vector<streamed_slab<Varyings>> parts;
     for (std::size_t r = 0; r < ranges.size(); ++r)
         for (const slabs::layer_range& s : plan.slabs)
-            if (const int begin = std::max(s.begin, ranges[r].begin), end = std::min(s.end, ranges[r].end); begin < end)
-                parts.push_back({{begin, end}, r, {}});
+            if (const int begin = std::max(s.begin, ranges[r].begin), end = std::min(s.end, ranges[r].end);
+                begin < end) {
+                auto& part = parts.emplace_back();
+                part.layers = {begin, end};
+                part.range = r;
+            }
     return parts;
 }
 
-} // namespace
+// The triangles of each slab.
+template <class Varyings>
+void bin_triangles(triangle_stream& model, const corner_placer& classify, const stream_place& place, double room,
+                   int layers, std::vector<streamed_slab<Varyings>>& parts) {
+    // The first slab that ends behind a layer.
+    std::vector<std::size_t> first_slab(static_cast<std::size_t>(layers) + 1, parts.size());
+    for (std::size_t s = parts.size(); s-- > 0;) std::fill_n(first_slab.begin(), parts[s].layers.end, s);
+    std::vector<slabs::bin<corner_record<Varyings>>> bins(parts.size());
+    {
+        slabs::bin_memory<corner_record<Varyings>> spilled(static_cast<std::uint64_t>(room / 8), bins.size(),
+                                                           place.folder.string());
+        model.for_each_block([&](const triangle_stream::block& block) {
+            for (std::size_t i = 0; 3 * i < block.corners.size(); ++i) {
+                const slabs::classified c = classify(block.part, block.corners.data() + 3 * i);
+                if (c.kind != vp::core::triangle_class::drawn) continue;
+                const corner_record<Varyings> r = record_of<Varyings>(block, i);
+                for (std::size_t s = first_slab[static_cast<std::size_t>(c.reach.lo[2])];
+                     s < parts.size() && parts[s].layers.begin <= c.reach.hi[2]; ++s) {
+                    spilled.push(bins, s, r);
+                    std::vector<part_count>& counts = parts[s].parts;
+                    if (counts.empty() || counts.back().part != block.part) counts.push_back({block.part, 0});
+                    ++counts.back().triangles;
+                }
+            }
+        });
+    }
+    for (std::size_t s = 0; s < parts.size(); ++s) parts[s].triangles = std::move(bins[s]);
+}
 
-void draw_streamed(triangle_stream& model, const stream_place& place, const voxelize_request& request,
-                   std::span<const slabs::layer_range> ranges, voxelize_stats& stats,
-                   const std::function<void(std::size_t, sparse_volume&&)>& sink) {
+template <class Varyings>
+void draw_streamed_as(triangle_stream& model, const stream_place& place, const voxelize_request& request,
+                      std::span<const slabs::layer_range> ranges, voxelize_stats& stats,
+                      const std::function<void(std::size_t, sparse_volume&&)>& sink) {
     const voxelpipe::grid& whole = request.grid;
-    const corner_placer classify(request, place.to_world);
+    const corner_placer classify(request, model);
     stats.backend = "cpu";
     stats.threads = thread_count(request.threads);
     stats.triangles = model.num_triangles();
@@ -163,42 +246,23 @@ void draw_streamed(triangle_stream& model, const stream_place& place, const voxe
 
     slabs::histogram layers(whole.extent);
     vp::counters counts;
-    model.for_each_block([&](std::span<const glm::vec3> corners, std::uint64_t) {
-        for (std::size_t i = 0; i < corners.size(); i += 3) {
-            const slabs::classified c = classify(corners.data() + i);
+    model.for_each_block([&](const triangle_stream::block& block) {
+        for (std::size_t i = 0; i < block.corners.size(); i += 3) {
+            const slabs::classified c = classify(block.part, block.corners.data() + i);
             vp::core::count_class(counts, c.kind);
             if (c.kind == vp::core::triangle_class::drawn) layers.add(c.reach);
         }
     });
     slabs::plan_options how;
     how.align = brick;
-    const auto most = static_cast<std::uint64_t>(std::max(1.0, room / 4 / draw_bytes));
-    std::vector<streamed_slab> parts = slabs_within(slabs::cover(layers, 2, most, how), ranges);
+    const auto most = static_cast<std::uint64_t>(std::max(1.0, room / 4 / draw_bytes<Varyings>));
+    auto parts = slabs_within<Varyings>(slabs::cover(layers, 2, most, how), ranges);
     place.say(std::to_string(model.num_triangles()) + " triangles do not fit into " + memory::mebibytes(room) +
               ": they are drawn in " + std::to_string(parts.size()) + " slabs, through temporary files in " +
               place.folder.string());
 
     try {
-        // The first slab that ends behind a layer.
-        std::vector<std::size_t> first_slab(static_cast<std::size_t>(whole.extent.z) + 1, parts.size());
-        for (std::size_t s = parts.size(); s-- > 0;) std::fill_n(first_slab.begin(), parts[s].layers.end, s);
-        std::vector<slabs::bin<corner_record>> bins(parts.size());
-        {
-            slabs::bin_memory<corner_record> spilled(static_cast<std::uint64_t>(room / 8), bins.size(),
-                                                     place.folder.string());
-            model.for_each_block([&](std::span<const glm::vec3> corners, std::uint64_t first) {
-                for (std::size_t i = 0; i < corners.size(); i += 3) {
-                    const slabs::classified c = classify(corners.data() + i);
-                    if (c.kind != vp::core::triangle_class::drawn) continue;
-                    const corner_record r{{corners[i], corners[i + 1], corners[i + 2]},
-                                          static_cast<std::uint32_t>(first + i / 3)};
-                    for (std::size_t s = first_slab[static_cast<std::size_t>(c.reach.lo[2])];
-                         s < parts.size() && parts[s].layers.begin <= c.reach.hi[2]; ++s)
-                        spilled.push(bins, s, r);
-                }
-            });
-        }
-        for (std::size_t s = 0; s < parts.size(); ++s) parts[s].triangles = std::move(bins[s]);
+        bin_triangles(model, classify, place, room, whole.extent.z, parts);
         const std::chrono::duration<double, std::milli> binning = std::chrono::steady_clock::now() - start;
         stats.milliseconds.emplace_back("bin", binning.count());
         stats.triangles_dropped = counts.triangles_dropped();
@@ -211,7 +275,7 @@ void draw_streamed(triangle_stream& model, const stream_place& place, const voxe
             for (; s < parts.size() && parts[s].range == r; ++s) {
                 const int begin = std::max(parts[s].layers.begin, padding),
                           end = std::min(parts[s].layers.end, whole.extent.z - padding);
-                scene of_slab = scene_of(std::exchange(parts[s].triangles, {}), model.num_triangles(), place.to_world);
+                scene of_slab = scene_of(std::move(parts[s]), model);
                 if (begin >= end) continue;
                 if (of_slab.triangle_count() == 0) { // nothing to draw; its rows are counted
                     if (request.solid)
@@ -234,7 +298,7 @@ void draw_streamed(triangle_stream& model, const stream_place& place, const voxe
                 ++stats.slabs;
             }
             if (of_range.empty()) { // the whole grid without a triangle
-                scene nothing = scene_of({}, 0, place.to_world);
+                scene nothing;
                 voxelize_stats none;
                 voxelize_request inside = request;
                 inside.grid = whole.crop(glm::ivec3(padding), whole.extent - 2 * padding);
@@ -248,6 +312,17 @@ void draw_streamed(triangle_stream& model, const stream_place& place, const voxe
     } catch (const std::bad_alloc&) {
         throw memory_error(memory::shortage("take fewer targets or voxels"));
     }
+}
+
+} // namespace
+
+void draw_streamed(triangle_stream& model, const stream_place& place, const voxelize_request& request,
+                   std::span<const slabs::layer_range> ranges, voxelize_stats& stats,
+                   const std::function<void(std::size_t, sparse_volume&&)>& sink) {
+    if (model.has_colors())
+        draw_streamed_as<vertex_color>(model, place, request, ranges, stats, sink);
+    else
+        draw_streamed_as<vp::no_varyings>(model, place, request, ranges, stats, sink);
 }
 
 sparse_volume run_streamed_voxelizer(triangle_stream& model, const stream_place& place, const voxelize_request& request,

@@ -23,12 +23,11 @@
 namespace voxelize {
 
 // The command's input as a stream, where it has to be one: a file that open_stream() knows and that takes more memory
-// than there is, for targets that need no colours and solids without repairs, on the CPU. Null: the model is loaded.
+// than there is, for all targets but color-outer and for solids without repairs, on the CPU. Null: the model is loaded.
 [[nodiscard]] std::unique_ptr<triangle_stream> streamed_input(const command_line& options);
 
 // What a streamed model is drawn with.
 struct stream_place {
-    affine to_world;                             // of the stream's corners, with --scale
     std::filesystem::path folder;                // for temporary files
     std::function<void(const std::string&)> say; // is told once in how many slabs the model is drawn
 };

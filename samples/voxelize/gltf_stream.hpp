@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A glTF file of plain triangles, read block by block from its own bytes and from the files that it names: for models
+// that do not fit into memory.
+
+#include "gltf_scene.hpp"
+#include "triangle_stream.hpp"
+#include "vertex_cache.hpp"
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace voxelize {
+
+class gltf_stream : public triangle_stream {
+public:
+    // The file at PATH, if all that its scene shows are triangles as they stand in it (find_parts()). room: bytes that
+    // may be held.
+    [[nodiscard]] static std::unique_ptr<gltf_stream> open(const std::filesystem::path& path, std::uint64_t room,
+                                                           const gltf_limits& limits, const gltf_options& options);
+
+    gltf_stream(gltf_parts&& parts, std::uint64_t room);
+
+    [[nodiscard]] std::uint64_t num_vertices() const override { return num_vertices_; }
+    // Positions and indices as they are loaded, snapped, and paired with tiles.
+    [[nodiscard]] double held_bytes() const override {
+        return 36 * (static_cast<double>(num_triangles()) + static_cast<double>(num_vertices_));
+    }
+    [[nodiscard]] bool has_colors() const override { return has_colors_; }
+    [[nodiscard]] std::vector<std::string> warnings() const override { return source_.warnings; }
+    void for_each_block(const visitor& visit) override;
+
+private:
+    gltf_parts source_; // its parts as those of the stream
+    std::vector<model_bytes> files_;
+    std::uint64_t room_, num_vertices_ = 0;
+    bool has_colors_ = false;
+};
+
+} // namespace voxelize
