@@ -56,18 +56,17 @@ public:
     // fragments: crossings that there is room for.
     bounded_solid_bricks(const grid& g, std::uint64_t fragments, const brick_room& room, cudaStream_t stream,
                          arena& memory)
-        : g_(g), stream_(stream), rows_(std::max<std::uint64_t>(fragments, 1)),
-          room_(std::max<std::uint64_t>(room.bricks, 1)),
-          // A row's runs begin and end at its crossings, or at its end.
-          passes_(rows_, 2 * rows_, stream, memory), found_runs_(passes_.take_runs(memory)),
-          voxel_runs_(passes_.take_runs(memory)) {
-        for (bounded_level& l : levels_) l = passes_.take_level(memory);
-        for (bounded_runs& r : any_) r = passes_.take_runs(memory);
-        for (bounded_runs& r : all_) r = passes_.take_runs(memory);
+        : g_(g), stream_(stream), entries_(fragments), rows_(room_of(0).rows),
+          room_(std::max<std::uint64_t>(room.bricks, 1)), passes_(rows_, stream, memory),
+          found_runs_(passes_.take_runs(room_of(0), memory)), voxel_runs_(passes_.take_runs(room_of(0), memory)) {
+        for (int l = 0; l < 5; ++l) levels_[l] = passes_.take_level(room_of(l), memory);
+        for (bounded_runs* runs : {any_, all_}) // of the odd levels, and of the even ones
+            for (int k = 0; k < 2; ++k) runs[k] = passes_.take_runs(room_of(2 - k), memory);
         for (std::uint32_t*& o : order_) o = memory.take<std::uint32_t>(rows_);
+        other_keys_ = memory.take<std::uint64_t>(rows_);
         totals_ = memory.take<run_totals>(1);
-        first_ = memory.take<unsigned long long>(rows_ + 1);
-        first_row_ = memory.take<std::uint64_t>(rows_ + 1);
+        first_ = memory.take<unsigned long long>(levels_[3].rows + 1);
+        first_row_ = memory.take<std::uint64_t>(levels_[3].rows + 1);
         bricks_ = passes_.take_cells(room_, memory);
         tiles_ = passes_.take_cells(room_, memory);
         mask_counts_ = memory.take<std::uint32_t>(room_);
@@ -107,6 +106,7 @@ private:
     static constexpr int max_levels = 18; // of tiles
     // Zero, ends of the tiles' levels, bricks, bricks with masks.
     static constexpr std::size_t num_numbers = max_levels + 3;
+    [[nodiscard]] row_room room_of(int level) const { return row_room_of(g_.extent, entries_, level); }
     [[nodiscard]] static int bits_of(std::uint64_t most) { return std::max(1, static_cast<int>(std::bit_width(most))); }
     [[nodiscard]] int row_bits() const {
         const glm::ivec3 whole = g_.whole_extent();
@@ -136,12 +136,13 @@ private:
 
     const grid& g_;
     cudaStream_t stream_;
-    std::uint64_t rows_, room_;
+    std::uint64_t entries_, rows_, room_; // that there is room for: rows of voxels; bricks
     bounded_rows<> passes_;
     bounded_runs found_runs_, voxel_runs_;
     bounded_level levels_[5]; // of voxels, of 2, 4 and 8; beyond, of bricks, the last two in turn
     bounded_runs any_[2], all_[2];
     std::uint32_t* order_[2];
+    std::uint64_t* other_keys_;
     run_totals* totals_;
     unsigned long long* first_;
     std::uint64_t* first_row_;
@@ -159,7 +160,7 @@ void bounded_solid_bricks<N>::launch(bounded_arrays<>& to) {
     static_assert(sizeof(run_totals) == 2 * sizeof(unsigned long long));
     for_each(1, end_runs{totals_, reinterpret_cast<std::uint64_t*>(found_runs_.first)}, where, stream_);
     levels_[0].count = &totals_->rows;
-    passes_.sort(levels_[0], found_runs_, voxel_runs_, levels_[4].keys, order_, row_bits(), storage_, sort_bytes_);
+    passes_.sort(levels_[0], found_runs_, voxel_runs_, other_keys_, order_, row_bits(), storage_, sort_bytes_);
     // What is wholly inside, and what is at all, up to rows of bricks.
     const bounded_runs *all = &voxel_runs_, *any = &voxel_runs_;
     for (int l = 1; l < 4; ++l) {
@@ -176,14 +177,13 @@ void bounded_solid_bricks<N>::launch(bounded_arrays<>& to) {
 template <int N>
 void bounded_solid_bricks<N>::write_masks(const bounded_runs& all, const bounded_runs& any, bounded_arrays<>& to) {
     const bounded_level& beams = levels_[3];
-    passes_.list({beams.keys, 0, any.view(), all.view(), nullptr, 1}, beams.count, bricks_, first_, numbers_,
-                 num_bricks());
+    passes_.list({beams.keys, 0, any.view(), all.view(), nullptr, 1}, beams, bricks_, first_, numbers_, num_bricks());
     std::uint32_t* rows = nullptr;
     to.keys = sort_cells(bricks_, brick_bits(), &rows);
     to.num_bricks = num_bricks();
     for_each(1, take_bricks{num_bricks(), to.room.bricks, num_masks()}, where, stream_);
     for_each(
-        rows_ + 1,
+        beams.rows + 1,
         compose_within{{beams.first_child, levels_[2].first_child, levels_[1].first_child, first_row_}, beams.count},
         where, stream_);
     const core::make_masks make{to.keys,  rows,        0, first_row_, levels_[0].keys, voxel_runs_.view(),
@@ -197,13 +197,14 @@ void bounded_solid_bricks<N>::list_tiles(const bounded_runs& all) {
     const bounded_runs* inside = &all;
     for (int l = 0; l < num_levels(); ++l) {
         bounded_level above = levels_[l % 2 == 0 ? 4 : 1]; // those of voxels, and of 2 and 4, are needed no more
+        above.rows = room_of(l + 4).rows;
         const bounded_runs& inside_above = all_[inside == &all_[0] ? 1 : 0];
         passes_.make_parents(here, above);
         passes_.template join<true>(above, *inside, inside_above);
         const unsigned long long *const begin = numbers_ + l, *const end = numbers_ + (l + 1);
         passes_.list(
             {here.keys, 0, inside->view(), inside_above.view(), reinterpret_cast<const std::uint64_t*>(here.parent), 2},
-            here.count, tiles_, first_, begin, numbers_ + (l + 1));
+            here, tiles_, first_, begin, numbers_ + (l + 1));
         for_each(room_, make_tiles_within{{tiles_.keys[0], l, tiles_.keys[0]}, begin, end, room_}, where, stream_);
         here = above;
         inside = &inside_above;

@@ -113,9 +113,14 @@ private:
         for (const draw_type& d : draws) shaded.push_back({d.mesh, d.vertex_shader, {d.fragment_shader}});
         auto* const state = reinterpret_cast<pipeline_state*>(memory_of(memory)); // the list's
         abuffer_view<payload> lists;
-        list_async<Coverage, Run>(make_list_call<listed_type, payload>(std::span<const listed_type>(shaded), g,
-                                                                       options.rule, triangles, workspace.limits),
-                                  options.rule, workspace, memory, lists, stream);
+        auto call = make_list_call<listed_type, payload>(std::span<const listed_type>(shaded), g, options.rule,
+                                                         triangles, workspace.limits);
+        // A constant discards nothing, so lists need no more room if they are shaded late.
+        if constexpr (core::is_constant<FragmentShader>) {
+            call.may_shade_late = true;
+            call.filters = false;
+        }
+        list_async<Coverage, Run>(call, options.rule, workspace, memory, lists, stream);
         const bounded_fold<payload, Targets...> fold(g.whole_extent(), workspace.limits, result, memory);
         if constexpr (Run) fold.launch(lists, g, options.count_voxels, state, result, stream);
     }
