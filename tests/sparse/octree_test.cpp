@@ -288,8 +288,10 @@ TEST(Octree, ChildrenFollowEachOther) {
         for (std::uint64_t n = 0; n < tree.num_nodes(level); ++n) {
             ASSERT_NE(nodes.mask(n), 0u);
             ASSERT_EQ(nodes.first_child(n), next);
-            for (unsigned c = 0; c < 8; ++c)
-                if ((nodes.mask(n) >> c & 1u) != 0) ASSERT_EQ(nodes.child(n, c), next++) << level << ' ' << n;
+            for (unsigned c = 0; c < 8; ++c) {
+                if ((nodes.mask(n) >> c & 1u) == 0) continue;
+                ASSERT_EQ(nodes.child(n, c), next++) << level << ' ' << n;
+            }
         }
         EXPECT_EQ(next, tree.num_nodes(level - 1));
     }
