@@ -178,7 +178,7 @@ make_scene(const execution& how, std::span<const draw<Mesh, VertexShader, Fragme
     return s;
 }
 
-// Whether the numbers of every subset ascend and are below the number of its whole mesh.
+// True if the numbers of every subset ascend and are below the number of its whole mesh.
 template <class Draw>
 [[nodiscard]] bool are_numbered(std::span<const Draw> draws) {
     return std::all_of(draws.begin(), draws.end(), [](const Draw& d) {

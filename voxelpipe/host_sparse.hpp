@@ -25,7 +25,7 @@ namespace voxelpipe {
 
 namespace core {
 
-// Whether a target's blend sums in a wider format than it stores.
+// True if a target's blend sums in a wider format than it stores.
 template <class Target>
 inline constexpr bool has_wide_sums =
     !std::is_same_v<typename Target::traits::accumulator, typename Target::value_type>;
@@ -120,7 +120,7 @@ public:
     [[nodiscard]] std::uint64_t num_voxels() const { return table().num_voxels(); }
     // Values of a target: one for each voxel that exists in a brick, and one for each tile.
     [[nodiscard]] std::uint64_t num_values() const { return (offsets.empty() ? 0 : offsets.back()) + tiles.size(); }
-    // Whether a voxel exists, numbered from the corner of the part; false outside.
+    // True if a voxel exists, numbered from the corner of the part; false outside.
     [[nodiscard]] bool contains(const glm::ivec3& voxel) const { return table().find(voxel) != brick_table::none; }
 
     // One brick: where it lies, and which voxels of it exist.
@@ -260,7 +260,7 @@ template <std::size_t I, class... Targets>
     return typename host_sparse<Targets...>::template target_reference<I>(h);
 }
 
-// Whether two hold the same bits: bricks, tiles, voxels and the values of all targets. Where they lie in space and what
+// True if two hold the same bits: bricks, tiles, voxels and the values of all targets. Where they lie in space and what
 // absent voxels read as is not compared. Values that are structs need an operator==.
 template <class... Targets>
 [[nodiscard]] bool same_contents(const host_sparse<Targets...>& a, const host_sparse<Targets...>& b) {

@@ -87,7 +87,7 @@ public:
         if (num_levels() != 0) visit(num_levels(), 0, 0, level, f);
     }
 
-    // Whether two have the same nodes.
+    // True if two have the same nodes.
     friend bool operator==(const octree&, const octree&) = default;
 
 private:

@@ -78,7 +78,7 @@ public:
 
     // True if a voxel exists, in the numbers of the whole grid; false outside.
     [[nodiscard]] bool contains(const glm::ivec3& voxel) const { return view().contains(voxel); }
-    // Whether two have the same nodes in the same order.
+    // True if two have the same nodes in the same order.
     friend bool operator==(const octree_dag&, const octree_dag&) = default;
 
 private:

@@ -24,13 +24,13 @@
 
 namespace voxelpipe::core {
 
-// Whether a second fragment of the same value changes nothing.
+// True if a second fragment of the same value changes nothing.
 template <class Blend>
 inline constexpr bool ignores_repeats =
     std::is_same_v<Blend, blend::replace> || std::is_same_v<Blend, blend::min> || std::is_same_v<Blend, blend::max> ||
     std::is_same_v<Blend, blend::bit_and> || std::is_same_v<Blend, blend::bit_or>;
 
-// Whether a solid call whose shader is constant gives all voxels one value. is_drawn(I): target I takes fragments.
+// True if a solid call whose shader is constant gives all voxels one value. is_drawn(I): target I takes fragments.
 template <class... Targets, class Draw, class IsDrawn>
 [[nodiscard]] bool has_one_value(std::span<const Draw> draws, const solid_options& options, const IsDrawn& is_drawn) {
     if (options.bodies == bodies::call || draws.size() == 1) return true;
@@ -50,7 +50,7 @@ template <class... Targets, class Draw, class IsDrawn>
         return equal;
     });
 }
-// Whether a solid call makes tiles: one constant decides every voxel, and nothing that existed stays.
+// True if a solid call makes tiles: one constant decides every voxel, and nothing that existed stays.
 template <class Draw, class Backend, class... Targets>
 [[nodiscard]] bool makes_tiles(std::span<const Draw> draws, const solid_options& options,
                                const sparse_framebuffer<Backend, Targets...>& fb) {

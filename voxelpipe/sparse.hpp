@@ -134,7 +134,7 @@ public:
     void limit(const sparse_limits& limits) { limits_ = limits; }         // Bounds later calls.
     [[nodiscard]] const sparse_limits& limits() const { return limits_; } // As set; without bounds by default.
 
-    // Whether the voxels' sums are kept in the format in which their blend adds, from the next call on; only targets
+    // True if the voxels' sums are kept in the format in which their blend adds, from the next call on; only targets
     // that sum floats (blend::add, add_quantum) or saturate signed integers have any. An octree rounds a parent's sum
     // once then. What the clear value adds is not among them.
     template <std::size_t I>
@@ -273,7 +273,7 @@ VOXELPIPE_HD void add_sums(Sum& a, const Sum& b) {
     }
 }
 
-// Whether voxels that exist stay: some target keeps what it holds.
+// True if voxels that exist stay: some target keeps what it holds.
 template <class Backend, class... Targets>
 [[nodiscard]] bool keeps_voxels(const sparse_framebuffer<Backend, Targets...>& fb) {
     bool keeps = false;

@@ -23,7 +23,7 @@ namespace voxelpipe {
 
 namespace core {
 
-// Whether two ranks have the same bits in all targets, and the same sums where these are kept.
+// True if two ranks have the same bits in all targets, and the same sums where these are kept.
 template <class... Targets>
 [[nodiscard]] bool have_same_values(const host_sparse<Targets...>& a, std::uint64_t i, const host_sparse<Targets...>& b,
                                     std::uint64_t j) {

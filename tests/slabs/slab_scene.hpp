@@ -123,7 +123,7 @@ struct host_of<vp::sparse_framebuffer<backend_type, Targets...>> {
 };
 using host_sparse = typename host_of<sparse>::type;
 
-// Whether a slab's targets are the whole's at its place.
+// True if a slab's targets are the whole's at its place.
 inline void expect_crop(backend_type& backend, const dense& whole, const vp::grid& whole_grid, const vp::grid& part,
                         const dense& slab) {
     vp::core::for_each_index<num_targets>([&]<std::size_t I>() {

@@ -40,7 +40,7 @@ inline constexpr int sparse_brick_voxels = sparse_brick_size * sparse_brick_size
 struct brick_mask {
     std::uint64_t words[8]{}; // bit b is bit b % 64 of word b / 64
 
-    // Whether the voxel of this bit exists, 0 <= bit < 512.
+    // True if the voxel of this bit exists, 0 <= bit < 512.
     [[nodiscard]] VOXELPIPE_HD bool has(unsigned bit) const { return (words[bit >> 6] >> (bit & 63u) & 1u) != 0; }
     // The number of voxels that exist below a bit.
     [[nodiscard]] VOXELPIPE_HD unsigned before(unsigned bit) const {
@@ -101,7 +101,7 @@ struct brick_table {
         const std::uint64_t brick = find_brick(of_brick);
         return brick == none ? rank_of_tile(of_brick) : rank_of(brick, key);
     }
-    // Whether (x, y, z) is a voxel of the part, whether it exists or not.
+    // True if (x, y, z) is a voxel of the part, whether it exists or not.
     [[nodiscard]] VOXELPIPE_HD bool is_in_part(const glm::ivec3& voxel) const {
         bool is_in = true;
         for (int a = 0; a < 3; ++a) is_in = is_in && voxel[a] >= 0 && voxel[a] < extent[a];

@@ -38,7 +38,7 @@ template <class T>
 //   plane(o, below, above)   as in small_conservative, with o as the origin
 // Numbers that exceed what a brick can change are cut off, with their sign.
 
-// Whether the triangle can have voxels in the brick; never false if it has some.
+// True if the triangle can have voxels in the brick; never false if it has some.
 template <class Setup>
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool meets_mask_brick(const Setup& s, const triple<int>& o) {
     std::int32_t least = 0;

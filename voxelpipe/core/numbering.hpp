@@ -39,7 +39,7 @@ template <class Draw>
     return std::any_of(draws.begin(), draws.end(), [](const Draw& d) { return d.mesh.part.whole != 0; });
 }
 
-// Whether a call has to read numbers before it draws.
+// True if a call has to read numbers before it draws.
 template <class Draw>
 [[nodiscard]] bool has_unchecked_subset(std::span<const Draw> draws) {
     return std::any_of(draws.begin(), draws.end(),

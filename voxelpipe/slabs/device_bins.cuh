@@ -69,7 +69,7 @@ struct layer_counter {
     }
 };
 
-// Whether a triangle stays; the last flag, behind all triangles, is 0.
+// True if a triangle stays; the last flag, behind all triangles, is 0.
 template <class Mesh, class VertexShader>
 struct slab_chooser {
     classifier<Mesh, VertexShader> classes;

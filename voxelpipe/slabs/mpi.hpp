@@ -235,7 +235,7 @@ private:
             .reach;
     }
 
-    // Whether no rank has failed. Every rank.
+    // True if no rank has failed. Every rank.
     [[nodiscard]] bool agree(const status& own, const std::exception_ptr& thrown) const {
         int failed = !own.ok() || thrown ? 1 : 0;
         MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, comm_);

@@ -95,7 +95,7 @@ public:
             }
         });
     }
-    // Whether the chunk can be drawn.
+    // True if the chunk can be drawn.
     [[nodiscard]] const status& valid() const { return valid_; }
 
     // Calls visit(record, reach) for each of the triangles [first, last) that may touch the grid, in order, and adds

@@ -104,7 +104,7 @@ struct sparse_result {
 
 namespace core {
 
-// Whether a call in this grid can go on from what the result says, as validate_sparse.
+// True if a call in this grid can go on from what the result says, as validate_sparse.
 template <class... Targets>
 [[nodiscard]] status validate_start(const sparse_result<Targets...>& result, const grid& g) {
     if (!result.keeps_voxels()) return {};

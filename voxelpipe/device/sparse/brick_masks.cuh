@@ -29,7 +29,7 @@ namespace voxelpipe::device {
 template <class FragmentShader, class... Targets>
 inline constexpr bool may_follow_from_masks = core::is_constant<FragmentShader> && (follows_from_count<Targets> && ...);
 
-// Whether the rasters of masks serve the draws: one constant.
+// True if the rasters of masks serve the draws: one constant.
 template <class Draw>
 [[nodiscard]] bool can_raster_masks(std::span<const Draw> draws, const grid& g, coverage rule,
                                     std::uint64_t triangles_in) {

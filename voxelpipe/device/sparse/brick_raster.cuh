@@ -42,7 +42,7 @@ public:
         deferred_ = deferred_triangles::take(memory, triangles);
     }
 
-    // Whether bricks or nodes of 2^log2_cell voxels a side have a raster of their own: conservative coverage of larger
+    // True if bricks or nodes of 2^log2_cell voxels a side have a raster of their own: conservative coverage of larger
     // voxels, with more fraction bits.
     template <coverage Rule>
     [[nodiscard]] bool is_coarse(int log2_cell) const {

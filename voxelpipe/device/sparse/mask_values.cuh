@@ -16,7 +16,7 @@
 
 namespace voxelpipe::device {
 
-// Whether a target's value is known from the number of a voxel's fragments, all of one value.
+// True if a target's value is known from the number of a voxel's fragments, all of one value.
 template <class Target>
 inline constexpr bool follows_from_count =
     is_blended_once<Target> || core::repeated_fold<typename Target::blend_type, typename Target::value_type>::available;
