@@ -34,7 +34,7 @@ using corner_record = slabs::record<Varyings>;
 
 // For each triangle of a slab, at least: record, scene, snapped vertices, pairs with tiles.
 template <class Varyings>
-constexpr double draw_bytes = std::is_empty_v<Varyings> ? 220 : 220 + 2 * 3 * sizeof(vertex_color);
+constexpr double draw_bytes = std::is_empty_v<Varyings> ? 220 : 220 + 6 * sizeof(vertex_color);
 constexpr int brick = 8;
 
 template <class Varyings>
