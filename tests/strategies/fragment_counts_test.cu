@@ -338,7 +338,7 @@ TEST(FragmentCountsPlan, LetsAnotherTargetGiveTheNumberOfVoxels) {
     EXPECT_FALSE(beside(1.0f).possible);
     vp::get<1>(fb.targets).load = vp::load_operation::off;
     EXPECT_TRUE(beside(0.1f).possible);
-    EXPECT_EQ(beside(0.1f).modes.of[1], immediate_mode::blend);
+    EXPECT_EQ(beside(0.1f).modes.of[1], immediate_mode::off);
 }
 
 // A few triangles in a large grid are not counted if the last pass would read the whole grid, which takes longer.
