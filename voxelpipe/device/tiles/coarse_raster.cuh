@@ -35,7 +35,12 @@ struct tile_cells {
         std::int32_t longest = 0, others = 0;
         std::uint32_t n = 1;
         for (int k = 0; k < 3; ++k) {
-            const std::int32_t last = geo.extent[k] - 1,
+            // By name: nvcc --Ofast-compile=mid reads a vector in a kernel's parameters from a wrong address if the
+            // index is not a constant.
+            const std::int32_t last = (k == 0   ? geo.extent.x
+                                       : k == 1 ? geo.extent.y
+                                                : geo.extent.z) -
+                                      1,
                                length = (t.hi[k] >> tiles.log2_size) - (t.lo[k] >> tiles.log2_size);
             others += length < longest ? length : longest;
             longest = length < longest ? longest : length;
