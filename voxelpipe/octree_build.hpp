@@ -43,7 +43,7 @@ struct mask_bytes {
     std::uint64_t* words;
     std::uint64_t count; // nodes
 
-    // Of node n. With that of the last node, the rest of its word becomes 0.
+    // Stores the mask of node n. The last node also sets the rest of its word to 0.
     VOXELPIPE_HD void store(std::uint64_t n, unsigned mask) const {
         auto* const bytes = reinterpret_cast<std::uint8_t*>(words);
         bytes[n] = static_cast<std::uint8_t>(mask);

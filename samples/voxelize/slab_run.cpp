@@ -104,7 +104,7 @@ private:
         std::error_code error;
         return fs::exists(path_ / "data", error);
     }
-    // Of any slab: a folder without is one that another process is making.
+    // True if some slab is done. A folder without a mark may be one that another process is just making.
     [[nodiscard]] bool has_marks() const {
         std::error_code error;
         for (const fs::directory_entry& entry : fs::directory_iterator(path_, error))

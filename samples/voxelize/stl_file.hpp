@@ -15,7 +15,7 @@ namespace voxelize {
 class stl_file : public triangle_stream {
 public:
     // The file at PATH, if it is one: 84 bytes, the last four of which count the triangles of 50 bytes that follow.
-    // Where COLORS are asked for, it has to have none, which is looked for in all of it.
+    // With `colors`, the whole file is searched first, and one that has colours is refused.
     [[nodiscard]] static std::unique_ptr<stl_file> open(const std::filesystem::path& path, bool colors);
 
     void for_each_block(const visitor& visit) override;

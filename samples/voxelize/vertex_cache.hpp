@@ -29,7 +29,7 @@ struct position_layout {
     std::size_t place[3]{};  // bytes of x, y and z from there
     bool is_double[3]{};     // otherwise float
 
-    // Of a vertex, behind which the file may end.
+    // The bytes that a vertex takes, up to the end of its last component: less than `stride` where others follow.
     [[nodiscard]] std::size_t bytes() const;
     [[nodiscard]] glm::vec3 value(const char* vertex) const;
 };

@@ -44,7 +44,7 @@ struct brick_tile {
         const glm::ivec3 brick = core::morton_position(first());
         return {brick.x * 8, brick.y * 8, brick.z * 8};
     }
-    // Behind the last tile of an array that has room for more: it has the key of no brick, and sorts to the end.
+    // No tile. Fills the rest of an array with room for more: no brick has its key, and it sorts to the end.
     [[nodiscard]] VOXELPIPE_HD static constexpr brick_tile none() { return of(~std::uint64_t{0} >> level_bits, 0); }
     friend constexpr bool operator==(const brick_tile&, const brick_tile&) = default;
 };

@@ -36,8 +36,8 @@ struct with_count {
 struct row_room {
     std::uint64_t rows, bounds;
 };
-// Of rows of cells of 2^level voxels a side in a part of a grid, with this many entries: runs begin and end at entries,
-// or at the end of the part.
+// An upper bound for the rows of cells of 2^level voxels a side in a part of a grid, and for the bounds of their runs.
+// Runs begin and end at entries, or at the end of the part.
 [[nodiscard]] inline row_room row_room_of(const glm::ivec3& extent, std::uint64_t entries, int level) {
     const auto cells = [&](int size) { return static_cast<std::uint64_t>((size >> level) + 2); };
     const std::uint64_t rows = std::min(std::max<std::uint64_t>(entries, 1), cells(extent.y) * cells(extent.z));

@@ -161,7 +161,7 @@ void bounded_solid_bricks<N>::launch(bounded_arrays<>& to) {
     for_each(1, end_runs{totals_, reinterpret_cast<std::uint64_t*>(found_runs_.first)}, where, stream_);
     levels_[0].count = &totals_->rows;
     passes_.sort(levels_[0], found_runs_, voxel_runs_, other_keys_, order_, row_bits(), storage_, sort_bytes_);
-    // What is wholly inside, and what is at all, up to rows of bricks.
+    // Level by level, up to bricks: the runs of cells wholly inside, and of cells with any voxel inside.
     const bounded_runs *all = &voxel_runs_, *any = &voxel_runs_;
     for (int l = 1; l < 4; ++l) {
         passes_.make_parents(levels_[l - 1], levels_[l]);

@@ -46,7 +46,7 @@ public:
         tiles_ = memory.take<brick_tile>(room_);
     }
     [[nodiscard]] bool is_empty() const { return before_.num_tiles == 0; }
-    // What is counted and listed below there must be numbers for.
+    // As many tiles as are counted and listed below: those of `before` and those of this call.
     [[nodiscard]] std::uint64_t num_places() const { return before_.num_tiles + room_; }
     [[nodiscard]] const brick_tile* tiles() const { return is_empty() ? nullptr : tiles_; }
     [[nodiscard]] std::uint64_t capacity() const { return is_empty() ? 0 : room_; }
