@@ -154,6 +154,7 @@ private:
         EXPECT_EQ(a.tiles, b.tiles);
         vp::core::for_each_index<result_type::num_targets>([&]<std::size_t I>() {
             EXPECT_TRUE(unit::same_bytes(vp::get<I>(a.values), vp::get<I>(b.values))) << "target " << I;
+            EXPECT_TRUE(unit::same_bytes(vp::get<I>(a.sums), vp::get<I>(b.sums))) << "sums of " << I;
             EXPECT_TRUE(vp::get<I>(a.clear_values) == vp::get<I>(b.clear_values)) << "target " << I;
         });
     }
@@ -229,6 +230,72 @@ TEST(DeviceSparseGoesOn, ConstantsHaveTheBytesOfTheCpu) {
         EXPECT_GT(c.p.on_host.num_voxels(), 300u);
         c.draw({meshes[1]}, g, vp::coverage::thin, "loaded", as_it_is, constant_shader);
     }
+}
+
+// Sums that are kept, from the first call on or from a later one, have the bytes of the CPU's, until they are kept no
+// longer.
+TEST(DeviceSparseGoesOn, KeptSumsHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{45, 34, 37};
+    const vp::grid whole = unit::unit_grid(extent);
+    const std::vector<unit::small_mesh> meshes{unit::make_mesh(1, 25, extent), unit::make_mesh(2, 15, extent)};
+    const std::vector<unit::small_mesh> more{unit::make_mesh(3, 20, extent)};
+    const auto keep = [](bool keeps) {
+        return [keeps](auto& to) {
+            to.template keep_sums<2>(keeps);
+            to.template keep_sums<3>(keeps);
+            to.template keep_sums<4>(keeps);
+        };
+    };
+    for (const vp::grid& g : {whole, whole.crop({13, 5, 3}, {31, 25, 32})}) {
+        sequence<pair> c(g.extent);
+        const auto num_sums = [&] { return vp::get<3>(c.result.to_host(c.p.device).sums).size(); };
+        c.draw(
+            meshes, g, vp::coverage::thin, "cleared, sums kept",
+            [&](auto& to) {
+                clear_all(to);
+                keep(true)(to);
+            },
+            shader{});
+        EXPECT_GT(num_sums(), 300u);
+        c.draw(more, g, vp::coverage::conservative, "loaded, sums kept", as_it_is, shader{});
+        c.draw(meshes, g, vp::coverage::crosshair, "cleared, loaded, off, sums kept", mix, shader{});
+        c.draw({}, g, vp::coverage::thin, "no draws, sums kept", as_it_is, shader{});
+        EXPECT_GT(num_sums(), 300u);
+        c.draw_solid(more, g, {.bodies = vp::bodies::draw}, "a solid, sums kept", as_it_is, solid_shader{});
+        c.draw(more, g, vp::coverage::thin, "loaded, no sums", keep(false), shader{});
+        EXPECT_EQ(num_sums(), 0u);
+        c.draw(more, g, vp::coverage::thin, "loaded, sums again", keep(true), shader{});
+        EXPECT_GT(num_sums(), 300u);
+    }
+}
+
+// A constant, whose values would follow from masks, or from the rows of a solid, if no sums were kept.
+TEST(DeviceSparseGoesOn, KeptSumsOfConstantsHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{67, 40, 36};
+    const vp::grid g = unit::unit_grid(extent);
+    const std::vector<unit::small_mesh> meshes{unit::make_mesh(11, 40, extent), unit::make_mesh(12, 25, extent)};
+    unit::small_mesh box;
+    add_box(box, {2.5f, 3, 0}, {66, 39, 34.7f});
+    const auto keep = [](auto& to) { to.template keep_sums<2>(); };
+    const auto clear_and_keep = [&](auto& to) {
+        clear_constants(to);
+        keep(to);
+    };
+    sequence<constant_pair> c(extent);
+    c.draw({meshes[0]}, g, vp::coverage::conservative, "cleared, sums kept", clear_and_keep, constant_shader);
+    c.draw({meshes[1]}, g, vp::coverage::thin, "loaded, sums kept", as_it_is, constant_shader);
+    EXPECT_GT(vp::get<2>(c.result.to_host(c.p.device).sums).size(), 300u);
+    sequence<constant_pair> d(extent);
+    d.draw_solid({box}, g, {}, "a solid, sums kept", clear_and_keep, constant_shader);
+    EXPECT_EQ(d.p.on_host.num_tiles(), 0u);
+    // Tiles that a call goes on from have sums of their own.
+    sequence<constant_pair> e(extent);
+    e.draw_solid({box}, g, {}, "a solid in tiles", clear_constants, constant_shader);
+    e.draw({meshes[1]}, g, vp::coverage::thin, "a surface on tiles, sums kept", keep, constant_shader);
+    EXPECT_GT(e.p.on_host.num_tiles(), 0u);
+    e.draw(
+        {}, g, vp::coverage::thin, "no draws, sums kept", [](auto& to) { target<2>(to).clear(1.5f); }, constant_shader);
+    EXPECT_GT(e.p.on_host.num_tiles(), 0u);
 }
 
 // A sparse framebuffer with tiles is what the first call goes on from.
@@ -310,7 +377,7 @@ TEST(DeviceSparseGoesOn, SolidsOfOneValueMakeTheTilesOfTheCpu) {
     EXPECT_LT(b.p.on_host.num_values(), 300000u);
 }
 
-// Two calls in one graph, which is replayed with moved vertices: the second one goes on from the first.
+// Two calls in one graph, which is replayed with moved vertices: the second one goes on from the first. Both keep sums.
 TEST(DeviceSparseGoesOn, AGraphHoldsCallsThatGoOn) {
     const glm::ivec3 extent{45, 34, 37};
     const vp::grid g = unit::unit_grid(extent);
@@ -322,6 +389,12 @@ TEST(DeviceSparseGoesOn, AGraphHoldsCallsThatGoOn) {
     using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, shader>;
     const draw_type first{a.view(), {}, shader{}}, second{b.view(), {}, shader{}};
     const std::span<const draw_type> firsts(&first, 1), seconds(&second, 1);
+    const auto expect_same = [](const auto& a, const auto& b) {
+        EXPECT_TRUE(vp::same_contents(a, b));
+        EXPECT_TRUE(unit::same_bytes(vp::get<2>(a.sums), vp::get<2>(b.sums)));
+        EXPECT_TRUE(unit::same_bytes(vp::get<3>(a.sums), vp::get<3>(b.sums)));
+        EXPECT_GT(vp::get<2>(a.sums).size(), 300u);
+    };
     vp::workspace_limits limits{};
     limits.bricks = 400;
     limits.voxels = 60000;
@@ -329,6 +402,9 @@ TEST(DeviceSparseGoesOn, AGraphHoldsCallsThatGoOn) {
     limits.fragment_records = 20000;
     result_of<framebuffer<vp::cuda_backend>>::type result, joined;
     clear_all(result);
+    result.keep_sums<2>();
+    joined.keep_sums<2>();
+    joined.keep_sums<3>();
     const std::size_t bytes = vp::workspace_bytes(firsts, g, result, {}, limits);
     // The second call needs more, which follows from what it goes on from.
     const vp::cuda_backend::buffer<std::byte> memory(be, bytes), other(be, 2 * bytes);
@@ -350,11 +426,13 @@ TEST(DeviceSparseGoesOn, AGraphHoldsCallsThatGoOn) {
         ASSERT_TRUE(vp::read_status(be, v).ok());
         p.on_host = framebuffer<vp::cpu_backend>(p.host, extent);
         clear_all(p.on_host);
+        p.on_host.keep_sums<2>();
         ASSERT_TRUE(vp::voxelize(p.host, moved.view(), g, vp::passthrough{}, shader{}, p.on_host).ok());
-        EXPECT_TRUE(vp::same_contents(result.to_host(be), p.on_host.to_host(p.host)));
+        expect_same(result.to_host(be), p.on_host.to_host(p.host));
         load_all<8>(p.on_host);
+        p.on_host.keep_sums<3>();
         ASSERT_TRUE(vp::voxelize(p.host, more.view(), g, vp::passthrough{}, shader{}, p.on_host).ok());
-        EXPECT_TRUE(vp::same_contents(joined.to_host(be), p.on_host.to_host(p.host)));
+        expect_same(joined.to_host(be), p.on_host.to_host(p.host));
     }
 }
 

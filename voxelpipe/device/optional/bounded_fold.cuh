@@ -33,19 +33,24 @@ template <class... Targets>
            before.num_tiles < core::max_numbered - l.bricks;
 }
 
-// A sparse result in an arena: its bricks, and values for each voxel, and tile, that there is room for. Bricks:
-// bounded_arrays, or bounded_bricks.
+// A sparse result in an arena: its bricks, and values, and sums where they are kept, for each voxel, and tile, that
+// there is room for. Bricks: bounded_arrays, or bounded_bricks.
 template <class Bricks, class... Targets>
 struct bounded_result {
     using values_type = core::pack<typename core::rank_map<Targets>::element*...>;
     workspace_limits limits;
     Bricks bricks;
     values_type values{};
+    core::pack<core::kept_sum<Targets>*...> sums{};
 
-    bounded_result(const Bricks& empty, const workspace_limits& l, arena& memory) : limits(l), bricks(empty) {
+    bounded_result(const Bricks& empty, const workspace_limits& l, const sparse_result<Targets...>& result,
+                   arena& memory)
+        : limits(l), bricks(empty) {
         core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-            using map = core::rank_map<typename core::pack_element<I, Targets...>::type>;
+            using target = typename core::pack_element<I, Targets...>::type;
+            using map = core::rank_map<target>;
             get<I>(values) = memory.take<typename map::element>(map::elements(limits.voxels));
+            if (result.keeps_sums(I)) get<I>(sums) = memory.take<core::kept_sum<target>>(limits.voxels);
         });
     }
     // When the masks are complete, as bounded_bricks. read_status would take triangles that were left to the deferred
@@ -63,7 +68,10 @@ struct bounded_result {
         result.view.table = {bricks.keys, bricks.masks, bricks.offsets, limits.bricks,
                              g.extent,    g.offset,     tiles,          num_tiles};
         result.view.clear_values = result.next_background();
-        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() { get<I>(result.view.values) = get<I>(values); });
+        core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            get<I>(result.view.values) = get<I>(values);
+            get<I>(result.sums) = get<I>(sums);
+        });
     }
 };
 
@@ -77,7 +85,7 @@ struct bounded_fold {
 
     bounded_fold(const glm::ivec3& whole, const workspace_limits& limits, const sparse_result<Targets...>& result,
                  arena& memory)
-        : made({whole, to_room(limits), memory}, limits, memory),
+        : made({whole, to_room(limits), memory}, limits, result, memory),
           before(result.keeps_voxels() ? result.start.view.table : brick_table{}),
           tiles(before, to_room(limits), memory), listed(memory.take<std::uint32_t>(num_ranks())),
           existing(keeps() ? memory.take<std::uint32_t>(num_ranks()) : nullptr) {}
@@ -96,7 +104,9 @@ struct bounded_fold {
             using map = core::rank_map<target>;
             auto* const values = get<I>(made.values);
             const auto* const earlier = get<I>(result.start.view.values);
-            const fold_target<target> fold{get<I>(background), result.loads[I], false, earlier, values, nullptr};
+            auto* const sums = get<I>(made.sums);
+            const fold_target<target> fold{
+                get<I>(background), result.loads[I], result.keeps_sums(I), earlier, values, sums};
             const std::uint64_t most =
                 keeps() ? made.limits.voxels : std::min(made.limits.voxels, made.limits.fragments);
             if (most == 0) return;
@@ -106,8 +116,8 @@ struct bounded_fold {
                           stage::tile_resolve, fold, static_cast<const std::uint64_t*>(&bricks.counts->voxels),
                           static_cast<const std::uint32_t*>(listed), static_cast<const std::uint32_t*>(existing),
                           lists.offsets, lists.payloads);
-            tiles.template store<target>(earlier, values, result.loads[I] != load_operation::clear, get<I>(background),
-                                         bricks.counts, stream);
+            tiles.template store<target>(earlier, values, sums, result.loads[I] != load_operation::clear,
+                                         get<I>(background), bricks.counts, stream);
         });
         made.set(result, g, tiles.tiles(), tiles.capacity());
     }

@@ -5,9 +5,9 @@
 // voxelize_async into bricks: a sparse call that never waits and never allocates. Bricks and values lie in the caller's
 // workspace, so that a CUDA graph can capture the call and replay it with changed vertices. workspace_limits::bricks,
 // voxels and nodes say how many there may be, tiles among them as bricks and as voxels. Shaders that are not constant
-// need `fragments` too, and so does every call that goes on from what an earlier one left (sparse_result::start). If
-// something does not fit, the result is empty, and read_status reports what was needed. What an earlier call left is
-// only read.
+// need `fragments` too, and so does every call that keeps sums (sparse_result::keep_sums) or goes on from what an
+// earlier one left (sparse_result::start). If something does not fit, the result is empty, and read_status reports what
+// was needed. What an earlier call left is only read.
 
 #include <voxelpipe/device/optional/bounded_fold.cuh>
 
@@ -47,7 +47,8 @@ struct bounded_call<Coverage, draw<Mesh, VertexShader, FragmentShader>, Targets.
         bounded_call all = *this;
         all.workspace.limits.expects_deferred = true; // a sparse call keeps the deferred pass
         if constexpr (may_follow_from_masks<FragmentShader, Targets...>)
-            if (!result.keeps_voxels() && can_raster_masks(draws, g, options.rule, triangles)) {
+            if (!result.keeps_voxels() && !result.keeps_any_sums() &&
+                can_raster_masks(draws, g, options.rule, triangles)) {
                 all.template by_masks<Run>(memory, result);
                 return true;
             }
@@ -61,7 +62,7 @@ private:
         auto* const state = memory.take<pipeline_state>(1);
         brick_raster<draw_type> raster(draws, g, stream, nullptr, memory);
         const bounded_result<bounded_bricks<>, Targets...> made({g.whole_extent(), to_room(workspace.limits), memory},
-                                                                workspace.limits, memory);
+                                                                workspace.limits, result, memory);
         const std::uint64_t num_counts = workspace.limits.voxels + spare_ranks;
         auto* const counts = memory.take<std::uint32_t>((is_blended_once<Targets> && ...) ? 0 : num_counts);
         if constexpr (Run) {
@@ -162,6 +163,7 @@ template <class... Targets>
 void forget_made(sparse_result<Targets...>& result) {
     result.counts = nullptr;
     result.view = {};
+    result.sums = {};
     result.where = {};
     result.is_tiled = false;
 }

@@ -38,12 +38,22 @@ struct sparse_result {
     std::array<load_operation, num_targets> loads{};
     sparse_start<Targets...> start; // What the call goes on from; nothing by default.
 
+    // True if the call keeps the sums of voxels in `sums`, as sparse_framebuffer::keep_sums; only targets that sum
+    // floats or saturate signed integers have any. `load` leaves it as it is.
+    template <std::size_t I>
+    void keep_sums(bool keep = true) {
+        static_assert(core::has_wide_sums<typename core::pack_element<I, Targets...>::type>,
+                      "voxelpipe: this target's blend keeps no sums");
+        keeps_sums_[I] = keep;
+    }
+
     const sparse_counts* counts = nullptr; // numbers of bricks, voxels and tiles
     // For device code. Its table has room: behind the last brick its keys are ~0, which no voxel has, and behind the
     // last tile it has brick_tile::none().
     sparse_view<Targets...> view{};
-    grid where;            // of the call
-    bool is_tiled = false; // as host_sparse's; set by the call
+    core::pack<const core::kept_sum<Targets>*...> sums{}; // by rank, where they are kept; set by the call
+    grid where;                                           // of the call
+    bool is_tiled = false;                                // as host_sparse's; set by the call
 
     // Makes the next call go on from what an earlier one left: every target loads. It must be given another workspace.
     void load(const sparse_result& earlier) {
@@ -61,6 +71,14 @@ struct sparse_result {
         bool keeps = false;
         for (const load_operation l : loads) keeps = keeps || l != load_operation::clear;
         return keeps && (start.view.table.count != 0 || start.view.table.num_tiles != 0);
+    }
+    // True if the call keeps the sums of this target.
+    [[nodiscard]] bool keeps_sums(std::size_t target) const { return keeps_sums_[target]; }
+    // True if it keeps those of any.
+    [[nodiscard]] bool keeps_any_sums() const {
+        bool keeps = false;
+        for (const bool k : keeps_sums_) keeps = keeps || k;
+        return keeps;
     }
     // What absent voxels read as after the call.
     [[nodiscard]] core::pack<typename Targets::value_type...> next_background() const {
@@ -94,12 +112,17 @@ struct sparse_result {
             copy(h.tiles, view.table.tiles, n[0].tiles);
             core::for_each_index<num_targets>([&]<std::size_t I>() {
                 using map = core::rank_map<typename core::pack_element<I, Targets...>::type>;
-                copy(get<I>(h.values), get<I>(view.values), map::elements(n[0].voxels + n[0].tiles));
+                const std::uint64_t ranks = n[0].voxels + n[0].tiles;
+                copy(get<I>(h.values), get<I>(view.values), map::elements(ranks));
+                if (get<I>(sums) != nullptr) copy(get<I>(h.sums), get<I>(sums), ranks);
             });
             device::check(cudaStreamSynchronize(backend.stream));
         });
         return h;
     }
+
+private:
+    std::array<bool, num_targets> keeps_sums_{};
 };
 
 namespace core {

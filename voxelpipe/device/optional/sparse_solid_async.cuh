@@ -6,7 +6,7 @@
 // limits, `fragments` must hold the crossings, as for framebuffers (solid_async.cuh), and `bricks`, `voxels` and
 // `nodes` the result, whose bytes are those of voxelize_solid. Where that makes tiles, memory is in proportion to the
 // crossings and the result. Otherwise the voxels inside are listed: in proportion to `voxels`, times the draws for
-// bodies::draw. A call that goes on (sparse_result::start) lists them always.
+// bodies::draw. A call that goes on (sparse_result::start), or keeps sums, lists them always.
 
 #include <voxelpipe/device/optional/bounded_solid_bricks.cuh>
 #include <voxelpipe/device/optional/solid_async.cuh>
@@ -84,9 +84,9 @@ struct bounded_solid<draw<Mesh, VertexShader, SolidShader>, Targets...> {
 private:
     // As core::makes_tiles. Only the device knows whether anything exists where `result` goes on, so voxels stay then.
     [[nodiscard]] bool makes_tiles(const sparse_result<Targets...>& result) const {
-        return !result.keeps_voxels() && core::has_one_value<Targets...>(draws, options, [&](std::size_t i) {
-            return result.loads[i] != load_operation::off;
-        });
+        return !result.keeps_voxels() && !result.keeps_any_sums() &&
+               core::has_one_value<Targets...>(draws, options,
+                                               [&](std::size_t i) { return result.loads[i] != load_operation::off; });
     }
     // Bricks and tiles of the rows' runs, and one value.
     template <bool Run>
@@ -97,7 +97,7 @@ private:
         const solid_runs<draw_type> call{{{draws, g, options, static_cast<std::uint32_t>(triangles), room}}};
         if (!call.entries.fits() || limits.fragments >= core::max_numbered / 2) return false;
         const auto m = call.take(memory); // its state comes first
-        bounded_result<bounded_arrays<>, Targets...> made({to_room(limits), memory}, limits, memory);
+        bounded_result<bounded_arrays<>, Targets...> made({to_room(limits), memory}, limits, result, memory);
         auto* const num_values = memory.take<unsigned long long>(1);
         bounded_solid_bricks<> bricks(g, limits.fragments, to_room(limits), stream, memory);
         if constexpr (Run) {

@@ -70,11 +70,12 @@ public:
         for_each(num_places(), list_bounded_tiles{list, made}, where, stream);
         for_each(room_, end_bounded_tiles{bits_, made, tiles_}, where, stream);
     }
-    // Writes the values of the tiles, behind those of the voxels. Words of bits are zero behind these.
+    // Writes the values of the tiles, behind those of the voxels, and their sums; null where these are not kept. Words
+    // of bits are zero behind these.
     template <class Target>
     void store(const typename core::rank_map<Target>::element* before, typename core::rank_map<Target>::element* values,
-               bool is_loaded, const typename Target::value_type& background, const sparse_counts* made,
-               cudaStream_t stream) const;
+               core::kept_sum<Target>* sums, bool is_loaded, const typename Target::value_type& background,
+               const sparse_counts* made, cudaStream_t stream) const;
 
 private:
     static constexpr stage where = stage::tile_resolve;
@@ -106,11 +107,11 @@ struct store_bounded_tiles {
 template <int N>
 template <class Target>
 void bounded_kept_tiles<N>::store(const typename core::rank_map<Target>::element* before,
-                                  typename core::rank_map<Target>::element* values, bool is_loaded,
-                                  const typename Target::value_type& background, const sparse_counts* made,
-                                  cudaStream_t stream) const {
+                                  typename core::rank_map<Target>::element* values, core::kept_sum<Target>* sums,
+                                  bool is_loaded, const typename Target::value_type& background,
+                                  const sparse_counts* made, cudaStream_t stream) const {
     if (is_empty()) return;
-    const core::keep_tile_values<Target> keep{before, 0, sources_, 0, values, nullptr, 0, is_loaded, background};
+    const core::keep_tile_values<Target> keep{before, 0, sources_, 0, values, sums, 0, is_loaded, background};
     // A word of bits more than tiles could fill.
     for_each(room_ + 1, store_bounded_tiles<Target>{keep, before_, made}, where, stream);
 }
