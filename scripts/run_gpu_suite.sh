@@ -120,7 +120,9 @@ run_suite() {
     for source in tests/{stages,strategies,robustness}/*_test.cu api_test.cu; do
         [[ $source != */solid_calls_test.cu ]] || continue    # in device_solids_test
         [[ $source != */programs_async_test.cu ]] || continue # in device_programs_test
+        [[ $source != */programs_goes_on_test.cu ]] || continue # in device_programs_test
         [[ $source != */sparse_goes_on_test.cu ]] || continue  # in device_sparse_test
+        [[ $source != */sparse_merge_test.cu ]] || continue    # in device_sparse_test
         program="build/$folder/tests/strategies/device_$(basename "$source" .cu)"
         [[ $part != default && $program == *scenes_test ]] && continue
         run_program "$part" "$(basename "$program")" "$program"

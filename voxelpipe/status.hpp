@@ -34,7 +34,7 @@ enum class status_code : std::uint8_t {
     bad_level,            // a tessellation program gave a level below 1 or above its max_level
     bad_count,            // a geometry program emitted more triangles than its type holds
     bad_subset,           // mesh_view::part: not one number a triangle, or not ascending below `whole`
-    other_rank_failed,    // slabs/mpi.hpp: this rank has not failed, another one has
+    other_rank_failed,    // slabs/: this part of the work has not failed, that of another rank or GPU has
     crop_without_whole,   // repair::exterior of a crop: what lies outside follows from the whole grid
     no_device,            // cuda_backend without a usable device
     device_error,         // `device_error` holds the CUDA error
@@ -142,7 +142,7 @@ struct required_sizes {
     case status_code::bad_subset:
         return "bad subset: a mesh's part needs one number a triangle, ascending and below the whole";
     case status_code::other_rank_failed:
-        return "other rank failed: no slab of this rank is to be used";
+        return "another rank or GPU failed: this one's part is not to be used";
     case status_code::crop_without_whole:
         return "crop without whole: the exterior of a crop follows from the whole grid, draw that";
     case status_code::no_device:

@@ -36,6 +36,7 @@
 #include <voxelpipe/device/optional/solid_async.cuh>
 #include <voxelpipe/device/optional/sparse.cuh>
 #include <voxelpipe/device/optional/sparse_async.cuh>
+#include <voxelpipe/device/optional/sparse_merge_async.cuh>
 #include <voxelpipe/device/optional/sparse_solid.cuh>
 #include <voxelpipe/device/optional/sparse_solid_async.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>

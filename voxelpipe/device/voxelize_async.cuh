@@ -195,6 +195,7 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
     device::pipeline_state state{};
     if (const status s = device::read_start(workspace.memory, state, backend.stream); !s.ok()) return s;
     if ((state.index_error & device::bad_numbers) != 0) return core::failure(status_code::bad_subset);
+    if ((state.index_error & device::stopped) != 0) return core::failure(status_code::other_rank_failed);
     if (state.index_error != 0) return core::failure(status_code::index_out_of_range, stage::coarse_raster);
     const device::capacities limits = device::to_capacities(workspace.limits);
     const auto& bricks = state.sparse;

@@ -129,6 +129,21 @@ public:
             if (members_[i]->thrown) std::rethrow_exception(members_[i]->thrown);
     }
 
+    // What GPU `later` is given from now on begins when what GPU `earlier` has been given has ended. Does not wait.
+    void order(std::size_t earlier, std::size_t later) const {
+        if (earlier == later) return;
+        const detail::current_device device(ordinal(earlier));
+        device::with_runtime_errors([&] {
+            cudaEvent_t event = nullptr;
+            device::check(cudaEventCreateWithFlags(&event, cudaEventDisableTiming));
+            const cudaError_t recorded = cudaEventRecord(event, backend(earlier).stream);
+            const cudaError_t waits =
+                recorded == cudaSuccess ? cudaStreamWaitEvent(backend(later).stream, event, 0) : recorded;
+            (void)cudaEventDestroy(event); // which the driver keeps as long as it is waited for
+            device::check(waits);
+        });
+    }
+
 private:
     struct member {
         int ordinal;

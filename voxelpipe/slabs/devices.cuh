@@ -105,6 +105,59 @@ public:
         });
     }
 
+    // ---- calls that never wait ----
+
+    // Bytes that draw_async needs for slab i; 0 if the arguments are invalid. out: as voxelize_async's.
+    template <class FragmentShader, class Output>
+    [[nodiscard]] std::size_t workspace_bytes(std::size_t i, const FragmentShader& shader, const Output& out,
+                                              const workspace_limits& limits) const {
+        const detail::current_device device(gpus_.ordinal(i));
+        const auto one = draw_of(meshes_[i]->view(), shader);
+        return voxelpipe::workspace_bytes(std::span(&one, 1), slabs_[i].where, out, options_.voxelize, limits);
+    }
+    // Puts every slab's voxelize_async on its GPU's stream, and returns when all are launched. outputs, workspaces: one
+    // a slab, in its GPU's memory; a sparse_result may go on from its own slab's. Returns the first call that was not
+    // launched; what the GPUs find out is said by read_status. Outputs and conditions are those of draw().
+    template <class FragmentShader, class Output>
+    [[nodiscard]] status draw_async(const FragmentShader& shader, std::vector<Output>& outputs,
+                                    std::span<const workspace_view> workspaces) {
+        if (device::is_lists<Output> && plan_.axis != 2) return core::failure(status_code::bad_crop);
+        if (outputs.size() != size() || workspaces.size() != size()) return core::failure(status_code::extent_mismatch);
+        return on_each(size(), [&](std::size_t i, cuda_backend& gpu) {
+            const auto one = draw_of(meshes_[i]->view(), shader);
+            return voxelize_async(gpu, std::span(&one, 1), slabs_[i].where, outputs[i], options_.voxelize,
+                                  workspaces[i]);
+        });
+    }
+    // Waits for all GPUs. Returns the counts of the whole, or the first slab that failed. need: as read_status of each
+    // slab gives it.
+    [[nodiscard]] status read_status(std::span<const workspace_view> workspaces,
+                                     std::vector<workspace_limits>* need = nullptr) {
+        if (workspaces.size() != size()) return core::failure(status_code::extent_mismatch);
+        if (need != nullptr) {
+            need->clear();
+            for (const workspace_view& w : workspaces) need->push_back(w.limits);
+        }
+        const status s = on_each(size(), [&](std::size_t i, cuda_backend& gpu) {
+            workspace_limits* const of_slab = need == nullptr ? nullptr : need->data() + i;
+            return slabs_[i].drawn = voxelpipe::read_status(gpu, workspaces[i], of_slab);
+        });
+        return s.ok() ? count_whole() : s;
+    }
+    // Puts merge_async of what draw_async made on the stream of GPU `at`, behind all slabs' calls, and returns. Later
+    // calls of the slabs begin when their results have been copied. whole, workspace: in memory of GPU `at`.
+    template <class... Targets>
+    [[nodiscard]] status merge_async(const std::vector<sparse_result<Targets...>>& parts,
+                                     std::span<const workspace_view> workspaces, std::size_t at,
+                                     sparse_result<Targets...>& whole, const workspace_view& workspace) {
+        if (at >= size() || parts.size() != size()) return core::failure(status_code::extent_mismatch);
+        for (std::size_t i = 0; i < size(); ++i) gpus_.order(i, at);
+        const detail::current_device device(gpus_.ordinal(at));
+        const status s = voxelpipe::merge_async(gpus_.backend(at), parts, workspaces, whole, workspace);
+        for (std::size_t i = 0; i < size(); ++i) gpus_.order(at, i);
+        return s;
+    }
+
     // Copies target I of every slab into that of a framebuffer of the whole grid, on any of the GPUs or in host memory
     // that view() shows, and waits. Earlier work on the whole has ended. bad_crop: slabs are not along z, or do not
     // begin with a brick of a tiled target.
@@ -194,7 +247,10 @@ private:
             const auto one = draw_of(meshes_[i]->view(), shader);
             return slabs_[i].drawn = call(gpu, std::span(&one, 1), slabs_[i].where, outputs[i]);
         });
-        if (!s.ok()) return s;
+        return s.ok() ? count_whole() : s;
+    }
+    // The counts of the whole, of what was drawn into the slabs.
+    [[nodiscard]] status count_whole() {
         status all;
         for (slab& one : slabs_) {
             one.voxels_before = all.counts.voxels;
