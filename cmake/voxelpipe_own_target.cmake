@@ -29,3 +29,16 @@ function(voxelpipe_hot_target)
     endif()
   endforeach()
 endfunction()
+
+# voxelpipe_tool_library(target...): a library of the tool's. With VOXELPIPE_JOIN_FILES its files are compiled as one, but
+# those with options of their own; VOXELPIPE_TOOL_OPTIONS is for builds whose models are small.
+function(voxelpipe_tool_library)
+  foreach(target IN LISTS ARGN)
+    target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:${VOXELPIPE_TOOL_OPTIONS}>)
+    if(VOXELPIPE_JOIN_FILES)
+      set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
+      # g++ gives this warning for what is not the main file, where another might include it.
+      target_compile_options(${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-subobject-linkage>)
+    endif()
+  endforeach()
+endfunction()

@@ -73,7 +73,7 @@ double cuda_start::milliseconds_ago() const {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count();
 }
 
-std::uint64_t model_bytes(const scene& model) { return bytes_of(model); }
+std::uint64_t input_bytes(const scene& model) { return bytes_of(model); }
 
 std::string why_not(const cuda_facts& facts) {
     if (!facts.built_in) return "this program was built without CUDA";

@@ -65,7 +65,7 @@ private:
 [[nodiscard]] std::uint64_t default_work_memory(const cuda_facts& facts);
 
 // Bytes of a scene's vertices, indices and texels.
-[[nodiscard]] std::uint64_t model_bytes(const scene& model);
+[[nodiscard]] std::uint64_t input_bytes(const scene& model);
 
 // Why a scene cannot fit into that device's memory, as far as can be told before the attempt. Empty where it may.
 [[nodiscard]] std::string why_too_large(const cuda_facts& facts, const scene& model, const voxelize_request& request);

@@ -105,7 +105,7 @@ std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_
     const bool is_forced = request.strategy != voxelpipe::strategy::automatic || request.devices != 1;
     if (request.backend == backend_choice::automatic && !is_forced && built_with_cuda()) {
         const work_size work = work_of(request, static_cast<double>(model.triangle_count() + model.line_count()),
-                                       static_cast<double>(model_bytes(model)));
+                                       static_cast<double>(input_bytes(model)));
         const double on_cpu = cpu_milliseconds(work, thread_count(request.threads));
         const double on_cuda = cuda_milliseconds(work, request.cuda ? request.cuda->milliseconds_ago() : 0);
         stats.estimate = in_words(on_cpu, on_cuda);
