@@ -82,10 +82,9 @@ void list_async(const Call& call, const workspace_view& workspace, arena& memory
         outputs.value.primitives = primitives;
         outputs.value.payloads = payloads;
         const auto sorted = call.template launch<Rule, Key>(memory, stream, outputs);
-        const bool are_done = sorted.are_at_output && std::is_void_v<Payload>; // only the lengths are missing
-        launch_behind(publish_lists_kernel<Key, payload_storage<Payload>>, are_done ? 1 : fill_device(capacity),
-                      threads_per_block, stream, stage::abuffer_emit, sorted, state, call.limits, counts, voxels,
-                      offsets, primitives, payloads);
+        const unsigned blocks = sorted.are_stored() ? 1 : fill_device(capacity); // 1: only the lengths are missing
+        launch_behind(publish_lists_kernel<Key, payload_storage<Payload>>, blocks, threads_per_block, stream,
+                      stage::abuffer_emit, sorted, state, call.limits, counts, voxels, offsets, primitives, payloads);
         if (core::has_subset(call.draws)) {
             const std::vector<listed_draw> draws = listed_draws(call.draws);
             upload(
@@ -134,7 +133,8 @@ template <class Draw, class Payload>
             limits.lists_fragments,
             true,
             limits.fragments > 2 * triangles,
-            core::arms_of(rule)};
+            core::arms_of(rule),
+            true};
 }
 
 } // namespace device

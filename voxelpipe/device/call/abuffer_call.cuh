@@ -36,6 +36,7 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     bool may_shade_late = false, filters = false;
     bool has_few_a_voxel = false;             // fragments; see min_counted
     core::arm_set arms = core::arm_set::none; // if any, launched as conservative coverage
+    bool has_outputs = false;                 // every launch has output pointers, so payloads need no room beside them
 
     // Everything that this call's launches depend on, if it is trivially copyable.
     static constexpr bool has_bytes = std::is_trivially_copyable_v<draw_type>;
@@ -176,7 +177,7 @@ private:
               buffers(memory, c.draws), deferred(deferred_triangles::take(memory, c.num_primitives)),
               order(order_memory::take(memory, c.limits.fragments)),
               spare(memory.take<std::uint32_t>(c.limits.fragments)),
-              payloads(memory.take<Payload>(has_payload ? c.limits.fragments : 0)) {}
+              payloads(memory.take<Payload>(has_payload && !c.has_outputs ? c.limits.fragments : 0)) {}
         template <coverage Rule>
         [[nodiscard]] fragment_lists<std::uint32_t, Payload> launch(pipeline_state* state, cudaStream_t stream,
                                                                     const output_pointers& outputs) {
@@ -197,6 +198,7 @@ private:
             }
             sorted.payloads = has_payload ? payloads : nullptr;
             sorted.payloads_in_order = true;
+            sorted.are_payloads_at_output = has_payload && sorted.are_at_output;
             return sorted;
         }
     };

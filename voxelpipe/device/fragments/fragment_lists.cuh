@@ -147,9 +147,14 @@ struct fragment_lists {
     const std::uint64_t* first_of_voxel;
     const csr_pointers* pointers; // output pointers of the call
     Payload payload;
-    bool are_at_output;     // all but the payloads are at the output pointers, and only there
-    bool payloads_in_order; // payloads are by fragment, not by offset
+    bool are_at_output;          // all but the payloads are at the output pointers, and only there
+    bool payloads_in_order;      // payloads are by fragment, not by offset
+    bool are_payloads_at_output; // and they are there too
 
+    // True if nothing is to be copied to the output pointers.
+    [[nodiscard]] bool are_stored() const {
+        return are_at_output && (std::is_same_v<Payload, no_payload> || are_payloads_at_output);
+    }
     [[nodiscard]] __device__ std::uint64_t voxel(std::uint64_t i) const {
         return voxels != nullptr ? voxels[i] : keys[first_of_voxel[i]];
     }

@@ -77,8 +77,9 @@ void filter_lists(const Scene& s, list_buffers<std::uint32_t, Payload>& b, pipel
     std::swap(b.values[0], b.values[1]);
 }
 
-// Shades sorted fragments: payloads[i] becomes fragment i's, if there are payloads. Counts discarded ones; if there are
-// any, the lists are not the call's result.
+// Shades sorted fragments: payloads[i] becomes fragment i's, if there are payloads; those of lists that are at the
+// output pointers are written there instead. Counts discarded ones; if there are any, the lists are not the call's
+// result.
 template <class MakePayload, class Scene, class Payload>
 __global__ __launch_bounds__(threads_per_block, 4) void shade_lists_kernel(
     const __grid_constant__ Scene s, const __grid_constant__ fragment_lists<std::uint32_t, Payload> lists,
@@ -87,6 +88,8 @@ __global__ __launch_bounds__(threads_per_block, 4) void shade_lists_kernel(
     if (has_failed(*state, limits)) return;
     const auto n = static_cast<std::uint32_t>(state->list_fragments); // see core::max_numbered
     const std::uint32_t* const primitives = lists.are_at_output ? lists.pointers->primitives : lists.values;
+    if constexpr (!std::is_same_v<Payload, no_payload>)
+        if (lists.are_at_output) payloads = static_cast<Payload*>(lists.pointers->payloads);
     std::uint32_t discarded = 0;
     for (std::uint64_t i = std::uint64_t{blockIdx.x} * threads_per_block + threadIdx.x; i < n;
          i += std::uint64_t{gridDim.x} * threads_per_block) {

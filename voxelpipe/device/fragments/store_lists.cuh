@@ -17,7 +17,7 @@ struct list_counts {
     std::uint64_t voxels, fragments;
 };
 
-// Copies the lists, or only the payloads if the rest is in place. All threads of the launch call it. The padding of a
+// Copies the lists, or what of them is not in place. All threads of the launch call it. The padding of a
 // payload, which nobody has written and nobody reads, is copied with it: tools that look for uninitialised memory
 // report that.
 template <class Key, class Payload>
@@ -33,6 +33,7 @@ __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint6
         }
         if (thread == 0 && num_voxels != 0) offsets[num_voxels] = num_fragments;
     }
+    if (lists.are_payloads_at_output) return; // and so is all else
     for (std::uint64_t i = thread; i < num_fragments; i += threads) {
         if (!lists.are_at_output) primitives[i] = lists.primitive(i);
         if constexpr (!std::is_same_v<Payload, no_payload>) payloads[i] = lists.payload_of(i);
@@ -59,7 +60,7 @@ __global__ void store_lists_kernel(const __grid_constant__ fragment_lists<Key, P
 template <class Key, class Payload>
 void store_lists(const fragment_lists<Key, Payload>& lists, const pipeline_state* state, const capacities& limits,
                  cudaStream_t stream, stage_clock* clock) {
-    if (lists.are_at_output && std::is_same_v<Payload, no_payload>) return;
+    if (lists.are_stored()) return;
     launch_behind(store_lists_kernel<Key, Payload>, fill_device(limits.fragments), threads_per_block, stream,
                   stage::abuffer_emit, lists, state, limits);
     end_stage(clock, &stage_times::abuffer_emit);
