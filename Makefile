@@ -4,7 +4,7 @@
 # Two commands for a person, two for the maintainers. The scripts do the work and say what they do.
 #
 #   make demo [MODEL=file.glb] [RESOLUTION=256]   a model (glTF, OBJ, STL, PLY, ...) becomes voxels, files and a picture in demo/
-#   make test                                     builds everything and runs all tests
+#   make test                                     builds everything and runs the tests
 #   make docs                                     the site, in build/docs/html
 #   make dist                                     the source archive, in build/dist
 #   make bench                                    the CPU table
