@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "memory.hpp"
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -10,6 +11,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <string>
 #include <string_view>
 
 namespace voxelize::memory {
@@ -18,27 +20,47 @@ namespace {
 
 std::atomic<std::uint64_t> counted{0};          // bytes of large blocks that are held
 std::atomic<std::uint64_t> allowed{UINT64_MAX}; // that they may reach: the limit without what else is resident
-std::atomic<std::uint64_t> overhead{0};         // what else is resident; never taken to shrink
+std::atomic<std::uint64_t> overhead{0};         // what else is resident, when it was measured last
+std::atomic<std::uint64_t> unmeasured{0};       // bytes that were taken since then
 std::atomic<std::uint64_t> wanted{0};           // counted bytes of the last refusal; 0: there was none
 std::uint64_t limit_bytes = UINT64_MAX;
 bool limit_is_option = false;
 
-// Without an allocation: it is called within operator new.
-std::uint64_t resident_now() noexcept {
+// Bytes in physical memory.
+struct residence {
+    std::uint64_t all = 0, of_files = 0; // of_files: code and mapped files
+};
+
+// Takes no counted block: it is called within operator new.
+residence residence_now() noexcept {
     std::FILE* const file = std::fopen("/proc/self/statm", "r");
-    if (file == nullptr) return 0;
-    unsigned long long all = 0, pages = 0;
-    const bool read = std::fscanf(file, "%llu %llu", &all, &pages) == 2;
+    if (file == nullptr) return {};
+    unsigned long long all = 0, pages = 0, shared = 0;
+    const bool read = std::fscanf(file, "%llu %llu %llu", &all, &pages, &shared) == 3;
     std::fclose(file);
-    return read ? pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) : 0;
+    const auto page = static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+    return read ? residence{pages * page, shared * page} : residence{};
 }
 
-// Code, stacks, small blocks and what other libraries take have to fit beside the counted blocks.
+// Bytes of malloc's heaps, where the blocks lie that are not counted, and where their memory stays once they are given
+// back.
+std::uint64_t heap_bytes() noexcept { return mallinfo2().arena; }
+
+std::uint64_t difference(std::uint64_t a, std::uint64_t b) { return a > b ? a - b : 0; }
+
+// Code, stacks, small blocks and what other libraries take have to fit beside the counted blocks. What is resident
+// without these does not tell: pages of a block that nothing has touched yet are counted and not resident, and would
+// hide as much of the rest.
 void measure_overhead() noexcept {
-    const std::uint64_t now = resident_now(), blocks = counted;
-    const std::uint64_t rest = std::max(overhead.load(), now > blocks ? now - blocks : 0);
+    static const std::uint64_t data_of_libraries = [] {
+        const residence at_first = residence_now();
+        return difference(at_first.all, at_first.of_files + heap_bytes() + counted);
+    }();
+    unmeasured = 0;
+    const residence now = residence_now();
+    const std::uint64_t rest = std::max(difference(now.all, counted), now.of_files + data_of_libraries + heap_bytes());
     overhead = rest;
-    if (limit_bytes != UINT64_MAX) allowed = limit_bytes > rest ? limit_bytes - rest : 0;
+    if (limit_bytes != UINT64_MAX) allowed = difference(limit_bytes, rest);
 }
 
 // The number in FILE; the greatest where there is none ("max").
@@ -91,10 +113,13 @@ void set_limit(std::uint64_t limit, bool is_option) {
 
 std::uint64_t limit() { return limit_bytes; }
 
-std::uint64_t resident() { return resident_now(); }
+std::uint64_t resident() { return residence_now().all; }
 
 std::uint64_t peak() {
-    rusage usage{};
+    std::ifstream status("/proc/self/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.starts_with("VmHWM:")) return std::stoull(line.substr(6)) * 1024;
+    rusage usage{}; // which counts what the process was before it began this program, too
     getrusage(RUSAGE_SELF, &usage);
     return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
@@ -106,8 +131,8 @@ std::uint64_t room() {
 }
 
 bool take(std::size_t bytes) noexcept {
-    constexpr std::size_t worth_a_look = std::size_t{16} << 20;
-    if (bytes >= worth_a_look) measure_overhead();
+    constexpr std::uint64_t worth_a_look = std::uint64_t{4} << 20;
+    if (unmeasured += bytes; unmeasured >= worth_a_look) measure_overhead();
     const std::uint64_t now = counted += bytes;
     if (now <= allowed) return true;
     wanted = now;

@@ -42,9 +42,11 @@ void release(void* block) noexcept {
     std::free(block);
 }
 
-// malloc keeps the memory of blocks below its threshold, and raises that as it goes: fixed, so that what is given back
-// is gone and what is counted is what is resident.
-[[maybe_unused]] const int fixed_threshold = mallopt(M_MMAP_THRESHOLD, 1 << 20);
+// malloc keeps the memory of blocks below its threshold, and raises that as it goes. Fixed at the least counted block:
+// what is counted is gone once it is given back, and only small blocks stay. The system grants a process some 65
+// thousand mappings, of which the rest of it needs a few.
+[[maybe_unused]] const int fixed_threshold = mallopt(M_MMAP_THRESHOLD, voxelize::memory::counted_block);
+[[maybe_unused]] const int most_mappings = mallopt(M_MMAP_MAX, 1 << 15);
 
 } // namespace
 

@@ -29,6 +29,7 @@ std::unique_ptr<stl_file> stl_file::open(const std::filesystem::path& path, bool
     if (!result->file_.read(reinterpret_cast<char*>(&count), sizeof(count))) return nullptr;
     if (bytes != stl_head + stl_triangle * count) return nullptr;
     result->add_only_part(path, count);
+    result->materials_[0].name = "DefaultMaterial"; // as its loader has it
     if (colors && result->is_colored()) return nullptr;
     return result;
 }

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // --max-memory and the two kinds of files that do not fit: honest ones end with 3 and the figures, and as much as was
 // named suffices; those that claim what they do not hold end with 2, soon and in little address space.
-#include "tool_test.hpp"
+#include "two_ways.hpp"
 
 #include <memory.hpp>
 
@@ -68,31 +68,16 @@ TEST(Memory, TheNeedThatIsNamedSuffices) {
     add_sheet(file, 60);
     for (int i = 0; i < 150; ++i) file.append("nodes", {{"mesh", 0}, {"translation", {i % 12, i / 12, 0}}});
     file.write_glb(folder / "m.glb");
-    const auto voxelize = [&](const std::string& out, const std::vector<std::string>& how) {
-        std::vector<std::string> arguments{folder / "m.glb",
-                                           "-o",
-                                           folder / out,
-                                           "-r",
-                                           sanitized ? "40" : "300",
-                                           "-t",
-                                           "occupancy,normal,color,triangle",
-                                           "--stats=json",
-                                           "--backend",
-                                           "cpu",
-                                           "-j",
-                                           "2",
-                                           "-q"};
-        arguments.insert(arguments.end(), how.begin(), how.end());
-        return run(folder, arguments);
-    };
-    const outcome free = voxelize("free.npz", {});
+    const two_ways runs{
+        folder, folder / "m.glb", {"-r", sanitized ? "40" : "300", "-t", "occupancy,normal,color,triangle", "-q"}};
+    const outcome free = runs.draw("free.npz");
     ASSERT_EQ(0, free.code) << free.err;
     if (sanitized) return;
     int limit = 1;
     int tries = 0;
     for (outcome tight; tight.code != 0; ++tries) {
         ASSERT_GT(8, tries) << limit;
-        tight = voxelize("tight.npz", {"--max-memory", std::to_string(limit), "--dense"});
+        tight = runs.draw("tight.npz", {"--max-memory", std::to_string(limit), "--dense"});
         if (tight.code == 0) {
             const std::uint64_t peak = json::parse(tight.out)["peak_memory_bytes"];
             EXPECT_GE(static_cast<double>(limit), static_cast<double>(peak) / (1 << 20));
@@ -237,6 +222,18 @@ TEST(Memory, InstancesWithoutEndEndWithThree) {
     add_sheet(file, 140);
     for (int i = 0; i < 20000; ++i) file.append("nodes", {{"mesh", 0}, {"translation", {i % 100, i / 100, 0}}});
     expect_refusal("instances", text_of(file), 3);
+}
+
+// A program that a large process has started is not larger for that.
+TEST(Memory, ThePeakIsTheProgramsOwn) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const std::vector<char> large(std::size_t{300} << 20, '\1');
+    const outcome result =
+        run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-r", "16", "--stats=json", "--backend", "cpu"});
+    ASSERT_EQ(0, result.code) << result.err;
+    EXPECT_GT(100.0, static_cast<double>(json::parse(result.out)["peak_memory_bytes"]) / (1 << 20)) << large.back();
 }
 
 TEST(Memory, TheMachinesLimitIsPartOfWhatItHas) {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models that do not fit --max-memory go through temporary files, and give the same voxels, values and counts as a run
 // that holds them.
-#include "tool_test.hpp"
+#include "two_ways.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
@@ -53,63 +54,24 @@ void write_stl(const fs::path& file, int side, bool colored = false) {
 TEST(Streamed, MeshesThatDoNotFit) {
     if (sanitized) return;
     const scratch_folder folder;
-    write_stl(folder / "m.stl", 480);
-    const auto voxelize = [&](const std::string& out, const std::vector<std::string>& how,
-                              std::uint64_t address_space = 0) {
-        std::vector<std::string> arguments{folder / "m.stl",
-                                           "-o",
-                                           folder / out,
-                                           "-r",
-                                           "150",
-                                           "-t",
-                                           "occupancy,count,normal,triangle,depth",
-                                           "--scale",
-                                           "3",
-                                           "--padding",
-                                           "3",
-                                           "-j",
-                                           "2",
-                                           "--backend",
-                                           "cpu",
-                                           "--stats=json"};
-        arguments.insert(arguments.end(), how.begin(), how.end());
-        return run(folder, arguments, address_space);
-    };
-    const auto expect_streamed = [&](const outcome& streamed, const std::string& out, int most) {
-        ASSERT_EQ(0, streamed.code) << streamed.err;
-        EXPECT_NE(std::string::npos, streamed.err.find("460800 triangles do not fit")) << streamed.err;
-        const json stats = json::parse(streamed.out);
-        EXPECT_GE(most, static_cast<double>(stats["peak_memory_bytes"].get<std::uint64_t>()) / (1 << 20));
-        EXPECT_LT(1, stats["slabs"].get<int>());
-        EXPECT_GT(fs::file_size(folder / out), 1000u);
-    };
-    const outcome tight = voxelize("tight.npz", {"--max-memory", "90"});
-    expect_streamed(tight, "tight.npz", 90);
+    write_stl(folder / "m.stl", 320);
+    const two_ways values{
+        folder,
+        folder / "m.stl",
+        {"-r", "100", "-t", "occupancy,count,normal,triangle,depth", "--scale", "3", "--padding", "3"}};
+    values.expect_equal(56);
     // Nothing is left of the temporary files.
-    EXPECT_EQ(4, std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()))
-        << "m.stl, tight.npz, streams";
-#if VOXELPIPE_TOOL_HAS_ASSIMP
-    const outcome free = voxelize("free.npz", {"--sparse"});
-    ASSERT_EQ(0, free.code) << free.err;
-    EXPECT_EQ(std::string::npos, free.err.find("do not fit")) << free.err;
-    EXPECT_TRUE(read_file(folder / "free.npz") == read_file(folder / "tight.npz"));
-    const json a = json::parse(free.out), b = json::parse(tight.out);
-    for (const char* const name : {"triangles", "triangles_dropped", "fragments", "voxels"})
-        EXPECT_EQ(a.value(name, -1), b.value(name, -1)) << name;
-#endif
-    const outcome bounded = voxelize("bounded.npz", {"--max-memory", "60"}, std::uint64_t{400} << 20);
-    expect_streamed(bounded, "bounded.npz", 60);
-    EXPECT_TRUE(read_file(folder / "bounded.npz") == read_file(folder / "tight.npz"));
+    EXPECT_EQ(VOXELPIPE_TOOL_HAS_ASSIMP ? 5 : 4,
+              std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()))
+        << "m.stl, tight.npz, free.npz, streams";
+    fs::rename(folder / "tight.npz", folder / "first.npz");
+    EXPECT_EQ(0, values.draw_streamed(52, std::uint64_t{400} << 20).code);
+    EXPECT_TRUE(read_file(folder / "first.npz") == read_file(folder / "tight.npz"));
     // White, without a colour in the file; one that has colours is not streamed, and its need is named.
-    const std::vector<std::string> in_color{"--max-memory", "90", "-t", "color,material"};
-    const outcome white = voxelize("white.npz", in_color);
-    expect_streamed(white, "white.npz", 90);
-#if VOXELPIPE_TOOL_HAS_ASSIMP
-    ASSERT_EQ(0, voxelize("white_free.npz", {"--sparse", "-t", "color,material"}).code);
-    EXPECT_TRUE(read_file(folder / "white_free.npz") == read_file(folder / "white.npz"));
-#endif
-    write_stl(folder / "m.stl", 480, true);
-    EXPECT_EQ(3, voxelize("colors.npz", in_color).code);
+    const two_ways colors{folder, folder / "m.stl", {"-r", "100", "-t", "color,material"}};
+    colors.expect_equal(56);
+    write_stl(folder / "m.stl", 320, true);
+    EXPECT_EQ(3, colors.draw("colors.npz", {"--max-memory", "56"}).code);
 }
 
 // The same relief with shared vertices, whose colours and whose faces' flags are passed over. corners(n): what
@@ -140,51 +102,26 @@ void write_ply(
 TEST(Streamed, BinaryPly) {
     if (sanitized) return;
     const scratch_folder folder;
-    write_ply(folder / "m.ply", 480);
-    const auto voxelize = [&](const std::string& out, const std::vector<std::string>& how) {
-        std::vector<std::string> arguments{
-            folder / "m.ply", "-o", folder / out, "-r", "80", "-j", "2", "-t", "occupancy,count,normal,triangle,depth",
-            "--stats=json"};
-        arguments.insert(arguments.end(), how.begin(), how.end());
-        return run(folder, arguments);
-    };
-    const outcome tight = voxelize("tight.npz", {"--max-memory", "90"});
-    ASSERT_EQ(0, tight.code) << tight.err;
-    EXPECT_NE(std::string::npos, tight.err.find("460800 triangles do not fit")) << tight.err;
-    const json b = json::parse(tight.out);
-    EXPECT_GE(90, static_cast<double>(b["peak_memory_bytes"].get<std::uint64_t>()) / (1 << 20));
-#if VOXELPIPE_TOOL_HAS_ASSIMP
-    const outcome free = voxelize("free.npz", {"--sparse"});
-    ASSERT_EQ(0, free.code) << free.err;
-    EXPECT_TRUE(read_file(folder / "free.npz") == read_file(folder / "tight.npz"));
-    const json a = json::parse(free.out);
-    for (const char* const name : {"triangles", "triangles_dropped", "fragments", "voxels"})
-        EXPECT_EQ(a.value(name, -1), b.value(name, -1)) << name;
-#endif
+    constexpr int side = 320, memory = 60;
+    write_ply(folder / "m.ply", side);
+    const two_ways values{folder, folder / "m.ply", {"-r", "60", "-t", "occupancy,count,normal,triangle,depth"}};
+    values.expect_equal(memory);
     // Solids by a rule, too; an open one is warned of as a whole.
-    const std::vector<std::string> solid{"--solid", "nonzero", "--solid-extent", "centre"};
-    std::vector<std::string> in_little = solid;
-    in_little.insert(in_little.end(), {"--max-memory", "90"});
-    const outcome filled = voxelize("filled.npz", in_little);
-    ASSERT_EQ(0, filled.code) << filled.err;
-    EXPECT_NE(std::string::npos, filled.err.find("460800 triangles do not fit")) << filled.err;
-#if VOXELPIPE_TOOL_HAS_ASSIMP
-    std::vector<std::string> in_much = solid;
-    in_much.emplace_back("--sparse");
-    const outcome whole = voxelize("whole.npz", in_much);
-    ASSERT_EQ(0, whole.code) << whole.err;
-    EXPECT_TRUE(read_file(folder / "filled.npz") == read_file(folder / "whole.npz"));
-    EXPECT_EQ(json::parse(filled.out)["solid"], json::parse(whole.out)["solid"]);
-#endif
+    two_ways{folder, folder / "m.ply", {"-r", "60", "--solid", "nonzero", "--solid-extent", "centre"}}.expect_equal(
+        memory);
     // Slab by slab, without holding the bricks of all.
-    const outcome slabs = voxelize("slabs.zarr", {"--max-memory", "90", "--resume"});
-    EXPECT_EQ(0, slabs.code) << slabs.err;
-    EXPECT_EQ(json::parse(slabs.out).value("voxels", -1), b.value("voxels", -2));
+    const std::vector<std::string> little{"--max-memory", std::to_string(memory)};
+    const two_ways counts{folder, folder / "m.ply", {"-r", "60"}};
+    const outcome slabs = counts.draw("slabs.zarr", {little[0], little[1], "--resume"}),
+                  whole = counts.draw("whole.npz", little);
+    ASSERT_EQ(0, slabs.code) << slabs.err;
+    ASSERT_EQ(0, whole.code) << whole.err;
+    EXPECT_EQ(json::parse(slabs.out).value("voxels", -1), json::parse(whole.out).value("voxels", -2));
     // A face that lies about its corners is found while it is read.
-    write_ply(folder / "m.ply", 480, [](int n) { return n == 300'000 ? 4 : 3; });
-    const outcome bad = voxelize("bad.npz", {"--max-memory", "90"});
+    write_ply(folder / "m.ply", side, [](int n) { return n == 100'000 ? 4 : 3; });
+    const outcome bad = counts.draw("bad.npz", little);
     EXPECT_EQ(2, bad.code);
-    EXPECT_NE(std::string::npos, bad.err.find("face 300000 is no triangle")) << bad.err;
+    EXPECT_NE(std::string::npos, bad.err.find("face 100000 is no triangle")) << bad.err;
 }
 
 // Two primitives, one of them without indices, under a node that turns, mirrors and stretches them.
@@ -192,75 +129,14 @@ TEST(Streamed, PlainGlb) {
     if (sanitized) return;
     const scratch_folder folder;
     builder file;
-    gltf_test::add_sheet(file, 700);
+    gltf_test::add_sheet(file, 580);
     const int alone = file.accessor(std::vector<float>{0, 0, 0.1f, 1, 0, 0.2f, 0, 1, 0.3f}, "VEC3");
     file.root["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", alone}}}});
     file.append("nodes", {{"mesh", 0}, {"matrix", {0, 0, 2, 0, 1, 0, 0, 0, 0, -1.5, 0, 0, 7, 8, 9, 1}}});
     file.write_glb(folder / "m.glb");
-    const auto voxelize = [&](const std::string& out, const std::vector<std::string>& how) {
-        std::vector<std::string> arguments{folder / "m.glb",
-                                           "-o",
-                                           folder / out,
-                                           "-r",
-                                           "80",
-                                           "-j",
-                                           "2",
-                                           "--scale",
-                                           "0.5",
-                                           "-t",
-                                           "occupancy,count,normal,triangle,depth",
-                                           "--stats=json"};
-        arguments.insert(arguments.end(), how.begin(), how.end());
-        return run(folder, arguments);
-    };
-    const outcome tight = voxelize("tight.npz", {"--max-memory", "60"});
-    ASSERT_EQ(0, tight.code) << tight.err;
-    EXPECT_NE(std::string::npos, tight.err.find("980001 triangles do not fit")) << tight.err;
-    const json b = json::parse(tight.out);
-    EXPECT_GE(60, static_cast<double>(b["peak_memory_bytes"].get<std::uint64_t>()) / (1 << 20));
-    const outcome free = voxelize("free.npz", {"--sparse", "--backend", "cpu"});
-    ASSERT_EQ(0, free.code) << free.err;
-    EXPECT_TRUE(read_file(folder / "free.npz") == read_file(folder / "tight.npz"));
-    const json a = json::parse(free.out);
-    for (const char* const name : {"triangles", "triangles_dropped", "fragments", "voxels"})
-        EXPECT_EQ(a.value(name, -1), b.value(name, -1)) << name;
+    two_ways{folder, folder / "m.glb", {"-r", "80", "--scale", "0.5", "-t", "occupancy,count,normal,triangle,depth"}}
+        .expect_equal(42);
 }
-
-// Runs of one model with and without room for it.
-struct two_ways {
-    const scratch_folder& folder;
-    std::string model;
-    std::vector<std::string> how;
-
-    [[nodiscard]] outcome draw(const std::string& out, const std::vector<std::string>& more) const {
-        std::vector<std::string> arguments{model, "-o", folder / out,   "-r",        "140",
-                                           "-j",  "2",  "--stats=json", "--backend", "cpu"};
-        arguments.insert(arguments.end(), how.begin(), how.end());
-        arguments.insert(arguments.end(), more.begin(), more.end());
-        return run(folder, arguments);
-    }
-    void expect_equal(int mebibytes) const {
-        std::string text;
-        for (const std::string& word : how) text += word + ' ';
-        SCOPED_TRACE(text);
-        const outcome tight = draw("tight.npz", {"--max-memory", std::to_string(mebibytes)});
-        ASSERT_EQ(0, tight.code) << tight.err;
-        EXPECT_NE(std::string::npos, tight.err.find(" triangles do not fit")) << tight.err;
-        const outcome free = draw("free.npz", {"--sparse"});
-        ASSERT_EQ(0, free.code) << free.err;
-        EXPECT_EQ(std::string::npos, free.err.find(" triangles do not fit")) << free.err;
-        EXPECT_TRUE(read_file(folder / "free.npz") == read_file(folder / "tight.npz"));
-        const json a = json::parse(free.out), b = json::parse(tight.out);
-        if (!b.contains("solid")) { // whose lists are small blocks, which the budget counts late
-            EXPECT_GE(1.02 * mebibytes, static_cast<double>(b["peak_memory_bytes"].get<std::uint64_t>()) / (1 << 20));
-        }
-        EXPECT_LT(1, b["slabs"].get<int>());
-        for (const char* const name : {"triangles", "triangles_dropped", "fragments", "fragments_discarded", "voxels"})
-            EXPECT_EQ(a.value(name, -1), b.value(name, -1)) << name;
-        for (const char* const name : {"solid", "materials"})
-            EXPECT_EQ(a.value(name, json()), b.value(name, json())) << name;
-    }
-};
 
 // A file of several meshes, materials and colours, and nodes that move, turn, mirror and stretch them; one mesh is
 // shown by three of them. SIDE: quads along a side of each sheet.
@@ -295,62 +171,65 @@ builder world_of_parts(int side) {
     file.append("nodes", {{"mesh", 1}, {"scale", {1, -0.5, 1}}, {"rotation", {0.3, 0, 0, 0.9}}});
     file.append("nodes", {{"mesh", 0}, {"scale", {1, 0.6, 1}}, {"translation", {0, 0.4, 0.3}}});
     file.append("nodes", {{"mesh", 0}, {"matrix", {0, 0, 1, 0, 0.5, 0, 0, 0, 0, 1.5, 0, 0, 0.5, 0.3, -1, 1}}});
-    file.root["scenes"] = {{{"nodes", {0, 3}}}};
+    // High, so that slabs are thin: one has eight layers at least, whose triangles have to fit.
+    file.append("nodes", {{"scale", {0.25, 0.25, 1}}, {"children", {0, 3}}});
+    file.root["scenes"] = {{{"nodes", {4}}}};
     return file;
 }
 
-// In two runs, since a slab's values have to fit.
-const std::vector<std::string> colors{"-t", "occupancy,color,color-max,material"};
-const std::vector<std::string> last_and_sums{"-t", "count,color-replace,triangle,depth"};
+constexpr int world_side = 180, world_memory = 52;
+const std::vector<std::string> colors{"-r", "240", "-t", "occupancy,color,material"};
 
 TEST(Streamed, GltfOfManyParts) {
     if (sanitized) return;
     const scratch_folder folder;
-    const builder file = world_of_parts(180);
-    file.write_glb(folder / "m.glb");
-    for (const std::vector<std::string>& how :
-         {colors,
-          last_and_sums,
-          {"-t", "occupancy,count,triangle", "--scale", "0.25", "--padding", "3", "--coverage", "thin"}})
-        two_ways{folder, folder / "m.glb", how}.expect_equal(52);
-    // A body is a part.
+    world_of_parts(world_side).write_glb(folder / "m.glb");
+    two_ways{folder, folder / "m.glb", colors}.expect_equal(world_memory);
     two_ways{
-        folder, folder / "m.glb", {"--solid", "each_draw", "-t", "occupancy,count,color", "--fill-color", "#102030"}}
-        .expect_equal(52);
+        folder,
+        folder / "m.glb",
+        {"-r", "240", "-t", "count,color-replace,triangle", "--scale", "0.25", "--padding", "3", "--coverage", "thin"}}
+        .expect_equal(world_memory);
+    // A body is a part.
+    two_ways{folder, folder / "m.glb", {"-r", "240", "--solid", "each_draw", "-t", "occupancy,count"}}.expect_equal(
+        world_memory);
     // The mean of the whole surface is not known slab by slab.
-    EXPECT_EQ(3, (two_ways{folder, folder / "m.glb", {"--solid", "nonzero", "-t", "color", "--max-memory", "52"}})
-                     .draw("mean.npz", {})
+    EXPECT_EQ(3, (two_ways{folder, folder / "m.glb", {"-r", "240", "--solid", "nonzero", "-t", "color"}})
+                     .draw("mean.npz", {"--max-memory", std::to_string(world_memory)})
                      .code);
 }
 
 TEST(Streamed, GltfWithItsBuffersInFiles) {
     if (sanitized) return;
     const scratch_folder folder;
-    builder file = world_of_parts(180);
+    builder file = world_of_parts(world_side);
     fs::create_directories(folder.path() / "parts");
     std::ofstream(folder / "parts/a b.bin", std::ios::binary)
         .write(reinterpret_cast<const char*>(file.binary.data()), static_cast<std::streamsize>(file.binary.size()));
     file.root["buffers"] = {{{"byteLength", file.binary.size()}, {"uri", "parts/a%20b.bin"}}};
     std::ofstream(folder / "m.gltf") << file.root.dump();
-    two_ways{folder, folder / "m.gltf", colors}.expect_equal(52);
+    const two_ways values{folder, folder / "m.gltf", {"-r", "240", "-t", "occupancy,count,color"}};
+    values.expect_equal(world_memory);
     // A buffer outside of the folder is refused, as it is by the loader.
     file.root["buffers"][0]["uri"] = "../m.bin";
     std::ofstream(folder / "m.gltf") << file.root.dump();
-    EXPECT_EQ(2, (two_ways{folder, folder / "m.gltf", colors}).draw("no.npz", {"--max-memory", "52"}).code);
+    EXPECT_EQ(2, values.draw("no.npz", {"--max-memory", std::to_string(world_memory)}).code);
 }
 
 // Textures are not streamed, but a model whose textures nobody asks for is.
 TEST(Streamed, TexturesOnlyWhereNobodyAsks) {
     if (sanitized) return;
     const scratch_folder folder;
-    builder file = world_of_parts(180);
+    builder file = world_of_parts(world_side);
     const int material = gltf_test::add_textured_material(file, 1, 1, {10, 200, 30, 255});
     file.root["meshes"][1]["primitives"][0]["material"] = material;
     file.root["meshes"][1]["primitives"][0]["attributes"]["TEXCOORD_0"] =
-        file.accessor(std::vector<float>(2 * 181 * 181), "VEC2");
+        file.accessor(std::vector<float>(2 * (world_side + 1) * (world_side + 1)), "VEC2");
     file.write_glb(folder / "m.glb");
-    two_ways{folder, folder / "m.glb", {"-t", "occupancy,count,normal,material"}}.expect_equal(52);
-    EXPECT_EQ(3, (two_ways{folder, folder / "m.glb", colors}).draw("no.npz", {"--max-memory", "52"}).code);
+    two_ways{folder, folder / "m.glb", {"-r", "240", "-t", "occupancy,material"}}.expect_equal(world_memory);
+    EXPECT_EQ(3, (two_ways{folder, folder / "m.glb", colors})
+                     .draw("no.npz", {"--max-memory", std::to_string(world_memory)})
+                     .code);
 }
 
 #if VOXELPIPE_TOOL_HAS_ASSIMP
@@ -358,7 +237,7 @@ TEST(Streamed, ColorsOfPlyVertices) {
     if (sanitized) return;
     const scratch_folder folder;
     for (const bool has_bytes : {true, false}) {
-        constexpr int side = 480;
+        constexpr int side = 320;
         std::ofstream out(folder / "m.ply", std::ios::binary);
         const std::string type = has_bytes ? "uchar" : "float";
         out << "ply\nformat binary_little_endian 1.0\nelement vertex " << (side + 1) * (side + 1)
@@ -385,7 +264,8 @@ TEST(Streamed, ColorsOfPlyVertices) {
             for (const int v : {n % 2 == 0 ? a : a + 1, n % 2 == 0 ? a + 1 : b + 1, b}) put(std::uint32_t(v));
         }
         out.close();
-        two_ways{folder, folder / "m.ply", {"-t", "occupancy,color,color-max,color-replace,material"}}.expect_equal(90);
+        two_ways{folder, folder / "m.ply", {"-r", "60", "-t", "occupancy,color,color-max,color-replace,material"}}
+            .expect_equal(60);
     }
 }
 #endif

@@ -3,6 +3,7 @@
 #pragma once
 // Common to all tests of the voxelize program: the program, models for it, readers of its files.
 
+#include "sanitized.hpp"
 #include "tool_runner.hpp"
 #include "tool_scenes.hpp"
 
@@ -12,17 +13,5 @@ namespace tool_test {
 
 using gltf_test::builder;
 using gltf_test::json;
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-inline constexpr bool sanitized = true; // shadow memory is no part of the figures, and needs all address space
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-inline constexpr bool sanitized = true;
-#else
-inline constexpr bool sanitized = false;
-#endif
-#else
-inline constexpr bool sanitized = false;
-#endif
 
 } // namespace tool_test

@@ -1,0 +1,62 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Runs of one model with and without room for it, which give the same files and counts.
+
+#include "tool_test.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace tool_test {
+
+struct two_ways {
+    const scratch_folder& folder;
+    std::string model;
+    std::vector<std::string> how; // options of all runs
+
+    [[nodiscard]] outcome draw(const std::string& out, const std::vector<std::string>& more = {},
+                               std::uint64_t address_space = 0) const {
+        std::vector<std::string> arguments{model, "-o", folder / out, "-j", "2", "--stats=json", "--backend", "cpu"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run(folder, arguments, address_space);
+    }
+
+    // Into tight.npz in so much memory, which is less than the model takes.
+    [[nodiscard]] outcome draw_streamed(int mebibytes, std::uint64_t address_space = 0) const {
+        const outcome tight = draw("tight.npz", {"--max-memory", std::to_string(mebibytes)}, address_space);
+        EXPECT_EQ(0, tight.code) << tight.err;
+        if (tight.code != 0) return tight;
+        EXPECT_NE(std::string::npos, tight.err.find(" triangles do not fit")) << tight.err;
+        const json stats = json::parse(tight.out);
+        EXPECT_GE(mebibytes, static_cast<double>(stats["peak_memory_bytes"].get<std::uint64_t>()) / (1 << 20));
+        EXPECT_LT(1, stats["slabs"].get<int>());
+        return tight;
+    }
+
+    // The same, and into free.npz with the model in memory, where the build can load it: the files and counts are
+    // equal.
+    void expect_equal(int mebibytes) const {
+        std::string text;
+        for (const std::string& word : how) text += word + ' ';
+        SCOPED_TRACE(text);
+        const outcome tight = draw_streamed(mebibytes);
+        const bool is_gltf = model.ends_with(".glb") || model.ends_with(".gltf");
+        if (tight.code != 0 || (!is_gltf && !VOXELPIPE_TOOL_HAS_ASSIMP)) return;
+        const outcome free = draw("free.npz", {"--sparse"});
+        ASSERT_EQ(0, free.code) << free.err;
+        EXPECT_EQ(std::string::npos, free.err.find(" triangles do not fit")) << free.err;
+        EXPECT_TRUE(read_file(folder / "free.npz") == read_file(folder / "tight.npz"));
+        const json a = json::parse(free.out), b = json::parse(tight.out);
+        for (const char* const name : {"triangles", "triangles_dropped", "fragments", "fragments_discarded", "voxels"})
+            EXPECT_EQ(a.value(name, -1), b.value(name, -1)) << name;
+        for (const char* const name : {"solid", "materials"})
+            EXPECT_EQ(a.value(name, json()), b.value(name, json())) << name;
+    }
+};
+
+} // namespace tool_test
