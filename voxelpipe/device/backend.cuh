@@ -15,7 +15,8 @@
 #include <voxelpipe/device/call/kernels.cuh>
 #include <voxelpipe/device/call/list_arrays.cuh>
 #include <voxelpipe/device/scene/check_indices.cuh>
-#include <voxelpipe/device/scene/cub_sort.cuh>
+#include <voxelpipe/device/scene/key_sort.cuh>
+#include <voxelpipe/device/scene/prefix_sum.cuh>
 #include <voxelpipe/device/scene/subset.cuh>
 #include <voxelpipe/program.hpp>
 #include <voxelpipe/solid.hpp>

@@ -13,7 +13,8 @@
 #include <voxelpipe/device/fragments/order_voxels_kernels.cuh>
 #include <voxelpipe/device/fragments/radix_sort_kernels.cuh>
 #include <voxelpipe/device/scene/check_indices_kernels.cuh>
-#include <voxelpipe/device/scene/cub_sort_kernels.cuh>
+#include <voxelpipe/device/scene/key_sort_kernels.cuh>
+#include <voxelpipe/device/scene/prefix_sum_kernels.cuh>
 #include <voxelpipe/device/scene/subset_kernels.cuh>
 #include <voxelpipe/device/tiles/tile_passes_kernels.cuh>
 #else

@@ -4,8 +4,9 @@
 
 // The kernels of the counting sort (fragments/counting_sort.cuh), and their launches.
 
+#include <voxelpipe/device/base/block_scan.cuh>
+#include <voxelpipe/device/base/lookback.cuh>
 #include <voxelpipe/device/fragments/counting_sort.cuh>
-#include <voxelpipe/device/fragments/lookback.cuh>
 
 #include <cstdint>
 
@@ -45,12 +46,7 @@ __global__ __launch_bounds__(threads_per_block) void number_fragments_kernel(
 // Prefix sum over the lanes before this one; `all`: the sum over all lanes.
 [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long sum_before(unsigned long long own,
                                                                         unsigned long long& all) {
-    unsigned long long up_to = own;
-#pragma unroll
-    for (unsigned apart = 1; apart < 32; apart *= 2) {
-        const unsigned long long other = __shfl_up_sync(0xffffffffu, up_to, apart);
-        up_to += threadIdx.x % 32 >= apart ? other : 0;
-    }
+    const unsigned long long up_to = warp_sum_up_to(own);
     all = __shfl_sync(0xffffffffu, up_to, 31);
     return up_to - own;
 }

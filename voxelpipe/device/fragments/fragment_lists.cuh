@@ -14,8 +14,9 @@
 #include <voxelpipe/device/fragments/order_voxels.cuh>
 #include <voxelpipe/device/fragments/radix_sort.cuh>
 #include <voxelpipe/device/scene/count_and_emit.cuh>
-#include <voxelpipe/device/scene/cub_sort.cuh>
 #include <voxelpipe/device/scene/fragment_shade.cuh>
+#include <voxelpipe/device/scene/key_sort.cuh>
+#include <voxelpipe/device/scene/prefix_sum.cuh>
 #include <voxelpipe/tuning/tuning_raster.hpp>
 
 #include <algorithm>
@@ -111,7 +112,7 @@ struct list_buffers {
     std::size_t storage_bytes;
 };
 
-// True if up to `capacity` keys of this type are sorted by fragments/radix_sort.cuh; otherwise cub sorts them.
+// True if up to `capacity` keys of this type are sorted by fragments/radix_sort.cuh; otherwise by scene/key_sort.cuh.
 template <class Key>
 [[nodiscard]] VOXELPIPE_HD constexpr bool are_sorted_here(std::uint64_t capacity) {
     return sizeof(Key) == sizeof(std::uint32_t) && capacity < max_sorted;
@@ -167,7 +168,7 @@ struct fragment_lists {
     }
 };
 
-// Runs the preparation. If cub sorts, fills the capacity beyond the fragments.
+// Runs the preparation. If scene/key_sort.cuh sorts, fills the capacity beyond the fragments.
 template <class Key>
 void prepare_sort(Key* keys, std::uint32_t* values, std::uint64_t capacity, const sort_preparation& preparation,
                   const pipeline_state* state, const capacities& limits, cudaStream_t stream);

@@ -5,10 +5,9 @@
 // Long voxels: those with more fragments than a window holds (fragments/order_voxels.cuh). A warp or a block sorts such
 // a voxel; a longer one is divided into runs, which are sorted and merged.
 
+#include <voxelpipe/device/base/block_scan.cuh>
 #include <voxelpipe/device/fragments/order_memory.cuh>
 #include <voxelpipe/device/fragments/warp_sort.cuh>
-
-#include <cub/block/block_scan.cuh>
 
 #include <cstdint>
 
@@ -139,12 +138,11 @@ __global__ __launch_bounds__(tuning::block_sort_threads, 4) void order_long_kern
 // primitives of earlier parts.
 template <class Buffers>
 __global__ __launch_bounds__(tuning::dense_threads) void order_dense_kernel(const __grid_constant__ Buffers b) {
-    using scan = cub::BlockScan<std::uint32_t, tuning::dense_threads, cub::BLOCK_SCAN_WARP_SCANS>;
     constexpr std::uint32_t num_words = tuning::dense_part / 32;
     constexpr unsigned at_once = 4; // loads in flight
     static_assert(num_words == tuning::dense_threads);
     __shared__ std::uint32_t words[num_words], offsets[num_words], all_before;
-    __shared__ typename scan::TempStorage storage;
+    __shared__ block_scan<std::uint32_t, tuning::dense_threads> scan;
     await_stream();
     std::uint32_t* const primitives = b.pointers().primitives;
     const std::uint32_t parts = b.lists.dense_parts(), lane = threadIdx.x % 32,
@@ -184,9 +182,7 @@ __global__ __launch_bounds__(tuning::dense_threads) void order_dense_kernel(cons
         before = __reduce_add_sync(0xffffffffu, before);
         if (lane == 0 && before != 0) atomicAdd(&all_before, before);
         __syncthreads();
-        std::uint32_t offset = static_cast<std::uint32_t>(__popc(words[threadIdx.x]));
-        scan(storage).ExclusiveSum(offset, offset);
-        offsets[threadIdx.x] = offset;
+        offsets[threadIdx.x] = scan.sum_before(static_cast<std::uint32_t>(__popc(words[threadIdx.x])));
         __syncthreads();
         // One word per warp, so that neighbouring lanes write neighbouring elements.
         std::uint32_t* const to = primitives + run.begin + all_before;

@@ -4,7 +4,7 @@
 
 // Kernels and launches of the fragment order (fragments/order_voxels.cuh).
 
-#include <voxelpipe/device/fragments/lookback.cuh>
+#include <voxelpipe/device/base/lookback.cuh>
 #include <voxelpipe/device/fragments/order_long_voxels.cuh>
 #include <voxelpipe/device/fragments/order_voxels.cuh>
 #include <voxelpipe/device/fragments/warp_sort.cuh>

@@ -4,10 +4,11 @@
 
 // Fragment sort: a stable radix sort of (voxel, value) pairs whose number only the device knows. One kernel counts the
 // digits of all passes; then each pass reads and writes every pair once, and a tile learns from earlier tiles where its
-// digits go (decoupled look-back: Merrill and Garland 2016, Adinets and Merrill 2022). cub's sort needs the number on
-// the host, so it would sort the whole capacity, and it takes 8 bits a pass: the 30 bits of a voxel of 1024^3 are three
-// passes of ten here and four there. Between passes a key is stored next to its value: a pass writes short runs, and 16
-// consecutive pairs occupy fewer cache sectors than 16 keys and 16 values apart.
+// digits go (decoupled look-back: Merrill and Garland 2016, Adinets and Merrill 2022). The sort of
+// scene/key_sort.cuh needs the number on the host, so it would sort the whole capacity, and it takes 9 bits a pass: the
+// 30 bits of a voxel of 1024^3 are three passes of ten here and four there. Between passes a key is stored next to its
+// value: a pass writes short runs, and 16 consecutive pairs occupy fewer cache sectors than 16 keys and 16 values
+// apart.
 
 #include <voxelpipe/device/base/kernel_library.cuh>
 #include <voxelpipe/device/scene/scene.cuh>

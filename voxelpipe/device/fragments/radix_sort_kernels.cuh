@@ -4,10 +4,9 @@
 
 // Kernels and launches of the fragment sort (fragments/radix_sort.cuh).
 
+#include <voxelpipe/device/base/block_scan.cuh>
+#include <voxelpipe/device/base/lookback.cuh>
 #include <voxelpipe/device/fragments/radix_sort.cuh>
-
-#include <cub/block/block_scan.cuh>
-#include <cuda/atomic>
 
 #include <algorithm>
 #include <cstdint>
@@ -30,11 +29,10 @@ struct digit_of {
 template <class Count>
 __global__ __launch_bounds__(tuning::digit_count_threads) void count_digits_kernel(
     const std::uint32_t* keys, const __grid_constant__ Count count, const __grid_constant__ sort_memory m) {
-    using scan = cub::BlockScan<std::uint32_t, tuning::digit_count_threads>;
     constexpr int at_once = 4; // loads in flight
     static_assert(tuning::digit_count_threads >= 1 << tuning::max_digit_bits);
     __shared__ std::uint32_t digits[max_digit_passes][1 << tuning::max_digit_bits];
-    __shared__ typename scan::TempStorage storage;
+    __shared__ block_scan<std::uint32_t, tuning::digit_count_threads> scan;
     __shared__ bool is_last;
     const std::uint32_t num_digits = m.plan.num_digits();
     for (int p = 0; p < m.plan.passes; ++p)
@@ -78,10 +76,9 @@ __global__ __launch_bounds__(tuning::digit_count_threads) void count_digits_kern
     if (threadIdx.x == 0) m.all_tiles->num = static_cast<std::uint32_t>(n);
     for (int p = 0; p < m.plan.passes; ++p) {
         std::uint32_t* const mine = &m.all_tiles->digits[p][threadIdx.x];
-        std::uint32_t sum = threadIdx.x < num_digits ? __ldcg(mine) : 0;
-        scan(storage).ExclusiveSum(sum, sum);
+        const std::uint32_t sum = scan.sum_before(threadIdx.x < num_digits ? __ldcg(mine) : 0);
         if (threadIdx.x < num_digits) *mine = sum;
-        __syncthreads(); // the storage may be used again
+        __syncthreads(); // the scan's memory may be used again
     }
 }
 
@@ -105,37 +102,6 @@ struct digit_group {
     }
 };
 
-// Number of pairs in earlier tiles with each of the thread's digits. mine: the thread's word of this tile; words of
-// consecutive tiles are `apart` words apart. Blocks start in the order of their numbers, which cub's scan relies on
-// too, so all earlier ones are running or done. (Taking the tile's number from a counter cost a tenth of the pass.)
-template <int DigitsEach>
-[[nodiscard]] __device__ VOXELPIPE_INLINE typename digit_group<DigitsEach>::word
-count_before(typename digit_group<DigitsEach>::word* mine, std::uint32_t tile, std::uint32_t apart) {
-    using group = digit_group<DigitsEach>;
-    using word = typename group::word;
-    using atomic_word = ::cuda::atomic_ref<word, ::cuda::thread_scope_device>;
-    constexpr int at_once = 4; // loads in flight
-    constexpr word all = group::each(sort_memory::all), value = group::each(sort_memory::value);
-    word sum = 0;
-    for (std::int64_t last = std::int64_t{tile} - 1;;) {
-        word w[at_once];
-#pragma unroll
-        for (int k = 0; k < at_once; ++k)
-            w[k] = last < k
-                       ? all // before the first tile
-                       : atomic_word(mine[(last - k - std::int64_t{tile}) * apart]).load(::cuda::memory_order_relaxed);
-        bool is_ready = true;
-#pragma unroll
-        for (int k = 0; k < at_once; ++k) {
-            is_ready = is_ready && (w[k] & ~value) != 0;
-            if (!is_ready) continue;
-            sum += w[k] & value;
-            --last;
-            if ((w[k] & all) != 0) return sum;
-        }
-    }
-}
-
 // Shared memory of a block: first the number of each digit's pairs in its warps, then the pairs of its tile.
 template <int DigitsEach, int Items>
 union sort_tile_memory {
@@ -150,10 +116,8 @@ __global__ __launch_bounds__(tuning::sort_threads,
                                                                                const __grid_constant__ pair_array to,
                                                                                const __grid_constant__ Memory m,
                                                                                int pass) {
-    using scan = cub::BlockScan<std::uint32_t, tuning::sort_threads, cub::BLOCK_SCAN_WARP_SCANS>; // needs few registers
     using group = digit_group<DigitsEach>;
     using word = typename group::word;
-    using atomic_word = ::cuda::atomic_ref<word, ::cuda::thread_scope_device>;
     using counts = typename group::counts;
     using tile_memory = sort_tile_memory<DigitsEach, Items>;
     constexpr unsigned warps = tuning::sort_threads / 32;
@@ -164,7 +128,7 @@ __global__ __launch_bounds__(tuning::sort_threads,
     auto& shared = *reinterpret_cast<tile_memory*>(dynamic_memory);
     // By digit: the offset within the tile, later the difference from it to the global offset.
     __shared__ std::uint32_t offsets[DigitsEach * tuning::sort_threads];
-    __shared__ typename scan::TempStorage storage;
+    __shared__ block_scan<std::uint32_t, tuning::sort_threads> scan;
     const digit_of digit(m.plan, pass);
     const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32, num_digits = m.plan.num_digits();
     for (unsigned i = threadIdx.x; i < sizeof(shared.counts) / sizeof(std::uint32_t); i += tuning::sort_threads)
@@ -222,11 +186,15 @@ __global__ __launch_bounds__(tuning::sort_threads,
 #pragma unroll
     for (int k = 0; k < DigitsEach; ++k) total[k] = group::get(own, k);
     if (has_digits) {
-        atomic_word(*mine).store(group::each(tile == 0 ? sort_memory::all : sort_memory::own) | own,
-                                 ::cuda::memory_order_relaxed);
+        store_relaxed(*mine, group::each(tile == 0 ? sort_memory::all : sort_memory::own) | own);
         if (pass + 1 < m.plan.passes) reinterpret_cast<word*>(m.words[1 - pass % 2])[my_word] = 0;
     }
-    scan(storage).ExclusiveSum(total, tile_offset);
+    if constexpr (DigitsEach == 1) {
+        tile_offset[0] = scan.sum_before(total[0]);
+    } else {
+        tile_offset[0] = scan.sum_before(total[0] + total[1]);
+        tile_offset[1] = tile_offset[0] + total[0];
+    }
 #pragma unroll
     for (std::uint32_t k = 0; k < DigitsEach; ++k) offsets[first_digit + k] = tile_offset[k];
     __syncthreads();
@@ -244,8 +212,9 @@ __global__ __launch_bounds__(tuning::sort_threads,
     if (has_digits) {
         word before = 0;
         if (tile != 0) {
-            before = count_before<DigitsEach>(mine, tile, apart);
-            atomic_word(*mine).store(group::each(sort_memory::all) | (before + own), ::cuda::memory_order_relaxed);
+            before = lookback::before_alone(mine, tile, apart, group::each(sort_memory::all),
+                                            group::each(sort_memory::value));
+            store_relaxed(*mine, group::each(sort_memory::all) | (before + own));
         }
 #pragma unroll
         for (int k = 0; k < DigitsEach; ++k)

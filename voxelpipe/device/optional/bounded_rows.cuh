@@ -7,7 +7,8 @@
 // no more rows, and no more bounds, than the one below, nor more than fit the grid.
 
 #include <voxelpipe/device/base/for_each.cuh>
-#include <voxelpipe/device/scene/cub_sort.cuh>
+#include <voxelpipe/device/scene/key_sort.cuh>
+#include <voxelpipe/device/scene/prefix_sum.cuh>
 #include <voxelpipe/row_runs.hpp>
 
 #include <glm/vec3.hpp>

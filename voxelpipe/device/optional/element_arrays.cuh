@@ -7,7 +7,8 @@
 
 #include <voxelpipe/device/abuffer_async.cuh>
 #include <voxelpipe/device/base/for_each.cuh>
-#include <voxelpipe/device/scene/cub_sort.cuh>
+#include <voxelpipe/device/scene/key_sort.cuh>
+#include <voxelpipe/device/scene/prefix_sum.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>
 #include <voxelpipe/element_call.hpp>
 

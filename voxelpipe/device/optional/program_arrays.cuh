@@ -7,7 +7,7 @@
 
 #include <voxelpipe/device/base/for_each.cuh>
 #include <voxelpipe/device/optional/async_output.cuh>
-#include <voxelpipe/device/scene/cub_sort.cuh>
+#include <voxelpipe/device/scene/prefix_sum.cuh>
 #include <voxelpipe/program_types.hpp>
 
 #include <cstddef>

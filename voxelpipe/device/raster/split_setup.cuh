@@ -5,11 +5,10 @@
 // Splits large triangles into work items, and sets them up: once each if they have many work items, otherwise for every
 // work item (raster/split_triangles.cuh draws them).
 
+#include <voxelpipe/device/base/relaxed_access.cuh>
 #include <voxelpipe/device/raster/deferred_triangles.cuh>
 #include <voxelpipe/device/raster/small_triangles.cuh>
 #include <voxelpipe/device/scene/count_and_emit.cuh>
-
-#include <cuda/atomic>
 
 #include <algorithm>
 #include <cstdint>
@@ -203,10 +202,9 @@ struct alignas(16) split_setup {
     // True if all `num` setups are ready. Polls for a short time only: there may be blocks that have not begun. All
     // lanes call it.
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool are_kept(const deferred_triangles& lists, std::uint32_t num) {
-        ::cuda::atomic_ref<unsigned long long, ::cuda::thread_scope_device> kept(*lists.setups_ready);
         bool all = false;
         for (int look = 0; look < tuning::setup_polls && !all; ++look) {
-            if (threadIdx.x % 32 == 0) all = kept.load(::cuda::memory_order_relaxed) == num;
+            if (threadIdx.x % 32 == 0) all = load_relaxed(*lists.setups_ready) == num;
             all = __shfl_sync(0xffffffffu, static_cast<int>(all), 0) != 0;
         }
         __syncwarp();

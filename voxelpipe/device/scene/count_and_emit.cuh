@@ -8,7 +8,7 @@
 // has two passes, count and emit, with a prefix sum between: cells come out by ascending primitive, whatever the launch
 // order.
 
-#include <voxelpipe/device/scene/cub_sort.cuh>
+#include <voxelpipe/device/scene/prefix_sum.cuh>
 #include <voxelpipe/device/scene/scene.cuh>
 #include <voxelpipe/tuning/tuning_raster.hpp>
 

@@ -9,7 +9,7 @@
 
 #include <voxelpipe/device/fragments/fragment_lists.cuh>
 #include <voxelpipe/device/fragments/radix_sort.cuh>
-#include <voxelpipe/device/scene/cub_sort.cuh>
+#include <voxelpipe/device/scene/key_sort.cuh>
 #include <voxelpipe/tuning/tuning_solid.hpp>
 
 #include <algorithm>

@@ -9,7 +9,6 @@
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/device/base/device_buffer.cuh>
 #include <voxelpipe/device/base/launch.cuh>
-#include <voxelpipe/device/scene/cub_sort.cuh>
 #include <voxelpipe/device/sparse/brick_index.cuh>
 #include <voxelpipe/device/sparse/mask_counts.cuh>
 

@@ -7,7 +7,7 @@
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/device/base/device_buffer.cuh>
 #include <voxelpipe/device/base/launch.cuh>
-#include <voxelpipe/device/scene/cub_sort.cuh>
+#include <voxelpipe/device/scene/prefix_sum.cuh>
 
 #include <cstddef>
 #include <cstdint>

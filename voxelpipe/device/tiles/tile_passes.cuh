@@ -9,7 +9,7 @@
 
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/scene/count_and_emit.cuh>
-#include <voxelpipe/device/scene/cub_sort.cuh>
+#include <voxelpipe/device/scene/key_sort.cuh>
 #include <voxelpipe/device/tiles/tile_resolve.cuh>
 #include <voxelpipe/device/tiles/tile_split.cuh>
 

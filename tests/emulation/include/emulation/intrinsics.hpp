@@ -253,6 +253,10 @@ template <class T>
 void atom_increment_u64(T& old, std::uint64_t p) {
     old = static_cast<T>((*global<std::uint64_t>(p))++);
 }
+inline void ld_u32(std::uint32_t& v, std::uint64_t p) { v = *global<std::uint32_t>(p); }
+inline void ld_u64(unsigned long long& v, std::uint64_t p) { v = *global<std::uint64_t>(p); }
+inline void st_u32(std::uint64_t p, std::uint32_t v) { *global<std::uint32_t>(p) = v; }
+inline void st_u64(std::uint64_t p, std::uint64_t v) { *global<std::uint64_t>(p) = v; }
 inline void atom_shared_cas_b32(std::uint32_t& old, std::uint32_t p, std::uint32_t expected, std::uint32_t v) {
     old = atomicCAS(shared<std::uint32_t>(p), expected, v);
 }

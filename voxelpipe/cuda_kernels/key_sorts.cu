@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 //
-// Sorts, sums and selections by cub, and what goes before them.
+// Sorts of keys, prefix sums and selections, and the preparation of a sort.
 #include <voxelpipe/device/fragments/fragment_lists_kernels.cuh>
-#include <voxelpipe/device/scene/cub_sort_kernels.cuh>
+#include <voxelpipe/device/scene/key_sort_kernels.cuh>
+#include <voxelpipe/device/scene/prefix_sum_kernels.cuh>
 #include <voxelpipe/voxelpipe.hpp>
 
 namespace voxelpipe::device {
