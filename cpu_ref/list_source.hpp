@@ -52,7 +52,7 @@ public:
     }
 
 private:
-    // Of a listed voxel, in the grid from the corner of its first tile.
+    // The position of a listed voxel, in the grid from the corner of its first tile.
     [[nodiscard]] glm::ivec3 position(std::size_t i) const {
         const auto nx = static_cast<std::uint64_t>(extent_.x), ny = static_cast<std::uint64_t>(extent_.y);
         const std::uint64_t v = voxels_[i];

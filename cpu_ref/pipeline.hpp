@@ -112,7 +112,7 @@ struct geometry {
     glm::ivec3 lead{0};                       // lowest voxel of `where` that is drawn
     core::arm_set arms = core::arm_set::none; // leave out the conservative voxels whose arms a triangle does not meet
 
-    // What the primitives of each draw are called where some draw is a subset (mesh_view::part); otherwise empty.
+    // The primitive numbers of each draw if some draw is a subset (mesh_view::part); otherwise empty.
     std::vector<core::numbering> numberings;
 
     struct primitive {

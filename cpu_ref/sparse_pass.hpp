@@ -6,7 +6,7 @@
 // into a thread's dense tile, then its bricks. Nothing is dense but one tile a thread, so memory is in proportion to
 // the result. Tiles lie on the lattice of the whole grid, also where a part of it is drawn.
 //
-// What is drawn comes from a source of fragments:
+// The fragments come from a source:
 //   num_tiles(), key(i)   the tiles that it may draw in: Morton keys in the whole grid, ascending
 //   make_scratch()        a unique_ptr to what a thread needs to draw
 //   draw(i, ...)          blends the tile's fragments into scratch.view, counts, and ends the tile (scratch.end_...)

@@ -57,7 +57,7 @@ struct brick_list {
     }
 };
 
-// What is the same for all tiles of a call.
+// Data that is the same for all tiles of a call.
 template <class... Targets>
 struct sparse_plan {
     core::pack<sparse_target<Targets>...> targets;
@@ -65,7 +65,7 @@ struct sparse_plan {
     bool keeps_voxels = false;
 };
 
-// What one thread keeps for the tile that it is at. Positions in it count from the tile's lowest voxel that is drawn.
+// Memory of one thread for the tile that it draws. Positions in it count from the tile's lowest voxel that is drawn.
 template <class... Targets>
 class sparse_scratch {
     template <class Target>
@@ -141,7 +141,7 @@ public:
     void count_repeats() {
         if (constant.repeats == nullptr) constant.repeats = std::make_unique<std::uint32_t[]>(tile_voxels);
     }
-    // What has been drawn becomes the voxels' values: of `shaded`, or of `constant`.
+    // Makes what has been drawn the voxels' values: of `shaded`, or of `constant`.
     void end_shaded() {
         mark(shaded.touched.data());
         resolve_tile(glm::ivec3(0), view, shaded);

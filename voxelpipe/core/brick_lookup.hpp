@@ -26,7 +26,7 @@ struct brick_lookup {
     [[nodiscard]] static int log2_slots_for(std::uint64_t bricks) {
         return static_cast<int>(std::bit_width(bricks == 0 ? 1 : 2 * bricks - 1));
     }
-    // Where the search for a brick's key begins.
+    // The slot at which the search for a brick's key begins.
     [[nodiscard]] VOXELPIPE_HD static std::uint64_t first_slot(std::uint64_t key, int log2_slots) {
         return key * 0x9e3779b97f4a7c15u >> (64 - log2_slots);
     }

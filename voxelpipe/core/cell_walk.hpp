@@ -108,7 +108,7 @@ private:
         }
         return true;
     }
-    // Where the ray leaves a cell along an axis that it moves along.
+    // The ray parameter at which it leaves a cell along an axis that it moves along.
     [[nodiscard]] VOXELPIPE_HD S side_of(int a, int cell) const {
         return (static_cast<S>(cell + (direction_[a] > 0 ? 1 : 0)) - origin_[a]) * inverse_[a];
     }

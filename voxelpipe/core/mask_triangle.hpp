@@ -188,7 +188,7 @@ struct mask_rows {
     }
 };
 
-// Where the bits of a row go in its brick's mask (brick_table.hpp), taken as 16 words of 32 bits: `bits` has a bit for
+// Puts the bits of a row into its brick's mask (brick_table.hpp), taken as 16 words of 32 bits. `bits` has a bit for
 // each of the 8 voxels along axis `row`, at (across, deep). Calls set(word, bits) for each of up to four words' parts
 // that has any.
 template <class Set>

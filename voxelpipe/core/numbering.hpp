@@ -20,7 +20,7 @@ struct visible_numbers {
     std::uint32_t triangle, primitive;
 };
 
-// Of one draw of a call with a subset.
+// Primitive numbers of one draw of a call with a subset.
 struct numbering {
     const std::uint32_t* numbers = nullptr; // of the triangles in the whole mesh; null: the draw is no subset
     std::uint32_t whole = 0;                // triangles of the whole mesh; 0: no draw of the call is a subset

@@ -52,7 +52,7 @@ struct pipeline_state {
         unsigned long long nodes, bricks, voxels;
     } sparse; // what a sparse call in the caller's memory needs
 
-    // Where triangles of this kind are counted.
+    // The counter of triangles of this kind.
     [[nodiscard]] VOXELPIPE_HD unsigned long long* counter_of(core::triangle_class kind) {
         using core::triangle_class;
         return kind == triangle_class::nonfinite   ? &nonfinite

@@ -77,7 +77,7 @@ public:
         storage_ = memory.take<std::byte>(sort_bytes_);
         made_tiles_ = memory.take<brick_tile>(room_);
     }
-    // Where the runs of the rows are written, in any order of rows.
+    // The arrays into which the runs of the rows are written, in any order of rows.
     [[nodiscard]] run_arrays found() const {
         return {levels_[0].keys, reinterpret_cast<std::uint64_t*>(found_runs_.first), found_runs_.bounds, 0, 0};
     }

@@ -21,7 +21,7 @@
 
 namespace voxelpipe::device {
 
-// What the passes count, beside the state of the call.
+// Numbers that the passes count, beside the state of the call.
 struct element_totals {
     std::uint64_t counts[core::index_of(core::element_count::size)];
     std::uint64_t listed; // fragments, as far as they fit

@@ -17,7 +17,8 @@
 namespace voxelpipe {
 namespace device {
 
-// What a call makes of the lists of all fragments. Payload: of the lists. has_room(out, limits): they are numbered.
+// The use that a call makes of the lists of all fragments. Payload: of the lists. has_room(out, limits): they are
+// numbered.
 template <class Output, class ShaderOutput>
 struct element_output;
 template <class... Targets, class ShaderOutput>

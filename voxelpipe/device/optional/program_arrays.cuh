@@ -22,10 +22,10 @@ struct program_limits : workspace_limits {
     // Room of each draw for triangles that its programs make, with those that a tessellation leaves out. The whole room
     // is drawn, and its unused part lies outside of the grid. A room that is much too large takes time.
     std::uint64_t triangles = 0;
-    // Of each draw with a tessellation: points of its patches, (n + 1)(n + 2) / 2 of one with n^2 triangles. Three a
+    // Points of the patches of each draw with a tessellation, (n + 1)(n + 2) / 2 of one with n^2 triangles. Three a
     // triangle are always enough.
     std::uint64_t lattice_points = 0;
-    // Of each draw with both programs: triangles between them.
+    // Triangles between the two programs of each draw that has both.
     std::uint64_t lattice_triangles = 0;
 
     // Room for `n` triangles before and behind a geometry program, and a start for the rest.
@@ -56,7 +56,7 @@ struct program_state {
     unsigned int stop;               // workspace_view::stop
     unsigned int has_left_out;       // 1 if the triangles hold those that a tessellation leaves out
 };
-// What is emitted of a draw.
+// The triangles and points that are emitted of a draw.
 struct program_room {
     std::uint64_t triangles;   // 0 if not all can be
     lattice_size lattice;      // zeros if not all can be

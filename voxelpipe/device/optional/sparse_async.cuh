@@ -128,8 +128,8 @@ private:
     [[nodiscard]] static void* memory_of(arena memory) { return memory.take<std::byte>(1); }
 };
 
-// What a call into bricks needs, 0 if it cannot be numbered. call.template operator()<Run>(arena, result) takes its
-// memory, launches it if Run is true, and returns false if it cannot be numbered.
+// Bytes that a call into bricks needs, 0 if it cannot be numbered. call.template operator()<Run>(arena, result) takes
+// its memory, launches it if Run is true, and returns false if it cannot be numbered.
 template <class Call, class... Targets>
 [[nodiscard]] std::size_t bounded_bytes(const sparse_result<Targets...>& result, const Call& call) {
     arena plan;

@@ -15,8 +15,8 @@
 
 namespace voxelpipe {
 
-// What an earlier call left, which a call can go on from. Refers to memory of the device that is not part of the call's
-// workspace; the stream has passed what writes it when it reaches the call.
+// The result of an earlier call, which a call can go on from. Refers to memory of the device that is not part of the
+// call's workspace; the stream has passed what writes it when it reaches the call.
 template <class... Targets>
 struct sparse_start {
     // Bricks, tiles and values; what absent voxels read as.
@@ -33,8 +33,8 @@ struct sparse_result {
 
     // To be set before the call. What voxels of cleared targets start from, and absent ones read as.
     core::pack<typename Targets::value_type...> clear_values = core::make_pack(Targets::traits::identity()...);
-    // What the call does with each target: clear, as it is by default, or load or off, which go on from `start`. Where
-    // any is not cleared, the voxels of `start` stay.
+    // The operation on each target: clear, the default, or load or off, which go on from `start`. If any target is not
+    // cleared, the voxels of `start` stay.
     std::array<load_operation, num_targets> loads{};
     sparse_start<Targets...> start; // What the call goes on from; nothing by default.
 
@@ -80,7 +80,7 @@ struct sparse_result {
         for (const bool k : keeps_sums_) keeps = keeps || k;
         return keeps;
     }
-    // What absent voxels read as after the call.
+    // The values that absent voxels read as after the call.
     [[nodiscard]] core::pack<typename Targets::value_type...> next_background() const {
         auto values = start.view.clear_values;
         core::for_each_index<num_targets>([&]<std::size_t I>() {

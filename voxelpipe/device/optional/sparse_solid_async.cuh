@@ -35,7 +35,7 @@ __global__ void publish_solid_lists(const __grid_constant__ solid_list_arrays<Pa
     *counts = {state->voxels, state->fragments};
     to.offsets[state->voxels] = state->fragments;
 }
-// What the bricks need becomes part of the call's state. Lists that were too short left no bricks to count.
+// Makes the room that the bricks need a part of the call's state. Lists that were too short left no bricks to count.
 template <int = 0> // compiled where it is called
 __global__ void join_solid_state(pipeline_state* state, const pipeline_state* of_bricks, bool count_voxels) {
     const unsigned long long voxels = state->voxels;

@@ -28,7 +28,7 @@ struct brick_room {
     std::uint64_t nodes, bricks, voxels;
 };
 
-// What number_words and list_keys give numbers to beyond the room.
+// Cells beyond the room that number_words and list_keys give numbers to.
 inline constexpr std::uint64_t spare_cells = 64;
 // Voxels of a failed call have the ranks of one brick.
 inline constexpr std::uint64_t spare_ranks = core::sparse_brick_voxels;
@@ -98,7 +98,7 @@ private:
     std::byte* storage_;
 };
 
-// What a result has, on the device.
+// Sizes of a result, on the device.
 struct bounded_totals {
     const unsigned long long *bricks, *voxels;
     const unsigned long long* tiles; // null: none

@@ -31,7 +31,7 @@ struct end_bounded_tiles {
     }
 };
 
-// What is left of the tiles of `before`, room.bricks at most; nothing is taken or launched where that can have none.
+// The tiles of `before` that are left, room.bricks at most. Nothing is taken or launched if `before` can have none.
 template <int = 0> // so that programs that do not call it compile no kernels
 class bounded_kept_tiles {
 public:

@@ -166,7 +166,7 @@ public:
     [[nodiscard]] index_level bricks() { return level(0); }
     // After the bricks have been marked: their number. Waits.
     [[nodiscard]] std::uint64_t make_numbers() { return number(words_[0]); }
-    // Of all bricks, in order.
+    // Writes the keys of all bricks, in order.
     void write_keys(std::uint64_t* keys) { write_keys(0, ~std::uint64_t{0}, keys); }
 
     [[nodiscard]] static int log2_cell_of(int level) {

@@ -53,7 +53,7 @@ template <class Draw, class Backend, class... Targets>
 
 // ---- kernels --------------------------------------------------------------------------------------------------------
 
-// What the host reads when the masks are complete.
+// Numbers that the host reads when the masks are complete.
 struct mask_call_state {
     pipeline_state state;
     mask_totals masks;

@@ -15,7 +15,7 @@
 
 namespace voxelpipe::device {
 
-// Where x, y and z of a voxel lie among the bits of a block.
+// The bit of a voxel in its block.
 [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned bit_in_block(int x, int y, int z) {
     const auto spread = [](int n) VOXELPIPE_INLINE_LAMBDA {
         return (static_cast<unsigned>(n) & 1u) | (static_cast<unsigned>(n) & 2u) << 2;

@@ -12,7 +12,7 @@
 
 namespace voxelpipe::device {
 
-// Where a brick of the raster lies from the lowest voxel of a triangle's box, in the axes of its rows.
+// The offset of a brick of the raster from the lowest voxel of a triangle's box, in the axes of its rows.
 template <class Setup>
 [[nodiscard]] __device__ VOXELPIPE_INLINE core::triple<int> offset_of_brick(const Setup& s, int x, int y, int z) {
     return core::turn_to_row(s.row(), (x << log2_mask_brick) - s.lowest(0), (y << log2_mask_brick) - s.lowest(1),

@@ -143,8 +143,8 @@ struct mask_memory {
         large_mask_triangle large[max_large];
     };
     mask_pair pairs[max_pairs];
-    // Of the lanes' pairs, while they are drawn: near_plane; mask_rows::by_across, by_deep and met; the axis of the
-    // rows; the brick's number.
+    // Set-ups of the lanes' pairs, while they are drawn: near_plane; mask_rows::by_across, by_deep and met; the axis of
+    // the rows; the brick's number.
     float planes[6][32];
     word limits[4][32], met[2][32], axes[32], bricks[32];
     std::uint16_t rows[32 * rows_each]; // that are to be drawn: across + 8 deep, 64 pair

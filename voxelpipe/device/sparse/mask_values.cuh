@@ -27,7 +27,7 @@ __global__ void fill_values(Element* values, const unsigned long long* voxels, E
          i += std::uint64_t{gridDim.x} * blockDim.x)
         values[i] = value;
 }
-// Of a target of bits: a word a thread. Bits behind the last voxel are 0.
+// Fills a target of bits, a word a thread. Bits behind the last voxel are 0.
 template <int = 0> // compiled where it is called
 __global__ void fill_bits(word* values, const unsigned long long* voxels, word value) {
     for (std::uint64_t w = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; 32 * w < *voxels;

@@ -54,7 +54,7 @@ struct long_voxel {
     unsigned thread; // that has the voxel
 };
 
-// What threads that share a voxel pass on: sums, or values where the order matters. None, if it does not fit.
+// The type that threads which share a voxel pass on: sums, or values if the order matters. Not used if it does not fit.
 template <std::size_t I, class Target, class Payload>
 using fold_part = std::conditional_t<Target::traits::order_free, typename Target::traits::accumulator,
                                      std::remove_cvref_t<decltype(get<I>(std::declval<const Payload&>()))>>;

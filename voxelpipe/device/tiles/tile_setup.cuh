@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the shading of a triangle's fragments in a tile has in common, computed once and kept in shared memory: weights
+// The common part of shading a triangle's fragments in a tile, computed once and kept in shared memory: weights
 // are linear functions of the column, in integers, and a quotient is a product with a reciprocal, corrected to the bits
 // of the division that core/interpolate.hpp defines.
 
