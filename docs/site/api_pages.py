@@ -32,7 +32,7 @@ CPP = {
               ["slabs/stream.hpp", "slabs/mpi.hpp", "slabs/plan.hpp", "slabs/records.hpp", "slabs/bins.hpp"]),
     "streams": ("Streams and graphs", "Calls that never wait, with memory of the caller. For cuda_backend.",
                 ["device/voxelize_async.cuh", "device/abuffer_async.cuh", "device/optional/solid_async.cuh",
-                 "device/optional/sparse_result.cuh", "device/optional/sparse_async.cuh", "device/optional/sparse_solid_async.cuh", "device/optional/program_async.cuh",
+                 "device/optional/sparse_result.cuh", "device/optional/sparse_async.cuh", "device/optional/sparse_merge_async.cuh", "device/optional/sparse_solid_async.cuh", "device/optional/program_async.cuh",
                  "device/optional/program_arrays.cuh",
                  "device/optional/element_async.cuh"]),
     "arithmetic": ("Arithmetic for shaders", "Operations with the same bits on every compiler and device, and views of arrays.",
