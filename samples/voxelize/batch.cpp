@@ -4,6 +4,7 @@
 
 #include "exit_code.hpp"
 #include "memory.hpp"
+#include "named_files.hpp"
 #include "run_model.hpp"
 
 #include <nlohmann/json.hpp>
@@ -285,13 +286,27 @@ private:
 std::string work_of(const command_line& options, const fs::path& model) {
     content arguments;
     for (const std::string& argument : options.arguments) arguments.add(argument.c_str(), argument.size() + 1);
-    std::error_code error;
-    const std::uintmax_t size = fs::file_size(model, error);
-    const auto time = fs::last_write_time(model, error).time_since_epoch().count();
-    std::array<char, 64> text{};
-    std::snprintf(text.data(), text.size(), "%08x-%jx-%llx", arguments.crc, size,
-                  static_cast<unsigned long long>(time));
-    return text.data();
+    const auto size_and_time = [](const fs::path& file) {
+        std::error_code error;
+        const std::uintmax_t size = fs::file_size(file, error);
+        const auto time = fs::last_write_time(file, error).time_since_epoch().count();
+        std::array<char, 64> text{};
+        std::snprintf(text.data(), text.size(), "-%jx-%llx", size, static_cast<unsigned long long>(time));
+        return std::string(text.data());
+    };
+    const auto hex = [](std::uint32_t number) {
+        std::array<char, 16> text{};
+        std::snprintf(text.data(), text.size(), "%08x", number);
+        return std::string(text.data());
+    };
+    std::string work = hex(arguments.crc) + size_and_time(model);
+    content named;
+    for (const fs::path& file : named_files(model)) {
+        const std::string text = file.string() + size_and_time(file);
+        named.add(text.c_str(), text.size() + 1);
+    }
+    if (named.bytes != 0) work += '-' + hex(named.crc);
+    return work;
 }
 
 std::vector<listed_model> read_list(std::istream& list) {

@@ -52,7 +52,8 @@ std::string percent_decoded(std::string_view uri) {
     return text;
 }
 
-// A relative path that stays inside the folder; anything else, and every URI with a scheme, is refused.
+} // namespace
+
 std::filesystem::path local_path(const std::string& uri) {
     const std::string text = percent_decoded(uri);
     if (text.empty()) throw gltf_error("an empty file name");
@@ -64,8 +65,6 @@ std::filesystem::path local_path(const std::string& uri) {
     if (path.begin()->string() == "..") throw gltf_error("a path that leaves the folder of the file");
     return path;
 }
-
-} // namespace
 
 resources::resources(const checked_document& document, std::span<const std::byte> binary, bool has_binary,
                      const gltf_file_reader& read_file, budget& memory, leniency& tolerance,

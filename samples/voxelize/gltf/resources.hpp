@@ -62,6 +62,10 @@ private:
     std::vector<std::span<const std::byte>> buffers_; // empty: a placeholder
 };
 
+// The file that a URI of a .gltf names: a relative path that stays inside its folder. Throws gltf_error for anything
+// else, and for every URI with a scheme.
+[[nodiscard]] std::filesystem::path local_path(const std::string& uri);
+
 // Reads files below FOLDER, which need not exist for files that name no others.
 [[nodiscard]] gltf_file_reader folder_reader(std::filesystem::path folder);
 
