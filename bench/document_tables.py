@@ -15,7 +15,7 @@ import sys
 
 from record import ROOT, read, sections
 
-DOCUMENTS = ["README.md", "docs/performance.md"]
+DOCUMENTS = ["README.md", "docs/performance.md", "docs/performance_solids.md"]
 COLUMNS = [
     ("bit_conservative", "bit, conservative"),
     ("bit_thin", "bit, thin"),
