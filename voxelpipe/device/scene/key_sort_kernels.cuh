@@ -206,7 +206,7 @@ std::size_t sort_bytes(std::uint64_t capacity, int bits) {
 
 template <class Key>
 int sort_by_cell(Key* const (&keys)[2], std::uint32_t* const (&values)[2], std::uint64_t capacity, int bits,
-                 void* storage, std::size_t bytes, stage where, cudaStream_t stream) {
+                 void* storage, [[maybe_unused]] std::size_t bytes, stage where, cudaStream_t stream) {
     if (capacity == 0) return 0;
     VOXELPIPE_ASSERT(bytes >= sort_bytes<Key>(capacity, bits));
     arena memory(storage);

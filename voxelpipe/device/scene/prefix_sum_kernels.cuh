@@ -68,8 +68,8 @@ VOXELPIPE_DEFINES_KERNELS std::size_t cell_scan_bytes(std::uint32_t num_primitiv
 }
 
 VOXELPIPE_DEFINES_KERNELS void sum_counts(const std::uint32_t* counts, unsigned long long* offsets,
-                                          std::uint32_t num_primitives, void* storage, std::size_t bytes, stage where,
-                                          cudaStream_t stream) {
+                                          std::uint32_t num_primitives, void* storage,
+                                          [[maybe_unused]] std::size_t bytes, stage where, cudaStream_t stream) {
     if (num_primitives == 0) return;
     VOXELPIPE_ASSERT(bytes >= cell_scan_bytes(num_primitives));
     check(cudaMemsetAsync(storage, 0, cell_scan_bytes(num_primitives), stream), where);
@@ -120,7 +120,7 @@ VOXELPIPE_DEFINES_KERNELS std::size_t select_bytes(std::uint64_t capacity) {
 
 VOXELPIPE_DEFINES_KERNELS void select_voxels(const sorted_keys& keys, std::uint64_t* first_of_voxel,
                                              pipeline_state* state, const capacities& limits, void* storage,
-                                             std::size_t bytes, cudaStream_t stream) {
+                                             [[maybe_unused]] std::size_t bytes, cudaStream_t stream) {
     constexpr stage where = stage::abuffer_emit;
     const std::size_t used = select_bytes(limits.fragments);
     VOXELPIPE_ASSERT(bytes >= used);
