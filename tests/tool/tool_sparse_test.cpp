@@ -182,7 +182,7 @@ TEST(ToolSparse, IsChosenWhereItHasToBeAndSaysSo) {
     EXPECT_EQ(0, result.code) << result.err;
     EXPECT_NE(std::string::npos, result.err.find("a dense one would take")) << result.err;
     // .vti is dense, but never as a whole.
-    result = voxelize({"-o", folder / "a.vti", "-r", "400", "-t", "depth", "--max-memory", "150"});
+    result = voxelize({"-o", folder / "a.vti", "-r", "400", "-t", "depth", "--max-memory", "170"});
     EXPECT_EQ(0, result.code) << result.err;
     EXPECT_NE(std::string::npos, result.err.find("a dense one would take")) << result.err;
     // So are shapes of the voxels, which --dense makes too large. A sanitizer's own memory would count.
