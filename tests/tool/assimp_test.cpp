@@ -209,6 +209,16 @@ TEST(Obj, Utf16IsNamed) {
     EXPECT_EQ("assimp: the file is text in UTF-16, not UTF-8", error_of("wide.obj", bytes));
 }
 
+// assimp by itself drops it in files of more than 16 MiB, which it reads in blocks.
+TEST(Obj, TheLastLineNeedsNoEnd) {
+    const std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", last = "f 3 2 1";
+    std::string comments;
+    for (int i = 0; i < 17; ++i) comments += "# " + std::string((1 << 20) - 3, ' ') + '\n';
+    EXPECT_EQ(2U, load("short.obj", text + last).triangle_count());
+    EXPECT_EQ(2U, load("long.obj", text + comments + last).triangle_count());
+    EXPECT_EQ(2U, load("long.obj", text + comments + last + '\n').triangle_count());
+}
+
 TEST(Obj, LinesAndPointsComeBesideTriangles) {
     const scene scene = load("mixed.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nl 2 3\nf 1 2 3\np 2\n");
     EXPECT_EQ(1U, scene.triangle_count());

@@ -40,29 +40,34 @@ void check_text(std::span<const std::byte> bytes, const std::string& extension) 
 
 class memory_stream : public Assimp::IOStream {
 public:
-    explicit memory_stream(std::span<const std::byte> bytes) : bytes_{bytes} {}
+    // ends_line: a line's end follows the bytes.
+    memory_stream(std::span<const std::byte> bytes, bool ends_line)
+        : bytes_{bytes}, size_{bytes.size() + (ends_line ? 1 : 0)} {}
 
     std::size_t Read(void* buffer, std::size_t size, std::size_t count) override {
         if (size == 0) return 0;
-        count = std::min(count, (bytes_.size() - at_) / size);
-        if (count != 0) std::memcpy(buffer, bytes_.data() + at_, count * size);
-        at_ += count * size;
+        count = std::min(count, (size_ - at_) / size);
+        const std::size_t end = at_ + count * size, last = std::min(end, bytes_.size());
+        if (last > at_) std::memcpy(buffer, bytes_.data() + at_, last - at_);
+        if (end > std::max(last, at_)) static_cast<char*>(buffer)[end - at_ - 1] = '\n';
+        at_ = end;
         return count;
     }
     std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
     aiReturn Seek(std::size_t offset, aiOrigin origin) override {
-        const std::size_t base = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? at_ : bytes_.size();
+        const std::size_t base = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? at_ : size_;
         const std::size_t target = base + offset; // may wrap: a negative offset
-        if (target > bytes_.size()) return aiReturn_FAILURE;
+        if (target > size_) return aiReturn_FAILURE;
         at_ = target;
         return aiReturn_SUCCESS;
     }
     std::size_t Tell() const override { return at_; }
-    std::size_t FileSize() const override { return bytes_.size(); }
+    std::size_t FileSize() const override { return size_; }
     void Flush() override {}
 
 private:
     std::span<const std::byte> bytes_;
+    std::size_t size_;
     std::size_t at_ = 0;
 };
 
@@ -76,7 +81,10 @@ public:
     Assimp::IOStream* Open(const char* file, const char* mode) override {
         if (mode != nullptr && std::strpbrk(mode, "wa+") != nullptr) return nullptr;
         const auto found = find(file);
-        return found ? new memory_stream(*found) : nullptr;
+        if (!found) return nullptr;
+        // Of an OBJ of more than 16 MiB assimp drops a last line that has no end.
+        const bool lacks_end = !found->empty() && found->back() != std::byte{'\n'};
+        return new memory_stream(*found, file == name_ && lower_extension(name_) == ".obj" && lacks_end);
     }
     void Close(Assimp::IOStream* stream) override { delete stream; }
 
