@@ -4,6 +4,7 @@
 
 #include "backend_estimate.hpp"
 #include "cuda_device.hpp"
+#include "memory.hpp"
 #include "model_file.hpp"
 #include "picture_levels.hpp"
 #include "slab_run.hpp"
@@ -14,6 +15,7 @@
 #include <cstdio>
 #include <iostream>
 #include <memory>
+#include <new>
 #include <optional>
 #include <system_error>
 
@@ -86,6 +88,17 @@ scene outline_of(const triangle_stream& stream, const triangle_stream::boxes& bo
     return model;
 }
 
+// The model, which is no stream. One that is refused as such and does not fit says so with its need.
+scene load_whole(const std::filesystem::path& file, const load_options& options, const opened_stream& opened) {
+    try {
+        return load_model(file, options);
+    } catch (const std::bad_alloc&) {
+        if (opened.refusal.empty()) throw;
+        memory::require(static_cast<double>(memory::room()) + 1, "the model", opened.refusal, opened.need);
+        throw;
+    }
+}
+
 // Draws and writes the slabs of this process.
 void run_slabs(const command_line& options, slab_source&& source, run_report& report) {
     report.is_sparse = true;
@@ -112,10 +125,11 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     report.request.cuda = start_cuda(options);
     load_options load = options.load;
     load.picture_hook = picture_reducer{options.grid, options.voxelize};
-    const std::unique_ptr<triangle_stream> stream = streamed_input(options);
+    const opened_stream opened = streamed_input(options, folder_of(options.outputs.front()));
+    triangle_stream* const stream = opened.stream.get();
     triangle_stream::boxes boxes;
     if (stream) boxes = stream->bounds();
-    scene model = stream ? outline_of(*stream, boxes) : load_model(options.input, load);
+    scene model = stream ? outline_of(*stream, boxes) : load_whole(options.input, load, opened);
     report.warnings = options.warnings;
     report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
     report.vertices = stream ? stream->num_vertices() : model.vertex_count();
@@ -148,7 +162,7 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     if (options.by_slabs) {
         bar.start("voxelizing slab by slab");
         report.request.progress = [&bar](double done) { bar.show(done); };
-        run_slabs(options, {std::move(model), stream.get(), place}, report);
+        run_slabs(options, {std::move(model), stream, place}, report);
         bar.clear();
         report.peak_memory = memory::peak();
         add_rest(report, milliseconds_since(begin));

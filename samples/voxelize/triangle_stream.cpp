@@ -5,6 +5,7 @@
 #include "assimp/file_name.hpp"
 #include "gltf_stream.hpp"
 #include "model_error.hpp"
+#include "obj_file.hpp"
 #include "ply_file.hpp"
 #include "stl_file.hpp"
 
@@ -41,16 +42,17 @@ void triangle_stream::add_only_part(const std::filesystem::path& file, std::uint
     if (num_triangles != 0) parts_.push_back({file.filename().string(), {}, 0, 0, num_triangles});
 }
 
-std::unique_ptr<triangle_stream> open_stream(const std::filesystem::path& file, std::uint64_t room,
-                                             const load_options& options) {
+opened_stream open_stream(const std::filesystem::path& file, std::uint64_t room, const std::filesystem::path& folder,
+                          const load_options& options) {
     const std::string extension = assimp::lower_extension(file);
-    std::unique_ptr<triangle_stream> stream;
-    if (extension == ".stl") stream = stl_file::open(file, options.gltf.colors);
-    if (extension == ".ply") stream = ply_file::open(file, room, options.gltf.colors);
+    opened_stream opened;
+    if (extension == ".stl") opened.stream = stl_file::open(file, options.gltf.colors);
+    if (extension == ".ply") opened.stream = ply_file::open(file, room, options.gltf.colors);
+    if (extension == ".obj") opened = open_obj(file, room, folder, options.gltf);
     if (extension == ".glb" || extension == ".gltf")
-        stream = gltf_stream::open(file, room, options.limits, options.gltf);
-    if (stream) stream->scale_lengths(options.scale);
-    return stream;
+        opened.stream = gltf_stream::open(file, room, options.limits, options.gltf);
+    if (opened.stream) opened.stream->scale_lengths(options.scale);
+    return opened;
 }
 
 } // namespace voxelize

@@ -81,9 +81,16 @@ protected:
     std::vector<material> materials_;
 };
 
-// The file as a stream, where it is of a kind that can be read so (stl_file.hpp, ply_file.hpp, gltf_stream.hpp);
-// otherwise null. room: bytes that the stream may hold.
-[[nodiscard]] std::unique_ptr<triangle_stream> open_stream(const std::filesystem::path& file, std::uint64_t room,
-                                                           const load_options& options);
+// A model that may not fit into memory.
+struct opened_stream {
+    std::unique_ptr<triangle_stream> stream; // none: the model is to be loaded
+    std::string refusal;                     // why a model that is not likely to fit is no stream, where that is known
+    double need = 0;                         // bytes that it is likely to take when it is loaded, with a refusal
+};
+
+// The file as a stream, where it is of a kind that can be read so (stl_file.hpp, ply_file.hpp, gltf_stream.hpp,
+// obj_file.hpp). room: bytes that the stream may hold. folder: for temporary files, of OBJ. Throws as open_obj() does.
+[[nodiscard]] opened_stream open_stream(const std::filesystem::path& file, std::uint64_t room,
+                                        const std::filesystem::path& folder, const load_options& options);
 
 } // namespace voxelize

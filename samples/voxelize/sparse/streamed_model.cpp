@@ -132,7 +132,7 @@ scene scene_of(streamed_slab<Varyings>&& slab, const triangle_stream& model) {
 
 } // namespace
 
-std::unique_ptr<triangle_stream> streamed_input(const command_line& options) {
+opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder) {
     const voxelize_request& request = options.voxelize;
     // Repairs need the whole mesh.
     const bool is_by_rule = !request.solid || (request.solid->rule != solid_rule::exterior && !request.solid->vote &&
@@ -147,10 +147,10 @@ std::unique_ptr<triangle_stream> streamed_input(const command_line& options) {
     const bool sees_whole_grid = wants([](target t) { return t == target::color_outer; }) ||
                                  (request.solid && !request.solid->fill_color &&
                                   wants([](target t) { return info_of(t).name.starts_with("color"); }));
-    if (!is_drawn_here || sees_whole_grid) return nullptr;
-    std::unique_ptr<triangle_stream> file = open_stream(options.input, memory::room() / 8, options.load);
-    if (file && file->held_bytes() <= static_cast<double>(memory::room())) return nullptr;
-    return file;
+    if (!is_drawn_here || sees_whole_grid) return {};
+    opened_stream opened = open_stream(options.input, memory::room() / 8, folder, options.load);
+    if (opened.stream && opened.stream->held_bytes() <= static_cast<double>(memory::room())) return {};
+    return opened;
 }
 
 void add_part(voxelize_stats& all, const voxelize_stats& part) {

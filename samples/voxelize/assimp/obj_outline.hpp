@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What assimp makes of an OBJ file besides its triangles, and of its polygons, without the whole file: assimp is given
+// a file in which each run of faces is one, and polygons some thousands at a time. So objects, groups, materials and
+// their order are those of a file that is loaded, and so are the triangles of a polygon.
+
+#include "wire.hpp"
+
+#include <glm/glm.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace voxelize::assimp {
+
+class obj_outline {
+public:
+    // A line of the file that names an object, a group, a material or a library.
+    void add_structure(std::string_view line);
+    // Faces follow, with none of these between them. Runs are numbered from 0.
+    void add_run();
+    [[nodiscard]] std::size_t num_runs() const { return num_runs_; }
+
+    struct parts {
+        model source;                                 // primitives without triangles that mean anything
+        std::vector<std::vector<std::uint32_t>> runs; // of each primitive, in the order of its faces
+    };
+    // FILE is the model, in whose folder libraries lie. Runs in a process of its own. Throws obj_refusal for more
+    // objects and groups than that has room for, and model_error.
+    [[nodiscard]] parts read(const std::filesystem::path& file) const;
+
+private:
+    std::string text_ = "v 0 0 0\n";
+    std::size_t num_runs_ = 0;
+};
+
+// The triangles of polygons: of the first, then of the second, ... The corners of one stand behind those of the one
+// before, sizes[i] of polygon i; triangles are indices of these. A polygon without area may have none. Runs in a
+// process of its own. Throws model_error.
+[[nodiscard]] std::vector<glm::uvec3> cut_polygons(std::span<const glm::vec3> corners,
+                                                   std::span<const std::uint32_t> sizes);
+
+} // namespace voxelize::assimp
