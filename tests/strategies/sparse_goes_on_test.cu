@@ -416,11 +416,7 @@ TEST(DeviceSparseGoesOn, AGraphHoldsCallsThatGoOn) {
         return s.ok() ? vp::voxelize_async(be, seconds, g, joined, {}, v) : s;
     });
     for (const glm::vec3& by : {glm::vec3(3, -2, 1), glm::vec3(0)}) {
-        unit::small_mesh moved = mesh;
-        for (glm::vec3& q : moved.positions) q += by;
-        ASSERT_EQ(cudaMemcpyAsync(const_cast<glm::vec3*>(a.view().positions.data()), moved.positions.data(),
-                                  moved.positions.size() * sizeof(glm::vec3), cudaMemcpyDefault, be.stream),
-                  cudaSuccess);
+        const unit::small_mesh moved = sparse_pairs::move_mesh(be, a, mesh, by);
         graph.launch(be.stream);
         ASSERT_TRUE(vp::read_status(be, w).ok());
         ASSERT_TRUE(vp::read_status(be, v).ok());

@@ -38,6 +38,16 @@ struct chain {
 namespace sparse_pairs {
 
 using sparse_values::chain;
+
+// Writes `mesh`, moved, over the positions that a captured call reads, and returns it.
+[[nodiscard]] inline unit::small_mesh move_mesh(vp::cuda_backend& be, const vp::mesh<vp::cuda_backend>& on_device,
+                                                unit::small_mesh mesh, const glm::vec3& by) {
+    for (glm::vec3& p : mesh.positions) p += by;
+    EXPECT_EQ(cudaMemcpyAsync(const_cast<glm::vec3*>(on_device.view().positions.data()), mesh.positions.data(),
+                              mesh.positions.size() * sizeof(glm::vec3), cudaMemcpyDefault, be.stream),
+              cudaSuccess);
+    return mesh;
+}
 using sparse_values::record;
 
 struct shader {

@@ -552,11 +552,7 @@ TEST(DeviceSparse, SolidsInMemoryOfTheCaller) {
             const device_test::captured_graph graph(
                 be.stream, [&] { return vp::voxelize_solid_async(be, all, grid, result, o, workspace); });
             for (const glm::vec3& by : {glm::vec3(3, -2, 1), glm::vec3(0)}) {
-                unit::small_mesh moved = mesh;
-                for (glm::vec3& v : moved.positions) v += by;
-                ASSERT_EQ(cudaMemcpyAsync(const_cast<glm::vec3*>(a.view().positions.data()), moved.positions.data(),
-                                          moved.positions.size() * sizeof(glm::vec3), cudaMemcpyDefault, be.stream),
-                          cudaSuccess);
+                const unit::small_mesh moved = sparse_pairs::move_mesh(be, a, mesh, by);
                 graph.launch(be.stream);
                 expect_same(by, vp::read_status(be, workspace));
             }
