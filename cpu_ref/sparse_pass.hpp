@@ -13,7 +13,7 @@
 // Triangles are a source (surface_source), and so are solids (sparse_solid.hpp).
 
 #include <cpu_ref/sparse_tile.hpp>
-#include <voxelpipe/kept_tiles.hpp>
+#include <voxelpipe/sparse/kept_tiles.hpp>
 
 #include <algorithm>
 #include <atomic>

@@ -5,11 +5,11 @@
 // Solids into sparse framebuffers: the rows of a solid, tile by tile, as a source of fragments for sparse_pass.hpp. One
 // sweep over all rows finds the tiles that have voxels and counts; a tile is then drawn from the crossings of its beam,
 // those before it included. Beside the result, memory is in proportion to the crossings and the tiles. Calls that make
-// tiles (solid_bricks.hpp) need the rows alone, as runs.
+// tiles (sparse/solid_bricks.hpp) need the rows alone, as runs.
 
 #include <cpu_ref/solid.hpp>
 #include <cpu_ref/sparse_pass.hpp>
-#include <voxelpipe/solid_bricks.hpp>
+#include <voxelpipe/sparse/solid_bricks.hpp>
 
 #include <algorithm>
 #include <bit>

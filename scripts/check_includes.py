@@ -16,8 +16,9 @@ Inside voxelpipe/device/ an include names a file of the same folder or of a fold
     base
 
 core/ includes core/, tuning/ and config.hpp only: no header of the API, nothing of device/. tuning/ includes core/ and tuning/
-only. cpu_ref/ includes nothing of device/, and of the API headers only voxelpipe.hpp includes device/. No include cycle anywhere. At most
-four files lie directly in device/.
+only. programs/, octree/ and sparse/ hold the passes behind the API's headers and count as these. cpu_ref/ includes nothing of
+device/, and of the API headers only voxelpipe.hpp includes device/. No include cycle anywhere. At most four files lie directly
+in device/.
 
     scripts/check_includes.py [ROOT]
 """

@@ -3,12 +3,12 @@
 #pragma once
 
 // An octree over a sparse framebuffer in the memory of a backend, built there: the nodes, values and rays of
-// octree.hpp, bit for bit. Its passes (octree_build.hpp) are functors for Backend::for_each, so that a program that
+// octree.hpp, bit for bit. Its passes (octree/build.hpp) are functors for Backend::for_each, so that a program that
 // does not use it compiles none.
 
 #include <voxelpipe/core/morton_parents.hpp>
 #include <voxelpipe/octree.hpp>
-#include <voxelpipe/octree_build.hpp>
+#include <voxelpipe/octree/build.hpp>
 #include <voxelpipe/sparse.hpp>
 
 #include <cstddef>

@@ -9,10 +9,10 @@
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/core/segment.hpp>
 #include <voxelpipe/elements.hpp>
-#include <voxelpipe/fragment_pool.hpp>
 #include <voxelpipe/program_options.hpp>
-#include <voxelpipe/program_outputs.hpp>
-#include <voxelpipe/program_parts.hpp>
+#include <voxelpipe/programs/fragment_pool.hpp>
+#include <voxelpipe/programs/outputs.hpp>
+#include <voxelpipe/programs/parts.hpp>
 
 #include <array>
 #include <concepts>

@@ -9,7 +9,7 @@
 
 #include <voxelpipe/core/octree_view.hpp>
 #include <voxelpipe/host_sparse.hpp>
-#include <voxelpipe/octree_nodes.hpp>
+#include <voxelpipe/octree/nodes.hpp>
 
 #include <algorithm>
 #include <bit>

@@ -6,11 +6,11 @@
 // drawn like any mesh. If not, they are made and listed a chunk at a time, and the fragments of all chunks are sorted
 // and folded at the end: results are the same.
 
-#include <voxelpipe/fragment_pool.hpp>
-#include <voxelpipe/program_draws.hpp>
 #include <voxelpipe/program_options.hpp>
-#include <voxelpipe/program_outputs.hpp>
-#include <voxelpipe/program_parts.hpp>
+#include <voxelpipe/programs/draws.hpp>
+#include <voxelpipe/programs/fragment_pool.hpp>
+#include <voxelpipe/programs/outputs.hpp>
+#include <voxelpipe/programs/parts.hpp>
 #include <voxelpipe/solid.hpp>
 #include <voxelpipe/voxelize.hpp>
 

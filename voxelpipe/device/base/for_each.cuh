@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A functor for each of many numbers: the passes of programs (program_passes.hpp), points and lines. Compiled by
+// A functor for each of many numbers: the passes of programs (programs/passes.hpp), points and lines. Compiled by
 // programs that use these, and by no other.
 
 #include <voxelpipe/device/base/launch.cuh>

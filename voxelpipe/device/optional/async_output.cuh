@@ -6,7 +6,7 @@
 
 #include <voxelpipe/device/abuffer_async.cuh>
 #include <voxelpipe/device/optional/sparse_async.cuh>
-#include <voxelpipe/program_outputs.hpp>
+#include <voxelpipe/programs/outputs.hpp>
 
 namespace voxelpipe {
 

@@ -2,14 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The passes of row_runs.hpp in memory of the caller, for calls that never wait: levels of rows with room for the most
-// rows and bounds that there can be, while only the device knows how many there are. Nothing can overflow: a level has
-// no more rows, and no more bounds, than the one below, nor more than fit the grid.
+// The passes of sparse/row_runs.hpp in memory of the caller, for calls that never wait: levels of rows with room for
+// the most rows and bounds that there can be, while only the device knows how many there are. Nothing can overflow: a
+// level has no more rows, and no more bounds, than the one below, nor more than fit the grid.
 
 #include <voxelpipe/device/base/for_each.cuh>
 #include <voxelpipe/device/scene/key_sort.cuh>
 #include <voxelpipe/device/scene/prefix_sum.cuh>
-#include <voxelpipe/row_runs.hpp>
+#include <voxelpipe/sparse/row_runs.hpp>
 
 #include <glm/vec3.hpp>
 

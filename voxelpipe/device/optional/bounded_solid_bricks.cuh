@@ -2,15 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// solid_bricks.hpp in memory of the caller, for calls that never wait: the same passes over the rows' runs, level by
-// level, for as many levels as the grid can have. Memory is in proportion to the crossings, bricks and tiles that there
-// is room for.
+// sparse/solid_bricks.hpp in memory of the caller, for calls that never wait: the same passes over the rows' runs,
+// level by level, for as many levels as the grid can have. Memory is in proportion to the crossings, bricks and tiles
+// that there is room for.
 
 #include <voxelpipe/device/optional/bounded_rows.cuh>
 #include <voxelpipe/device/solid/run_rows.cuh>
 #include <voxelpipe/device/sparse/bounded_bricks.cuh>
 #include <voxelpipe/device/sparse/bounded_tiles.cuh>
-#include <voxelpipe/solid_bricks.hpp>
+#include <voxelpipe/sparse/solid_bricks.hpp>
 
 #include <algorithm>
 #include <bit>

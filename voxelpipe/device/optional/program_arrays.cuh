@@ -8,7 +8,7 @@
 #include <voxelpipe/device/base/for_each.cuh>
 #include <voxelpipe/device/optional/async_output.cuh>
 #include <voxelpipe/device/scene/prefix_sum.cuh>
-#include <voxelpipe/program_types.hpp>
+#include <voxelpipe/programs/types.hpp>
 
 #include <cstddef>
 #include <cstdint>

@@ -12,8 +12,8 @@
 #include <voxelpipe/device/sparse/brick_build.cuh>
 #include <voxelpipe/device/sparse/brick_masks.cuh>
 #include <voxelpipe/device/sparse/voxel_fold.cuh>
-#include <voxelpipe/kept_tiles.hpp>
 #include <voxelpipe/sparse.hpp>
+#include <voxelpipe/sparse/kept_tiles.hpp>
 
 #include <cstddef>
 #include <cstdint>

@@ -3,15 +3,15 @@
 #pragma once
 
 // Solids into sparse framebuffers on a GPU: cuda_backend::run_sparse_solid, with the bytes of cpu_backend. Calls that
-// make tiles (solid_bricks.hpp) need the rows alone, as runs: memory is in proportion to the surface. For others the
-// sweep over the rows lists the fragments with all their outputs, and the lists become bricks and values as those of
-// triangles do: at most 2^32 - 2 voxels.
+// make tiles (sparse/solid_bricks.hpp) need the rows alone, as runs: memory is in proportion to the surface. For others
+// the sweep over the rows lists the fragments with all their outputs, and the lists become bricks and values as those
+// of triangles do: at most 2^32 - 2 voxels.
 
 #include <voxelpipe/device/base/for_each.cuh>
 #include <voxelpipe/device/optional/solid.cuh>
 #include <voxelpipe/device/optional/sparse.cuh>
 #include <voxelpipe/device/solid/run_rows.cuh>
-#include <voxelpipe/solid_bricks.hpp>
+#include <voxelpipe/sparse/solid_bricks.hpp>
 
 #include <cstdint>
 #include <span>

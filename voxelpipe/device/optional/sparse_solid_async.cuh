@@ -13,7 +13,7 @@
 #include <voxelpipe/device/optional/sparse_async.cuh>
 #include <voxelpipe/device/solid/list_rows.cuh>
 #include <voxelpipe/device/solid/run_rows.cuh>
-#include <voxelpipe/solid_bricks.hpp>
+#include <voxelpipe/sparse/solid_bricks.hpp>
 
 #include <cstddef>
 #include <cstdint>

@@ -7,7 +7,7 @@
 
 #include <voxelpipe/device/base/for_each.cuh>
 #include <voxelpipe/device/sparse/bounded_bricks.cuh>
-#include <voxelpipe/kept_tiles.hpp>
+#include <voxelpipe/sparse/kept_tiles.hpp>
 
 #include <cstdint>
 

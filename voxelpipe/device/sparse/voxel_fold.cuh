@@ -6,9 +6,9 @@
 // which is the meaning of every blend; a block shares a voxel of very many. The fragments' outputs come from an
 // A-buffer whose payload is all of them.
 
-#include <voxelpipe/all_outputs.hpp>
 #include <voxelpipe/device/base/launch.cuh>
 #include <voxelpipe/device/sparse/brick_build.cuh>
+#include <voxelpipe/programs/all_outputs.hpp>
 #include <voxelpipe/sparse.hpp>
 #include <voxelpipe/tuning/tuning_fragments.hpp>
 

@@ -3,8 +3,8 @@
 #pragma once
 // The triangles that programs make of draws, any chunk at a time, as meshes in the backend's memory.
 
-#include <voxelpipe/program_passes.hpp>
-#include <voxelpipe/program_types.hpp>
+#include <voxelpipe/programs/passes.hpp>
+#include <voxelpipe/programs/types.hpp>
 
 #include <algorithm>
 #include <array>

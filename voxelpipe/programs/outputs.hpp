@@ -3,9 +3,9 @@
 #pragma once
 // The outputs of calls with programs, points and lines: what is checked of each kind, and what fragments are listed of.
 
-#include <voxelpipe/all_outputs.hpp>
-#include <voxelpipe/fragment_pool.hpp>
-#include <voxelpipe/program_types.hpp>
+#include <voxelpipe/programs/all_outputs.hpp>
+#include <voxelpipe/programs/fragment_pool.hpp>
+#include <voxelpipe/programs/types.hpp>
 #include <voxelpipe/sparse.hpp>
 #include <voxelpipe/voxelize.hpp>
 

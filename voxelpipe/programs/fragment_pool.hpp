@@ -7,10 +7,10 @@
 // Backend::for_each, the same on every backend.
 
 #include <voxelpipe/abuffer.hpp>
-#include <voxelpipe/all_outputs.hpp>
 #include <voxelpipe/core/shared_counter.hpp>
 #include <voxelpipe/framebuffer.hpp>
 #include <voxelpipe/grid.hpp>
+#include <voxelpipe/programs/all_outputs.hpp>
 
 #include <bit>
 #include <cstddef>

@@ -4,7 +4,7 @@
 // What calls with programs are made of, known before any of them runs: the types between the stages, the shaders of
 // emitted meshes, and the checks of draws and counts.
 
-#include <voxelpipe/program_passes.hpp>
+#include <voxelpipe/programs/passes.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <algorithm>

@@ -6,10 +6,10 @@
 // inside get masks; those that are wholly inside are part of the largest cubes that are, which become tiles. Nothing is
 // ever in proportion to the volume.
 
-#include <voxelpipe/kept_tiles.hpp>
-#include <voxelpipe/row_runs.hpp>
 #include <voxelpipe/solid.hpp>
 #include <voxelpipe/sparse.hpp>
+#include <voxelpipe/sparse/kept_tiles.hpp>
+#include <voxelpipe/sparse/row_runs.hpp>
 
 #include <algorithm>
 #include <array>

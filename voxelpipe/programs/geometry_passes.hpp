@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The passes of a geometry program, as patch_passes.hpp: one functor counts the triangles of an input and emits them.
+// The passes of a geometry program, as programs/patch_passes.hpp: one functor counts the triangles of an input and
+// emits them.
 
-#include <voxelpipe/patch_passes.hpp>
+#include <voxelpipe/programs/patch_passes.hpp>
 
 #include <cstdint>
 

@@ -7,7 +7,7 @@
 // parts, one after the other, and the chunks are made again for each: the voxels of a part are exactly those of the
 // whole.
 
-#include <voxelpipe/fragment_pool.hpp>
+#include <voxelpipe/programs/fragment_pool.hpp>
 #include <voxelpipe/sparse.hpp>
 #include <voxelpipe/status.hpp>
 #include <voxelpipe/triangle_counts.hpp>

@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Tessellation and geometry programs on a draw: count, prefix sum, emit (patch_passes.hpp, geometry_passes.hpp). What
-// they emit are ordinary meshes in the backend's memory, any range of a draw's primitives at a time, so every strategy,
-// list and solid draws them.
+// Tessellation and geometry programs on a draw: count, prefix sum, emit (programs/patch_passes.hpp,
+// programs/geometry_passes.hpp). What they emit are ordinary meshes in the backend's memory, any range of a draw's
+// primitives at a time, so every strategy, list and solid draws them.
 
-#include <voxelpipe/geometry_passes.hpp>
-#include <voxelpipe/patch_passes.hpp>
+#include <voxelpipe/programs/geometry_passes.hpp>
+#include <voxelpipe/programs/patch_passes.hpp>
 
 #include <cstdint>
 #include <type_traits>
