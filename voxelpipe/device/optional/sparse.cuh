@@ -57,7 +57,8 @@ template <class Payload, class... Targets>
     status limited;
     struct beyond_limits {};
     const auto arrays = [&]() -> brick_arrays {
-        return {made.keys.data(), made.masks.data(), made.offsets.data(), listed.data(), existing.data()};
+        return {made.keys.data(), made.masks.data(), made.offsets.data(), listed.data(),
+                keeps ? existing.data() : nullptr};
     };
     const auto allocate_bricks = [&](std::uint64_t bricks) {
         made.keys = device_buffer<std::uint64_t>(backend, bricks);
@@ -75,7 +76,7 @@ template <class Payload, class... Targets>
         }
         made.num_voxels = voxels;
         listed = device_buffer<std::uint32_t>(backend, voxels);
-        existing = device_buffer<std::uint32_t>(backend, voxels);
+        existing = device_buffer<std::uint32_t>(backend, keeps ? voxels : 0);
         return arrays();
     };
     try {
@@ -106,7 +107,8 @@ template <class Payload, class... Targets>
                       backend.stream, stage::tile_resolve, fold,
                       static_cast<const std::uint64_t*>(made.offsets.data() + made.keys.size()),
                       static_cast<const std::uint32_t*>(listed.data()),
-                      static_cast<const std::uint32_t*>(existing.data()), lists.offsets.data(), lists.payloads.data());
+                      static_cast<const std::uint32_t*>(keeps ? existing.data() : nullptr), lists.offsets.data(),
+                      lists.payloads.data());
     });
     core::store_kept_tiles(backend, fb, tiles, made);
     check(cudaStreamSynchronize(backend.stream), stage::tile_resolve);

@@ -9,6 +9,7 @@
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/device/base/device_buffer.cuh>
 #include <voxelpipe/device/base/launch.cuh>
+#include <voxelpipe/device/scene/scene.cuh>
 #include <voxelpipe/device/sparse/brick_index.cuh>
 #include <voxelpipe/device/sparse/mask_counts.cuh>
 
@@ -39,13 +40,18 @@ struct brick_voxels {
 struct brick_arrays {
     std::uint64_t* keys;
     brick_mask* masks;
-    std::uint64_t* offsets;           // one more than bricks
-    std::uint32_t *listed, *existing; // of each voxel, by rank: its number in the list, its rank before; or no_source
+    std::uint64_t* offsets; // one more than bricks
+    // Of each voxel, by rank: its number in the list, its rank before; or no_source. existing: null if nothing stays.
+    std::uint32_t *listed, *existing;
 };
 
-// The place of a listed voxel in the whole grid.
+// The place of a listed voxel in the whole grid. Most numbers fit 32 bits, whose divisions take a few instructions.
 [[nodiscard]] __device__ VOXELPIPE_INLINE glm::ivec3 place_of(std::uint64_t voxel, const glm::ivec3& extent,
                                                               const glm::ivec3& offset) {
+    if (voxel >> 32 == 0) {
+        const voxel_position at = position_of(static_cast<std::uint32_t>(voxel), extent);
+        return glm::ivec3(at.x, at.y, at.z) + offset;
+    }
     const auto nx = static_cast<std::uint64_t>(extent.x), ny = static_cast<std::uint64_t>(extent.y);
     return glm::ivec3(static_cast<int>(voxel % nx), static_cast<int>(voxel / nx % ny),
                       static_cast<int>(voxel / (nx * ny))) +
@@ -172,8 +178,9 @@ void build_bricks_by_index(const stream_memory& memory, const brick_voxels& from
     check(cudaMemcpyAsync(&on_host, totals.data(), sizeof(on_host), cudaMemcpyDeviceToHost, stream), where);
     check(cudaStreamSynchronize(stream), where);
     to = allocate_voxels(bricks, on_host.voxels);
-    check(cudaMemsetAsync(to.listed, 0xff, on_host.voxels * sizeof(std::uint32_t), stream), where);
-    check(cudaMemsetAsync(to.existing, 0xff, on_host.voxels * sizeof(std::uint32_t), stream), where);
+    if (to.existing != nullptr) // otherwise each voxel is listed
+        for (std::uint32_t* const sources : {to.listed, to.existing})
+            check(cudaMemsetAsync(sources, 0xff, on_host.voxels * sizeof(std::uint32_t), stream), where);
     by_voxels(place_listed_voxels<0>, place_kept_voxels<0>, kept * 8, index.bricks(), to);
     by_bricks(place_voxels_of_tiles<0>, static_cast<const std::uint64_t*>(to.offsets), to.existing);
     check(cudaStreamSynchronize(stream), where);
