@@ -17,8 +17,10 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
+#include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -33,7 +35,7 @@ struct options {
     std::vector<std::string> names;
     std::vector<int> resolutions{1024, 4096, 16384};
     gpu::repetition repeat;
-    int largest_mean = 4096, largest_dense = 1024, largest_octree = 0;
+    int largest_mean = 4096, largest_dense = 1024, largest_octree = 0, slabs = 1;
 };
 
 struct published_sparse {
@@ -102,10 +104,22 @@ struct measured {
     gpu::octree_times octree; // where it is wanted
 };
 
-// One kind of output of one scene in one grid. A backend of its own, so that no memory is there before.
+// Parts of a grid along z, whole bricks of equal size.
+std::vector<vp::grid> cut(const vp::grid& g, int slabs) {
+    const int depth = g.extent.z / slabs;
+    if (slabs < 1 || (slabs > 1 && (g.extent.z % slabs != 0 || depth % 8 != 0)))
+        throw std::runtime_error("slabs of equal size are not whole bricks");
+    std::vector<vp::grid> parts;
+    for (int i = 0; i < slabs; ++i)
+        parts.push_back(slabs == 1 ? g : g.crop({0, 0, i * depth}, {g.extent.x, g.extent.y, depth}));
+    return parts;
+}
+
+// One kind of output of one scene in the parts of a grid, one after the other in the same framebuffer. A backend of its
+// own, so that no memory is there before.
 template <class Framebuffer, class VertexShader, class Shader>
-measured measure(gpu::session& s, const gpu::resident_mesh& mesh, const vp::grid& g, const Shader& shader,
-                 const gpu::repetition& how, bool wants_octree = false) {
+measured measure(gpu::session& s, const gpu::resident_mesh& mesh, const std::vector<vp::grid>& parts,
+                 const Shader& shader, const gpu::repetition& how, bool wants_octree = false) {
     s.wait();
     s.trim();
     vp::cuda_backend backend(s.stream());
@@ -113,24 +127,26 @@ measured measure(gpu::session& s, const gpu::resident_mesh& mesh, const vp::grid
                          {mesh.triangles.data(), mesh.triangles.size()}};
     view.checked = vp::check_indices(backend, view.triangles);
     pool_watch watch;
-    Framebuffer framebuffer(backend, g.extent);
-    vp::status last;
-    const auto call = [&] {
-        last = vp::voxelize(backend, view, g, VertexShader{}, shader, framebuffer);
-        if (last.code == vp::status_code::out_of_memory) throw gpu::out_of_device_memory(last.message());
-        last.or_throw();
-    };
+    Framebuffer framebuffer(backend, parts[0].extent);
     measured m;
+    const auto call = [&] {
+        m.bricks = m.voxels = m.fragments = m.bytes = 0;
+        for (const vp::grid& part : parts) {
+            const vp::status last = vp::voxelize(backend, view, part, VertexShader{}, shader, framebuffer);
+            if (last.code == vp::status_code::out_of_memory) throw gpu::out_of_device_memory(last.message());
+            last.or_throw();
+            m.voxels += last.counts.voxels;
+            m.fragments += last.counts.fragments;
+            if constexpr (requires { framebuffer.num_bricks(); }) {
+                m.bricks += framebuffer.num_bricks();
+                m.bytes = std::max(m.bytes, framebuffer.num_bytes());
+            }
+        }
+    };
     watch.start();
     call();
     s.wait();
     m.peak = watch.peak();
-    m.voxels = last.counts.voxels;
-    m.fragments = last.counts.fragments;
-    if constexpr (requires { framebuffer.num_bricks(); }) {
-        m.bricks = framebuffer.num_bricks();
-        m.bytes = framebuffer.num_bytes();
-    }
     m.ms = gpu::time_calls(s, how, call).median;
     backend.times = &m.stages;
     call();
@@ -167,16 +183,17 @@ int run(const options& how, const std::string& command) {
             for (const bool is_mean : {false, true}) {
                 if (is_mean && n > how.largest_mean) continue;
                 try {
-                    const vp::grid g = vp::fit(data.positions, glm::ivec3(n));
+                    const std::vector<vp::grid> whole{vp::fit(data.positions, glm::ivec3(n))},
+                        parts = cut(whole[0], how.slabs);
                     const auto bits = vp::constant(true);
                     measured m, dense;
                     if (n <= how.largest_dense)
-                        dense = is_mean
-                                    ? measure<dense_mean, pass_position>(session, mesh, g, give_position{}, how.repeat)
-                                    : measure<dense_bits, vp::passthrough>(session, mesh, g, bits, how.repeat);
-                    m = is_mean ? measure<sparse_mean, pass_position>(session, mesh, g, give_position{}, how.repeat,
-                                                                      n <= how.largest_octree)
-                                : measure<sparse_bits, vp::passthrough>(session, mesh, g, bits, how.repeat);
+                        dense = is_mean ? measure<dense_mean, pass_position>(session, mesh, whole, give_position{},
+                                                                             how.repeat)
+                                        : measure<dense_bits, vp::passthrough>(session, mesh, whole, bits, how.repeat);
+                    m = is_mean ? measure<sparse_mean, pass_position>(session, mesh, parts, give_position{}, how.repeat,
+                                                                      n <= how.largest_octree && how.slabs == 1)
+                                : measure<sparse_bits, vp::passthrough>(session, mesh, parts, bits, how.repeat);
                     watch.read();
                     const double peer = is_mean ? 0 : published_peer(data.name, n);
                     rows.add_row(
@@ -239,6 +256,10 @@ int main(int argc, char** argv) {
     app.add_option("--largest-mean", how.largest_mean, "Largest grid of the mean")->capture_default_str();
     app.add_option("--largest-dense", how.largest_dense, "Largest grid of dense targets")->capture_default_str();
     app.add_option("--largest-octree", how.largest_octree, "Largest grid of octrees, of the mean; 0: none")
+        ->capture_default_str();
+    app.add_option("--slabs", how.slabs,
+                   "Parts along z that sparse grids are drawn in, one after the other; result and "
+                   "peak are then those of the largest")
         ->capture_default_str();
     app.add_option("--out", how.out, "Folder for gpu_sparse.md, gpu_sparse.csv and gpu_octrees.csv");
     CLI11_PARSE(app, argc, argv);

@@ -38,7 +38,9 @@ struct device_options {
     double voxel_bytes = 0;
     // What a triangle costs, in bytes of memory that its GPU could fill in the same time.
     double triangle_bytes = 512;
-    int align = 1;         // slabs begin at multiples of this: 8 for targets in bricks that are gathered
+    // Slabs begin at multiples of this: 8 for targets in bricks that are gathered, and for sparse framebuffers; those
+    // of grids of more than 2048 voxels a side may take several times as long where they begin at no multiple of 128.
+    int align = 1;
     bool may_turn = true;  // false: slabs along z, which A-buffers and gather() need
     bool is_solid = false; // for draw_solid: triangles beside the grid along x count too, and slabs are along y or z
 };
@@ -117,7 +119,8 @@ public:
     }
     // Puts every slab's voxelize_async on its GPU's stream, and returns when all are launched. outputs, workspaces: one
     // a slab, in its GPU's memory; a sparse_result may go on from its own slab's. Returns the first call that was not
-    // launched; what the GPUs find out is said by read_status. Outputs and conditions are those of draw().
+    // launched; what the GPUs find out is said by read_status. Outputs and conditions are those of draw(). Surfaces
+    // alone: solids in slabs are draw_solid's, which waits.
     template <class FragmentShader, class Output>
     [[nodiscard]] status draw_async(const FragmentShader& shader, std::vector<Output>& outputs,
                                     std::span<const workspace_view> workspaces) {
@@ -145,7 +148,8 @@ public:
         return s.ok() ? count_whole() : s;
     }
     // Puts merge_async of what draw_async made on the stream of GPU `at`, behind all slabs' calls, and returns. Later
-    // calls of the slabs begin when their results have been copied. whole, workspace: in memory of GPU `at`.
+    // calls of the slabs begin when their results have been copied. whole, workspace: in memory of GPU `at`. Parts that
+    // may have tiles, such as those that go on from solids, are refused (strategy_unavailable): see merge_async.
     template <class... Targets>
     [[nodiscard]] status merge_async(const std::vector<sparse_result<Targets...>>& parts,
                                      std::span<const workspace_view> workspaces, std::size_t at,

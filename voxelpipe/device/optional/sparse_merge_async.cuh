@@ -5,7 +5,9 @@
 // merge_async: joins the results of sparse calls in parts of one grid, on this GPU or on others, to the bytes of one
 // call in the whole. Never waits, never allocates. The parts are copied as far as they have room, since the host does
 // not know how much of it they use; then their bricks are numbered by an index, as those of any call, and each voxel's
-// values go to its rank. Tiles are not joined here: merge() of sparse_merge.hpp does that on the host.
+// values go to its rank. Tiles are not joined here: a brick that a border cuts may become a tile, and eight equal tiles
+// of several parts become one, level by level, so that voxels move behind the bricks, and how many ranks there are is
+// known last. merge() of sparse_merge.hpp does that on the host.
 
 #include <voxelpipe/device/base/for_each.cuh>
 #include <voxelpipe/device/optional/sparse_async.cuh>
@@ -219,7 +221,8 @@ template <class... Targets>
 // is empty, and read_status(backend, workspace) says other_rank_failed or capacity_exceeded.
 // A status other than ok means that nothing was launched, or that a launch failed. extent_mismatch: no parts, not one
 // workspace a part, or parts of several grids. null_view: a part was not drawn, or keeps other sums than the first.
-// strategy_unavailable: a part may have tiles. size_overflow: limits beyond what is numbered.
+// strategy_unavailable: a part may have tiles, which merge() joins on the host. size_overflow: limits beyond what is
+// numbered.
 template <class... Targets>
 [[nodiscard]] status merge_async(cuda_backend& backend,
                                  std::type_identity_t<std::span<const sparse_result<Targets...>>> parts,
