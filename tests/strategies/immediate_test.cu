@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Constant shaders are drawn without tiles if every target takes a fragment by one atomic. Every such target is
-// compared with cpu_backend byte for byte, and so is the choice between this strategy and tiles.
+// Constant shaders are drawn without tiles if every target takes a fragment by one atomic. Sums, several draws, checks
+// of indices and calls in a row are compared with cpu_backend byte for byte; immediate_*_test.cu compare other targets.
 
-#include "cells.hpp"
+#include "immediate_cases.hpp"
 
 #include <gtest/gtest.h>
 
@@ -19,69 +19,6 @@
 namespace {
 
 using namespace device_test;
-namespace blend = voxelpipe::blend;
-
-// Runs of 1 to 40 triangles within a voxel, one voxel after the other.
-mesh_data specks() {
-    mesh_data m;
-    for (int run = 1; run <= 40; ++run)
-        for (int i = 0; i < run; ++i) {
-            const glm::vec3 corner(static_cast<float>(run) - 0.9f, 1.1f + static_cast<float>(run % 3), 1.2f);
-            const float step = 0.01f * static_cast<float>(i);
-            add_triangle(m, corner + glm::vec3(step, 0.0f, 0.1f), corner + glm::vec3(0.3f, 0.5f, step),
-                         corner + glm::vec3(0.1f, 0.2f + step, 0.3f));
-        }
-    return m;
-}
-
-// Slivers and other triangles with bounding boxes of 2 to 40 voxels, or up to `longest`, in all directions.
-mesh_data middling_triangles(glm::ivec3 extent, std::uint32_t seed, int count = 3000, float longest = 40.0f) {
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<float> unit(0.0f, 1.0f);
-    mesh_data m;
-    for (int i = 0; i < count; ++i) {
-        const glm::vec3 a = glm::vec3(unit(random), unit(random), unit(random)) * glm::vec3(extent);
-        const float length = 2.0f + (longest - 2.0f) * unit(random);
-        const auto side = [&](float scale) {
-            return scale * glm::vec3(unit(random) - 0.5f, unit(random) - 0.5f, unit(random) - 0.5f);
-        };
-        const glm::vec3 b = a + side(2.0f * length);
-        add_triangle(m, a, b, (i % 2 == 0 ? b : a) + side(i % 4 < 2 ? 2.0f : length));
-    }
-    return m;
-}
-
-// Cleared and loaded, with and without the voxel counter, in a grid that cuts triangles at every side.
-template <class Targets, class... Values>
-void compare_constants(Targets targets, const vp::constant_output<Values...>& shader) {
-    for (const vp::coverage rule : both_rules) {
-        const mesh_data m = mixed_triangles(3000, 60.0f, 81);
-        expect_same(targets, m, box_grid({60, 47, 71}), vp::passthrough{}, shader, rule);
-        expect_same(targets, m, box_grid({97, 9, 31}), vp::passthrough{}, shader, vp::voxelize_options{rule, false},
-                    start::load);
-        expect_same(targets, mixed_triangles(200, 1.0f, 82), box_grid({1, 1, 1}), vp::passthrough{}, shader, rule);
-        // Odd and even numbers of neighbouring triangles that share one voxel.
-        expect_same(targets, specks(), box_grid({40, 5, 3}), vp::passthrough{}, shader,
-                    vp::voxelize_options{rule, false});
-    }
-}
-
-template <class T>
-void compare_integers(T value) {
-    using targets = target_list<vp::target<T, blend::add>, vp::target<T, blend::min>, vp::target<T, blend::max>,
-                                vp::target<T, blend::bit_and>, vp::target<T, blend::bit_or>,
-                                vp::target<T, blend::bit_xor>, vp::target<T, blend::count>>;
-    compare_constants(targets{}, vp::constant(value, value, value, value, value, value, value));
-}
-
-TEST(Immediate, Unsigned32IsTheCpus) { compare_integers<std::uint32_t>(0x9234567u); }
-TEST(Immediate, Signed32IsTheCpus) { compare_integers<std::int32_t>(-7654321); }
-TEST(Immediate, Unsigned64IsTheCpus) { compare_integers<std::uint64_t>(0x923456789abcdef1u); }
-TEST(Immediate, Signed64IsTheCpus) { compare_integers<std::int64_t>(-765432123456789); }
-
-TEST(Immediate, BitsAreTheCpus) {
-    for (const bool value : {false, true}) compare_constants(bit_targets{}, same_bits(value));
-}
 
 // The size classes between a thread's and a split triangle's. Their limits depend on the grid's fraction bits.
 TEST(Immediate, TrianglesOfMediumSizeGiveTheCpusBytes) {
@@ -96,51 +33,6 @@ TEST(Immediate, TrianglesOfMediumSizeGiveTheCpusBytes) {
         }
 }
 
-// From one triangle, whose work items are spread over the device, to more than it runs at once.
-TEST(Immediate, FewAndManyLargeTrianglesGiveTheCpusBytes) {
-    const glm::ivec3 extent(150, 130, 140);
-    std::mt19937 random(86);
-    std::uniform_real_distribution<float> unit(-0.3f, 1.3f);
-    for (const int count : {1, 2, 7, 33, 300, 2000}) {
-        mesh_data m;
-        for (int i = 0; i < count; ++i) {
-            const auto point = [&] { return glm::vec3(unit(random), unit(random), unit(random)) * glm::vec3(extent); };
-            add_triangle(m, point(), point(), point());
-        }
-        for (const vp::coverage rule : both_rules)
-            expect_same(bit_targets{}, m, box_grid(extent), vp::passthrough{}, same_bits(true), rule);
-    }
-}
-
-// Enough of each size class that every thread has one, and that warps combine words of thin bits. Some lie outside.
-TEST(Immediate, ManyTrianglesOfMediumSizeGiveTheCpusBytes) {
-    const glm::ivec3 extent(190, 170, 180);
-    const mesh_data m = middling_triangles(extent, 89, 150000, 16.0f);
-    for (const vp::coverage rule : both_rules)
-        for (const bool count_voxels : {false, true})
-            expect_same<vp::target<vp::bit, blend::bit_or>>(m, box_grid(extent), vp::passthrough{}, vp::constant(true),
-                                                            vp::voxelize_options{rule, count_voxels});
-    expect_same_lists<void>(m, box_grid(extent), vp::passthrough{}, vp::constant(true),
-                            vp::voxelize_options{vp::coverage::thin, true});
-}
-
-// Few triangles in a bit grid too large for an occupancy mask: bitwise or and and in place, onto loaded targets.
-TEST(Immediate, FewTrianglesInManyBitsGiveTheCpusBytes) {
-    const glm::ivec3 extent(250, 200, 256);
-    mesh_data m = middling_triangles(extent, 88);
-    m.triangles.resize(300);
-    for (const vp::coverage rule : both_rules) {
-        const vp::voxelize_options options{rule, false};
-        const vp::grid g = box_grid(extent);
-        expect_same<vp::target<vp::bit, blend::bit_and>>(m, g, vp::passthrough{}, vp::constant(false), options,
-                                                         start::load);
-        expect_same<vp::target<vp::bit, blend::bit_or>>(m, g, vp::passthrough{}, vp::constant(true), options,
-                                                        start::load);
-        expect_same(target_list<vp::target<vp::bit, blend::bit_and>, vp::target<vp::bit, blend::bit_or>>{}, m, g,
-                    vp::passthrough{}, vp::constant(false, true), options, start::load);
-    }
-}
-
 // Many work items of each triangle, more than the device has warps.
 TEST(Immediate, LargeTrianglesWithManyWorkItemsGiveTheCpusBytes) {
     const glm::ivec3 extent(420, 390, 400);
@@ -151,19 +43,6 @@ TEST(Immediate, LargeTrianglesWithManyWorkItemsGiveTheCpusBytes) {
                     box_grid(extent), vp::passthrough{}, vp::constant(true, 1u), options);
         expect_same<vp::target<vp::bit, blend::bit_or>>(m, box_grid(extent), vp::passthrough{}, vp::constant(true),
                                                         options);
-    }
-}
-
-// As many as there are kept set-ups, some of which are not split, and more: then no set-up is kept, and each work item
-// repeats it.
-TEST(Immediate, MoreLargeTrianglesThanKeptSetUpsGiveTheCpusBytes) {
-    constexpr auto most = static_cast<int>(vp::tuning::max_setups);
-    const glm::ivec3 extent(150, 160, 140);
-    for (const int count : {most, most + most / 4}) {
-        const mesh_data m = long_triangles(extent, count, 88);
-        for (const vp::coverage rule : both_rules)
-            expect_same<vp::target<vp::bit, blend::bit_or>>(m, box_grid(extent), vp::passthrough{}, vp::constant(true),
-                                                            vp::voxelize_options{rule, false});
     }
 }
 
@@ -195,37 +74,6 @@ TEST(Immediate, FlatLargeTrianglesGiveTheCpusBytes) {
                     box_grid(extent), vp::passthrough{}, vp::constant(true, 1u), options);
         expect_same_lists<void>(m, box_grid(extent), vp::passthrough{}, vp::constant(true), options);
     }
-}
-
-// Many triangles for their grid (may_be_close), of which a warp's lie within two, three or five voxels, over a grid
-// whose rows are more than a word long, at its faces and beyond them; one in some batches is longer, lies apart or has
-// no area.
-TEST(Immediate, CloseTrianglesGiveTheCpusBytes) {
-    const glm::ivec3 extent(70, 30, 24);
-    std::mt19937 random(91);
-    std::uniform_real_distribution<float> unit(0.0f, 1.0f);
-    const auto vector = [&] { return glm::vec3(unit(random), unit(random), unit(random)); };
-    mesh_data m;
-    for (int batch = 0; batch < 900; ++batch) {
-        const float reach = batch % 3 == 0 ? 0.6f : batch % 3 == 1 ? 1.4f : 2.5f;
-        const glm::vec3 corner = vector() * glm::vec3(extent + 2) - 1.5f; // most of the grid stays empty
-        for (int i = 0; i < 32; ++i) {
-            const glm::vec3 a = corner + reach * vector(), b = a + 0.7f * vector();
-            const bool is_odd = i == batch % 41;
-            const glm::vec3 c = !is_odd          ? a + 0.7f * vector()
-                                : batch % 4 == 0 ? a + 4.0f * vector()
-                                : batch % 4 == 1 ? a
-                                : batch % 4 == 2 ? a + 9.0f * vector()
-                                                 : a + 100.0f;
-            add_triangle(m, a, b, c);
-        }
-    }
-    ASSERT_TRUE(vp::device::may_be_close(static_cast<std::uint32_t>(m.triangles.size()), extent));
-    for (const vp::coverage rule : both_rules)
-        for (const bool counts : {false, true})
-            for (const start how : {start::clear, start::load})
-                expect_same<vp::target<vp::bit, blend::bit_or>>(m, box_grid(extent), vp::passthrough{},
-                                                                vp::constant(true), {rule, counts}, how);
 }
 
 TEST(Immediate, SumsAreTheCpus) {
