@@ -12,15 +12,30 @@ namespace voxelpipe::core {
 
 // The first number in [0, count] for which is_before(number) is false. It is true below that and not asked of `count`.
 VOXELPIPE_ANY_CALLABLE
-template <class IsBefore>
-[[nodiscard]] VOXELPIPE_HD constexpr std::uint64_t bisect(std::uint64_t count, const IsBefore& is_before) {
-    std::uint64_t first = 0, last = count;
+template <class Number, class IsBefore>
+[[nodiscard]] VOXELPIPE_HD constexpr Number bisect(Number count, const IsBefore& is_before) {
+    Number first = 0, last = count;
     while (first < last) {
-        const std::uint64_t middle = first + (last - first) / 2;
+        const Number middle = first + (last - first) / 2;
         if (is_before(middle))
             first = middle + 1;
         else
             last = middle;
+    }
+    return first;
+}
+
+// The last number in [first, end) for which holds(number) is true. It is true below that, and not asked of `first`, for
+// which it is known: a range of one number reads nothing.
+VOXELPIPE_ANY_CALLABLE
+template <class Number, class Holds>
+[[nodiscard]] VOXELPIPE_HD constexpr Number bisect_last(Number first, Number end, const Holds& holds) {
+    while (end - first > 1) {
+        const Number middle = first + (end - first) / 2;
+        if (holds(middle))
+            first = middle;
+        else
+            end = middle;
     }
     return first;
 }

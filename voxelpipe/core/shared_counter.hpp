@@ -6,6 +6,7 @@
 // order.
 
 #include <voxelpipe/config.hpp>
+#include <voxelpipe/core/bisect.hpp>
 
 #include <atomic>
 #include <cstdint>
@@ -43,15 +44,7 @@ VOXELPIPE_HD inline void store_shared(std::uint32_t& to, std::uint32_t mask, boo
 // The last i of 0 .. count - 1 with first[i] <= number; first[0] is 0.
 [[nodiscard]] VOXELPIPE_HD inline std::uint32_t find_owner(const std::uint64_t* first, std::uint32_t count,
                                                            std::uint64_t number) {
-    std::uint32_t lo = 0, hi = count;
-    while (hi - lo > 1) {
-        const std::uint32_t middle = lo + (hi - lo) / 2;
-        if (first[middle] <= number)
-            lo = middle;
-        else
-            hi = middle;
-    }
-    return lo;
+    return bisect_last(0u, count, [=](std::uint32_t i) { return first[i] <= number; });
 }
 
 } // namespace voxelpipe::core

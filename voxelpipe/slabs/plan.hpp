@@ -10,6 +10,7 @@
 //   split       a number of slabs, so that the most expensive one is as cheap as cuts between layers allow
 //   cover       as few slabs as keep each one below a limit
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/status.hpp>
@@ -140,12 +141,11 @@ public:
 
     // The longest range from `begin` on whose cost is at most `limit`: one step of alignment at least.
     [[nodiscard]] layer_range longest(int begin, std::uint64_t limit) const {
-        int fits = 1, too_long = (layers_ - begin + step_ - 1) / step_ + 1; // numbers of steps
-        while (too_long - fits > 1) {
-            const int middle = fits + (too_long - fits) / 2;
-            (cost({begin, end_of(begin, middle)}) <= limit ? fits : too_long) = middle;
-        }
-        return {begin, end_of(begin, fits)};
+        const int all = (layers_ - begin + step_ - 1) / step_;
+        const int steps = core::bisect_last(1, all + 1, [&](int n) {
+            return cost({begin, end_of(begin, n)}) <= limit;
+        });
+        return {begin, end_of(begin, steps)};
     }
     // The fewest ranges whose costs are at most `limit`, but for single steps that cost more.
     [[nodiscard]] std::vector<layer_range> ranges_below(std::uint64_t limit) const {
@@ -180,19 +180,13 @@ private:
 [[nodiscard]] inline plan split_along(const histogram& counts, int axis, int num_slabs, const plan_options& options) {
     const layer_costs costs(counts, axis, options);
     // The least limit that `num_slabs` ranges meet: costs grow with their ranges, so longest ranges need the fewest.
-    std::uint64_t low = 0, high = costs.cost({0, costs.layers()});
     const auto meets = [&](std::uint64_t limit) {
         const auto ranges = costs.ranges_below(limit);
         return ranges.size() <= static_cast<std::size_t>(num_slabs) && costs.dearest(ranges) <= limit;
     };
-    while (low < high) {
-        const std::uint64_t middle = low + (high - low) / 2;
-        if (meets(middle))
-            high = middle;
-        else
-            low = middle + 1;
-    }
-    std::vector<layer_range> ranges = costs.ranges_below(low);
+    const std::uint64_t least =
+        core::bisect(costs.cost({0, costs.layers()}), [&](std::uint64_t limit) { return !meets(limit); });
+    std::vector<layer_range> ranges = costs.ranges_below(least);
     ranges.resize(static_cast<std::size_t>(num_slabs), {costs.layers(), costs.layers()});
     return make_plan(costs, axis, std::move(ranges));
 }

@@ -5,6 +5,7 @@
 // Long voxels: those with more fragments than a window holds (fragments/order_voxels.cuh). A warp or a block sorts such
 // a voxel; a longer one is divided into runs, which are sorted and merged.
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/device/base/block_scan.cuh>
 #include <voxelpipe/device/fragments/order_memory.cuh>
 #include <voxelpipe/device/fragments/warp_sort.cuh>
@@ -200,17 +201,7 @@ __global__ __launch_bounds__(tuning::dense_threads) void order_dense_kernel(cons
 // Number of n sorted numbers that are less than w.
 [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t count_less(const std::uint32_t* numbers, std::uint32_t n,
                                                                    std::uint32_t w) {
-    std::uint32_t lo = 0;
-    while (n > 0) {
-        const std::uint32_t half = n / 2;
-        if (numbers[lo + half] < w) {
-            lo += half + 1;
-            n -= half + 1;
-        } else {
-            n = half;
-        }
-    }
-    return lo;
+    return core::bisect(n, [=](std::uint32_t i) { return numbers[i] < w; });
 }
 
 // Merges up to merge_ways sorted runs of `length` each: a primitive's position is the sum, over the runs, of how many

@@ -5,6 +5,7 @@
 // The scene as kernels see it. geometry: triangles and snapped positions, which is all that the coarse stages read.
 // scene: geometry with the draws' shaders and varyings.
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/core/numbering.hpp>
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/device/base/call_state.cuh>
@@ -82,16 +83,8 @@ struct geometry {
     }
 
     [[nodiscard]] VOXELPIPE_HD std::uint32_t find_draw(std::uint32_t primitive) const {
-        std::uint32_t lo = 0,
-                      hi = num_draws; // the last draw that begins at or before the primitive; empty draws precede it
-        while (hi - lo > 1) {
-            const std::uint32_t middle = lo + (hi - lo) / 2;
-            if (draw(middle).first_primitive <= primitive)
-                lo = middle;
-            else
-                hi = middle;
-        }
-        return lo;
+        // Empty draws precede the one that begins at the same primitive.
+        return core::bisect_last(0u, num_draws, [&](std::uint32_t d) { return draw(d).first_primitive <= primitive; });
     }
 
     [[nodiscard]] VOXELPIPE_HD loaded_triangle load(std::uint32_t primitive) const {

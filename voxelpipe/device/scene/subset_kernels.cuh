@@ -4,6 +4,7 @@
 
 // Kernels and launches of scene/subset.cuh.
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/device/base/warp.cuh>
 #include <voxelpipe/device/scene/subset.cuh>
 
@@ -30,12 +31,8 @@ __global__ void renumber_lists_kernel(const listed_draw* draws, std::uint32_t nu
     const std::uint64_t n = count != nullptr ? *count : most;
     for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < n;
          i += std::uint64_t{gridDim.x} * blockDim.x) {
-        std::uint32_t lo = 0, hi = num_draws; // the last draw that begins at or before the primitive
-        while (hi - lo > 1) {
-            const std::uint32_t middle = lo + (hi - lo) / 2;
-            (draws[middle].first <= primitives[i] ? lo : hi) = middle;
-        }
-        const listed_draw& d = draws[lo];
+        const listed_draw& d =
+            draws[core::bisect_last(0u, num_draws, [&](std::uint32_t at) { return draws[at].first <= primitives[i]; })];
         const std::uint32_t drawn = primitives[i] - d.first;
         primitives[i] = d.numbers.of(drawn % d.each, drawn / d.each).primitive;
     }

@@ -5,6 +5,7 @@
 // Crossings of triangles that the first pass (solid/small_rows.cuh) leaves: those of many rows, and those beyond 32
 // bits. They are cut into work items of 32 lines of rows, a line a lane of a warp, which all warps share.
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/device/solid/crossing_sinks.cuh>
 #include <voxelpipe/tuning/tuning_solid.hpp>
 
@@ -145,22 +146,16 @@ __device__ VOXELPIPE_INLINE std::uint32_t emit_item(const Source& source, const 
     crossing_line line{0, {0, -1}};
     std::uint32_t draw = 0;
     if (valid) {
-        std::uint32_t lo = 0, hi = num_triangles; // the last one that begins at or before the item
-        while (hi - lo > 1) {
-            const std::uint32_t middle = lo + (hi - lo) / 2;
-            if (kept.first_items[middle] <= item)
-                lo = middle;
-            else
-                hi = middle;
-        }
-        const auto at = source.locate(kept.triangles[lo]);
+        const std::uint32_t triangle =
+            core::bisect_last(0u, num_triangles, [&](std::uint32_t i) { return kept.first_items[i] <= item; });
+        const auto at = source.locate(kept.triangles[triangle]);
         draw = at.draw;
         p[0] = source.exact(at, at.index.x);
         p[1] = source.exact(at, at.index.y);
         p[2] = source.exact(at, at.index.z);
         const core::row_box rows = core::rows_within<0>(p[0], p[1], p[2], grid.fraction, grid.whole_box());
         const item_grid parts(rows);
-        const auto part = static_cast<std::uint32_t>(item - kept.first_items[lo]);
+        const auto part = static_cast<std::uint32_t>(item - kept.first_items[triangle]);
         line.z = rows.v.lo + std::int64_t{part % parts.by_z} * tuning::lines_per_item + threadIdx.x % 32;
         line.y.lo = rows.u.lo + std::int64_t{part / parts.by_z} * tuning::rows_per_line;
         line.y.hi =

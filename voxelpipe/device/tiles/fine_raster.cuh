@@ -8,6 +8,7 @@
 // full; what 32 bits do not serve is divided into units of about equal cost, one per thread. So one triangle that fills
 // the tile and a thousand in one voxel keep the block equally busy.
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/tiles/tile_image.cuh>
 #include <voxelpipe/device/tiles/tile_part.cuh>
@@ -232,19 +233,13 @@ __device__ void for_each_fragment(const Scene& s, const core::voxel_box& tile, c
         }
         const int all = m.sums[Threads - 1];
         for (int u = static_cast<int>(threadIdx.x); u < all; u += Threads) {
-            int lo = 0, hi = Threads - 1; // the first triangle whose sum is beyond u
-            while (lo < hi) {
-                const int middle = (lo + hi) / 2;
-                if (m.sums[middle] > u)
-                    hi = middle;
-                else
-                    lo = middle + 1;
-            }
-            const int unit = u - (lo == 0 ? 0 : m.sums[lo - 1]);
-            const std::uint32_t triangle = m.ids[lo];
+            // The first one whose sum is beyond u.
+            const unsigned at = core::bisect(Threads - 1u, [&](unsigned i) { return m.sums[i] <= u; });
+            const int unit = u - (at == 0 ? 0 : m.sums[at - 1]);
+            const std::uint32_t triangle = m.ids[at];
             const loaded_triangle t = s.geo.load(triangle);
             shade_fragments<Rule>(
-                s, t, triangle, m.lists[lo].unit(tile, unit),
+                s, t, triangle, m.lists[at].unit(tile, unit),
                 [&](int x, int y, int z, const auto& out) { visit(voxel_of(x, y, z), triangle, out); });
         }
         __syncthreads();

@@ -4,6 +4,7 @@
 
 // The coarse pass (tiles/tile_passes.cuh) and its kernels, which depend on no shader and no target.
 
+#include <voxelpipe/core/bisect.hpp>
 #include <voxelpipe/device/tiles/coarse_raster.cuh>
 #include <voxelpipe/device/tiles/tile_passes.cuh>
 
@@ -26,15 +27,9 @@ __global__ void tile_split_kernel(const std::uint32_t* keys, Buffers out, pipeli
         lo += step;
         step *= 2;
     }
-    std::uint64_t hi = lo + step < num_pairs ? lo + step : num_pairs;
-    while (hi - lo > 1) {
-        const std::uint64_t middle = lo + (hi - lo) / 2;
-        if (keys[middle] == tile)
-            lo = middle;
-        else
-            hi = middle;
-    }
-    const auto count = static_cast<std::uint32_t>(hi - first);
+    const std::uint64_t end = lo + step < num_pairs ? lo + step : num_pairs;
+    const std::uint64_t last = core::bisect_last(lo, end, [=](std::uint64_t at) { return keys[at] == tile; });
+    const auto count = static_cast<std::uint32_t>(last + 1 - first);
     const std::uint32_t parts = (count + out.pairs_per_item - 1) / out.pairs_per_item;
     const std::uint32_t at = atomicAdd(&state->num_items, parts);
     if (parts == 1) {
