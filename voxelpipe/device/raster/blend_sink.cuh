@@ -52,14 +52,10 @@ struct blending_sink : sink_base<Call> {
     // Blends the voxels x0 + i of a row, for the bits i of the mask.
     __device__ VOXELPIPE_INLINE void row(int x0, int y, int z, word mask) {
         if (mask == 0) return;
-        mine.fragments += static_cast<unsigned>(__popc(mask));
-        each_target([&]<std::size_t K, class Target>(const target_view<Target>& t, immediate_mode mode)
-                        VOXELPIPE_INLINE_LAMBDA {
-                            if constexpr (has_value_rows<Target>)
-                                if (mode == immediate_mode::blend) [[likely]]
-                                    return add_row(t, x0, y, z, mask, value_of<K>());
-                            mine.touched += blend_row(t, x0, y, z, mask, value_of<K>(), mode);
-                        });
+        add_or_blend(
+            mask, [=](const auto& t, const auto& value) VOXELPIPE_INLINE_LAMBDA { add_row(t, x0, y, z, mask, value); },
+            [=](const auto& t, const auto& value, immediate_mode mode)
+                VOXELPIPE_INLINE_LAMBDA { return blend_row(t, x0, y, z, mask, value, mode); });
     }
     __device__ VOXELPIPE_INLINE void row_by_all(unsigned, int x0, int y, int z, word mask) {
         const word own = mask & bits_of_lane();
@@ -89,14 +85,11 @@ struct blending_sink : sink_base<Call> {
     }
     // Voxels as in blend_cube.
     __device__ VOXELPIPE_INLINE void cube(int x, int y, int z, word voxels) {
-        mine.fragments += static_cast<unsigned>(__popc(voxels));
-        each_target([&]<std::size_t K, class Target>(const target_view<Target>& t, immediate_mode mode)
-                        VOXELPIPE_INLINE_LAMBDA {
-                            if constexpr (has_value_rows<Target>)
-                                if (mode == immediate_mode::blend) [[likely]]
-                                    return add_cube(t, x, y, z, voxels, value_of<K>());
-                            mine.touched += blend_cube(t, x, y, z, voxels, value_of<K>(), mode);
-                        });
+        add_or_blend(
+            voxels,
+            [=](const auto& t, const auto& value) VOXELPIPE_INLINE_LAMBDA { add_cube(t, x, y, z, voxels, value); },
+            [=](const auto& t, const auto& value, immediate_mode mode)
+                VOXELPIPE_INLINE_LAMBDA { return blend_cube(t, x, y, z, voxels, value, mode); });
     }
     // Counts voxels that are drawn by other means.
     __device__ VOXELPIPE_INLINE void count(word voxels) { mine.fragments += static_cast<unsigned>(__popc(voxels)); }
@@ -148,6 +141,20 @@ private:
             return true;
         else
             return (voxelpipe::get<K>(this->call.out.values));
+    }
+    // Counts the fragments of `bits`, and gives them to each target: to one whose values are added by rows, in the mode
+    // `blend`, by add(target, value), to any other by blend(target, value, mode), which returns how many voxels are
+    // new.
+    template <class Add, class Blend>
+    __device__ VOXELPIPE_INLINE void add_or_blend(word bits, const Add& add, const Blend& blend) {
+        mine.fragments += static_cast<unsigned>(__popc(bits));
+        each_target([&]<std::size_t K, class Target>(const target_view<Target>& t, immediate_mode mode)
+                        VOXELPIPE_INLINE_LAMBDA {
+                            if constexpr (has_value_rows<Target>)
+                                if (mode == immediate_mode::blend) [[likely]]
+                                    return add(t, value_of<K>());
+                            mine.touched += blend(t, value_of<K>(), mode);
+                        });
     }
     template <class F>
     __device__ VOXELPIPE_INLINE void each_target(F&& f) const {
