@@ -12,26 +12,6 @@
 
 namespace voxelpipe::cpu {
 
-// True if the values have equal bytes. Padding within a value may differ, which makes it false.
-template <class... Ts>
-[[nodiscard]] bool same_values(const constant_output<Ts...>& a, const constant_output<Ts...>& b) {
-    bool same = true;
-    core::for_each_index<sizeof...(Ts)>([&]<std::size_t I>() {
-        const auto &x = get<I>(a.values), &y = get<I>(b.values);
-        // Equal bytes mean equal values. Draws with equal values in different bytes are shaded fragment by fragment.
-        same = same && std::memcmp(&x, &y, sizeof(x)) == 0; // NOLINT(bugprone-suspicious-memory-comparison)
-    });
-    return same;
-}
-
-// True if all draws give the same values.
-template <class Scene>
-[[nodiscard]] bool same_values(const Scene& s) {
-    for (const auto& d : s.draws)
-        if (!same_values(d.fragment_shader, s.draws[0].fragment_shader)) return false;
-    return true;
-}
-
 // True if folding the same value a second time changes nothing.
 template <class Blend, class T>
 inline constexpr bool folds_once = std::is_same_v<Blend, blend::replace> || std::is_same_v<Blend, blend::min> ||

@@ -8,6 +8,7 @@
 
 #include <cpu_ref/bin_triangles.hpp>
 #include <cpu_ref/constant_tile.hpp>
+#include <voxelpipe/core/same_bits.hpp>
 
 #include <array>
 #include <atomic>
@@ -266,7 +267,7 @@ template <coverage Rule, class Key, class Scene, class... Targets>
     const unsigned workers = binned.workers(how.threads);
     bool constant_output = false;
     if constexpr (core::is_constant<typename Scene::fragment_shader>) {
-        constant_output = same_values(s);
+        constant_output = core::have_same_values(s.draws);
         if (constant_output)
             raster_constant_tiles<Rule>(how, s, binned.tiles, binned.ranges, binned.pairs, workers, fb, result.counts);
     }

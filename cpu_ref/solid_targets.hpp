@@ -8,6 +8,7 @@
 
 #include <cpu_ref/framebuffer_pass.hpp>
 #include <cpu_ref/solid_rows.hpp>
+#include <voxelpipe/core/same_bits.hpp>
 
 #include <bit>
 #include <cstddef>
@@ -212,10 +213,7 @@ void sweep_all(const execution& how, const solid_sweep<Crossing>& sweep,
 // True if all draws that give fragments give the same values.
 template <class Draw>
 [[nodiscard]] bool has_same_values(std::span<const Draw> draws, bodies body) {
-    if (body == bodies::call) return true;
-    for (const auto& d : draws)
-        if (!same_values(d.fragment_shader, draws[0].fragment_shader)) return false;
-    return true;
+    return body == bodies::call || core::have_same_values(draws);
 }
 
 template <class Draw>

@@ -13,6 +13,7 @@
 // Triangles are a source (surface_source), and so are solids (sparse_solid.hpp).
 
 #include <cpu_ref/sparse_tile.hpp>
+#include <voxelpipe/core/same_bits.hpp>
 #include <voxelpipe/sparse/kept_tiles.hpp>
 
 #include <algorithm>
@@ -63,7 +64,7 @@ public:
                 pairs_[i].key = core::morton_key(corner + tiles.position(pairs_[i].key));
         });
         ranges_ = tile_sort(how, pairs_, core::morton_key(corner + tiles.tiles - 1) + 1);
-        if constexpr (core::is_constant<typename Scene::fragment_shader>) all_same_ = same_values(s);
+        if constexpr (core::is_constant<typename Scene::fragment_shader>) all_same_ = core::have_same_values(s.draws);
     }
 
     status_code code = status_code::ok;

@@ -6,12 +6,12 @@
 // voxel, whatever the layout. for_each_voxel and for_each_occupied visit either.
 
 #include <voxelpipe/core/layout.hpp>
+#include <voxelpipe/core/same_bits.hpp>
 
 #include <glm/vec3.hpp>
 
 #include <algorithm>
 #include <cstddef>
-#include <cstring>
 #include <type_traits>
 #include <vector>
 
@@ -127,7 +127,7 @@ namespace core {
 template <class T>
 [[nodiscard]] bool is_same_value(const T& a, const T& b) {
     if constexpr (is_scalar<T> || vector_traits<T>::components > 1 || std::is_same_v<T, bool>)
-        return std::memcmp(&a, &b, sizeof(T)) == 0;
+        return has_same_bits(a, b);
     else
         return a == b;
 }

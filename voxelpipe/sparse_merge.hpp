@@ -5,6 +5,7 @@
 // Joins sparse framebuffers of parts of one grid, in host memory, to what one call in the whole gives: bricks that a
 // border cuts, and tiles that meet at one.
 
+#include <voxelpipe/core/same_bits.hpp>
 #include <voxelpipe/host_sparse.hpp>
 
 #include <glm/common.hpp>
@@ -12,7 +13,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
 #include <stdexcept>
 #include <type_traits>
@@ -37,7 +37,7 @@ template <class... Targets>
             using sum = kept_sum<target>;
             static_assert(std::has_unique_object_representations_v<sum>);
             const auto &s = voxelpipe::get<I>(a.sums), &t = voxelpipe::get<I>(b.sums);
-            if (!s.empty()) same = same && std::memcmp(&s[i], &t[j], sizeof(sum)) == 0;
+            if (!s.empty()) same = same && has_same_bits(s[i], t[j]);
         }
     });
     return same;

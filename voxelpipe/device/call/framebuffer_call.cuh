@@ -6,6 +6,7 @@
 // kernels on one stream without waiting (launch). voxelize reads the counters at the end; voxelize_async leaves them on
 // the device.
 
+#include <voxelpipe/core/same_bits.hpp>
 #include <voxelpipe/device/call/graph_cache.cuh>
 #include <voxelpipe/device/call/immediate_strategy.cuh>
 #include <voxelpipe/device/call/mask_strategy.cuh>
@@ -239,11 +240,7 @@ private:
                        is_listable(plan.num_primitives, core::make_snap_transform(plan.g).fraction, plan.g.extent);
         f.fits_in_passes = core::arms_of(plan.options.rule) == core::arm_set::none &&
                            is_listable(max_pass_triangles(), core::make_snap_transform(plan.g).fraction, plan.g.extent);
-        if constexpr (core::is_constant<FragmentShader>)
-            f.all_draws_equal = std::all_of(draws.begin(), draws.end(), [&](const draw_type& d) {
-                return std::memcmp(&draws[0].fragment_shader.values, &d.fragment_shader.values,
-                                   sizeof(d.fragment_shader.values)) == 0;
-            });
+        if constexpr (core::is_constant<FragmentShader>) f.all_draws_equal = core::have_same_values(draws);
         f.blends_in_place = possible.immediate && plan.targets.possible;
         f.counts_are_cheap = plan.targets.is_cheap;
         f.counts_voxels = plan.options.count_voxels;

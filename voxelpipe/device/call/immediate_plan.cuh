@@ -4,11 +4,11 @@
 
 // Decides, for calls of constant shaders, which targets are blended in place and which count their fragments.
 
+#include <voxelpipe/core/same_bits.hpp>
 #include <voxelpipe/device/targets/finalize_counts.cuh>
 #include <voxelpipe/tuning/tuning_strategy.hpp>
 
 #include <bit>
-#include <cstring>
 #include <span>
 
 namespace voxelpipe::device {
@@ -20,7 +20,7 @@ template <std::size_t K, class Target, class Draw>
         if constexpr (!std::is_same_v<typename Target::blend_type, blend::count>) {
             const auto& first = voxelpipe::get<K>(draws[0].fragment_shader.values);
             for (const Draw& d : draws) // numbers: equal bytes are equal values
-                if (std::memcmp(&first, &voxelpipe::get<K>(d.fragment_shader.values), sizeof(first)) != 0) return false;
+                if (!core::has_same_bits(first, voxelpipe::get<K>(d.fragment_shader.values))) return false;
         }
         return true;
     } else {

@@ -7,6 +7,7 @@
 // voxels sets bits in the masks. Values follow from the masks, or from the number of fragments of each voxel. Nothing
 // is sorted, and beside the result memory is in proportion to the bricks and the triangles.
 
+#include <voxelpipe/core/same_bits.hpp>
 #include <voxelpipe/device/base/call_state.cuh>
 #include <voxelpipe/device/call/attempt.cuh>
 #include <voxelpipe/device/call/strategy.hpp>
@@ -16,9 +17,7 @@
 #include <voxelpipe/device/sparse/mask_values.cuh>
 #include <voxelpipe/sparse.hpp>
 
-#include <algorithm>
 #include <cstdint>
-#include <cstring>
 #include <optional>
 #include <span>
 
@@ -37,10 +36,7 @@ template <class Draw>
            is_rastered(triangles_in, core::make_snap_transform(g).fraction, g.extent,
                        rule == coverage::thin ? split_pieces<coverage::thin>::max_work_items(g.extent)
                                               : split_pieces<coverage::conservative>::max_work_items(g.extent)) &&
-           std::all_of(draws.begin(), draws.end(), [&](const Draw& d) {
-               return std::memcmp(&draws[0].fragment_shader.values, &d.fragment_shader.values,
-                                  sizeof(d.fragment_shader.values)) == 0;
-           });
+           core::have_same_values(draws);
 }
 template <class Draw, class Backend, class... Targets>
 [[nodiscard]] bool follows_from_masks(std::span<const Draw> draws, const grid& g, coverage rule,

@@ -7,6 +7,7 @@
 // floats need not be exact in its type, and voxels can be counted without an atomic that reports first touches. Here
 // are the decision which targets are counted (immediate_plan) and the last pass (finalize_counts).
 
+#include <voxelpipe/core/same_bits.hpp>
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/targets/dirty_chunks.cuh>
 #include <voxelpipe/device/targets/immediate_mode.cuh>
@@ -47,7 +48,7 @@ template <class Target>
     if constexpr (is_countable<Target> && !map::bricks) {
         constexpr typename Target::value_type none{};
         return map::elements(t.extent) * sizeof(none) >= tuning::marked_bytes &&
-               std::memcmp(&t.clear_value, &none, sizeof(none)) == 0;
+               core::has_same_bits(t.clear_value, none);
     } else {
         return false;
     }
