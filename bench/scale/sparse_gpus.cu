@@ -171,6 +171,7 @@ public:
         for (std::size_t i = 0; i < parts.size(); ++i) {
             vp::workspace_limits l = vp::workspace_limits::for_triangles(drawn_.mesh(i).num_triangles());
             l.fragments = drawn_.slabs()[i].drawn.counts.fragments;
+            l.lists_fragments = true;
             l.bricks = parts[i].num_bricks();
             l.voxels = parts[i].num_voxels();
             limits.push_back(l);

@@ -18,12 +18,23 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <random>
 
 namespace {
 
 using namespace sparse_pairs;
+
+// Notes the most bytes that were live.
+struct peak_resource : device_test::counting_resource {
+    std::size_t peak = 0;
+    void* allocate_async(std::size_t bytes, std::size_t alignment, cudaStream_t stream) {
+        void* const p = device_test::counting_resource::allocate_async(bytes, alignment, stream);
+        peak = std::max(peak, live);
+        return p;
+    }
+};
 
 } // namespace
 
@@ -184,6 +195,41 @@ TEST(DeviceSparse, LargeTrianglesGiveTheBytesOfTheCpu) {
         constant_pair p(part.extent);
         p.draw({mesh}, part, vp::coverage::conservative, "a part of a large grid", constant_shader);
         EXPECT_GT(p.on_host.num_voxels(), 10000u);
+    }
+}
+
+// Beside the result a call takes 20 bytes a triangle and no setups, and they are gone when keys and ranks come.
+TEST(DeviceSparse, ConstantShadersTakeLittleMemoryBesideTheResult) {
+    const glm::ivec3 extent{256, 256, 256};
+    const vp::grid grid = unit::unit_grid(extent);
+    for (const float size : {1.0f, 5.0f}) {
+        std::mt19937 random{7};
+        std::uniform_real_distribution<float> place(1.0f, 250.0f), side(0.0f, size);
+        unit::small_mesh mesh;
+        constexpr std::uint32_t triangles = 9000;
+        for (std::uint32_t i = 0; i < 3 * triangles; i += 3) {
+            const glm::vec3 at(place(random), place(random), place(random));
+            for (int k = 0; k < 3; ++k) mesh.positions.push_back(at + glm::vec3(side(random), side(random), size));
+            mesh.triangles.emplace_back(i, i + 1, i + 2);
+        }
+        peak_resource memory;
+        {
+            device_test::stream_owner owner;
+            vp::cuda_backend gpu{owner.stream, memory};
+            const vp::mesh<vp::cuda_backend> on_device(gpu, mesh.positions, mesh.triangles);
+            vp::sparse_framebuffer<vp::cuda_backend, vp::target<vp::bit, blend::bit_or>> fb(gpu, extent);
+            const std::size_t before = memory.live;
+            memory.peak = before;
+            const vp::status s = vp::voxelize(gpu, on_device, grid, vp::passthrough{}, vp::constant(true), fb);
+            ASSERT_TRUE(s.ok()) << s.message();
+            EXPECT_GT(fb.num_voxels(), triangles);
+            const std::size_t lists = 20 * triangles, index = std::size_t{1} << 14;
+            const std::size_t while_drawn = lists + fb.num_bricks() * sizeof(vp::brick_mask),
+                              in_the_end = fb.num_bytes() + 8 * fb.num_bricks();
+            EXPECT_LE(memory.peak - before, std::max(while_drawn, in_the_end) + index);
+            EXPECT_GT(memory.peak - before, fb.num_bytes());
+        }
+        EXPECT_EQ(memory.live, 0u);
     }
 }
 

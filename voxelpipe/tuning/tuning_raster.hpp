@@ -68,8 +68,10 @@ inline constexpr int pieces_per_work_item = Rule == coverage::thin ? 32 : 8;
 // All triangles are set up before their work items are drawn if each warp has at least this many.
 inline constexpr unsigned min_items_for_setups = 3;
 inline constexpr std::size_t max_setups = 1u << 14; // that are kept
-inline constexpr int setup_polls = 256;             // of their number, before a warp sets up its own
-inline constexpr int max_bricks = 64;               // that wait in a warp
+// Largest side of a sparse grid whose bricks are marked without kept setups, which would take more than the result.
+inline constexpr int max_extent_without_setups = 4096;
+inline constexpr int setup_polls = 256; // of their number, before a warp sets up its own
+inline constexpr int max_bricks = 64;   // that wait in a warp
 
 // ---- counting and emitting cells (device/scene/count_and_emit.cuh) --------------------------------------------------
 

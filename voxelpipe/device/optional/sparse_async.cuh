@@ -61,6 +61,7 @@ private:
     void by_masks(arena& memory, sparse_result<Targets...>& result) const {
         auto* const state = memory.take<pipeline_state>(1);
         brick_raster<draw_type> raster(draws, g, stream, nullptr, memory);
+        raster.take_lists(memory, true);
         const bounded_result<bounded_bricks<>, Targets...> made({g.whole_extent(), to_room(workspace.limits), memory},
                                                                 workspace.limits, result, memory);
         const std::uint64_t num_counts = workspace.limits.voxels + spare_ranks;

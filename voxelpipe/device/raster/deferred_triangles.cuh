@@ -71,26 +71,34 @@ struct deferred_triangles {
     unsigned long long* setups_ready;
     std::uint32_t num_setups;
 
-    // Oversized triangles that a block of the first pass leaves until its end, in a part of the array for each block.
-    // Later, if setups are kept: the setup of each work item.
+    // Oversized triangles that a block of the first pass leaves until its end, in a part of the array for each block;
+    // not used by outputs whose blocks find them again. Later, if setups are kept: the setup of each work item.
     std::uint32_t* oversized;
     std::uint64_t oversized_capacity;
 
     [[nodiscard]] static deferred_triangles take(arena& memory, std::size_t num_triangles) {
+        deferred_triangles l = take_lists(memory, num_triangles);
+        l.take_setups(memory, num_triangles);
+        return l;
+    }
+    // The lists alone, for outputs whose blocks find oversized triangles again: no setups are kept.
+    [[nodiscard]] static deferred_triangles take_lists(arena& memory, std::size_t num_triangles) {
         deferred_triangles l{};
         l.work_item_bits = work_item_bits_for(num_triangles);
-        // A block's part holds whole batches of all threads of a persistent kernel.
-        const std::size_t threads = std::max(static_cast<std::size_t>(num_multiprocessors()) * 2048,
-                                             num_triangles / warp_triangles::max_rounds + tuning::raster_threads);
-        l.oversized_capacity = num_triangles + std::min(threads, num_triangles + 2048);
-        l.oversized = memory.take<std::uint32_t>(l.oversized_capacity);
         for (auto& array : l.arrays) array = memory.take<std::uint32_t>(num_triangles);
         l.capacity = static_cast<std::uint32_t>(num_triangles);
         l.split = memory.take<std::uint32_t>(num_triangles);
         l.first_work_items = memory.take<unsigned long long>(num_triangles);
-        l.num_setups = static_cast<std::uint32_t>(std::min(num_triangles, tuning::max_setups));
-        l.setups = memory.take<std::byte>(l.num_setups * setup_bytes);
         return l;
+    }
+    void take_setups(arena& memory, std::size_t num_triangles) {
+        // A block's part holds whole batches of all threads of a persistent kernel.
+        const std::size_t threads = std::max(static_cast<std::size_t>(num_multiprocessors()) * 2048,
+                                             num_triangles / warp_triangles::max_rounds + tuning::raster_threads);
+        oversized_capacity = num_triangles + std::min(threads, num_triangles + 2048);
+        oversized = memory.take<std::uint32_t>(oversized_capacity);
+        num_setups = static_cast<std::uint32_t>(std::min(num_triangles, tuning::max_setups));
+        setups = memory.take<std::byte>(num_setups * setup_bytes);
     }
     // Sets the pointers to the counters, which must be zero.
     [[nodiscard]] deferred_triangles with(pipeline_state* state) const {

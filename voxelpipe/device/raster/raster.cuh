@@ -11,6 +11,7 @@
 #include <voxelpipe/device/raster/block_pass.cuh>
 #include <voxelpipe/device/raster/deferred_pass.cuh>
 #include <voxelpipe/device/raster/deferred_triangles.cuh>
+#include <voxelpipe/device/raster/oversized.cuh>
 #include <voxelpipe/device/raster/small_triangles.cuh>
 #include <voxelpipe/device/raster/split_triangles.cuh>
 #include <voxelpipe/device/raster/warp_combine.cuh>
@@ -36,8 +37,6 @@ union cubes_or_rows {
     cube_queue cubes;
     kept_rows rows;
 };
-
-inline constexpr int oversized_side = 64; // stands for triangles to split: larger than max_group_side
 
 // Shared memory of one warp of the first pass.
 template <class Call>
@@ -85,14 +84,9 @@ struct first_warp {
         int32_triangle r;
         if (valid) {
             r = load();
-            side = r.longest_side();
             inside = r.inside(call.in.extent);
-            if (!r.fits_int32 || side > max_group_side(call.in.fraction)) {
-                side = oversized_side;
-            } else if (inside < 0 && r.template is_outside<Call::rule>(call.in.extent)) {
-                sink.drop(triangle_class::outside);
-                side = 0;
-            }
+            side = side_to_draw<Call::rule>(call.in, r, inside);
+            if (side == 0) sink.drop(triangle_class::outside);
         }
         if constexpr (!thin) {
             if (!draws_slim(i, r, inside, side, load_next)) {
@@ -133,7 +127,10 @@ struct first_warp {
         if (__any_sync(0xffffffffu, side != 0)) {
             writer.push(side != 0 && side != oversized_side ? size_class_of<Call::rule>(r, side) : -1, code);
             // A function call here would spill the caller's registers.
-            if (side == oversized_side) oversized[atomicAdd(&num_oversized, 1u)] = i;
+            if (side == oversized_side) {
+                const unsigned at = atomicAdd(&num_oversized, 1u);
+                if constexpr (!finds_oversized_again<typename Call::output>) oversized[at] = i;
+            }
         }
         __syncwarp();
         if constexpr (thin)
@@ -298,17 +295,18 @@ __global__ __launch_bounds__(tuning::raster_threads,
     first_memory<Call>& memory = memories[warp_in_block()];
     sink_type sink(call, dropped, memory.sink);
     class_writer writer{call.lists, memory.queues};
-    const std::uint32_t step = gridDim.x * tuning::raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
-    first_warp<Call, Close> warp{call,
-                                 memory,
-                                 sink,
-                                 writer,
-                                 call.lists.oversized + std::size_t{blockIdx.x} * batches * tuning::raster_threads,
-                                 num_oversized,
-                                 alone};
+    std::uint32_t* oversized = nullptr;
+    if constexpr (!finds_oversized_again<typename Call::output>) {
+        const std::uint32_t step = gridDim.x * tuning::raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
+        oversized = call.lists.oversized + std::size_t{blockIdx.x} * batches * tuning::raster_threads;
+    }
+    first_warp<Call, Close> warp{call, memory, sink, writer, oversized, num_oversized, alone};
     const unsigned looked_at = warp.run(index);
     __syncthreads();
-    split_oversized(call, sink, warp.oversized, num_oversized);
+    if constexpr (!finds_oversized_again<typename Call::output>)
+        split_oversized(call, sink, warp.oversized, num_oversized);
+    else if (num_oversized != 0)
+        split_oversized_again(again, dropped, memory.sink);
     writer.note(slots);
     int left = class_writer::many;
     if (alone)

@@ -94,6 +94,8 @@ public:
 
     template <coverage Rule>
     [[nodiscard]] status run(framebuffer& fb, bool count_voxels, std::uint64_t triangles_in) {
+        std::optional<lists> of_raster;
+        of_raster.emplace(*this, raster_.template reads_setups<Rule>());
         index_.mark_above([&](const index_level& level, int log2_cell) {
             raster_.template mark<Rule>(level, log2_cell, raster_.template is_coarse<Rule>(log2_cell));
         });
@@ -103,15 +105,14 @@ public:
         if (bricks > core::max_numbered) return core::failure(status_code::size_overflow, stage::coarse_raster);
 
         sparse_contents<Backend, Targets...> made(backend_);
-        made.keys = device_buffer<std::uint64_t>(backend_, bricks);
         made.masks = device_buffer<brick_mask>(backend_, bricks);
-        made.offsets = device_buffer<std::uint64_t>(backend_, bricks == 0 ? 0 : bricks + 1);
-        if (bricks != 0) {
-            index_.write_keys(made.keys.data());
-            clear(made.masks.data(), bricks * sizeof(brick_mask));
-        }
+        if (bricks != 0) clear(made.masks.data(), bricks * sizeof(brick_mask));
         raster_.template set_masks<Rule>(index_.bricks(), made.masks.data(), &totals_.data()->state);
+        of_raster.reset(); // before all else is taken: the lists are the most that a call takes beside its result
+        made.keys = device_buffer<std::uint64_t>(backend_, bricks);
+        made.offsets = device_buffer<std::uint64_t>(backend_, bricks == 0 ? 0 : bricks + 1);
         device_buffer<std::uint32_t> counts(backend_, bricks);
+        if (bricks != 0) index_.write_keys(made.keys.data());
         if (bricks != 0)
             rank_bricks(backend_, made.masks.data(), static_cast<std::uint32_t>(bricks), counts.data(),
                         made.offsets.data(), &totals_.data()->masks, stage::fine_raster);
@@ -140,6 +141,21 @@ public:
     }
 
 private:
+    // The raster's lists while it draws. Freed in the order of the stream.
+    class lists {
+    public:
+        lists(mask_call& call, bool has_setups) : memory_(call.backend_, take(call, has_setups, nullptr)) {
+            (void)take(call, has_setups, memory_.data());
+        }
+
+    private:
+        static std::size_t take(mask_call& call, bool has_setups, void* memory) {
+            arena at(memory);
+            call.raster_.take_lists(at, has_setups);
+            return at.used();
+        }
+        device_buffer<std::byte> memory_;
+    };
     [[nodiscard]] std::size_t plan_memory() const {
         arena plan;
         (void)brick_raster<draw_type>(draws_, g_, stream_, clock_, plan);
@@ -159,6 +175,7 @@ private:
             if (counts.size() == 0) {
                 counts = device_buffer<std::uint32_t>(backend_, voxels);
                 clear(counts.data(), voxels * sizeof(std::uint32_t));
+                const lists of_raster(*this, true);
                 raster_.template count_fragments<Rule>(index_.bricks(), made.masks.data(), made.offsets.data(),
                                                        counts.data());
             }

@@ -28,18 +28,34 @@ class brick_raster<draw<Mesh, VertexShader, FragmentShader>> {
     static constexpr bool shades_in_raster = is_cheap<VertexShader>;
 
 public:
-    // Takes its memory. With an arena that only adds up bytes, nothing but that is done.
+    // Takes its memory, all but the lists. With an arena that only adds up bytes, nothing but that is done.
     brick_raster(std::span<const draw_type> draws, const grid& g, cudaStream_t stream, stage_clock* clock,
                  arena& memory)
         : draws_(draws), g_(g), snap_(core::make_snap_transform(g)), stream_(stream), clock_(clock),
           coarse_state_(memory.take<pipeline_state>(1)) {
-        std::size_t triangles = 0, vertices = 0;
+        std::size_t vertices = 0;
         for (const draw_type& d : draws) {
-            triangles = std::max<std::size_t>(triangles, d.mesh.num_triangles());
+            triangles_ = std::max<std::size_t>(triangles_, d.mesh.num_triangles());
             vertices = std::max<std::size_t>(vertices, d.mesh.num_vertices());
         }
         positions_ = vertex_positions::take(memory, shades_in_raster ? 0 : vertices);
-        deferred_ = deferred_triangles::take(memory, triangles);
+    }
+    // Takes the lists of deferred triangles of the rasters that follow. has_setups: where those read them.
+    void take_lists(arena& memory, bool has_setups) {
+        deferred_ = has_setups ? deferred_triangles::take(memory, triangles_)
+                               : deferred_triangles::take_lists(memory, triangles_);
+    }
+    // True if mark and set_masks may read setups of large triangles: where they draw voxel by voxel in the deferred
+    // pass, or so many bricks that their work items are worth it.
+    template <coverage Rule>
+    [[nodiscard]] bool reads_setups() const {
+        if (Rule != coverage::conservative) return true;
+        const glm::ivec3 whole = g_.whole_extent();
+        bool reads = std::max({whole.x, whole.y, whole.z}) > tuning::max_extent_without_setups ||
+                     g_.offset % core::sparse_brick_size != glm::ivec3(0);
+        for (int l = 0; l < index_size_of(whole).levels; ++l)
+            reads = reads || !is_coarse<Rule>(brick_index<>::log2_cell_of(l));
+        return reads;
     }
 
     // True if bricks or nodes of 2^log2_cell voxels a side have a raster of their own: conservative coverage of larger
@@ -122,6 +138,7 @@ private:
     pipeline_state* coarse_state_;
     vertex_positions positions_{};
     deferred_triangles deferred_{};
+    std::size_t triangles_ = 0; // of the largest draw
     bool is_first_pass_ = true;
 };
 

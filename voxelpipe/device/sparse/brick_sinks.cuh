@@ -114,6 +114,7 @@ struct output_base {
     static constexpr bool defers = true;
     static constexpr bool can_skip_deferred_pass = true; // nothing that outlives the call is written
     static constexpr bool only_sets = false;
+    static constexpr bool finds_oversized_again = true;
 
     glm::ivec3 lead; // from voxels of the raster to those of the whole grid
     std::uint32_t num_vertices;
