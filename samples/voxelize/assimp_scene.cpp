@@ -57,6 +57,8 @@ public:
             } catch (const model_error& error) {
                 scene_.warnings.push_back("the texture " + gltf::in_quotes(key) + " cannot be used: " + error.what() +
                                           "; the material's colour is used alone");
+            } catch (const std::bad_alloc&) {
+                throw picture_memory_error("the picture " + gltf::in_quotes(key));
             }
             found = images_.emplace(key, image).first;
         }

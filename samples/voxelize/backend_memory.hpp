@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 namespace voxelize {
@@ -39,12 +40,22 @@ public:
         else
             copy_.push_back({backend, source});
     }
-    [[nodiscard]] const T* data() const { return copy_.empty() ? host_.data() : copy_.front().data(); }
-    [[nodiscard]] std::size_t size() const { return copy_.empty() ? host_.size() : copy_.front().size(); }
+    // The same of a list that others may hold too.
+    stored(Backend& backend, const std::shared_ptr<const std::vector<T>>& source) {
+        if constexpr (memory_access<Backend>::on_host)
+            shared_ = source;
+        else
+            copy_.push_back({backend, *source});
+    }
+    [[nodiscard]] const T* data() const { return copy_.empty() ? on_host().data() : copy_.front().data(); }
+    [[nodiscard]] std::size_t size() const { return copy_.empty() ? on_host().size() : copy_.front().size(); }
     [[nodiscard]] voxelpipe::array_view<const T> view() const { return {data(), size()}; }
 
 private:
+    [[nodiscard]] const std::vector<T>& on_host() const { return shared_ ? *shared_ : host_; }
+
     std::vector<T> host_;
+    std::shared_ptr<const std::vector<T>> shared_; // in place of host_
     std::vector<typename Backend::template buffer<T>> copy_;
 };
 

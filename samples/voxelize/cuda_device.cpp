@@ -29,8 +29,10 @@ std::uint64_t bytes_of(const scene& model) {
     for (const primitive& part : model.primitives)
         bytes += bytes_of(part.positions) + bytes_of(part.triangles) + bytes_of(part.lines) + bytes_of(part.texcoords) +
                  bytes_of(part.colors);
-    for (const picture& image : model.images)
-        bytes += bytes_of(image.rgba) + bytes_of(image.levels[0]) + bytes_of(image.levels[1]);
+    for (const picture& image : model.images) {
+        bytes += bytes_of(image.rgba);
+        for (const auto& levels : image.levels) bytes += levels ? bytes_of(*levels) : 0;
+    }
     return bytes;
 }
 

@@ -17,7 +17,6 @@
 #include "affine.hpp"
 #include "model_error.hpp"
 #include "scene.hpp"
-#include "vertex_cache.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -80,30 +79,5 @@ using gltf_file_reader =
 [[nodiscard]] scene load_gltf(std::span<const std::byte> bytes, const gltf_file_reader& read_file = {},
                               const gltf_limits& limits = {}, const gltf_options& options = {},
                               const load_hooks& hooks = {});
-
-// A scene that can be read in parts: instances of primitives of triangles whose indices, positions (as floats) and
-// colours lie in files as they stand.
-struct gltf_parts {
-    struct part {
-        std::string name;
-        affine to_world;
-        std::uint32_t material = 0;
-        position_layout vertices;
-        std::optional<color_layout> colors;
-        std::uint64_t first_index = 0, num_triangles = 0;            // byte, triangles
-        std::size_t index_bytes = 0;                                 // of one; 0: vertices count up
-        std::size_t vertex_file = 0, color_file = 0, index_file = 0; // of files
-    };
-    std::vector<part> parts; // those with triangles, in the order in which load_gltf() gives their instances
-    std::vector<std::filesystem::path> files; // the file itself, then those that it names
-    std::vector<material> materials;          // as in the scene
-    std::vector<std::string> warnings;
-};
-
-// The file's scene as such parts, without reading their bytes. None if it is not made of them: with lines, strips,
-// skins, morph targets, compression, sparse accessors, positions that are no floats, buffers in data URIs, textures
-// that the options ask for, or an animation. None, too, for a file that load_gltf() refuses.
-[[nodiscard]] std::optional<gltf_parts> find_parts(const std::filesystem::path& file, const gltf_limits& limits = {},
-                                                   const gltf_options& options = {});
 
 } // namespace voxelize

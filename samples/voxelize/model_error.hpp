@@ -3,6 +3,7 @@
 #pragma once
 // Why a model cannot be used, whatever its format.
 
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -15,6 +16,16 @@ struct model_error : std::runtime_error {
 
     std::vector<std::string> warnings; // what was found before it came to that; one line each
     bool lenient_helps = false;        // load_options::lenient would have gone on
+};
+
+// A picture does not fit into memory: the message names it.
+class picture_memory_error : public std::bad_alloc {
+public:
+    explicit picture_memory_error(const std::string& picture) : message_(picture) {}
+    [[nodiscard]] const char* what() const noexcept override { return message_.what(); }
+
+private:
+    std::runtime_error message_; // which copies without throwing
 };
 
 } // namespace voxelize

@@ -244,31 +244,29 @@ void obj_file::number_parts() {
     }
 }
 
-void obj_file::for_each_block(const visitor& visit) {
+void obj_file::read_part(std::size_t part, const visitor& visit) {
     constexpr std::uint64_t block = 16384; // triangles
     std::vector<glm::uvec3> indices;
     std::vector<glm::vec3> corners;
     std::vector<glm::vec4> colors;
     model_bytes &triangles = triangles_.reader(), &vertices = vertices_.reader();
-    for (std::size_t p = 0; p < parts_.size(); ++p) {
-        std::uint64_t number = parts_[p].first_number;
-        for (const std::uint32_t r : runs_of_[p])
-            for (std::uint64_t done = 0; done < runs_[r].num_triangles;) {
-                indices.resize(static_cast<std::size_t>(std::min(block, runs_[r].num_triangles - done)));
-                triangles.read((runs_[r].first + done) * sizeof(glm::uvec3),
-                               {reinterpret_cast<char*>(indices.data()), indices.size() * sizeof(glm::uvec3)});
-                corners.clear();
-                colors.clear();
-                for (const glm::uvec3& t : indices)
-                    for (const std::uint32_t v : {t.x, t.y, t.z}) {
-                        corners.push_back(positions_->at(v, vertices));
-                        if (colors_) colors.push_back(colors_->at(v, vertices));
-                    }
-                visit({p, number, corners, colors});
-                done += indices.size();
-                number += indices.size();
-            }
-    }
+    std::uint64_t number = parts_[part].first_number;
+    for (const std::uint32_t r : runs_of_[part])
+        for (std::uint64_t done = 0; done < runs_[r].num_triangles;) {
+            indices.resize(static_cast<std::size_t>(std::min(block, runs_[r].num_triangles - done)));
+            triangles.read((runs_[r].first + done) * sizeof(glm::uvec3),
+                           {reinterpret_cast<char*>(indices.data()), indices.size() * sizeof(glm::uvec3)});
+            corners.clear();
+            colors.clear();
+            for (const glm::uvec3& t : indices)
+                for (const std::uint32_t v : {t.x, t.y, t.z}) {
+                    corners.push_back(positions_->at(v, vertices));
+                    if (colors_) colors.push_back(colors_->at(v, vertices));
+                }
+            visit({part, number, corners, colors});
+            done += indices.size();
+            number += indices.size();
+        }
 }
 
 opened_stream open_obj(const std::filesystem::path& path, std::uint64_t room, const std::filesystem::path& folder,

@@ -31,7 +31,7 @@ public:
     [[nodiscard]] double held_bytes() const override;
     [[nodiscard]] bool has_colors() const override { return colors_.has_value(); }
     [[nodiscard]] std::vector<std::string> warnings() const override { return warnings_; }
-    void for_each_block(const visitor& visit) override;
+    void read_part(std::size_t part, const visitor& visit) override;
 
 private:
     // Faces with neither a group nor a material named between them.

@@ -7,6 +7,7 @@
 
 #include "placement.hpp"
 #include "scene.hpp"
+#include "triangle_stream.hpp"
 #include "voxelizer.hpp"
 
 #include <voxelpipe/grid.hpp>
@@ -22,6 +23,10 @@ namespace voxelize {
 [[nodiscard]] int first_sampled_level(const scene& model, std::uint32_t width, std::uint32_t height,
                                       const std::vector<std::uint32_t>& materials, const voxelpipe::grid& grid,
                                       int threads);
+
+// Reads the textures of a stream, reduced in the same way; a picture's triangles are read for that. What is kept lasts
+// as long as the stream. Throws as triangle_stream::read_textures() does.
+void read_textures(triangle_stream& model, const voxelpipe::grid& grid, const voxelize_request& request);
 
 // load_hooks::picture of the tool: replaces the texels of each picture by the levels that its materials sample. The
 // texels stay if the request has no target of colour, or names no grid.

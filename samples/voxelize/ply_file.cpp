@@ -130,7 +130,7 @@ std::unique_ptr<ply_file> ply_file::open(const std::filesystem::path& path, std:
         found_colors.stride = f.vertices.stride;
         found_colors.has_alpha = has_color[3];
         found_colors.is_encoded = true;
-        found_colors.type = is_byte ? color_layout::component::byte : color_layout::component::float32;
+        found_colors.type = is_byte ? vertex_component::byte : vertex_component::float32;
         f.colors = found_colors;
     }
     return std::make_unique<ply_file>(path, f, room);
@@ -142,7 +142,7 @@ ply_file::ply_file(const std::filesystem::path& path, const layout& header, std:
     if (header.colors) colors_.emplace(*header.colors, room / 2);
 }
 
-void ply_file::for_each_block(const visitor& visit) {
+void ply_file::read_part(std::size_t, const visitor& visit) {
     std::vector<char> faces;
     std::vector<glm::vec3> corners;
     std::vector<glm::vec4> colors;

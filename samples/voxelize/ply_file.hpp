@@ -38,7 +38,7 @@ public:
 
     [[nodiscard]] std::uint64_t num_vertices() const override { return header_.vertices.count; }
     [[nodiscard]] bool has_colors() const override { return colors_.has_value(); }
-    void for_each_block(const visitor& visit) override;
+    void read_part(std::size_t part, const visitor& visit) override;
 
 private:
     layout header_;

@@ -152,6 +152,13 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     if (bounds.empty) refuse("nothing to voxelize has a corner at a finite position");
     report.request.grid = place_grid(options.grid, bounds);
     report.request.padding = options.grid.padding;
+    if (stream) {
+        const std::size_t known = stream->warnings().size();
+        read_textures(*stream, report.request.grid, report.request);
+        const std::vector<std::string> warnings = stream->warnings();
+        report.warnings.insert(report.warnings.end(), warnings.begin() + static_cast<std::ptrdiff_t>(known),
+                               warnings.end());
+    }
     if (std::string warning = precision_warning(model, report.request.grid); !warning.empty())
         report.warnings.push_back(std::move(warning));
     report.stats.milliseconds.emplace_back("place", milliseconds_since(start));
@@ -234,6 +241,8 @@ run_outcome run_model(const command_line& options, clock::time_point begin) {
         fail(exit_usage, error.what());
     } catch (const memory_error& error) {
         fail(exit_too_large, error.what());
+    } catch (const picture_memory_error& error) {
+        fail(exit_too_large, memory::shortage(error.what()));
     } catch (const std::bad_alloc&) {
         fail(exit_too_large, memory::shortage());
     } catch (const write_error& error) {

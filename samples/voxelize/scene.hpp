@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -36,10 +37,10 @@ struct picture {
     std::uint32_t width = 0; // texels, as in the file
     std::uint32_t height = 0;
     std::vector<std::uint8_t> rgba; // width * height * 4 bytes; empty if the levels below take its place
-    // Mip levels from first_level on (mip_levels.hpp): [0] colours alone, [1] colours by their alpha. One that no
-    // material needs is empty.
+    // Mip levels from first_level on (mip_levels.hpp): [0] colours alone, [1] colours by their alpha. None where
+    // no material needs them; shared by scenes that show the picture.
     int first_level = 0;
-    std::array<std::vector<glm::u8vec4>, 2> levels;
+    std::array<std::shared_ptr<const std::vector<glm::u8vec4>>, 2> levels;
 };
 
 // A picture and the way it is sampled. Coordinates: (0, 0) is the top left corner of the picture, (1, 1) the bottom

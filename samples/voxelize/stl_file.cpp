@@ -63,7 +63,7 @@ bool stl_file::is_colored() {
     return found;
 }
 
-void stl_file::for_each_block(const visitor& visit) {
+void stl_file::read_part(std::size_t, const visitor& visit) {
     std::vector<glm::vec3> corners;
     for_each_raw_block([&](std::uint64_t first, const std::vector<char>& facets) {
         corners.resize(3 * facets.size() / stl_triangle);

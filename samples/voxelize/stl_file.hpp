@@ -18,7 +18,7 @@ public:
     // With `colors`, the whole file is searched first, and one that has colours is refused.
     [[nodiscard]] static std::unique_ptr<stl_file> open(const std::filesystem::path& path, bool colors);
 
-    void for_each_block(const visitor& visit) override;
+    void read_part(std::size_t part, const visitor& visit) override;
 
 private:
     // Calls visit(number of the first, bytes) for the facets in order, some thousands at a time.

@@ -9,6 +9,7 @@
 #include "ply_file.hpp"
 #include "stl_file.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace voxelize {
@@ -19,6 +20,14 @@ void triangle_stream::scale_lengths(double factor) {
         p.to_world = affine::scaling(factor).after(p.to_world);
         if (!p.to_world.is_finite()) throw model_error("--scale is too large for the model");
     }
+}
+
+bool triangle_stream::has_texcoords() const {
+    return std::any_of(parts_.begin(), parts_.end(), [](const part& p) { return p.has_texcoords; });
+}
+
+void triangle_stream::for_each_block(const visitor& visit) {
+    for (std::size_t part = 0; part < parts_.size(); ++part) read_part(part, visit);
 }
 
 triangle_stream::boxes triangle_stream::bounds() {

@@ -8,6 +8,7 @@
 #include "placement.hpp"
 #include "scene.hpp"
 
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
@@ -31,13 +32,15 @@ public:
         affine to_world;
         std::uint32_t material = 0;                        // of materials()
         std::uint64_t first_number = 0, num_triangles = 0; // at least one
+        bool has_texcoords = false;                        // of its material's texture
     };
     // Triangles of one part.
     struct block {
         std::size_t part = 0;
-        std::uint64_t first_number = 0;     // of the first triangle, among all of the stream
-        std::span<const glm::vec3> corners; // three a triangle, as the file has them
-        std::span<const glm::vec4> colors;  // of the corners, linear; empty: white
+        std::uint64_t first_number = 0;            // of the first triangle, among all of the stream
+        std::span<const glm::vec3> corners;        // three a triangle, as the file has them
+        std::span<const glm::vec4> colors;         // of the corners, linear; empty: white
+        std::span<const glm::vec2> texcoords = {}; // of the corners, if the part has them
     };
     using visitor = std::function<void(const block&)>;
 
@@ -55,14 +58,25 @@ public:
     [[nodiscard]] virtual std::uint64_t num_vertices() const { return 3 * num_triangles(); }
     // Bytes that a run takes, at least, which holds the model.
     [[nodiscard]] virtual double held_bytes() const { return 300 * static_cast<double>(num_triangles()); }
-    // Those of the scene, without textures.
+    // Those of the scene. Without textures, until read_textures().
     [[nodiscard]] const std::vector<material>& materials() const { return materials_; }
+    [[nodiscard]] const std::vector<texture>& textures() const { return textures_; }
+    [[nodiscard]] const std::vector<picture>& images() const { return images_; }
+    // True if a part has texture coordinates.
+    [[nodiscard]] bool has_texcoords() const;
+    // Reads the pictures that the materials show. Each is given to the hook before the next is read, as in
+    // load_hooks::picture, with a scene of materials alone. Throws picture_memory_error and model_error.
+    using picture_hook = std::function<void(const scene&, picture&, const std::vector<std::uint32_t>& materials)>;
+    virtual void read_textures(const picture_hook&) {}
     // True if any vertex has a colour of its own.
     [[nodiscard]] virtual bool has_colors() const { return false; }
     // What was left out or put right; one line each.
     [[nodiscard]] virtual std::vector<std::string> warnings() const { return {}; }
-    // Calls visit with all triangles in order, some thousands at a time. Throws model_error where the file is damaged.
-    virtual void for_each_block(const visitor& visit) = 0;
+    // Calls visit with the triangles of a part in order, some thousands at a time. Throws model_error where the file is
+    // damaged.
+    virtual void read_part(std::size_t part, const visitor& visit) = 0;
+    // The same with those of all parts.
+    void for_each_block(const visitor& visit);
 
     // Multiplies all lengths, about the world's origin. Throws model_error where a transform is not finite then.
     void scale_lengths(double factor);
@@ -79,6 +93,8 @@ protected:
 
     std::vector<part> parts_;
     std::vector<material> materials_;
+    std::vector<texture> textures_;
+    std::vector<picture> images_;
 };
 
 // A model that may not fit into memory.

@@ -163,8 +163,7 @@ private:
     void upload_pictures(scene& model) {
         const auto texels_for = [&](picture& source, bool by_alpha) {
             std::vector<stored<Backend, glm::u8vec4>> texels;
-            std::vector<glm::u8vec4>& levels = source.levels[by_alpha ? 1 : 0];
-            if (!levels.empty()) {
+            if (const auto& levels = source.levels[by_alpha ? 1 : 0]) {
                 texels.push_back({backend_, levels});
                 return texels;
             }

@@ -16,8 +16,8 @@ T load(const char* from) {
     return value;
 }
 
-std::size_t bytes_of(color_layout::component type) {
-    return type == color_layout::component::byte ? 1 : type == color_layout::component::word ? 2 : 4;
+std::size_t bytes_of(vertex_component type) {
+    return type == vertex_component::byte ? 1 : type == vertex_component::word ? 2 : 4;
 }
 
 } // namespace
@@ -51,13 +51,13 @@ glm::vec4 color_layout::value(const char* vertex) const {
     const auto component_at = [&](std::size_t c) {
         const char* const from = vertex + place[c];
         switch (type) {
-        case component::byte: // as the loaders round
+        case vertex_component::byte: // as the loaders round
             return is_encoded ? static_cast<float>(load<std::uint8_t>(from)) / 255.0F
                               : static_cast<float>(load<std::uint8_t>(from) / 255.0);
-        case component::word:
+        case vertex_component::word:
             return is_encoded ? static_cast<float>(load<std::uint16_t>(from)) / 65535.0F
                               : static_cast<float>(load<std::uint16_t>(from) / 65535.0);
-        case component::float32:
+        case vertex_component::float32:
             break;
         }
         return load<float>(from);
@@ -67,6 +67,24 @@ glm::vec4 color_layout::value(const char* vertex) const {
     for (glm::length_t c = 0; c < 3; ++c) color[c] = assimp::linear_of(color[c]);
     if (!(color.a >= 0 && color.a <= 1)) color.a = 1;
     return color;
+}
+
+std::size_t texcoord_layout::bytes() const { return 2 * bytes_of(type); }
+
+glm::vec2 texcoord_layout::value(const char* vertex) const {
+    const auto component_at = [&](std::size_t c) -> double {
+        const char* const from = vertex + c * bytes_of(type);
+        switch (type) {
+        case vertex_component::byte:
+            return load<std::uint8_t>(from) / 255.0;
+        case vertex_component::word:
+            return load<std::uint16_t>(from) / 65535.0;
+        case vertex_component::float32:
+            break;
+        }
+        return static_cast<double>(load<float>(from));
+    };
+    return transformed(transform, component_at(0), component_at(1));
 }
 
 } // namespace voxelize

@@ -1,11 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Positions and colours that stay in their file: blocks of them are read where they are asked for, and some blocks are
-// kept. A mesh whose faces name vertices that lie near each other in the file is read about once.
+// Positions, colours and texture coordinates that stay in their file: blocks of them are read where they are asked for,
+// and some blocks are kept. A mesh whose faces name vertices that lie near each other in the file is read about once.
 
 #include "model_error.hpp"
+#include "texture_transform.hpp"
 
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
@@ -34,20 +36,35 @@ struct position_layout {
     [[nodiscard]] glm::vec3 value(const char* vertex) const;
 };
 
+// Of an attribute; unsigned integers are fractions of their greatest.
+enum class vertex_component : std::uint8_t { float32, byte, word };
+
 // Where vertex colours lie in a file.
 struct color_layout {
-    using value_type = glm::vec4;                                // linear light and alpha
-    enum class component : std::uint8_t { float32, byte, word }; // unsigned integers are fractions of their greatest
+    using value_type = glm::vec4; // linear light and alpha
 
     std::uint64_t first = 0, count = 0; // as above
     std::size_t stride = 0;
     std::size_t place[4]{};  // bytes of red, green, blue and alpha
     bool has_alpha = false;  // otherwise 1
     bool is_encoded = false; // sRGB, as in the formats that assimp reads; an alpha beyond [0, 1] is 1
-    component type = component::float32;
+    vertex_component type = vertex_component::float32;
 
     [[nodiscard]] std::size_t bytes() const;
     [[nodiscard]] glm::vec4 value(const char* vertex) const;
+};
+
+// Where texture coordinates lie in a file.
+struct texcoord_layout {
+    using value_type = glm::vec2; // transformed
+
+    std::uint64_t first = 0, count = 0; // as above
+    std::size_t stride = 0;
+    texture_transform transform = no_texture_transform;
+    vertex_component type = vertex_component::float32;
+
+    [[nodiscard]] std::size_t bytes() const;
+    [[nodiscard]] glm::vec2 value(const char* vertex) const;
 };
 
 // A file whose parts are read where they lie. Throws model_error where it ends before them.
@@ -60,7 +77,7 @@ private:
     std::ifstream file_;
 };
 
-// The values of a layout (position_layout, color_layout).
+// The values of a layout (position_layout, color_layout, texcoord_layout).
 template <class Layout>
 class vertex_cache {
 public:
@@ -108,5 +125,6 @@ private:
 
 using position_cache = vertex_cache<position_layout>;
 using color_cache = vertex_cache<color_layout>;
+using texcoord_cache = vertex_cache<texcoord_layout>;
 
 } // namespace voxelize

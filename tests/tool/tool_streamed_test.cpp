@@ -216,20 +216,92 @@ TEST(Streamed, GltfWithItsBuffersInFiles) {
     EXPECT_EQ(2, values.draw("no.npz", {"--max-memory", std::to_string(world_memory)}).code);
 }
 
-// Textures are not streamed, but a model whose textures nobody asks for is.
-TEST(Streamed, TexturesOnlyWhereNobodyAsks) {
+// Gives the same model textures: one of SIDE texels that is reduced, moved by its transform, and shown by opaque parts
+// and by some that blend; a small one by a mask, whose coordinates are bytes; and parts whose material has a texture
+// that they have no coordinates for.
+void add_textures(builder& file, std::uint32_t side) {
+    const auto vertices = static_cast<std::size_t>(world_side + 1) * static_cast<std::size_t>(world_side + 1);
+    std::vector<float> floats;
+    std::vector<std::uint8_t> bytes, texels;
+    for (std::size_t v = 0; v < vertices; ++v) {
+        const auto x = static_cast<float>(v % (world_side + 1)), y = static_cast<float>(v / (world_side + 1));
+        floats.insert(floats.end(), {x / world_side, 1.5F * y / world_side - 0.25F}); // some repeat
+        for (const std::size_t step : {7U, 3U}) bytes.push_back(static_cast<std::uint8_t>(v * step));
+    }
+    for (std::uint32_t t = 0; t < side * side; ++t)
+        for (const std::uint32_t step : {1U, 3U, 7U, 5U}) texels.push_back(static_cast<std::uint8_t>(t * step >> 4));
+    const int large = gltf_test::add_textured_material(file, side, side, texels, {{"name", "wide"}});
+    json& texture = file.root["materials"][static_cast<std::size_t>(large)]["pbrMetallicRoughness"]["baseColorTexture"];
+    texture["extensions"]["KHR_texture_transform"] = {{"offset", {0.1, 0.2}}, {"rotation", 0.3}, {"scale", {0.3, 0.5}}};
+    json blend = file.root["materials"][static_cast<std::size_t>(large)];
+    blend["alphaMode"] = "BLEND";
+    const int of_blend = file.append("materials", blend);
+    const std::vector<std::uint8_t> leaf{255, 255, 0, 255, 255, 255, 255, 0, 255, 255, 255, 0, 0, 255, 255, 255};
+    const int mask = gltf_test::add_textured_material(file, 2, 2, leaf, {{"name", "leaf"}, {"alphaMode", "MASK"}});
+    const int texcoords = file.accessor(floats, "VEC2"), of_mask = file.accessor(bytes, "VEC2", true);
+    const auto set = [&](json& part, int material, int coordinates) {
+        part["material"] = material;
+        if (coordinates >= 0) part["attributes"]["TEXCOORD_0"] = coordinates;
+    };
+    json &first = file.root["meshes"][0]["primitives"], &second = file.root["meshes"][1]["primitives"];
+    set(first[0], mask, of_mask);
+    set(first[1], large, texcoords);
+    set(first[2], of_blend, texcoords);
+    set(first[3], large, -1);
+    set(second[0], large, texcoords);
+}
+
+constexpr int textured_memory = 58;
+
+TEST(Streamed, Textures) {
     if (sanitized) return;
     const scratch_folder folder;
     builder file = world_of_parts(world_side);
-    const int material = gltf_test::add_textured_material(file, 1, 1, {10, 200, 30, 255});
-    file.root["meshes"][1]["primitives"][0]["material"] = material;
-    file.root["meshes"][1]["primitives"][0]["attributes"]["TEXCOORD_0"] =
-        file.accessor(std::vector<float>(2 * (world_side + 1) * (world_side + 1)), "VEC2");
+    add_textures(file, 600);
     file.write_glb(folder / "m.glb");
-    two_ways{folder, folder / "m.glb", {"-r", "240", "-t", "occupancy,material"}}.expect_equal(world_memory);
-    EXPECT_EQ(3, (two_ways{folder, folder / "m.glb", colors})
-                     .draw("no.npz", {"--max-memory", std::to_string(world_memory)})
-                     .code);
+    two_ways{folder, folder / "m.glb", {"-r", "240", "-t", "occupancy,color,color-max,color-replace"}}.expect_equal(
+        textured_memory);
+    two_ways{folder, folder / "m.glb", {"-r", "160", "-t", "color", "--alpha", "cutoff", "--coverage", "thin"}}
+        .expect_equal(textured_memory);
+    // Nobody asks for colours, but the mask cuts fragments off.
+    two_ways{folder, folder / "m.glb", {"-r", "160", "-t", "count,material"}}.expect_equal(world_memory);
+    // The other formats, dense against slab by slab.
+    const two_ways values{folder, folder / "m.glb", {"-r", "80", "-t", "occupancy,color"}};
+    for (const char* const name : {".vti", ".ply"}) {
+        SCOPED_TRACE(name);
+        const outcome tight =
+                          values.draw(std::string("tight") + name, {"--max-memory", std::to_string(textured_memory)}),
+                      free = values.draw(std::string("free") + name, {"--dense"});
+        ASSERT_EQ(0, tight.code) << tight.err;
+        ASSERT_EQ(0, free.code) << free.err;
+        EXPECT_NE(std::string::npos, tight.err.find(" triangles do not fit")) << tight.err;
+        EXPECT_TRUE(read_file(folder / (std::string("tight") + name)) ==
+                    read_file(folder / (std::string("free") + name)));
+    }
+}
+
+TEST(Streamed, TexturesInFilesAndThoseThatDoNotFit) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    builder file = world_of_parts(world_side);
+    add_textures(file, 16);
+    constexpr std::uint32_t picture_side = 2048; // of which 16 MiB are decoded, and as many encoded
+    const std::vector<std::uint8_t> texels(std::size_t{4} * picture_side * picture_side, 200);
+    const std::vector<std::byte> encoded = gltf_test::png(picture_side, picture_side, texels);
+    std::ofstream(folder / "wall 1.png", std::ios::binary)
+        .write(reinterpret_cast<const char*>(encoded.data()), static_cast<std::streamsize>(encoded.size()));
+    file.root["images"][0] = {{"uri", "wall%201.png"}};
+    file.write_glb(folder / "m.glb");
+    const two_ways values{folder, folder / "m.glb", {"-r", "120", "-t", "color"}};
+    const outcome tight = values.draw("no.npz", {"--max-memory", std::to_string(world_memory)});
+    EXPECT_EQ(3, tight.code) << tight.err;
+    EXPECT_NE(std::string::npos, tight.err.find(" MiB are needed")) << tight.err;
+    EXPECT_NE(std::string::npos, tight.err.find("the picture images[0] \"wall%201.png\"")) << tight.err;
+    // One that cannot be read is a warning, and the factor is used alone.
+    fs::remove(folder / "wall 1.png");
+    const outcome without = values.draw("without.npz", {"--max-memory", std::to_string(textured_memory)});
+    EXPECT_EQ(0, without.code) << without.err;
+    EXPECT_NE(std::string::npos, without.err.find("images[0] cannot be used: \"wall%201.png\"")) << without.err;
 }
 
 #if VOXELPIPE_TOOL_HAS_ASSIMP

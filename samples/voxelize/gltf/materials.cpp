@@ -5,7 +5,9 @@
 #include "text.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <new>
 #include <string>
 #include <utility>
 
@@ -175,6 +177,8 @@ std::int32_t material_reader::scene_image(std::size_t index, const char* instead
     } catch (const gltf_error& error) {
         scene_.warnings.push_back("images[" + std::to_string(index) + "] cannot be used: " + error.what() + "; " +
                                   instead);
+    } catch (const std::bad_alloc&) {
+        throw picture_memory_error("the picture images[" + std::to_string(index) + "]" + bytes_.image_title(index));
     }
     return *result;
 }

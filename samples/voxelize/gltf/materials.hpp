@@ -7,10 +7,10 @@
 #include "accessor.hpp"
 
 #include "../scene.hpp"
+#include "../texture_transform.hpp"
 
 #include <tiny_gltf.h>
 
-#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -21,8 +21,7 @@ namespace voxelize::gltf {
 // How the textures of a material are reached from a primitive's attributes.
 struct texture_coordinates {
     int set = 0; // TEXCOORD_<set>
-    // u' = m[0] u + m[1] v + m[2],  v' = m[3] u + m[4] v + m[5]
-    std::array<double, 6> m{1, 0, 0, 0, 1, 0};
+    texture_transform m = no_texture_transform;
     friend bool operator==(const texture_coordinates&, const texture_coordinates&) = default;
 };
 

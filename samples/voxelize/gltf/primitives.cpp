@@ -338,18 +338,14 @@ void primitive_reader::read_texcoords(primitive& result, const tinygltf::Primiti
     const std::string name = "TEXCOORD_" + std::to_string(wanted->set);
     const tinygltf::Accessor* accessor = attribute(source, name, result.positions.size(), where);
     if (accessor == nullptr) {
-        ++counted_["primitive(s) without the texture coordinates of their base-colour texture are not textured"];
+        ++counted_[without_texcoords];
         return;
     }
     if (accessor->type != TINYGLTF_TYPE_VEC2 || accessor->componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
         throw gltf_error(where + ": " + name + " is not a VEC2 of floats or of 8 or 16 bit integers");
     memory_.charge(accessor->count, sizeof(glm::vec2), where);
     const budget::scope temporary{memory_};
-    const std::array<double, 6>& m = wanted->m;
-    const auto place = [&m](double u, double v) {
-        return glm::vec2(static_cast<float>(std::fma(m[0], u, std::fma(m[1], v, m[2]))),
-                         static_cast<float>(std::fma(m[3], u, std::fma(m[4], v, m[5]))));
-    };
+    const auto place = [&m = wanted->m](double u, double v) { return transformed(m, u, v); };
     const auto index = static_cast<std::size_t>(source.attributes.at(name));
     result.texcoords.resize(accessor->count);
     if (const auto in_place = accessors_.in_place(index);

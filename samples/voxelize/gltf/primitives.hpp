@@ -43,6 +43,10 @@ namespace voxelize::gltf {
 // What messages call primitive PART of a mesh: the mesh's name, or where it stands in the file.
 [[nodiscard]] std::string name_of(const tinygltf::Model& model, std::size_t mesh, std::size_t part);
 
+// Ends the warning about primitives whose material has a texture and that have no coordinates for it.
+inline constexpr const char* without_texcoords =
+    "primitive(s) without the texture coordinates of their base-colour texture are not textured";
+
 // The material of primitives that name none.
 [[nodiscard]] material default_material();
 

@@ -122,6 +122,13 @@ std::vector<std::byte> resources::fetch(const std::string& uri) const {
     return bytes;
 }
 
+std::string resources::image_title(std::size_t index) const {
+    const image_source& source = document_.images[index];
+    if (!source.name.empty()) return ' ' + in_quotes(source.name);
+    if (source.uri && !source.uri->starts_with("data:")) return ' ' + in_quotes(*source.uri);
+    return "";
+}
+
 picture resources::decode_image(std::size_t index, std::span<const std::byte> view_bytes) const {
     const image_source& source = document_.images[index];
     std::vector<std::byte> fetched;

@@ -43,6 +43,10 @@ public:
 
     [[nodiscard]] std::size_t image_count() const { return document_.images.size(); }
 
+    // Picture INDEX as messages name it beside its number: a blank, and its name or file in quotes; empty if it has
+    // neither.
+    [[nodiscard]] std::string image_title(std::size_t index) const;
+
     // The buffer view that picture INDEX lies in, if it lies in one.
     [[nodiscard]] std::optional<std::uint32_t> image_view(std::size_t index) const {
         return document_.images[index].buffer_view;

@@ -25,30 +25,49 @@ namespace voxelize {
 namespace {
 
 namespace slabs = voxelpipe::slabs;
+// What a vertex may have.
 struct vertex_color {
     glm::vec4 color;
 };
-// Positions as the file has them, with the colours of the vertices or without.
+struct vertex_texcoord {
+    glm::vec2 texcoord;
+};
+struct vertex_texcoord_color {
+    glm::vec2 texcoord;
+    glm::vec4 color;
+};
+template <class Varyings>
+constexpr bool has_color = requires(Varyings v) {
+    v.color;
+};
+template <class Varyings>
+constexpr bool has_texcoord = requires(Varyings v) {
+    v.texcoord;
+};
+
+// Positions as the file has them, with what else the vertices have.
 template <class Varyings>
 using corner_record = slabs::record<Varyings>;
 
 // For each triangle of a slab, at least: record, scene, snapped vertices, pairs with tiles.
 template <class Varyings>
-constexpr double draw_bytes = std::is_empty_v<Varyings> ? 220 : 220 + 6 * sizeof(vertex_color);
+constexpr double draw_bytes = std::is_empty_v<Varyings> ? 220 : 220 + 6 * sizeof(Varyings);
 constexpr int brick = 8;
 
 template <class Varyings>
 corner_record<Varyings> record_of(const triangle_stream::block& from, std::size_t triangle) {
     const std::size_t i = 3 * triangle;
     const auto number = static_cast<std::uint32_t>(from.first_number + triangle);
-    if constexpr (std::is_empty_v<Varyings>) {
-        return {{from.corners[i], from.corners[i + 1], from.corners[i + 2]}, number};
-    } else {
-        const auto color = [&](std::size_t corner) {
-            return vertex_color{from.colors.empty() ? glm::vec4(1) : from.colors[i + corner]};
-        };
-        return {{from.corners[i], from.corners[i + 1], from.corners[i + 2]}, number, {color(0), color(1), color(2)}};
+    corner_record<Varyings> made{};
+    made.number = number;
+    for (std::size_t k = 0; k < 3; ++k) {
+        made.positions[k] = from.corners[i + k];
+        if constexpr (has_color<Varyings>)
+            made.varyings[k].color = from.colors.empty() ? glm::vec4(1) : from.colors[i + k];
+        if constexpr (has_texcoord<Varyings>)
+            made.varyings[k].texcoord = from.texcoords.empty() ? glm::vec2(0) : from.texcoords[i + k];
     }
+    return made;
 }
 
 // The corners as the pipeline places them, in the request's grid.
@@ -98,6 +117,8 @@ template <class Varyings>
 scene scene_of(streamed_slab<Varyings>&& slab, const triangle_stream& model) {
     scene made;
     made.materials = model.materials();
+    made.textures = model.textures();
+    made.images = model.images();
     std::uint64_t before = 0; // triangles of the model before the primitive's `whole`
     for (const part_count& count : slab.parts) {
         const triangle_stream::part& source = model.parts()[count.part];
@@ -109,7 +130,9 @@ scene scene_of(streamed_slab<Varyings>&& slab, const triangle_stream& model) {
         part.positions.reserve(3 * count.triangles);
         part.triangles.reserve(count.triangles);
         part.numbers.reserve(count.triangles);
-        if constexpr (!std::is_empty_v<Varyings>) part.colors.reserve(3 * count.triangles);
+        if constexpr (has_color<Varyings>) part.colors.reserve(3 * count.triangles);
+        if constexpr (has_texcoord<Varyings>)
+            if (source.has_texcoords) part.texcoords.reserve(3 * count.triangles);
     }
     std::size_t at = 0; // the primitive
     slab.triangles.for_each_block([&](std::span<const corner_record<Varyings>> block) {
@@ -122,8 +145,11 @@ scene scene_of(streamed_slab<Varyings>&& slab, const triangle_stream& model) {
             part.triangles.emplace_back(first, first + 1, first + 2);
             const std::uint64_t skipped = source.first_number + source.num_triangles - part.whole;
             part.numbers.push_back(static_cast<std::uint32_t>(r.number - skipped));
-            if constexpr (!std::is_empty_v<Varyings>)
-                for (const vertex_color& c : r.varyings) part.colors.push_back(c.color);
+            if constexpr (has_color<Varyings>)
+                for (const Varyings& v : r.varyings) part.colors.push_back(v.color);
+            if constexpr (has_texcoord<Varyings>)
+                if (source.has_texcoords)
+                    for (const Varyings& v : r.varyings) part.texcoords.push_back(v.texcoord);
         }
     });
     slab.triangles = {};
@@ -319,10 +345,17 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
 void draw_streamed(triangle_stream& model, const stream_place& place, const voxelize_request& request,
                    std::span<const slabs::layer_range> ranges, voxelize_stats& stats,
                    const std::function<void(std::size_t, sparse_volume&&)>& sink) {
-    if (model.has_colors())
-        draw_streamed_as<vertex_color>(model, place, request, ranges, stats, sink);
+    const auto draw = [&]<class Varyings>(Varyings) {
+        draw_streamed_as<Varyings>(model, place, request, ranges, stats, sink);
+    };
+    if (model.has_colors() && model.has_texcoords())
+        draw(vertex_texcoord_color{});
+    else if (model.has_colors())
+        draw(vertex_color{});
+    else if (model.has_texcoords())
+        draw(vertex_texcoord{});
     else
-        draw_streamed_as<vp::no_varyings>(model, place, request, ranges, stats, sink);
+        draw(vp::no_varyings{});
 }
 
 sparse_volume run_streamed_voxelizer(triangle_stream& model, const stream_place& place, const voxelize_request& request,
