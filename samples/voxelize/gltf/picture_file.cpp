@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "picture_file.hpp"
 
+#include "stb_memory.hpp"
 #include "text.hpp"
 
 #include <stb_image.h>
@@ -82,9 +83,10 @@ picture decode_by_stb(std::span<const std::byte> bytes, const gltf_limits& limit
     struct free_pixels {
         void operator()(stbi_uc* pixels) const { stbi_image_free(pixels); }
     };
+    stb_ran_out_of_memory = false;
     const std::unique_ptr<stbi_uc, free_pixels> decoded{
         stbi_load_from_memory(data, size, &width, &height, &channels, 4)};
-    if (!decoded && reason() == "outofmem") throw std::bad_alloc{};
+    if (!decoded && stb_ran_out_of_memory) throw std::bad_alloc{};
     if (!decoded) throw gltf_error("it cannot be decoded (" + reason() + ")");
     picture result;
     result.width = static_cast<std::uint32_t>(width);
