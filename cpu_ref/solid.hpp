@@ -101,7 +101,7 @@ template <class Mesh, class VertexShader, class SolidShader, class Finish>
                                const Finish& finish) {
     solid_geometry s = make_solid_geometry(how, draws, g, lead, options);
     status result;
-    if (options.repair == repair::close_holes && !add_cones(s, options.max_hole_edges, result.solid))
+    if (options.repair == repair::close_holes && !add_cones(s, options, result.solid))
         return solid_failure(status_code::too_many_triangles, s);
     constexpr bool needs_winding = shader_reads_winding<draw<Mesh, VertexShader, SolidShader>>;
     const bool small_keys = row_numbers(g.extent).num_beams() * tile_rows <= std::uint64_t{1} << 32;

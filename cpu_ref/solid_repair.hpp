@@ -21,7 +21,7 @@ namespace voxelpipe::cpu {
 // ---- close_holes ----------------------------------------------------------------------------------------------------
 
 // Puts the cones of each body behind its draws' parts. False if there are then more triangles than can be numbered.
-[[nodiscard]] inline bool add_cones(solid_geometry& s, std::uint64_t max_hole_edges, solid_counters& counts) {
+[[nodiscard]] inline bool add_cones(solid_geometry& s, const solid_options& options, solid_counters& counts) {
     std::vector<geometry::part> parts;
     std::vector<std::uint32_t> body;
     std::vector<bool> is_repair;
@@ -36,7 +36,9 @@ namespace voxelpipe::cpu {
             body.push_back(s.body[last]);
             is_repair.push_back(false);
         }
-        const core::hole_cones& cones = s.cones.emplace_back(core::close_holes(of_body, max_hole_edges));
+        const core::hole_cones& cones =
+            s.cones.emplace_back(options.cones != nullptr ? core::moved(options.cones[s.body[first]], s.snap.offset)
+                                                          : core::close_holes(of_body, options.max_hole_edges));
         counts.hole_edges += cones.edges;
         counts.holes += cones.holes;
         counts.cones += cones.cones;

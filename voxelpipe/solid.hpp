@@ -19,6 +19,10 @@
 
 namespace voxelpipe {
 
+namespace core {
+struct hole_cones;
+}
+
 // The unit that is one body, with one winding number: all draws of the call together, which gives one fragment a voxel;
 // or each draw by itself, which gives one fragment for each draw that a voxel lies in.
 enum class bodies : std::uint8_t { call, draw };
@@ -49,6 +53,9 @@ struct solid_options {
 
     // close_holes: holes with more boundary edges than this stay open.
     std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max();
+    // close_holes of a part of a mesh: the cones of each body of the whole one, in host memory (slabs/holes.hpp), in
+    // place of those that this call would find. Null: found by the call. Like that, they need a triangle to be drawn.
+    const core::hole_cones* cones = nullptr;
     // exterior: gaps of up to about twice as many voxels are closed, 0 to max_closing.
     int closing = 0;
     static constexpr int max_closing = 64; // the largest `closing`

@@ -89,35 +89,11 @@ private:
     std::vector<std::uint64_t> ends_;         // the higher vertex, and whether the edge comes down from it
 };
 
-// The cones of one body: all its triangles, in whatever parts. Throws std::bad_alloc, or std::length_error for more
-// than 2^32 boundary vertices.
-[[nodiscard]] inline hole_cones close_holes(const std::vector<hole_part>& body, std::uint64_t max_hole_edges) {
-    // Most edges cancel between the vertices as the mesh numbers them; a sum of chains may be taken in any order.
-    std::vector<std::uint64_t> ends; // of each part's vertices, numbered through all parts
-    ends.reserve(body.size());
-    std::uint64_t num_vertices = 0;
-    for (const hole_part& p : body) ends.push_back(num_vertices += p.num_vertices);
-    edge_chain all(num_vertices);
-    const auto for_each_edge = [&](auto&& visit) {
-        std::uint64_t first = 0;
-        for (const hole_part& p : body) {
-            for (std::size_t i = 0; i < p.num_triangles; ++i) {
-                const glm::uvec3 t = p.triangles[static_cast<std::uint32_t>(i)];
-                if (t.x >= p.num_vertices || t.y >= p.num_vertices || t.z >= p.num_vertices) continue;
-                if (!is_drawable(p.positions[t.x]) || !is_drawable(p.positions[t.y]) || !is_drawable(p.positions[t.z]))
-                    continue;
-                visit(first + t.x, first + t.y);
-                visit(first + t.y, first + t.z);
-                visit(first + t.z, first + t.x);
-            }
-            first += p.num_vertices;
-        }
-    };
-    for_each_edge([&](std::uint64_t a, std::uint64_t b) { all.count(a, b); });
-    all.start();
-    for_each_edge([&](std::uint64_t a, std::uint64_t b) { all.add(a, b); });
-    const std::vector<edge_chain::edge> unwelded = all.boundary();
-
+// The cones over the boundary of a set of triangles. `unwelded`: edges that are left once some opposite ones have
+// cancelled; position(v): where their vertex v is. Throws as close_holes().
+template <class Position>
+[[nodiscard]] hole_cones close_boundary(const std::vector<edge_chain::edge>& unwelded, const Position& position,
+                                        std::uint64_t max_hole_edges) {
     // The vertices of what is left, welded by position: their numbers are their ranks.
     struct vertex {
         snapped_position p;
@@ -125,10 +101,6 @@ private:
     };
     const auto same = [](const snapped_position& a, const snapped_position& b) {
         return a.x == b.x && a.y == b.y && a.z == b.z;
-    };
-    const auto position = [&](std::uint64_t v) {
-        const auto part = static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), v) - ends.begin());
-        return body[part].positions[v - (ends[part] - body[part].num_vertices)];
     };
     std::vector<std::uint64_t> used;
     for (const auto& e : unwelded) used.insert(used.end(), {e.from, e.to});
@@ -210,6 +182,47 @@ private:
             out.triangles.push_back({static_cast<std::uint32_t>(e.to), static_cast<std::uint32_t>(e.from), c.apex});
     }
     return out;
+}
+
+// The cones of one body: all its triangles, in whatever parts. Throws std::bad_alloc, or std::length_error for more
+// than 2^32 boundary vertices.
+[[nodiscard]] inline hole_cones close_holes(const std::vector<hole_part>& body, std::uint64_t max_hole_edges) {
+    // Most edges cancel between the vertices as the mesh numbers them; a sum of chains may be taken in any order.
+    std::vector<std::uint64_t> ends; // of each part's vertices, numbered through all parts
+    ends.reserve(body.size());
+    std::uint64_t num_vertices = 0;
+    for (const hole_part& p : body) ends.push_back(num_vertices += p.num_vertices);
+    edge_chain all(num_vertices);
+    const auto for_each_edge = [&](auto&& visit) {
+        std::uint64_t first = 0;
+        for (const hole_part& p : body) {
+            for (std::size_t i = 0; i < p.num_triangles; ++i) {
+                const glm::uvec3 t = p.triangles[static_cast<std::uint32_t>(i)];
+                if (t.x >= p.num_vertices || t.y >= p.num_vertices || t.z >= p.num_vertices) continue;
+                if (!is_drawable(p.positions[t.x]) || !is_drawable(p.positions[t.y]) || !is_drawable(p.positions[t.z]))
+                    continue;
+                visit(first + t.x, first + t.y);
+                visit(first + t.y, first + t.z);
+                visit(first + t.z, first + t.x);
+            }
+            first += p.num_vertices;
+        }
+    };
+    for_each_edge([&](std::uint64_t a, std::uint64_t b) { all.count(a, b); });
+    all.start();
+    for_each_edge([&](std::uint64_t a, std::uint64_t b) { all.add(a, b); });
+    const auto position = [&](std::uint64_t v) {
+        const auto part = static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), v) - ends.begin());
+        return body[part].positions[v - (ends[part] - body[part].num_vertices)];
+    };
+    return close_boundary(all.boundary(), position, max_hole_edges);
+}
+
+// The same cones as a part of the whole grid sees them, whose first voxel is `offset` units (snap_transform) from its
+// own.
+[[nodiscard]] inline hole_cones moved(hole_cones cones, const std::int64_t (&offset)[3]) {
+    for (snapped_position& p : cones.positions) p = {p.x - offset[0], p.y - offset[1], p.z - offset[2]};
+    return cones;
 }
 
 } // namespace voxelpipe::core

@@ -78,7 +78,9 @@ template <class Mesh, class VertexShader, class SolidShader>
                             {meshes[d].triangles.data(), static_cast<std::uint32_t>(meshes[d].triangles.size()),
                              static_cast<std::uint32_t>(draws[d].mesh.positions.size())},
                             draws[d].mesh.num_triangles()});
-        const core::hole_cones cones = core::close_holes(body, options.max_hole_edges);
+        const core::hole_cones cones = options.cones != nullptr
+                                           ? core::moved(options.cones[made.parts.size()], snap.offset)
+                                           : core::close_holes(body, options.max_hole_edges);
         made.counts.hole_edges += cones.edges;
         made.counts.holes += cones.holes;
         made.counts.cones += cones.cones;
