@@ -367,7 +367,17 @@ TEST(DeviceSparseGoesOn, SolidsOfOneValueMakeTheTilesOfTheCpu) {
     sequence<constant_pair> r(far.extent);
     r.draw_solid(meshes, far, {}, "far away", clear_constants, constant_shader);
     EXPECT_GT(r.p.on_host.num_tiles(), 0u);
-    // A large tile, in a grid that has more than two levels of them.
+    // More than two levels of tiles, if not a large one.
+    const vp::grid longer = unit::unit_grid({140, 18, 17});
+    unit::small_mesh box;
+    add_box(box, {-3, -3, -3}, {139.5f, 17.5f, 40});
+    sequence<constant_pair> l(longer.extent);
+    l.draw_solid({box}, longer, {}, "a long box", clear_constants, constant_shader);
+    EXPECT_GT(l.p.on_host.num_tiles(), 5u);
+}
+
+// A large tile, in a grid that has more than two levels of them.
+TEST(DeviceSparseGoesOn, ALargeSolidMakesTheTilesOfTheCpu) {
     const vp::grid large = unit::unit_grid({140, 140, 140});
     unit::small_mesh box;
     add_box(box, {-3, -3, -3}, {139.5f, 139.5f, 139.5f});

@@ -529,6 +529,10 @@ TEST(DeviceSparse, TilesAreTheCpus) {
 TEST(DeviceSparse, MergedSlabsHaveTheTilesOfTheWhole) {
     vp::cuda_backend backend;
     merge_cases::slabs_are_the_whole(backend, 5); // 1, 7, 3 and 3 slabs
+}
+
+TEST(DeviceSparse, OtherTilesStayWhenMerged) {
+    vp::cuda_backend backend;
     merge_cases::other_tiles_stay(backend);
 }
 
