@@ -3,12 +3,13 @@
 #pragma once
 // Small glTF files for tests: JSON that a test fills in as it likes, and one buffer that grows by what it appends.
 
+#include "slow_build.hpp"
+
 #include <glm/glm.hpp>
 #include <nlohmann/json.hpp>
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <initializer_list>
@@ -21,12 +22,7 @@
 namespace gltf_test {
 
 using nlohmann::json;
-
-// True in a build with sanitizers, which asks for less of what goes through the same code again.
-[[nodiscard]] inline bool is_slow_build() {
-    const char* const scale = std::getenv("VOXELPIPE_TEST_SCALE");
-    return scale != nullptr && std::strtod(scale, nullptr) < 1;
-}
+using tool_test::is_slow_build;
 
 // Every one, but in a slow build one in `step`.
 template <class T>

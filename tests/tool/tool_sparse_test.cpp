@@ -107,8 +107,9 @@ TEST(ToolSparse, WritesTheSameFilesAsADenseRun) {
     constexpr const char* extensions[] = {".png", ".nvdb", ".vti", ".vox", ".glb"};
     const scratch_folder folder;
     gltf_test::small_world().write_glb(folder / "m.glb");
+    const char* const resolution = gltf_test::is_slow_build() ? "45" : "90";
     const auto voxelize = [&](const std::string& name, std::vector<std::string> more) {
-        std::vector<std::string> arguments{folder / "m.glb", "-r", "90", "--image-size", "320x240"};
+        std::vector<std::string> arguments{folder / "m.glb", "-r", resolution, "--image-size", "320x240"};
         for (const char* extension : extensions) {
             arguments.emplace_back("-o");
             arguments.push_back(folder / (name + extension));
@@ -132,8 +133,9 @@ TEST(ToolSparse, WritesTheSameFilesAsADenseRun) {
 
 // Shapes of several .vox models, of joined faces, of points, of the other axis upright, of solids without colours.
 TEST(ToolSparse, WritesTheSameShapesAsADenseRun) {
+    const char* const several = gltf_test::is_slow_build() ? "70" : "270"; // one model and several
     const std::vector<std::vector<std::string>> runs{
-        {"-r", "270", "--coverage", "thin", "--up", "z", "-o", "$.vox"},
+        {"-r", several, "--coverage", "thin", "--up", "z", "-o", "$.vox"},
         {"-r", "61", "--merge", "--up", "z", "-o", "$.glb", "-o", "$.obj", "-o", "$.ply", "-o", "$.schem"},
         {"-r", "50", "--points", "-t", "occupancy", "-o", "$.ply", "-o", "$.vox", "-o", "$.xyz"},
         {"-r", "50", "--solid", "exterior", "-t", "occupancy", "-o", "$.glb", "-o", "$.binvox", "-o", "$.schem", "-o",

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
+#include "../slow_build.hpp"
 #include "formats/formats.hpp"
 #include "formats/palette.hpp"
 #include "test_volumes.hpp"
 
-#include <cstdlib>
 #include <map>
 #include <set>
 #include <sstream>
@@ -208,10 +208,8 @@ TEST_F(Vox, OneModelHoldsEveryVoxelAndItsColor) {
 }
 
 TEST_F(Vox, LargeGridsAreSplitAndPutTogether) {
-    // 17 million voxels are split along all axes at once, where VOXELPIPE_TEST_SCALE does not ask for less.
-    const char* const scale = std::getenv("VOXELPIPE_TEST_SCALE");
-    const bool in_full = scale == nullptr || std::strtod(scale, nullptr) >= 1;
-    const point large = in_full ? point{257, 258, 259} : point{257, 5, 259};
+    // 17 million voxels are split along all axes at once, but in a slow build.
+    const point large = tool_test::is_slow_build() ? point{257, 5, 259} : point{257, 258, 259};
     for (const up_axis up : {up_axis::y, up_axis::z})
         for (const auto& extent : {point{300, 20, 7}, large, point{20, 600, 3}, point{3, 4, 513}}) {
             volume v = make_colored(extent, 97);
