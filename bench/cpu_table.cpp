@@ -72,7 +72,7 @@ struct our_run {
     vp::counters counts;
 };
 
-// What the tables show: wall time, or the time that all threads computed.
+// The tables' unit: wall time, or the time that all threads computed.
 bench::timing shown(bench::timing t, const options& how) {
     if (how.processor_time) t.wall_ms = t.cpu_ms;
     return t;

@@ -355,7 +355,7 @@ def plot_scaling(rows, label, out):
     return drawn
 
 
-# What tells a kind of file from the others: some of its columns.
+# Columns that tell a kind of file from the others.
 KINDS = [
     ({"scene", "fastest_over_ms"}, plot_ahead),
     ({"series", "variant"}, plot_scaling),

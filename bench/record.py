@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent / "records"
 HISTORY = ROOT / "history.csv"
 HISTORY_COLUMNS = ["commit", "machine", "cell", "ms"]
 
-# What a benchmark writes: the report whose head names device and commit, and its files with their names under records/.
+# Files that a benchmark writes: the report whose head names device and commit, and its files with their names under records/.
 REPORTS = {
     "gpu.md": {"gpu.csv": "table.csv", "gpu_stages.csv": "stages.csv"},
     "gpu_scaling.md": {"gpu_scaling.csv": "scaling.csv"},

@@ -95,11 +95,11 @@ Install them and run the same command again; on Debian or Ubuntu:
     done
 }
 
-# What the library, the tool and the samples are built with.
+# Packages to build the library, the tool and the samples with.
 build_packages=(g++ cmake ninja-build libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev zlib1g-dev
     libminizip-dev libdeflate-dev libwebp-dev libassimp-dev libdraco-dev libmeshoptimizer-dev libzstd-dev)
 
-# What the tests need beside them: readers of NanoVDB files that are not ours, MPI for the slabs of several machines, and a
+# Packages that the tests need beside them: readers of NanoVDB files that are not ours, MPI for the slabs of several machines, and a
 # browser.
 test_packages=(libgtest-dev libnanovdb-dev libnanovdb-tools libmpich-dev mpich)
 # Ubuntu's package asks for a snap; without a browser the test of the page is left out there.
@@ -109,7 +109,7 @@ grep -q '^ID=ubuntu' /etc/os-release 2>/dev/null || test_packages+=(chromium)
 torch_packages=()
 grep -q '^ID=debian' /etc/os-release 2>/dev/null && torch_packages=(python3-torch)
 
-# What the site is made with.
+# Packages to make the site with.
 docs_packages=(doxygen python3-sphinx python3-breathe python3-myst-parser furo python3-numpy python3-pil)
 
 # configure PRESET [cmake option...]: quiet unless it fails. Uses ccache where there is one, and the staged prefix.

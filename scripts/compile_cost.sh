@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# What it costs to compile a call of voxelize: the five programs of tests/packaging/compile_cost, each from the headers alone
+# Measures the cost of compiling a call of voxelize: the five programs of tests/packaging/compile_cost, each from the headers alone
 # and for voxelpipe::cuda_kernels (base/kernel_library.cuh), then the library itself. Prints kernels in the PTX, seconds of
 # processor time of an optimised build for one architecture, and the object's size. Seconds are worth something on a machine
 # with nothing else to do.

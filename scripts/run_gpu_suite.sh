@@ -157,7 +157,7 @@ for part in "${parts[@]}"; do
         ;;
     sanitizer)
         [[ $step == build ]] || command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"
-        # Of this commit, whatever lies there.
+        # Built again, so that they are this commit's.
         sanitized=(small_loads small_lists counting_sort fragment_order fragment_sort immediate immediate_bits kept_graphs tracked_changes)
         for program in "${sanitized[@]}"; do target=device_${program}_test build_suite gpu; done
         for tool in memcheck racecheck initcheck synccheck; do

@@ -42,7 +42,7 @@ inline void expect(bool is_equal, const char* what) {
     if (!is_equal) throw std::runtime_error(std::string("not the host's: ") + what);
 }
 
-// Of a framebuffer whose target 0 is summed and whose target 1 counts.
+// For a framebuffer whose target 0 is summed and whose target 1 counts.
 template <class Framebuffer>
 octree_times time_octree(session& s, voxelpipe::cuda_backend& backend, const Framebuffer& fb, const repetition& how) {
     namespace vp = voxelpipe;

@@ -90,7 +90,7 @@ struct options {
     int scaling_resolution = 512, max_resolution = 2048; // of the series triangles, and where the series grid ends
 };
 
-// What a cell draws.
+// The draws of a cell.
 struct solid_kind {
     std::string_view name;
     vp::solid_options options;

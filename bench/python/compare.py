@@ -31,7 +31,7 @@ from meshes import sphere  # noqa: E402
 
 
 def version(package):
-    """Of an installed package, under whichever of its names; None where it is not."""
+    """The version of an installed package, under whichever of its names; None if there is none."""
     for name in (package, f"{package}-cpu"):
         try:
             return importlib.metadata.version(name)

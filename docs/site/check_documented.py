@@ -31,7 +31,7 @@ def main():
         if compound is None or compound.get("kind") not in ("class", "struct", "namespace", "union"):
             continue
         scope = compound.findtext("compoundname")
-        # What writes NanoVDB's structures is no interface but for what nanovdb_file takes; a specialisation is part of its template.
+        # Code that writes NanoVDB's structures is no interface but for what nanovdb_file takes; a specialisation is part of its template.
         if compound.get("prot", "public") != "public" or not scope.startswith("voxelpipe") or scope == "voxelpipe::io::nanovdb" or "<" in scope:
             continue
         where = compound.find("location")

@@ -13,7 +13,7 @@ TRAILING = re.compile(r"^(\s*[^/\s\"](?:[^\"]|\"[^\"]*\")*?(?:;|,|\{|\}|\w|\))\s
 
 
 def escaped(text):
-    """What Doxygen would take for a command, a tag or a link; not within backticks."""
+    """Escapes text that Doxygen would take for a command, a tag or a link; not within backticks."""
     parts = re.split(r"(`[^`]*`)", text)
     for i in range(0, len(parts), 2):
         parts[i] = re.sub(r"([<>&@\\#%$])", r"\\\1", parts[i])

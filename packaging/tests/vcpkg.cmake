@@ -73,7 +73,7 @@ if(NOT name STREQUAL PORT)
 endif()
 include("${PORT_DIR}/portfile.cmake")
 
-# What vcpkg's own checks ask for: no empty or debug folders, a licence, a config file under share/.
+# vcpkg's own checks ask for this: no empty or debug folders, a licence, a config file under share/.
 file(GLOB left RELATIVE "${CURRENT_PACKAGES_DIR}" "${CURRENT_PACKAGES_DIR}/*")
 if(NOT left STREQUAL "include;share")
   message(FATAL_ERROR "the port leaves ${left}")

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the module's functions have in common: arrays of NumPy as the library's views, and results that NumPy owns.
+// Shared by the module's functions: arrays of NumPy as the library's views, and results that NumPy owns.
 
 #include "report.hpp"
 
@@ -40,7 +40,7 @@ using triangle_array = nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_
             array_view<const glm::uvec3>(reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0))};
 }
 
-// Whether a (nz, ny, nx, ...) array has the grid's shape, and rows of `columns` values. Throws ValueError.
+// Throws ValueError unless a (nz, ny, nx, ...) array has the grid's shape, and rows of `columns` values.
 template <class Array>
 void expect_shape(const Array& out, const grid& g, std::initializer_list<std::size_t> tail = {},
                   std::size_t last_axis = 0) {

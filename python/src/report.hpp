@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the modules for CPU and GPU have in common: names of options, and a failed status as a Python exception.
+// Shared by the modules for CPU and GPU: names of options, and a failed status as a Python exception.
 
 #include <voxelpipe/solid.hpp>
 #include <voxelpipe/voxelpipe.hpp>

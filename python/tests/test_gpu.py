@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is drawn on a GPU has the bits of what the CPU draws. Needs a GPU, voxelpipe-cuda13, and torch or CuPy."""
+"""A GPU's results have the bits of the CPU's. Needs a GPU, voxelpipe-cuda13, and torch or CuPy."""
 
 import numpy as np
 import pytest

@@ -19,7 +19,7 @@ from ._core import Grid
 
 
 def is_on_device(a: Any) -> bool:
-    """Whether an array lies in a GPU's memory."""
+    """True if an array lies in a GPU's memory."""
     return hasattr(a, "__cuda_array_interface__") or getattr(getattr(a, "device", None), "type", "cpu") == "cuda"
 
 

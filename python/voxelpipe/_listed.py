@@ -12,7 +12,7 @@ from ._mesh import to_numpy
 
 
 def is_list(values: Any) -> bool:
-    """Whether these are what sparse() returns: (voxels, attributes)."""
+    """True if these are a result of sparse(): (voxels, attributes)."""
     return isinstance(values, tuple) and len(values) == 2
 
 

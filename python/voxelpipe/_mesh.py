@@ -13,7 +13,7 @@ import numpy as np
 from ._core import Grid
 from ._device import DeviceMesh, as_device_mesh, is_on_device
 
-# What functions take as a mesh; see as_mesh.
+# Types that functions take as a mesh; see as_mesh.
 MeshLike = Any
 
 

@@ -189,7 +189,7 @@ TEST(BrickTriangle, RowsOfTheLargestTrianglesAreTheGeneralSet) {
     EXPECT_GT(far_rows, static_cast<std::uint64_t>(unit::cases(300)));
 }
 
-// What rows of a brick leave, by the bits that go into its mask. `brick`: its first voxel.
+// The triangle's part of a brick by rows, as the bits that go into its mask. `brick`: its first voxel.
 voxels voxels_of_mask_brick(const mask_triangle& t, const voxel_box& box, const triple<std::int64_t>& brick) {
     const auto o = turn_to_row(t.row, static_cast<int>(brick[0] - box.lo[0]), static_cast<int>(brick[1] - box.lo[1]),
                                static_cast<int>(brick[2] - box.lo[2]));

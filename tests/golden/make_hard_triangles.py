@@ -61,7 +61,7 @@ def unit(n, size):
 
 
 def other_normals(n):
-    """What other roundings give: the five other orders, sums that are not fused, one reciprocal for three quotients."""
+    """Results of other roundings: the five other orders, sums that are not fused, one reciprocal for three quotients."""
     x, y, z = n
     results = {}
     for order in permutations("xyz"):

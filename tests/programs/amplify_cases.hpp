@@ -84,7 +84,7 @@ using bits = vp::target<vp::bit, blend::bit_xor>;
 template <class Backend>
 using framebuffer_of = vp::framebuffer<Backend, ids, sums, bits>;
 
-// What a call gives in a framebuffer, lists, a sparse framebuffer and, with a constant shader, in bits.
+// Results of a call in a framebuffer, lists, a sparse framebuffer and, with a constant shader, in bits.
 struct results {
     vp::counters counts, of_constants;
     std::vector<glm::uvec4> ids, payloads;

@@ -67,7 +67,7 @@ TEST(Field, Wraps) {
 }
 
 TEST(Field, LevelsAreMeansOfBoxes) {
-    // Of a constant, the constant; of any texels, the mean on the last level, to float.
+    // The last level of a constant is the constant, that of any texels their mean, to float.
     const std::vector<float> same(std::size_t{90}, 0.1f), texels = ramp(6 * 5 * 3);
     for (const float v : vp::with_levels<float>(same, 6, 5, 3)) EXPECT_EQ(v, 0.1f);
     const std::vector<float> all = vp::with_levels<float>(texels, 6, 5, 3);

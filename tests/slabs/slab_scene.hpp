@@ -78,7 +78,7 @@ struct chain { // changes with the order
     folded combine(folded a, folded b) const { return {(a.chain ^ b.chain) * 0x100000001b3u}; }
 };
 
-// What a fragment of the whole call has: numbers, voxel, colours, normal.
+// The inputs of a fragment of the whole call: numbers, voxel, colours, normal.
 inline std::uint64_t mark_of(const vp::fragment<varyings>& f) {
     std::uint64_t m = unit::mark(f.primitive ^ f.triangle << 3 ^ f.draw << 7 ^ f.instance << 9, f.voxel);
     const float sees[] = {f.varyings.color.x, f.normal.z, f.vertex_varyings[2]->color.y, f.barycentric.x};

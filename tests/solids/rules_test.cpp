@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// What is inside: the oracle, the table of fill rules, theorems, closed formulas, extents, and inputs that other
+// Insides: the oracle, the table of fill rules, theorems, closed formulas, extents, and inputs that other
 // voxelizers are known to get wrong.
 
 #include "solid_support.hpp"

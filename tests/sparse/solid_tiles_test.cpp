@@ -42,7 +42,7 @@ vp::status draw_box(backend_type& backend, const small_mesh& m, const vp::grid& 
     const vp::draw<vp::mesh_view<>, vp::passthrough, decltype(shader)> one[]{{m.view(), {}, shader}};
     return vp::voxelize_solid(backend, one, g, fb, {});
 }
-// What each voxel is, read in every way; `label` of a voxel that exists, 0 of another.
+// Checks each voxel, read in every way; `label` of a voxel that exists, 0 of another.
 template <class Label>
 void expect_voxels(const vp::host_sparse<mask_target, label_target>& h, const glm::ivec3& extent, const Label& label) {
     std::uint64_t expected = 0, visited = 0, last_key = 0;
@@ -229,7 +229,8 @@ TEST(SparseSolids, OctreesHaveTiles) {
     EXPECT_EQ(wrong, 0);
 }
 
-// What a later call draws into tiles becomes bricks; the rest stays the largest cubes, with the values that it had.
+// Tiles become bricks where a later call draws into them; the rest stays the largest cubes, with the values that it
+// had.
 TEST(SparseSolids, TilesAreLoaded) {
     backend_type backend = unit::make_backend(2);
     const glm::ivec3 extent(80, 72, 96), low(0, 3, 8), high(80, 67, 90);

@@ -55,7 +55,7 @@ struct coordinates_of_bricks {
     }
 };
 
-// What is drawn, kept with its backend.
+// The drawn framebuffer, kept with its backend.
 template <class... Targets>
 struct kept_bricks {
     call_backend own;

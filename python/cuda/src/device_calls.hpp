@@ -15,13 +15,13 @@
 
 namespace voxelpipe::python {
 
-// Where a call runs. The stream is the caller's.
+// The device and stream of a call. The stream is the caller's.
 struct device_stream {
     int device = 0;
     std::uintptr_t stream = 0; // a cudaStream_t
 };
 
-// What becomes of a voxel's fragments. A mean is a sum that is divided.
+// The fold of a voxel's fragments. A mean is a sum that is divided.
 enum class combine : std::uint8_t { mean, sum, min, max, last };
 
 // Columns [first, first + count) of rows with `columns` values, one row for each vertex or for each triangle.
@@ -51,7 +51,7 @@ struct device_values {
 [[nodiscard]] status bake(const device_stream& on, const mesh_view<>& mesh, const grid& g, coverage rule,
                           const device_values<std::int64_t>& values, std::int64_t fill, std::int64_t* out);
 
-// Which voxels have a fragment, in Morton order, and what became of the values in them. The result is kept on the
+// The voxels that have a fragment, in Morton order, and the values folded in them. The result is kept on the
 // device until the arrays are there that it goes into.
 template <class T>
 struct sparse_result {
