@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Which parts of a model enclose something, so that their insides can be filled.
+// Finds the parts of a model that enclose something, so that their insides can be filled.
 
 #include <glm/glm.hpp>
 

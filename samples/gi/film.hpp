@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Where frames go: a picture, a film by ffmpeg, or a picture a frame where there is no ffmpeg.
+// The output of frames: a picture, a film by ffmpeg, or a picture a frame where there is no ffmpeg.
 
 #include "settings.hpp"
 

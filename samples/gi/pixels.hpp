@@ -55,7 +55,7 @@ struct ray_order {
     }
 };
 
-// What a ray meets: for its own pixel, and what neighbours ask.
+// The surface that a ray meets: for its own pixel, and for neighbours that ask.
 struct seen_point {
     glm::vec3 normal{0.0f}; // towards the eye
     std::uint32_t triangle = 0;
@@ -65,7 +65,7 @@ struct alignas(16) near_point {
     glm::vec3 position{0.0f};
     std::uint32_t facing = 0; // of the normal, packed; 0: the ray meets nothing
 };
-// What arrives at a point, as far as its phase knows it.
+// The light that arrives at a point, as far as its phase knows it.
 struct alignas(16) received_light {
     glm::vec3 diffuse{0.0f}; // irradiance / pi of the cones; of view_choice::ao, their occlusion
     float visible = -1;      // part of the light; less than 0: not known

@@ -46,7 +46,7 @@ struct triangle_lists {
         return slots[vp::direction_mips_view::index(extent, v)];
     }
 
-    // What the list's fragment number i shows.
+    // The surface of the list's fragment number i.
     [[nodiscard]] VOXELPIPE_HD surface fragment(const world& w, std::uint64_t i) const {
         return w.at(primitives[i], {1.0f - weights[i].x - weights[i].y, weights[i].x, weights[i].y});
     }

@@ -27,7 +27,7 @@ public:
     // The frame at a time of 0 to 1. Light bounces off what the call before rendered; the first call makes up for that.
     // Throws std::bad_alloc, and std::runtime_error with the library's message.
     [[nodiscard]] virtual frame render(double time) = 0;
-    // What it runs on, for people.
+    // The device's name, for people.
     [[nodiscard]] virtual std::string device() const = 0;
 };
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What gi renders: triangles with materials, one light, a sky, an object that moves and a camera that turns. In plain
+// The scene of gi: triangles with materials, one light, a sky, an object that moves and a camera that turns. In plain
 // vectors on the host, in the scene's own units, y up.
 
 #include "../voxelize/scene.hpp"

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the user chose, and the command line that says it.
+// The user's choices, and the command line that says them.
 
 #include <cstdint>
 #include <filesystem>
@@ -11,7 +11,7 @@
 
 namespace gi {
 
-// Where frames are rendered: `automatic` takes a GPU if the program is built for one and finds it.
+// The device that renders frames: `automatic` takes a GPU if the program is built for one and finds it.
 enum class backend_choice : std::uint8_t { automatic, cpu, cuda };
 
 enum class view_choice : std::uint8_t { final, direct, ao, indirect, level };

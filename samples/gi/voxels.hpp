@@ -90,7 +90,7 @@ struct fold_fragments {
     }
 };
 
-// What the last frame's voxels send to number i, by the cones of its phase.
+// The light that the last frame's voxels send to number i, by the cones of its phase.
 struct gathered {
     glm::vec3 light{0.0f};
     std::uint32_t facing = 0; // of its normal

@@ -21,7 +21,7 @@ namespace gi {
 
 namespace vp = voxelpipe;
 
-// What a triangle shows at one of its points.
+// The material that a triangle shows at one of its points.
 struct surface {
     glm::vec3 position{0.0f}; // grid coordinates
     glm::vec3 normal{0.0f};   // interpolated, unit
