@@ -59,7 +59,9 @@ public:
             workspace_memory_ = device_array<std::byte>(bytes);
             workspace_ = {workspace_memory_.data(), bytes, limits};
             call_async();
-            if (vp::read_status(backend_, workspace_, &limits).ok()) return true;
+            const bool expected_deferred = limits.expects_deferred;
+            if (vp::read_status(backend_, workspace_, &limits).ok() && limits.expects_deferred == expected_deferred)
+                return true;
         }
         return false;
     }

@@ -585,17 +585,18 @@ TEST(Pipeline, LaunchesFillTheDevice) {
     }
 }
 
-// When a call's first kernel is launched alone. Results are right either way, so no comparison could find a mistake.
-TEST(Pipeline, TheFirstKernelIsAloneForFineMeshesOnly) {
+// When blocks of the first pass draw what they would defer. Results are right either way, so no comparison could find a
+// mistake.
+TEST(Pipeline, BlocksDrawWhatTheyWouldDeferForFineMeshesOnly) {
     using deferred = decltype(vp::device::pipeline_state::deferred);
     const std::uint64_t much = ~std::uint64_t{0};
     for (const vp::coverage rule : both_rules) {
         const bool thin = rule == vp::coverage::thin;
         EXPECT_EQ(deferred{}.num_deferred(rule), 0u);
-        EXPECT_EQ((deferred{0, {5, 3, 0, 0}, 0}.num_deferred(rule)), thin ? 3u : 8u);
-        EXPECT_EQ((deferred{1, {5, 3, 0, 0}, 1}.num_deferred(rule)), much);
-        EXPECT_EQ((deferred{0, {5, 3, 1, 0}, 0}.num_deferred(rule)), much);
-        EXPECT_EQ((deferred{0, {0, 0, 0, 1}, 0}.num_deferred(rule)), much);
+        EXPECT_EQ((deferred{0, {5, 3, 0, 0}, 0, 0}.num_deferred(rule)), thin ? 3u : 8u);
+        EXPECT_EQ((deferred{1, {5, 3, 0, 0}, 1, 0}.num_deferred(rule)), much);
+        EXPECT_EQ((deferred{0, {5, 3, 1, 0}, 0, 0}.num_deferred(rule)), much);
+        EXPECT_EQ((deferred{0, {0, 0, 0, 1}, 0, 0}.num_deferred(rule)), much);
     }
     const std::uint64_t each = vp::tuning::max_left_of_block;
     for (const std::size_t triangles : {1u, 128u, 129u, 1u << 30}) {

@@ -319,8 +319,7 @@ status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader
             return device::with_framebuffer_call<Selector>(draws, g, fb, options, triangles_in, limits, [&](auto call) {
                 call.clock = clock;
                 choose(call, true);
-                limits.skips_deferred_pass = call.plan.limits.skips_deferred_pass =
-                    call.can_skip_deferred_pass(guess.num_deferred) ? 1 : 0;
+                limits.deferred = call.plan.limits.deferred = call.deferral_for(guess.num_deferred);
                 launch_within_memory<Coverage>(call, state);
                 return call.lists_fragments() && strategy == voxelpipe::strategy::automatic;
             });
@@ -339,8 +338,7 @@ status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader
         [&](device::attempt_guess& guess, device::pipeline_state& state, device::stage_clock* clock) {
             device::capacities& limits = guess.limits;
             call_type call{draws, g, static_cast<std::uint32_t>(triangles_in), limits, clock};
-            limits.skips_deferred_pass = call.limits.skips_deferred_pass =
-                call.can_skip_deferred_pass(guess.num_deferred) ? 1 : 0;
+            limits.deferred = call.limits.deferred = call.deferral_for(guess.num_deferred);
             call.arms = core::arms_of(options.rule);
             call.has_few_a_voxel = limits.fragments < tuning::min_counted * guess.expected_voxels;
             device::list_filler filler(call, *this, workspace_, use_pinned_memory, use_graphs, made, state);

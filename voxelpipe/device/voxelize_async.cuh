@@ -28,7 +28,7 @@ struct workspace_limits {
     // side, or three for conservative coverage. Without it, the deferred pass for those is left out, which saves 3 to 6
     // us for a mesh that is finer than the grid. A few in a hundred may then be larger, none by much; a call that meets
     // more fails for its capacity and writes no target. Calls of several draws, and the strategies immediate and tiled,
-    // keep the pass.
+    // keep the pass and never fail for it.
     bool expects_deferred = true;
     // As cuda_backend::strategy.
     voxelpipe::strategy strategy = voxelpipe::strategy::automatic;
@@ -69,7 +69,7 @@ namespace device {
 [[nodiscard]] inline capacities to_capacities(const workspace_limits& l) {
     capacities c{l.tile_pairs, l.tile_records, l.fragments, l.fragment_records};
     if (!l.orders_long_voxels) c.longest_ordered = 0;
-    c.skips_deferred_pass = l.expects_deferred ? 0 : 1;
+    c.deferred = l.expects_deferred ? deferral::to_pass : deferral::to_no_pass;
     return c;
 }
 
@@ -79,7 +79,7 @@ auto with_call(std::span<const Draw> draws, const grid& g, const Framebuffer& fb
     return with_framebuffer_call<tuning::fine_raster_selector>(
         draws, g, fb, options, triangles, to_capacities(limits), [&](auto call) {
             const bool is_served = call.choose(limits.strategy, limits.lists_fragments);
-            if (is_served && !call.can_skip_deferred_pass(0)) call.plan.limits.skips_deferred_pass = 0;
+            if (is_served) call.plan.limits.deferred = call.deferral_for(limits.expects_deferred ? ~0ull : 0);
             return f(call, is_served);
         });
 }
@@ -171,11 +171,6 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
                                           backend.stream);
                     core::known_coverage<Known...>::dispatch(
                         options.rule, [&]<coverage Rule>() { call.template launch<Rule>(memory, backend.stream); });
-                    if (!workspace.limits.expects_deferred &&
-                        call.plan.limits.skips_deferred_pass == 0) { // no triangle is missing
-                        auto* const state = static_cast<device::pipeline_state*>(workspace.memory);
-                        device::check(cudaMemsetAsync(&state->deferred, 0, sizeof(state->deferred), backend.stream));
-                    }
                 });
             };
             device::with_call(draws, g, fb, options, s.counts.triangles_in, workspace.limits, launch);
@@ -188,7 +183,8 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
 
 // Waits for the stream and returns the status of the last call in this workspace. If it was too small
 // (capacity_exceeded) and `need` is not null, *need receives limits with which the same call succeeds or comes closer:
-// a pass without room for its records has not counted all of its pairs. A CUDA error that shows only here has stage
+// a pass without room for its records has not counted all of its pairs. Of a call that succeeded,
+// need->expects_deferred alone may be set: the call is quicker with it. A CUDA error that shows only here has stage
 // validate: it may stem from any earlier work of the stream.
 [[nodiscard]] inline status read_status(cuda_backend& backend, const workspace_view& workspace,
                                         workspace_limits* need = nullptr) {
@@ -221,6 +217,8 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
         }
         return s;
     }
+    // A call that kept the deferred pass has drawn what blocks left to it, but would better not have let them try.
+    if (need != nullptr && !state.deferred.are_none()) need->expects_deferred = true;
     return device::to_status(state);
 }
 

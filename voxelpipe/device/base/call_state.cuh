@@ -32,6 +32,7 @@ struct pipeline_state {
     struct {
         unsigned long long split, lengths[4];
         unsigned long long setups_ready; // split triangles whose setup is kept (split_setup)
+        unsigned long long drawn;        // 1 if a deferred pass has drawn them
         [[nodiscard]] VOXELPIPE_HD bool are_none() const {
             return (split | lengths[0] | lengths[1] | lengths[2] | lengths[3]) == 0;
         }
@@ -69,18 +70,26 @@ struct pipeline_state {
     }
 };
 
+// Who draws the triangles that the first pass would defer. As wide as the members of `capacities`, so that these have
+// no padding (call_bytes).
+enum class deferral : unsigned long long {
+    to_pass, // the deferred pass
+    of_many, // a block of the first pass that has few of them at its end; the deferred pass draws those of other blocks
+    to_no_pass, // a block of the first pass likewise; there is no deferred pass, and the call fails if a block has many
+};
+
 // Lengths of a call's arrays. Elements that do not fit are counted but not written.
 struct capacities {
     unsigned long long tile_pairs, tile_records, fragments, fragment_records;
-    // Kernels that earlier calls like this one hardly needed, and that are not launched: those for voxels of more
-    // fragments than longest_ordered, and the deferred pass.
+    // Kernels for voxels of more fragments than this are not launched, because earlier calls like this one hardly
+    // needed them.
     unsigned long long longest_ordered = ~0ull;
-    unsigned long long skips_deferred_pass = 0; // or 1. As wide as the rest, so that there is no padding (call_bytes)
+    deferral deferred = deferral::to_pass;
 };
 
-// True if triangles were deferred and no deferred pass was launched.
+// True if triangles were deferred and no deferred pass has drawn them.
 [[nodiscard]] VOXELPIPE_HD inline bool misses_deferred(const pipeline_state& s, const capacities& c) {
-    return c.skips_deferred_pass != 0 && !s.deferred.are_none();
+    return c.deferred == deferral::to_no_pass && s.deferred.drawn == 0 && !s.deferred.are_none();
 }
 // True if the call must not write its targets: an index is out of range, or something did not fit.
 [[nodiscard]] VOXELPIPE_HD inline bool has_failed(const pipeline_state& s, const capacities& c) {

@@ -62,7 +62,10 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
                is_listable(num_primitives, core::make_snap_transform(g).fraction, g.extent);
     }
     // See framebuffer_call.
-    [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t left) const { return defers_few(num_primitives, left); }
+    // Given that calls like this one deferred num_deferred triangles.
+    [[nodiscard]] deferral deferral_for(std::uint64_t num_deferred) const {
+        return defers_few(num_primitives, num_deferred) ? deferral::to_no_pass : deferral::to_pass;
+    }
     template <class Key>
     [[nodiscard]] bool shades_late() const {
         return !core::is_constant<FragmentShader> && is_listed_call<Key>();

@@ -106,13 +106,14 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     [[nodiscard]] bool lists_fragments() const {
         return chosen() == strategy::sorted_reduce || chosen() == strategy::sorted_fold;
     }
-    // True if the deferred pass may be skipped, given that calls like this one deferred num_deferred triangles. Safe:
-    // these strategies write no target before all triangles are drawn, so a wrong guess only costs time.
-    [[nodiscard]] bool can_skip_deferred_pass(std::uint64_t num_deferred) const {
-        if (draws.size() != 1 || !defers_few(max_triangles(), num_deferred)) return false;
-        if (max_pass_triangles() != max_triangles() && !lists_fragments())
-            return false; // the state has the last pass's
-        return chosen() == strategy::occupancy_mask || lists_fragments();
+    // Who draws deferred triangles, given that calls like this one deferred num_deferred. A wrong guess only costs
+    // time: the deferred pass is left out by strategies that write no target before all triangles are drawn.
+    [[nodiscard]] deferral deferral_for(std::uint64_t num_deferred) const {
+        if (draws.size() != 1 || !defers_few(max_triangles(), num_deferred)) return deferral::to_pass;
+        if (chosen() == strategy::immediate) return deferral::of_many;
+        if (lists_fragments()) return deferral::to_no_pass;
+        const bool is_one_pass = max_pass_triangles() == max_triangles(); // the state has the last pass's
+        return chosen() == strategy::occupancy_mask && is_one_pass ? deferral::to_no_pass : deferral::to_pass;
     }
 
     // Bytes of the workspace.

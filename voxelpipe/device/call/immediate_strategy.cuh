@@ -75,10 +75,11 @@ private:
                      cudaStream_t stream) const {
         using values_type = decltype(d.fragment_shader.values);
         const auto& plan = call.plan;
+        const auto raster_into = [&]<class Output>(const Output& output) {
+            return raster_call<Rule, Source, Output>{call.raster_input_of(d, source), output, deferred.with(state)};
+        };
         const auto draw_into = [&](const auto& output) {
-            const raster_call<Rule, Source, std::remove_cvref_t<decltype(output)>> raster{
-                call.raster_input_of(d, source), output, deferred.with(state)};
-            launch_raster(raster, state, stage::fine_raster, stream);
+            launch_raster(raster_into(output), state, stage::fine_raster, stream, false, plan.limits.deferred);
             end_stage(call.clock, &stage_times::fine_raster);
         };
         if constexpr (is_mask_itself<framebuffer_type>) {
@@ -90,6 +91,15 @@ private:
         }
         const framebuffer_output<framebuffer_type, values_type> output{plan.fb, d.fragment_shader.values,
                                                                        plan.targets.modes, marks};
+        if constexpr (has_only_values<framebuffer_type>) {
+            if (plan.targets.only_blends() && marks.words == nullptr) { // a first pass that asks less of a fragment
+                launch_first_pass(raster_into(blended_output<framebuffer_type, values_type>{output}), state,
+                                  stage::fine_raster, stream, false);
+                launch_deferred_pass(raster_into(output), state, stage::fine_raster, stream);
+                end_stage(call.clock, &stage_times::fine_raster);
+                return;
+            }
+        }
         draw_into(output);
     }
 };

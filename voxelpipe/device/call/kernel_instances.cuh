@@ -32,7 +32,7 @@
 
 #define VOXELPIPE_MASK_RASTER(HOW, RULE, ...)                                                                          \
     HOW void launch_raster(const raster_call<RULE, __VA_ARGS__, mask_output>&, pipeline_state*, stage, cudaStream_t,   \
-                           bool, bool);
+                           bool, deferral);
 #define VOXELPIPE_MASK_RASTERS(HOW)                                                                                    \
     VOXELPIPE_MASK_RASTER(HOW, coverage::conservative, stored_source)                                                  \
     VOXELPIPE_MASK_RASTER(HOW, coverage::thin, stored_source)                                                          \

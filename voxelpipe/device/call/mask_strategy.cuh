@@ -35,8 +35,7 @@ struct mask_strategy {
                 call.raster_input_of(d, source),
                 {mask, call.plan.g.extent, num_vertices, state, false},
                 deferred.with(state)};
-            launch_raster(raster, state, stage::fine_raster, stream, is_first,
-                          call.plan.limits.skips_deferred_pass != 0);
+            launch_raster(raster, state, stage::fine_raster, stream, is_first, call.plan.limits.deferred);
             end_stage(call.clock, &stage_times::fine_raster);
         });
         fill_from_mask(mask, call.plan.fb, call.track(), call.draws[0].fragment_shader.values,

@@ -269,8 +269,8 @@ struct list_output {
     template <class Call>
     using deferred_sink = listing_sink<Call, tuning::deferred_staged_fragments, tuning::deferred_flush_at>;
     static constexpr bool defers = true;
-    static constexpr bool can_skip_deferred_pass = true; // no target is written if triangles are missing
-    static constexpr bool only_sets = false;
+    static constexpr bool may_draw_few = true;
+    static constexpr bool only_blends = false, only_sets = false;
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return false; }
 
     std::uint32_t* voxels; // by fragment
@@ -305,7 +305,7 @@ void list_raster(const raster_input<Source>& in, std::uint32_t num_vertices, std
                  cudaStream_t stream) {
     const raster_call<Rule, Source, list_output> call{
         in, {voxels, primitives, limits.fragments, num_vertices, first_primitive, state, preparation}, deferred};
-    launch_raster(call, state, stage::abuffer_emit, stream, false, limits.skips_deferred_pass != 0);
+    launch_raster(call, state, stage::abuffer_emit, stream, false, limits.deferred);
 }
 
 } // namespace voxelpipe::device

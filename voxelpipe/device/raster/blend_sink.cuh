@@ -39,14 +39,15 @@ struct blending_sink : sink_base<Call> {
     // If the output has marks: marks the chunks that a triangle may touch, or, of a split triangle, those that it does
     // touch.
     __device__ VOXELPIPE_INLINE void mark_boxes(bool wanted, const int32_triangle& r) const {
-        if (this->call.out.marks.words != nullptr) device::mark_boxes<Call::rule>(this->call.out.marks, wanted, r);
+        if constexpr (!Call::output::only_blends)
+            if (this->call.out.marks.words != nullptr) device::mark_boxes<Call::rule>(this->call.out.marks, wanted, r);
     }
     __device__ VOXELPIPE_INLINE void mark_row(int x0, int x1, int y, int z) const {
-        if constexpr (merges_equal_voxels)
+        if constexpr (merges_equal_voxels && !Call::output::only_blends)
             if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_row(x0, x1, y, z);
     }
     __device__ VOXELPIPE_INLINE void mark_brick(const std::int32_t (&corner)[3], unsigned lane) const {
-        if constexpr (merges_equal_voxels)
+        if constexpr (merges_equal_voxels && !Call::output::only_blends)
             if (this->call.out.marks.words != nullptr) this->call.out.marks.mark_brick(corner, lane);
     }
     // Blends the voxels x0 + i of a row, for the bits i of the mask.
@@ -160,7 +161,7 @@ private:
     __device__ VOXELPIPE_INLINE void each_target(F&& f) const {
         core::for_each_index<targets_of<decltype(this->call.out.fb)>::count>([&]<std::size_t K>() {
             const auto& t = voxelpipe::get<K>(this->call.out.fb.targets);
-            if constexpr (Call::output::only_sets)
+            if constexpr (Call::output::only_sets || Call::output::only_blends)
                 f.template operator()<K>(t, immediate_mode::blend);
             else if (const immediate_mode mode = this->call.out.modes.of[K]; mode != immediate_mode::off)
                 f.template operator()<K>(t, mode);
@@ -180,10 +181,10 @@ struct framebuffer_output {
     template <class Call>
     using deferred_sink = sink<Call>;
     static constexpr bool defers = has_only_bits<Framebuffer>; // otherwise raster/block_pass.cuh draws
-    // Targets are written while triangles are drawn, so no triangle may be missing at the end.
-    static constexpr bool can_skip_deferred_pass = false;
-    // A fact for the compiler: all targets are in use, their mode is to blend, and all values are true.
-    static constexpr bool only_sets = false;
+    static constexpr bool may_draw_few = false;                // rarely gains, and takes long to compile
+    // Facts for the compiler: all targets are in use, their mode is to blend, and there are no marks; or all values are
+    // true instead of the last.
+    static constexpr bool only_blends = false, only_sets = false;
     Framebuffer fb;
     Values values;
     immediate_modes<targets_of<Framebuffer>::count> modes;
@@ -193,5 +194,19 @@ struct framebuffer_output {
     // True if check_indices has run; otherwise the sink checks all indices.
     [[nodiscard]] __device__ VOXELPIPE_INLINE static bool is_checked() { return true; }
 };
+
+// For the first pass of calls that blend all of their targets, which hold values, and mark no chunks.
+template <class Framebuffer, class Values>
+struct blended_output : framebuffer_output<Framebuffer, Values> {
+    template <class Call>
+    using sink = blending_sink<Call>;
+    template <class Call>
+    using deferred_sink = sink<Call>;
+    static constexpr bool only_blends = true;
+};
+template <class Framebuffer>
+inline constexpr bool has_only_values = false;
+template <class... Targets>
+inline constexpr bool has_only_values<framebuffer_view<Targets...>> = (has_value_rows<Targets> && ...);
 
 } // namespace voxelpipe::device

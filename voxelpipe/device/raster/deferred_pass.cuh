@@ -143,7 +143,9 @@ __global__ __launch_bounds__(tuning::raster_threads,
     await_stream();
     call.out.prepare(std::uint64_t{blockIdx.x} * tuning::raster_threads + threadIdx.x,
                      std::uint64_t{gridDim.x} * tuning::raster_threads);
-    if (state->index_error != 0) return;
+    // With nothing to draw, the launch costs a call little.
+    if (state->index_error != 0 || state->deferred.are_none()) return;
+    if (blockIdx.x == 0 && threadIdx.x == 0) state->deferred.drawn = 1;
     if (threadIdx.x < num_triangle_classes) dropped[threadIdx.x] = 0;
     __syncthreads();
     const unsigned in_block = warp_in_block();

@@ -24,7 +24,7 @@ struct mask_output : framebuffer_output<framebuffer_view<mask_target>, core::pac
     using sink = mask_sink<Call>;
     template <class Call>
     using deferred_sink = sink<Call>;
-    static constexpr bool can_skip_deferred_pass = true; // the last pass writes nothing if triangles are missing
+    static constexpr bool may_draw_few = true;
     static constexpr bool only_sets = true;
 
     std::uint32_t num_vertices;

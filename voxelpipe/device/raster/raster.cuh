@@ -68,7 +68,7 @@ struct first_warp {
     class_writer& writer;
     std::uint32_t* oversized; // the block's oversized triangles
     unsigned& num_oversized;
-    bool alone;        // there is no deferred pass (raster_first)
+    bool defers_rest;  // what waits at the end goes to the deferred pass, few as it may be
     int num_cubes = 0; // thin triangles that wait
     static constexpr std::uint32_t not_close =
         1u << 31; // flag of a code, which has 16 bits: the previous batch was not close
@@ -220,7 +220,7 @@ struct first_warp {
             }
         }
         if constexpr (thin) {
-            if (!alone) { // defers the remaining cubes
+            if (defers_rest) { // the remaining cubes too
                 const int at = static_cast<int>(lane);
                 writer.push(at < num_cubes ? static_cast<int>(size_class::tiny) : -1, memory.thin.cubes.triangle[at]);
             } else if (num_cubes != 0) {
@@ -269,23 +269,21 @@ draw_remaining(const Call& call, unsigned* dropped, first_memory<Call> (&memorie
     return sink.end();
 }
 
-// The first pass. is_alone: no deferred pass follows, because calls like this one deferred little. Each block then
-// draws its own deferred triangles at its end if they are few; if not, they are missing, and the call fails. `again`: a
-// copy of the call for out-of-line functions. If its own address were taken, the compiler would reload the call after
-// each reduction.
+// The first pass. `again`: a copy of the call for out-of-line functions. If its own address were taken, the compiler
+// would reload the call after each reduction.
 template <class Call, bool Close>
 __global__ __launch_bounds__(tuning::raster_threads,
                              first_min_blocks<Call>) void first_pass_kernel(const __grid_constant__ Call call,
                                                                             const __grid_constant__ Call again,
-                                                                            bool is_alone, pipeline_state* state) {
+                                                                            deferral deferred, pipeline_state* state) {
     using sink_type = typename Call::sink;
     __shared__ first_memory<Call> memories[raster_warps];
     __shared__ unsigned slots[size_class::count][raster_warps];
     __shared__ unsigned dropped[num_triangle_classes], num_oversized;
     const glm::uvec3 index = load_index(call.in, blockIdx.x * tuning::raster_threads + threadIdx.x);
     await_stream();
-    const bool alone = Call::output::can_skip_deferred_pass && is_alone;
-    if (alone)
+    const bool draws_few = Call::output::may_draw_few && deferred != deferral::to_pass;
+    if (Call::output::may_draw_few && deferred == deferral::to_no_pass)
         call.out.prepare(std::uint64_t{blockIdx.x} * tuning::raster_threads + threadIdx.x,
                          std::uint64_t{gridDim.x} * tuning::raster_threads);
     if (call.out.is_checked() && state->index_error != 0) return;
@@ -300,7 +298,7 @@ __global__ __launch_bounds__(tuning::raster_threads,
         const std::uint32_t step = gridDim.x * tuning::raster_threads, batches = (call.in.num_triangles - 1) / step + 1;
         oversized = call.lists.oversized + std::size_t{blockIdx.x} * batches * tuning::raster_threads;
     }
-    first_warp<Call, Close> warp{call, memory, sink, writer, oversized, num_oversized, alone};
+    first_warp<Call, Close> warp{call, memory, sink, writer, oversized, num_oversized, !draws_few};
     const unsigned looked_at = warp.run(index);
     __syncthreads();
     if constexpr (!finds_oversized_again<typename Call::output>)
@@ -309,7 +307,7 @@ __global__ __launch_bounds__(tuning::raster_threads,
         split_oversized_again(again, dropped, memory.sink);
     writer.note(slots);
     int left = class_writer::many;
-    if (alone)
+    if (draws_few)
         left = writer.count();
     else
         __syncthreads();
@@ -333,7 +331,8 @@ __global__ __launch_bounds__(tuning::raster_threads,
     return std::min(batches, std::max(at_once, core::blocks_for_each(batches, warp_triangles::max_rounds)));
 }
 
-// True if a call of one draw may be launched without a deferred pass, if calls like it deferred `left` triangles.
+// True if blocks of the first pass can draw what they would defer, if calls of one draw like this one deferred `left`
+// triangles.
 [[nodiscard]] inline bool defers_few(std::size_t num_triangles, std::uint64_t left) {
     const std::uint64_t batches = core::blocks_for_each(num_triangles, tuning::raster_threads);
     const auto at_once = static_cast<std::uint64_t>(num_multiprocessors()) * tuning::max_left_blocks;
@@ -341,11 +340,10 @@ __global__ __launch_bounds__(tuning::raster_threads,
 }
 
 // The first pass alone. is_first: these are a call's first kernels. They read indices before they wait for the stream,
-// so they must not start early: a kernel of the caller may still be writing them. skips_deferred_pass: triangles that
-// the first pass defers all the same are not drawn, and the call fails.
+// so they must not start early: a kernel of the caller may still be writing them.
 template <class Call>
 void launch_first_pass(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first,
-                       bool skips_deferred_pass = false) {
+                       deferral deferred = deferral::to_pass) {
     static_assert(fragment_sink<typename Call::sink> && fragment_sink<typename Call::deferred_sink>);
     const unsigned triangles = call.in.num_triangles;
     if constexpr (Call::output::defers) {
@@ -354,7 +352,7 @@ void launch_first_pass(const Call& call, pipeline_state* state, stage where, cud
         const unsigned blocks = raster_blocks(triangles, first_min_blocks<Call>);
         const auto launch = [&]<bool Close>() {
             launch_kernel(!is_first, first_pass_kernel<Call, Close>, blocks, tuning::raster_threads, 0, stream, where,
-                          call, call, skips_deferred_pass, state);
+                          call, call, deferred, state);
         };
         if (are_close)
             launch.template operator()<has_close_cubes<Call>>();
@@ -365,15 +363,18 @@ void launch_first_pass(const Call& call, pipeline_state* state, stage where, cud
                       tuning::raster_threads, 0, stream, where, call, state);
     }
 }
-// The raster of a draw; arguments as above.
 template <class Call>
-void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
-                   bool skips_deferred_pass = false) {
-    launch_first_pass(call, state, where, stream, is_first, skips_deferred_pass);
-    if (skips_deferred_pass) return;
+void launch_deferred_pass(const Call& call, pipeline_state* state, stage where, cudaStream_t stream) {
     const auto multiprocessors = static_cast<unsigned>(num_multiprocessors());
     launch_behind(deferred_pass_kernel<Call>, multiprocessors * deferred_min_blocks<Call>, tuning::raster_threads,
                   stream, where, call, state);
+}
+// The raster of a draw; arguments as above.
+template <class Call>
+void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
+                   deferral deferred = deferral::to_pass) {
+    launch_first_pass(call, state, where, stream, is_first, deferred);
+    if (deferred != deferral::to_no_pass) launch_deferred_pass(call, state, where, stream);
 }
 
 } // namespace voxelpipe::device

@@ -57,8 +57,9 @@ concept fragment_sink = requires(Sink sink, const glm::uvec3& indices, std::uint
 // One draw. Output says where its fragments go, and names the sinks of the first pass and of the deferred pass. Its
 // compile-time members:
 //   defers                  the first pass leaves larger triangles to the deferred pass; otherwise block_pass.cuh
-//   can_skip_deferred_pass  the deferred pass may be left out: a call that misses triangles writes no target
-//   only_sets               all targets are in use, blended in place, and all values are true
+//   may_draw_few            blocks of the first pass can draw what they would defer, if it is little (deferral)
+//   only_blends             all targets are in use and blended in place, and no chunk is marked
+//   only_sets               all targets are in use and blended in place, and all values are true
 template <coverage Rule, class Source, class Output>
 struct raster_call {
     static constexpr coverage rule = Rule;

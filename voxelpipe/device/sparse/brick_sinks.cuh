@@ -112,8 +112,8 @@ struct block_sink : sink_base<Call> {
 
 struct output_base {
     static constexpr bool defers = true;
-    static constexpr bool can_skip_deferred_pass = true; // nothing that outlives the call is written
-    static constexpr bool only_sets = false;
+    static constexpr bool may_draw_few = true;
+    static constexpr bool only_blends = false, only_sets = false;
     static constexpr bool finds_oversized_again = true;
 
     glm::ivec3 lead; // from voxels of the raster to those of the whole grid

@@ -14,6 +14,7 @@
 #include <voxelpipe/tuning/tuning_raster.hpp>
 #include <voxelpipe/tuning/tuning_strategy.hpp>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <span>
@@ -33,6 +34,9 @@ struct immediate_plan {
     [[nodiscard]] bool counts(std::size_t k) const { return modes.of[k] == immediate_mode::count; }
     [[nodiscard]] bool any_counted() const { return first_counted() >= 0; }
     [[nodiscard]] bool has_last_pass() const { return any_counted() || bits_of >= 0; }
+    [[nodiscard]] bool only_blends() const {
+        return std::ranges::all_of(modes.of, [](immediate_mode mode) { return mode == immediate_mode::blend; });
+    }
     [[nodiscard]] int first_counted() const {
         for (std::size_t k = 0; k < N; ++k)
             if (counts(k)) return static_cast<int>(k);
