@@ -21,6 +21,7 @@ struct model_error : std::runtime_error {
 // A picture does not fit into memory: the message names it.
 class picture_memory_error : public std::bad_alloc {
 public:
+    // NOLINTNEXTLINE(bugprone-throw-keyword-missing): message_ is a member
     explicit picture_memory_error(const std::string& picture) : message_(picture) {}
     [[nodiscard]] const char* what() const noexcept override { return message_.what(); }
 
