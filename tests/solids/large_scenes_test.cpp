@@ -12,9 +12,9 @@ TEST(SolidScenes, DragonIsClosedAndTheSameUnderEveryRule) {
     std::string why;
     const auto dragon = load_scene("dragon", why);
     if (!dragon) GTEST_SKIP() << why;
-    EXPECT_EQ(scene_status(*dragon, 512, {}).counts.voxels, 7458944u);
-    const vp::status nonzero = scene_status(*dragon, 1024, {});
-    EXPECT_EQ(nonzero.counts.voxels, scene_status(*dragon, 1024, {.rule = vp::fill_rule::even_odd}).counts.voxels);
+    EXPECT_EQ(status_of_bits(*dragon, 512, {}).counts.voxels, 7458944u);
+    const vp::status nonzero = status_of_bits(*dragon, 1024, {});
+    EXPECT_EQ(nonzero.counts.voxels, status_of_bits(*dragon, 1024, {.rule = vp::fill_rule::even_odd}).counts.voxels);
     EXPECT_EQ(nonzero.solid.open_rows, 0u);
 }
 
@@ -23,7 +23,7 @@ TEST(SolidScenes, BladeAndAsianDragonAreClosed) {
         std::string why;
         const auto m = load_scene(name, why);
         if (!m) GTEST_SKIP() << why;
-        for (const int n : {128, 1024}) EXPECT_EQ(scene_status(*m, n, {}).solid.open_rows, 0u) << name << ' ' << n;
+        for (const int n : {128, 1024}) EXPECT_EQ(status_of_bits(*m, n, {}).solid.open_rows, 0u) << name << ' ' << n;
     }
 }
 
@@ -31,8 +31,8 @@ TEST(SolidScenes, ConferenceIsOpen) {
     std::string why;
     const auto conference = load_scene("conference", why);
     if (!conference) GTEST_SKIP() << why;
-    EXPECT_EQ(scene_status(*conference, 1024, {.rule = vp::fill_rule::even_odd}).solid.open_rows, 73303u);
-    EXPECT_EQ(scene_status(*conference, 1024, {}).solid.open_rows, 74566u);
+    EXPECT_EQ(status_of_bits(*conference, 1024, {.rule = vp::fill_rule::even_odd}).solid.open_rows, 73303u);
+    EXPECT_EQ(status_of_bits(*conference, 1024, {}).solid.open_rows, 74566u);
 }
 
 TEST(SolidScenes, DragonsSurfaceHasTheKnownNumbersOfVoxels) {

@@ -20,11 +20,4 @@ inline std::optional<mesh> load_scene(std::string_view name, std::string& why) {
     return mesh{loaded.positions, loaded.triangles};
 }
 
-inline vp::status scene_status(const mesh& m, int n, const vp::solid_options& options) {
-    vp::cpu_backend backend{2};
-    const vp::grid g = vp::fit(m.positions, glm::ivec3(n));
-    vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, vp::blend::bit_or>> fb{backend, g.extent};
-    return vp::voxelize_solid(backend, m.view(), g, vp::passthrough{}, vp::constant(true), fb, options);
-}
-
 } // namespace solids

@@ -11,7 +11,7 @@ TEST(SolidScenes, DragonHasTheKnownNumberOfVoxels) {
     const auto dragon = load_scene("dragon", why);
     if (!dragon) GTEST_SKIP() << why;
     for (const vp::fill_rule rule : {vp::fill_rule::even_odd, vp::fill_rule::nonzero, vp::fill_rule::positive}) {
-        const vp::status s = scene_status(*dragon, 128, {.rule = rule});
+        const vp::status s = status_of_bits(*dragon, 128, {.rule = rule});
         EXPECT_EQ(s.counts.voxels, 116606u);
         EXPECT_EQ(s.solid.open_rows, 0u);
     }
@@ -21,7 +21,7 @@ TEST(SolidScenes, BladeHasTheKnownNumberOfVoxels) {
     std::string why;
     const auto blade = load_scene("blade", why);
     if (!blade) GTEST_SKIP() << why;
-    const vp::status s = scene_status(*blade, 128, {});
+    const vp::status s = status_of_bits(*blade, 128, {});
     EXPECT_EQ(s.counts.voxels, 98727u);
     EXPECT_EQ(s.solid.open_rows, 0u);
 }

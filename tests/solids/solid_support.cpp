@@ -194,6 +194,13 @@ solid library_solid(const std::vector<mesh>& draws, const vp::grid& g, const vp:
     return r;
 }
 
+vp::status status_of_bits(const mesh& m, int n, const vp::solid_options& options) {
+    vp::cpu_backend backend{2};
+    const vp::grid g = vp::fit(m.positions, glm::ivec3(n));
+    vp::framebuffer<vp::cpu_backend, bit_target> fb{backend, g.extent};
+    return vp::voxelize_solid(backend, m.view(), g, vp::passthrough{}, vp::constant(true), fb, options);
+}
+
 voxel_set library_cover(const mesh& m, const vp::grid& g) {
     vp::cpu_backend backend{2};
     vp::framebuffer<vp::cpu_backend, bit_target> fb{backend, g.extent};

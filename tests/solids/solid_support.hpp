@@ -71,6 +71,8 @@ inline solid library_solid(const mesh& m, const vp::grid& g, const vp::solid_opt
                            unsigned threads = 2) {
     return library_solid(std::vector<mesh>{m}, g, options, threads);
 }
+// What a call says that draws a solid into bits, along the mesh's longest axis n voxels.
+vp::status status_of_bits(const mesh& m, int n, const vp::solid_options& options);
 // The conservative cover.
 voxel_set library_cover(const mesh& m, const vp::grid& g);
 
