@@ -11,6 +11,10 @@
 #include <string>
 #include <vector>
 
+namespace voxelpipe::core {
+struct hole_cones;
+}
+
 namespace voxelize {
 
 // What is inside; the first three are the library's fill rules for the model as one body.
@@ -40,6 +44,8 @@ struct solid_request {
     std::uint64_t close_holes = 0;
     bool vote = false; // most of the parities along x, y and z, whatever the rule; the extent is outer
     int closing = 0;   // exterior: gaps of about twice as many voxels are closed
+    // close_holes of a part of the model: the lids of each body (voxelpipe::solid_options::cones), not owned.
+    const voxelpipe::core::hole_cones* cones = nullptr;
     // sRGB of the voxels inside; none: the mean of the model's covered voxels, in linear light, by alpha.
     std::optional<std::array<std::uint8_t, 3>> fill_color;
 };

@@ -34,6 +34,7 @@ namespace voxelize {
     if (request.close_holes != 0) {
         options.repair = vp::repair::close_holes;
         options.max_hole_edges = request.close_holes;
+        options.cones = request.cones;
     }
     switch (request.extent) {
     case solid_extent::centre:

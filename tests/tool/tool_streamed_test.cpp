@@ -109,6 +109,10 @@ TEST(Streamed, BinaryPly) {
     // Solids by a rule, too; an open one is warned of as a whole.
     two_ways{folder, folder / "m.ply", {"-r", "60", "--solid", "nonzero", "--solid-extent", "centre"}}.expect_equal(
         memory);
+    // Lids on holes: one that all slabs share, and with a greatest number of edges only those around what is dropped.
+    two_ways{folder, folder / "m.ply", {"-r", "60", "--solid", "nonzero", "--close-holes"}}.expect_equal(memory);
+    two_ways{folder, folder / "m.ply", {"-r", "60", "--solid", "even_odd", "--close-holes=9", "-t", "occupancy,normal"}}
+        .expect_equal(memory);
     // Slab by slab, without holding the bricks of all.
     const std::vector<std::string> little{"--max-memory", std::to_string(memory)};
     const two_ways counts{folder, folder / "m.ply", {"-r", "60"}};
@@ -193,6 +197,9 @@ TEST(Streamed, GltfOfManyParts) {
     // A body is a part.
     two_ways{folder, folder / "m.glb", {"-r", "240", "--solid", "each_draw", "-t", "occupancy,count"}}.expect_equal(
         world_memory);
+    // Each with its own lids, which reach slabs that it has no triangle in; parts that mirror turn their corners.
+    two_ways{folder, folder / "m.glb", {"-r", "160", "--solid", "each_draw", "--close-holes", "-t", "count"}}
+        .expect_equal(world_memory);
     // The mean of the whole surface is not known slab by slab.
     EXPECT_EQ(3, (two_ways{folder, folder / "m.glb", {"-r", "240", "--solid", "nonzero", "-t", "color"}})
                      .draw("mean.npz", {"--max-memory", std::to_string(world_memory)})

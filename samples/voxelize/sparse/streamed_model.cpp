@@ -8,6 +8,7 @@
 #include "../placement.hpp"
 #include "../surface.hpp"
 #include "sparse_voxelizer.hpp"
+#include "streamed_holes.hpp"
 
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/plan.hpp>
@@ -15,6 +16,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <new>
 #include <system_error>
 #include <type_traits>
@@ -153,16 +155,32 @@ scene scene_of(streamed_slab<Varyings>&& slab, const triangle_stream& model) {
         }
     });
     slab.triangles = {};
+    // Lids need a triangle in their body's draw.
+    constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
+    for (primitive& part : made.primitives)
+        if (part.triangles.empty()) {
+            part.positions.emplace_back(nowhere, nowhere, nowhere);
+            part.triangles.emplace_back(0U, 0U, 0U);
+            part.numbers.push_back(0);
+        }
     return made;
+}
+
+// Adds parts without triangles to a slab's.
+void add_parts(std::vector<part_count>& to, const std::vector<std::size_t>& parts) {
+    for (const std::size_t part : parts) {
+        const auto at =
+            std::lower_bound(to.begin(), to.end(), part, [](const part_count& c, std::size_t p) { return c.part < p; });
+        if (at == to.end() || at->part != part) to.insert(at, {part, 0});
+    }
 }
 
 } // namespace
 
 opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder) {
     const voxelize_request& request = options.voxelize;
-    // Repairs need the whole mesh.
-    const bool is_by_rule = !request.solid || (request.solid->rule != solid_rule::exterior && !request.solid->vote &&
-                                               request.solid->close_holes == 0);
+    // The other two need the whole grid.
+    const bool is_by_rule = !request.solid || (request.solid->rule != solid_rule::exterior && !request.solid->vote);
     const bool is_drawn_here = request.backend != backend_choice::cuda &&
                                request.strategy == voxelpipe::strategy::automatic && is_by_rule &&
                                options.storage != storage_choice::dense;
@@ -294,6 +312,8 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
         stats.triangles_dropped = counts.triangles_dropped();
         stats.triangles_flat = counts.triangles_zero_area;
 
+        const streamed_holes holes(model, request, room, place.folder);
+
         // Nothing is drawn in the padding.
         const int padding = request.padding;
         for (std::size_t r = 0, s = 0; r < ranges.size(); ++r) {
@@ -301,6 +321,9 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
             for (; s < parts.size() && parts[s].range == r; ++s) {
                 const int begin = std::max(parts[s].layers.begin, padding),
                           end = std::min(parts[s].layers.end, whole.extent.z - padding);
+                add_parts(parts[s].parts, holes.parts());
+                std::vector<std::size_t> numbers;
+                for (const part_count& c : parts[s].parts) numbers.push_back(c.part);
                 scene of_slab = scene_of(std::move(parts[s]), model);
                 if (begin >= end) continue;
                 if (of_slab.triangle_count() == 0) { // nothing to draw; its rows are counted
@@ -318,8 +341,11 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
                 const double done = static_cast<double>(s), all = static_cast<double>(parts.size());
                 if (request.progress)
                     part.progress = [&, done, all](double share) { request.progress((done + share) / all); };
+                const std::vector<vp::core::hole_cones> cones = holes.of_bodies(numbers);
+                if (!cones.empty()) part.solid->cones = cones.data();
                 voxelize_stats of_part;
                 of_range.push_back(draw_sparse(of_slab, part, whole, of_part));
+                holes.count(of_part);
                 add_part(stats, of_part);
                 ++stats.slabs;
             }
@@ -332,6 +358,7 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
             }
             sink(r, of_range.size() == 1 ? std::move(of_range[0]) : join_slabs(std::move(of_range)));
         }
+        holes.count(stats);
         warn_of_parts(stats, request);
     } catch (const std::system_error& error) {
         throw write_error(place.folder, "temporary files for the triangles: " + error.code().message());
