@@ -29,7 +29,7 @@ class face_cutter {
 public:
     using taker = std::function<void(std::uint32_t run, const glm::uvec3& vertices)>;
 
-    face_cutter(position_cache& positions, model_bytes& vertices, taker take)
+    face_cutter(position_cache& positions, scratch_bytes& vertices, taker take)
         : positions_(positions), vertices_(vertices), take_(std::move(take)) {}
 
     // The face whose corners end the list.
@@ -89,7 +89,7 @@ private:
     [[noreturn]] static void fail() { throw model_error("assimp cut polygons into triangles of others"); }
 
     position_cache& positions_;
-    model_bytes& vertices_;
+    scratch_bytes& vertices_;
     taker take_;
     std::vector<face> faces_;
 };
@@ -196,7 +196,7 @@ void obj_file::read_faces(const std::filesystem::path& path) {
     std::uint64_t before = 0, num_triangles = 0;
     std::uint32_t num_runs = 0;
     bool is_within_run = false;
-    face_cutter faces(*positions_, vertices_.reader(), [&](std::uint32_t number, const glm::uvec3& vertices) {
+    face_cutter faces(*positions_, vertices_, [&](std::uint32_t number, const glm::uvec3& vertices) {
         run& of_face = runs_[number];
         if (of_face.num_triangles++ == 0) of_face.first = num_triangles;
         ++num_triangles;
@@ -249,19 +249,18 @@ void obj_file::read_part(std::size_t part, const visitor& visit) {
     std::vector<glm::uvec3> indices;
     std::vector<glm::vec3> corners;
     std::vector<glm::vec4> colors;
-    model_bytes &triangles = triangles_.reader(), &vertices = vertices_.reader();
     std::uint64_t number = parts_[part].first_number;
     for (const std::uint32_t r : runs_of_[part])
         for (std::uint64_t done = 0; done < runs_[r].num_triangles;) {
             indices.resize(static_cast<std::size_t>(std::min(block, runs_[r].num_triangles - done)));
-            triangles.read((runs_[r].first + done) * sizeof(glm::uvec3),
-                           {reinterpret_cast<char*>(indices.data()), indices.size() * sizeof(glm::uvec3)});
+            triangles_.read((runs_[r].first + done) * sizeof(glm::uvec3),
+                            {reinterpret_cast<char*>(indices.data()), indices.size() * sizeof(glm::uvec3)});
             corners.clear();
             colors.clear();
             for (const glm::uvec3& t : indices)
                 for (const std::uint32_t v : {t.x, t.y, t.z}) {
-                    corners.push_back(positions_->at(v, vertices));
-                    if (colors_) colors.push_back(colors_->at(v, vertices));
+                    corners.push_back(positions_->at(v, vertices_));
+                    if (colors_) colors.push_back(colors_->at(v, vertices_));
                 }
             visit({part, number, corners, colors});
             done += indices.size();

@@ -4,27 +4,22 @@
 
 #include "formats/output_file.hpp"
 
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstdlib>
-#include <string>
 #include <system_error>
 #include <utility>
 
 namespace voxelize {
 
-scratch_bytes::scratch_bytes(std::filesystem::path folder) : folder_(std::move(folder)) {
-    std::string name = folder_.string() + "/voxelize-XXXXXX";
-    file_ = ::mkstemp(name.data());
-    if (file_ < 0) fail(errno);
-    reader_.emplace(name);
-    (void)::unlink(name.c_str());
+template <class Work>
+auto scratch_bytes::named(const Work& work) const {
+    try {
+        return work();
+    } catch (const std::system_error& error) {
+        throw write_error(folder_, "temporary files for the model: " + error.code().message());
+    }
 }
 
-scratch_bytes::~scratch_bytes() {
-    if (file_ >= 0) ::close(file_);
-}
+scratch_bytes::scratch_bytes(std::filesystem::path folder)
+    : folder_(std::move(folder)), file_(named([this] { return voxelpipe::slabs::scratch_file(folder_.string()); })) {}
 
 void scratch_bytes::append(std::span<const std::byte> bytes) {
     constexpr std::size_t block = std::size_t{1} << 20;
@@ -32,24 +27,15 @@ void scratch_bytes::append(std::span<const std::byte> bytes) {
     if (pending_.size() >= block) flush();
 }
 
-model_bytes& scratch_bytes::reader() {
+void scratch_bytes::read(std::uint64_t offset, std::span<char> bytes) {
     if (!pending_.empty()) flush();
-    return *reader_;
+    named([&] { file_.read(offset, std::as_writable_bytes(bytes)); });
 }
 
 void scratch_bytes::flush() {
-    std::span<const std::byte> rest = pending_;
-    while (!rest.empty()) {
-        const ssize_t n = ::write(file_, rest.data(), rest.size());
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) fail(n < 0 ? errno : EIO);
-        rest = rest.subspan(static_cast<std::size_t>(n));
-    }
+    file_.write(file_.extend(pending_.size()), {pending_});
+    named([&] { file_.check(); });
     pending_.clear();
-}
-
-void scratch_bytes::fail(int error) const {
-    throw write_error(folder_, "temporary files for the model: " + std::generic_category().message(error));
 }
 
 } // namespace voxelize

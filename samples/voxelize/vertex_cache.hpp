@@ -91,8 +91,9 @@ public:
             static_cast<std::size_t>(std::min(blocks, std::max(least, room / (block_vertices * sizeof(value_type))))));
     }
 
-    // Throws model_error for an index that names no vertex.
-    [[nodiscard]] const value_type& at(std::uint64_t i, model_bytes& file) {
+    // file: a model_bytes or scratch_bytes. Throws model_error for an index that names no vertex.
+    template <class File>
+    [[nodiscard]] const value_type& at(std::uint64_t i, File& file) {
         if (i >= layout_.count) throw model_error("an index is out of range");
         const std::uint64_t number = i / block_vertices;
         block& kept = blocks_[static_cast<std::size_t>(number % blocks_.size())];
@@ -107,7 +108,8 @@ private:
         std::vector<value_type> values;
     };
 
-    void read(block& kept, std::uint64_t number, model_bytes& file) {
+    template <class File>
+    void read(block& kept, std::uint64_t number, File& file) {
         const std::uint64_t first = number * block_vertices;
         const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(block_vertices, layout_.count - first));
         kept.number = ~std::uint64_t{0};
