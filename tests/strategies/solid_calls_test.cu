@@ -196,6 +196,33 @@ TEST(Solids, ClosedHoles) {
         }
 }
 
+// Cones that were found beforehand, of the whole mesh, are drawn in place of those that the call would find.
+TEST(Solids, ConesOfTheWholeMesh) {
+    const mesh_data m = broken_meshes()[1];
+    const vp::grid g = box_grid({37, 26, 25}), part = g.crop({5, 6, 7}, {20, 9, 11});
+    const vp::core::snap_transform snap = vp::core::make_snap_transform(g);
+    std::vector<vp::core::snapped_position> at;
+    for (const glm::vec3& p : m.positions) at.push_back(vp::core::snap(snap, p.x, p.y, p.z));
+    const auto vertices = static_cast<std::uint32_t>(at.size()),
+               triangles = static_cast<std::uint32_t>(m.triangles.size());
+    const vp::core::hole_part whole{at.data(), at.size(), {m.triangles.data(), triangles, vertices}, triangles};
+    const vp::core::hole_cones cones = vp::core::close_holes({whole}, ~std::uint64_t{0});
+    ASSERT_NE(cones.cones, 0u);
+    vp::cuda_backend gpu;
+    const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
+    bit_target<vp::cuda_backend> a{gpu, part.extent}, b{gpu, part.extent};
+    for (const auto of : all_bodies) {
+        vp::solid_options options{.bodies = of, .extent = vp::solid_extent::outer, .repair = vp::repair::close_holes};
+        const vp::status found = vp::voxelize_solid(gpu, mesh, part, vp::passthrough{}, vp::constant(true), a, options);
+        options.max_hole_edges = 0; // of what the call would find
+        options.cones = &cones;
+        const vp::status given = vp::voxelize_solid(gpu, mesh, part, vp::passthrough{}, vp::constant(true), b, options);
+        ASSERT_TRUE(found.ok() && given.ok()) << found.message() << given.message();
+        EXPECT_EQ(found.solid, given.solid);
+        expect_same_bytes(vp::get<0>(a).to_host(gpu), vp::get<0>(b).to_host(gpu), "bits");
+    }
+}
+
 TEST(Solids, ExteriorAndVote) {
     const drawing_of_everything all{broken_meshes(), {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};
     const drawing_of_bits bits{broken_meshes(), {{}}, {{true}}};
