@@ -93,8 +93,8 @@ public:
 
     template <coverage Rule>
     [[nodiscard]] status run(framebuffer& fb, bool count_voxels, std::uint64_t triangles_in) {
-        // Until the end: the pool of cudaMallocAsync gives back at every wait what is free, and 140 MiB take 0.25 ms to
-        // map.
+        // Until the end, because the pool of cudaMallocAsync gives back at each wait what is free, and mapping many MiB
+        // again takes a call longer than drawing.
         const lists of_raster(*this, raster_.template reads_setups<Rule>() || !(is_blended_once<Targets> && ...));
         index_.mark_above([&](const index_level& level, int log2_cell) {
             raster_.template mark<Rule>(level, log2_cell, raster_.template is_coarse<Rule>(log2_cell));
