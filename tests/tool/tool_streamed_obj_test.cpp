@@ -98,6 +98,10 @@ TEST(StreamedObj, WhatCannotBeStreamedIsRefusedWithItsNeed) {
         EXPECT_NE(std::string::npos, textured.err.find(" MiB are needed")) << textured.err;
     }
     two_ways{folder, folder / "m.obj", {"-r", "60"}}.expect_equal(mebibytes);
+    // assimp's process counts as well, and has too little.
+    const outcome narrow = two_ways{folder, folder / "m.obj", {"-r", "60"}}.draw("no.npz", {"--max-memory", "24"});
+    EXPECT_EQ(3, narrow.code) << narrow.err;
+    EXPECT_NE(std::string::npos, narrow.err.find("assimp, which reads its groups")) << narrow.err;
     write(folder / "m.obj", relief(side, false) + "l 1 2\n");
     const outcome lines = two_ways{folder, folder / "m.obj", {"-r", "60"}}.draw("no.npz", tight);
     EXPECT_EQ(3, lines.code) << lines.err;

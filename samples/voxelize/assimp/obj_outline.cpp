@@ -4,9 +4,11 @@
 
 #include "../gltf/resources.hpp"
 #include "../isolated.hpp"
+#include "../memory.hpp"
 #include "import.hpp"
 #include "obj_text.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <utility>
 
@@ -16,13 +18,20 @@ namespace {
 // A run's number as two coordinates that floats hold.
 constexpr std::size_t number_base = std::size_t{1} << 20;
 
-// assimp holds a block of 16 MiB of a file twice, however short that is.
-constexpr std::uint64_t process_memory = std::uint64_t{256} << 20;
+constexpr std::uint64_t most_memory = std::uint64_t{256} << 20;
 
+// In a process of its own, which takes no more than the budget has left, so that both stay within it. assimp holds a
+// block of 16 MiB of a file twice, however short that is.
 model read_isolated(std::span<const std::byte> bytes, const std::string& name, const gltf_file_reader& read_file) {
     isolation_limits limits;
-    limits.memory = limits.result = process_memory;
-    return from_bytes(run_isolated([&] { return to_bytes(read_model(bytes, name, read_file)); }, limits, "assimp"));
+    limits.memory = limits.result = std::min(most_memory, memory::room());
+    try {
+        return from_bytes(run_isolated([&] { return to_bytes(read_model(bytes, name, read_file)); }, limits, "assimp"));
+    } catch (const isolation_memory_error&) {
+        if (limits.memory == most_memory) throw;
+        throw obj_refusal("assimp, which reads its groups and cuts its polygons, has " +
+                          memory::mebibytes(static_cast<double>(limits.memory)) + " of the memory left");
+    }
 }
 
 } // namespace
