@@ -181,11 +181,11 @@ voxelize_async(cuda_backend& backend, std::span<const draw<Mesh, VertexShader, F
     }
 }
 
-// Waits for the stream and returns the status of the last call in this workspace. If it was too small
-// (capacity_exceeded) and `need` is not null, *need receives limits with which the same call succeeds or comes closer:
-// a pass without room for its records has not counted all of its pairs. Of a call that succeeded,
-// need->expects_deferred alone may be set: the call is quicker with it. A CUDA error that shows only here has stage
-// validate: it may stem from any earlier work of the stream.
+// Waits for the stream and returns the status of the last call in this workspace. `need` may be null.
+// - The workspace was too small (capacity_exceeded): *need receives larger limits. The same call may fail with these
+//   too, because a pass stops counting pairs when its records do not fit.
+// - The call succeeded: *need stays as it is, except that expects_deferred is set if the call is quicker with it.
+// - A CUDA error that shows only here has stage validate: it may stem from any earlier work of the stream.
 [[nodiscard]] inline status read_status(cuda_backend& backend, const workspace_view& workspace,
                                         workspace_limits* need = nullptr) {
     device::pipeline_state state{};

@@ -65,10 +65,10 @@ public:
     }
 
 private:
-    // An edge by its lower end, and how many more go up than down.
+    // The directed edges between two positions.
     struct edge {
-        core::snapped_position low, high;
-        std::int64_t sum;
+        core::snapped_position low, high; // in the order of place()
+        std::int64_t sum;                 // edges from low to high minus edges from high to low
     };
     [[nodiscard]] static auto place(const core::snapped_position& p) { return std::tie(p.x, p.y, p.z); }
     [[nodiscard]] static auto place(const edge& e) { return std::tuple_cat(place(e.low), place(e.high)); }

@@ -73,9 +73,13 @@ struct pipeline_state {
 // Who draws the triangles that the first pass would defer. As wide as the members of `capacities`, so that these have
 // no padding (call_bytes).
 enum class deferral : unsigned long long {
-    to_pass, // the deferred pass
-    of_many, // a block of the first pass that has few of them at its end; the deferred pass draws those of other blocks
-    to_no_pass, // a block of the first pass likewise; there is no deferred pass, and the call fails if a block has many
+    // The deferred pass draws all of them.
+    to_pass,
+    // A block of the first pass that has few at its end draws these itself. The deferred pass draws those of other
+    // blocks.
+    of_many,
+    // The same, but there is no deferred pass. The call fails if a block has many.
+    to_no_pass,
 };
 
 // Lengths of a call's arrays. Elements that do not fit are counted but not written.

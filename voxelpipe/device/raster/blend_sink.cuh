@@ -181,7 +181,7 @@ struct framebuffer_output {
     template <class Call>
     using deferred_sink = sink<Call>;
     static constexpr bool defers = has_only_bits<Framebuffer>; // otherwise raster/block_pass.cuh draws
-    static constexpr bool may_draw_few = false;                // rarely gains, and takes long to compile
+    static constexpr bool may_draw_few = false;                // compiles less; not timed
     // Facts for the compiler: all targets are in use, their mode is to blend, and there are no marks; or all values are
     // true instead of the last.
     static constexpr bool only_blends = false, only_sets = false;
