@@ -6,6 +6,7 @@
 // the row before: a surface has four times the voxels at twice the resolution.
 
 #include "machine.hpp"
+#include "mean_shaders.hpp"
 #include "mesh_file.hpp"
 #include "output.hpp"
 #include "scene_choice.hpp"
@@ -36,20 +37,6 @@ struct options {
     int largest_dense = 512;
 };
 
-struct position_varying {
-    glm::vec4 value;
-};
-struct pass_position {
-    template <class Vertex>
-    vp::vertex_output<position_varying> operator()(const Vertex& v) const {
-        return {v.position, {glm::vec4(v.position, 1.0f)}};
-    }
-};
-struct give_position {
-    vp::output<glm::vec4, std::uint32_t> operator()(const vp::fragment<position_varying>& f) const {
-        return vp::outputs(f.varyings.value, 1u);
-    }
-};
 using bit = vp::target<vp::bit, vp::blend::bit_or>;
 using sum = vp::target<glm::vec4, vp::blend::add>;
 using count = vp::target<std::uint32_t, vp::blend::count>;

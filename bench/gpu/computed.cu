@@ -7,22 +7,17 @@
 // cleared) and the sum of a constant by the 2011 program. Prints a table of medians; --out writes it as CSV too.
 
 #include "../published_gpu_figures.hpp"
-#include "device_record.hpp"
 #include "floors.hpp"
-#include "machine.hpp"
 #include "one_thread_a_triangle.hpp"
 #include "output.hpp"
+#include "run.hpp"
 #include "scene_choice.hpp"
-#include "session.hpp"
 #include "table.hpp"
 
 #include <voxelpipe/voxelpipe.hpp>
 
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cstdio>
-#include <iostream>
 #include <string>
 #include <tuple>
 #include <type_traits>
@@ -33,11 +28,8 @@ namespace {
 namespace vp = voxelpipe;
 using namespace bench;
 
-struct options {
-    std::string scenes = VOXELPIPE_SCENES_DIR, out;
-    std::vector<std::string> names, programs, strategies;
-    std::vector<int> resolutions{128, 512, 1024};
-    gpu::repetition repeat;
+struct options : gpu::run_options {
+    std::vector<std::string> programs, strategies;
     bool compares = true, tracks = false;
 };
 
@@ -306,23 +298,18 @@ int run(const options& how, const std::string& command) {
             }
         }
     }
-    std::string text =
-        "# Shaders that compute\n\n" + gpu::describe_device(watch) + "- commit: " + describe_machine().commit +
-        "\n- date: " + describe_machine().date + "\n" + "- clocks over the run: " + watch.range() +
-        "\n- device copy, read and write: " + significant(bandwidth * 1e-12) + " TB/s\n- command: `" + command +
-        "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
-        " calls, CUDA events around the whole call, clear and wait included, mesh on the device\n"
-        "- each strategy forced; its targets compared word by word with the first one's\n"
-        "- floor: each fragment's pair once written and read, the targets cleared\n"
-        "- 2011: quoted from an NVIDIA H200, its bits of a constant (constant_bit) or sum of a constant\n"
-        "- stages: of one more call, with events between them\n";
-    for (const std::string& note : notes) text += "- " + note + "\n";
-    text += "\n" + rows.markdown();
-    std::cout << text;
-    if (!how.out.empty()) {
-        write_file(std::filesystem::path(how.out) / "gpu_computed.md", text);
-        write_file(std::filesystem::path(how.out) / "gpu_computed.csv", rows.csv());
-    }
+    gpu::write_report(how,
+                      {"Shaders that compute",
+                       "gpu_computed",
+                       "CUDA events around the whole call, clear and wait included, mesh on the device",
+                       {"device copy, read and write: " + significant(bandwidth * 1e-12) + " TB/s",
+                        "each strategy forced; its targets compared word by word with the first one's",
+                        "floor: each fragment's pair once written and read, the targets cleared",
+                        "2011: quoted from an NVIDIA H200, its bits of a constant (constant_bit) or sum of a constant",
+                        "stages: of one more call, with events between them"},
+                       notes,
+                       {}},
+                      watch, command, rows);
     return differ ? 1 : 0;
 }
 
@@ -330,25 +317,17 @@ int run(const options& how, const std::string& command) {
 
 int main(int argc, char** argv) {
     options how;
-    CLI::App app{"cuda_backend's times of shaders that compute, by strategy, next to floors and published figures"};
-    app.add_option("--scenes", how.scenes, "Folder of the benchmark scenes (.vpm or .vpz)")->capture_default_str();
-    app.add_option("--mesh", how.names, "A scene, a generated mesh or a file; may be repeated. Default: five scenes");
-    app.add_option("--resolution", how.resolutions, "Voxels a side; may be repeated")->capture_default_str();
-    app.add_option("--program", how.programs,
-                   "constant_bit, constant_sum, float_add_varying, float_max_computed, texture_mean, normal_mean or "
-                   "abuffer_height; may be repeated. Default: all");
-    app.add_option("--strategy", how.strategies,
-                   "occupancy_mask, immediate, sorted_reduce, tiled or lists; may be repeated. Default: all");
-    app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
-    app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
-    app.add_flag("!--no-comparison", how.compares, "Leave out the comparison of strategies");
-    app.add_flag("--track", how.tracks, "Targets track their changes");
-    app.add_option("--out", how.out, "Folder for gpu_computed.md and gpu_computed.csv");
-    CLI11_PARSE(app, argc, argv);
-    try {
-        return run(how, bench::command_line(argc, argv));
-    } catch (const std::exception& e) {
-        std::fprintf(stderr, "bench_gpu_computed: %s\n", e.what());
-        return 1;
-    }
+    how.resolutions = {128, 512, 1024};
+    gpu::command line("bench_gpu_computed",
+                      "cuda_backend's times of shaders that compute, by strategy, next to floors and published figures",
+                      how, "gpu_computed.md and gpu_computed.csv");
+    line.add_meshes();
+    line.add("--program", how.programs,
+             "constant_bit, constant_sum, float_add_varying, float_max_computed, texture_mean, normal_mean or "
+             "abuffer_height; may be repeated. Default: all");
+    line.add("--strategy", how.strategies,
+             "occupancy_mask, immediate, sorted_reduce, tiled or lists; may be repeated. Default: all");
+    line.add_flag("!--no-comparison", how.compares, "Leave out the comparison of strategies");
+    line.add_flag("--track", how.tracks, "Targets track their changes");
+    return line.run(argc, argv, [&](const std::string& command) { return run(how, command); });
 }

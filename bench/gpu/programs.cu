@@ -5,20 +5,16 @@
 // scene, a million instances of a small mesh, ten million points, a million segments, and 10^9 triangles of 10^6
 // patches in chunks. Prints a table of medians; --out writes it as CSV too.
 
-#include "device_record.hpp"
 #include "generated_meshes.hpp"
 #include "output.hpp"
+#include "run.hpp"
 #include "scene_choice.hpp"
-#include "session.hpp"
 #include "table.hpp"
 
 #include <voxelpipe/voxelpipe.hpp>
 
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cstdio>
-#include <iostream>
 #include <string>
 #include <vector>
 
@@ -26,11 +22,6 @@ namespace {
 
 namespace vp = voxelpipe;
 using namespace bench;
-
-struct options {
-    std::string scenes = VOXELPIPE_SCENES_DIR, out;
-    gpu::repetition repeat;
-};
 
 using bits = vp::target<vp::bit, vp::blend::bit_or>;
 using counts = vp::target<std::uint32_t, vp::blend::count>;
@@ -56,7 +47,7 @@ struct placed {
 
 class program_table {
 public:
-    explicit program_table(const options& how) : how_(how), backend_(session_.stream()) {}
+    explicit program_table(const gpu::run_options& how) : how_(how), backend_(session_.stream()) {}
 
     // The scene was made of a base mesh by dividing each triangle into n^2, row by row.
     void tessellated(const std::string& name, unsigned n) {
@@ -137,15 +128,15 @@ public:
             0);
     }
     void print(const std::string& command) {
-        std::string text = "# Programs, instances, points and lines on a GPU\n\n" + gpu::describe_device(watch_) +
-                           "- command: `" + command +
-                           "`\n- milliseconds, medians, CUDA events around the whole call, clear and count of voxels "
-                           "included, inputs on the device\n\n" +
-                           rows_.markdown();
-        std::cout << text;
-        if (how_.out.empty()) return;
-        write_file(std::filesystem::path(how_.out) / "gpu_programs.md", text);
-        write_file(std::filesystem::path(how_.out) / "gpu_programs.csv", rows_.csv());
+        gpu::write_report(
+            how_,
+            {"Programs, instances, points and lines on a GPU",
+             "gpu_programs",
+             "CUDA events around the whole call, clear and count of voxels included, inputs on the device",
+             {},
+             {},
+             {}},
+            watch_, command, rows_);
     }
 
 private:
@@ -167,7 +158,7 @@ private:
         say(what + " " + significant(ms) + " ms");
     }
 
-    options how_;
+    gpu::run_options how_;
     gpu::session session_;
     gpu::clock_watch watch_;
     vp::cuda_backend backend_;
@@ -178,23 +169,17 @@ private:
 } // namespace
 
 int main(int argc, char** argv) {
-    options how;
-    CLI::App app{"cuda_backend's times of programs, instances, points and lines"};
-    app.add_option("--scenes", how.scenes, "Folder of the benchmark scenes (.vpm or .vpz)")->capture_default_str();
-    app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
-    app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
-    app.add_option("--out", how.out, "Folder for gpu_programs.md and gpu_programs.csv");
-    CLI11_PARSE(app, argc, argv);
-    try {
+    gpu::run_options how;
+    gpu::command line("bench_gpu_programs", "cuda_backend's times of programs, instances, points and lines", how,
+                      "gpu_programs.md and gpu_programs.csv");
+    return line.run(argc, argv, [&](const std::string& command) {
         program_table table(how);
         table.tessellated("asiandragon", 16);
         table.tessellated("blade", 3);
         table.instanced();
         table.elements();
         table.in_chunks();
-        table.print(bench::command_line(argc, argv));
-    } catch (const std::exception& e) {
-        std::fprintf(stderr, "bench_gpu_programs: %s\n", e.what());
-        return 1;
-    }
+        table.print(command);
+        return 0;
+    });
 }

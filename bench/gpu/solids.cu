@@ -7,22 +7,17 @@
 // have whole calls only. Prints a table of medians; --out writes it as CSV too. --scaling times both rules over
 // triangles, 10^3 to 10^7 on a sphere, and over grids instead.
 
-#include "device_record.hpp"
 #include "floors.hpp"
 #include "generated_on_device.hpp"
-#include "machine.hpp"
 #include "output.hpp"
+#include "run.hpp"
 #include "scene_choice.hpp"
-#include "session.hpp"
 #include "table.hpp"
 
 #include <voxelpipe/device/optional/solid_async.cuh>
 #include <voxelpipe/voxelpipe.hpp>
 
-#include <CLI/CLI.hpp>
-
 #include <cstdio>
-#include <iostream>
 #include <string>
 #include <vector>
 
@@ -81,11 +76,7 @@ std::uint64_t differences(const gpu::session& s, const std::uint32_t* a, const s
 
 // ---- the table ------------------------------------------------------------------------------------------------------
 
-struct options {
-    std::string scenes = VOXELPIPE_SCENES_DIR, out;
-    std::vector<std::string> names;
-    std::vector<int> resolutions{128, 256, 512, 1024};
-    gpu::repetition repeat;
+struct options : gpu::run_options {
     bool baseline = true, repairs = true, scaling = false;
     int scaling_resolution = 512, max_resolution = 2048; // of the series triangles, and where the series grid ends
 };
@@ -238,21 +229,17 @@ int run(const options& how, const std::string& command) {
                 say(notes.back());
             }
     }
-    std::string text = "# Solids into bits on a GPU\n\n" + gpu::describe_device(watch) +
-                       "- commit: " + describe_machine().commit + "\n- date: " + describe_machine().date + "\n" +
-                       "- clocks over the run: " + watch.range() + "\n- command: `" + command +
-                       "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
-                       " calls, CUDA events around the whole call, clear included, mesh on the device\n"
-                       "- peer: quoted, the fastest of three kernels of two public voxelizers on an NVIDIA H200; their "
-                       "sets are not exact\n";
-    for (const std::string& note : notes) text += "- " + note + "\n";
-    text += "- ahead of the peer, geometric means: even_odd " + significant(geometric_mean(ahead[0])) + ", nonzero " +
-            significant(geometric_mean(ahead[1])) + "\n\n" + rows.markdown();
-    std::cout << text;
-    if (!how.out.empty()) {
-        write_file(std::filesystem::path(how.out) / "gpu_solids.md", text);
-        write_file(std::filesystem::path(how.out) / "gpu_solids.csv", rows.csv());
-    }
+    notes.push_back("ahead of the peer, geometric means: even_odd " + significant(geometric_mean(ahead[0])) +
+                    ", nonzero " + significant(geometric_mean(ahead[1])));
+    gpu::write_report(how,
+                      {"Solids into bits on a GPU",
+                       "gpu_solids",
+                       "CUDA events around the whole call, clear included, mesh on the device",
+                       {"peer: quoted, the fastest of three kernels of two public voxelizers on an NVIDIA H200; their "
+                        "sets are not exact"},
+                       notes,
+                       {}},
+                      watch, command, rows);
     return failed ? 1 : 0;
 }
 
@@ -305,18 +292,14 @@ int run_scaling(const options& how, const std::string& command) {
     const gpu::resident_mesh mesh = gpu::upload(data);
     for (int n = 64; n <= how.max_resolution; n *= 2)
         point("grid", data.name, n, mesh, vp::fit(data.positions, glm::ivec3(n)));
-    std::string text = "# Solids into bits on a GPU, over triangles and grids\n\n" + gpu::describe_device(watch) +
-                       "- commit: " + describe_machine().commit + "\n- date: " + describe_machine().date + "\n" +
-                       "- clocks over the run: " + watch.range() + "\n- command: `" + command +
-                       "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
-                       " calls, clear included, mesh on the device; fragments: crossings\n";
-    for (const std::string& note : notes) text += "- " + note + "\n";
-    text += "\n" + rows.markdown();
-    std::cout << text;
-    if (!how.out.empty()) {
-        write_file(std::filesystem::path(how.out) / "gpu_solids_scaling.md", text);
-        write_file(std::filesystem::path(how.out) / "gpu_solids_scaling.csv", rows.csv());
-    }
+    gpu::write_report(how,
+                      {"Solids into bits on a GPU, over triangles and grids",
+                       "gpu_solids_scaling",
+                       "clear included, mesh on the device; fragments: crossings",
+                       {},
+                       notes,
+                       {}},
+                      watch, command, rows);
     return failed ? 1 : 0;
 }
 
@@ -324,23 +307,16 @@ int run_scaling(const options& how, const std::string& command) {
 
 int main(int argc, char** argv) {
     options how;
-    CLI::App app{"cuda_backend's times of solids next to a plain baseline, the floor and published figures"};
-    app.add_option("--scenes", how.scenes, "Folder of the benchmark scenes (.vpm or .vpz)")->capture_default_str();
-    app.add_option("--mesh", how.names, "A scene, a generated mesh or a file; may be repeated. Default: five scenes");
-    app.add_option("--resolution", how.resolutions, "Voxels a side; may be repeated")->capture_default_str();
-    app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
-    app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
-    app.add_flag("!--no-baseline", how.baseline, "Leave out the baseline");
-    app.add_flag("!--no-repairs", how.repairs, "Leave out the repairs");
-    app.add_flag("--scaling", how.scaling, "Curves over triangles and grids, instead of the table");
-    app.add_option("--most-resolution", how.max_resolution, "Where the curve over grids ends")->capture_default_str();
-    app.add_option("--out", how.out, "Folder for gpu_solids.md and gpu_solids.csv, or gpu_solids_scaling");
-    CLI11_PARSE(app, argc, argv);
-    try {
-        const std::string command = bench::command_line(argc, argv);
+    how.resolutions = {128, 256, 512, 1024};
+    gpu::command line("bench_gpu_solids",
+                      "cuda_backend's times of solids next to a plain baseline, the floor and published figures", how,
+                      "gpu_solids.md and gpu_solids.csv, or gpu_solids_scaling");
+    line.add_meshes();
+    line.add_flag("!--no-baseline", how.baseline, "Leave out the baseline");
+    line.add_flag("!--no-repairs", how.repairs, "Leave out the repairs");
+    line.add_flag("--scaling", how.scaling, "Curves over triangles and grids, instead of the table");
+    line.add("--most-resolution", how.max_resolution, "Where the curve over grids ends");
+    return line.run(argc, argv, [&](const std::string& command) {
         return how.scaling ? run_scaling(how, command) : run(how, command);
-    } catch (const std::exception& e) {
-        std::fprintf(stderr, "bench_gpu_solids: %s\n", e.what());
-        return 1;
-    }
+    });
 }

@@ -5,21 +5,17 @@
 // shaded mean comes; the most device memory that a call takes, and what its result takes; at 1024 the same into dense
 // targets, with their clear; and the fastest published figure. Prints a table of medians; --out writes it as CSV too.
 
-#include "device_record.hpp"
-#include "machine.hpp"
+#include "mean_shaders.hpp"
 #include "octrees.cuh"
 #include "output.hpp"
+#include "run.hpp"
 #include "scene_choice.hpp"
-#include "session.hpp"
 #include "table.hpp"
 
 #include <voxelpipe/voxelpipe.hpp>
 
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cstdio>
-#include <iostream>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -30,11 +26,7 @@ namespace {
 namespace vp = voxelpipe;
 using namespace bench;
 
-struct options {
-    std::string scenes = VOXELPIPE_SCENES_DIR, out;
-    std::vector<std::string> names;
-    std::vector<int> resolutions{1024, 4096, 16384};
-    gpu::repetition repeat;
+struct options : gpu::run_options {
     int largest_mean = 4096, largest_dense = 1024, largest_octree = 0, slabs = 1;
 };
 
@@ -53,23 +45,6 @@ double published_peer(std::string_view scene, int n) {
         if (p.scene == scene && p.resolution == n) return p.peer;
     return 0;
 }
-
-// ---- the two shaders ------------------------------------------------------------------------------------------------
-
-struct position_varying {
-    glm::vec4 value;
-};
-struct pass_position {
-    template <class Vertex>
-    VOXELPIPE_HD vp::vertex_output<position_varying> operator()(const Vertex& v) const {
-        return {v.position, {glm::vec4(v.position, 1.0f)}};
-    }
-};
-struct give_position {
-    VOXELPIPE_HD vp::output<glm::vec4, std::uint32_t> operator()(const vp::fragment<position_varying>& f) const {
-        return vp::outputs(f.varyings.value, 1u);
-    }
-};
 
 using bit = vp::target<vp::bit, vp::blend::bit_or>;
 using sum = vp::target<glm::vec4, vp::blend::add>;
@@ -219,27 +194,22 @@ int run(const options& how, const std::string& command) {
                 }
             }
     }
-    std::string text = "# Sparse framebuffers on a GPU\n\n" + gpu::describe_device(watch) +
-                       "- commit: " + describe_machine().commit + "\n- date: " + describe_machine().date + "\n" +
-                       "- clocks over the run: " + watch.range() + "\n- command: `" + command +
-                       "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
-                       " calls, CUDA events around the whole call, allocations and waits included, mesh on the device\n"
-                       "- conservative coverage; mean: the sums of four floats that vary and a count\n"
-                       "- peak: device memory that the first call takes in all, its result included\n"
-                       "- peer: quoted, the fastest of five public sparse voxelizers on an NVIDIA H200\n";
-    for (const std::string& note : notes) text += "- " + note + "\n";
-    text += "\n" + rows.markdown();
+    gpu::run_report report{"Sparse framebuffers on a GPU",
+                           "gpu_sparse",
+                           "CUDA events around the whole call, allocations and waits included, mesh on the device",
+                           {"conservative coverage; mean: the sums of four floats that vary and a count",
+                            "peak: device memory that the first call takes in all, its result included",
+                            "peer: quoted, the fastest of five public sparse voxelizers on an NVIDIA H200"},
+                           notes,
+                           {}};
     if (how.largest_octree > 0)
-        text +=
+        report.after =
             "\nOctrees over the framebuffers of the mean, all byte-equal to the host's; host: one thread; mean: of the "
             "four sums on every level; rays: 1024 x 1024, parallel\n\n" +
             octrees.markdown();
-    std::cout << text;
-    if (!how.out.empty()) {
-        write_file(std::filesystem::path(how.out) / "gpu_sparse.md", text);
-        write_file(std::filesystem::path(how.out) / "gpu_sparse.csv", rows.csv());
-        if (how.largest_octree > 0) write_file(std::filesystem::path(how.out) / "gpu_octrees.csv", octrees.csv());
-    }
+    gpu::write_report(how, report, watch, command, rows);
+    if (!how.out.empty() && how.largest_octree > 0)
+        write_file(std::filesystem::path(how.out) / "gpu_octrees.csv", octrees.csv());
     return failed ? 1 : 0;
 }
 
@@ -247,26 +217,16 @@ int run(const options& how, const std::string& command) {
 
 int main(int argc, char** argv) {
     options how;
-    CLI::App app{"cuda_backend's times and memory of sparse framebuffers next to dense ones and published figures"};
-    app.add_option("--scenes", how.scenes, "Folder of the benchmark scenes (.vpm or .vpz)")->capture_default_str();
-    app.add_option("--mesh", how.names, "A scene, a generated mesh or a file; may be repeated. Default: five scenes");
-    app.add_option("--resolution", how.resolutions, "Voxels a side; may be repeated")->capture_default_str();
-    app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
-    app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
-    app.add_option("--largest-mean", how.largest_mean, "Largest grid of the mean")->capture_default_str();
-    app.add_option("--largest-dense", how.largest_dense, "Largest grid of dense targets")->capture_default_str();
-    app.add_option("--largest-octree", how.largest_octree, "Largest grid of octrees, of the mean; 0: none")
-        ->capture_default_str();
-    app.add_option("--slabs", how.slabs,
-                   "Parts along z that sparse grids are drawn in, one after the other; result and "
-                   "peak are then those of the largest")
-        ->capture_default_str();
-    app.add_option("--out", how.out, "Folder for gpu_sparse.md, gpu_sparse.csv and gpu_octrees.csv");
-    CLI11_PARSE(app, argc, argv);
-    try {
-        return run(how, bench::command_line(argc, argv));
-    } catch (const std::exception& e) {
-        std::fprintf(stderr, "bench_gpu_sparse: %s\n", e.what());
-        return 1;
-    }
+    how.resolutions = {1024, 4096, 16384};
+    gpu::command line("bench_gpu_sparse",
+                      "cuda_backend's times and memory of sparse framebuffers next to dense ones and published figures",
+                      how, "gpu_sparse.md, gpu_sparse.csv and gpu_octrees.csv");
+    line.add_meshes();
+    line.add("--largest-mean", how.largest_mean, "Largest grid of the mean");
+    line.add("--largest-dense", how.largest_dense, "Largest grid of dense targets");
+    line.add("--largest-octree", how.largest_octree, "Largest grid of octrees, of the mean; 0: none");
+    line.add("--slabs", how.slabs,
+             "Parts along z that sparse grids are drawn in, one after the other; result and peak are then those of the "
+             "largest");
+    return line.run(argc, argv, [&](const std::string& command) { return run(how, command); });
 }

@@ -7,21 +7,15 @@
 // with what that GPU drew alone, where both fit. One GPU works for two where there is no other. Prints a table of
 // medians; --out writes it as CSV too.
 
-#include "device_record.hpp"
-#include "machine.hpp"
+#include "gpu_set.cuh"
 #include "output.hpp"
+#include "run.hpp"
 #include "scene_choice.hpp"
-#include "session.hpp"
 #include "table.hpp"
 
 #include <voxelpipe/slabs/devices.cuh>
 
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
-#include <chrono>
-#include <cstdio>
-#include <iostream>
 #include <string>
 #include <vector>
 
@@ -31,47 +25,10 @@ namespace vp = voxelpipe;
 namespace slabs = voxelpipe::slabs;
 using namespace bench;
 
-struct options {
-    std::string scenes = VOXELPIPE_SCENES_DIR, out;
-    std::vector<std::string> names;
-    std::vector<int> resolutions{512, 1024, 2048};
+struct options : gpu::run_options {
     std::vector<std::string> cells{"bit", "float_add", "abuffer"};
-    gpu::repetition repeat;
     double triangle_bytes = slabs::device_options{}.triangle_bytes;
 };
-
-double now_ms() {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-template <class Call>
-double median_ms(const gpu::repetition& how, const Call& call) {
-    for (int i = 0; i < how.warmups; ++i) call();
-    std::vector<double> times;
-    const double start = now_ms();
-    while (static_cast<int>(times.size()) < how.runs &&
-           (static_cast<int>(times.size()) < how.least_runs || now_ms() - start < 1000 * how.seconds)) {
-        const double begin = now_ms();
-        call();
-        times.push_back(now_ms() - begin);
-    }
-    return summarize(times).median;
-}
-
-// Memory that is freed stays with each GPU's pool, as in a program that calls often.
-void keep_memory(int ordinal) {
-    cudaMemPool_t pool = nullptr;
-    std::uint64_t all = ~std::uint64_t{0};
-    gpu::check(cudaDeviceGetDefaultMemPool(&pool, ordinal), "pool");
-    gpu::check(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &all), "pool");
-}
-void trim_pools(const slabs::devices& gpus) {
-    gpus.for_each(gpus.size(), [&](std::size_t i, vp::cuda_backend& backend) {
-        cudaMemPool_t pool = nullptr;
-        gpu::check(cudaStreamSynchronize(backend.stream), "wait");
-        gpu::check(cudaDeviceGetDefaultMemPool(&pool, gpus.ordinal(i)), "pool");
-        gpu::check(cudaMemPoolTrimTo(pool, 0), "pool");
-    });
-}
 
 struct words_differ {
     const std::uint32_t *a, *b;
@@ -98,7 +55,7 @@ public:
           backend_(one.backend(0)), mesh_(backend_, data.positions, data.triangles),
           whole_(make(backend_, grid_.extent)) {
         options_.count_voxels = is_list;
-        one_ms_ = median_ms(how_.repeat, [&] {
+        one_ms_ = gpu::median_ms(how_.repeat, [&] {
             last_ = vp::voxelize(backend_, mesh_, grid_, vp::passthrough{}, shader_, whole_, options_);
             if (last_.code == vp::status_code::out_of_memory) throw gpu::out_of_device_memory(last_.message());
             last_.or_throw();
@@ -116,9 +73,9 @@ public:
         cut.triangle_bytes = how_.triangle_bytes;
         const vp::mesh_view<> view{data_.positions, data_.triangles};
         (void)slabs::device_slabs(gpus, grid_, view, vp::passthrough{}, cut); // loads the kernels
-        const double begin = now_ms();
+        const double begin = gpu::now_ms();
         slabs::device_slabs drawn(gpus, grid_, view, vp::passthrough{}, cut);
-        m.binning_ms = now_ms() - begin;
+        m.binning_ms = gpu::now_ms() - begin;
         auto parts = drawn.make([](vp::cuda_backend& backend, glm::ivec3 extent) { return make(backend, extent); });
         vp::status s;
         const auto call = [&] {
@@ -127,12 +84,12 @@ public:
         };
         call();
         compare(drawn, gpus, parts, s, m);
-        m.ms = median_ms(how_.repeat, call);
+        m.ms = gpu::median_ms(how_.repeat, call);
         for (std::size_t i = 0; i < drawn.size(); ++i) { // alone, so that no GPU waits for another
             double ms = 0;
             gpus.for_each(i + 1, [&](std::size_t k, vp::cuda_backend& backend) {
                 if (k != i) return;
-                ms = median_ms(how_.repeat, [&] {
+                ms = gpu::median_ms(how_.repeat, [&] {
                     vp::voxelize(backend, drawn.mesh(i), drawn.slabs()[i].where, vp::passthrough{}, shader_, parts[i],
                                  options_)
                         .or_throw();
@@ -167,7 +124,8 @@ private:
             if (grid_.extent.x > 1024) return; // one framebuffer of the whole is enough
             Output gathered = make(backend_, grid_.extent);
             gpu::check(cudaStreamSynchronize(backend_.stream), "wait");
-            m.gather_ms = median_ms({1, 3, 1, 1}, [&] { drawn.template gather<0>(parts, gathered.view()).or_throw(); });
+            m.gather_ms =
+                gpu::median_ms({1, 3, 1, 1}, [&] { drawn.template gather<0>(parts, gathered.view()).or_throw(); });
             const auto& a = vp::get<0>(whole_).view();
             const auto& b = vp::get<0>(gathered).view();
             using element = std::remove_cvref_t<decltype(*a.elements)>;
@@ -200,7 +158,7 @@ int run(const options& how, const std::string& command) {
     using lists = vp::abuffer<vp::cuda_backend>;
     std::vector<int> ordinals = slabs::devices::all();
     if (ordinals.empty()) throw std::runtime_error("no GPU");
-    for (const int o : ordinals) keep_memory(o);
+    gpu::keep_memory(ordinals);
     if (ordinals.size() == 1) ordinals.push_back(ordinals[0]);
     slabs::devices one({ordinals[0]});
     gpu::clock_watch watch;
@@ -213,12 +171,12 @@ int run(const options& how, const std::string& command) {
         const auto measure = [&]<class Output>(std::type_identity<Output>, const char* kind, int n, auto shader) {
             if (std::find(how.cells.begin(), how.cells.end(), kind) == how.cells.end()) return;
             try {
-                trim_pools(one);
+                gpu::trim_pools(one);
                 cell<Output, decltype(shader)> c(how, one, data, n, shader);
                 for (std::size_t k = 2; k <= ordinals.size(); ++k) {
                     slabs::devices gpus({ordinals.begin(), ordinals.begin() + static_cast<std::ptrdiff_t>(k)});
                     const measured m = c.draw_with(gpus);
-                    trim_pools(gpus);
+                    gpu::trim_pools(gpus);
                     watch.read();
                     const double efficiency = c.one_ms() / (static_cast<double>(k) * m.ms);
                     rows.add_row({data.name, std::to_string(n), kind, std::to_string(c.counts().triangles_in),
@@ -242,21 +200,18 @@ int run(const options& how, const std::string& command) {
             measure(std::type_identity<lists>{}, "abuffer", n, vp::constant(true));
         }
     }
-    std::string text = "# Several GPUs of one host\n\n" + gpu::describe_device(watch) + "- GPUs: ";
-    for (const int o : ordinals) text += std::to_string(o) + " ";
-    text += "\n- commit: " + describe_machine().commit + "\n- date: " + describe_machine().date + "\n" +
-            "- clocks over the run: " + watch.range() + "\n- command: `" + command +
-            "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
-            " calls by the host's clock, allocations and waits included, mesh on the devices\n"
-            "- slabs_ms: the slab of each GPU while the others rest; binning_ms: copying the mesh to all GPUs, cutting "
-            "and binning, once a mesh; gather_ms: all slabs to the first GPU\n";
-    for (const std::string& note : notes) text += "- " + note + "\n";
-    text += "\n" + rows.markdown();
-    std::cout << text;
-    if (!how.out.empty()) {
-        write_file(std::filesystem::path(how.out) / "gpu_scale.md", text);
-        write_file(std::filesystem::path(how.out) / "gpu_scale.csv", rows.csv());
-    }
+    std::string used = "GPUs:";
+    for (const int o : ordinals) used += " " + std::to_string(o);
+    gpu::write_report(
+        how,
+        {"Several GPUs of one host",
+         "gpu_scale",
+         "by the host's clock, allocations and waits included, mesh on the devices",
+         {used, "slabs_ms: the slab of each GPU while the others rest; binning_ms: copying the mesh to all "
+                "GPUs, cutting and binning, once a mesh; gather_ms: all slabs to the first GPU"},
+         notes,
+         {}},
+        watch, command, rows);
     return failed ? 1 : 0;
 }
 
@@ -264,23 +219,11 @@ int run(const options& how, const std::string& command) {
 
 int main(int argc, char** argv) {
     options how;
-    CLI::App app{"One GPU against several of the same host, a slab each"};
-    app.add_option("--scenes", how.scenes, "Folder of the benchmark scenes (.vpm or .vpz)")->capture_default_str();
-    app.add_option("--mesh", how.names, "A scene, a generated mesh or a file; may be repeated. Default: five scenes");
-    app.add_option("--resolution", how.resolutions, "Voxels a side; may be repeated")->capture_default_str();
-    app.add_option("--cell", how.cells, "What is drawn: bit, float_add or abuffer; may be repeated")
-        ->check(CLI::IsMember({"bit", "float_add", "abuffer"}))
-        ->capture_default_str();
-    app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
-    app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
-    app.add_option("--triangle-bytes", how.triangle_bytes, "What a triangle costs when the grid is cut")
-        ->capture_default_str();
-    app.add_option("--out", how.out, "Folder for gpu_scale.md and gpu_scale.csv");
-    CLI11_PARSE(app, argc, argv);
-    try {
-        return run(how, bench::command_line(argc, argv));
-    } catch (const std::exception& e) {
-        std::fprintf(stderr, "bench_gpu_gpus: %s\n", e.what());
-        return 1;
-    }
+    how.resolutions = {512, 1024, 2048};
+    gpu::command line("bench_gpu_gpus", "One GPU against several of the same host, a slab each", how,
+                      "gpu_scale.md and gpu_scale.csv");
+    line.add_meshes();
+    line.add("--cell", how.cells, "What is drawn: bit, float_add or abuffer; may be repeated", how.cells);
+    line.add("--triangle-bytes", how.triangle_bytes, "What a triangle costs when the grid is cut");
+    return line.run(argc, argv, [&](const std::string& command) { return run(how, command); });
 }

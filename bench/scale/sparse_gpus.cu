@@ -7,21 +7,16 @@
 // host; of larger ones, numbers of bricks, voxels and fragments. --repeat-gpu draws several slabs on one GPU. Prints a
 // table of medians; --out writes it as CSV too.
 
-#include "device_record.hpp"
-#include "machine.hpp"
+#include "gpu_set.cuh"
+#include "mean_shaders.hpp"
 #include "output.hpp"
+#include "run.hpp"
 #include "scene_choice.hpp"
-#include "session.hpp"
 #include "table.hpp"
 
 #include <voxelpipe/slabs/devices.cuh>
 
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
-#include <chrono>
-#include <cstdio>
-#include <iostream>
 #include <memory>
 #include <span>
 #include <string>
@@ -33,45 +28,9 @@ namespace vp = voxelpipe;
 namespace slabs = voxelpipe::slabs;
 using namespace bench;
 
-struct options {
-    std::string scenes = VOXELPIPE_SCENES_DIR, out;
-    std::vector<std::string> names;
-    std::vector<int> resolutions{1024, 4096};
-    gpu::repetition repeat;
+struct options : gpu::run_options {
     int largest_mean = 1024, largest_async = 16384, repeat_gpu = 0;
     std::uint64_t largest_compared = std::uint64_t{1} << 30; // bytes
-};
-
-double now_ms() {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-template <class Call>
-double median_ms(const gpu::repetition& how, const Call& call) {
-    for (int i = 0; i < how.warmups; ++i) call();
-    std::vector<double> times;
-    const double start = now_ms();
-    while (static_cast<int>(times.size()) < how.runs &&
-           (static_cast<int>(times.size()) < how.least_runs || now_ms() - start < 1000 * how.seconds)) {
-        const double begin = now_ms();
-        call();
-        times.push_back(now_ms() - begin);
-    }
-    return summarize(times).median;
-}
-
-struct position_varying {
-    glm::vec4 value;
-};
-struct pass_position {
-    template <class Vertex>
-    VOXELPIPE_HD vp::vertex_output<position_varying> operator()(const Vertex& v) const {
-        return {v.position, {glm::vec4(v.position, 1.0f)}};
-    }
-};
-struct give_position {
-    VOXELPIPE_HD vp::output<glm::vec4, std::uint32_t> operator()(const vp::fragment<position_varying>& f) const {
-        return vp::outputs(f.varyings.value, 1u);
-    }
 };
 
 struct occupancy {
@@ -165,7 +124,7 @@ public:
                 expect(vp::same_contents(joined, one.contents), "slabs of calls that wait");
             m.compared = "bytes";
         }
-        m.ms = median_ms(how_.repeat, call);
+        m.ms = gpu::median_ms(how_.repeat, call);
         if (drawn_.slabs()[0].where.extent.x > how_.largest_async) return m;
         std::vector<vp::workspace_limits> limits;
         for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -225,11 +184,11 @@ private:
         vp::read_status(gpus_.backend(0), for_whole.view).or_throw();
         if (m.compared == "bytes")
             expect(vp::same_contents(whole.to_host(gpus_.backend(0)), one.contents), "the merge");
-        m.async_ms = median_ms(how_.repeat, [&] {
+        m.async_ms = gpu::median_ms(how_.repeat, [&] {
             draw();
             drawn_.read_status(workspaces).or_throw();
         });
-        m.merged_ms = median_ms(how_.repeat, [&] {
+        m.merged_ms = gpu::median_ms(how_.repeat, [&] {
             draw();
             merge();
             vp::read_status(gpus_.backend(0), for_whole.view).or_throw();
@@ -244,26 +203,10 @@ private:
     std::vector<result> results_;
 };
 
-// Memory that is freed stays with each GPU's pool, as in a program that calls often.
-void keep_memory(int ordinal) {
-    cudaMemPool_t pool = nullptr;
-    std::uint64_t all = ~std::uint64_t{0};
-    gpu::check(cudaDeviceGetDefaultMemPool(&pool, ordinal), "pool");
-    gpu::check(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &all), "pool");
-}
-void trim_pools(const slabs::devices& gpus) {
-    gpus.for_each(gpus.size(), [&](std::size_t i, vp::cuda_backend& backend) {
-        cudaMemPool_t pool = nullptr;
-        gpu::check(cudaStreamSynchronize(backend.stream), "wait");
-        gpu::check(cudaDeviceGetDefaultMemPool(&pool, gpus.ordinal(i)), "pool");
-        gpu::check(cudaMemPoolTrimTo(pool, 0), "pool");
-    });
-}
-
 int run(const options& how, const std::string& command) {
     std::vector<int> ordinals = slabs::devices::all();
     if (ordinals.empty()) throw std::runtime_error("no GPU");
-    for (const int o : ordinals) keep_memory(o);
+    gpu::keep_memory(ordinals);
     if (how.repeat_gpu > 0) ordinals.assign(static_cast<std::size_t>(how.repeat_gpu), ordinals[0]);
     gpu::clock_watch watch;
     table rows({"scene", "resolution", "output", "bricks", "voxels", "fragments", "result_MiB", "gpus", "ms",
@@ -284,7 +227,7 @@ int run(const options& how, const std::string& command) {
                         cell<Kind> c(how, gpus, data, vp::fit(data.positions, glm::ivec3(n)));
                         m = c.run(one, k == 1);
                     }
-                    trim_pools(gpus);
+                    gpu::trim_pools(gpus);
                     watch.read();
                     if (k == 1) {
                         one.ms = m.ms;
@@ -314,22 +257,17 @@ int run(const options& how, const std::string& command) {
             if (n <= how.largest_mean) measure(mean{}, n);
         }
     }
-    std::string text =
-        "# Sparse framebuffers on several GPUs of one host\n\n" + gpu::describe_device(watch) +
-        "- commit: " + describe_machine().commit + "\n- date: " + describe_machine().date + "\n" +
-        "- clocks over the run: " + watch.range() + "\n- command: `" + command +
-        "`\n- milliseconds, medians of at most " + std::to_string(how.repeat.runs) +
-        " calls by the host's clock until all GPUs have ended, mesh on the devices\n"
-        "- ms: calls that wait and allocate; async_ms: calls in memory of the caller; merged_ms: the same "
-        "and the merge of all slabs on the first GPU\n"
-        "- efficiency: the time of one GPU over the number of GPUs times theirs\n";
-    for (const std::string& note : notes) text += "- " + note + "\n";
-    text += "\n" + rows.markdown();
-    std::cout << text;
-    if (!how.out.empty()) {
-        write_file(std::filesystem::path(how.out) / "gpu_sparse_scale.md", text);
-        write_file(std::filesystem::path(how.out) / "gpu_sparse_scale.csv", rows.csv());
-    }
+    gpu::write_report(
+        how,
+        {"Sparse framebuffers on several GPUs of one host",
+         "gpu_sparse_scale",
+         "by the host's clock until all GPUs have ended, mesh on the devices",
+         {"ms: calls that wait and allocate; async_ms: calls in memory of the caller; merged_ms: the same "
+          "and the merge of all slabs on the first GPU",
+          "efficiency: the time of one GPU over the number of GPUs times theirs"},
+         notes,
+         {}},
+        watch, command, rows);
     return failed ? 1 : 0;
 }
 
@@ -337,25 +275,14 @@ int run(const options& how, const std::string& command) {
 
 int main(int argc, char** argv) {
     options how;
-    CLI::App app{"Sparse framebuffers: one GPU against several of the same host, a slab each"};
-    app.add_option("--scenes", how.scenes, "Folder of the benchmark scenes (.vpm or .vpz)")->capture_default_str();
-    app.add_option("--mesh", how.names, "A scene, a generated mesh or a file; may be repeated. Default: five scenes");
-    app.add_option("--resolution", how.resolutions, "Voxels a side; may be repeated")->capture_default_str();
-    app.add_option("--runs", how.repeat.runs, "Timed calls a figure, at most")->capture_default_str();
-    app.add_option("--seconds", how.repeat.seconds, "Fewer calls once they took so long")->capture_default_str();
-    app.add_option("--largest-mean", how.largest_mean, "Largest grid of the mean")->capture_default_str();
-    app.add_option("--largest-async", how.largest_async, "Largest grid of calls that do not wait")
-        ->capture_default_str();
-    app.add_option("--largest-compared", how.largest_compared, "Bytes of the largest result that is compared")
-        ->capture_default_str();
-    app.add_option("--repeat-gpu", how.repeat_gpu, "Draw on the first GPU alone, as so many; 0: on all GPUs")
-        ->capture_default_str();
-    app.add_option("--out", how.out, "Folder for gpu_sparse_scale.md and gpu_sparse_scale.csv");
-    CLI11_PARSE(app, argc, argv);
-    try {
-        return run(how, bench::command_line(argc, argv));
-    } catch (const std::exception& e) {
-        std::fprintf(stderr, "bench_gpu_sparse_gpus: %s\n", e.what());
-        return 1;
-    }
+    how.resolutions = {1024, 4096};
+    gpu::command line("bench_gpu_sparse_gpus",
+                      "Sparse framebuffers: one GPU against several of the same host, a slab each", how,
+                      "gpu_sparse_scale.md and gpu_sparse_scale.csv");
+    line.add_meshes();
+    line.add("--largest-mean", how.largest_mean, "Largest grid of the mean");
+    line.add("--largest-async", how.largest_async, "Largest grid of calls that do not wait");
+    line.add("--largest-compared", how.largest_compared, "Bytes of the largest result that is compared");
+    line.add("--repeat-gpu", how.repeat_gpu, "Draw on the first GPU alone, as so many; 0: on all GPUs");
+    return line.run(argc, argv, [&](const std::string& command) { return run(how, command); });
 }
