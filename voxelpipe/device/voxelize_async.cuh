@@ -69,7 +69,7 @@ namespace device {
 [[nodiscard]] inline capacities to_capacities(const workspace_limits& l) {
     capacities c{l.tile_pairs, l.tile_records, l.fragments, l.fragment_records};
     if (!l.orders_long_voxels) c.longest_ordered = 0;
-    c.deferred = l.expects_deferred ? deferral::to_pass : deferral::to_no_pass;
+    c.deferred = l.expects_deferred ? deferral::by_pass : deferral::by_blocks;
     return c;
 }
 

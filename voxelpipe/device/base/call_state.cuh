@@ -74,12 +74,12 @@ struct pipeline_state {
 // no padding (call_bytes).
 enum class deferral : unsigned long long {
     // The deferred pass draws all of them.
-    to_pass,
+    by_pass,
     // A block of the first pass that has few at its end draws these itself. The deferred pass draws those of other
     // blocks.
-    of_many,
-    // The same, but there is no deferred pass. The call fails if a block has many.
-    to_no_pass,
+    by_blocks_then_pass,
+    // The blocks draw theirs, and there is no deferred pass. The call fails if a block has many.
+    by_blocks,
 };
 
 // Lengths of a call's arrays. Elements that do not fit are counted but not written.
@@ -88,12 +88,12 @@ struct capacities {
     // Kernels for voxels of more fragments than this are not launched, because earlier calls like this one hardly
     // needed them.
     unsigned long long longest_ordered = ~0ull;
-    deferral deferred = deferral::to_pass;
+    deferral deferred = deferral::by_pass;
 };
 
 // True if triangles were deferred and no deferred pass has drawn them.
 [[nodiscard]] VOXELPIPE_HD inline bool misses_deferred(const pipeline_state& s, const capacities& c) {
-    return c.deferred == deferral::to_no_pass && s.deferred.drawn == 0 && !s.deferred.are_none();
+    return c.deferred == deferral::by_blocks && s.deferred.drawn == 0 && !s.deferred.are_none();
 }
 // True if the call must not write its targets: an index is out of range, or something did not fit.
 [[nodiscard]] VOXELPIPE_HD inline bool has_failed(const pipeline_state& s, const capacities& c) {

@@ -64,7 +64,7 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     // See framebuffer_call.
     // Given that calls like this one deferred num_deferred triangles.
     [[nodiscard]] deferral deferral_for(std::uint64_t num_deferred) const {
-        return defers_few(num_primitives, num_deferred) ? deferral::to_no_pass : deferral::to_pass;
+        return defers_few(num_primitives, num_deferred) ? deferral::by_blocks : deferral::by_pass;
     }
     template <class Key>
     [[nodiscard]] bool shades_late() const {

@@ -109,11 +109,11 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     // Who draws deferred triangles, given that calls like this one deferred num_deferred. A wrong guess only costs
     // time: the deferred pass is left out by strategies that write no target before all triangles are drawn.
     [[nodiscard]] deferral deferral_for(std::uint64_t num_deferred) const {
-        if (draws.size() != 1 || !defers_few(max_triangles(), num_deferred)) return deferral::to_pass;
-        if (chosen() == strategy::immediate) return deferral::of_many;
-        if (lists_fragments()) return deferral::to_no_pass;
+        if (draws.size() != 1 || !defers_few(max_triangles(), num_deferred)) return deferral::by_pass;
+        if (chosen() == strategy::immediate) return deferral::by_blocks_then_pass;
+        if (lists_fragments()) return deferral::by_blocks;
         const bool is_one_pass = max_pass_triangles() == max_triangles(); // the state has the last pass's
-        return chosen() == strategy::occupancy_mask && is_one_pass ? deferral::to_no_pass : deferral::to_pass;
+        return chosen() == strategy::occupancy_mask && is_one_pass ? deferral::by_blocks : deferral::by_pass;
     }
 
     // Bytes of the workspace.

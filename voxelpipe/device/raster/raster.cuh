@@ -282,8 +282,8 @@ __global__ __launch_bounds__(tuning::raster_threads,
     __shared__ unsigned dropped[num_triangle_classes], num_oversized;
     const glm::uvec3 index = load_index(call.in, blockIdx.x * tuning::raster_threads + threadIdx.x);
     await_stream();
-    const bool draws_few = Call::output::may_draw_few && deferred != deferral::to_pass;
-    if (Call::output::may_draw_few && deferred == deferral::to_no_pass)
+    const bool draws_few = Call::output::may_draw_few && deferred != deferral::by_pass;
+    if (Call::output::may_draw_few && deferred == deferral::by_blocks)
         call.out.prepare(std::uint64_t{blockIdx.x} * tuning::raster_threads + threadIdx.x,
                          std::uint64_t{gridDim.x} * tuning::raster_threads);
     if (call.out.is_checked() && state->index_error != 0) return;
@@ -343,7 +343,7 @@ __global__ __launch_bounds__(tuning::raster_threads,
 // so they must not start early: a kernel of the caller may still be writing them.
 template <class Call>
 void launch_first_pass(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first,
-                       deferral deferred = deferral::to_pass) {
+                       deferral deferred = deferral::by_pass) {
     static_assert(fragment_sink<typename Call::sink> && fragment_sink<typename Call::deferred_sink>);
     const unsigned triangles = call.in.num_triangles;
     if constexpr (Call::output::defers) {
@@ -372,9 +372,9 @@ void launch_deferred_pass(const Call& call, pipeline_state* state, stage where, 
 // The raster of a draw; arguments as above.
 template <class Call>
 void launch_raster(const Call& call, pipeline_state* state, stage where, cudaStream_t stream, bool is_first = false,
-                   deferral deferred = deferral::to_pass) {
+                   deferral deferred = deferral::by_pass) {
     launch_first_pass(call, state, where, stream, is_first, deferred);
-    if (deferred != deferral::to_no_pass) launch_deferred_pass(call, state, where, stream);
+    if (deferred != deferral::by_blocks) launch_deferred_pass(call, state, where, stream);
 }
 
 } // namespace voxelpipe::device
