@@ -30,6 +30,7 @@ namespace voxelpipe {
 class cpu_backend {
 public:
     static constexpr bool runs_on_host = true; // its calls may be given memory of the host as it is
+    static constexpr bool takes_solid_slabs = true;
 
     // Host memory, uninitialised, aligned to 64 bytes. The constructor throws std::bad_alloc.
     template <class T>

@@ -35,6 +35,8 @@ public:
         r[x / 64] |= std::uint64_t{bits} << at;
         if (at > 32 && bits >> (64 - at) != 0) r[x / 64 + 1] |= std::uint64_t{bits} >> (64 - at);
     }
+    // Flips the 32 bits from x on, a multiple of 32; those beyond the extent must be 0.
+    void flip_bits(int x, int y, int z, std::uint32_t bits) { row(y, z)[x / 64] ^= std::uint64_t{bits} << (x % 64); }
     // The 32 bits from x on; 0 beyond the row.
     [[nodiscard]] std::uint32_t get_bits(int x, int y, int z) const {
         const std::uint64_t* const r = row(y, z);
@@ -43,6 +45,17 @@ public:
         std::uint64_t w = r[i] >> at;
         if (at > 32 && i + 1 < words_) w |= r[i + 1] << (64 - at);
         return static_cast<std::uint32_t>(w);
+    }
+    // All rows, by y, then z.
+    [[nodiscard]] const std::uint64_t* data() const { return bits_.data(); }
+    // Keeps the layers [first, first + count) along z.
+    void keep_layers(int first_layer, int count) {
+        const std::size_t layer = words_ * static_cast<std::size_t>(extent_.y);
+        const auto begin = bits_.begin() + static_cast<std::ptrdiff_t>(layer * static_cast<std::size_t>(first_layer));
+        const std::size_t kept = layer * static_cast<std::size_t>(count);
+        std::copy(begin, begin + static_cast<std::ptrdiff_t>(kept), bits_.begin());
+        bits_.resize(kept);
+        extent_.z = count;
     }
     // Bits of the last word that belong to the row.
     [[nodiscard]] std::uint64_t last_word() const {

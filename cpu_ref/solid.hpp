@@ -8,6 +8,7 @@
 
 #include <cpu_ref/solid_lists.hpp>
 #include <cpu_ref/solid_repair.hpp>
+#include <cpu_ref/solid_vote.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -74,8 +75,9 @@ template <class Crossing, class Finish>
         crossings = std::move(found.crossings);
     }
     const bool is_set = options.repair == repair::exterior || options.repair == repair::vote;
+    const bool is_decided = options.repair == repair::exterior && options.slab != nullptr;
     if (is_set || options.extent != solid_extent::centre) {
-        cover_list cover = find_cover(how, s);
+        cover_list cover = is_decided ? count_triangles(s) : find_cover(how, s);
         if (cover.code != status_code::ok) return solid_failure(cover.code, s);
         if (options.repair == repair::exterior) result.counts = cover.counts;
         words = std::move(cover.beams);
@@ -85,7 +87,9 @@ template <class Crossing, class Finish>
         if (options.repair == repair::vote) {
             count_crossings(crossings, result.solid);
             crossings = {};
-            words = find_majority(how, s, std::move(words));
+            words = find_majority(how, s, options.slab, std::move(words));
+        } else if (is_decided) {
+            words = take_interior(how, s, *options.slab);
         } else {
             words = find_interior(how, s, options.closing, std::move(words));
         }

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Meshes with holes: repair::close_holes adds cones to the geometry, repair::exterior and repair::vote decide each
-// body's voxels on dense grids of bits. All three give sets that no order of work can change.
+// Meshes with holes: repair::close_holes adds cones to the geometry, repair::exterior decides each body's voxels on a
+// dense grid of bits, as repair::vote does (solid_vote.hpp). All three give sets that no order of work can change.
 
 #include <cpu_ref/bit_grid.hpp>
 #include <cpu_ref/solid_cover.hpp>
@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <utility>
 #include <vector>
 
@@ -138,11 +137,11 @@ inline void spread_in_row(std::uint64_t* from, const std::uint64_t* open, std::s
     }
 }
 
-// The bits of ~walls that a 6-connected walk through them reaches from the faces of the grid, which hold no walls.
-[[nodiscard]] inline bit_grid flood(const bit_grid& walls) {
+// Adds the bits of ~walls that a 6-connected walk through them reaches from those that are reached, none of which is a
+// wall.
+inline void spread(const bit_grid& walls, bit_grid& reached) {
     const glm::ivec3 e = walls.extent();
     const std::size_t n = walls.words();
-    bit_grid reached(e);
     struct place {
         int y, z;
     };
@@ -153,17 +152,7 @@ inline void spread_in_row(std::uint64_t* from, const std::uint64_t* open, std::s
     };
     std::vector<std::uint64_t> open(n);
     for (int z = 0; z < e.z; ++z)
-        for (int y = 0; y < e.y; ++y) {
-            std::uint64_t* const r = reached.row(y, z);
-            if (y == 0 || z == 0 || y == e.y - 1 || z == e.z - 1) {
-                std::fill(r, r + n, ~std::uint64_t{0});
-                r[n - 1] &= walls.last_word();
-            } else {
-                reached.set(0, y, z);
-                reached.set(e.x - 1, y, z);
-            }
-            queue.push_back({y, z});
-        }
+        for (int y = 0; y < e.y; ++y) queue.push_back({y, z});
     while (!queue.empty()) {
         const auto [y, z] = queue.back();
         queue.pop_back();
@@ -192,8 +181,60 @@ inline void spread_in_row(std::uint64_t* from, const std::uint64_t* open, std::s
         pass_on(y, z - 1);
         pass_on(y, z + 1);
     }
+}
+
+// Sets the bits of the grid's faces: of all but the lowest and the highest along z, or of these too.
+inline void set_faces(bit_grid& g, bool lowest, bool highest) {
+    const glm::ivec3 e = g.extent();
+    const std::size_t n = g.words();
+    for (int z = 0; z < e.z; ++z)
+        for (int y = 0; y < e.y; ++y) {
+            std::uint64_t* const r = g.row(y, z);
+            if (y == 0 || y == e.y - 1 || (lowest && z == 0) || (highest && z == e.z - 1)) {
+                std::fill(r, r + n, ~std::uint64_t{0});
+                r[n - 1] &= g.last_word();
+            } else {
+                g.set(0, y, z);
+                g.set(e.x - 1, y, z);
+            }
+        }
+}
+
+// The bits of ~walls that a 6-connected walk through them reaches from the faces of the grid, which hold no walls.
+[[nodiscard]] inline bit_grid flood(const bit_grid& walls) {
+    bit_grid reached(walls.extent());
+    set_faces(reached, true, true);
+    spread(walls, reached);
     return reached;
 }
+
+// What solid_options::slab gives, in the numbers of the geometry's grid, in which the slab begins at its lead.
+class slab_bits {
+public:
+    slab_bits(const std::uint64_t* bits, const solid_geometry& s)
+        : bits_(bits), lead_(s.lead), rows_(s.where.extent.y - s.lead.y),
+          words_((static_cast<std::size_t>(s.where.extent.x - s.lead.x) + 63) / 64) {}
+    // The 32 bits from x on, a multiple of 32; those before the slab, and behind its row, are 0 and of no meaning.
+    [[nodiscard]] std::uint32_t operator()(int x, int y, int z) const {
+        const std::uint64_t* const r =
+            bits_ + (static_cast<std::size_t>(z - lead_.z) * static_cast<std::size_t>(rows_) +
+                     static_cast<std::size_t>(y - lead_.y)) *
+                        words_;
+        const int first = x - lead_.x; // above -32
+        if (first < 0) return static_cast<std::uint32_t>(r[0]) << -first;
+        const auto i = static_cast<std::size_t>(first) / 64;
+        const int at = first % 64;
+        std::uint64_t w = r[i] >> at;
+        if (at > 32 && i + 1 < words_) w |= r[i + 1] << (64 - at);
+        return static_cast<std::uint32_t>(w);
+    }
+
+private:
+    const std::uint64_t* bits_;
+    glm::ivec3 lead_;
+    int rows_;
+    std::size_t words_;
+};
 
 // Each body's complement of what a flood from outside the grid reaches, through voxels further than `closing` from its
 // cover in the max norm; grown back by as much.
@@ -219,112 +260,35 @@ inline void spread_in_row(std::uint64_t* from, const std::uint64_t* open, std::s
     return beams;
 }
 
-// ---- vote -----------------------------------------------------------------------------------------------------------
-
-// Parities of one body along one axis, and the rows of that axis that are open: their number of crossings is odd.
-template <int Axis>
-class parity_grid {
-public:
-    parity_grid(const solid_geometry& s, std::uint32_t draw) : inside_(s.where.extent), open_(face(s.where.extent)) {
-        const core::voxel_box whole = s.whole_box();
-        const glm::ivec3 e = s.where.extent;
-        for (std::size_t part = 0; part < s.parts.size(); ++part) {
-            if (s.body[part] != draw) continue;
-            const geometry::part& in = s.parts[part];
-            for (std::uint32_t i = 0; i < in.num_triangles; ++i) {
-                const glm::uvec3 t = in.triangles[i];
-                const core::snapped_position &a = in.positions[t.x], &b = in.positions[t.y], &c = in.positions[t.z];
-                if (!core::is_drawable(a) || !core::is_drawable(b) || !core::is_drawable(c)) continue;
-                const core::row_box box = core::rows_within<Axis>(a, b, c, s.snap.fraction, whole);
-                core::for_each_crossing<Axis, core::centre_offset<>>(
-                    a, b, c, s.snap.fraction, box, [&](std::int64_t u, std::int64_t v, std::int64_t first, int) {
-                        const auto w = static_cast<int>(std::clamp<std::int64_t>(first, 0, e[Axis]));
-                        const auto p = core::to_xyz(Axis, static_cast<int>(u), static_cast<int>(v), w);
-                        if (w < e[Axis]) inside_.flip(p[0], p[1], p[2]);
-                        // The row as a point of a face: along x its y and z, else its x and the other.
-                        if constexpr (Axis == 0)
-                            open_.flip(p[1], p[2], 0);
-                        else
-                            open_.flip(p[0], Axis == 1 ? p[2] : p[1], 0);
-                    });
-            }
-        }
-        accumulate();
-    }
-
-    // Bits of 32 voxels along x: inside, and outside; neither if their row is open.
-    void vote(int x, int y, int z, std::uint32_t& for_it, std::uint32_t& against) const {
-        const std::uint32_t in = inside_.get_bits(x, y, z);
-        std::uint32_t open = 0;
-        if constexpr (Axis == 0)
-            open = (open_.get_bits(y & ~31, z, 0) >> (y & 31) & 1u) != 0 ? ~0u : 0u;
-        else
-            open = open_.get_bits(x, Axis == 1 ? z : y, 0);
-        for_it = in & ~open;
-        against = ~in & ~open;
-    }
-
-private:
-    static glm::ivec3 face(glm::ivec3 e) {
-        return Axis == 0 ? glm::ivec3(e.y, e.z, 1) : glm::ivec3(e.x, Axis == 1 ? e.z : e.y, 1);
-    }
-    // Each bit becomes the parity of those up to it along the axis.
-    void accumulate() {
-        const glm::ivec3 e = inside_.extent();
-        const std::size_t n = inside_.words();
-        for (int z = 0; z < e.z; ++z)
-            for (int y = 0; y < e.y; ++y) {
-                std::uint64_t* const r = inside_.row(y, z);
-                if constexpr (Axis == 0) {
-                    std::uint64_t carry = 0;
-                    for (std::size_t i = 0; i < n; ++i) {
-                        std::uint64_t w = r[i];
-                        for (int k = 1; k < 64; k *= 2) w ^= w << k;
-                        r[i] = w ^= carry;
-                        carry = w >> 63 != 0 ? ~std::uint64_t{0} : 0;
-                    }
-                } else if (Axis == 1 ? y > 0 : z > 0) {
-                    const std::uint64_t* const before = Axis == 1 ? inside_.row(y - 1, z) : inside_.row(y, z - 1);
-                    for (std::size_t i = 0; i < n; ++i) r[i] ^= before[i];
-                }
-            }
-    }
-
-    bit_grid inside_;
-    bit_grid open_; // a bit a row, in one slice
-};
-
-// Each body's voxels that more of the closed rows along x, y and z call inside than outside, and its cover.
-[[nodiscard]] inline std::vector<beam_words> find_majority(const execution& how, const solid_geometry& s,
-                                                           std::vector<beam_words>&& cover) {
+// The same for a slab of which a flood of the whole grid has decided all voxels.
+[[nodiscard]] inline std::vector<beam_words> take_interior(const execution& how, const solid_geometry& s,
+                                                           const solid_slab& slab) {
     const stopwatch watch(how.times, &stage_times::fine_raster);
     const row_numbers rows(s.where.extent);
-    std::vector<beam_words> beams;
-    for (std::uint32_t draw = 0; draw <= s.body.back(); ++draw) {
-        std::unique_ptr<parity_grid<0>> x_rows;
-        std::unique_ptr<parity_grid<1>> y_rows;
-        std::unique_ptr<parity_grid<2>> z_rows;
-        parallel_for(how.threads, 3, [&](unsigned, std::size_t axis) {
-            if (axis == 0) x_rows = std::make_unique<parity_grid<0>>(s, draw);
-            if (axis == 1) y_rows = std::make_unique<parity_grid<1>>(s, draw);
-            if (axis == 2) z_rows = std::make_unique<parity_grid<2>>(s, draw);
-        });
-        if (draw == 0) beams = all_beams(rows);
-        bit_grid touched(s.where.extent);
-        for_each_word(cover, rows, draw,
-                      [&](int x, int y, int z, std::uint32_t bits) { touched.set_bits(x, y, z, bits); });
-        add_bits(how, rows, s.whole_box(), draw, beams, [&](int x, int y, int z) {
-            std::uint32_t a = 0, b = 0, c = 0, not_a = 0, not_b = 0, not_c = 0;
-            x_rows->vote(x, y, z, a, not_a);
-            y_rows->vote(x, y, z, b, not_b);
-            z_rows->vote(x, y, z, c, not_c);
-            const std::uint32_t two = (a & b) | (b & c) | (c & a);
-            const std::uint32_t alone = (a | b | c) & ~(not_a | not_b | not_c);
-            return two | alone | touched.get_bits(x, y, z);
-        });
-    }
+    std::vector<beam_words> beams = all_beams(rows);
+    add_bits(how, rows, s.whole_box(), 0, beams, slab_bits(slab.inside, s));
     end_beams(how, beams);
     return beams;
+}
+
+// The code and the counts that a cover has, of its triangles.
+[[nodiscard]] inline cover_list count_triangles(const solid_geometry& s) {
+    cover_list none;
+    const core::voxel_box whole = s.whole_box();
+    for (const geometry::part& p : s.parts)
+        for (std::uint32_t i = 0; i < p.num_triangles; ++i) {
+            const glm::uvec3 t = p.triangles[i];
+            if (t.x >= p.num_vertices || t.y >= p.num_vertices || t.z >= p.num_vertices) {
+                none.code = status_code::index_out_of_range;
+                return none;
+            }
+            core::voxel_box reach{};
+            core::count_class(none.counts,
+                              core::classify<coverage::conservative>(p.positions[t.x], p.positions[t.y],
+                                                                     p.positions[t.z], s.snap.fraction, whole, reach));
+        }
+    none.counts.triangles_in = s.triangles_in;
+    return none;
 }
 
 } // namespace voxelpipe::cpu

@@ -43,6 +43,18 @@ enum class repair : std::uint8_t {
     vote,     // what most of the closed rows along x, y and z call inside by even_odd; a tie is outside
 };
 
+// What repair::exterior and repair::vote take from the rest of the grid where a call draws a slab of it along z. Bits
+// of host memory: 64 voxels along x a word, from the slab's first one on, each row of words from a new word on; rows by
+// ascending y, then z. Not owned.
+struct solid_slab {
+    // exterior: the slab's voxels that are inside, which is all that is drawn (cpu_ref/slab_exterior.hpp). Like
+    // solid_options::cones, they need a triangle to be drawn, whichever.
+    const std::uint64_t* inside = nullptr;
+    // vote, a bit a column along z: the parity below the slab, and whether the column is open (slabs/columns.hpp). The
+    // call has all triangles that reach the slab's layers and meet its x or y interval.
+    const std::uint64_t *below = nullptr, *open = nullptr;
+};
+
 // Written {.rule = fill_rule::even_odd, .extent = solid_extent::outer}.
 struct solid_options {
     fill_rule rule = fill_rule::nonzero;                // what a winding number means
@@ -59,6 +71,9 @@ struct solid_options {
     // exterior: gaps of up to about twice as many voxels are closed, 0 to max_closing.
     int closing = 0;
     static constexpr int max_closing = 64; // the largest `closing`
+    // exterior or vote of a slab of a mesh in slabs, with bodies::call; on cpu_backend alone. Null: of the grid by
+    // itself.
+    const solid_slab* slab = nullptr;
 };
 
 // even_odd, each draw by itself: overlapping draws stay solid, cavities within one draw stay empty.
@@ -112,11 +127,24 @@ template <class Mesh, class VertexShader, class SolidShader, class Payload>
     return false;
 }
 
-[[nodiscard]] inline status validate(const solid_options& o, const grid& g) {
+// True if a backend's calls take solid_options::slab.
+template <class Backend>
+inline constexpr bool takes_solid_slabs = requires {
+    Backend::takes_solid_slabs;
+};
+
+[[nodiscard]] inline status validate(const solid_options& o, const grid& g, bool takes_slabs = false) {
     const bool known = o.rule <= fill_rule::positive && o.bodies <= bodies::draw && o.extent <= solid_extent::inner &&
                        o.repair <= repair::vote;
     if (!known || o.closing < 0 || o.closing > solid_options::max_closing)
         return failure(status_code::bad_solid_options);
+    if (o.slab != nullptr) {
+        if (!takes_slabs) return failure(status_code::strategy_unavailable);
+        const bool has_bits = o.repair == repair::exterior
+                                  ? o.slab->inside != nullptr
+                                  : o.repair == repair::vote && o.slab->below != nullptr && o.slab->open != nullptr;
+        return has_bits && o.bodies == bodies::call ? status{} : failure(status_code::bad_solid_options);
+    }
     if (o.repair == repair::exterior && g.extent != g.whole_extent()) return failure(status_code::crop_without_whole);
     return {};
 }
@@ -134,7 +162,7 @@ template <class Backend, class Mesh, class VertexShader, class SolidShader, clas
                                     const solid_options& options = {}) {
     if constexpr (core::solid_fits_targets<Mesh, VertexShader, SolidShader, Targets...>()) {
         if (const status s = validate(g); !s.ok()) return s;
-        if (const status s = core::validate(options, g); !s.ok()) return s;
+        if (const status s = core::validate(options, g, core::takes_solid_slabs<Backend>); !s.ok()) return s;
         if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
         const status s = core::validate_draws(draws);
         if (!s.ok()) return s;
@@ -160,7 +188,7 @@ template <class Backend, class Mesh, class VertexShader, class SolidShader, clas
                                     const solid_options& options = {}) {
     if constexpr (core::solid_fits_payload<Mesh, VertexShader, SolidShader, Payload>()) {
         if (const status s = validate(g); !s.ok()) return s;
-        if (const status s = core::validate(options, g); !s.ok()) return s;
+        if (const status s = core::validate(options, g, core::takes_solid_slabs<Backend>); !s.ok()) return s;
         const status s = core::validate_draws(draws);
         if (!s.ok()) return s;
         if (s.counts.triangles_in == 0) {

@@ -343,7 +343,7 @@ template <class Backend, class Mesh, class VertexShader, class SolidShader, clas
                                     const solid_options& options = {}) {
     if constexpr (core::solid_fits_targets<Mesh, VertexShader, SolidShader, Targets...>()) {
         if (const status s = validate(g); !s.ok()) return s;
-        if (const status s = core::validate(options, g); !s.ok()) return s;
+        if (const status s = core::validate(options, g, core::takes_solid_slabs<Backend>); !s.ok()) return s;
         if (const status s = core::validate_sparse(fb, g); !s.ok()) return s;
         const status s = core::validate_draws(draws);
         if (!s.ok()) return s;

@@ -11,6 +11,7 @@
 //   cover       as few slabs as keep each one below a limit
 
 #include <voxelpipe/core/bisect.hpp>
+#include <voxelpipe/core/crossing.hpp>
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/status.hpp>
@@ -254,6 +255,26 @@ struct classified {
     } else if (t.kind == core::triangle_class::drawn && rule != coverage::conservative &&
                core::has_zero_area(p, q, r)) {
         t.kind = core::triangle_class::zero_area;
+    }
+    return t;
+}
+
+// The same for voxelize_solid with repair::vote, in slabs along z: rows along x and y count, so that a triangle beside
+// the grid along one of them does.
+[[nodiscard]] inline classified classify_for_vote(const core::snap_transform& snap, const glm::ivec3& extent,
+                                                  const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
+    const auto snapped = [&](const glm::vec3& p) { return core::snap(snap, p.x, p.y, p.z); };
+    const core::snapped_position p = snapped(a), q = snapped(b), r = snapped(c);
+    const core::voxel_box whole{{{0, 0, 0}}, {{extent.x - 1, extent.y - 1, extent.z - 1}}};
+    constexpr std::int64_t far = std::int64_t{1} << core::coordinate_bits;
+    const core::voxel_box layers{{{-far, -far, 0}}, {{far, far, extent.z - 1}}};
+    classified t;
+    t.kind = core::classify<coverage::conservative>(p, q, r, snap.fraction, layers, t.reach);
+    if (t.kind != core::triangle_class::drawn) return t;
+    if (!core::meets_rows(p, q, r, snap.fraction, whole, true)) t.kind = core::triangle_class::outside;
+    for (int axis = 0; axis < 2; ++axis) {
+        t.reach.lo[axis] = std::clamp(t.reach.lo[axis], whole.lo[axis], whole.hi[axis]);
+        t.reach.hi[axis] = std::clamp(t.reach.hi[axis], whole.lo[axis], whole.hi[axis]);
     }
     return t;
 }

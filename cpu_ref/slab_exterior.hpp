@@ -1,0 +1,209 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// repair::exterior of a grid whose bits do not fit into memory. The walls are kept as bricks, on disk beyond a budget;
+// the flood goes slab by slab, up and down, and passes from one to the next through their faces, until none gets news.
+// What it reaches is a set, so the order does not show: the bits are those of a flood of the whole grid. A path that
+// winds up and down takes as many sweeps as it has turns. Needs POSIX files.
+
+#include <cpu_ref/solid_repair.hpp>
+#include <voxelpipe/core/brick_table.hpp>
+#include <voxelpipe/slabs/bins.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe::cpu {
+
+// One body. Members throw std::bad_alloc, and std::system_error of files.
+class slab_exterior {
+public:
+    // extent: of the whole grid, in voxels. closing: as solid_options has it. budget: bytes that may be held, about;
+    // four layers of bits for each of its slabs, which are never thinner than 8 layers, come on top. folder: for a
+    // temporary file. threads: at least 1.
+    slab_exterior(glm::ivec3 extent, int closing, std::uint64_t budget, std::string folder, unsigned threads)
+        : extent_(extent), padded_(extent + 2 * (closing + 1)), closing_(closing), threads_(threads),
+          depth_(depth_for(budget / 2)), slabs_(static_cast<std::size_t>((extent.z + depth_ - 1) / depth_)),
+          bins_(slabs_.size()), walls_(budget / 2, bins_.size(), std::move(folder)) {}
+    // Bytes that are held for a budget, at least.
+    [[nodiscard]] static double least_bytes(glm::ivec3 extent, int closing) {
+        const double row = 8 * ((extent.x + 2 * (closing + 1) + 63) / 64);
+        const double layer = row * (extent.y + 2 * (closing + 1));
+        return layer * (5 * brick + 2 * closing + 4 * ((extent.z + brick - 1) / brick));
+    }
+    [[nodiscard]] std::size_t num_slabs() const { return slabs_.size(); }
+    // Slabs that have been flooded, those counted again that were more than once.
+    [[nodiscard]] std::uint64_t num_visits() const { return visits_; }
+
+    // Voxels of the conservative cover, without tiles: of the whole grid or a crop of it. In any order; bricks may come
+    // in parts.
+    void add_walls(const brick_table& cover) {
+        for (std::uint64_t b = 0; b < cover.count; ++b) {
+            const glm::ivec3 at = core::morton_position(cover.keys[b]);
+            walls_.push(bins_, static_cast<std::size_t>(at.z * brick / depth_), {cover.keys[b], cover.masks[b]});
+        }
+    }
+
+    // Finds what is outside. All walls are there.
+    void flood() {
+        for (bool any = true; any;) {
+            any = false;
+            for (std::size_t s = 0; s < slabs_.size(); ++s) any |= visit_if_needed(s);
+            for (std::size_t s = slabs_.size(); s-- > 0;) any |= visit_if_needed(s);
+        }
+    }
+
+    // The voxels of a box of the grid that are inside, after flood(). Cheapest by ascending z.
+    [[nodiscard]] bit_grid inside(const glm::ivec3& begin, const glm::ivec3& size) {
+        const int ring = closing_ + 1, low = begin.z + ring, high = low + size.z; // padded layers
+        const int first = std::max(0, low - closing_), last = std::min(padded_.z, high + closing_);
+        bit_grid outside({padded_.x, padded_.y, last - first});
+        for (std::size_t s = 0; s < slabs_.size(); ++s) {
+            const int from = std::max(first, first_layer(s)), to = std::min(last, last_layer(s));
+            if (from >= to) continue;
+            const bit_grid& reached = reached_in(s);
+            for (int z = from; z < to; ++z) copy_layer(reached, z - first_layer(s), outside, z - first);
+        }
+        dilate(outside, closing_, threads_);
+        bit_grid result(size);
+        for (int z = 0; z < size.z; ++z)
+            for (int y = 0; y < size.y; ++y)
+                for (int x = 0; x < size.x; x += 32) {
+                    std::uint32_t bits = ~outside.get_bits(begin.x + x + ring, begin.y + y + ring, low + z - first);
+                    if (size.x - x < 32) bits &= (1u << (size.x - x)) - 1;
+                    result.set_bits(x, y, z, bits);
+                }
+        return result;
+    }
+
+private:
+    static constexpr int brick = core::sparse_brick_size;
+    struct wall_brick {
+        std::uint64_t key;
+        brick_mask mask;
+    };
+    using face = std::vector<std::uint64_t>; // a layer of bits
+    // The lowest and the highest layer of a slab: what has been reached, and what is open and has not.
+    struct slab_faces {
+        face reached[2], left[2];
+        bool is_known = false;
+    };
+
+    // Layers of a slab: walls, what is reached in it and in two more, rows that wait, and a window that is larger by
+    // `closing` on either side.
+    [[nodiscard]] int depth_for(std::uint64_t bytes) const {
+        const double row = 8 * ((padded_.x + 63) / 64), layer = row * padded_.y;
+        const double layers = (static_cast<double>(bytes) / layer - 2 * closing_) / (4 + 8 / row);
+        return static_cast<int>(std::clamp(layers / brick, 1.0, 1.0 + extent_.z / brick)) * brick;
+    }
+    // Layers count from the lowest one around the grid; the slabs at the ends have those around it.
+    [[nodiscard]] int first_layer(std::size_t s) const {
+        return s == 0 ? 0 : static_cast<int>(s) * depth_ + closing_ + 1;
+    }
+    [[nodiscard]] int last_layer(std::size_t s) const {
+        return s + 1 == slabs_.size() ? padded_.z : first_layer(s + 1);
+    }
+    static void copy_layer(const bit_grid& from, int at, bit_grid& to, int to_at) {
+        const std::size_t words = from.words() * static_cast<std::size_t>(from.extent().y);
+        std::copy_n(from.row(0, at), words, to.row(0, to_at));
+    }
+
+    // The walls of a slab, grown by `closing`.
+    [[nodiscard]] bit_grid walls_of(std::size_t slab) const {
+        const int first = std::max(0, first_layer(slab) - closing_),
+                  last = std::min(padded_.z, last_layer(slab) + closing_), ring = closing_ + 1;
+        bit_grid walls({padded_.x, padded_.y, last - first});
+        for (std::size_t s = 0; s < slabs_.size(); ++s) {
+            if (last_layer(s) <= first || first_layer(s) >= last) continue;
+            bins_[s].for_each_block([&](std::span<const wall_brick> bricks) {
+                for (const wall_brick& b : bricks) {
+                    const glm::ivec3 at = core::morton_position(b.key) * brick + ring;
+                    for (int row = 0; row < brick * brick; ++row) {
+                        const int y = at.y + row % brick, z = at.z + row / brick - first;
+                        const std::uint32_t bits = row_of(b.mask, row % brick, row / brick);
+                        if (bits != 0 && z >= 0 && z < last - first) walls.set_bits(at.x, y, z, bits);
+                    }
+                }
+            });
+        }
+        dilate(walls, closing_, threads_);
+        walls.keep_layers(first_layer(slab) - first, last_layer(slab) - first_layer(slab));
+        return walls;
+    }
+    // Eight voxels of a brick along x.
+    [[nodiscard]] static std::uint32_t row_of(const brick_mask& mask, int y, int z) {
+        const auto at = static_cast<unsigned>(core::morton_key(0, y, z));
+        const auto two = [](std::uint64_t n) { return (n & 3) | (n >> 6 & 12); };
+        // x 0 and 1 are neighbours, 2 and 3 eight bits, 4 to 7 a word further on.
+        return static_cast<std::uint32_t>(two(mask.words[at / 64] >> at % 64) | two(mask.words[at / 64 + 1] >> at % 64)
+                                                                                    << 4);
+    }
+
+    // What is reached in a slab from around the grid and from its neighbours, as far as these are known.
+    [[nodiscard]] bit_grid flooded(std::size_t s, const bit_grid& walls) const {
+        bit_grid reached(walls.extent());
+        set_faces(reached, s == 0, s + 1 == slabs_.size());
+        if (s > 0) enter(slabs_[s - 1].reached[1], walls, reached, 0);
+        if (s + 1 < slabs_.size()) enter(slabs_[s + 1].reached[0], walls, reached, walls.extent().z - 1);
+        spread(walls, reached);
+        return reached;
+    }
+    static void enter(const face& from, const bit_grid& walls, bit_grid& reached, int z) {
+        const std::uint64_t* const w = walls.row(0, z);
+        std::uint64_t* const r = reached.row(0, z);
+        for (std::size_t i = 0; i < from.size(); ++i) r[i] |= from[i] & ~w[i];
+    }
+
+    // True if a neighbour reaches what the slab has not.
+    [[nodiscard]] bool has_news(std::size_t s) const {
+        if (!slabs_[s].is_known) return true;
+        const auto meets = [](const face& reached, const face& left) {
+            for (std::size_t i = 0; i < reached.size(); ++i)
+                if ((reached[i] & left[i]) != 0) return true;
+            return false;
+        };
+        return (s > 0 && meets(slabs_[s - 1].reached[1], slabs_[s].left[0])) ||
+               (s + 1 < slabs_.size() && meets(slabs_[s + 1].reached[0], slabs_[s].left[1]));
+    }
+    bool visit_if_needed(std::size_t s) {
+        if (!has_news(s)) return false;
+        ++visits_;
+        const bit_grid walls = walls_of(s), reached = flooded(s, walls);
+        const std::size_t words = walls.words() * static_cast<std::size_t>(padded_.y);
+        for (const int end : {0, 1}) {
+            const int z = end == 0 ? 0 : walls.extent().z - 1;
+            const std::uint64_t *const w = walls.row(0, z), *const r = reached.row(0, z);
+            slabs_[s].reached[end].assign(r, r + words);
+            face& left = slabs_[s].left[end];
+            left.resize(words);
+            for (std::size_t i = 0; i < words; ++i) left[i] = ~(w[i] | r[i]);
+        }
+        slabs_[s].is_known = true;
+        return true;
+    }
+
+    // All that is reached in a slab, after the flood; two are kept.
+    [[nodiscard]] const bit_grid& reached_in(std::size_t s) {
+        if (const auto found = kept_.find(s); found != kept_.end()) return found->second;
+        if (kept_.size() > 1) kept_.erase(kept_.begin());
+        return kept_.emplace(s, flooded(s, walls_of(s))).first->second;
+    }
+
+    glm::ivec3 extent_, padded_; // the grid, and that with what lies around it
+    int closing_;
+    unsigned threads_;
+    int depth_; // layers of the grid a slab, a multiple of a brick's
+    std::vector<slab_faces> slabs_;
+    std::vector<slabs::bin<wall_brick>> bins_;
+    slabs::bin_memory<wall_brick> walls_;
+    std::uint64_t visits_ = 0;
+    std::map<std::size_t, bit_grid> kept_;
+};
+
+} // namespace voxelpipe::cpu
