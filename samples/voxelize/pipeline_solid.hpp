@@ -46,7 +46,7 @@ void pipeline<Backend>::draw_solid(volume& result, const voxelpipe::grid& slab, 
         status =
             vp::voxelize_solid(backend_, uploaded_->bits_draws(), part, framebuffer, solid_options_of(*request_.solid));
     }
-    add_solid_counts(status, part);
+    add_solid_counts(status, slab);
     report_(1.0);
     const stage_timer timer{*this, "resolve"};
     if (part.extent == slab.extent) {
@@ -75,10 +75,9 @@ void pipeline<Backend>::finish_solid(volume& result) {
 template <class Backend>
 void pipeline<Backend>::warn_of_solid(std::uint64_t voxels, std::uint64_t surface) {
     stats_.voxels = voxels;
-    if (request_.solid->rule == solid_rule::exterior && voxels != 0 && voxels == surface)
-        stats_.warnings.push_back(
-            "--solid exterior finds nothing enclosed: all its voxels are the surface's. If the flood "
-            "leaked through gaps, --closing R closes those of about 2 R voxels");
+    stats_.solid->touched += surface;
+    if (std::string warning = flood_warning(*request_.solid, *stats_.solid, voxels); !warning.empty())
+        stats_.warnings.push_back(std::move(warning));
     if (std::string warning = open_warning(*request_.solid, *stats_.solid); !warning.empty())
         stats_.warnings.push_back(std::move(warning));
 }

@@ -96,6 +96,12 @@ std::string open_warning(const solid_request& request, const solid_counts& count
            "what cannot be reached from outside";
 }
 
+std::string flood_warning(const solid_request& request, const solid_counts& counts, std::uint64_t voxels) {
+    if (request.rule != solid_rule::exterior || voxels == 0 || voxels != counts.touched) return {};
+    return "--solid exterior finds nothing enclosed: all its voxels are the surface's. If the flood leaked through "
+           "gaps, --closing R closes those of about 2 R voxels";
+}
+
 void fill_inside(volume& v, const channel& solid, const channel& surface, const solid_request& request, int threads) {
     threads = thread_count(threads);
     for (channel& c : v.channels) {

@@ -11,9 +11,12 @@
 #include <string>
 #include <vector>
 
-namespace voxelpipe::core {
+namespace voxelpipe {
+struct solid_slab;
+namespace core {
 struct hole_cones;
 }
+} // namespace voxelpipe
 
 namespace voxelize {
 
@@ -46,6 +49,8 @@ struct solid_request {
     int closing = 0;   // exterior: gaps of about twice as many voxels are closed
     // close_holes of a part of the model: the lids of each body (voxelpipe::solid_options::cones), not owned.
     const voxelpipe::core::hole_cones* cones = nullptr;
+    // exterior and vote of a slab along z: what the other slabs decide (voxelpipe::solid_options::slab), not owned.
+    const voxelpipe::solid_slab* slab = nullptr;
     // sRGB of the voxels inside; none: the mean of the model's covered voxels, in linear light, by alpha.
     std::optional<std::array<std::uint8_t, 3>> fill_color;
 };
@@ -57,11 +62,15 @@ struct solid_counts {
     std::uint64_t crossings = 0;
     std::uint64_t max_winding = 0;
     std::uint64_t hole_edges = 0, holes = 0, closed_holes = 0; // of the whole model, with close_holes
+    std::uint64_t touched = 0; // voxels that a triangle touches, where the surface is drawn
 };
 
 // One line where open rows prove that what was filled is not closed: how many, and what to do; empty where there are
 // none, or the rule does without closed models.
 [[nodiscard]] std::string open_warning(const solid_request& request, const solid_counts& counts);
+
+// One line where a flood leaves nothing but the surface, of so many voxels in all; empty elsewhere.
+[[nodiscard]] std::string flood_warning(const solid_request& request, const solid_counts& counts, std::uint64_t voxels);
 
 // The mean of colours, in linear light, weighted by alpha, opaque; clay where none of them shows. Sums of integers, so
 // that the order in which colours are added does not show.

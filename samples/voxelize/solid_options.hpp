@@ -36,6 +36,7 @@ namespace voxelize {
         options.max_hole_edges = request.close_holes;
         options.cones = request.cones;
     }
+    options.slab = request.slab;
     switch (request.extent) {
     case solid_extent::centre:
         options.extent = vp::solid_extent::centre;

@@ -223,10 +223,11 @@ private:
 
     // The solid's bricks and tiles, and the values of the surface where that lies in them: in bricks.
     [[nodiscard]] sparse_volume draw_solid(sparse_volume&& surface_of) {
-        // What is outside follows from the whole grid: a flood is drawn there, with the padding.
+        // What is outside follows from the whole grid: a flood is drawn there, with the padding, or has been before.
         const bool is_flood = this->request_.solid->rule == solid_rule::exterior;
+        const voxelpipe::grid& wanted_part = this->uploaded_->relative_grid();
         const voxelpipe::grid part =
-            is_flood ? this->uploaded_->relative_grid().uncropped() : this->uploaded_->relative_grid();
+            is_flood && this->request_.solid->slab == nullptr ? wanted_part.uncropped() : wanted_part;
         std::bitset<2> enabled;
         enabled[0] = !this->counts_bodies();
         enabled[1] = this->counts_bodies();
@@ -240,14 +241,16 @@ private:
             status = vp::voxelize_solid(this->backend_, this->uploaded_->bits_draws(), part, framebuffer,
                                         solid_options_of(*this->request_.solid));
         }
-        this->add_solid_counts(status, part);
+        this->add_solid_counts(status, wanted_part);
         const typename base::stage_timer timer{*this, "fill"};
         sparse_volume result;
         result.shape = surface_of.shape;
         take_bricks(result, framebuffer);
         if (!surface_of.keys.empty() && !result.tiles.empty()) result = open_tiles(result, &surface_of.keys);
-        if (is_flood)
-            keep_part(result, this->uploaded_->relative_grid().offset, this->uploaded_->relative_grid().extent);
+        if (part.extent != wanted_part.extent)
+            keep_part(result, wanted_part.offset, wanted_part.extent);
+        else if (is_flood && wanted_part.offset.x != 0 && !result.tiles.empty()) // as without slabs, where it is padded
+            result = open_tiles(result);
         this->warn_of_solid(result.num_voxels(), surface_of.num_voxels());
         for (const target wanted : this->request_.targets) {
             if (wanted == target::occupancy)

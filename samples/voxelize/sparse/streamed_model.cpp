@@ -6,9 +6,10 @@
 #include "../memory.hpp"
 #include "../parallel.hpp"
 #include "../placement.hpp"
-#include "../surface.hpp"
 #include "sparse_voxelizer.hpp"
 #include "streamed_holes.hpp"
+#include "streamed_repairs.hpp"
+#include "streamed_slab.hpp"
 
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/plan.hpp>
@@ -24,165 +25,11 @@
 #include <vector>
 
 namespace voxelize {
-namespace {
-
-namespace slabs = voxelpipe::slabs;
-// What a vertex may have.
-struct vertex_color {
-    glm::vec4 color;
-};
-struct vertex_texcoord {
-    glm::vec2 texcoord;
-};
-struct vertex_texcoord_color {
-    glm::vec2 texcoord;
-    glm::vec4 color;
-};
-template <class Varyings>
-constexpr bool has_color = requires(Varyings v) {
-    v.color;
-};
-template <class Varyings>
-constexpr bool has_texcoord = requires(Varyings v) {
-    v.texcoord;
-};
-
-// Positions as the file has them, with what else the vertices have.
-template <class Varyings>
-using corner_record = slabs::record<Varyings>;
-
-// For each triangle of a slab, at least: record, scene, snapped vertices, pairs with tiles.
-template <class Varyings>
-constexpr double draw_bytes = std::is_empty_v<Varyings> ? 220 : 220 + 6 * sizeof(Varyings);
-constexpr int brick = 8;
-
-template <class Varyings>
-corner_record<Varyings> record_of(const triangle_stream::block& from, std::size_t triangle) {
-    const std::size_t i = 3 * triangle;
-    const auto number = static_cast<std::uint32_t>(from.first_number + triangle);
-    corner_record<Varyings> made{};
-    made.number = number;
-    for (std::size_t k = 0; k < 3; ++k) {
-        made.positions[k] = from.corners[i + k];
-        if constexpr (has_color<Varyings>)
-            made.varyings[k].color = from.colors.empty() ? glm::vec4(1) : from.colors[i + k];
-        if constexpr (has_texcoord<Varyings>)
-            made.varyings[k].texcoord = from.texcoords.empty() ? glm::vec2(0) : from.texcoords[i + k];
-    }
-    return made;
-}
-
-// The corners as the pipeline places them, in the request's grid.
-class corner_placer {
-public:
-    corner_placer(const voxelize_request& request, const triangle_stream& model)
-        : rule_(request.solid ? voxelpipe::coverage::conservative : request.coverage),
-          is_solid_(request.solid.has_value()) {
-        for (const triangle_stream::part& p : model.parts())
-            places_.emplace_back(p.to_world, reference_point(request.grid));
-        grid_ = request.grid;
-        grid_.origin -= reference_point(request.grid);
-        snap_ = vp::core::make_snap_transform(grid_);
-    }
-    [[nodiscard]] slabs::classified operator()(std::size_t part, const glm::vec3* corners) const {
-        const placed_vertex_shader& place = places_[part];
-        return slabs::classify(snap_, grid_.extent, rule_, place(corners[0]), place(corners[1]), place(corners[2]),
-                               is_solid_);
-    }
-
-private:
-    std::vector<placed_vertex_shader> places_; // by part
-    voxelpipe::coverage rule_;
-    bool is_solid_; // triangles beside the grid along x count too
-    voxelpipe::grid grid_;
-    vp::core::snap_transform snap_{};
-};
-
-// How many triangles of a part are in a slab.
-struct part_count {
-    std::size_t part;
-    std::size_t triangles;
-};
-
-// A slab that is drawn at once: layers of one range.
-template <class Varyings>
-struct streamed_slab {
-    slabs::layer_range layers;
-    std::size_t range = 0;
-    slabs::bin<corner_record<Varyings>> triangles;
-    std::vector<part_count> parts; // of its triangles, in their order
-};
-
-// A slab's triangles as a scene of the parts that are there. A primitive's triangles have the numbers of the whole
-// model: `whole` counts those of parts that are left out before it, too. Consumes the triangles.
-template <class Varyings>
-scene scene_of(streamed_slab<Varyings>&& slab, const triangle_stream& model) {
-    scene made;
-    made.materials = model.materials();
-    made.textures = model.textures();
-    made.images = model.images();
-    std::uint64_t before = 0; // triangles of the model before the primitive's `whole`
-    for (const part_count& count : slab.parts) {
-        const triangle_stream::part& source = model.parts()[count.part];
-        const std::uint64_t end = source.first_number + source.num_triangles;
-        made.instances.push_back({static_cast<std::uint32_t>(made.primitives.size()), source.to_world});
-        primitive& part = made.primitives.emplace_back();
-        part.material = source.material;
-        part.whole = end - std::exchange(before, end);
-        part.positions.reserve(3 * count.triangles);
-        part.triangles.reserve(count.triangles);
-        part.numbers.reserve(count.triangles);
-        if constexpr (has_color<Varyings>) part.colors.reserve(3 * count.triangles);
-        if constexpr (has_texcoord<Varyings>)
-            if (source.has_texcoords) part.texcoords.reserve(3 * count.triangles);
-    }
-    std::size_t at = 0; // the primitive
-    slab.triangles.for_each_block([&](std::span<const corner_record<Varyings>> block) {
-        for (const corner_record<Varyings>& r : block) {
-            while (made.primitives[at].triangles.size() == slab.parts[at].triangles) ++at;
-            primitive& part = made.primitives[at];
-            const triangle_stream::part& source = model.parts()[slab.parts[at].part];
-            const auto first = static_cast<std::uint32_t>(part.positions.size());
-            part.positions.insert(part.positions.end(), r.positions, r.positions + 3);
-            part.triangles.emplace_back(first, first + 1, first + 2);
-            const std::uint64_t skipped = source.first_number + source.num_triangles - part.whole;
-            part.numbers.push_back(static_cast<std::uint32_t>(r.number - skipped));
-            if constexpr (has_color<Varyings>)
-                for (const Varyings& v : r.varyings) part.colors.push_back(v.color);
-            if constexpr (has_texcoord<Varyings>)
-                if (source.has_texcoords)
-                    for (const Varyings& v : r.varyings) part.texcoords.push_back(v.texcoord);
-        }
-    });
-    slab.triangles = {};
-    // Lids need a triangle in their body's draw.
-    constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
-    for (primitive& part : made.primitives)
-        if (part.triangles.empty()) {
-            part.positions.emplace_back(nowhere, nowhere, nowhere);
-            part.triangles.emplace_back(0U, 0U, 0U);
-            part.numbers.push_back(0);
-        }
-    return made;
-}
-
-// Adds parts without triangles to a slab's.
-void add_parts(std::vector<part_count>& to, const std::vector<std::size_t>& parts) {
-    for (const std::size_t part : parts) {
-        const auto at =
-            std::lower_bound(to.begin(), to.end(), part, [](const part_count& c, std::size_t p) { return c.part < p; });
-        if (at == to.end() || at->part != part) to.insert(at, {part, 0});
-    }
-}
-
-} // namespace
 
 opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder) {
     const voxelize_request& request = options.voxelize;
-    // The other two need the whole grid.
-    const bool is_by_rule = !request.solid || (request.solid->rule != solid_rule::exterior && !request.solid->vote);
     const bool is_drawn_here = request.backend != backend_choice::cuda &&
-                               request.strategy == voxelpipe::strategy::automatic && is_by_rule &&
+                               request.strategy == voxelpipe::strategy::automatic &&
                                options.storage != storage_choice::dense;
     const auto wants = [&](const auto& is_wanted) {
         return std::any_of(request.targets.begin(), request.targets.end(), is_wanted);
@@ -212,6 +59,7 @@ void add_part(voxelize_stats& all, const voxelize_stats& part) {
         to.hole_edges = part.solid->hole_edges;
         to.holes = part.solid->holes;
         to.closed_holes = part.solid->closed_holes;
+        to.touched += part.solid->touched;
     }
     for (const auto& stage : part.milliseconds) {
         const auto found = std::find_if(all.milliseconds.begin(), all.milliseconds.end(),
@@ -232,25 +80,33 @@ void warn_of_parts(voxelize_stats& stats, const voxelize_request& request) {
 
 namespace {
 
-// The slabs of a plan, cut at the borders of the ranges.
+// The slabs of a plan, cut at the borders of the ranges; with_gaps: those between the ranges too.
 template <class Varyings>
-std::vector<streamed_slab<Varyings>> slabs_within(const slabs::plan& plan, std::span<const slabs::layer_range> ranges) {
+std::vector<streamed_slab<Varyings>> slabs_within(const slabs::plan& plan, std::span<const slabs::layer_range> ranges,
+                                                  bool with_gaps) {
     std::vector<streamed_slab<Varyings>> parts;
-    for (std::size_t r = 0; r < ranges.size(); ++r)
+    const auto add = [&](const slabs::layer_range& layers, std::size_t range) {
         for (const slabs::layer_range& s : plan.slabs)
-            if (const int begin = std::max(s.begin, ranges[r].begin), end = std::min(s.end, ranges[r].end);
-                begin < end) {
+            if (const int begin = std::max(s.begin, layers.begin), end = std::min(s.end, layers.end); begin < end) {
                 auto& part = parts.emplace_back();
                 part.layers = {begin, end};
-                part.range = r;
+                part.range = range;
             }
+    };
+    int at = 0;
+    for (std::size_t r = 0; r < ranges.size(); ++r) {
+        if (with_gaps) add({at, ranges[r].begin}, streamed_slab<Varyings>::no_range);
+        add(ranges[r], r);
+        at = ranges[r].end;
+    }
+    if (with_gaps) add({at, plan.slabs.back().end}, streamed_slab<Varyings>::no_range);
     return parts;
 }
 
 // The triangles of each slab.
 template <class Varyings>
 void bin_triangles(triangle_stream& model, const corner_placer& classify, const stream_place& place, double room,
-                   int layers, std::vector<streamed_slab<Varyings>>& parts) {
+                   int layers, streamed_repairs& repairs, std::vector<streamed_slab<Varyings>>& parts) {
     // The first slab that ends behind a layer.
     std::vector<std::size_t> first_slab(static_cast<std::size_t>(layers) + 1, parts.size());
     for (std::size_t s = parts.size(); s-- > 0;) std::fill_n(first_slab.begin(), parts[s].layers.end, s);
@@ -259,6 +115,7 @@ void bin_triangles(triangle_stream& model, const corner_placer& classify, const 
         slabs::bin_memory<corner_record<Varyings>> spilled(static_cast<std::uint64_t>(room / 8), bins.size(),
                                                            place.folder.string());
         model.for_each_block([&](const triangle_stream::block& block) {
+            repairs.add(block);
             for (std::size_t i = 0; 3 * i < block.corners.size(); ++i) {
                 const slabs::classified c = classify(block.part, block.corners.data() + 3 * i);
                 if (c.kind != vp::core::triangle_class::drawn) continue;
@@ -297,16 +154,26 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
             if (c.kind == vp::core::triangle_class::drawn) layers.add(c.reach);
         }
     });
+    streamed_repairs repairs(model, request, room, place.folder);
     slabs::plan_options how;
     how.align = brick;
+    how.layer_cost = static_cast<std::uint64_t>(repairs.layer_bytes() / draw_bytes<Varyings>);
     const auto most = static_cast<std::uint64_t>(std::max(1.0, room / 4 / draw_bytes<Varyings>));
-    auto parts = slabs_within<Varyings>(slabs::cover(layers, 2, most, how), ranges);
+    auto parts = slabs_within<Varyings>(slabs::cover(layers, 2, most, how), ranges, repairs.floods());
     place.say(std::to_string(model.num_triangles()) + " triangles do not fit into " + memory::mebibytes(room) +
               ": they are drawn in " + std::to_string(parts.size()) + " slabs, through temporary files in " +
               place.folder.string());
 
     try {
-        bin_triangles(model, classify, place, room, whole.extent.z, parts);
+        // Nothing is drawn in the padding.
+        const int padding = request.padding;
+        const auto drawn_layers = [&](const slabs::layer_range& all) -> slabs::layer_range {
+            return {std::max(all.begin, padding), std::max(padding, std::min(all.end, whole.extent.z - padding))};
+        };
+        std::vector<slabs::layer_range> drawn;
+        for (const auto& part : parts) drawn.push_back(drawn_layers(part.layers));
+        repairs.begin(drawn);
+        bin_triangles(model, classify, place, room, whole.extent.z, repairs, parts);
         const std::chrono::duration<double, std::milli> binning = std::chrono::steady_clock::now() - start;
         stats.milliseconds.emplace_back("bin", binning.count());
         stats.triangles_dropped = counts.triangles_dropped();
@@ -314,17 +181,41 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
 
         const streamed_holes holes(model, request, room, place.folder);
 
-        // Nothing is drawn in the padding.
-        const int padding = request.padding;
+        const auto num_drawn = std::count_if(parts.begin(), parts.end(), [](const auto& part) {
+            return part.range != streamed_slab<Varyings>::no_range;
+        });
+        const double all =
+            static_cast<double>(parts.size()) * (repairs.floods() ? 1 : 0) + static_cast<double>(num_drawn);
+        double done = 0; // of `all`
+        const auto report_part = [&](voxelize_request& part) {
+            if (request.progress) part.progress = [&, done](double share) { request.progress((done + share) / all); };
+            ++done;
+        };
+        if (repairs.floods()) {
+            const auto begin = std::chrono::steady_clock::now();
+            for (auto& part : parts) {
+                if (part.triangles.size() != 0) {
+                    voxelize_request walls = repairs.wall_request(part.layers);
+                    report_part(walls);
+                    repairs.add_walls(wall_scene(scene_of(part, model)), walls);
+                }
+                if (part.range == streamed_slab<Varyings>::no_range) part.triangles = {};
+            }
+            std::erase_if(parts, [](const auto& part) { return part.range == streamed_slab<Varyings>::no_range; });
+            repairs.flood();
+            const std::chrono::duration<double, std::milli> flooding = std::chrono::steady_clock::now() - begin;
+            stats.milliseconds.emplace_back("flood", flooding.count());
+        }
         for (std::size_t r = 0, s = 0; r < ranges.size(); ++r) {
             std::vector<sparse_volume> of_range;
             for (; s < parts.size() && parts[s].range == r; ++s) {
-                const int begin = std::max(parts[s].layers.begin, padding),
-                          end = std::min(parts[s].layers.end, whole.extent.z - padding);
+                const auto [begin, end] = drawn_layers(parts[s].layers);
                 add_parts(parts[s].parts, holes.parts());
+                if (repairs.floods()) add_parts(parts[s].parts, {0}); // its inside needs no triangle
                 std::vector<std::size_t> numbers;
                 for (const part_count& c : parts[s].parts) numbers.push_back(c.part);
-                scene of_slab = scene_of(std::move(parts[s]), model);
+                scene of_slab = scene_of(parts[s], model);
+                parts[s].triangles = {};
                 if (begin >= end) continue;
                 if (of_slab.triangle_count() == 0) { // nothing to draw; its rows are counted
                     if (request.solid)
@@ -338,9 +229,9 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
                                        {whole.extent.x - 2 * padding, whole.extent.y - 2 * padding, end - begin});
                 part.work_memory =
                     request.work_memory != 0 ? request.work_memory : static_cast<std::uint64_t>(room / 8);
-                const double done = static_cast<double>(s), all = static_cast<double>(parts.size());
-                if (request.progress)
-                    part.progress = [&, done, all](double share) { request.progress((done + share) / all); };
+                report_part(part);
+                const vp::solid_slab decided = repairs.of(part.grid);
+                if (repairs.is_any()) part.solid->slab = &decided;
                 const std::vector<vp::core::hole_cones> cones = holes.of_bodies(numbers);
                 if (!cones.empty()) part.solid->cones = cones.data();
                 voxelize_stats of_part;
@@ -391,6 +282,9 @@ sparse_volume run_streamed_voxelizer(triangle_stream& model, const stream_place&
     const slabs::layer_range layers{0, request.grid.extent.z};
     draw_streamed(model, place, request, std::span(&layers, 1), stats,
                   [&](std::size_t, sparse_volume&& bricks) { all = std::move(bricks); });
+    if (request.solid && stats.solid)
+        if (std::string text = flood_warning(*request.solid, *stats.solid, stats.voxels); !text.empty())
+            stats.warnings.push_back(std::move(text));
     return all;
 }
 

@@ -1,0 +1,150 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// Floods and votes of models that do not fit --max-memory, whose slabs depend on each other: the same voxels, values
+// and counts as of a run that holds the model.
+#include "gltf_builder.hpp"
+#include "two_ways.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+using namespace tool_test;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int side = 320;
+
+// A wavy ball from 0.05 to 0.95 of 2 SIDE^2 triangles; without those of a window of HOLE quads a side, which looks
+// along x, y and z a little.
+void write_ball(const fs::path& file, int hole) {
+    std::ofstream out(file, std::ios::binary);
+    out << "ply\nformat binary_little_endian 1.0\nelement vertex " << side * (side + 1)
+        << "\nproperty float x\nproperty float y\nproperty float z\nelement face " << 2 * (side * side - hole * hole)
+        << "\nproperty list uchar int vertex_indices\nend_header\n";
+    const auto put = [&](const auto& value) { out.write(reinterpret_cast<const char*>(&value), sizeof(value)); };
+    constexpr double pi = 3.14159265358979;
+    for (int v = 0; v <= side; ++v)
+        for (int u = 0; u < side; ++u) {
+            const double a = 2 * pi * u / side, b = pi * v / side, r = 0.4 + 0.05 * std::sin(5 * a) * std::sin(4 * b);
+            put(static_cast<float>(0.5 + r * std::cos(a) * std::sin(b)));
+            put(static_cast<float>(0.5 + r * std::sin(a) * std::sin(b)));
+            put(static_cast<float>(0.5 - r * std::cos(b)));
+        }
+    for (int v = 0; v < side; ++v)
+        for (int u = 0; u < side; ++u) {
+            if (u >= 30 && u < 30 + hole && v >= 110 && v < 110 + hole) continue;
+            const int next = (u + 1) % side, a = v * side + u, b = v * side + next;
+            for (const auto& [p, q, r] : {std::array{a, b, b + side}, std::array{a, b + side, a + side}}) {
+                put(std::uint8_t{3});
+                put(std::int32_t{p});
+                put(std::int32_t{q});
+                put(std::int32_t{r});
+            }
+        }
+}
+
+TEST(StreamedSolids, FloodsOfClosedAndOpenModels) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    write_ball(folder / "m.ply", 0);
+    two_ways{folder, folder / "m.ply", {"-r", "60", "--solid", "exterior"}}.expect_equal(60);
+    // The hole is of about four voxels.
+    write_ball(folder / "m.ply", 16);
+    const two_ways leaks{folder, folder / "m.ply", {"-r", "60", "--solid", "exterior", "-t", "occupancy,normal"}};
+    leaks.expect_equal(60);
+    const outcome shell = leaks.draw_streamed(60);
+    EXPECT_NE(std::string::npos, shell.err.find("finds nothing enclosed")) << shell.err;
+    const two_ways closes{
+        folder,
+        folder / "m.ply",
+        {"-r", "60", "--solid", "exterior", "--closing", "2", "--padding", "3", "-t", "occupancy,count,depth"}};
+    for (const int memory : {58, 72}) closes.expect_equal(memory);
+    const outcome whole = closes.draw_streamed(60);
+    EXPECT_LT(4 * json::parse(shell.out).value("voxels", 0), json::parse(whole.out).value("voxels", 0));
+    // The model leaves the grid.
+    two_ways{folder,
+             folder / "m.ply",
+             {"--voxel-size", "0.02", "--origin", "0.3,0.1,0.4", "--extent", "30,50,20", "--solid", "exterior",
+              "--closing", "1"}}
+        .expect_equal(60);
+}
+
+TEST(StreamedSolids, VotesOfClosedAndOpenModels) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    write_ball(folder / "m.ply", 60);
+    const two_ways whole{folder, folder / "m.ply", {"-r", "60", "--solid", "nonzero", "--vote", "-t", "count,normal"}};
+    for (const int memory : {58, 72}) whole.expect_equal(memory);
+    two_ways{
+        folder,
+        folder / "m.ply",
+        {"--voxel-size", "0.02", "--origin", "0.3,0.1,0.4", "--extent", "30,50,20", "--solid", "nonzero", "--vote"}}
+        .expect_equal(60);
+    write_ball(folder / "m.ply", 0);
+    two_ways{folder, folder / "m.ply", {"-r", "60", "--padding", "4", "--solid", "nonzero", "--vote"}}.expect_equal(60);
+}
+
+// Several parts, of which one mirrors, and colours.
+TEST(StreamedSolids, PartsOfGltf) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    builder file;
+    gltf_test::add_sheet(file, 580);
+    const int alone = file.accessor(std::vector<float>{0, 0, 0.1f, 1, 0, 0.2f, 0, 1, 0.3f}, "VEC3");
+    file.root["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", alone}}}});
+    file.append("nodes", {{"mesh", 0}, {"matrix", {0, 0, 2, 0, 1, 0, 0, 0, 0, -1.5, 0, 0, 7, 8, 9, 1}}});
+    file.write_glb(folder / "m.glb");
+    const std::vector<std::string> rules[] = {{"exterior", "--closing", "3"}, {"nonzero", "--vote"}};
+    for (const std::vector<std::string>& rule : rules) {
+        std::vector<std::string> how{"-r",           "80",      "-t",     "occupancy,color,triangle",
+                                     "--fill-color", "#102030", "--solid"};
+        how.insert(how.end(), rule.begin(), rule.end());
+        two_ways{folder, folder / "m.glb", how}.expect_equal(44);
+    }
+}
+
+// Tiles of bricks, and slabs that several processes share or that one goes on with.
+TEST(StreamedSolids, TilesAndSharedSlabs) {
+    if (sanitized || !VOXELPIPE_TOOL_HAS_ASSIMP) return;
+    const scratch_folder folder;
+    write_ball(folder / "m.ply", 16);
+    const std::vector<std::string> little{"--max-memory", "60"};
+    const std::vector<std::string> rules[] = {{"exterior", "--closing", "2"}, {"nonzero", "--vote"}};
+    for (const std::vector<std::string>& rule : rules) {
+        std::vector<std::string> how{"-r", "60", "--fill-color", "#102030", "--solid"};
+        how.insert(how.end(), rule.begin(), rule.end());
+        const two_ways solid{folder, folder / "m.ply", how};
+        ASSERT_EQ(0, solid.draw("tight.nvdb", little).code);
+        ASSERT_EQ(0, solid.draw("free.nvdb", {"--sparse"}).code);
+        EXPECT_TRUE(read_file(folder / "free.nvdb") == read_file(folder / "tight.nvdb"));
+        fs::create_directories(folder.path() / "free");
+        fs::create_directories(folder.path() / "tight");
+        ASSERT_EQ(0, solid.draw("free/m.pvti", {"--sparse", "--pieces", "3"}).code);
+        for (const char* const rank : {"1", "0"}) {
+            const outcome part = solid.draw(
+                "tight/m.pvti", {little[0], little[1], "--pieces", "3", "--world-size", "2", "--rank", rank});
+            ASSERT_EQ(0, part.code) << part.err;
+            EXPECT_NE(std::string::npos, part.err.find(" triangles do not fit")) << part.err;
+        }
+        std::size_t files = 0;
+        for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder.path() / "free")) {
+            if (!entry.is_regular_file()) continue;
+            ++files;
+            const fs::path other = folder.path() / "tight" / fs::relative(entry.path(), folder.path() / "free");
+            EXPECT_TRUE(read_file(entry.path()) == read_file(other)) << other;
+        }
+        EXPECT_EQ(4u, files);
+        fs::remove_all(folder.path() / "free");
+        fs::remove_all(folder.path() / "tight");
+    }
+}
+
+} // namespace
