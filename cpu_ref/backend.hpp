@@ -29,8 +29,8 @@ namespace voxelpipe {
 // `progress` then gets reports of all calls.
 class cpu_backend {
 public:
-    static constexpr bool runs_on_host = true; // its calls may be given memory of the host as it is
-    static constexpr bool takes_solid_slabs = true;
+    static constexpr bool runs_on_host = true;      // its calls may be given memory of the host as it is
+    static constexpr bool takes_solid_slabs = true; // its solid calls take solid_options::slab
 
     // Host memory, uninitialised, aligned to 64 bytes. The constructor throws std::bad_alloc.
     template <class T>
