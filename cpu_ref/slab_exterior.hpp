@@ -33,9 +33,8 @@ public:
           bins_(slabs_.size()), walls_(budget / 2, bins_.size(), std::move(folder)) {}
     // Bytes that are held for a budget, at least.
     [[nodiscard]] static double least_bytes(glm::ivec3 extent, int closing) {
-        const double row = 8 * ((extent.x + 2 * (closing + 1) + 63) / 64);
-        const double layer = row * (extent.y + 2 * (closing + 1));
-        return layer * (5 * brick + 2 * closing + 4 * ((extent.z + brick - 1) / brick));
+        const int layers = 5 * brick + 2 * closing + 4 * ((extent.z + brick - 1) / brick);
+        return layer_bytes(extent + 2 * (closing + 1)) * layers;
     }
     [[nodiscard]] std::size_t num_slabs() const { return slabs_.size(); }
     // Slabs that have been flooded, those counted again that were more than once.
@@ -95,12 +94,18 @@ private:
         bool is_known = false;
     };
 
+    // Bytes of a layer of bits.
+    [[nodiscard]] static double layer_bytes(glm::ivec3 extent) {
+        const int words = (extent.x + 63) / 64;
+        return 8.0 * words * extent.y;
+    }
     // Layers of a slab: walls, what is reached in it and in two more, rows that wait, and a window that is larger by
     // `closing` on either side.
     [[nodiscard]] int depth_for(std::uint64_t bytes) const {
-        const double row = 8 * ((padded_.x + 63) / 64), layer = row * padded_.y;
-        const double layers = (static_cast<double>(bytes) / layer - 2 * closing_) / (4 + 8 / row);
-        return static_cast<int>(std::clamp(layers / brick, 1.0, 1.0 + extent_.z / brick)) * brick;
+        const double layer = layer_bytes(padded_), waiting = 8 * static_cast<double>(padded_.y);
+        const double layers = (static_cast<double>(bytes) - 2 * closing_ * layer) / (4 * layer + waiting);
+        const int most = 1 + extent_.z / brick;
+        return static_cast<int>(std::clamp<double>(layers / brick, 1, most)) * brick;
     }
     // Layers count from the lowest one around the grid; the slabs at the ends have those around it.
     [[nodiscard]] int first_layer(std::size_t s) const {

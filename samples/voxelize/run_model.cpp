@@ -188,7 +188,7 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     if (stream)
         bricks = run_streamed_voxelizer(*stream, place, report.request, report.stats);
     else if (storage.sparse)
-        bricks = run_sparse_voxelizer(std::move(model), report.request, report.stats);
+        bricks = run_sparse_voxelizer(std::move(model), report.request, place.folder, report.stats);
     else
         voxels = run_voxelizer(std::move(model), report.request, report.stats);
     const std::uint64_t num_bricks = bricks.keys.size(), brick_bytes = bricks.num_bytes();

@@ -101,9 +101,10 @@ voxel_set plain_inside(const voxel_set& walls, glm::ivec3 extent, int closing) {
 
 // A budget that gives slabs of about so many layers.
 std::uint64_t budget_for(glm::ivec3 extent, int closing, int layers) {
-    const auto row = static_cast<std::uint64_t>(8 * ((extent.x + 2 * closing + 2 + 63) / 64)),
-               y = static_cast<std::uint64_t>(extent.y + 2 * closing + 2);
-    return 2 * y * (static_cast<std::uint64_t>(layers) * (4 * row + 8) + row * static_cast<std::uint64_t>(2 * closing));
+    const int words = (extent.x + 2 * closing + 2 + 63) / 64, y = extent.y + 2 * closing + 2;
+    const std::uint64_t row = std::uint64_t{8} * static_cast<unsigned>(words);
+    const auto all = static_cast<std::uint64_t>(layers), grown = static_cast<std::uint64_t>(closing);
+    return 2 * static_cast<std::uint64_t>(y) * (all * (4 * row + 8) + 2 * grown * row);
 }
 
 struct flood_result {

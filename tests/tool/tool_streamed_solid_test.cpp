@@ -146,4 +146,32 @@ TEST(StreamedSolids, TilesAndSharedSlabs) {
     }
 }
 
+// A model that fits, in a grid whose dense bits do not: a box with a slit, and a triangle beside it.
+TEST(StreamedSolids, GridsThatDoNotFit) {
+    if (sanitized || !VOXELPIPE_TOOL_HAS_ASSIMP) return;
+    const scratch_folder folder;
+    std::ofstream(folder / "m.obj")
+        << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n"
+           "v 0 1 0.497\nv 0 0 0.497\nv 0 0 0.503\nv 0 1 0.503\nv 2 0.4 0.5\nv 2 0.6 0.5\nv 1.5 0.5 0.7\n"
+           "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 2 4 8 6\nf 1 10 9 3\nf 5 7 12 11\nf 13 14 15\n";
+    const std::vector<std::string> rules[] = {{"exterior", "--closing", "2"}, {"nonzero", "--vote"}};
+    for (const std::vector<std::string>& rule : rules) {
+        std::vector<std::string> how{"-r", "900", "-t", "occupancy", "--fill-color", "#102030", "--solid"};
+        how.insert(how.end(), rule.begin(), rule.end());
+        const two_ways solid{folder, folder / "m.obj", how};
+        const outcome tight = solid.draw("tight.nvdb", {"--sparse", "--max-memory", "76"}),
+                      free = solid.draw("free.nvdb", {"--sparse"});
+        ASSERT_EQ(0, tight.code) << tight.err;
+        ASSERT_EQ(0, free.code) << free.err;
+        EXPECT_TRUE(read_file(folder / "free.nvdb") == read_file(folder / "tight.nvdb"));
+        const json a = json::parse(tight.out), b = json::parse(free.out);
+        EXPECT_LT(1, a.value("slabs", 0));
+        EXPECT_EQ(1, b.value("slabs", 0));
+        EXPECT_LT(90'000'000, a.value("voxels", 0)); // the slit is closed, or outvoted
+        for (const char* const name : {"triangles", "fragments", "voxels"})
+            EXPECT_EQ(a.value(name, -1), b.value(name, -2)) << name;
+        EXPECT_EQ(a["solid"], b["solid"]);
+    }
+}
+
 } // namespace

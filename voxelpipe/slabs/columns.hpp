@@ -34,7 +34,8 @@ public:
     }
     // Bytes that the bits of a grid take.
     [[nodiscard]] static double bytes(const grid& g, std::size_t num_slabs) {
-        return (static_cast<double>(num_slabs) + 1) * 8 * ((g.extent.x + 63) / 64) * static_cast<double>(g.extent.y);
+        const int words = (g.extent.x + 63) / 64;
+        return (static_cast<double>(num_slabs) + 1) * 8 * words * g.extent.y;
     }
 
     // A triangle, snapped in the grid; each of the mesh once, wherever it lies. One that cannot be drawn is left out.

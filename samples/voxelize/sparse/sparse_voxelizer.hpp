@@ -7,6 +7,8 @@
 #include "../voxelizer.hpp"
 #include "sparse_volume.hpp"
 
+#include <voxelpipe/slabs/plan.hpp>
+
 #include <filesystem>
 #include <span>
 #include <string>
@@ -30,7 +32,14 @@ struct storage_decision {
 [[nodiscard]] sparse_volume draw_sparse(scene& model, const voxelize_request& inside, const voxelpipe::grid& whole,
                                         voxelize_stats& stats);
 
-// Consumes the scene. Throws as run_voxelizer does.
-[[nodiscard]] sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
+// What a flood of --solid exterior stops at: all voxels that triangles touch in layers of the request's grid, whatever
+// materials cut off. Consumes the scene. Throws std::bad_alloc.
+[[nodiscard]] sparse_volume draw_walls(scene&& model, const voxelize_request& request,
+                                       const voxelpipe::slabs::layer_range& layers);
+
+// Consumes the scene. A flood or a vote whose bits do not fit into the run's memory is drawn in slabs. folder: for
+// temporary files. Throws as run_voxelizer does, and write_error for a folder that is full.
+[[nodiscard]] sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& request,
+                                                 const std::filesystem::path& folder, voxelize_stats& stats);
 
 } // namespace voxelize

@@ -171,6 +171,7 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
             return {std::max(all.begin, padding), std::max(padding, std::min(all.end, whole.extent.z - padding))};
         };
         std::vector<slabs::layer_range> drawn;
+        drawn.reserve(parts.size());
         for (const auto& part : parts) drawn.push_back(drawn_layers(part.layers));
         repairs.begin(drawn);
         bin_triangles(model, classify, place, room, whole.extent.z, repairs, parts);
@@ -195,9 +196,9 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
             const auto begin = std::chrono::steady_clock::now();
             for (auto& part : parts) {
                 if (part.triangles.size() != 0) {
-                    voxelize_request walls = repairs.wall_request(part.layers);
+                    voxelize_request walls;
                     report_part(walls);
-                    repairs.add_walls(wall_scene(scene_of(part, model)), walls);
+                    repairs.add_walls(scene_of(part, model), part.layers, walls.progress);
                 }
                 if (part.range == streamed_slab<Varyings>::no_range) part.triangles = {};
             }

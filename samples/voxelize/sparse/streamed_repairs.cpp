@@ -54,20 +54,12 @@ void streamed_repairs::add(const triangle_stream::block& block) {
     for (std::size_t i = 0; i < block.corners.size(); i += 3) columns_->add(at(i), at(i + 1), at(i + 2));
 }
 
-voxelize_request streamed_repairs::wall_request(const slabs::layer_range& layers) const {
+void streamed_repairs::add_walls(scene&& of_slab, const slabs::layer_range& layers,
+                                 const std::function<void(double)>& progress) {
     voxelize_request how = request_;
-    how.solid.reset();
-    how.targets = {target::occupancy};
-    how.coverage = voxelpipe::coverage::conservative;
-    how.grid =
-        request_.grid.crop({0, 0, layers.begin}, {request_.grid.extent.x, request_.grid.extent.y, layers.size()});
     how.work_memory = request_.work_memory != 0 ? request_.work_memory : static_cast<std::uint64_t>(room_ / 8);
-    return how;
-}
-
-void streamed_repairs::add_walls(scene&& of_slab, const voxelize_request& how) {
-    voxelize_stats of_part;
-    exterior_->add_walls(draw_sparse(of_slab, how, request_.grid, of_part).table());
+    how.progress = progress;
+    exterior_->add_walls(draw_walls(std::move(of_slab), how, layers).table());
 }
 
 void streamed_repairs::flood() { exterior_->flood(); }
@@ -85,19 +77,6 @@ vp::solid_slab streamed_repairs::of(const voxelpipe::grid& part) {
         slab.inside = inside_->data();
     }
     return slab;
-}
-
-scene wall_scene(scene&& model) {
-    scene made;
-    made.materials.emplace_back();
-    made.instances = std::move(model.instances);
-    made.primitives = std::move(model.primitives);
-    for (primitive& p : made.primitives) {
-        p.material = 0;
-        p.colors = {};
-        p.texcoords = {};
-    }
-    return made;
 }
 
 } // namespace voxelize

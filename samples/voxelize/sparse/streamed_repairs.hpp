@@ -16,6 +16,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -37,9 +38,9 @@ public:
     void begin(std::span<const voxelpipe::slabs::layer_range> drawn);
     // All triangles, once each.
     void add(const triangle_stream::block& block);
-    // How walls are drawn in layers of the whole grid; add_walls() consumes the scene.
-    [[nodiscard]] voxelize_request wall_request(const voxelpipe::slabs::layer_range& layers) const;
-    void add_walls(scene&& of_slab, const voxelize_request& how);
+    // The triangles of layers of the whole grid.
+    void add_walls(scene&& of_slab, const voxelpipe::slabs::layer_range& layers,
+                   const std::function<void(double)>& progress);
     // Once all walls are there.
     void flood();
     // What the call of a slab needs, until the next one is asked for; slabs come in order. part: of the request's grid.
@@ -58,8 +59,5 @@ private:
     std::optional<vp::cpu::slab_exterior> exterior_;
     std::optional<vp::cpu::bit_grid> inside_; // of the slab that was asked for
 };
-
-// The triangles of a scene, without anything that a fragment could be cut off by.
-[[nodiscard]] scene wall_scene(scene&& model);
 
 } // namespace voxelize
