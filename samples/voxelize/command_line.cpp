@@ -66,6 +66,14 @@ std::vector<std::string> arguments(int argc, const char* const* argv) {
     return list;
 }
 
+// WORDS of the command line are neither options nor their values.
+std::string why_unexpected(const std::vector<std::string>& words) {
+    const auto option =
+        std::find_if(words.begin(), words.end(), [](const std::string& w) { return w.starts_with('-'); });
+    if (option != words.end()) return "there is no option " + *option;
+    return '"' + words.front() + "\": one INPUT is read; --list FILE reads many";
+}
+
 } // namespace
 
 command_line parse_command_line(int argc, const char* const* argv) {
@@ -85,6 +93,12 @@ command_line parse_command_line(int argc, const char* const* argv) {
         throw early_exit{app.help()};
     } catch (const CLI::CallForVersion& version) {
         throw early_exit{std::string(version.what()) + '\n'};
+    } catch (const CLI::ExtrasError&) {
+        throw usage_error(why_unexpected(app.remaining()));
+    } catch (const CLI::ArgumentMismatch& error) {
+        const std::string text = error.what();
+        throw usage_error(
+            text.find(" required ") == std::string::npos ? text : text.substr(0, text.find(':')) + " needs a value");
     } catch (const CLI::ParseError& error) {
         throw usage_error(error.what());
     }
@@ -93,7 +107,8 @@ command_line parse_command_line(int argc, const char* const* argv) {
     if (!std::isfinite(options.load.gltf.seconds)) throw usage_error("--time is a number of seconds");
     for (const CLI::Option* const option : app.get_options()) {
         const std::string group = option->get_group();
-        if (option->count() == 0 || group == "Many models" || group == "Machine" || group == "Messages") continue;
+        if (option->count() == 0 || group == "Many models, many processes" || group == "Machine" || group == "Messages")
+            continue;
         options.arguments.push_back(option->get_name());
         for (const std::string& value : option->results()) options.arguments.push_back(value);
     }

@@ -59,8 +59,12 @@ TEST(Tool, WrongCommandLinesAreExplained) {
     expect({model, "-o", out, "--background", "mauve"}, "mauve");
     expect({model, "-o", out, "-o", folder / "o.binvox", "--voxel-size", "1,1,2"}, "one voxel size for all axes");
     expect({model, "-o", out, "-o", folder / "o.vox", "--voxel-size", "1,1,2"}, ".vox has one voxel size for all axes");
-    expect({model, "-o", out, "--no-such-option"}, "--no-such-option");
-    expect({model, model, "-o", out}, "m.glb");
+    expect({model, "-o", out, "--no-such-option", "5"}, "there is no option --no-such-option");
+    expect({model, model, "-o", out}, "m.glb\": one INPUT is read; --list FILE reads many");
+    expect({model, "-o"}, "--output needs a value");
+    expect({model, "-o", out, "--max-memory", "lots"}, "--max-memory: a number from 1 to 1073741824, not \"lots\"");
+    expect({model, "-o", out, "--scale", "nan"}, "--scale: a number from 1e-30 to 1e+30, not \"nan\"");
+    expect({model, "-o", out, "-r", "8x8"}, "one number or three, X,Y,Z or XxYxZ, not \"8x8\"");
 }
 
 TEST(Tool, ModelsThatCannotBeUsedEndWithTwo) {

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,6 +42,19 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
     return app.add_option_function<std::string>(name, take, description);
 }
 
+// A number in [LOW, HIGH].
+template <class Number>
+CLI::Validator between(Number low, Number high) {
+    const auto why_not = [low, high](const std::string& text) -> std::string {
+        Number value{};
+        if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return "";
+        std::ostringstream reason;
+        reason << "a number from " << low << " to " << high << ", not \"" << text << '"';
+        return reason.str();
+    };
+    return {why_not, "", "between"};
+}
+
 void describe_files(CLI::App& app, command_line& options, raw_options& raw) {
     app.add_option("INPUT", options.input,
                    "Model: glTF 2.0 (.glb, .gltf), or .obj, .stl, .ply, .off and others that assimp reads")
@@ -63,30 +77,29 @@ void describe_batch(CLI::App& app, command_line& options) {
                                       "In place of INPUT: a file with the path of a model in each line, - for standard "
                                       "input. {name} in each -o is the model's name, see MANY MODELS")
                            ->option_text("FILE")
-                           ->group("Many models");
+                           ->group("Many models, many processes");
     auto* const size = app.add_option("--world-size", options.batch.world_size,
                                       "How many processes share the list, or the slabs of one model. Default: 1, or as "
                                       "mpiexec says, with --list as srun says too")
-                           ->check(CLI::Range(1, 1 << 30).description(""))
+                           ->check(between(1, 1 << 30))
                            ->option_text("W")
-                           ->group("Many models");
+                           ->group("Many models, many processes");
     app.add_option("--rank", options.batch.rank,
                    "The number of this one, from 0: it takes the models or slabs RANK, RANK + W, RANK + 2 W, ...")
-        ->check(CLI::Range(0, 1 << 30).description(""))
+        ->check(between(0, 1 << 30))
         ->needs(size)
         ->option_text("R")
-        ->group("Many models");
+        ->group("Many models, many processes");
     app.add_flag("--resume", options.by_slabs,
                  "One model slab by slab into a .zarr or .pvti: a run that was stopped goes on where it was when the "
-                 "same command "
-                 "is given again, see LARGE MODELS")
-        ->group("Machine");
+                 "same command is given again, see LARGE MODELS")
+        ->group("Many models, many processes");
     app.add_option("--jobs", options.batch.jobs,
                    "Models at a time, which share --max-memory and the machine's cores. Default: 1")
-        ->check(CLI::Range(1, 1024).description(""))
+        ->check(between(1, 1024))
         ->needs(list)
         ->option_text("J")
-        ->group("Many models");
+        ->group("Many models, many processes");
 }
 
 void describe_grid(CLI::App& app, command_line& options, raw_options& raw) {
@@ -118,7 +131,7 @@ void describe_model(CLI::App& app, command_line& options) {
            "--scale", options.load.scale,
            "Multiply all lengths of the model by this: 0.001 takes millimetres to metres. Default: 1, the file's "
            "own units")
-        ->check(CLI::Range(1e-30, 1e30).description(""))
+        ->check(between(1e-30, 1e30))
         ->option_text("F")
         ->group("Model");
     auto* const animation =
@@ -193,7 +206,7 @@ void describe_solids(CLI::App& app, raw_options& raw) {
         ->group("Solids");
     app.add_option("--closing", raw.closing,
                    "With --solid exterior: close gaps of about 2 R voxels for the flood. Default: 0")
-        ->check(CLI::Range(0, 64).description(""))
+        ->check(between(0, 64))
         ->option_text("R")
         ->group("Solids");
     app.add_option("--fill-color", raw.fill_color,
@@ -231,7 +244,7 @@ void describe_machine(CLI::App& app, command_line& options) {
         ->option_text("N|all")
         ->group("Machine");
     app.add_option("-j,--threads", options.voxelize.threads, "Threads on the CPU. Default: 0, one for each core")
-        ->check(CLI::Range(0, 1024).description(""))
+        ->check(between(0, 1024))
         ->option_text("N")
         ->group("Machine");
     app.add_option_function<int>(
@@ -239,7 +252,7 @@ void describe_machine(CLI::App& app, command_line& options) {
            [&options](int mebibytes) { options.max_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
            "The most MiB of this machine's memory that the run may hold at any time. Default: nine tenths of what "
            "there is")
-        ->check(CLI::Range(1, 1 << 30).description(""))
+        ->check(between(1, 1 << 30))
         ->option_text("MIB")
         ->group("Machine");
     app.add_option_function<int>(
@@ -247,7 +260,7 @@ void describe_machine(CLI::App& app, command_line& options) {
            [&options](int mebibytes) { options.voxelize.work_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
            "MiB for sums that exist only on the way; a grid that needs more is computed in slabs, with the same "
            "result. Default: 128, on a GPU up to 1024")
-        ->check(CLI::Range(1, 1 << 20).description(""))
+        ->check(between(1, 1 << 20))
         ->option_text("MIB")
         ->group("Machine");
     app.add_option_function<int>(
@@ -255,7 +268,7 @@ void describe_machine(CLI::App& app, command_line& options) {
            [&options](int mebibytes) { options.voxelize.device_memory = static_cast<std::uint64_t>(mebibytes) << 20; },
            "The most MiB of a GPU's memory to take; where that is too little, auto turns to the CPU. Default: all that "
            "is free")
-        ->check(CLI::Range(1, 1 << 20).description(""))
+        ->check(between(1, 1 << 20))
         ->option_text("MIB")
         ->group("Machine");
 
@@ -283,7 +296,7 @@ void describe_picture(CLI::App& app, command_line& options, raw_options& raw) {
         ->option_text("DEG")
         ->group("Picture (.png)");
     app.add_option("--elevation", picture.elevation, "Degrees above the horizon. Default: 25")
-        ->check(CLI::Range(-90.0, 90.0).description(""))
+        ->check(between(-90.0, 90.0))
         ->option_text("DEG")
         ->group("Picture (.png)");
     app.add_option("--zoom", picture.zoom, "1 fits the model into the picture. Default: 1")
@@ -291,11 +304,11 @@ void describe_picture(CLI::App& app, command_line& options, raw_options& raw) {
         ->option_text("F")
         ->group("Picture (.png)");
     app.add_option("--fov", picture.field_of_view, "Degrees from top to bottom, 0: orthographic. Default: 28")
-        ->check(CLI::Range(0.0, 150.0).description(""))
+        ->check(between(0.0, 150.0))
         ->option_text("DEG")
         ->group("Picture (.png)");
     app.add_option("--samples", picture.samples, "Rays along each side of a pixel. Default: 2")
-        ->check(CLI::Range(1, 8).description(""))
+        ->check(between(1, 8))
         ->option_text("N")
         ->group("Picture (.png)");
     app.add_option("--background", raw.background,
@@ -325,7 +338,7 @@ void describe_output(CLI::App& app, command_line& options) {
            "--pieces", options.write.pieces,
            "Slabs along z that .pvti is cut into, a file each, and .nvdb, a grid of each value each. Default: as "
            "many as .pvti needs for pieces of 1 GiB, or of a quarter of --max-memory; one in .nvdb")
-        ->check(CLI::Range(1, 512).description(""))
+        ->check(between(1, 512))
         ->option_text("N")
         ->group("Files");
     add_choice(app, "--zarr-codec", options.write.zstd, {{"gzip", false}, {"zstd", true}},
@@ -334,7 +347,7 @@ void describe_output(CLI::App& app, command_line& options) {
         ->group("Files");
     app.add_option("--compression", options.write.compression,
                    "Level of .npz, .vti, .nrrd, .zarr and .schem, 0 to 9. Default: 1")
-        ->check(CLI::Range(0, 9).description(""))
+        ->check(between(0, 9))
         ->option_text("N")
         ->group("Files");
 }

@@ -37,8 +37,9 @@ template <class Number>
         }
         at = next + 1;
     }
-    throw usage_error(option + " takes " + (least == 3 ? "three numbers x,y,z" : "one number or three, x,y,z") +
-                      ", not \"" + text + '"');
+    throw usage_error(option + " takes " +
+                      (least == 3 ? "three numbers, X,Y,Z" : "one number or three, X,Y,Z or XxYxZ") + ", not \"" +
+                      text + '"');
 }
 
 // One member of every entry, with commas between.
