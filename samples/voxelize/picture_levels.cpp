@@ -96,11 +96,6 @@ bool is_among(const std::vector<std::uint32_t>& materials, std::uint32_t materia
     return std::find(materials.begin(), materials.end(), material) != materials.end();
 }
 
-bool shades(const voxelize_request& request) {
-    return std::any_of(request.targets.begin(), request.targets.end(),
-                       [](target id) { return info_of(id).name.starts_with("color"); });
-}
-
 // Replaces the texels of a picture by the levels that its materials sample; first_level() says from where on, at a
 // look at every triangle.
 template <class FirstLevel>
@@ -140,7 +135,7 @@ int first_sampled_level(const scene& model, std::uint32_t width, std::uint32_t h
 
 void read_textures(triangle_stream& model, const voxelpipe::grid& grid, const voxelize_request& request) {
     model.read_textures([&](const scene& materials, picture& decoded, const std::vector<std::uint32_t>& users) {
-        if (!shades(request)) { // masks alone, of level 0
+        if (!request.wants_colors()) { // masks alone, of level 0
             std::vector<glm::u8vec4> texels(decoded.rgba.size() / 4);
             std::memcpy(texels.data(), decoded.rgba.data(), decoded.rgba.size());
             decoded.levels.fill(std::make_shared<const std::vector<glm::u8vec4>>(std::move(texels)));
@@ -175,7 +170,7 @@ const std::optional<voxelpipe::grid>& picture_reducer::grid_of(const scene& mode
 }
 
 void picture_reducer::operator()(const scene& model, picture& decoded, const std::vector<std::uint32_t>& materials) {
-    if (!shades(request_) || !grid_of(model)) return;
+    if (!request_.wants_colors() || !grid_of(model)) return;
     reduce(model.materials, decoded, materials, request_, [&] {
         return first_sampled_level(model, decoded.width, decoded.height, materials, *grid_, request_.threads);
     });

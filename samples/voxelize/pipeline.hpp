@@ -43,7 +43,7 @@ public:
         draws_surface_ = !request.solid || request.solid->rule == solid_rule::exterior;
         for (const target wanted : request.targets)
             draws_surface_ = draws_surface_ || (wanted != target::occupancy && wanted != target::count);
-        // What the sides of the grid see, and what lies inside, is known once all voxels are.
+        // The bits of all voxels decide what the sides of the grid see and what lies inside.
         keeps_bits_ = request.solid ? draws_surface_ : wants(target::occupancy) || wants(target::color_outer);
         if (request.solid) bits_name_ = "surface";
         const std::uint64_t num_lines = model.line_count();
@@ -71,14 +71,7 @@ public:
     // The parts of run(), for pipelines on several devices that share a volume: one makes it, each draws the surface of
     // some layers, and one finishes it.
     [[nodiscard]] volume unset_volume() const {
-        volume result;
-        const voxelpipe::grid& grid = request_.grid;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            const auto a = static_cast<glm::length_t>(axis);
-            result.extent[axis] = grid.extent[a];
-            result.origin[axis] = grid.part_origin()[a];
-            result.voxel_size[axis] = grid.voxel_size[a];
-        }
+        volume result = volume_of(request_.grid);
         for (const target wanted : request_.targets)
             result.add_unset(std::string(info_of(wanted).name), info_of(wanted).type, info_of(wanted).components);
         // Channels that nobody asked for come last.
@@ -318,7 +311,7 @@ protected: // sparse_pipeline draws the same into bricks
 
     void add_solid_counts(const vp::status& status, const voxelpipe::grid& part);
 
-    // What is outside follows from the whole grid: a flood is drawn there, with the padding.
+    // The outside follows from the whole grid: a flood is drawn there, with the padding.
     void draw_solid(volume& result, const voxelpipe::grid& slab, int begin);
 
     // The volume's other values, once all bits are there.
@@ -357,7 +350,7 @@ protected: // sparse_pipeline draws the same into bricks
 
     // ---- resolve: slab -> volume -----------------------------------------------------------------------------------
 
-    // Where voxel (0, 0, begin) of a channel lies.
+    // The address of voxel (0, 0, begin) of a channel.
     template <class T>
     [[nodiscard]] static T* channel_at(volume& result, std::string_view name, int begin) {
         channel* c = result.find(name);

@@ -118,13 +118,7 @@ private:
 
 // Shape and channels of the output, without values.
 volume shape_of(const voxelize_request& request, std::size_t num_targets) {
-    volume v;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto a = static_cast<glm::length_t>(axis);
-        v.extent[axis] = request.grid.extent[a];
-        v.origin[axis] = request.grid.part_origin()[a];
-        v.voxel_size[axis] = request.grid.voxel_size[a];
-    }
+    volume v = volume_of(request.grid);
     for (std::size_t t = 0; t < num_targets; ++t) {
         const target_info& info = info_of(request.targets[t]);
         v.channels.push_back({std::string(info.name), info.type, info.components, {}});
@@ -149,16 +143,12 @@ sparse_volume draw_loaded(const scene& model, const voxelize_request& request, c
 
 std::string why_not_by_slabs(const command_line& options) {
     const voxelize_request& request = options.voxelize;
-    const auto wants = [&](target id) {
-        return std::find(request.targets.begin(), request.targets.end(), id) != request.targets.end();
-    };
     if (options.outputs.size() != 1 || !has_slab_output(options.outputs[0])) return "one output, a .zarr or .pvti";
     if (options.storage == storage_choice::dense || request.backend == backend_choice::cuda || request.devices != 1 ||
         request.strategy != voxelpipe::strategy::automatic)
         return "the CPU and bricks: no --dense, --backend cuda, --devices or --strategy";
-    if (wants(target::color_outer)) return "no --target color-outer, which sees the whole grid at once";
-    const bool has_colors = wants(target::color) || wants(target::color_max) || wants(target::color_replace);
-    if (request.solid && has_colors && !request.solid->fill_color)
+    if (request.wants(target::color_outer)) return "no --target color-outer, which sees the whole grid at once";
+    if (request.solid && request.wants_colors() && !request.solid->fill_color)
         return "--fill-color '#rrggbb' where a solid has colours, since their mean is that of the whole grid";
     return "";
 }

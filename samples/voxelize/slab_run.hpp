@@ -35,7 +35,7 @@ struct slab_outcome {
     bool finished = false;  // the output is there
 };
 
-// Why the options cannot be drawn slab by slab, the rest of a sentence that names what; empty where they can.
+// The reason why the options cannot be drawn slab by slab: the rest of a sentence that names what is needed, or empty.
 [[nodiscard]] std::string why_not_by_slabs(const command_line& options);
 
 // Consumes the source. Adds the counts of the slabs drawn now to report.stats; those of all slabs, once the output is

@@ -54,6 +54,8 @@ inline constexpr std::array target_table{
 
 [[nodiscard]] constexpr const target_info& info_of(target id) { return target_table[static_cast<std::size_t>(id)]; }
 
+[[nodiscard]] constexpr bool is_color(target id) { return info_of(id).name.starts_with("color"); }
+
 [[nodiscard]] constexpr std::optional<target> target_named(std::string_view name) {
     for (const target_info& entry : target_table)
         if (entry.name == name) return entry.id;

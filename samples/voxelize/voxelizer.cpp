@@ -101,7 +101,7 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
 // The GPU, where it can be used: stats.no_cuda says why where it cannot.
 std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_stats& stats) {
     const auto start = std::chrono::steady_clock::now();
-    // How a GPU draws, or how many do.
+    // The user has chosen how a GPU draws, or how many draw.
     const bool is_forced = request.strategy != voxelpipe::strategy::automatic || request.devices != 1;
     if (request.backend == backend_choice::automatic && !is_forced && built_with_cuda()) {
         const work_size work = work_of(request, static_cast<double>(model.triangle_count() + model.line_count()),

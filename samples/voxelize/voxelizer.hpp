@@ -15,6 +15,8 @@
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/status.hpp>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -57,7 +59,22 @@ struct voxelize_request {
     std::uint64_t device_memory = 0;      // most bytes to take of a GPU's memory; 0: all that is free
     std::shared_ptr<cuda_start> cuda;     // if CUDA is starting already; otherwise it starts when it is wanted
     std::function<void(double)> progress; // called with 0..1, one call at a time; may be empty
+
+    [[nodiscard]] bool wants(target id) const { return std::find(targets.begin(), targets.end(), id) != targets.end(); }
+    [[nodiscard]] bool wants_colors() const { return std::any_of(targets.begin(), targets.end(), is_color); }
 };
+
+// A volume of the grid's extent and place, without channels.
+[[nodiscard]] inline volume volume_of(const voxelpipe::grid& grid) {
+    volume made;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto a = static_cast<glm::length_t>(axis);
+        made.extent[axis] = grid.extent[a];
+        made.origin[axis] = grid.part_origin()[a];
+        made.voxel_size[axis] = grid.voxel_size[a];
+    }
+    return made;
+}
 
 struct voxelize_stats {
     std::string backend;                 // "cpu" or "cuda"
@@ -94,7 +111,7 @@ struct backend_error : std::runtime_error {
 // Throws memory_error, backend_error, and std::runtime_error for what the library refuses.
 [[nodiscard]] volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
 
-// Why no voxel is covered, one line; for stats that count none.
+// The reason why no voxel is covered, one line; for stats that count none.
 [[nodiscard]] std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage);
 
 // One line on normals that cancel; empty where none do.

@@ -36,8 +36,8 @@ std::optional<int> from_environment(std::initializer_list<const char*> names) {
 
 void understand_batch(command_line& options, bool has_world) {
     batch_request& batch = options.batch;
-    if (batch.list.empty() && options.input.empty()) throw usage_error("INPUT is required");
-    if (options.outputs.empty()) throw usage_error("--output is required");
+    if (batch.list.empty() && options.input.empty()) throw usage_error("INPUT is required: voxelize INPUT -o FILE");
+    if (options.outputs.empty()) throw usage_error("--output is required: voxelize INPUT -o FILE");
     const auto check_rank = [&] {
         if (batch.rank >= batch.world_size)
             throw usage_error("--rank is below --world-size: " + std::to_string(batch.rank) + " of " +
@@ -183,7 +183,7 @@ void understand_outputs(command_line& options, const raw_options& raw) {
         const std::string_view name = info_of(id).name;
         const bool held = std::any_of(options.outputs.begin(), options.outputs.end(), [&](const auto& output) {
             const format* const found = find_format(output);
-            return id == target::occupancy || found->all_channels || (found->shows_colors && name.starts_with("color"));
+            return id == target::occupancy || found->all_channels || (found->shows_colors && is_color(id));
         });
         if (!held)
             options.warnings.push_back("--target " + std::string(name) +
@@ -196,8 +196,7 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     if (needs_occupancy && std::find(targets.begin(), targets.end(), target::occupancy) == targets.end())
         options.implied.push_back(target::occupancy);
     targets.insert(targets.end(), options.implied.begin(), options.implied.end());
-    options.load.gltf.colors =
-        std::any_of(targets.begin(), targets.end(), [](target id) { return info_of(id).name.starts_with("color"); });
+    options.load.gltf.colors = options.voxelize.wants_colors();
     options.load.gltf.blend_cuts = options.voxelize.alpha == blend_alpha::cutoff;
 }
 

@@ -36,12 +36,7 @@ public:
         if (this->wants(target::color_outer))
             throw std::logic_error("color-outer needs a dense grid"); // the caller's to refuse
         sparse_volume result;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            const auto a = static_cast<glm::length_t>(axis);
-            result.shape.extent[axis] = whole.extent[a];
-            result.shape.origin[axis] = whole.part_origin()[a];
-            result.shape.voxel_size[axis] = whole.voxel_size[a];
-        }
+        result.shape = volume_of(whole);
         const int passes = (this->draws_surface_ ? 1 : 0) + (this->request_.solid ? 1 : 0);
         // A pass from `begin` to `end` of its work.
         const auto report_from = [this, passes](int pass, double begin, double end) {
@@ -79,7 +74,7 @@ private:
             bytes += static_cast<double>(size_of(info_of(wanted).type)) * info_of(wanted).components;
         return bytes;
     }
-    // How many voxels the surface has, more or less: its projections along the three axes, in voxels.
+    // An estimate of the surface's voxels: its projections along the three axes, in voxels.
     [[nodiscard]] double likely_voxels() const {
         const glm::dvec3 size = this->uploaded_->relative_grid().voxel_size;
         double voxels = 0;
@@ -223,7 +218,7 @@ private:
 
     // The solid's bricks and tiles, and the values of the surface where that lies in them: in bricks.
     [[nodiscard]] sparse_volume draw_solid(sparse_volume&& surface_of) {
-        // What is outside follows from the whole grid: a flood is drawn there, with the padding, or has been before.
+        // The outside follows from the whole grid: a flood is drawn there, with the padding, or has been before.
         const bool is_flood = this->request_.solid->rule == solid_rule::exterior;
         const voxelpipe::grid& wanted_part = this->uploaded_->relative_grid();
         const voxelpipe::grid part =

@@ -23,14 +23,6 @@ namespace voxelize {
 
 namespace slabs = voxelpipe::slabs;
 
-namespace {
-
-bool wants(const voxelize_request& request, target id) {
-    return std::find(request.targets.begin(), request.targets.end(), id) != request.targets.end();
-}
-
-} // namespace
-
 storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
                                 std::span<const std::filesystem::path> outputs) {
     if (choice == storage_choice::dense) return {};
@@ -41,7 +33,7 @@ storage_decision choose_storage(storage_choice choice, const voxelize_request& r
     const bool insists = choice == storage_choice::sparse;
     if (!insists && !needs_bricks && fits) return {};
     const char* refused = nullptr;
-    if (wants(request, target::color_outer)) refused = "--target color-outer needs a dense grid";
+    if (request.wants(target::color_outer)) refused = "--target color-outer needs a dense grid";
     if (request.backend == backend_choice::cuda)
         refused = "the tool draws sparse grids on the CPU, not with --backend cuda";
     if (refused != nullptr) {

@@ -15,7 +15,7 @@
 
 namespace voxelize {
 
-// Whether voxels are kept in bricks or in a dense grid.
+// The user's choice between bricks and a dense grid.
 enum class storage_choice : std::uint8_t { automatic, sparse, dense };
 
 struct storage_decision {
