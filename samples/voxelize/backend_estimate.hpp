@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How long the work at hand will take on the CPU and on a GPU, roughly: what --backend auto decides by. Only whole
+// Rough estimates of the time on the CPU and on a GPU, by which --backend auto decides. Only whole
 // orders matter: starting CUDA takes about as long as the CPU takes for a million shaded fragments a thread.
 
 #include "placement.hpp"
@@ -20,7 +20,7 @@ struct work_size {
     double result_bytes = 0; // of the volume
 };
 
-// Of a request and a model with so many triangles and bytes.
+// The work of a request and a model with so many triangles and bytes.
 [[nodiscard]] work_size work_of(const voxelize_request& request, double triangles, double model_bytes);
 
 // Time on the CPU with that many threads.

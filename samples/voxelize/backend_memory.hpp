@@ -14,8 +14,8 @@
 
 namespace voxelize {
 
-// How the host reads a backend's memory. This is for memory that it reads where it lies; other backends specialise it
-// before the pipeline is instantiated.
+// Access of the host to a backend's memory. This is for memory that it reads where it lies; other backends specialise
+// it before the pipeline is instantiated.
 template <class Backend>
 struct memory_access {
     static constexpr bool on_host = true;

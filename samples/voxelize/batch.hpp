@@ -24,8 +24,8 @@ struct listed_model {
 // its extension. Where it was taken before, it gets -2, -3, ..., the first that no model of the list has.
 [[nodiscard]] std::vector<listed_model> read_list(std::istream& list);
 
-// What makes two runs the same work on a model: every option that can change a byte, and the
-// sizes and times of the file and of those that it names.
+// A name that two runs share if they do the same work on a model: it stands for every option that can change a byte,
+// and for the sizes and times of the file and of those that it names.
 [[nodiscard]] std::string work_of(const command_line& options, const std::filesystem::path& model);
 
 // PATH with NAME for every {name}.

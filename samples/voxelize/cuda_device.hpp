@@ -58,7 +58,7 @@ private:
 // True if this program has CUDA code at all.
 [[nodiscard]] bool built_with_cuda();
 
-// Why the pipeline cannot run there: the rest of a sentence, without a full stop. Empty where it can.
+// The reason why the pipeline cannot run there: the rest of a sentence, without a full stop. Empty where it can.
 [[nodiscard]] std::string why_not(const cuda_facts& facts);
 
 // Bytes of working memory where the user leaves the choice: larger slabs, because each costs a pass over all triangles.
@@ -67,7 +67,7 @@ private:
 // Bytes of a scene's vertices, indices and texels.
 [[nodiscard]] std::uint64_t input_bytes(const scene& model);
 
-// Why a scene cannot fit into that device's memory, as far as can be told before the attempt. Empty where it may.
+// The reason why a scene cannot fit into that device's memory, as far as it is known before. Empty where it may fit.
 [[nodiscard]] std::string why_too_large(const cuda_facts& facts, const scene& model, const voxelize_request& request);
 
 // The first layers of NUM parts of the grid, and its end: parts of about equal work, as a sample of the triangles has

@@ -29,7 +29,7 @@
 
 namespace voxelize {
 
-// Why a file cannot be loaded.
+// A file cannot be loaded; the message says why.
 struct gltf_error : model_error {
     using model_error::model_error;
 };

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Why a model cannot be used, whatever its format.
+// Errors of models that cannot be used, whatever their format.
 
 #include <new>
 #include <stdexcept>

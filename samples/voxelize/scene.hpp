@@ -21,7 +21,7 @@
 
 namespace voxelize {
 
-// How a texture coordinate outside [0, 1] finds its texel.
+// The texel of a texture coordinate outside [0, 1].
 enum class wrap_mode : std::uint8_t { repeat, clamp_to_edge, mirrored_repeat };
 
 // The nearest texel, or the bilinear mean of the four around the sample.
@@ -82,7 +82,7 @@ struct primitive {
     std::vector<glm::vec2> texcoords;  // of the base-colour texture, its transform applied; empty: no texture
     std::vector<glm::vec4> colors;     // linear vertex colours and alpha; empty: white
     std::uint32_t material = 0;        // index into scene::materials
-    // Where the triangles are some of a larger mesh's: their numbers in it, ascending, and how many it has.
+    // For triangles that are some of a larger mesh's: their numbers in it, ascending, and the number of all.
     std::vector<std::uint32_t> numbers;
     std::uint64_t whole = 0;
 };
@@ -96,7 +96,7 @@ struct instance {
 
 struct scene {
     std::vector<primitive> primitives;
-    // What is drawn, in this order, triangles before lines; later ones win where only one can.
+    // Drawn in this order, triangles before lines; later ones win where only one can.
     std::vector<instance> instances;
     std::vector<material> materials; // the file's, in its order; then, where one is needed, the default material
     std::vector<texture> textures;

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using voxelpipe::slabs::layer_range;
 
-// What a process that ended in the middle of a file has left of it.
+// Removes the parts of files that a process left which ended while it wrote them.
 void remove_parts(const fs::path& folder) {
     std::error_code error;
     std::vector<fs::path> parts;

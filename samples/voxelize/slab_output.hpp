@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the slabs of slab_run.hpp are written into, by the format of the output. Slabs lie in a folder of their own, in
-// any order and from any process; the one who finds all of them makes the output of the folder.
+// The folder that the slabs of slab_run.hpp are written into, by the format of the output. They come in any order and
+// from any process; the process that finds all of them makes the output of the folder.
 
 #include "formats/formats.hpp"
 #include "volume.hpp"

@@ -20,7 +20,7 @@ struct hole_cones;
 
 namespace voxelize {
 
-// What is inside; the first three are the library's fill rules for the model as one body.
+// The rule for what is inside; the first three are the library's fill rules for the model as one body.
 enum class solid_rule : std::uint8_t {
     nonzero,
     even_odd,
@@ -29,7 +29,7 @@ enum class solid_rule : std::uint8_t {
     exterior,  // what a flood from outside does not reach; the extent is outer
 };
 
-// Which voxels are part of the solid.
+// The voxels that are part of the solid.
 enum class solid_extent : std::uint8_t {
     centre, // those whose centre is inside
     outer,  // these and those that a triangle touches

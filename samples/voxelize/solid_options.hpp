@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What --solid asks for, as the library takes it.
+// The options of --solid, as the library takes them.
 
 #include "solid.hpp"
 #include "surface.hpp"

@@ -67,7 +67,7 @@ public:
     [[nodiscard]] const numbered_draw* draw_table() const { return draw_table_.front().data(); }
     [[nodiscard]] std::size_t num_draws() const { return draw_table_.front().size(); }
     [[nodiscard]] const color_tables* tables() const { return tables_.data(); }
-    // Whether a material discards fragments.
+    // True if a material discards fragments.
     [[nodiscard]] bool has_masks() const { return has_masks_; }
     // Positions are relative to this point; see reference_point.
     [[nodiscard]] const glm::dvec3& reference() const { return reference_; }
@@ -93,7 +93,7 @@ private:
             const primitive& part = model.primitives[shown.primitive];
             if ((part.*elements).empty()) continue;
             const bool mirrors = shown.to_world.mirrors();
-            // What a draw numbers with 32 bits.
+            // A draw numbers its vertices and elements with 32 bits.
             const std::uint64_t each = std::max(part.positions.size(), (part.*elements).size());
             const std::uint64_t most = std::min<std::uint64_t>(most_copies, UINT32_MAX / each);
             if (runs.empty() || runs.back().primitive != shown.primitive || runs.back().mirrors != mirrors ||

@@ -11,9 +11,9 @@
 
 namespace voxelize::assimp {
 
-// Where FILE, named by a model, lies relative to that model's folder, and never outside it: of an absolute path, of one
-// with a drive, and of one that leaves the folder, the last part. Backslashes separate, too. Nothing for a name without
-// a last part.
+// The path of FILE, named by a model, relative to that model's folder and never outside it. An absolute path, one with
+// a drive and one that leaves the folder give their last part. Backslashes separate, too. Nothing for a name without a
+// last part.
 [[nodiscard]] inline std::optional<std::filesystem::path> local_file(std::string file) {
     if (file.find('\0') != std::string::npos) return std::nullopt;
     std::replace(file.begin(), file.end(), '\\', '/');

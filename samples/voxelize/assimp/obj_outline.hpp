@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What assimp makes of an OBJ file besides its triangles, and of its polygons, without the whole file: assimp is given
-// a file in which each run of faces is one, and polygons some thousands at a time. So objects, groups, materials and
-// their order are those of a file that is loaded, and so are the triangles of a polygon.
+// Objects, groups and materials of an OBJ file, and the triangles of its polygons, as assimp makes them without the
+// whole file: assimp is given a file with one face for each run of faces, and polygons some thousands at a time. So
+// all of these, and their order, are those of a file that is loaded.
 
 #include "wire.hpp"
 

@@ -51,7 +51,7 @@ struct format {
 // True if voxels of this size are cubes, but for what fitting a grid loses by rounding.
 [[nodiscard]] bool are_cubic(const std::array<double, 3>& voxel_size);
 
-// Whether this program was built with libzstd.
+// True if this program was built with libzstd.
 [[nodiscard]] bool has_zstd();
 
 // In the order in which --help lists them.

@@ -43,7 +43,7 @@ public:
         return num_bricks() == 0 ? 0 : bricks_->offsets[brick];
     }
 
-    // Whether there are colours; if not, voxels are clay.
+    // True if there are colours; if not, voxels are clay.
     [[nodiscard]] bool colored() const { return colors_ != nullptr; }
     // sRGB, red in the low byte; of an occupied voxel of a brick.
     [[nodiscard]] std::uint32_t rgb(std::size_t brick, const glm::ivec3& voxel) const {

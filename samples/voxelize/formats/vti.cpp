@@ -174,7 +174,7 @@ volume layers_of(const volume& v, std::int64_t first, std::int64_t last) {
     return part;
 }
 
-// How many pieces a file at this path names that was written here; 0 without one.
+// The number of pieces that a .pvti of this tool at the path names; 0 without one.
 std::int64_t pieces_before(const std::filesystem::path& path) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error)) return 0;

@@ -26,12 +26,12 @@ std::vector<std::filesystem::path> write_pvti(const volume& v, const std::filesy
 // The same piece by piece, in any order and by any number of processes. Only its shape and channels are asked for of a
 // volume, but the values of its piece where that is written. Pieces count from 0 here.
 
-// How many pieces write_pvti() makes.
+// The number of pieces that write_pvti() makes.
 [[nodiscard]] std::int64_t num_pvti_pieces(const volume& v, const write_options& options);
 // The layers [first, last) of a piece.
 [[nodiscard]] std::pair<std::int64_t, std::int64_t> pvti_piece_layers(const volume& v, std::int64_t piece,
                                                                       std::int64_t pieces);
-// Where the piece of a .pvti lies.
+// The path of a piece of a .pvti.
 [[nodiscard]] std::filesystem::path pvti_piece_path(const std::filesystem::path& path, std::int64_t piece);
 void write_pvti_piece(const volume& v, const std::filesystem::path& file, std::int64_t piece, std::int64_t pieces,
                       const write_options& options);

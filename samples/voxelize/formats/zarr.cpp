@@ -30,7 +30,7 @@ public:
                               folder, options) {}
 
     [[nodiscard]] std::int64_t num_shards() const { return array_layout::product(file_.layout().shards); }
-    // Of a layer of shards.
+    // Shards of a layer.
     [[nodiscard]] std::int64_t shards_of_slab() const { return file_.layout().shards[1] * file_.layout().shards[2]; }
     // Chunks of so many shards.
     [[nodiscard]] std::int64_t chunks_of(std::int64_t shards) const {
@@ -139,7 +139,7 @@ void write_description(const fs::path& group, const std::string& text) {
     json.commit();
 }
 
-// Where a channel's own array lies in its group.
+// The folder of a channel's own array in its group.
 fs::path array_of(const fs::path& folder, const channel& c, const write_options& options) {
     return options.levels ? folder / c.name / "0" : folder / c.name;
 }

@@ -20,7 +20,7 @@ std::vector<std::filesystem::path> write_zarr(const volume& v, const std::filesy
 
 inline constexpr std::int64_t zarr_slab_layers = 256;
 
-// What a path means: without a slash at its end, and where a link leads.
+// The folder that a path means: without a slash at its end, and where a link leads.
 [[nodiscard]] std::filesystem::path zarr_target(const std::filesystem::path& path);
 // Writes a slab of a volume. Each file appears whole or not at all.
 void write_zarr_slab(const volume& v, const std::filesystem::path& folder, const std::filesystem::path& levels,

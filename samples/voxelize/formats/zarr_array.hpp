@@ -25,7 +25,7 @@ using zyx = std::array<std::int64_t, 3>; // numbers along z, y, x
 
 inline constexpr std::int64_t chunk_side = 64, most_chunks = 4; // voxels of a chunk, chunks of a shard, along each axis
 
-// How an array is cut: chunks, in shards of the same number of them along each axis.
+// The cut of an array: chunks, in shards of the same number of them along each axis.
 struct array_layout {
     zyx extent, shards, per_shard;
 
@@ -67,7 +67,7 @@ struct array_values {
     [[nodiscard]] std::size_t voxel_bytes() const;
     // Makes all voxels empty.
     void clear(std::span<std::byte> voxels) const;
-    // Whether all voxels are empty.
+    // True if all voxels are empty.
     [[nodiscard]] bool are_empty(std::span<const std::byte> voxels) const;
 };
 

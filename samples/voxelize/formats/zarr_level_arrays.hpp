@@ -28,7 +28,7 @@ static_assert(level_block_side == 2 * chunk_side && level_block_side >> most_lev
 // filled before the next. Those of the layers of blocks [first, last).
 [[nodiscard]] std::vector<zyx> level_blocks(const volume& v, std::int64_t first, std::int64_t last);
 
-// What the levels have of a block: of the first one a packed chunk, then parts of chunks. Nothing if it is empty.
+// The content of a block in the levels: of the first one a packed chunk, then parts of chunks. Nothing if it is empty.
 using block_levels = std::vector<std::vector<std::byte>>;
 
 class level_writer;

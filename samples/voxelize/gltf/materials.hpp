@@ -18,7 +18,7 @@
 
 namespace voxelize::gltf {
 
-// How the textures of a material are reached from a primitive's attributes.
+// The way from a primitive's attributes to the textures of its material.
 struct texture_coordinates {
     int set = 0; // TEXCOORD_<set>
     texture_transform m = no_texture_transform;

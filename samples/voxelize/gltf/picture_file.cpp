@@ -35,7 +35,7 @@ picture_format format_of(std::span<const std::byte> bytes) {
     return picture_format::other;
 }
 
-// Why BYTES, which are in none of the formats above, are refused.
+// The reason why BYTES, which are in none of the formats above, are refused.
 std::string reason_against(std::span<const std::byte> bytes) {
     struct known {
         std::size_t at;

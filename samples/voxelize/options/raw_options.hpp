@@ -35,7 +35,7 @@ struct raw_options {
 // parsing.
 void describe(CLI::App& app, command_line& options, raw_options& raw);
 
-// What is asked for of one model or many. HAS_WORLD: --world-size was given; otherwise mpiexec or srun may say it.
+// Sets the options of lists and of ranks. HAS_WORLD: --world-size was given; otherwise mpiexec or srun may say it.
 void understand_batch(command_line& options, bool has_world);
 // Fills OPTIONS from RAW, in this order. They throw usage_error.
 void understand_solid(command_line& options, const raw_options& raw);

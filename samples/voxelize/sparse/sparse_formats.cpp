@@ -73,8 +73,8 @@ struct brick_slab {
     }
 };
 
-// Where slabs end, in layers of bricks: as many slabs as the options say, or as few as hold leaves_per_grid bricks
-// each.
+// The ends of the slabs, in layers of bricks: as many slabs as the options say, or as few as hold leaves_per_grid
+// bricks each.
 std::vector<std::uint64_t> slab_ends(const sparse_volume& v, const write_options& options) {
     const auto layers = static_cast<std::uint64_t>((v.shape.extent[2] + 7) / 8);
     std::vector<std::uint64_t> ends;
