@@ -24,14 +24,14 @@ namespace voxelize {
 // assimp is best known for.
 [[nodiscard]] bool is_for_assimp(const std::string& extension);
 
-// Loads FILE. Throws model_error, in a build without assimp always, with what to do instead; and std::bad_alloc where
-// an honest file does not fit into memory.
+// Loads FILE. Of the options colors and blend_cuts count. Throws model_error, in a build without assimp always, with
+// what to do instead; and std::bad_alloc where an honest file does not fit into memory.
 [[nodiscard]] scene load_by_assimp(const std::filesystem::path& file, const gltf_limits& limits = {},
-                                   const load_hooks& hooks = {});
+                                   const gltf_options& options = {}, const load_hooks& hooks = {});
 
 // The same from memory; NAME is the file's, its extension says the format. Without a reader other files are not read.
 [[nodiscard]] scene load_by_assimp(std::span<const std::byte> bytes, const std::string& name,
                                    const gltf_file_reader& read_file = {}, const gltf_limits& limits = {},
-                                   const load_hooks& hooks = {});
+                                   const gltf_options& options = {}, const load_hooks& hooks = {});
 
 } // namespace voxelize

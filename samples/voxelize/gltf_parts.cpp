@@ -42,7 +42,7 @@ public:
         std::size_t file;
         std::uint64_t byte;
     };
-    // Where an address lies; nowhere for bytes that no file holds as they stand.
+    // The place of an address; none for bytes that no file holds as they stand.
     [[nodiscard]] std::optional<place> place_of(const std::byte* address) const {
         for (std::size_t f = 0; f < mapped_.size(); ++f) {
             const std::span<const std::byte> held = mapped_[f]->bytes();
@@ -84,14 +84,18 @@ public:
         for (std::size_t a = 0; a < 3; ++a) part.vertices.place[a] = a * sizeof(float);
         if (!locate(position->second, part.vertex_file, part.vertices.first, part.vertices.stride)) return std::nullopt;
         if (with_colors && !find_colors(source, part)) return std::nullopt;
-        part.num_triangles = vertices.count / 3;
+        part.num_triangles = count_of(source) / 3;
         if (source.indices < 0) return part;
         const tinygltf::Accessor& indices = accessor(source.indices);
-        part.num_triangles = indices.count / 3;
         if (!locate(source.indices, part.index_file, part.first_index, part.index_bytes) ||
             part.index_bytes != component_bytes(indices))
             return std::nullopt;
         return part;
+    }
+
+    // The number of a found primitive's corners.
+    [[nodiscard]] std::uint64_t count_of(const tinygltf::Primitive& source) const {
+        return accessor(source.indices >= 0 ? source.indices : source.attributes.at("POSITION")).count;
     }
 
     // The texture coordinates of a found part, none if the primitive has none. False for some that cannot be read so.
@@ -117,7 +121,7 @@ private:
     [[nodiscard]] static std::size_t component_bytes(const tinygltf::Accessor& a) {
         return static_cast<std::size_t>(tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(a.componentType)));
     }
-    // Where an accessor's elements begin, and how far apart they are. False if they do not lie in a file.
+    // Finds where an accessor's elements begin, and how far apart they are. False if they do not lie in a file.
     [[nodiscard]] bool locate(int index, std::size_t& file, std::uint64_t& first, std::size_t& stride) const {
         if (const auto view = static_cast<std::size_t>(accessor(index).bufferView);
             view < document_.meshopt_views.size() && document_.meshopt_views[view])
@@ -211,7 +215,7 @@ private:
     }
 };
 
-// What keeps a file from being read in parts.
+// Thrown for a file that cannot be read in parts.
 struct no_parts {};
 
 gltf_parts parts_in(open_document& in, const gltf_options& options) {
@@ -226,16 +230,23 @@ gltf_parts parts_in(open_document& in, const gltf_options& options) {
     };
     gltf_parts found;
     bool has_default = false;
-    std::set<std::pair<std::size_t, std::size_t>> untextured; // by mesh and part
+    std::set<std::pair<std::size_t, std::size_t>> known; // by mesh and part
+    std::uint64_t num_untextured = 0, num_with_rest = 0;
     in.for_each_primitive([&](const gltf::shown_mesh& shown, std::size_t number, const tinygltf::Primitive& source) {
         if (poses.is_posed(shown, source) || !shown.to_world.is_finite()) throw no_parts{};
         std::optional<gltf_parts::part> part = finder.find(source, needs_colors(source));
         if (!part) throw no_parts{};
+        bool is_untextured = false;
         if (source.material >= 0)
             if (const auto wanted = in.materials.want_texture(static_cast<std::size_t>(source.material))) {
                 if (!finder.find_texcoords(source, *wanted, *part)) throw no_parts{};
-                if (!part->texcoords) untextured.insert({shown.mesh, number});
+                is_untextured = !part->texcoords;
             }
+        if (known.insert({shown.mesh, number}).second) {
+            found.vertices.push_back({part->vertices, part->vertex_file});
+            if (is_untextured) ++num_untextured;
+            if (finder.count_of(source) % 3 != 0) ++num_with_rest;
+        }
         in.memory.charge(1, sizeof(gltf_parts::part), "nodes");
         has_default = has_default || source.material < 0;
         if (part->num_triangles == 0) return;
@@ -245,8 +256,11 @@ gltf_parts parts_in(open_document& in, const gltf_options& options) {
                                                                          : in.model.materials.size());
         found.parts.push_back(std::move(*part));
     });
-    if (!untextured.empty())
-        in.aside.warnings.push_back(std::to_string(untextured.size()) + ' ' + gltf::without_texcoords);
+    const auto warn = [&](std::uint64_t count, const char* what) { // in the order of the loader
+        if (count != 0) in.aside.warnings.push_back(std::to_string(count) + ' ' + what);
+    };
+    warn(num_with_rest, gltf::with_rest);
+    warn(num_untextured, gltf::without_texcoords);
     if (has_default) in.aside.materials.push_back(gltf::default_material());
     found.files = in.files.files();
     found.materials = std::move(in.aside.materials);

@@ -30,8 +30,13 @@ struct gltf_parts {
         std::size_t index_bytes = 0;                      // of one; 0: vertices count up
         std::size_t vertex_file = 0, color_file = 0, texcoord_file = 0, index_file = 0; // of files
     };
+    struct vertex_list {
+        position_layout layout;
+        std::size_t file = 0; // of files
+    };
     std::vector<part> parts; // those with triangles, in the order in which load_gltf() gives their instances
     std::vector<std::filesystem::path> files; // the file itself, then those that it names
+    std::vector<vertex_list> vertices;        // of each primitive once, those without triangles too
     std::vector<material> materials;          // as in the scene, without their textures
     std::vector<std::string> warnings;
 };

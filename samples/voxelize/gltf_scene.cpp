@@ -47,10 +47,10 @@ void load(scene& result, std::span<const std::byte> bytes, const gltf_file_reade
     for (const gltf::shown_mesh& shown : shown_scene.meshes)
         for (std::size_t part = 0; part < model.meshes[shown.mesh].primitives.size(); ++part)
             primitives.show(shown, part);
+    tolerance.finish();
+    primitives.finish();
     if (hooks.geometry) hooks.geometry(result);
     materials.read_textures(hooks);
-    primitives.finish();
-    tolerance.finish();
 }
 
 } // namespace

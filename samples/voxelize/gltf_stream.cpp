@@ -4,7 +4,6 @@
 
 #include "assimp/file_name.hpp"
 #include "gltf/mapped_file.hpp"
-#include "memory.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -34,7 +33,7 @@ double claimed_bytes(const std::filesystem::path& file) {
 
 } // namespace
 
-std::unique_ptr<gltf_stream> gltf_stream::open(const std::filesystem::path& path, std::uint64_t room,
+std::unique_ptr<gltf_stream> gltf_stream::open(const std::filesystem::path& path, const stream_room& room,
                                                const gltf_limits& limits, const gltf_options& options) {
     // A triangle has three bytes of indices at least, a vertex twelve of positions, and a mesh may be shown by several
     // nodes: what fits so is not looked at.
@@ -45,9 +44,9 @@ std::unique_ptr<gltf_stream> gltf_stream::open(const std::filesystem::path& path
     const double bytes = assimp::lower_extension(path) == ".gltf"
                              ? claimed_bytes(path)
                              : static_cast<double>(std::filesystem::file_size(path, error));
-    if (error || most_bytes * bytes <= static_cast<double>(memory::room())) return nullptr;
+    if (error || most_bytes * bytes <= room.loaded) return nullptr;
     std::optional<gltf_parts> parts = find_parts(path, limits, options);
-    return parts ? std::make_unique<gltf_stream>(path, std::move(*parts), room, limits, options) : nullptr;
+    return parts ? std::make_unique<gltf_stream>(path, std::move(*parts), room.stream, limits, options) : nullptr;
 }
 
 gltf_stream::gltf_stream(const std::filesystem::path& path, gltf_parts&& parts, std::uint64_t room,
@@ -55,6 +54,7 @@ gltf_stream::gltf_stream(const std::filesystem::path& path, gltf_parts&& parts, 
     : path_(path), limits_(limits), options_(options), source_(std::move(parts)), room_(room) {
     for (const std::filesystem::path& file : source_.files) files_.emplace_back(file);
     materials_ = source_.materials;
+    warnings_ = source_.warnings;
     std::uint64_t first = 0;
     for (const gltf_parts::part& p : source_.parts) {
         parts_.push_back({p.name, p.to_world, p.material, first, p.num_triangles, p.texcoords.has_value()});
@@ -97,13 +97,20 @@ void gltf_stream::read_part(std::size_t part, const visitor& visit) {
     }
 }
 
+std::optional<std::uint64_t> gltf_stream::count_not_finite() {
+    std::uint64_t count = 0;
+    for (const gltf_parts::vertex_list& list : source_.vertices)
+        count += voxelize::count_not_finite(list.layout, files_[list.file]);
+    return count;
+}
+
 void gltf_stream::read_textures(const picture_hook& take) {
     if (!has_texcoords()) return;
     gltf_textures read = voxelize::read_textures(path_, limits_, options_, {{}, take});
     materials_ = std::move(read.materials);
     textures_ = std::move(read.textures);
     images_ = std::move(read.images);
-    source_.warnings.insert(source_.warnings.end(), read.warnings.begin(), read.warnings.end());
+    warnings_.insert(warnings_.end(), read.warnings.begin(), read.warnings.end());
 }
 
 } // namespace voxelize

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,9 +20,9 @@ namespace voxelize {
 
 class gltf_stream : public triangle_stream {
 public:
-    // The file at PATH, if all that its scene shows are triangles as they stand in it (find_parts()). room: bytes that
-    // may be held.
-    [[nodiscard]] static std::unique_ptr<gltf_stream> open(const std::filesystem::path& path, std::uint64_t room,
+    // The file at PATH, if all that its scene shows are triangles as they stand in it (find_parts()), and if it may not
+    // fit when it is loaded.
+    [[nodiscard]] static std::unique_ptr<gltf_stream> open(const std::filesystem::path& path, const stream_room& room,
                                                            const gltf_limits& limits, const gltf_options& options);
 
     gltf_stream(const std::filesystem::path& path, gltf_parts&& parts, std::uint64_t room, const gltf_limits& limits,
@@ -33,11 +34,12 @@ public:
         return 36 * (static_cast<double>(num_triangles()) + static_cast<double>(num_vertices_)) + value_bytes_;
     }
     [[nodiscard]] bool has_colors() const override { return has_colors_; }
-    [[nodiscard]] std::vector<std::string> warnings() const override { return source_.warnings; }
     void read_part(std::size_t part, const visitor& visit) override;
     void read_textures(const picture_hook& take) override;
 
 private:
+    [[nodiscard]] std::optional<std::uint64_t> count_not_finite() override;
+
     std::filesystem::path path_;
     gltf_limits limits_;
     gltf_options options_;

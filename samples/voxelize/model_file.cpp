@@ -29,7 +29,7 @@ scene load_model(const std::filesystem::path& file, const load_options& options)
     if (options.gltf.animation) throw model_error("--animation is for glTF models");
     gltf_limits limits = options.limits;
     limits.room = std::min(limits.room, memory::room());
-    return load_by_assimp(file, limits, hooks);
+    return load_by_assimp(file, limits, options.gltf, hooks);
 }
 
 } // namespace voxelize

@@ -15,15 +15,15 @@ bool is_for_assimp(const std::string& extension) {
     return std::find(known.begin(), known.end(), extension) != known.end();
 }
 
-scene load_by_assimp(const std::filesystem::path&, const gltf_limits&, const load_hooks&) {
+scene load_by_assimp(const std::filesystem::path&, const gltf_limits&, const gltf_options&, const load_hooks&) {
     throw model_error(
         "this build reads glTF only, since it has no assimp: convert the file (`assimp export IN OUT.glb`, "
         "or Blender), or install libassimp-dev and build again");
 }
 
 scene load_by_assimp(std::span<const std::byte>, const std::string& name, const gltf_file_reader&,
-                     const gltf_limits& limits, const load_hooks& hooks) {
-    return load_by_assimp(std::filesystem::path(name), limits, hooks);
+                     const gltf_limits& limits, const gltf_options& options, const load_hooks& hooks) {
+    return load_by_assimp(std::filesystem::path(name), limits, options, hooks);
 }
 
 } // namespace voxelize

@@ -5,7 +5,8 @@
 
 namespace voxelize {
 
-opened_stream open_obj(const std::filesystem::path&, std::uint64_t, const std::filesystem::path&, const gltf_options&) {
+opened_stream open_obj(const std::filesystem::path&, const stream_room&, const std::filesystem::path&,
+                       const gltf_limits&, const gltf_options&) {
     return {};
 }
 

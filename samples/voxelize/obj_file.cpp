@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "obj_file.hpp"
 
-#include "assimp/obj_outline.hpp"
-#include "assimp/obj_text.hpp"
+#include "assimp/pictures.hpp"
+#include "finite.hpp"
+#include "gltf/budget.hpp"
+#include "gltf/resources.hpp"
 #include "gltf/text.hpp"
 #include "memory.hpp"
 
@@ -16,6 +18,7 @@
 namespace voxelize {
 namespace {
 
+using assimp::obj_corner;
 using assimp::obj_refusal;
 using assimp::obj_statement;
 
@@ -27,7 +30,7 @@ std::span<const std::byte> bytes_of(const T& value) {
 // Faces to triangles, in order; polygons many at a time.
 class face_cutter {
 public:
-    using taker = std::function<void(std::uint32_t run, const glm::uvec3& vertices)>;
+    using taker = std::function<void(std::uint32_t run, const obj_corner& a, const obj_corner& b, const obj_corner& c)>;
 
     face_cutter(position_cache& positions, scratch_bytes& vertices, taker take)
         : positions_(positions), vertices_(vertices), take_(std::move(take)) {}
@@ -46,7 +49,7 @@ public:
             if (f.num_corners > 3) {
                 sizes.push_back(f.num_corners);
                 for (std::size_t i = 0; i < f.num_corners; ++i)
-                    places.push_back(positions_.at(corners[at + i], vertices_));
+                    places.push_back(positions_.at(corners[at + i].vertex, vertices_));
             }
             at += f.num_corners;
         }
@@ -54,16 +57,16 @@ public:
         std::size_t next = 0, place = 0;
         at = 0;
         for (const face& f : faces_) {
-            const std::uint32_t* const own = corners.data() + at;
+            const obj_corner* const own = corners.data() + at;
             at += f.num_corners;
             if (f.num_corners == 3) {
-                take_(f.run, {own[0], own[1], own[2]});
+                take_(f.run, own[0], own[1], own[2]);
                 continue;
             }
             for (; next < triangles.size() && triangles[next].x - place < f.num_corners; ++next) {
                 glm::uvec3 t = triangles[next] - static_cast<std::uint32_t>(place);
                 if (t.y >= f.num_corners || t.z >= f.num_corners) fail();
-                take_(f.run, {own[t.x], own[t.y], own[t.z]});
+                take_(f.run, own[t.x], own[t.y], own[t.z]);
             }
             place += f.num_corners;
         }
@@ -72,7 +75,7 @@ public:
         corners.clear();
     }
 
-    std::vector<std::uint32_t> corners; // of the faces that wait
+    std::vector<obj_corner> corners; // of the faces that wait
 
 private:
     struct face {
@@ -125,26 +128,28 @@ face_counts count_faces(const std::filesystem::path& path) {
 } // namespace
 
 obj_file::obj_file(const std::filesystem::path& path, std::uint64_t room, const std::filesystem::path& folder,
-                   const gltf_options& options)
-    : vertices_(folder), triangles_(folder) {
-    read_vertices(path, room, options);
-    read_faces(path);
+                   const gltf_limits& limits, const gltf_options& options)
+    : path_(path), limits_(limits), options_(options), vertices_(folder), texcoords_(folder), triangles_(folder) {
+    assimp::obj_outline outline;
+    const bool has_colors = read_vertices(outline);
+    read_outline(outline);
+    make_caches(room, has_colors);
+    read_faces();
     number_parts();
 }
 
-void obj_file::read_vertices(const std::filesystem::path& path, std::uint64_t room, const gltf_options& options) {
-    assimp::obj_outline outline;
+bool obj_file::read_vertices(assimp::obj_outline& outline) {
     bool is_within_run = false, has_colors = false;
-    assimp::for_each_obj_line(path, [&](std::string_view line) {
-        switch (assimp::statement_of(line)) {
+    assimp::for_each_obj_line(path_, [&](std::string_view line) {
+        const obj_statement statement = assimp::statement_of(line);
+        switch (statement) {
         case obj_statement::vertex: {
             const assimp::obj_vertex v = assimp::vertex_of(line);
-            if (num_vertices_ == 0) has_colors = v.has_color;
+            if (counts_.vertices == 0) has_colors = v.has_color;
             if (has_colors != v.has_color) throw obj_refusal("some vertices have colours, and some have none");
-            if (++num_vertices_ > static_cast<std::uint64_t>(std::numeric_limits<std::int32_t>::max()))
-                throw obj_refusal("there are more vertices than indices can name");
             vertices_.append(bytes_of(v.position));
-            if (has_colors && options.colors) vertices_.append(bytes_of(v.color));
+            if (!is_finite(v.position)) ++num_not_finite_;
+            if (has_colors && options_.colors) vertices_.append(bytes_of(v.color));
             break;
         }
         case obj_statement::face:
@@ -154,67 +159,94 @@ void obj_file::read_vertices(const std::filesystem::path& path, std::uint64_t ro
             is_within_run = false;
             outline.add_structure(line);
             break;
+        case obj_statement::texcoord:
+        case obj_statement::normal:
         case obj_statement::nothing:
             break;
         }
+        counts_.add(statement);
+        if (std::max(counts_.vertices, counts_.texcoords) > std::uint64_t{std::numeric_limits<std::int32_t>::max()})
+            throw obj_refusal("there are more vertices than indices can name");
     });
-    const bool keeps_colors = has_colors && options.colors;
-    position_layout layout;
-    layout.count = num_vertices_;
-    layout.stride = keeps_colors ? 2 * sizeof(glm::vec3) : sizeof(glm::vec3);
-    for (std::size_t a = 0; a < 3; ++a) layout.place[a] = a * sizeof(float);
-    positions_.emplace(layout, keeps_colors ? room / 2 : room);
-    if (keeps_colors) {
-        color_layout of_colors;
-        of_colors.count = num_vertices_;
-        of_colors.stride = layout.stride;
-        of_colors.is_encoded = true;
-        for (std::size_t c = 0; c < 3; ++c) of_colors.place[c] = sizeof(glm::vec3) + c * sizeof(float);
-        colors_.emplace(of_colors, room / 2);
-    }
     runs_.resize(outline.num_runs());
     if (runs_.empty()) throw obj_refusal("vertices without faces are points, which are not streamed");
+    return has_colors;
+}
 
-    assimp::obj_outline::parts found = outline.read(path);
+void obj_file::read_outline(const assimp::obj_outline& outline) {
+    assimp::obj_outline::parts found = outline.read(path_);
     materials_ = std::move(found.source.materials);
     warnings_ = std::move(found.source.warnings);
+    named_.textures = std::move(found.source.textures);
+    asks_for_texture_.resize(materials_.size());
     for (const instance& one : found.source.instances) {
         const primitive& part = found.source.primitives[one.primitive];
         if (found.runs[one.primitive].empty()) continue;
-        const assimp::texture_source& texture = found.source.textures[part.material];
-        const bool shows_it =
-            options.colors || (options.blend_cuts && materials_[part.material].alpha == alpha_mode::blend);
-        if (texture.is_there() && shows_it)
-            throw obj_refusal("textures are not streamed, and colours of " + gltf::in_quotes(texture.path) +
-                              " are asked for");
+        asks_for_texture_[part.material] =
+            assimp::asks_for_texture(materials_[part.material], named_.textures[part.material], options_);
         parts_.push_back({part.name, one.to_world, part.material, 0, 0});
         runs_of_.push_back(found.runs[one.primitive]);
     }
 }
 
-void obj_file::read_faces(const std::filesystem::path& path) {
-    std::uint64_t before = 0, num_triangles = 0;
+void obj_file::make_caches(std::uint64_t room, bool has_colors) {
+    const bool keeps_colors = has_colors && options_.colors;
+    const bool keeps_texcoords =
+        std::find(asks_for_texture_.begin(), asks_for_texture_.end(), true) != asks_for_texture_.end();
+    room /= 1 + (keeps_colors ? 1 : 0) + (keeps_texcoords ? 1 : 0);
+    position_layout layout;
+    layout.count = counts_.vertices;
+    layout.stride = keeps_colors ? 2 * sizeof(glm::vec3) : sizeof(glm::vec3);
+    for (std::size_t a = 0; a < 3; ++a) layout.place[a] = a * sizeof(float);
+    positions_.emplace(layout, room);
+    if (keeps_colors) {
+        color_layout of_colors;
+        of_colors.count = counts_.vertices;
+        of_colors.stride = layout.stride;
+        of_colors.is_encoded = true;
+        for (std::size_t c = 0; c < 3; ++c) of_colors.place[c] = sizeof(glm::vec3) + c * sizeof(float);
+        colors_.emplace(of_colors, room);
+    }
+    if (keeps_texcoords) {
+        texcoord_layout of_texcoords;
+        of_texcoords.count = counts_.texcoords;
+        of_texcoords.stride = sizeof(glm::vec2);
+        texcoord_cache_.emplace(of_texcoords, room);
+    }
+}
+
+void obj_file::read_faces() {
+    assimp::obj_counts before;
+    std::uint64_t num_triangles = 0;
+    const bool are_finite = std::exchange(num_not_finite_, 0) == 0;
     std::uint32_t num_runs = 0;
     bool is_within_run = false;
-    face_cutter faces(*positions_, vertices_, [&](std::uint32_t number, const glm::uvec3& vertices) {
+    face_cutter faces(*positions_, vertices_, [&](std::uint32_t number, const auto& a, const auto& b, const auto& c) {
         run& of_face = runs_[number];
         if (of_face.num_triangles++ == 0) of_face.first = num_triangles;
         ++num_triangles;
-        triangles_.append(bytes_of(vertices));
+        triangles_.append(bytes_of(glm::uvec3(a.vertex, b.vertex, c.vertex)));
+        if (texcoord_cache_) triangles_.append(bytes_of(glm::uvec3(a.texcoord, b.texcoord, c.texcoord)));
     });
-    assimp::for_each_obj_line(path, [&](std::string_view line) {
-        switch (assimp::statement_of(line)) {
-        case obj_statement::vertex:
-            ++before;
+    assimp::for_each_obj_line(path_, [&](std::string_view line) {
+        const obj_statement statement = assimp::statement_of(line);
+        switch (statement) {
+        case obj_statement::texcoord:
+            if (texcoord_cache_) texcoords_.append(bytes_of(assimp::texcoord_of(line)));
             break;
         case obj_statement::face: {
             if (!std::exchange(is_within_run, true)) ++num_runs;
-            if (before > num_vertices_ || num_runs > runs_.size())
+            if (before.vertices > counts_.vertices || before.texcoords > counts_.texcoords || num_runs > runs_.size())
                 throw model_error("the file changes while it is read");
             const std::size_t first = faces.corners.size();
             assimp::add_face(line, before, faces.corners);
-            for (std::size_t i = first; i < faces.corners.size(); ++i)
-                if (faces.corners[i] >= num_vertices_) throw model_error("an index is out of range");
+            std::uint32_t& texcoords_end = runs_[num_runs - 1].texcoords_end;
+            for (std::size_t i = first; i < faces.corners.size(); ++i) {
+                const obj_corner& corner = faces.corners[i];
+                if (corner.vertex >= counts_.vertices) throw model_error("an index is out of range");
+                if (!are_finite && !is_finite(positions_->at(corner.vertex, vertices_))) ++num_not_finite_;
+                if (corner.texcoord != obj_corner::none) texcoords_end = std::max(texcoords_end, corner.texcoord + 1);
+            }
             num_corners_ += faces.corners.size() - first;
             ++num_faces_;
             faces.add(num_runs - 1, faces.corners.size() - first);
@@ -223,9 +255,12 @@ void obj_file::read_faces(const std::filesystem::path& path) {
         case obj_statement::structure:
             is_within_run = false;
             break;
+        case obj_statement::vertex:
+        case obj_statement::normal:
         case obj_statement::nothing:
             break;
         }
+        before.add(statement);
     });
     faces.cut();
 }
@@ -236,7 +271,14 @@ void obj_file::number_parts() {
     std::uint64_t first = 0;
     for (std::size_t p = 0; p < parts_.size(); ++p) {
         parts_[p].first_number = first;
-        for (const std::uint32_t r : runs_of_[p]) parts_[p].num_triangles += runs_[r].num_triangles;
+        // As assimp has it: one index out of range, and none of the part's faces has texture coordinates.
+        std::uint32_t texcoords_end = 0;
+        for (const std::uint32_t r : runs_of_[p]) {
+            parts_[p].num_triangles += runs_[r].num_triangles;
+            texcoords_end = std::max(texcoords_end, runs_[r].texcoords_end);
+        }
+        parts_[p].has_texcoords =
+            asks_for_texture_[parts_[p].material] && texcoords_end != 0 && texcoords_end <= counts_.texcoords;
         first += parts_[p].num_triangles;
         // Its vertices would be points.
         if (parts_[p].num_triangles == 0)
@@ -246,42 +288,67 @@ void obj_file::number_parts() {
 
 void obj_file::read_part(std::size_t part, const visitor& visit) {
     constexpr std::uint64_t block = 16384; // triangles
-    std::vector<glm::uvec3> indices;
+    const std::uint64_t triangle_bytes = (texcoord_cache_ ? 2 : 1) * sizeof(glm::uvec3);
+    std::vector<glm::uvec3> indices; // of a triangle's vertices, and then of its texture coordinates
     std::vector<glm::vec3> corners;
     std::vector<glm::vec4> colors;
+    std::vector<glm::vec2> texcoords;
     std::uint64_t number = parts_[part].first_number;
     for (const std::uint32_t r : runs_of_[part])
         for (std::uint64_t done = 0; done < runs_[r].num_triangles;) {
-            indices.resize(static_cast<std::size_t>(std::min(block, runs_[r].num_triangles - done)));
-            triangles_.read((runs_[r].first + done) * sizeof(glm::uvec3),
+            const std::uint64_t count = std::min(block, runs_[r].num_triangles - done);
+            indices.resize(static_cast<std::size_t>(count * triangle_bytes / sizeof(glm::uvec3)));
+            triangles_.read((runs_[r].first + done) * triangle_bytes,
                             {reinterpret_cast<char*>(indices.data()), indices.size() * sizeof(glm::uvec3)});
             corners.clear();
             colors.clear();
-            for (const glm::uvec3& t : indices)
-                for (const std::uint32_t v : {t.x, t.y, t.z}) {
+            texcoords.clear();
+            for (std::size_t i = 0; i < indices.size(); ++i) {
+                const bool is_of_texcoords = texcoord_cache_ && i % 2 == 1;
+                for (const std::uint32_t v : {indices[i].x, indices[i].y, indices[i].z}) {
+                    if (is_of_texcoords) {
+                        if (parts_[part].has_texcoords)
+                            texcoords.push_back(v == obj_corner::none ? assimp::no_texcoord_value
+                                                                      : texcoord_cache_->at(v, texcoords_));
+                        continue;
+                    }
                     corners.push_back(positions_->at(v, vertices_));
                     if (colors_) colors.push_back(colors_->at(v, vertices_));
                 }
-            visit({part, number, corners, colors});
-            done += indices.size();
-            number += indices.size();
+            }
+            visit({part, number, corners, colors, texcoords});
+            done += count;
+            number += count;
         }
 }
 
-opened_stream open_obj(const std::filesystem::path& path, std::uint64_t room, const std::filesystem::path& folder,
-                       const gltf_options& options) {
+void obj_file::read_textures(const picture_hook& take) {
+    gltf::budget memory{limits_};
+    scene shown;
+    shown.materials = materials_;
+    assimp::load_pictures(named_, asks_for_texture_, gltf::folder_reader(path_.parent_path()), memory, shown,
+                          {{}, take});
+    materials_ = std::move(shown.materials);
+    textures_ = std::move(shown.textures);
+    images_ = std::move(shown.images);
+    warnings_.insert(warnings_.end(), shown.warnings.begin(), shown.warnings.end());
+    for (part& one : parts_)
+        one.has_texcoords = one.has_texcoords && materials_[one.material].texture != material::no_texture;
+}
+
+opened_stream open_obj(const std::filesystem::path& path, const stream_room& room, const std::filesystem::path& folder,
+                       const gltf_limits& limits, const gltf_options& options) {
     // A triangle takes eight bytes of text at least; a polygon more for the same need. What fits so is not read.
     constexpr double most_by_byte = 46;
-    const auto room_now = [] { return static_cast<double>(memory::room()); };
     std::error_code error;
     if (options.animation || !std::filesystem::is_regular_file(path, error)) return {};
     const auto bytes = static_cast<double>(std::filesystem::file_size(path, error));
-    if (error || most_by_byte * bytes <= room_now()) return {};
+    if (error || most_by_byte * bytes <= room.loaded) return {};
     const face_counts count = count_faces(path);
-    if (count.likely_bytes() <= room_now()) return {};
+    if (count.likely_bytes() <= room.loaded) return {};
     opened_stream opened;
     try {
-        opened.stream = std::make_unique<obj_file>(path, room, folder, options);
+        opened.stream = std::make_unique<obj_file>(path, room.stream, folder, limits, options);
     } catch (const obj_refusal& refusal) {
         opened.refusal = std::string("it cannot be streamed: ") + refusal.what();
         opened.need = count.likely_bytes();

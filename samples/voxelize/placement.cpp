@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "placement.hpp"
 
+#include "finite.hpp"
 #include "parallel.hpp"
 
 #include <voxelpipe/core/fixed_point.hpp>
@@ -18,10 +19,8 @@ namespace voxelize {
 
 namespace {
 
-bool is_finite(const glm::vec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
-
-// How much larger than the model a grid of --resolution is along its longest side, at either end: surfaces that lie in
-// the faces of the bounding box stay off the grid's border.
+// A grid of --resolution is larger than the model by this part of its longest side, at either end: surfaces that lie
+// in the faces of the bounding box stay off the grid's border.
 constexpr double margin = 1e-4;
 
 [[noreturn]] void too_many_voxels(double count, int axis) {

@@ -25,7 +25,7 @@ public:
     [[nodiscard]] static std::unique_ptr<ply_file> open(const std::filesystem::path& path, std::uint64_t room,
                                                         bool colors);
 
-    // What the header says.
+    // The header's content.
     struct layout {
         position_layout vertices;
         std::optional<color_layout> colors;
@@ -41,6 +41,10 @@ public:
     void read_part(std::size_t part, const visitor& visit) override;
 
 private:
+    [[nodiscard]] std::optional<std::uint64_t> count_not_finite() override {
+        return voxelize::count_not_finite(header_.vertices, file_);
+    }
+
     layout header_;
     model_bytes file_;
     position_cache vertices_;

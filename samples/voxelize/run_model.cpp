@@ -13,11 +13,13 @@
 #include "sparse/streamed_model.hpp"
 
 #include <cstdio>
+#include <exception>
 #include <iostream>
 #include <memory>
 #include <new>
 #include <optional>
 #include <system_error>
+#include <utility>
 
 namespace voxelize {
 namespace {
@@ -40,8 +42,19 @@ std::shared_ptr<cuda_start> start_cuda(const command_line& options) {
     return std::make_shared<cuda_start>();
 }
 
-// Writes one output. Formats that hold every channel get those that were asked for, which come first in the volume.
-std::vector<std::filesystem::path> write_output(volume& voxels, const command_line& options,
+std::vector<std::filesystem::path> write_to(const volume& voxels, const std::filesystem::path& output,
+                                            const write_options& how) {
+    return write(voxels, output, how);
+}
+std::vector<std::filesystem::path> write_to(const sparse_volume& voxels, const std::filesystem::path& output,
+                                            const write_options& how) {
+    return write_sparse(voxels, output, how);
+}
+
+// Writes one output of a dense or sparse volume. Formats that hold every channel get those that were asked for, which
+// come first in the volume; .nvdb takes the colours that --help promises too.
+template <class Volume>
+std::vector<std::filesystem::path> write_output(Volume& voxels, const command_line& options,
                                                 const std::filesystem::path& output, const write_options& how) {
     std::vector<channel> aside;
     if (const format* const f = find_format(output); f->all_channels && !f->only_sparse)
@@ -49,26 +62,12 @@ std::vector<std::filesystem::path> write_output(volume& voxels, const command_li
             aside.push_back(std::move(voxels.channels.back()));
             voxels.channels.pop_back();
         }
-    std::vector<std::filesystem::path> files = write(voxels, output, how);
+    std::vector<std::filesystem::path> files = write_to(voxels, output, how);
     for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
     return files;
 }
 
-// The same of a sparse volume; .nvdb takes the colours that --help promises too.
-std::vector<std::filesystem::path> write_output(sparse_volume& voxels, const command_line& options,
-                                                const std::filesystem::path& output, const write_options& how) {
-    std::vector<channel> aside;
-    if (const format* const f = find_format(output); f->all_channels && !f->only_sparse)
-        while (aside.size() < options.implied.size()) {
-            aside.push_back(std::move(voxels.channels.back()));
-            voxels.channels.pop_back();
-        }
-    std::vector<std::filesystem::path> files = write_sparse(voxels, output, how);
-    for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
-    return files;
-}
-
-// Where a file lies.
+// The folder of a file.
 std::filesystem::path folder_of(const std::filesystem::path& file) {
     return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
@@ -99,11 +98,18 @@ scene load_whole(const std::filesystem::path& file, const load_options& options,
     }
 }
 
+void warn_of_dropped(run_report& report) {
+    if (report.stats.triangles_dropped != 0)
+        report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
+                                  " triangles are dropped: a position is not finite, or too far from the grid");
+}
+
 // Draws and writes the slabs of this process.
 void run_slabs(const command_line& options, slab_source&& source, run_report& report) {
     report.is_sparse = true;
     const slab_outcome outcome = run_by_slabs(options, std::move(source), report);
     report.warnings.insert(report.warnings.end(), report.stats.warnings.begin(), report.stats.warnings.end());
+    warn_of_dropped(report);
     if (outcome.finished && report.stats.voxels == 0)
         report.warnings.push_back(why_empty(report.stats, report.request.coverage));
     if (options.quiet) return;
@@ -114,22 +120,24 @@ void run_slabs(const command_line& options, slab_source&& source, run_report& re
     std::cerr << '\n';
 }
 
-// Does the work; every failure is an exception.
-void run(const command_line& options, clock::time_point begin, run_report& report) {
+// Does the work, with the model as OPENED has it. helps_to_stream: true as long as a shortage of memory may be one that
+// a loaded model makes and a streamed one does not.
+void run(const command_line& options, clock::time_point begin, const opened_stream& opened, run_report& report,
+         bool& helps_to_stream) {
     report.input = options.input;
     report.request = options.voxelize;
     progress_bar bar{!options.quiet};
-    report.stats.milliseconds.emplace_back("options", milliseconds_since(begin));
 
     auto start = clock::now();
     report.request.cuda = start_cuda(options);
     load_options load = options.load;
     load.picture_hook = picture_reducer{options.grid, options.voxelize};
-    const opened_stream opened = streamed_input(options, folder_of(options.outputs.front()));
     triangle_stream* const stream = opened.stream.get();
+    helps_to_stream = !stream;
     triangle_stream::boxes boxes;
     if (stream) boxes = stream->bounds();
     scene model = stream ? outline_of(*stream, boxes) : load_whole(options.input, load, opened);
+    helps_to_stream = !stream && !model.images.empty();
     report.warnings = options.warnings;
     report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
     report.vertices = stream ? stream->num_vertices() : model.vertex_count();
@@ -155,7 +163,7 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     if (stream) {
         const std::size_t known = stream->warnings().size();
         read_textures(*stream, report.request.grid, report.request);
-        const std::vector<std::string> warnings = stream->warnings();
+        const std::vector<std::string>& warnings = stream->warnings();
         report.warnings.insert(report.warnings.end(), warnings.begin() + static_cast<std::ptrdiff_t>(known),
                                warnings.end());
     }
@@ -191,11 +199,10 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
         bricks = run_sparse_voxelizer(std::move(model), report.request, place.folder, report.stats);
     else
         voxels = run_voxelizer(std::move(model), report.request, report.stats);
+    helps_to_stream = false;
     const std::uint64_t num_bricks = bricks.keys.size(), brick_bytes = bricks.num_bytes();
     for (const std::string& warning : report.stats.warnings) report.warnings.push_back(warning);
-    if (report.stats.triangles_dropped != 0)
-        report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
-                                  " triangles are dropped: a position is not finite, or too far from the grid");
+    warn_of_dropped(report);
     if (report.stats.voxels == 0) report.warnings.push_back(why_empty(report.stats, report.request.coverage));
 
     start = clock::now();
@@ -223,6 +230,34 @@ void run(const command_line& options, clock::time_point begin, run_report& repor
     add_rest(report, milliseconds_since(begin));
 }
 
+// Every failure is an exception. Streams a model that does not fit otherwise. How much its pictures take is known only
+// once they are held: one that fits without them alone is loaded first.
+void run_either_way(const command_line& options, clock::time_point begin, run_report& report) {
+    const std::filesystem::path folder = folder_of(options.outputs.front());
+    const double options_ms = milliseconds_since(begin);
+    report.stats.milliseconds.emplace_back("options", options_ms);
+    opened_stream opened = streamed_input(options, folder, static_cast<double>(memory::room()));
+    bool helps_to_stream = true;
+    const auto keep_for_later = [&]() -> std::exception_ptr { // within a handler
+        if (!helps_to_stream || !opened.refusal.empty()) throw;
+        return std::current_exception();
+    };
+    std::exception_ptr shortage;
+    try {
+        run(options, begin, opened, report, helps_to_stream);
+    } catch (const memory_error&) {
+        shortage = keep_for_later();
+    } catch (const std::bad_alloc&) {
+        shortage = keep_for_later();
+    }
+    if (!shortage) return;
+    opened = streamed_input(options, folder, 0);
+    if (!opened.stream) std::rethrow_exception(shortage);
+    report = {};
+    report.stats.milliseconds.emplace_back("options", options_ms);
+    run(options, begin, opened, report, helps_to_stream);
+}
+
 } // namespace
 
 run_outcome run_model(const command_line& options, clock::time_point begin) {
@@ -232,7 +267,7 @@ run_outcome run_model(const command_line& options, clock::time_point begin) {
         result.error = why;
     };
     try {
-        run(options, begin, result.report);
+        run_either_way(options, begin, result.report);
     } catch (const model_error& error) {
         result.report.warnings = error.warnings;
         fail(exit_input, options.input.string() + ": " + error.what() +

@@ -3,6 +3,7 @@
 #include "triangle_stream.hpp"
 
 #include "assimp/file_name.hpp"
+#include "finite.hpp"
 #include "gltf_stream.hpp"
 #include "model_error.hpp"
 #include "obj_file.hpp"
@@ -10,7 +11,6 @@
 #include "stl_file.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace voxelize {
 
@@ -33,16 +33,23 @@ void triangle_stream::for_each_block(const visitor& visit) {
 triangle_stream::boxes triangle_stream::bounds() {
     boxes found;
     found.own.resize(parts_.size());
+    const std::optional<std::uint64_t> counted = count_not_finite();
+    std::uint64_t corners = 0; // that are not finite
     for_each_block([&](const block& b) {
         const affine& place = parts_[b.part].to_world;
         bounding_box& own = found.own[b.part];
         for (const glm::vec3& p : b.corners) {
-            if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) continue;
+            if (!is_finite(p)) {
+                ++corners;
+                continue;
+            }
             const glm::dvec3 placed = place(glm::dvec3(p));
             own.include({p, p, false});
             found.placed.include({placed, placed, false});
         }
     });
+    if (const std::uint64_t count = counted.value_or(corners); count != 0)
+        warnings_.push_back(std::to_string(count) + ' ' + not_finite);
     return found;
 }
 
@@ -51,15 +58,16 @@ void triangle_stream::add_only_part(const std::filesystem::path& file, std::uint
     if (num_triangles != 0) parts_.push_back({file.filename().string(), {}, 0, 0, num_triangles});
 }
 
-opened_stream open_stream(const std::filesystem::path& file, std::uint64_t room, const std::filesystem::path& folder,
-                          const load_options& options) {
+opened_stream open_stream(const std::filesystem::path& file, const stream_room& room,
+                          const std::filesystem::path& folder, const load_options& options) {
     const std::string extension = assimp::lower_extension(file);
     opened_stream opened;
     if (extension == ".stl") opened.stream = stl_file::open(file, options.gltf.colors);
-    if (extension == ".ply") opened.stream = ply_file::open(file, room, options.gltf.colors);
-    if (extension == ".obj") opened = open_obj(file, room, folder, options.gltf);
+    if (extension == ".ply") opened.stream = ply_file::open(file, room.stream, options.gltf.colors);
+    if (extension == ".obj") opened = open_obj(file, room, folder, options.limits, options.gltf);
     if (extension == ".glb" || extension == ".gltf")
         opened.stream = gltf_stream::open(file, room, options.limits, options.gltf);
+    if (opened.stream && opened.stream->held_bytes() <= room.loaded) opened.stream = nullptr;
     if (opened.stream) opened.stream->scale_lengths(options.scale);
     return opened;
 }

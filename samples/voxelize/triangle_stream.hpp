@@ -17,6 +17,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,8 +26,8 @@ namespace voxelize {
 
 class triangle_stream {
 public:
-    // What one instance of a primitive is in a scene: triangles with one transform and one material, numbered one after
-    // the other.
+    // Triangles with one transform and one material, numbered one after the other: an instance of a primitive in a
+    // scene.
     struct part {
         std::string name;
         affine to_world;
@@ -70,8 +71,9 @@ public:
     virtual void read_textures(const picture_hook&) {}
     // True if any vertex has a colour of its own.
     [[nodiscard]] virtual bool has_colors() const { return false; }
-    // What was left out or put right; one line each.
-    [[nodiscard]] virtual std::vector<std::string> warnings() const { return {}; }
+    // Messages about what was left out or put right, one line each; those of bounds() and read_textures() follow their
+    // calls. They are the loader's, in its order.
+    [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
     // Calls visit with the triangles of a part in order, some thousands at a time. Throws model_error where the file is
     // damaged.
     virtual void read_part(std::size_t part, const visitor& visit) = 0;
@@ -88,6 +90,8 @@ public:
     [[nodiscard]] boxes bounds();
 
 protected:
+    // The number of vertices that are not finite, as the loader counts them. Nothing: all corners are looked at.
+    [[nodiscard]] virtual std::optional<std::uint64_t> count_not_finite() { return std::nullopt; }
     // One part, with the material that a scene has without any.
     void add_only_part(const std::filesystem::path& file, std::uint64_t num_triangles);
 
@@ -95,6 +99,7 @@ protected:
     std::vector<material> materials_;
     std::vector<texture> textures_;
     std::vector<picture> images_;
+    std::vector<std::string> warnings_;
 };
 
 // A model that may not fit into memory.
@@ -104,9 +109,16 @@ struct opened_stream {
     double need = 0;                         // bytes that it is likely to take when it is loaded, with a refusal
 };
 
+// Bytes that the model may take.
+struct stream_room {
+    std::uint64_t stream = 0; // read as a stream
+    double loaded = 0;        // held as a whole, with all that a run takes for that
+};
+
 // The file as a stream, where it is of a kind that can be read so (stl_file.hpp, ply_file.hpp, gltf_stream.hpp,
-// obj_file.hpp). room: bytes that the stream may hold. folder: for temporary files, of OBJ. Throws as open_obj() does.
-[[nodiscard]] opened_stream open_stream(const std::filesystem::path& file, std::uint64_t room,
+// obj_file.hpp) and is not likely to fit when it is loaded. folder: for temporary files, of OBJ. Throws as open_obj()
+// does.
+[[nodiscard]] opened_stream open_stream(const std::filesystem::path& file, const stream_room& room,
                                         const std::filesystem::path& folder, const load_options& options);
 
 } // namespace voxelize

@@ -4,6 +4,7 @@
 // Positions, colours and texture coordinates that stay in their file: blocks of them are read where they are asked for,
 // and some blocks are kept. A mesh whose faces name vertices that lie near each other in the file is read about once.
 
+#include "finite.hpp"
 #include "model_error.hpp"
 #include "texture_transform.hpp"
 
@@ -21,7 +22,7 @@
 
 namespace voxelize {
 
-// Where positions lie in a file.
+// The layout of positions in a file.
 struct position_layout {
     using value_type = glm::vec3;
 
@@ -36,10 +37,10 @@ struct position_layout {
     [[nodiscard]] glm::vec3 value(const char* vertex) const;
 };
 
-// Of an attribute; unsigned integers are fractions of their greatest.
+// The type of an attribute's components; unsigned integers are fractions of their greatest.
 enum class vertex_component : std::uint8_t { float32, byte, word };
 
-// Where vertex colours lie in a file.
+// The layout of vertex colours in a file.
 struct color_layout {
     using value_type = glm::vec4; // linear light and alpha
 
@@ -54,7 +55,7 @@ struct color_layout {
     [[nodiscard]] glm::vec4 value(const char* vertex) const;
 };
 
-// Where texture coordinates lie in a file.
+// The layout of texture coordinates in a file.
 struct texcoord_layout {
     using value_type = glm::vec2; // transformed
 
@@ -124,6 +125,15 @@ private:
     std::vector<block> blocks_; // block b at b % size
     std::vector<char> raw_;
 };
+
+// The number of a layout's positions that are not finite. Reads them all, in order. Throws as vertex_cache::at() does.
+template <class File>
+[[nodiscard]] std::uint64_t count_not_finite(const position_layout& layout, File& file) {
+    vertex_cache<position_layout> positions(layout, 0);
+    std::uint64_t count = 0;
+    for (std::uint64_t v = 0; v < layout.count; ++v) count += is_finite(positions.at(v, file)) ? 0 : 1;
+    return count;
+}
 
 using position_cache = vertex_cache<position_layout>;
 using color_cache = vertex_cache<color_layout>;

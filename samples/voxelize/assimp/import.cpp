@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "import.hpp"
 
+#include "../finite.hpp"
 #include "../gltf/text.hpp"
 #include "file_name.hpp"
 #include "linear_color.hpp"
@@ -82,7 +83,7 @@ public:
         if (mode != nullptr && std::strpbrk(mode, "wa+") != nullptr) return nullptr;
         const auto found = find(file);
         if (!found) return nullptr;
-        // Of an OBJ of more than 16 MiB assimp drops a last line that has no end.
+        // assimp drops the last line of an OBJ of more than 16 MiB if it has no end.
         const bool lacks_end = !found->empty() && found->back() != std::byte{'\n'};
         return new memory_stream(*found, file == name_ && lower_extension(name_) == ".obj" && lacks_end);
     }
@@ -215,7 +216,7 @@ primitive read_mesh(const aiMesh& source, std::size_t index, const model& result
     if (source.mNumFaces == 0)
         for (unsigned i = 0; i < source.mNumVertices; ++i) part.lines.emplace_back(i, i);
     for (const glm::vec3& p : part.positions)
-        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) ++without.unusable;
+        if (!is_finite(p)) ++without.unusable;
     if (source.HasBones()) ++without.bent;
     if (result.textures[part.material].is_there() && source.HasTextureCoords(0)) {
         part.texcoords.reserve(source.mNumVertices);
@@ -330,7 +331,7 @@ model read_model(std::span<const std::byte> bytes, const std::string& name, cons
         if (count != 0) result.warnings.push_back(std::to_string(count) + ' ' + what);
     };
     warn(without.bent, "mesh(es) with bones are shown as they were bound");
-    warn(without.unusable, "vertices at positions that are not finite: their triangles will be dropped");
+    warn(without.unusable, not_finite);
     warn(without.no_place, "mesh(es) with a transform that is not finite are left out");
     return result;
 }

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -22,10 +23,10 @@ constexpr auto most_vertices = static_cast<std::uint64_t>(std::numeric_limits<st
 bool is_blank(char c) { return c == ' ' || c == '\t'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-// What assimp's conversion throws.
+// The exception that assimp's conversion throws.
 struct bad_number : obj_refusal {
     template <class... Text>
-    explicit bad_number(Text&&...) : obj_refusal("a vertex has what is no number") {}
+    explicit bad_number(Text&&...) : obj_refusal("what is no number") {}
 };
 
 const char* skip_blanks(const char* at, const char* end) {
@@ -46,6 +47,23 @@ std::int64_t read_index(const char*& at, const char* end) {
     }
     if (at == first) throw obj_refusal("a face has what is no index");
     return is_negative ? -value : value;
+}
+
+// The numbers that follow the key of WHOSE line; how many there are.
+template <std::size_t N>
+std::size_t read_numbers(std::string_view text, const char* whose, std::array<ai_real, N>& numbers) {
+    std::size_t count = 0;
+    const char* const end = text.data() + text.size();
+    try {
+        for (const char* at = skip_blanks(text.data(), end); at != end; at = skip_blanks(at, end)) {
+            if (count == N || (!is_digit(*at) && *at != '-' && *at != '+')) throw bad_number();
+            at = Assimp::fast_atoreal_move<ai_real, bad_number>(at, numbers[count++]);
+            if (at != end && !is_blank(*at)) throw bad_number();
+        }
+    } catch (const bad_number& what) {
+        throw obj_refusal(std::string(whose) + " has " + what.what());
+    }
+    return count;
 }
 
 } // namespace
@@ -96,8 +114,9 @@ obj_statement statement_of(std::string_view line) {
     const std::string_view key = line.substr(0, line.find_first_of(" \t"));
     if (key == "v") return obj_statement::vertex;
     if (key == "f") return obj_statement::face;
-    for (const char* const passed_over : {"vt", "vn", "s", "mg"})
-        if (key == passed_over) return obj_statement::nothing;
+    if (key == "vt") return obj_statement::texcoord;
+    if (key == "vn") return obj_statement::normal;
+    if (key == "s" || key == "mg") return obj_statement::nothing;
     for (const char* const structure : {"g", "o", "usemtl", "mtllib"})
         if (key == structure) return obj_statement::structure;
     if (key == "l" || key == "p") throw obj_refusal("lines and points are not streamed");
@@ -106,13 +125,7 @@ obj_statement statement_of(std::string_view line) {
 
 obj_vertex vertex_of(std::string_view line) {
     std::array<ai_real, 6> n{};
-    std::size_t count = 0;
-    const char* const end = line.data() + line.size();
-    for (const char* at = skip_blanks(line.data() + 1, end); at != end; at = skip_blanks(at, end)) {
-        if (count == n.size() || (!is_digit(*at) && *at != '-' && *at != '+')) throw bad_number();
-        at = Assimp::fast_atoreal_move<ai_real, bad_number>(at, n[count++]);
-        if (at != end && !is_blank(*at)) throw bad_number();
-    }
+    const std::size_t count = read_numbers(line.substr(1), "a vertex", n);
     obj_vertex v;
     if (count == 4) {
         if (n[3] == 0) throw obj_refusal("a vertex has the weight 0");
@@ -127,19 +140,42 @@ obj_vertex vertex_of(std::string_view line) {
     return v;
 }
 
-void add_face(std::string_view line, std::uint64_t before, std::vector<std::uint32_t>& corners) {
+glm::vec2 texcoord_of(std::string_view line) {
+    std::array<ai_real, 3> n{};
+    if (const std::size_t count = read_numbers(line.substr(2), "a texture coordinate", n); count < 2)
+        throw obj_refusal("a texture coordinate has " + std::to_string(count) + " numbers");
+    for (ai_real& value : n)
+        if (!std::isfinite(value)) value = 0;
+    return {n[0], 1 - n[1]};
+}
+
+void add_face(std::string_view line, const obj_counts& before, std::vector<obj_corner>& corners) {
     const std::size_t first = corners.size();
+    // assimp takes an index behind one slash for that of a normal where the file has normals and no coordinates so far.
+    const bool has_normals_alone = before.texcoords == 0 && before.normals != 0;
     const char* const end = line.data() + line.size();
+    std::size_t num_texcoords = 0;
     for (const char* at = skip_blanks(line.data() + 1, end); at != end; at = skip_blanks(at, end)) {
         std::int64_t index = read_index(at, end);
-        for (int other = 0; other < 2 && at != end && *at == '/'; ++other) { // of a texture coordinate and a normal
+        index = index > 0 ? index - 1 : static_cast<std::int64_t>(before.vertices) + index;
+        if (index < 0) throw model_error("an index is out of range");
+        corners.push_back({static_cast<std::uint32_t>(index)});
+        bool has_texcoord = false;
+        for (int other = 0; other < 2 && at != end && *at == '/'; ++other) {
             ++at;
-            if (at != end && *at != '/' && !is_blank(*at)) (void)read_index(at, end);
+            if (at == end || *at == '/' || is_blank(*at)) continue;
+            const std::int64_t value = read_index(at, end);
+            if (other == 1 && has_texcoord && has_normals_alone)
+                throw obj_refusal("a face names texture coordinates before the first");
+            if (other == 1) continue;
+            has_texcoord = true;
+            if (has_normals_alone) continue;
+            const std::int64_t number = value > 0 ? value - 1 : static_cast<std::int64_t>(before.texcoords) + value;
+            // In the order of the corners, from the first on, whichever of them name some.
+            corners[first + num_texcoords++].texcoord =
+                number < 0 ? obj_corner::out_of_range : static_cast<std::uint32_t>(number);
         }
         if (at != end && !is_blank(*at)) throw obj_refusal("a face has what is no index");
-        index = index > 0 ? index - 1 : static_cast<std::int64_t>(before) + index;
-        if (index < 0) throw model_error("an index is out of range");
-        corners.push_back(static_cast<std::uint32_t>(index));
     }
     if (corners.size() - first < 3) throw obj_refusal("a face has fewer than three corners");
 }

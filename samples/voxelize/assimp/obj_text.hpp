@@ -4,6 +4,7 @@
 // The lines of an OBJ file, read as assimp reads them: the same numbers from the same digits. Lines that it reads in a
 // way of its own (continued lines, odd line ends, free-form surfaces) are refused, never guessed at.
 
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
 #include <cstddef>
@@ -17,7 +18,7 @@
 
 namespace voxelize::assimp {
 
-// What keeps an OBJ file from being read block by block, in one line.
+// The reason why an OBJ file cannot be read block by block, in one line.
 struct obj_refusal : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
@@ -43,8 +44,10 @@ private:
 };
 
 enum class obj_statement : std::uint8_t {
-    nothing, // blank, a comment, or what changes no voxel: vt, vn, s, mg
+    nothing, // blank, a comment, or what changes no voxel: s, mg
     vertex,
+    texcoord,
+    normal,
     face,
     structure // g, o, usemtl, mtllib
 };
@@ -61,10 +64,34 @@ struct obj_vertex {
 // A line that states a vertex, of obj_lines. Throws obj_refusal unless it has 3, 4 (homogeneous) or 6 numbers.
 [[nodiscard]] obj_vertex vertex_of(std::string_view line);
 
-// Appends the vertices of a line that states a face, numbered from 0; `before` of them stand before the line. Throws
-// obj_refusal where it has fewer than three corners or is no list of indices, and model_error for one before the first
-// vertex. Indices behind the last are the caller's to find.
-void add_face(std::string_view line, std::uint64_t before, std::vector<std::uint32_t>& corners);
+// A line that states texture coordinates; v runs downwards, as in texture. A value that is not finite is 0, a third one
+// is passed over. Throws obj_refusal unless it has 2 or 3 numbers.
+[[nodiscard]] glm::vec2 texcoord_of(std::string_view line);
+// Those of corners that name none.
+inline constexpr glm::vec2 no_texcoord_value{0, 1};
+
+// Lines of each kind that stand before another line.
+struct obj_counts {
+    std::uint64_t vertices = 0, texcoords = 0, normals = 0;
+
+    void add(obj_statement statement) {
+        if (statement == obj_statement::vertex) ++vertices;
+        if (statement == obj_statement::texcoord) ++texcoords;
+        if (statement == obj_statement::normal) ++normals;
+    }
+};
+
+// Both are numbered from 0.
+struct obj_corner {
+    static constexpr std::uint32_t none = UINT32_MAX;             // no texture coordinates
+    static constexpr std::uint32_t out_of_range = UINT32_MAX - 1; // some before the first
+
+    std::uint32_t vertex = 0, texcoord = none;
+};
+
+// Appends the corners of a line that states a face. Throws obj_refusal where it has fewer than three corners or is no
+// list of indices, and model_error for a vertex before the first. Indices behind the last are the caller's to find.
+void add_face(std::string_view line, const obj_counts& before, std::vector<obj_corner>& corners);
 
 // Calls visit(line) with all lines. An obj_refusal tells the line.
 template <class Visit>

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "primitives.hpp"
 
+#include "../finite.hpp"
 #include "text.hpp"
 
 #include <algorithm>
@@ -136,8 +137,7 @@ primitive_reader::read_part primitive_reader::read(const shown_mesh& shown, std:
             ++counted_["primitive(s) have indices left over that make no line"];
         memory_.charge(line_count(source.mode, count), sizeof(glm::uvec2), where);
     } else {
-        if (source.mode == TINYGLTF_MODE_TRIANGLES ? count % 3 != 0 : count < 3)
-            ++counted_["primitive(s) have indices left over that make no triangle"];
+        if (source.mode == TINYGLTF_MODE_TRIANGLES ? count % 3 != 0 : count < 3) ++counted_[with_rest];
         memory_.charge(triangle_count(source.mode, count), sizeof(glm::uvec3), where);
     }
 
@@ -258,11 +258,10 @@ primitive_reader::read_part primitive_reader::read_posed(primitive& result, cons
     result.positions.reserve(accessor.count);
     for (std::size_t i = 0; i < accessor.count; ++i) {
         const glm::vec3 p(at(i) - origin);
-        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) ++unusable;
+        if (!is_finite(p)) ++unusable;
         result.positions.push_back(p);
     }
-    if (unusable != 0)
-        counted_["vertices at positions that are not finite: their triangles will be dropped"] += unusable;
+    if (unusable != 0) counted_[not_finite] += unusable;
     return known;
 }
 
@@ -274,8 +273,7 @@ double primitive_reader::read_positions(primitive& result, const tinygltf::Primi
     memory_.charge(accessor.count, sizeof(glm::vec3), where);
     const budget::scope temporary{memory_};
     const auto warn_unusable = [&](std::uint64_t unusable) {
-        if (unusable != 0)
-            counted_["vertices at positions that are not finite: their triangles will be dropped"] += unusable;
+        if (unusable != 0) counted_[not_finite] += unusable;
     };
     if (const auto in_place = accessors_.in_place(index);
         in_place && accessor.componentType == TINYGLTF_COMPONENT_TYPE_FLOAT) {
@@ -286,7 +284,7 @@ double primitive_reader::read_positions(primitive& result, const tinygltf::Primi
             for (std::size_t i = begin; i < end; ++i) {
                 glm::vec3& p = result.positions[i];
                 std::memcpy(&p, in_place->first + i * in_place->stride, sizeof(p));
-                found += std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) ? 0 : 1;
+                found += is_finite(p) ? 0 : 1;
             }
             unusable += found;
         });
@@ -311,7 +309,7 @@ double primitive_reader::read_positions(primitive& result, const tinygltf::Primi
     for (std::size_t i = 0; i < accessor.count; ++i) {
         const glm::vec3 p(std::max(local[3 * i], least), std::max(local[3 * i + 1], least),
                           std::max(local[3 * i + 2], least));
-        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) ++unusable;
+        if (!is_finite(p)) ++unusable;
         result.positions.push_back(p);
     }
     warn_unusable(unusable);

@@ -40,8 +40,11 @@ namespace voxelize::gltf {
 [[nodiscard]] std::vector<glm::uvec2> unrolled_lines(int mode, const std::vector<std::uint32_t>& indices,
                                                      std::uint64_t count);
 
-// What messages call primitive PART of a mesh: the mesh's name, or where it stands in the file.
+// The name of primitive PART of a mesh in messages: the mesh's name, or where it stands in the file.
 [[nodiscard]] std::string name_of(const tinygltf::Model& model, std::size_t mesh, std::size_t part);
+
+// Ends the warning about primitives with one or two corners more than their triangles take.
+inline constexpr const char* with_rest = "primitive(s) have indices left over that make no triangle";
 
 // Ends the warning about primitives whose material has a texture and that have no coordinates for it.
 inline constexpr const char* without_texcoords =

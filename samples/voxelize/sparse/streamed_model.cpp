@@ -26,22 +26,16 @@
 
 namespace voxelize {
 
-opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder) {
+opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder, double loaded_room) {
     const voxelize_request& request = options.voxelize;
     const bool is_drawn_here = request.backend != backend_choice::cuda &&
                                request.strategy == voxelpipe::strategy::automatic &&
                                options.storage != storage_choice::dense;
-    const auto wants = [&](const auto& is_wanted) {
-        return std::any_of(request.targets.begin(), request.targets.end(), is_wanted);
-    };
     // Both see the whole grid at once.
-    const bool sees_whole_grid = wants([](target t) { return t == target::color_outer; }) ||
-                                 (request.solid && !request.solid->fill_color &&
-                                  wants([](target t) { return info_of(t).name.starts_with("color"); }));
+    const bool sees_whole_grid = request.wants(target::color_outer) ||
+                                 (request.solid && !request.solid->fill_color && request.wants_colors());
     if (!is_drawn_here || sees_whole_grid) return {};
-    opened_stream opened = open_stream(options.input, memory::room() / 8, folder, options.load);
-    if (opened.stream && opened.stream->held_bytes() <= static_cast<double>(memory::room())) return {};
-    return opened;
+    return open_stream(options.input, {memory::room() / 8, loaded_room}, folder, options.load);
 }
 
 void add_part(voxelize_stats& all, const voxelize_stats& part) {

@@ -22,12 +22,13 @@
 
 namespace voxelize {
 
-// The command's input as a stream, where it has to be one: a file that open_stream() knows and that takes more memory
-// than there is, for all targets but color-outer and for all solids, on the CPU. folder: for temporary
-// files. Throws as open_stream() does.
-[[nodiscard]] opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder);
+// The command's input as a stream, where it has to be one: a file that open_stream() knows and that takes more bytes
+// than LOADED_ROOM when it is loaded, for all targets but color-outer and for all solids, on the CPU. folder: for
+// temporary files. Throws as open_stream() does.
+[[nodiscard]] opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder,
+                                           double loaded_room);
 
-// What a streamed model is drawn with.
+// The surroundings in which a streamed model is drawn.
 struct stream_place {
     std::filesystem::path folder;                // for temporary files
     std::function<void(const std::string&)> say; // is told once in how many slabs the model is drawn

@@ -26,7 +26,7 @@ namespace voxelize {
 
 namespace slabs = voxelpipe::slabs;
 
-// What a vertex may have.
+// Attributes of a vertex beside its position.
 struct vertex_color {
     glm::vec4 color;
 };
@@ -102,7 +102,7 @@ private:
     vp::core::snap_transform snap_{};
 };
 
-// How many triangles of a part are in a slab.
+// The number of a part's triangles in a slab.
 struct part_count {
     std::size_t part;
     std::size_t triangles;
