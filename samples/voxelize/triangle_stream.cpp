@@ -5,6 +5,7 @@
 #include "assimp/file_name.hpp"
 #include "finite.hpp"
 #include "gltf_stream.hpp"
+#include "memory.hpp"
 #include "model_error.hpp"
 #include "obj_file.hpp"
 #include "ply_file.hpp"
@@ -67,7 +68,9 @@ opened_stream open_stream(const std::filesystem::path& file, const stream_room& 
     if (extension == ".obj") opened = open_obj(file, room, folder, options.limits, options.gltf);
     if (extension == ".glb" || extension == ".gltf")
         opened.stream = gltf_stream::open(file, room, options.limits, options.gltf);
-    if (opened.stream && opened.stream->held_bytes() <= room.loaded) opened.stream = nullptr;
+    // The open stream has taken some of the room.
+    const double left = std::min(room.loaded, static_cast<double>(memory::room()));
+    if (opened.stream && opened.stream->held_bytes() <= left) opened.stream = nullptr;
     if (opened.stream) opened.stream->scale_lengths(options.scale);
     return opened;
 }

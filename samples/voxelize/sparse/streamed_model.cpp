@@ -32,8 +32,8 @@ opened_stream streamed_input(const command_line& options, const std::filesystem:
                                request.strategy == voxelpipe::strategy::automatic &&
                                options.storage != storage_choice::dense;
     // Both see the whole grid at once.
-    const bool sees_whole_grid = request.wants(target::color_outer) ||
-                                 (request.solid && !request.solid->fill_color && request.wants_colors());
+    const bool sees_whole_grid =
+        request.wants(target::color_outer) || (request.solid && !request.solid->fill_color && request.wants_colors());
     if (!is_drawn_here || sees_whole_grid) return {};
     return open_stream(options.input, {memory::room() / 8, loaded_room}, folder, options.load);
 }

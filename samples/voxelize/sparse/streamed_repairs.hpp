@@ -43,7 +43,8 @@ public:
                    const std::function<void(double)>& progress);
     // Once all walls are there.
     void flood();
-    // The needs of a slab's call, valid until the next one is asked for; slabs come in order. part: of the request's grid.
+    // The needs of a slab's call, valid until the next one is asked for; slabs come in order. part: of the request's
+    // grid.
     [[nodiscard]] vp::solid_slab of(const voxelpipe::grid& part);
 
 private:
