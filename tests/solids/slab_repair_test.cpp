@@ -226,9 +226,11 @@ TEST(SlabVote, SlabsAreThoseOfOneCall) {
             slabs::column_parities columns(g, ranges);
             for (const glm::uvec3& t : m.triangles) columns.add(at[t.x], at[t.y], at[t.z]);
             for (std::size_t s = 0; s < ranges.size(); ++s) {
-                // The triangles that reach its layers.
+                // The triangles that reach its layers; those that cannot be drawn have no bounds.
                 mesh part = m;
                 std::erase_if(part.triangles, [&](const glm::uvec3& t) {
+                    for (int k = 0; k < 3; ++k)
+                        if (!vp::core::is_drawable(at[t[k]])) return true;
                     const vp::core::voxel_box box =
                         vp::core::bounds(at[t.x], at[t.y], at[t.z], vp::core::make_snap_transform(g).fraction);
                     return box.lo[2] >= ranges[s].end || box.hi[2] < ranges[s].begin;
