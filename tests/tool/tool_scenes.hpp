@@ -55,6 +55,14 @@ inline void add_sheet(builder& file, int side) {
     file.root["nodes"] = json::array();
 }
 
+// A sheet, and a triangle without indices, under a node that turns, mirrors and stretches them.
+inline void add_two_parts(builder& file, int side) {
+    add_sheet(file, side);
+    const int alone = file.accessor(std::vector<float>{0, 0, 0.1f, 1, 0, 0.2f, 0, 1, 0.3f}, "VEC3");
+    file.root["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", alone}}}});
+    file.append("nodes", {{"mesh", 0}, {"matrix", {0, 0, 2, 0, 1, 0, 0, 0, 0, -1.5, 0, 0, 7, 8, 9, 1}}});
+}
+
 // The surface of the cube from (0, 0, 0) to (1, 1, 1), 12 triangles that face outwards, moved and scaled by its node.
 inline void add_cube(builder& file, const std::vector<double>& translation, double scale, int material) {
     std::vector<float> positions;

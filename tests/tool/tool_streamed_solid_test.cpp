@@ -97,10 +97,7 @@ TEST(StreamedSolids, PartsOfGltf) {
     if (sanitized) return;
     const scratch_folder folder;
     builder file;
-    gltf_test::add_sheet(file, 580);
-    const int alone = file.accessor(std::vector<float>{0, 0, 0.1f, 1, 0, 0.2f, 0, 1, 0.3f}, "VEC3");
-    file.root["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", alone}}}});
-    file.append("nodes", {{"mesh", 0}, {"matrix", {0, 0, 2, 0, 1, 0, 0, 0, 0, -1.5, 0, 0, 7, 8, 9, 1}}});
+    gltf_test::add_two_parts(file, 580);
     file.write_glb(folder / "m.glb");
     two_ways{folder,
              folder / "m.glb",

@@ -131,7 +131,8 @@ sparse_volume draw_in_slabs(const scene& model, const voxelize_request& request,
         voxelize_stats of_part;
         parts.push_back(draw_sparse(copy, part, whole, of_part));
         // The first line is about the model's lines, if there is one; others are about the part alone.
-        if (parts.size() == 1 && model.line_count() != 0) stats.warnings.push_back(of_part.warnings.front());
+        if (parts.size() == 1 && model.line_count() != 0 && !of_part.warnings.empty())
+            stats.warnings.push_back(of_part.warnings.front());
         add_part(stats, of_part);
         stats.backend = of_part.backend;
         stats.threads = of_part.threads;

@@ -32,7 +32,7 @@ struct storage_decision {
 [[nodiscard]] sparse_volume draw_sparse(scene& model, const voxelize_request& inside, const voxelpipe::grid& whole,
                                         voxelize_stats& stats);
 
-// What a flood of --solid exterior stops at: all voxels that triangles touch in layers of the request's grid, whatever
+// The walls of a flood of --solid exterior: all voxels that triangles touch in layers of the request's grid, whatever
 // materials cut off. Consumes the scene. Throws std::bad_alloc.
 [[nodiscard]] sparse_volume draw_walls(scene&& model, const voxelize_request& request,
                                        const voxelpipe::slabs::layer_range& layers);
